@@ -1,0 +1,212 @@
+"""A gain schedule as the runtime uses it: L(p) from the stored table, and the plant it was proved for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.errors import EstimatorError, RangeError, ScheduleError
+from estimators.interpolate import FloatArray, PiecewiseLinear
+from estimators.schedule_check import SCHEMA, check_content
+from estimators.schedule_format import canonical, check_seal, read_content, sealed, write_content
+
+__all__ = [
+    "SCHEMA",
+    "GainSchedule",
+    "PlantMatrices",
+    "PlantPolynomial",
+    "SchedulingParameter",
+    "Signal",
+    "canonical",
+    "check_content",
+    "check_seal",
+    "read_content",
+    "sealed",
+    "write_content",
+]
+SHIPPED = Path(__file__).parent / "schedules"
+
+
+class Signal(NamedTuple):
+    """A state, an input, an output or a disturbance."""
+
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class SchedulingParameter:
+    """The measured quantity that the gains follow, and the box of values and rates for which they were proved."""
+
+    name: str
+    unit: str
+    min: float
+    max: float
+    rate_min: float  # unit per second
+    rate_max: float
+    absolute: bool  # gains and plant depend on the magnitude
+
+
+class PlantPolynomial(NamedTuple):
+    """M(p) = sum over k of coefficients[k] p^powers[k]."""
+
+    powers: npt.NDArray[np.int64]  # (m,)
+    coefficients: FloatArray  # (m, rows, columns)
+
+    def at(self, parameter: FloatArray) -> FloatArray:
+        """M(p), shape (*parameter.shape, rows, columns)."""
+        terms = parameter[..., None] ** self.powers
+        return np.tensordot(terms, self.coefficients, axes=1)
+
+
+class PlantMatrices(NamedTuple):
+    """xdot = A x + B u, y = C x + D u at given parameters; leading axes as the parameters."""
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class GainSchedule:
+    """Gains over one scheduling parameter, with the plant, the units and what was proved.
+
+    `table` has the shape (breakpoints, states, outputs), unit `gain_units`; arrays are read-only. The plant is
+    xdot = A x + B u + E d, y = C x + D u + F d. `sample_time` in s.
+    """
+
+    name: str
+    parameter: SchedulingParameter
+    breakpoints: FloatArray
+    table: FloatArray
+    gain_units: tuple[tuple[str, ...], ...]
+    sample_time: float
+    plant: Mapping[str, PlantPolynomial]
+    states: tuple[Signal, ...]
+    inputs: tuple[Signal, ...]
+    outputs: tuple[Signal, ...]
+    disturbances: tuple[Signal, ...]
+    guarantee: Mapping[str, Any]
+    sha256: str
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> GainSchedule:
+        """Reads a schedule file.
+
+        Raises:
+            ScheduleError: unreadable, edited, truncated, wrong version or structure; names the place.
+        """
+        return _build(read_content(path), os.fspath(path))
+
+    @classmethod
+    def shipped(cls, name: str) -> GainSchedule:
+        """A schedule that comes with the package, by name.
+
+        Raises:
+            ScheduleError: no such schedule; lists those there are.
+        """
+        names = sorted(path.stem for path in SHIPPED.glob("*.json"))
+        if name not in names:
+            raise ScheduleError(f"no shipped schedule '{name}'; there are: {', '.join(names) or 'none'}")
+        return cls.load(SHIPPED / f"{name}.json")
+
+    @classmethod
+    def from_content(cls, content: Mapping[str, Any], where: str = "schedule content") -> GainSchedule:
+        """From content in memory, sealed (then its digests must match) or not yet sealed.
+
+        Raises:
+            ScheduleError: names `where` and the place.
+        """
+        check_content(content, where)
+        if "sha256" in content or "section_sha256" in content:
+            check_seal(content, where)
+        return _build(content if "sha256" in content else sealed(content), where)
+
+    def gain(self, parameter: npt.ArrayLike) -> FloatArray:
+        """L(p), linear between the stored breakpoints: shape (*parameter.shape, states, outputs).
+
+        Raises:
+            RangeError: a value outside the certified range or not finite; names the first such sample.
+        """
+        values = self.certified(parameter)
+        table = self.table.reshape(len(self.breakpoints), -1)
+        found = PiecewiseLinear(self.breakpoints, table)(values.reshape(-1))
+        return np.ascontiguousarray(found.T).reshape(*values.shape, *self.table.shape[1:])
+
+    def plant_at(self, parameter: npt.ArrayLike) -> PlantMatrices:
+        """A, B, C, D at the parameters, leading axes as `parameter`.
+
+        Raises:
+            RangeError: as `gain`.
+        """
+        values = self.certified(parameter)
+        return PlantMatrices(*(self.plant[key].at(values) for key in "ABCD"))
+
+    def certified(self, parameter: npt.ArrayLike) -> FloatArray:
+        """The parameter as gains and plant depend on it (its magnitude if so declared), refused outside the range."""
+        try:
+            raw = np.asarray(parameter, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise EstimatorError(f"{self.parameter.name} is not an array of numbers: {error}") from error
+        values: FloatArray = np.abs(raw) if self.parameter.absolute else raw
+        good = (values >= self.parameter.min) & (values <= self.parameter.max)
+        if not good.all():
+            first = tuple(int(axis[0]) for axis in np.nonzero(~np.atleast_1d(good)))
+            place = "" if raw.ndim == 0 else f" (sample {first[0] if raw.ndim == 1 else first})"
+            raise RangeError(outside_range(self.parameter, float(np.atleast_1d(raw)[first]), place))
+        return values
+
+
+def outside_range(parameter: SchedulingParameter, value: float, place: str) -> str:
+    """The sentence that refuses a parameter value."""
+    box = f"[{parameter.min:g}, {parameter.max:g}] {parameter.unit}"
+    return f"{parameter.name} = {value:.12g} {parameter.unit} is outside the certified range {box}{place}"
+
+
+def _frozen(value: Any, shape: tuple[int, ...]) -> FloatArray:
+    array = np.array(value, dtype=np.float64).reshape(shape)
+    array.flags.writeable = False
+    return array
+
+
+def _build(content: Mapping[str, Any], where: str) -> GainSchedule:
+    """From checked and sealed content."""
+    if len(content["scheduling"]) != 1:
+        names = ", ".join(entry["name"] for entry in content["scheduling"])
+        raise ScheduleError(
+            f"{where}: scheduling: {len(content['scheduling'])} parameters ({names}); the runtime interpolates over one"
+        )
+    model, entry = content["model"], dict(content["scheduling"][0])
+    breakpoints = entry.pop("breakpoints")
+    for key in ("min", "max", "rate_min", "rate_max"):
+        entry[key] = float(entry[key])
+    signals = {
+        kind: tuple(Signal(signal["name"], signal["unit"]) for signal in model[kind])
+        for kind in ("states", "inputs", "outputs", "disturbances")
+    }
+    nx, nu, ny, nd = (len(found) for found in signals.values())
+    shapes = {"A": (nx, nx), "B": (nx, nu), "C": (ny, nx), "D": (ny, nu), "E": (nx, nd), "F": (ny, nd)}
+    plant = {}
+    for key, shape in shapes.items():
+        powers = np.array([power for (power,) in content["plant"][key]["monomials"]], dtype=np.int64)
+        powers.flags.writeable = False
+        plant[key] = PlantPolynomial(powers, _frozen(content["plant"][key]["coefficients"], (len(powers), *shape)))
+    return GainSchedule(
+        name=content["name"],
+        parameter=SchedulingParameter(**entry),
+        breakpoints=_frozen(breakpoints, (len(breakpoints),)),
+        table=_frozen(content["gain"]["table"], (len(breakpoints), nx, ny)),
+        gain_units=tuple(tuple(units) for units in content["gain"]["unit"]),
+        sample_time=float(content["sample_time"]),
+        plant=plant,
+        guarantee=dict(content["guarantee"]),
+        sha256=content["sha256"],
+        **signals,
+    )

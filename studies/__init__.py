@@ -1,0 +1,1 @@
+"""Everything that talks or draws: command line, specifications, drives, reports."""

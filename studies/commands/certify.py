@@ -1,0 +1,30 @@
+"""Output of `gainsmith certify`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+from studies.certify import certify
+
+
+def run_certify(files: list[Path], as_json: bool) -> int:
+    """Certify every file; 0 if all are certified, 1 if one is refuted or not proved, 2 if one is no valid schedule."""
+    results = [certify(path) for path in files]
+    if as_json:
+        rows = [
+            {"path": str(r.path), "name": r.name, "certified": r.certified, "message": r.message, "seconds": r.seconds,
+             "proofs": [asdict(proof) for proof in r.proofs]}
+            for r in results
+        ]  # fmt: skip
+        print(json.dumps(rows, indent=1))
+    else:
+        for result in results:
+            print(f"{result.path}: {result.message} ({result.seconds:.2f} s)")
+            for proof in result.proofs:
+                state = "proved" if proof.proved else "FAILS "
+                print(f"  {state}  {proof.claim} {proof.level:g} {proof.unit}  {proof.place}".rstrip())
+    if any(result.refusal for result in results):
+        return 2
+    return 0 if all(result.certified for result in results) else 1

@@ -1,0 +1,86 @@
+"""Output of `gainsmith schedules`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from studies.schedules import ScheduleRun, regenerate
+from studies.spec import load_spec, shipped_specs
+
+
+def run_schedules(specs: list[str], out: Path | None, check: bool, figures: Path | None, as_json: bool) -> int:
+    """Regenerate (or check) schedules, print a table; 0 good, 1 drift or refused design."""
+    names = specs or list(shipped_specs())
+    for name in names:
+        load_spec(name)  # bad input is refused before anything is designed or written
+    folder = out or Path("schedules")
+    progress = Progress(
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+        console=Console(stderr=True), disable=not sys.stderr.isatty(), transient=True,
+    )  # fmt: skip
+    with progress:
+        task = progress.add_task("designing and proving", total=len(names))
+        runs = regenerate(names, folder, check, lambda run: progress.advance(task))
+    if figures is not None:
+        from studies.report.gain_plots import plot_schedules
+
+        plot_schedules([run for run in runs if run.content], figures)
+    if as_json:
+        print(json.dumps([_row(run) for run in runs], indent=1))
+    else:
+        Console(width=None if sys.stdout.isatty() else 190).print(_table(runs))
+        for run in runs:
+            if run.message:
+                print(f"{run.name}: {run.message}", file=sys.stderr)
+    return 0 if all(run.good for run in runs) else 1
+
+
+HEADINGS = (
+    "schedule", "points", "L1 [m/s]", "published", "L2 [m/s^2]", "published", "friction", "noise [m/s]",
+    "decay", "contracts", "state", "s",
+)  # fmt: skip
+
+
+def _table(runs: list[ScheduleRun]) -> Table:
+    table = Table(
+        title="Gain schedules",
+        caption="friction, noise: L2 gain, lower bound .. proved for the deployed table at any rate; "
+        "decay [1/s] and contraction per sample: proved",
+    )
+    for heading in HEADINGS:
+        left = heading in ("schedule", "state")
+        table.add_column(heading, justify="left" if left else "right", no_wrap=True)
+    for run in runs:
+        if not run.content:
+            table.add_row(run.name, *[""] * 9, run.state, f"{run.seconds:.1f}")
+            continue
+        gains = np.array(run.content["gain"]["table"])[..., 0]
+        guarantee = run.content["guarantee"]
+        bands = [f"{low:g}..{high:g}" for low, high in run.published or ((np.nan, np.nan),) * 2]
+        channels = [f"{c['gamma_lower']:.4g}..{c['gamma_certified']:.4g}" for c in guarantee["channels"]]
+        table.add_row(
+            run.name, str(len(gains)),
+            f"{gains[:, 0].min():.3f}..{gains[:, 0].max():.3f}", bands[0],
+            f"{gains[:, 1].min():.1f}..{gains[:, 1].max():.1f}", bands[1],
+            channels[0], channels[-1], f"{guarantee['decay_rate']:g}", f"{guarantee['sampled_contraction']:.4f}",
+            run.state, f"{run.seconds:.1f}",
+        )  # fmt: skip
+    return table
+
+
+def _row(run: ScheduleRun) -> dict[str, Any]:
+    gains = np.array(run.content["gain"]["table"])[..., 0].T if run.content else np.empty((0, 0))
+    return {
+        "name": run.name, "state": run.state, "good": run.good, "message": run.message, "drift": run.drift,
+        "seconds": run.seconds, "gain_range": [[float(g.min()), float(g.max())] for g in gains],
+        "published_range": run.published, "guarantee": run.content.get("guarantee"),
+        "proofs": [{"claim": p.claim, "level": p.level, "proved": p.proved} for p in run.proofs],
+    }  # fmt: skip

@@ -1,0 +1,157 @@
+"""Specifications of schedules: TOML files that name a model, parameter values and what is asked of the gains."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from synthesis.deploy import DeploySettings
+from synthesis.errors import SpecError, unknown
+from synthesis.hinf_observer import Channel, ObserverDesign
+from synthesis.lmi.settings import LmiSettings
+from synthesis.models.catalogue import CATALOGUE
+from synthesis.models.lpv import LpvModel
+from synthesis.models.parameter_set import ParameterSet, load_parameter_set
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
+
+class ModelSpec(_Strict):
+    """Which model of the catalogue, with which parameter values, over which box."""
+
+    id: str
+    parameters: str
+    wheel_speed_maximum: float = Field(gt=0)
+    wheel_speed_rate: float = Field(ge=0)
+
+
+class ChannelSpec(_Strict):
+    """One channel of the design; without `bound` it is the one that is minimised."""
+
+    disturbances: list[str] = Field(min_length=1)
+    errors: list[str] = Field(min_length=1)
+    bound: float | None = Field(default=None, gt=0)
+    weights: list[float] | None = None
+
+
+class DesignSpec(_Strict):
+    """What is asked of the gains (synthesis.hinf_observer)."""
+
+    degree: int = 1
+    decay_rate: float = 0.0
+    fastest_pole: float | None = None
+    backoff: float = 0.02
+    relaxation: Literal["auto", "grid", "vertex", "exact"] = "auto"
+    points: int = 140
+    solver: str = "CLARABEL"
+    channels: list[ChannelSpec] = Field(min_length=1)
+
+
+class DeploySpec(_Strict):
+    """How the gains become a table (synthesis.deploy)."""
+
+    sample_time: float
+    dtype: Literal["float32", "float64"] = "float64"
+    interpolation_cost: float = 0.01
+
+
+class ScheduleSpec(_Strict):
+    """A whole specification."""
+
+    name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$")
+    description: str
+    model: ModelSpec
+    design: DesignSpec
+    deploy: DeploySpec
+
+    def parameter_set(self, folder: Path | None = None) -> ParameterSet:
+        """The parameter values: a shipped set by name, or a TOML file beside the specification."""
+        name = self.model.parameters
+        return load_parameter_set(folder / name if name.endswith(".toml") and folder else name)
+
+    def build_model(self, parameters: ParameterSet) -> LpvModel:
+        """The LPV model over its box."""
+        if self.model.id not in CATALOGUE:
+            raise SpecError(f"spec '{self.name}': {unknown('model', self.model.id, CATALOGUE)}")
+        return CATALOGUE[self.model.id](
+            parameters,
+            wheel_speed_maximum=self.model.wheel_speed_maximum,
+            wheel_speed_rate=self.model.wheel_speed_rate,
+        )
+
+    def observer_design(self) -> ObserverDesign:
+        """As the synthesis takes it."""
+        spec = self.design
+        channels = tuple(
+            Channel(tuple(c.disturbances), tuple(c.errors), c.bound, tuple(c.weights) if c.weights else None)
+            for c in spec.channels
+        )
+        settings = LmiSettings(relaxation=spec.relaxation, points=spec.points, solver=spec.solver)
+        return ObserverDesign(
+            channels, spec.degree, spec.decay_rate, spec.fastest_pole, backoff=spec.backoff, settings=settings
+        )
+
+    def deploy_settings(self) -> DeploySettings:
+        """As the deployment takes it."""
+        return DeploySettings(self.deploy.sample_time, self.deploy.dtype, self.deploy.interpolation_cost)
+
+    def resolved(self, parameters: ParameterSet) -> dict[str, Any]:
+        """The specification with the parameter values in it: what the digest in a schedule file speaks of."""
+        return {**self.model_dump(mode="json"), "parameter_set": parameters.model_dump(mode="json", exclude_none=True)}
+
+
+def shipped_specs() -> dict[str, Path]:
+    """The specifications that come with the package, by name."""
+    folder = Path(str(resources.files("studies") / "specs"))
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def load_spec(name: str | Path) -> tuple[ScheduleSpec, Path]:
+    """A shipped specification by name or one of your own by path; returns it with its folder.
+
+    Raises SpecError with the file, the key and what is wrong.
+    """
+    path = Path(name)
+    if path.suffix != ".toml":
+        known = shipped_specs()
+        if str(name) not in known:
+            raise SpecError(unknown("specification", str(name), known) + "; a file of your own ends with .toml")
+        path = known[str(name)]
+    try:
+        with path.open("rb") as file:
+            data = tomllib.load(file)
+    except FileNotFoundError:
+        raise SpecError(f"{path}: no such specification file") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise SpecError(f"{path}: {error}") from None
+    try:
+        return ScheduleSpec.model_validate(data), path.parent
+    except ValidationError as error:
+        raise SpecError(f"{path}: {explain(error)}") from None
+
+
+def explain(error: ValidationError) -> str:
+    """All violations in one line, unknown keys with the nearest known ones."""
+    parts = []
+    for entry in error.errors():
+        place = ".".join(str(part) for part in entry["loc"])
+        if entry["type"] == "extra_forbidden":
+            parts.append(f"{place}: {unknown('key', str(entry['loc'][-1]), _keys(entry['loc'][:-1]))}")
+        else:
+            parts.append(f"{place}: {entry['msg'][0].lower()}{entry['msg'][1:]}")
+    return "; ".join(parts)
+
+
+def _keys(place: tuple[int | str, ...]) -> list[str]:
+    """The keys that a table of a specification knows."""
+    tables: dict[str, type[BaseModel]] = {
+        "model": ModelSpec, "design": DesignSpec, "deploy": DeploySpec, "channels": ChannelSpec,
+    }  # fmt: skip
+    words = [part for part in place if isinstance(part, str)]
+    return list((tables[words[-1]] if words else ScheduleSpec).model_fields)

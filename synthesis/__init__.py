@@ -1,0 +1,1 @@
+"""Symbolic LPV models, LMI engine, observer design, certificates and export."""

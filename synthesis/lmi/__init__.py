@@ -1,0 +1,1 @@
+"""The LMI engine: problem, relaxation, conic assembly, solve, verdict."""

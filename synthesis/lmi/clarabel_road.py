@@ -1,0 +1,65 @@
+"""First road: conic data straight into Clarabel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import clarabel
+import numpy as np
+from scipy import sparse
+
+from synthesis.lmi.conic import ConicData
+from synthesis.lmi.settings import LmiSettings
+from synthesis.polynomials.matrix import FloatArray
+
+
+@dataclass(frozen=True)
+class RawAnswer:
+    """A point and what the solver claims about it."""
+
+    solver: str
+    decisions: FloatArray
+    status: str
+    infeasible: bool
+    iterations: int
+    seconds: float
+    dual_bound: float
+
+
+def solve_with_clarabel(data: ConicData, decisions: int, settings: LmiSettings) -> RawAnswer:
+    """Solve the conic problem; chordal decomposition is left on."""
+    options = clarabel.DefaultSettings()
+    options.verbose = False
+    options.max_iter = settings.max_iterations
+    options.max_threads = settings.threads
+    options.tol_gap_abs = options.tol_gap_rel = options.tol_feas = settings.tolerance
+    cones = [clarabel.ZeroConeT(data.equalities)] if data.equalities else []
+    cones += [clarabel.PSDTriangleConeT(size) for size in data.semidefinite]
+    width = len(data.q)
+    start = perf_counter()
+    solver = clarabel.DefaultSolver(sparse.csc_matrix((width, width)), data.q, data.A, data.b, cones, options)
+    solution = solver.solve()
+    seconds = perf_counter() - start
+    status = str(solution.status)
+    x, z = np.asarray(solution.x, float), np.asarray(solution.z, float)
+    return RawAnswer(
+        "clarabel",
+        x[:decisions],
+        status,
+        status in ("PrimalInfeasible", "AlmostPrimalInfeasible"),
+        solution.iterations,
+        seconds,
+        _dual_bound(data, x, z),
+    )
+
+
+def _dual_bound(data: ConicData, x: FloatArray, z: FloatArray) -> float:
+    """Weak duality with the margin taken out again and the dual residual r = A'z + q charged at ten times |x|.
+
+    For every feasible x': q'x' = r'x' - z'(A x') >= -b'z - |r|'|x'| with the b of the problem without margins.
+    """
+    if not (np.isfinite(x).all() and np.isfinite(z).all()):
+        return float("-inf")
+    residual = np.abs(data.A.T @ z + data.q)
+    return float(-((data.b + data.slack) @ z) - 10.0 * residual @ np.maximum(np.abs(x), 1e-3))

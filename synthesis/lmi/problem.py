@@ -1,0 +1,187 @@
+"""An LMI problem: unknown matrices, named inequalities and an objective, over a box of parameters and rates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from synthesis.errors import ProblemError
+from synthesis.lmi.basis import chebyshev_basis
+from synthesis.models.param import SchedulingParameter
+from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial, constant, variable
+
+MARGIN = "margin"
+
+
+@dataclass(frozen=True)
+class Inequality:
+    """`matrix` > 0 for every parameter and rate of its window, in local variables that run over [-1, 1].
+
+    `offset` and `factor` (v,) lead back from local variables to those of the problem. An inequality that is not `strict`
+    only normalises the unknowns: it takes no margin and no part in the verdict.
+    """
+
+    name: str
+    matrix: MatrixPolynomial
+    offset: FloatArray
+    factor: FloatArray
+    strict: bool = True
+
+
+@dataclass
+class LmiProblem:
+    """Variables and inequalities in scaled coordinates: parameters and rates run over [-1, 1].
+
+    The variables of every polynomial are (u_1..u_p, r_1..r_p) with p_i = middle_i + half_i u_i and
+    dp_i/dt = rate_middle_i + rate_half_i r_i.
+
+    With `maximise_margin` every strict inequality becomes M > t I for a common unknown t, which is maximised: the sign
+    of t decides, its size tells how far. The problem must then normalise its unknowns. Re-evaluation judges M itself.
+    """
+
+    parameters: tuple[SchedulingParameter, ...]
+    maximise_margin: bool = False
+    decisions: int = 0
+    unknowns: dict[str, MatrixPolynomial] = field(default_factory=dict)
+    inequalities: list[Inequality] = field(default_factory=list)
+    objective: str | None = None
+    sense: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.maximise_margin:
+            self.scalar(MARGIN)
+            self.maximise(MARGIN)
+
+    @property
+    def variables(self) -> int:
+        """Number of polynomial variables: parameters, then rates."""
+        return 2 * len(self.parameters)
+
+    def known(self, coefficients: FloatArray) -> MatrixPolynomial:
+        """A known matrix from its coefficients (d_1+1, ..., d_p+1, rows, columns) in the physical parameters."""
+        count = len(self.parameters)
+        array = np.asarray(coefficients, float)
+        if array.ndim != count + 2:
+            raise ProblemError(f"known matrix has {array.ndim} axes; {count} parameters need {count + 2}")
+        shaped = array.reshape(*array.shape[:count], *(1,) * count, *array.shape[count:], 1)
+        offsets = np.array([p.middle for p in self.parameters] + [0.0] * count)
+        factors = np.array([p.half_width for p in self.parameters] + [1.0] * count)
+        return MatrixPolynomial(shaped).affine(offsets, factors)
+
+    def constant(self, matrix: FloatArray) -> MatrixPolynomial:
+        """A matrix that depends on no parameter."""
+        return constant(np.asarray(matrix, float), self.variables)
+
+    def symmetric(self, name: str, size: int, degree: int | tuple[int, ...] = 0) -> MatrixPolynomial:
+        """Unknown symmetric polynomial matrix."""
+        rows, columns = np.triu_indices(size)
+        entries = np.zeros((len(rows), size, size))
+        entries[np.arange(len(rows)), rows, columns] = 1.0
+        entries[np.arange(len(rows)), columns, rows] = 1.0
+        return self._unknown(name, entries, degree)
+
+    def matrix(self, name: str, rows: int, columns: int, degree: int | tuple[int, ...] = 0) -> MatrixPolynomial:
+        """Unknown rectangular polynomial matrix."""
+        return self._unknown(name, np.eye(rows * columns).reshape(-1, rows, columns), degree)
+
+    def scalar(self, name: str) -> MatrixPolynomial:
+        """Unknown number."""
+        return self._unknown(name, np.ones((1, 1, 1)), 0)
+
+    def _unknown(self, name: str, entries: FloatArray, degree: int | tuple[int, ...]) -> MatrixPolynomial:
+        if name in self.unknowns:
+            raise ProblemError(f"the unknown '{name}' exists already; choose another name")
+        count = len(self.parameters)
+        basis = chebyshev_basis(count, degree)
+        functions, (number, rows, columns) = len(basis), entries.shape
+        out = np.zeros((*basis.shape[1:], *(1,) * count, rows, columns, 1 + self.decisions + functions * number))
+        terms = np.einsum("f...,eij->...ijfe", basis, entries).reshape(*basis.shape[1:], rows, columns, -1)
+        out[..., 1 + self.decisions :] = terms.reshape(*basis.shape[1:], *(1,) * count, rows, columns, -1)
+        self.decisions += functions * number
+        self.unknowns[name] = MatrixPolynomial(out)
+        return self.unknowns[name]
+
+    def time_derivative(self, matrix: MatrixPolynomial) -> MatrixPolynomial:
+        """dM/dt = sum_i dM/dp_i dp_i/dt, affine in the rates."""
+        count = len(self.parameters)
+        total = matrix * 0.0
+        for i, p in enumerate(self.parameters):
+            slope = matrix.derivative(i)
+            if not slope.coefficients.any():
+                continue
+            if p.may_jump:
+                raise ProblemError(
+                    f"'{p.name}' has unbounded rate [{p.rate_minimum}, {p.rate_maximum}] ({p.unit})/s, so no unknown may "
+                    "depend on it; use degree 0 for it or bound its rate"
+                )
+            rate_middle = 0.5 * (p.rate_minimum + p.rate_maximum)
+            rate_half = 0.5 * (p.rate_maximum - p.rate_minimum)
+            rate = self.constant(np.array([[rate_middle]])) + variable(count + i, self.variables) * rate_half
+            total = total + slope.scaled_by(rate) * (1.0 / p.half_width)
+        return total
+
+    def require(
+        self, name: str, matrix: MatrixPolynomial, window: tuple[float, float] | None = None, strict: bool = True
+    ) -> None:
+        """matrix > 0 on the whole box (pass the negative for < 0), or on a window of the only parameter.
+
+        `window` is in physical units; with it the matrix may differ from window to window (a gain table).
+        """
+        if matrix.shape[0] != matrix.shape[1]:
+            raise ProblemError(f"inequality '{name}' has the shape {matrix.shape}; it must be square and symmetric")
+        if self.maximise_margin and strict:
+            matrix = matrix - self.constant(np.eye(matrix.shape[0])).scaled_by(self.unknowns[MARGIN])
+        offset, factor = np.zeros(self.variables), np.ones(self.variables)
+        if window is not None:
+            if len(self.parameters) != 1:
+                raise ProblemError(
+                    f"inequality '{name}': a window needs exactly one parameter, not {len(self.parameters)}"
+                )
+            low, high = ((edge - self.parameters[0].middle) / self.parameters[0].half_width for edge in window)
+            offset[0], factor[0] = 0.5 * (low + high), 0.5 * (high - low)
+            matrix = matrix.affine(offset, factor)
+        self.inequalities.append(Inequality(name, matrix, offset, factor, strict))
+
+    def minimise(self, name: str) -> None:
+        """Minimise the unknown number of this name."""
+        self._objective_index(name)
+        self.objective, self.sense = name, 1.0
+
+    def maximise(self, name: str) -> None:
+        """Maximise the unknown number of this name."""
+        self.minimise(name)
+        self.sense = -1.0
+
+    def _objective_index(self, name: str) -> int:
+        entry = self.unknowns.get(name)
+        if entry is None or entry.shape != (1, 1):
+            raise ProblemError(f"'{name}' is not an unknown number of this problem and cannot be minimised")
+        return int(np.flatnonzero(entry.coefficients.reshape(-1))[0]) - 1
+
+    def without_margin(self, decisions: FloatArray) -> FloatArray:
+        """The same decisions with the common margin taken out of the inequalities."""
+        if not self.maximise_margin:
+            return decisions
+        out = decisions.copy()
+        out[self._objective_index(MARGIN)] = 0.0
+        return out
+
+    @property
+    def cost(self) -> FloatArray:
+        """Cost vector of the decisions."""
+        q = np.zeros(self.decisions)
+        if self.objective is not None:
+            q[self._objective_index(self.objective)] = self.sense
+        return q
+
+    def place(self, entry: Inequality, local: FloatArray) -> str:
+        """A point of an inequality's window in physical words."""
+        point = entry.offset + entry.factor * local
+        count, words = len(self.parameters), []
+        for i, p in enumerate(self.parameters):
+            words.append(f"{p.name} = {p.middle + p.half_width * point[i]:.4g} {p.unit}")
+            if not p.may_jump and p.rate_maximum > p.rate_minimum and point[count + i] != 0.0:
+                rate = 0.5 * (p.rate_minimum + p.rate_maximum + (p.rate_maximum - p.rate_minimum) * point[count + i])
+                words.append(f"rate = {rate:.4g} ({p.unit})/s")
+        return ", ".join(words)

@@ -1,0 +1,1 @@
+"""Symbolic LPV models, the catalogue of the papers and their parameter values."""

@@ -1,0 +1,126 @@
+"""From symbolic matrices to coefficient arrays over one common denominator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import sympy as sp
+
+from synthesis.errors import ModelError
+from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
+from synthesis.polynomials.positivity import prove_positive
+
+if TYPE_CHECKING:
+    from synthesis.models.lpv import LpvModel
+
+
+MATRICES = ("A", "B", "C", "D", "E", "F")
+
+
+@dataclass(frozen=True)
+class PolynomialModel:
+    """Matrices as numerator(p) / denominator(p).
+
+    Every array has the shape (d_1+1, ..., d_p+1, rows, columns) in the physical parameters; `denominator` has
+    1 x 1 entries and is positive on the whole range. A polynomial model has denominator 1.
+    """
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: FloatArray
+    E: FloatArray
+    F: FloatArray
+    denominator: FloatArray
+
+    @property
+    def parameters(self) -> int:
+        """Number of scheduling parameters."""
+        return self.A.ndim - 2
+
+    @property
+    def is_polynomial(self) -> bool:
+        """Whether the common denominator is one."""
+        return self.denominator.size == 1
+
+    def with_states_scaled(self, scale: FloatArray) -> PolynomialModel:
+        """The model in the states diag(scale) x."""
+        return replace(
+            self,
+            A=self.A * scale[:, None] / scale,
+            B=self.B * scale[:, None],
+            C=self.C / scale,
+            E=self.E * scale[:, None],
+        )
+
+
+def extract(model: LpvModel) -> PolynomialModel:
+    """Substitute constants, clear denominators and collect coefficients."""
+    generators = [sp.Symbol(p.name) for p in model.parameters]
+    values = {sp.Symbol(name): sp.Rational(str(c.value)) for name, c in model.constants.items()}
+    matrices = {key: getattr(model, key).subs(values) for key in MATRICES}
+    fractions = {
+        key: [[_fraction(entry, generators, f"model '{model.name}': {key}[{i},{j}]") for j, entry in enumerate(row)]
+              for i, row in enumerate(matrix.tolist())]
+        for key, matrix in matrices.items()
+    }  # fmt: skip
+    denominator = sp.Integer(1)
+    for rows in fractions.values():
+        for row in rows:
+            for _, below in row:
+                denominator = sp.lcm(denominator, below)
+    middle = {g: sp.Rational(str(p.middle)) for g, p in zip(generators, model.parameters, strict=True)}
+    size = sp.expand(denominator).subs(middle)
+    if size == 0:
+        raise ModelError(f"model '{model.name}': a denominator vanishes at the middle of the range; shrink the range")
+    denominator = sp.expand(denominator / size)  # one where the range has its middle: positive if it has no root
+    arrays = {}
+    for key, rows in fractions.items():
+        numerators = [[sp.expand(sp.cancel(above * denominator / below)) for above, below in row] for row in rows]
+        arrays[key] = _coefficients(numerators, matrices[key].shape, generators)
+    below = _coefficients([[denominator]], (1, 1), generators)
+    _check_denominator(model, below)
+    return PolynomialModel(denominator=below, **arrays)
+
+
+def _fraction(entry: sp.Expr, generators: list[sp.Symbol], where: str) -> tuple[sp.Expr, sp.Expr]:
+    above, below = sp.fraction(sp.cancel(sp.together(entry)))
+    for part in (above, below):
+        if not part.is_polynomial(*generators):
+            raise ModelError(f"{where} = {entry} is neither polynomial nor rational in the parameters")
+    if not (sp.Poly(above, *generators, domain="EX").free_symbols_in_domain <= set()):
+        raise ModelError(f"{where} = {entry} still contains a symbol without value")
+    return above, below
+
+
+def _coefficients(rows: list[list[sp.Expr]], shape: tuple[int, int], generators: list[sp.Symbol]) -> FloatArray:
+    polynomials = [[sp.Poly(entry, *generators) for entry in row] for row in rows]
+    degrees = [0] * len(generators)
+    for row in polynomials:
+        for polynomial in row:
+            degrees = [max(d, n, 0) for d, n in zip(degrees, polynomial.degree_list(), strict=True)]
+    out = np.zeros((*(d + 1 for d in degrees), *shape))
+    for i, row in enumerate(polynomials):
+        for j, polynomial in enumerate(row):
+            for powers, coefficient in polynomial.terms():
+                out[(*powers, i, j)] = float(coefficient)
+    out.setflags(write=False)
+    return out
+
+
+def _check_denominator(model: LpvModel, denominator: FloatArray) -> None:
+    if denominator.size == 1:
+        return
+    offsets = np.array([p.middle for p in model.parameters])
+    factors = np.array([p.half_width for p in model.parameters])
+    found = prove_positive(MatrixPolynomial(denominator[..., None]).affine(offsets, factors))
+    if not found.proved:
+        place = ", ".join(
+            f"{p.name} = {o + f * u:.4g} {p.unit}"
+            for p, o, f, u in zip(model.parameters, offsets, factors, found.place, strict=True)
+        )
+        raise ModelError(
+            f"model '{model.name}': a denominator vanishes inside the range, near {place}; shrink the range"
+        )

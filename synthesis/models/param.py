@@ -1,0 +1,109 @@
+"""What a model is made of besides its matrices: constants, signals, scheduling parameters, all with units."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+from synthesis.errors import ModelError
+
+
+@lru_cache(maxsize=1)
+def _registry() -> object:
+    import pint  # 0.2 s: paid only when a model is built
+
+    return pint.UnitRegistry()
+
+
+@lru_cache(maxsize=256)
+def check_unit(unit: str, where: str) -> str:
+    """Return the unit if pint knows it; '1' is dimensionless. Raises ModelError naming the place."""
+    if unit == "1":
+        return unit
+    try:
+        _registry().parse_units(unit)  # type: ignore[attr-defined]
+    except Exception as error:  # pint raises tokenizer, attribute and value errors alike
+        raise ModelError(
+            f"{where}: '{unit}' is not a unit ({error}); write for example 'rad/s', 'm/s^2' or '1'"
+        ) from None
+    if not unit.strip():
+        raise ModelError(f"{where}: the unit is missing; write '1' for a pure number")
+    return unit
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number of the model with its unit and where it was published."""
+
+    value: float
+    unit: str
+    source: str
+
+    def __post_init__(self) -> None:
+        check_unit(self.unit, "constant")
+        if not math.isfinite(self.value):
+            raise ModelError(f"constant has the value {self.value}; give a finite number")
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A named state, input, output or disturbance."""
+
+    name: str
+    unit: str
+
+    def __post_init__(self) -> None:
+        check_unit(self.unit, f"signal '{self.name}'")
+
+
+@dataclass(frozen=True)
+class SchedulingParameter:
+    """A measured parameter p(t) in [minimum, maximum] with dp/dt in [rate_minimum, rate_maximum].
+
+    An infinite rate means that the parameter may jump; then no Lyapunov function may depend on it.
+    `absolute` says that the runtime signal enters by its absolute value (wheel speed in reverse).
+    """
+
+    name: str
+    unit: str
+    minimum: float
+    maximum: float
+    rate_minimum: float
+    rate_maximum: float
+    absolute: bool = False
+
+    def __post_init__(self) -> None:
+        where = f"scheduling parameter '{self.name}'"
+        check_unit(self.unit, where)
+        if not (math.isfinite(self.minimum) and math.isfinite(self.maximum)):
+            raise ModelError(f"{where}: range [{self.minimum}, {self.maximum}] {self.unit} is not finite; bound it")
+        if not self.minimum < self.maximum:
+            raise ModelError(
+                f"{where}: range [{self.minimum}, {self.maximum}] {self.unit} is empty or reversed; "
+                "give minimum < maximum"
+            )
+        if math.isnan(self.rate_minimum) or math.isnan(self.rate_maximum):
+            raise ModelError(f"{where}: a rate bound is not a number; give numbers or inf")
+        if not self.rate_minimum <= 0.0 <= self.rate_maximum:
+            raise ModelError(
+                f"{where}: rates [{self.rate_minimum}, {self.rate_maximum}] ({self.unit})/s must contain 0; "
+                "give rate_minimum <= 0 <= rate_maximum"
+            )
+        if self.absolute and self.minimum < 0.0:
+            raise ModelError(f"{where}: enters as absolute value, so its minimum must be >= 0, not {self.minimum}")
+
+    @property
+    def middle(self) -> float:
+        """Middle of the range."""
+        return 0.5 * (self.minimum + self.maximum)
+
+    @property
+    def half_width(self) -> float:
+        """Half the width of the range."""
+        return 0.5 * (self.maximum - self.minimum)
+
+    @property
+    def may_jump(self) -> bool:
+        """Whether a rate is unbounded."""
+        return math.isinf(self.rate_minimum) or math.isinf(self.rate_maximum)

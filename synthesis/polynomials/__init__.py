@@ -1,0 +1,1 @@
+"""Matrix polynomials: arrays for the solvers, exact rationals for the proofs."""

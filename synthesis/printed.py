@@ -1,0 +1,109 @@
+"""Judge a given Lyapunov matrix exactly: over which parameter values does it prove what it is said to prove?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from flint import fmpq, fmpq_poly
+
+from synthesis.errors import ProblemError
+from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.rational import (
+    Matrix,
+    add,
+    derivative,
+    multiply,
+    polynomial_matrix,
+    rational,
+    scale,
+    transpose,
+)
+from synthesis.stability import Form
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Open intervals of the parameter on which every inequality holds; `everywhere` on the whole range asked for."""
+
+    intervals: tuple[tuple[float, float], ...]
+    everywhere: bool
+
+
+def judge(
+    model: LpvModel,
+    gains: Sequence[Sequence[float | str]],
+    lyapunov: Sequence[Any],
+    form: Form = "primal",
+    search: tuple[float, float] | None = None,
+) -> Judgement:
+    """Where M > 0 and its Lyapunov inequality hold, for both bounds of the rate, in exact arithmetic.
+
+    `lyapunov` holds the coefficients of M(p) as numbers or printed decimals; the inequality is A_e'M + M A_e + q M' < 0
+    (primal) or A_e M + M A_e' - q M' < 0 (dual), with q at both rate bounds. The end points of the intervals are roots of
+    leading principal minors, isolated by certified enclosures. `search` may extend the model's range.
+    Raises ProblemError for a model with several parameters or a rational one.
+    """
+    if len(model.parameters) != 1 or not model.polynomial.is_polynomial:
+        raise ProblemError(f"model '{model.name}': only polynomial models of one parameter can be judged exactly")
+    (parameter,) = model.parameters
+    low, high = search or (parameter.minimum, parameter.maximum)
+    powers = [[k] for k in range(len(lyapunov))]
+    M = polynomial_matrix(powers, lyapunov)
+    plant = {
+        key: polynomial_matrix([[k] for k in range(len(values))], values.tolist())
+        for key, values in (("A", model.polynomial.A), ("C", model.polynomial.C))
+    }
+    L = polynomial_matrix([[0]], [gains])
+    A_e = add(plant["A"], scale(multiply(L, plant["C"]), fmpq(-1)))
+    product = multiply(M, A_e) if form == "primal" else multiply(A_e, M)
+    sign = 1 if form == "primal" else -1
+    matrices = [M]
+    for rate in (parameter.rate_minimum, parameter.rate_maximum):
+        total = add(product, transpose(product), scale(derivative(M), sign * rational(rate)))
+        matrices.append(scale(total, fmpq(-1)))
+    return _intervals([minor for matrix in matrices for minor in leading_minors(matrix)], rational(low), rational(high))
+
+
+def leading_minors(matrix: Matrix) -> list[fmpq_poly]:
+    """Determinants of the leading square blocks; all positive means positive definite (Sylvester)."""
+    return [_determinant([row[:size] for row in matrix[:size]]) for size in range(1, len(matrix) + 1)]
+
+
+def _determinant(matrix: Matrix) -> fmpq_poly:
+    """By expansion along the first row: exact, for the small matrices that papers print."""
+    if len(matrix) == 1:
+        return matrix[0][0]
+    total = fmpq_poly([0])
+    for j, entry in enumerate(matrix[0]):
+        minor = [row[:j] + row[j + 1 :] for row in matrix[1:]]
+        total += (-1) ** j * entry * _determinant(minor)
+    return total
+
+
+def _intervals(minors: list[fmpq_poly], low: fmpq, high: fmpq) -> Judgement:
+    """Cut [low, high] at every root and keep the pieces on which all minors are positive."""
+    cuts = {low, high}
+    for minor in minors:
+        if minor.degree() < 1:
+            continue
+        for root, _ in minor.complex_roots():
+            if root.imag == 0:
+                middle = fmpq(*float(root.real.mid()).as_integer_ratio())
+                if low < middle < high:
+                    cuts.add(middle)
+    edges = sorted(cuts)
+    pieces: list[tuple[fmpq, fmpq]] = []
+    for left, right in pairwise(edges):
+        middle = (left + right) / 2
+        if all(minor(middle) > 0 for minor in minors):
+            if pieces and pieces[-1][1] == left and all(minor(left) > 0 for minor in minors):
+                pieces[-1] = (pieces[-1][0], right)
+            else:
+                pieces.append((left, right))
+    everywhere = (
+        len(pieces) == 1 and pieces[0] == (low, high) and all(minor(x) > 0 for minor in minors for x in (low, high))
+    )
+    return Judgement(tuple((float(a), float(b)) for a, b in pieces), everywhere)

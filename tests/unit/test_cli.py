@@ -1,0 +1,151 @@
+"""The command line: exit codes, one-line errors, drift, machine output."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from estimators.schedule import read_content, write_content
+from studies.cli import main
+from studies.spec import shipped_specs
+
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "estimators" / "schedules"
+SPEC = (ROOT / "studies" / "specs" / "corner-estimation-longitudinal.toml").read_text()
+
+
+def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert set(found["schedules"]) == set(found["specifications"]) == set(shipped_specs())
+    assert len(found["parameter sets"]) == 3
+    assert main(["list"]) == 0
+    assert "resilient-velocity-lateral" in capsys.readouterr().out
+
+
+def test_certify_exit_codes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    good = FOLDER / "longitudinal-speed.json"
+    assert main(["certify", str(good)]) == 0
+    content = read_content(good)
+    content["gain"]["table"][1][1][0] *= -1
+    write_content(tmp_path / "bad.json", content)
+    assert main(["certify", str(tmp_path / "bad.json")]) == 1
+    (tmp_path / "cut.json").write_bytes(good.read_bytes()[:-200])
+    assert main(["certify", "--json", str(tmp_path / "cut.json")]) == 2
+    assert main(["certify", str(tmp_path / "absent.json")]) == 2
+    assert "absent.json" in capsys.readouterr().out
+
+
+def test_schedules_write_check_and_drift(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    name = "longitudinal-speed"
+    out = ["--out", str(tmp_path)]
+    assert main(["schedules", name, *out, "--check"]) == 1
+    assert "does not exist" in capsys.readouterr().err
+    assert main(["schedules", name, *out, "--json", "--figures", str(tmp_path / "figures")]) == 0
+    row = json.loads(capsys.readouterr().out)[0]
+    assert row["state"] == "written" and all(proof["proved"] for proof in row["proofs"])  # noqa: PT018
+    assert (tmp_path / "figures" / f"{name}.svg").stat().st_size > 1000
+    before = (tmp_path / f"{name}.json").read_bytes()
+    assert main(["schedules", name, *out]) == 0
+    assert "unchanged" in capsys.readouterr().out
+    assert (tmp_path / f"{name}.json").read_bytes() == before
+    content = read_content(tmp_path / f"{name}.json")
+    content["gain"]["table"][3][1][0] += 0.5  # still proved, but no longer what the specification gives
+    write_content(tmp_path / f"{name}.json", content)
+    assert main(["schedules", name, *out, "--check"]) == 1
+    assert "drift" in capsys.readouterr().out
+
+
+def test_committed_schedules_do_not_drift(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schedules", "--out", str(FOLDER), "--check", "--json"]) == 0, capsys.readouterr()
+    assert {row["state"] for row in json.loads(capsys.readouterr().out)} == {"same"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("decay_rate = 80.0", "decay_rtae = 80.0", "did you mean decay_rate"),
+        ("decay_rate = 80.0", 'decay_rate = "80"', "design.decay_rate"),
+        ("decay_rate = 80.0", "decay_rate = nan", "decay_rate"),
+        ("degree = 1", "degree = 12", "degree 12"),
+        ("wheel_speed_maximum = 140.0", "wheel_speed_maximum = -1.0", "wheel_speed_maximum"),
+        ('parameters = "corner-estimation"', 'parameters = "corner-estimaton"', "did you mean corner-estimation"),
+        ('parameters = "corner-estimation"', 'parameters = "absent.toml"', "no such parameter file"),
+        ('id = "corner-velocity-longitudinal"', 'id = "corner-velocity"', "did you mean corner-velocity-l"),
+        ('disturbances = ["friction"]', 'disturbances = ["frictoin"]', "did you mean friction"),
+        ("[deploy]", "[deploy", "Expected"),
+        ("sample_time = 0.005", "sample_time = 0.0", "sample time"),
+    ],
+)
+def test_bad_specifications_are_one_clear_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, words: str
+) -> None:
+    path = tmp_path / "mine.toml"
+    assert old in SPEC
+    path.write_text(SPEC.replace(old, new, 1))
+    code = main(["schedules", str(path), "--out", str(tmp_path / "out")])
+    captured = capsys.readouterr()
+    assert code in (1, 2)
+    line = captured.err.strip()
+    assert words in line
+    assert len(line.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_unknown_names_are_refused_before_anything_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schedules", "corner-estimation-longitudnal", "--out", str(tmp_path / "out")]) == 2
+    assert "did you mean corner-estimation-longitudinal" in capsys.readouterr().err
+    assert main(["schedules", str(tmp_path / "none.toml")]) == 2
+    assert not (tmp_path / "out").exists()
+
+
+def test_literal_specification_is_reported_and_not_exported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    head, tail = SPEC.split("[design]")[0], "[deploy]" + SPEC.split("[deploy]")[1]
+    literal = '[design]\n[[design.channels]]\ndisturbances = ["friction", "acceleration_error"]\n'
+    literal += 'errors = ["bristle_deflection", "relative_velocity"]\n\n'
+    (tmp_path / "literal.toml").write_text(head + literal + tail)
+    assert main(["schedules", str(tmp_path / "literal.toml"), "--out", str(tmp_path / "out")]) == 1
+    assert "ill-posed: the infimum gamma = 1" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_own_tire_beside_the_specification(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tire = (ROOT / "synthesis" / "models" / "parameters" / "corner-estimation.toml").read_text()
+    (tmp_path / "my-tire.toml").write_text(tire.replace("value = 632.1", "value = 500.0"))
+    spec = SPEC.replace('parameters = "corner-estimation"', 'parameters = "my-tire.toml"')
+    (tmp_path / "mine.toml").write_text(spec.replace('name = "corner-estimation-longitudinal"', 'name = "mine"'))
+    assert main(["schedules", str(tmp_path / "mine.toml"), "--out", str(tmp_path)]) == 0
+    assert read_content(tmp_path / "mine.json")["model"]["constants"]["sigma0"]["value"] == 500.0
+    capsys.readouterr()
+
+
+def test_output_folder_that_cannot_be_made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    assert main(["schedules", "longitudinal-speed", "--out", str(tmp_path / "file" / "below")]) == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1
+
+
+def test_killed_in_the_middle_leaves_whole_files(tmp_path: Path) -> None:
+    """kill -9 at several moments: what is in the folder is either the old file or the new one, never half of one."""
+    name = "longitudinal-speed"
+    shutil.copy(FOLDER / f"{name}.json", tmp_path)
+    content = read_content(tmp_path / f"{name}.json")
+    content["description"] = "older"
+    write_content(tmp_path / f"{name}.json", content)
+    for delay in (0.8, 1.6, 2.4):
+        command = [sys.executable, "-m", "studies.cli", "schedules", name, "--out", str(tmp_path)]
+        process = subprocess.Popen(
+            command, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        time.sleep(delay)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        assert main(["certify", str(tmp_path / f"{name}.json")]) == 0

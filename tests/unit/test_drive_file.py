@@ -1,0 +1,136 @@
+"""What a drive file must say, and the one line that says what is wrong with it."""
+
+# ruff: noqa: E501
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from studies.drives.drive_file import read_drive
+from studies.drives.quantities import factor_to, to_si
+from synthesis.errors import SpecError
+from tests.drives.synthetic_drive import DRIVE, TORQUES
+
+REPOSITORY = Path(__file__).parents[2]
+TWO_LOGS = DRIVE.replace(
+    "[signals]",
+    '[[log]]\nname = "second"\nrate = "100 Hz"\nALIGN\n\n[signals]',
+).replace('column = "', 'log = "log", column = "')
+
+
+def refusal(folder: Path, text: str) -> str:
+    path = folder / "drive.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(SpecError) as caught:
+        read_drive(path)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith("drive.toml: ")
+    return message.removeprefix("drive.toml: ")
+
+
+def test_quantities_are_read_in_si(tmp_path: Path) -> None:
+    path = tmp_path / "drive.toml"
+    path.write_text(DRIVE.replace('unit = "m/s"', 'unit = "km/h", sign = "negative", factor = 2.0'), encoding="utf-8")
+    drive = read_drive(path)
+    assert drive.sample_time == pytest.approx(0.005)
+    assert drive.vehicle.rear_axle_to_cg == pytest.approx(1.4)
+    assert drive.reference["vx"].scale("m/s") == pytest.approx(-2 / 3.6)
+    assert drive.log[0].allowed_gap == pytest.approx(5 / 200)
+
+
+@pytest.mark.parametrize("path", sorted((REPOSITORY / "tests" / "drives").glob("*.toml")), ids=lambda path: path.stem)
+def test_drive_files_in_the_repository_are_valid(path: Path) -> None:
+    assert read_drive(path).sample_time == pytest.approx(0.005)
+
+
+@pytest.mark.parametrize(
+    ("unit", "target", "factor"),
+    [
+        ("rad/s", "rad/s", 1.0),
+        ("rpm", "rad/s", 2 * math.pi / 60),
+        ("deg/s", "rad/s", math.pi / 180),
+        ("deg", "rad", math.pi / 180),
+        ("km/h", "m/s", 1 / 3.6),
+        ("standard_gravity", "m/s^2", 9.80665),
+        ("kN", "N", 1e3),
+        ("kN*m", "N*m", 1e3),
+        ("ms", "s", 1e-3),
+        ("m/s**2", "m/s^2", 1.0),
+    ],
+)
+def test_units(unit: str, target: str, factor: float) -> None:
+    assert factor_to(unit, target) == pytest.approx(factor, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("unit", "target", "message"),
+    [
+        ("m/s", "rad/s", "has another dimension than rad/s; use one such as rad/s, deg/s, rpm"),
+        ("Hz", "rad/s", "does not count angle"),
+        ("g", "m/s^2", "use one such as m/s^2, standard_gravity"),
+        ("fathoms_per_dog_watch", "m/s", "unknown unit"),
+        ("m/s; import os", "m/s", "is not a unit"),
+        ("m^9^9", "m", "has another dimension"),
+        ("", "m", "is not a unit"),
+        ("m" * 50, "m", "is not a unit"),
+    ],
+)
+def test_wrong_units_are_refused(unit: str, target: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message.replace("^", r"\^")):
+        factor_to(unit, target)
+
+
+@pytest.mark.parametrize("text", ["fast", "5", "5 5 ms", "ms", "1e9999 s x", "--5 ms", "", True, None, [1]])
+def test_what_is_no_quantity_is_refused(text: object) -> None:
+    with pytest.raises(ValueError, match="unit"):
+        to_si(text, "s")
+
+
+def edited(old: str, new: str) -> str:
+    assert old in DRIVE
+    return DRIVE.replace(old, new)
+
+
+REFUSALS = [
+    (edited('mass = "1600.0 kg"\n', ""), "vehicle.mass: missing; add it"),
+    (edited("mass =", "mas ="), "vehicle: unknown key 'mas'; did you mean mass? (and 1 more)"),
+    (edited("[vehicle]", "[vehicel]"), "top level: unknown key 'vehicel'; did you mean vehicle? (and 1 more)"),
+    (edited('"1600.0 kg"', '"1600.0 m"'), "vehicle.mass: unit 'm' has another dimension than kg; use one such as kg, t"),
+    (edited('"1600.0 kg"', "1600.0"), 'vehicle.mass: 1600.0 has no unit; write it in quotes with its unit, such as "1600.0 kg"'),
+    (edited('"1600.0 kg"', '"-1600 kg"'), "vehicle.mass: '-1600 kg' is out of range; it must be finite and above 0 kg"),
+    (edited('"5 ms"', '"0 ms"'), "sample_time: '0 ms' is out of range; it must be finite and above 0 s"),
+    (edited("drive/1", "drive/7"), "schema: Input should be 'gainsmith.drive/1'"),
+    (edited('ax = {', 'axe = {'), "signals.axe: unknown signal 'axe'; did you mean ax?"),
+    (edited('ax = { column = "ax", unit = "m/s^2" }\n', ""), 'signals.ax: missing; add ax = { column = "...", unit = "m/s^2" }'),
+    (edited('column = "ax", unit = "m/s^2"', 'column = "ax", unit = "rad/s^2"'), "signals.ax.unit: unit 'rad/s^2' has another dimension than m/s^2; use one such as m/s^2, standard_gravity"),
+    (edited('column = "ax", unit', 'column = "ax", units'), "signals.ax: unknown key 'units'; did you mean unit? (and 1 more)"),
+    (edited('column = "ax",', 'column = "ax", factor = 0.0,'), "signals.ax.factor: 0 is not a scale; use a finite number other than zero"),
+    (edited('column = "ax",', 'column = "ax", factor = nan,'), "signals.ax.factor: Input should be a finite number"),
+    (edited('column = "ax",', 'column = "ax", sign = "minus",'), "signals.ax.sign: Input should be 'positive' or 'negative'"),
+    (edited('column = "ax",', 'log = "lok", column = "ax",'), "signals.ax.log: unknown log 'lok'; did you mean log?"),
+    (edited('time = "t"', 'time = "t"\ntime_unit = "m"'), "log[0].time_unit: unit 'm' has another dimension than s; use one such as s, ms, us, min"),
+    (edited('time = "t"', 'time = "t"\nmax_gab = "1 s"'), "log[0]: unknown key 'max_gab'; did you mean max_gap?"),
+    (edited("[reference]", TORQUES + "[reference]").replace('wheel_inertia = "1.5 kg*m^2"\n', ""), 'vehicle.wheel_inertia: missing, but wheel torques are given; add it, such as "1.6 kg*m^2"'),
+    (edited("[reference]", 'hand_wheel = { column = "hw", unit = "deg" }\n[reference]'), "vehicle.steering_ratio: missing, but hand_wheel is given; add it, such as 15.0"),
+    (edited("[reference]", 'steering = { column = "s", unit = "rad" }\nsteer_fl = { column = "s", unit = "rad" }\n[reference]'), "signals: steering and steer_fl say the same thing; keep steering, hand_wheel, or steer_fl and steer_fr"),
+    (edited("[signals]", '[[log]]\nname = "log"\nrate = "1 Hz"\n[signals]'), "log: two entries are called 'log'; give every log its own name"),
+    (edited("[signals]", '[[log]]\nname = "b"\nrate = "1 Hz"\n[signals]'), "signals.wheel_speed_fl.log: missing; say which log holds column 'w_fl': log, b"),
+    (TWO_LOGS.replace("ALIGN", 'align = { to = "lag" }'), "log 'second'.align.to: unknown log 'lag'; did you mean log? (a log with a clock of its own)"),
+    (TWO_LOGS.replace("ALIGN", 'align = { to = "log" }\nclock_offset = "1 s"'), "log 'second'.align: clock_offset is given as well; keep one of the two"),
+    (TWO_LOGS.replace("ALIGN", 'align = { to = "log", velocity = "vxx" }'), "log 'second'.align: unknown signal 'vxx'; did you mean vx?"),
+    (TWO_LOGS.replace("ALIGN", 'align = { to = "log" }'), "log 'second'.align: one of vx, ax must be in log 'second', the other in 'log'"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "message"), REFUSALS, ids=[message[:40] for _, message in REFUSALS])
+def test_refusals_name_the_key_and_the_remedy(tmp_path: Path, text: str, message: str) -> None:
+    assert refusal(tmp_path, text) == message
+
+
+def test_not_toml_and_not_there(tmp_path: Path) -> None:
+    assert refusal(tmp_path, "name = ").startswith("not a TOML file: ")
+    with pytest.raises(SpecError, match=r"^nowhere\.toml: cannot be read \(No such file or directory\)"):
+        read_drive(tmp_path / "nowhere.toml")
