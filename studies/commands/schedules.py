@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from studies.commands.progress import progress_bar
 from studies.schedules import ScheduleRun, regenerate
 from studies.spec import load_spec, shipped_specs
 
@@ -22,11 +22,7 @@ def run_schedules(specs: list[str], out: Path | None, check: bool, figures: Path
     for name in names:
         load_spec(name)  # bad input is refused before anything is designed or written
     folder = out or Path("schedules")
-    progress = Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-        console=Console(stderr=True), disable=not sys.stderr.isatty(), transient=True,
-    )  # fmt: skip
-    with progress:
+    with progress_bar() as progress:
         task = progress.add_task("designing and proving", total=len(names))
         runs = regenerate(names, folder, check, lambda run: progress.advance(task))
     if figures is not None:

@@ -51,7 +51,7 @@ def test_schedules_write_check_and_drift(tmp_path: Path, capsys: pytest.CaptureF
     assert "does not exist" in capsys.readouterr().err
     assert main(["schedules", name, *out, "--json", "--figures", str(tmp_path / "figures")]) == 0
     row = json.loads(capsys.readouterr().out)[0]
-    assert row["state"] == "written" and all(proof["proved"] for proof in row["proofs"])  # noqa: PT018
+    assert row["state"] == "written" and all(proof["proved"] for proof in row["proofs"])
     assert (tmp_path / "figures" / f"{name}.svg").stat().st_size > 1000
     before = (tmp_path / f"{name}.json").read_bytes()
     assert main(["schedules", name, *out]) == 0

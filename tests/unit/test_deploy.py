@@ -43,7 +43,7 @@ def test_well_posed_design_lies_in_the_published_ranges(model: LpvModel, gains: 
     grid = np.linspace(0.0, 140.0, 281)
     table = gains.gain(grid)[..., 0]
     assert gains.verdict is Verdict.CERTIFIED
-    assert (table > [0.4, 50.0]).all() and (table < [0.9, 210.0]).all()  # noqa: PT018
+    assert (table > [0.4, 50.0]).all() and (table < [0.9, 210.0]).all()
     poles = np.linalg.eigvals(model.on(grid).error_dynamics(gains.gain(grid))[0])
     assert poles.real.max() < -80.0
     assert poles.real.min() > -600.0
@@ -108,7 +108,7 @@ def test_sampled_radius_is_that_of_the_matrix_exponential(gains: ObserverGains) 
 def test_unproved_content_is_not_written(gains: ObserverGains, tmp_path) -> None:  # type: ignore[no-untyped-def]
     content = schedule_content(deploy(gains), "spoiled")
     content["gain"]["table"][2][1][0] = -5.0
-    with pytest.raises(ProblemError, match="is not written.*between breakpoints"):
+    with pytest.raises(ProblemError, match=r"is not written.*between breakpoints"):
         export(tmp_path / "spoiled.json", content)
     assert list(tmp_path.iterdir()) == []
 
@@ -162,20 +162,23 @@ def test_bad_deployments_are_refused(change: dict[str, object]) -> None:
         DeploySettings(**change)  # type: ignore[arg-type]
 
 
-def test_table_that_only_interpolation_spoils_is_refined() -> None:
+def test_table_that_only_interpolation_spoils_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """The law dips at 60 rad/s, where that is harmless; 8 points spread the dip to 50 rad/s, where it destabilises."""
     lateral = corner_velocity_model(load_parameter_set("corner-estimation"), "lateral")
-    base = design_observer(lateral, replace(WELL_POSED, decay_rate=2.0, fastest_pole=5e3))
+    base = design_observer(lateral, replace(WELL_POSED, decay_rate=2.0, fastest_pole=5e4))
 
     class Dipped(ObserverGains):
         def gain(self, points: np.ndarray) -> np.ndarray:
-            dip = 30.0 * np.exp(-(((np.ravel(points) - 60.0) / 2.0) ** 2))
-            return super().gain(points) - dip[:, None, None] * np.array([[1.0], [0.0]])
+            dip = 100.0 * np.exp(-(((np.ravel(points) - 60.0) / 2.0) ** 2))
+            return np.array([[1.11], [16.7]]) - dip[:, None, None] * np.array([[1.0], [0.0]])
 
     dipped = Dipped(**{name: getattr(base, name) for name in base.__dataclass_fields__})
     grid = np.linspace(0.0, 140.0, 1401)
     law = lateral.on(grid).error_dynamics(dipped.gain(grid))[0]
     assert np.linalg.eigvals(law).real.max() < 0.0
-    coarse = tabulate(dipped, 7, "float64").error_matrices(grid)[0]
-    assert np.linalg.eigvals(coarse).real.max() > 0.0
-    assert len(deploy(dipped, DeploySettings(interpolation_cost=0.5)).breakpoints) > 8
+    coarse = tabulate(dipped, 7, "float64")
+    assert np.linalg.eigvals(coarse.error_matrices(grid)[0]).real.max() > 0.0
+    assert all(np.isinf(level) for level in claim_levels(coarse, WELL_POSED).values())
+    monkeypatch.setattr("synthesis.deploy.SEGMENTS", (7,))
+    with pytest.raises(ProblemError, match="no table with up to 7 segments"):
+        deploy(dipped)

@@ -1,0 +1,1 @@
+"""Norms, sensitivity, switching, Markov jumps, packet drops, observability."""

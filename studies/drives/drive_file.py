@@ -1,0 +1,61 @@
+"""The drive file: which columns of which logs are what, and the vehicle they were recorded on.
+
+A drive file (TOML, ``gainsmith.drive/1``) maps log columns with units and signs to the signals of
+:mod:`studies.drives.quantities`, several log files with their own clocks to one clock, and names the schedule that
+the observers run with. Every quantity carries its unit; nothing is guessed from a column name.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from studies.drives.drive_checks import check_alignment, check_columns, check_logs, check_signals
+from studies.drives.drive_tables import Column, LogFile, Observer, Schedules, Table, Vehicle
+from studies.drives.quantities import Duration
+from studies.drives.validation import first_error
+from synthesis.errors import SpecError
+
+
+class DriveFile(Table):
+    """A drive file that was read, checked and converted to SI."""
+
+    schema_: Literal["gainsmith.drive/1"] = Field(alias="schema")
+    name: str = Field(min_length=1)
+    source: str = ""
+    sample_time: Duration
+    vehicle: Vehicle
+    schedules: Schedules
+    observer: Observer = Observer()
+    log: Annotated[list[LogFile], Field(min_length=1)]
+    signals: dict[str, Column]
+    reference: dict[str, Column] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _tables_agree(self) -> Self:
+        check_logs(self.log)
+        check_columns(self.signals, self.reference, self.log)
+        check_alignment({**self.reference, **self.signals}, self.log)
+        check_signals(self.signals, self.vehicle)
+        return self
+
+    def log_of(self, column: Column) -> str:
+        """The name of the log that holds a column (the only one, if the file has one)."""
+        return column.log if column.log is not None else self.log[0].name
+
+
+def read_drive(path: Path) -> DriveFile:
+    """Read and check a drive file. Raises SpecError, one line: file, key, what is wrong, what would be right."""
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SpecError(f"{path.name}: cannot be read ({error.strerror}); give the path of a drive file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SpecError(f"{path.name}: not a TOML file: {error}") from error
+    try:
+        return DriveFile.model_validate(content)
+    except ValidationError as error:
+        raise SpecError(f"{path.name}: {first_error(error, DriveFile)}") from error

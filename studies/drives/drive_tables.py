@@ -1,0 +1,104 @@
+"""The tables of a drive file: a log column, a log file and its clock, the vehicle, the observers."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+from studies.drives.quantities import (
+    AngularSpeed,
+    Duration,
+    Inertia,
+    Lag,
+    Length,
+    Mass,
+    Offset,
+    Rate,
+    factor_to,
+)
+
+
+def _a_time(unit: str) -> str:
+    factor_to(unit, "s")
+    return unit
+
+
+class Table(BaseModel):
+    """Strict and frozen: no unknown key, no number in quotes, no infinity."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+class Column(Table):
+    """One log column: value in SI = factor * sign * (column in ``unit``)."""
+
+    column: str = Field(min_length=1)
+    unit: str = Field(min_length=1)
+    log: str | None = None
+    sign: Literal["positive", "negative"] = "positive"
+    factor: float = 1.0
+
+    def scale(self, si_unit: str) -> float:
+        """The number that turns the column into ``si_unit`` with the sign of this project (x forward, y left, z up)."""
+        return factor_to(self.unit, si_unit) * self.factor * (-1.0 if self.sign == "negative" else 1.0)
+
+
+class Align(Table):
+    """Estimate a clock offset: the derivative of ``velocity`` must look like ``acceleration`` (:mod:`.align`)."""
+
+    to: str
+    velocity: str = "vx"
+    acceleration: str = "ax"
+    search: Duration | None = None
+
+
+class LogFile(Table):
+    """One log file: its clock, its rate, and the longest pause that may be bridged by interpolation."""
+
+    name: str = Field(min_length=1)
+    rate: Rate
+    file: str | None = None
+    time: str = "time"
+    time_unit: Annotated[str, AfterValidator(_a_time)] = "s"
+    delimiter: str = Field(default=",", min_length=1, max_length=1)
+    max_gap: Duration | None = None
+    duplicates: Literal["mean", "last", "refuse"] = "mean"
+    sort: bool = False
+    clock_offset: Offset = 0.0
+    align: Align | None = None
+
+    @property
+    def allowed_gap(self) -> float:
+        """The longest spacing of samples that is interpolated over, s (five nominal periods if the file names none)."""
+        return self.max_gap if self.max_gap is not None else 5.0 / self.rate
+
+
+class Vehicle(Table):
+    """Rigid-body and wheel data, SI. Lengths are to the centre of gravity; tracks are wheel centre to wheel centre."""
+
+    mass: Mass
+    front_axle_to_cg: Length
+    rear_axle_to_cg: Length
+    cg_height: Length
+    track_front: Length
+    track_rear: Length
+    effective_radius_front: Length
+    effective_radius_rear: Length
+    wheel_inertia: Inertia | None = None
+    rolling_resistance: float = Field(default=0.0, ge=0.0, le=0.2)
+    steering_ratio: float | None = Field(default=None, gt=0.0)
+
+
+class Observer(Table):
+    """How the observer inputs are formed: lag of the differentiators, and when a wheel counts as stopped."""
+
+    derivative_lag: Lag = 0.01
+    stopped_below: AngularSpeed = 1.0
+
+
+class Schedules(Table):
+    """The gain schedule of each direction: a shipped name, or the path of a JSON file beside the drive file."""
+
+    longitudinal: str = Field(min_length=1)
+    lateral: str | None = None

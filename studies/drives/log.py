@@ -1,0 +1,196 @@
+"""From the log files of a drive to signals in SI on one clock and one grid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from studies.drives.align import find_offset
+from studies.drives.csv_log import read_columns
+from studies.drives.drive_file import DriveFile
+from studies.drives.drive_tables import Column, LogFile
+from studies.drives.errors import LogError
+from studies.drives.quantities import REFERENCES, SIGNALS, factor_to
+from studies.drives.resample import Stamped, clean_stamps, resample
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DriveLog:
+    """Signals and references in SI over ``time``, s, n samples; NaN where nothing was measured.
+
+    ``report`` says for every log what was read, repaired, bridged and found.
+    """
+
+    time: Array
+    signals: dict[str, Array]
+    reference: dict[str, Array]
+    report: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class _Track:
+    stamped: Stamped
+    signals: dict[str, Array]
+    reference: dict[str, Array]
+
+
+def read_log(paths: Sequence[Path], drive: DriveFile) -> DriveLog:
+    """Read every log of the drive, put it on one clock, and resample it to ``drive.sample_time``.
+
+    Raises LogError: a file that belongs to no log, a log without a file, logs that do not overlap, and whatever
+    :mod:`studies.drives.csv_log`, :mod:`.resample` and :mod:`.align` refuse.
+    """
+    files = assign_files(paths, drive.log)
+    report: dict[str, Any] = {"logs": {}}
+    tracks: dict[str, _Track] = {}
+    for entry in drive.log:
+        tracks[entry.name], report["logs"][entry.name] = _read_track(files[entry.name], entry, drive)
+    offsets = _clock_offsets(drive, tracks, report)
+    grid = _common_grid(drive, tracks, offsets)
+    gaps = {entry.name: entry.allowed_gap for entry in drive.log}
+
+    def on_grid(columns: dict[str, Column], table: str) -> dict[str, Array]:
+        out = {}
+        for name, column in columns.items():
+            log = drive.log_of(column)
+            values: dict[str, Array] = getattr(tracks[log], table)
+            out[name] = resample(tracks[log].stamped.time + offsets[log], values[name], grid, gaps[log])
+        return out
+
+    signals, reference = on_grid(drive.signals, "signals"), on_grid(drive.reference, "reference")
+    report["grid"] = {
+        "samples": int(grid.size),
+        "sample_time_s": drive.sample_time,
+        "start_s": float(grid[0]),
+        "end_s": float(grid[-1]),
+        "missing_samples": {
+            name: int(np.count_nonzero(np.isnan(value)))
+            for name, value in {**reference, **signals}.items()
+            if np.isnan(value).any()
+        },
+    }
+    return DriveLog(time=grid, signals=signals, reference=reference, report=report)
+
+
+def assign_files(paths: Sequence[Path], entries: Sequence[LogFile]) -> dict[str, Path]:
+    """Which file is which log: by the ``file`` pattern of the log, in order where no log has one.
+
+    A directory stands for the files in it that some log asks for by pattern. Raises LogError naming what is left over.
+    """
+    patterns = [entry.file for entry in entries if entry.file is not None]
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            found += sorted(p for p in path.iterdir() if any(fnmatch(p.name, pattern) for pattern in patterns))
+        else:
+            found.append(path)
+    if not patterns and len(found) == len(entries):
+        return {entry.name: path for entry, path in zip(entries, found, strict=True)}
+    files: dict[str, Path] = {}
+    for entry in entries:
+        matching = [path for path in found if entry.file is None or fnmatch(path.name, entry.file)]
+        if len(matching) != 1:
+            wanted = f"a file like '{entry.file}'" if entry.file else "one file"
+            got = ", ".join(path.name for path in matching) or "none"
+            raise LogError(f"log '{entry.name}' needs {wanted}, given: {got}; name one file for each log of the drive")
+        files[entry.name] = matching[0]
+    spare = [path.name for path in found if path not in files.values()]
+    if spare:
+        raise LogError(f"{spare[0]}: belongs to no log of the drive file; leave it out, or add a [[log]] for it")
+    return files
+
+
+def _read_track(path: Path, entry: LogFile, drive: DriveFile) -> tuple[_Track, dict[str, Any]]:
+    signals = {name: c for name, c in drive.signals.items() if drive.log_of(c) == entry.name}
+    reference = {name: c for name, c in drive.reference.items() if drive.log_of(c) == entry.name}
+    wanted = {entry.time: f"time of log '{entry.name}'"}
+    wanted |= {c.column: f"reference.{name}" for name, c in reference.items()}
+    wanted |= {c.column: f"signals.{name}" for name, c in signals.items()}
+    table = read_columns(path, wanted, entry.delimiter)
+    values = {column: table.values[column] for column in wanted if column != entry.time}
+    seconds = table.values[entry.time] * factor_to(entry.time_unit, "s")
+    stamped = clean_stamps(path.name, seconds, values, sort=entry.sort, duplicates=entry.duplicates)
+    if stamped.time.size < 2:
+        raise LogError(f"{path.name}: holds a single time stamp; a drive needs at least two")
+    spacing = np.diff(stamped.time)
+    _check_rate(path, entry, float(np.median(spacing)))
+    report: dict[str, Any] = {
+        "file": path.name,
+        "rows": table.rows,
+        "duplicates": stamped.duplicates,
+        "out_of_order": stamped.out_of_order,
+        "gaps": int(np.count_nonzero(spacing > entry.allowed_gap * (1 + 1e-9))),
+        "largest_gap_s": float(spacing.max()),
+        "allowed_gap_s": entry.allowed_gap,
+        "median_rate_hz": float(1.0 / np.median(spacing)),
+        "clock_offset_s": entry.clock_offset,
+        "not_finite": table.not_finite,
+    }
+    track = _Track(
+        stamped=stamped,
+        signals={n: stamped.values[c.column] * c.scale(SIGNALS[n]) for n, c in signals.items()},
+        reference={n: stamped.values[c.column] * c.scale(REFERENCES[n]) for n, c in reference.items()},
+    )
+    return track, report
+
+
+def _check_rate(path: Path, entry: LogFile, spacing: float) -> None:
+    """A clock in the wrong unit shows as a rate that is off by a power of ten."""
+    if not 1 / 3 < spacing * entry.rate < 3:
+        raise LogError(
+            f"{path.name}: rows are {spacing:g} s apart where log '{entry.name}' says {entry.rate:g} Hz; "
+            f"correct its rate or its time_unit (now '{entry.time_unit}')"
+        )
+
+
+def _clock_offsets(drive: DriveFile, tracks: dict[str, _Track], report: dict[str, Any]) -> dict[str, float]:
+    """Seconds added to the stamps of each log; logs with ``align`` have theirs estimated and reported."""
+    offsets = {entry.name: entry.clock_offset for entry in drive.log}
+    for entry in drive.log:
+        if entry.align is None:
+            continue
+        velocity_log, velocity = _find(drive, tracks, entry.align.velocity)
+        acceleration_log, acceleration = _find(drive, tracks, entry.align.acceleration)
+        found = find_offset(
+            tracks[velocity_log].stamped.time,
+            velocity,
+            tracks[acceleration_log].stamped.time,
+            acceleration,
+            entry.align.search,
+        )
+        sign = 1.0 if velocity_log == entry.name else -1.0
+        offsets[entry.name] = offsets[entry.align.to] + sign * found.seconds
+        report["logs"][entry.name]["clock_offset_s"] = offsets[entry.name]
+        report["logs"][entry.name]["alignment"] = {
+            "to": entry.align.to,
+            "correlation": found.correlation,
+            "slope": found.slope,
+        }
+    return offsets
+
+
+def _find(drive: DriveFile, tracks: dict[str, _Track], name: str) -> tuple[str, Array]:
+    column = drive.signals.get(name) or drive.reference[name]
+    log = drive.log_of(column)
+    return log, (tracks[log].signals if name in drive.signals else tracks[log].reference)[name]
+
+
+def _common_grid(drive: DriveFile, tracks: dict[str, _Track], offsets: dict[str, float]) -> Array:
+    """The grid t0 + k*Ts over the time that all logs cover."""
+    start = max(float(track.stamped.time[0]) + offsets[name] for name, track in tracks.items())
+    end = min(float(track.stamped.time[-1]) + offsets[name] for name, track in tracks.items())
+    samples = int(np.floor((end - start) / drive.sample_time + 1e-6)) + 1
+    if samples < 2:
+        raise LogError(
+            f"the logs {', '.join(tracks)} do not overlap on one clock (from {start:g} s to {end:g} s); "
+            "check clock_offset, or let align estimate it"
+        )
+    return np.asarray(start + drive.sample_time * np.arange(samples), dtype=np.float64)

@@ -1,0 +1,137 @@
+"""The signals of one drive as arrays for the four corner observers, with what had to be assumed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from studies.drives import corner_inputs
+from studies.drives.drive_file import DriveFile
+from studies.drives.log import DriveLog
+from studies.drives.quantities import CORNERS
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CornerInputs:
+    """Inputs of the four corner observers over n samples, SI; corner order fl, fr, rl, rr.
+
+    The relative acceleration is u = R_e dw/dt - (free + per_speed V_x), P1 (22), with the estimate of V_x put in as the
+    observers run. ``assumptions`` says what the log did not give, ``force_sources`` where each corner's force is from.
+    """
+
+    time: Array
+    wheel_speed: Array
+    radius: Array
+    wheel_acceleration: Array
+    vertical_load: Array
+    force: Array
+    normalised_force: Array
+    free: Array
+    per_speed: Array
+    steer: Array
+    yaw_rate: Array
+    ax: Array
+    vy: Array
+    x: Array
+    y: Array
+    force_sources: tuple[str, ...]
+    assumptions: tuple[str, ...]
+
+    @property
+    def surface_speed(self) -> Array:
+        """R_e w (n, 4), m/s."""
+        return self.radius * self.wheel_speed
+
+
+def corner_inputs_of(log: DriveLog, drive: DriveFile) -> CornerInputs:
+    """Everything the observers need from a log; signals that are not measured count as zero, and are listed."""
+    car, lag, step = drive.vehicle, drive.observer.derivative_lag, drive.sample_time
+    assumptions: list[str] = []
+
+    def measured(name: str, meaning: str) -> Array:
+        if name not in log.signals:
+            assumptions.append(f"{meaning} is not measured: taken as 0")
+        return log.signals.get(name, np.zeros_like(log.time))
+
+    def rate(value: Array) -> Array:
+        columns = [corner_inputs.derivative(column, step, lag) for column in np.atleast_2d(value.T)]
+        return np.stack(columns, axis=-1).reshape(value.shape)
+
+    wheel_speed = _four(log, "wheel_speed")
+    radius = np.repeat([car.effective_radius_front, car.effective_radius_rear], 2)
+    ax, ay = log.signals["ax"], measured("ay", "lateral acceleration")
+    yaw_rate, vy = measured("yaw_rate", "yaw rate"), measured("vy", "lateral velocity")
+    steer = _steer(log, drive, assumptions)
+    wheel_acceleration = rate(wheel_speed)
+    geometry = (car.front_axle_to_cg, car.rear_axle_to_cg, car.track_front, car.track_rear)
+    load = corner_inputs.vertical_loads(
+        ax, ay, car.mass, car.front_axle_to_cg, car.rear_axle_to_cg, car.cg_height, car.track_front, car.track_rear
+    )
+    force, sources = _forces(log, drive, wheel_speed, wheel_acceleration, load, radius)
+    x, y = corner_inputs.corner_positions(*geometry)
+    free, per_speed = corner_inputs.corner_acceleration(ax, ay, yaw_rate, rate(yaw_rate), vy, steer, rate(steer), x, y)
+    return CornerInputs(
+        time=log.time,
+        wheel_speed=wheel_speed,
+        radius=radius,
+        wheel_acceleration=wheel_acceleration,
+        vertical_load=load,
+        force=force,
+        normalised_force=corner_inputs.normalised_forces(force, load, car.mass * corner_inputs.GRAVITY / 4),
+        free=free,
+        per_speed=per_speed,
+        steer=steer,
+        yaw_rate=yaw_rate,
+        ax=ax,
+        vy=vy,
+        x=x,
+        y=y,
+        force_sources=sources,
+        assumptions=tuple(assumptions),
+    )
+
+
+def _four(log: DriveLog, name: str) -> Array:
+    nothing = np.full_like(log.time, np.nan)
+    return np.stack([log.signals.get(f"{name}_{corner}", nothing) for corner in CORNERS], axis=-1)
+
+
+def _steer(log: DriveLog, drive: DriveFile, assumptions: list[str]) -> Array:
+    """Road-wheel angles (n, 4), rad: per corner where measured, else both front wheels alike, rear wheels straight."""
+    steer = np.zeros((log.time.size, 4))
+    if "steering" in log.signals:
+        steer[:, :2] = log.signals["steering"][:, None]
+    elif "hand_wheel" in log.signals and drive.vehicle.steering_ratio:
+        steer[:, :2] = log.signals["hand_wheel"][:, None] / drive.vehicle.steering_ratio
+    elif not any(name.startswith("steer_") for name in log.signals):
+        assumptions.append("steering angle is not measured: taken as 0")
+    for k, corner in enumerate(CORNERS):
+        steer[:, k] = log.signals.get(f"steer_{corner}", steer[:, k])
+    return steer
+
+
+def _forces(
+    log: DriveLog, drive: DriveFile, wheel_speed: Array, wheel_acceleration: Array, load: Array, radius: Array
+) -> tuple[Array, tuple[str, ...]]:
+    """F_x per corner: wheel dynamics where the torque is known, what is left of m a_x shared by load elsewhere."""
+    car = drive.vehicle
+    dynamics = corner_inputs.wheel_forces(
+        _four(log, "torque"),
+        wheel_speed,
+        wheel_acceleration,
+        load,
+        car.wheel_inertia or 0.0,
+        radius,
+        car.rolling_resistance,
+        drive.observer.stopped_below,
+    )
+    known = np.array([f"torque_{corner}" in log.signals for corner in CORNERS])
+    sources = tuple("wheel dynamics" if k else "m*a_x shared by load" for k in known)
+    if known.all():
+        return dynamics, sources
+    dynamics[:, ~known] = np.nan
+    return corner_inputs.shared_forces(log.signals["ax"], load, car.mass, dynamics, known), sources

@@ -1,0 +1,131 @@
+"""Units of a drive file, and what may be measured in a drive log.
+
+A quantity is a number and a unit in one string, ``"2300 kg"``; a log column has a unit alone, ``"rpm"``. Both are
+read by pint and kept in SI. Nothing is evaluated: a pattern takes number and unit apart before pint sees the unit.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from collections.abc import Callable
+from typing import Annotated
+
+import pint
+from pydantic import BeforeValidator
+
+CORNERS = ("fl", "fr", "rl", "rr")
+"""Corner order of every array: front left, front right, rear left, rear right."""
+
+
+def _corners(name: str, unit: str) -> dict[str, str]:
+    return {f"{name}_{corner}": unit for corner in CORNERS}
+
+
+SIGNALS: dict[str, str] = {
+    **_corners("wheel_speed", "rad/s"),
+    **_corners("steer", "rad"),
+    **_corners("torque", "N*m"),
+    "steering": "rad",
+    "hand_wheel": "rad",
+    "ax": "m/s^2",
+    "ay": "m/s^2",
+    "yaw_rate": "rad/s",
+    "vy": "m/s",
+}
+"""What the observers may use, and its SI unit."""
+
+REFERENCES: dict[str, str] = {
+    "vx": "m/s",
+    "vy": "m/s",
+    "ax": "m/s^2",
+    **_corners("force_x", "N"),
+    **_corners("force_z", "N"),
+}
+"""What the estimates may be judged against, and its SI unit; never an input."""
+
+_UNIT = re.compile(r"(1/)?[A-Za-zµ°][A-Za-zµ°_]*([*/ ]+[A-Za-zµ°][A-Za-zµ°_]*|(\^|\*\*)-?[0-9])*")
+_QUANTITY = re.compile(r"\s*([-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]{1,3})?)\s*(.*?)\s*")
+_EXAMPLES = {
+    "s": "s, ms, us, min",
+    "Hz": "Hz, kHz",
+    "rad": "rad, deg",
+    "rad/s": "rad/s, deg/s, rpm",
+    "m/s": "m/s, km/h, mph",
+    "m/s^2": "m/s^2, standard_gravity",
+    "N": "N, kN",
+    "N*m": "N*m, kN*m",
+    "kg": "kg, t",
+    "kg*m^2": "kg*m^2",
+    "m": "m, cm, mm",
+}
+
+
+@functools.cache
+def _registry() -> pint.UnitRegistry[float]:
+    return pint.UnitRegistry()
+
+
+@functools.cache
+def factor_to(unit: str, target: str) -> float:
+    """What a number in ``unit`` is multiplied by to be in ``target`` (an SI unit of this module).
+
+    Raises ValueError on an unknown unit, on another dimension, and on a unit that leaves open whether it counts turns
+    or radians (``Hz`` for a wheel speed): pint takes radians for plain numbers, a drive log must not.
+    """
+    examples = _EXAMPLES.get(target, target)
+    if len(unit) > 40 or not _UNIT.fullmatch(unit):
+        raise ValueError(f"'{unit}' is not a unit; use one such as {examples}")
+    try:
+        wanted = _registry().Quantity(1.0, target)
+        given = _registry().Quantity(1.0, unit)
+        value = given.to(wanted.units)
+    except pint.DimensionalityError as error:
+        raise ValueError(f"unit '{unit}' has another dimension than {target}; use one such as {examples}") from error
+    except Exception as error:  # pint raises its own, tokenizer and attribute errors for a word it does not know
+        raise ValueError(f"unknown unit '{unit}'; use one such as {examples}") from error
+    if _counts_angle(given) != _counts_angle(wanted):
+        raise ValueError(f"unit '{unit}' does not count angle the way {target} does; use one such as {examples}")
+    factor = float(value.magnitude)
+    if not math.isfinite(factor) or factor == 0:
+        raise ValueError(f"unit '{unit}' cannot be converted to {target}; use one such as {examples}")
+    return factor
+
+
+def _counts_angle(quantity: pint.Quantity[float]) -> bool:
+    return any(str(name) == "radian" for name, _ in quantity.to_root_units().unit_items())
+
+
+def to_si(text: object, target: str) -> float:
+    """The number of a quantity such as ``"5 ms"`` in the SI unit ``target``; ValueError on anything else."""
+    example = _EXAMPLES.get(target, target).split(",")[0]
+    if isinstance(text, bool) or not isinstance(text, str | int | float):
+        raise ValueError(f'write a number and a unit in quotes, such as "1.5 {example}"')
+    if not isinstance(text, str):
+        raise ValueError(f'{text} has no unit; write it in quotes with its unit, such as "{text} {example}"')
+    match = _QUANTITY.fullmatch(text)
+    if match is None or not match[2]:
+        raise ValueError(f"'{text}' is not a number with a unit; write it like \"1.5 {example}\"")
+    return float(match[1]) * factor_to(match[2], target)
+
+
+def _quantity(target: str, lowest: float, *, inclusive: bool) -> Callable[[object], float]:
+    def read(text: object) -> float:
+        value = to_si(text, target)
+        if not math.isfinite(value) or value < lowest or (value == lowest and not inclusive):
+            bound = "at least" if inclusive else "above"
+            raise ValueError(f"'{text}' is out of range; it must be finite and {bound} {lowest:g} {target}")
+        return value
+
+    return read
+
+
+Mass = Annotated[float, BeforeValidator(_quantity("kg", 0.0, inclusive=False))]
+Length = Annotated[float, BeforeValidator(_quantity("m", 0.0, inclusive=False))]
+Inertia = Annotated[float, BeforeValidator(_quantity("kg*m^2", 0.0, inclusive=False))]
+Duration = Annotated[float, BeforeValidator(_quantity("s", 0.0, inclusive=False))]
+Lag = Annotated[float, BeforeValidator(_quantity("s", 0.0, inclusive=True))]
+Offset = Annotated[float, BeforeValidator(_quantity("s", -math.inf, inclusive=False))]
+Rate = Annotated[float, BeforeValidator(_quantity("Hz", 0.0, inclusive=False))]
+AngularSpeed = Annotated[float, BeforeValidator(_quantity("rad/s", 0.0, inclusive=True))]

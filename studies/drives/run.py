@@ -1,0 +1,100 @@
+"""Replay a recorded drive and write what came of it: estimates, metrics against references and baselines, plots."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from studies.drives.drive_file import read_drive
+from studies.drives.judge import DriveData, judge
+from studies.drives.log import read_log
+from studies.drives.output import ready_folder, whole_file, write_csv, write_json
+from studies.drives.prepare import corner_inputs_of
+from studies.drives.quantities import CORNERS
+from studies.drives.replay import load_schedule, replay
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What a run produced: ``metrics`` as written to metrics.json, what reading the log found, and the files."""
+
+    metrics: dict[str, Any]
+    log_report: dict[str, Any]
+    paths: tuple[Path, ...]
+
+
+def run_drive(logs: Sequence[Path], drive: Path, out: Path, *, progress: Progress | None = None) -> RunResult:
+    """Run the four-corner longitudinal observers over the ``logs`` that the ``drive`` file describes.
+
+    Writes estimates.csv, metrics.json and the plots (svg and png) to ``out``, each whole or not at all. ``progress``
+    is called with the fraction done. Raises SpecError (drive file, schedule) or LogError (logs, ``out``), one line
+    each, before anything is written.
+    """
+    told = progress if progress is not None else _silent
+    data = replay_drive(logs, drive, progress=lambda done: told(0.4 * done))
+    metrics = judge(data)
+    ready_folder(out)
+    paths = [out / "estimates.csv", out / "metrics.json"]
+    write_csv(paths[0], estimate_columns(data))
+    write_json(paths[1], metrics)
+    paths += _draw(data, out, told)
+    told(1.0)
+    return RunResult(metrics=metrics, log_report=data.log.report, paths=tuple(paths))
+
+
+def replay_drive(logs: Sequence[Path], drive: Path, *, progress: Progress | None = None) -> DriveData:
+    """As :func:`run_drive`, but the arrays are returned and nothing is written."""
+    told = progress if progress is not None else _silent
+    description = read_drive(drive)
+    schedule = load_schedule(description.schedules.longitudinal, drive.parent, description.sample_time)
+    log = read_log(logs, description)
+    told(0.2)
+    inputs = corner_inputs_of(log, description)
+    replayed = replay(inputs, schedule, lambda done: told(0.2 + 0.8 * done))
+    return DriveData(description, schedule, log, inputs, replayed)
+
+
+def _silent(_done: float) -> None:
+    pass
+
+
+def estimate_columns(data: DriveData) -> dict[str, np.ndarray[Any, Any]]:
+    """The columns of estimates.csv, SI, the unit in every name."""
+    columns: dict[str, np.ndarray[Any, Any]] = {"time_s": data.log.time, "vx_mps": data.replay.velocity}
+    columns |= {f"vx_{name}_mps": value for name, value in data.baselines.items()}
+    per_corner = {
+        "vx_{}_mps": data.replay.corner_velocity,
+        "relative_velocity_{}_mps": data.replay.relative_velocity,
+        "slip_{}": data.slip,
+        "force_x_{}_N": data.inputs.force,
+        "force_z_{}_N": data.inputs.vertical_load,
+        "normalised_force_{}": data.inputs.normalised_force,
+        "innovation_{}": data.replay.innovation,
+        "flags_{}": data.replay.flags,
+    }
+    for pattern, values in per_corner.items():
+        columns |= {pattern.format(corner): values[:, k] for k, corner in enumerate(CORNERS)}
+    units = {"v": "mps", "a": "mps2", "f": "N"}
+    columns |= {f"reference_{name}_{units[name[0]]}": value for name, value in data.log.reference.items()}
+    return columns
+
+
+def _draw(data: DriveData, out: Path, told: Progress) -> list[Path]:
+    from studies.report.drive_plots import figures  # matplotlib costs a second that bad input must not
+
+    paths = []
+    drawn = figures(data)
+    for k, (name, save) in enumerate(drawn.items()):
+        for suffix in (".svg", ".png"):
+            path = out / f"{name}{suffix}"
+            with whole_file(path) as beside:
+                save(beside)
+            paths.append(path)
+        told(0.4 + 0.6 * (k + 1) / len(drawn))
+    return paths
