@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy as sp
 
 from synthesis.errors import ModelError
+from synthesis.models.param import Constant, SchedulingParameter
 from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
 from synthesis.polynomials.positivity import prove_positive
-
-if TYPE_CHECKING:
-    from synthesis.models.lpv import LpvModel
-
 
 MATRICES = ("A", "B", "C", "D", "E", "F")
 
@@ -56,13 +53,18 @@ class PolynomialModel:
         )
 
 
-def extract(model: LpvModel) -> PolynomialModel:
-    """Substitute constants, clear denominators and collect coefficients."""
-    generators = [sp.Symbol(p.name) for p in model.parameters]
-    values = {sp.Symbol(name): sp.Rational(str(c.value)) for name, c in model.constants.items()}
-    matrices = {key: getattr(model, key).subs(values) for key in MATRICES}
+def extract(
+    where: str,
+    symbolic: Mapping[str, sp.Matrix],
+    parameters: Sequence[SchedulingParameter],
+    constants: Mapping[str, Constant],
+) -> PolynomialModel:
+    """Substitute constants, clear denominators and collect coefficients; `where` names the model in messages."""
+    generators = [sp.Symbol(p.name) for p in parameters]
+    values = {sp.Symbol(name): sp.Rational(str(c.value)) for name, c in constants.items()}
+    matrices = {key: symbolic[key].subs(values) for key in MATRICES}
     fractions = {
-        key: [[_fraction(entry, generators, f"model '{model.name}': {key}[{i},{j}]") for j, entry in enumerate(row)]
+        key: [[_fraction(entry, generators, f"{where}: {key}[{i},{j}]") for j, entry in enumerate(row)]
               for i, row in enumerate(matrix.tolist())]
         for key, matrix in matrices.items()
     }  # fmt: skip
@@ -71,17 +73,17 @@ def extract(model: LpvModel) -> PolynomialModel:
         for row in rows:
             for _, below in row:
                 denominator = sp.lcm(denominator, below)
-    middle = {g: sp.Rational(str(p.middle)) for g, p in zip(generators, model.parameters, strict=True)}
+    middle = {g: sp.Rational(str(p.middle)) for g, p in zip(generators, parameters, strict=True)}
     size = sp.expand(denominator).subs(middle)
     if size == 0:
-        raise ModelError(f"model '{model.name}': a denominator vanishes at the middle of the range; shrink the range")
+        raise ModelError(f"{where}: a denominator vanishes at the middle of the range; shrink the range")
     denominator = sp.expand(denominator / size)  # one where the range has its middle: positive if it has no root
     arrays = {}
     for key, rows in fractions.items():
         numerators = [[sp.expand(sp.cancel(above * denominator / below)) for above, below in row] for row in rows]
         arrays[key] = _coefficients(numerators, matrices[key].shape, generators)
     below = _coefficients([[denominator]], (1, 1), generators)
-    _check_denominator(model, below)
+    _check_denominator(where, parameters, below)
     return PolynomialModel(denominator=below, **arrays)
 
 
@@ -110,17 +112,15 @@ def _coefficients(rows: list[list[sp.Expr]], shape: tuple[int, int], generators:
     return out
 
 
-def _check_denominator(model: LpvModel, denominator: FloatArray) -> None:
+def _check_denominator(where: str, parameters: Sequence[SchedulingParameter], denominator: FloatArray) -> None:
     if denominator.size == 1:
         return
-    offsets = np.array([p.middle for p in model.parameters])
-    factors = np.array([p.half_width for p in model.parameters])
+    offsets = np.array([p.middle for p in parameters])
+    factors = np.array([p.half_width for p in parameters])
     found = prove_positive(MatrixPolynomial(denominator[..., None]).affine(offsets, factors))
     if not found.proved:
         place = ", ".join(
             f"{p.name} = {o + f * u:.4g} {p.unit}"
-            for p, o, f, u in zip(model.parameters, offsets, factors, found.place, strict=True)
+            for p, o, f, u in zip(parameters, offsets, factors, found.place, strict=True)
         )
-        raise ModelError(
-            f"model '{model.name}': a denominator vanishes inside the range, near {place}; shrink the range"
-        )
+        raise ModelError(f"{where}: a denominator vanishes inside the range, near {place}; shrink the range")

@@ -89,7 +89,8 @@ class LpvModel:
     @cached_property
     def polynomial(self) -> PolynomialModel:
         """Coefficient arrays of the matrices in the physical parameters, over a common denominator."""
-        return extract(self)
+        matrices = {key: getattr(self, key) for key in MATRICES}
+        return extract(f"model '{self.name}'", matrices, self.parameters, self.constants)
 
     def on(self, grid: ArrayLike) -> NumericModel:
         """The model at g parameter values: the only border between sympy and numpy.

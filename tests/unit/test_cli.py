@@ -149,3 +149,27 @@ def test_killed_in_the_middle_leaves_whole_files(tmp_path: Path) -> None:
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
         assert main(["certify", str(tmp_path / f"{name}.json")]) == 0
+
+
+DRIVE = (ROOT / "tests" / "drives" / "ocd_suv_step_steer_22mps.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("drive", "log", "words"),
+    [
+        (DRIVE, "t_s,vx\n0.0,1.0\n", "t_s,vx"),
+        (DRIVE.replace("[vehicle]", "[vehcile]"), "", "vehcile"),
+        ("schema = ", "", "drive.toml"),
+    ],
+)
+def test_bad_replays_exit_with_two(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], drive: str, log: str, words: str
+) -> None:
+    (tmp_path / "drive.toml").write_text(drive)
+    (tmp_path / "ocd_suv_step_steer_22mps_200hz.csv").write_text(log)
+    logs = str(tmp_path / "ocd_suv_step_steer_22mps_200hz.csv")
+    assert main(["run", logs, "--drive", str(tmp_path / "drive.toml"), "--out", str(tmp_path / "out")]) == 2
+    line = capsys.readouterr().err.strip()
+    assert len(line.splitlines()) == 1
+    assert words in line or "column" in line
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,119 @@
+"""Small problems with known answers, built from the parts of the engine: used by several tests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from synthesis.lmi.problem import LmiProblem
+from synthesis.lmi.scaling import observer_scale
+from synthesis.models.catalogue.corner import Direction, corner_velocity_model
+from synthesis.models.lpv import LpvModel
+from synthesis.models.param import SchedulingParameter, Signal
+from synthesis.models.parameter_set import Published, load_parameter_set
+from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial, symmetric_block
+
+
+def parameter(name: str = "p", low: float = -1.0, high: float = 1.0, rate: float = 1.0) -> SchedulingParameter:
+    """A dimensionless parameter with symmetric rates; rate 0: constant, inf: it may jump."""
+    return SchedulingParameter(name, "1", low, high, -rate, rate)
+
+
+def small_model(A: Any, C: Any, parameters: Sequence[SchedulingParameter] = (), **more: Any) -> LpvModel:
+    """A model with dimensionless signals x1.., y1.., and disturbances d1.. if E is given."""
+    A, C = sp.Matrix(A), sp.Matrix(C)
+    disturbances = sp.Matrix(more["E"]).shape[1] if "E" in more else 0
+    inputs = sp.Matrix(more["B"]).shape[1] if "B" in more else 0
+    filled: dict[str, Any] = {
+        "name": "small",
+        "source": "made for a test",
+        "states": tuple(Signal(f"x{i + 1}", "1") for i in range(A.shape[0])),
+        "outputs": tuple(Signal(f"y{i + 1}", "1") for i in range(C.shape[0])),
+        "inputs": tuple(Signal(f"u{i + 1}", "1") for i in range(inputs)),
+        "disturbances": tuple(Signal(f"d{i + 1}", "1") for i in range(disturbances)),
+        "parameters": tuple(parameters) or (parameter(),),
+        "A": A,
+        "C": C,
+    }
+    return LpvModel(**(filled | more))
+
+
+def corner(name: str, direction: Direction, maximum: float = 180.0) -> tuple[LpvModel, Published]:
+    """A corner model of the papers with what its source prints."""
+    values = load_parameter_set(name)
+    published = values.tire[direction].published
+    assert published is not None
+    return corner_velocity_model(values, direction, maximum), published
+
+
+def lyapunov_problem(
+    parameters: Sequence[SchedulingParameter], A: FloatArray, degree: int | tuple[int, ...] = 0
+) -> LmiProblem:
+    """P > 0, A'P + P A + dP/dt < 0, normalised by P < 1, margin maximised; A as coefficients (d_1+1, .., n, n)."""
+    problem = LmiProblem(tuple(parameters), maximise_margin=True)
+    known = problem.known(A)
+    P = problem.symmetric("P", known.shape[0], degree)
+    product = P @ known
+    problem.require("P > 0", P)
+    problem.require("P < 1", problem.constant(np.eye(known.shape[0])) - P, strict=False)
+    problem.require("dV/dt < 0", -(product + product.T + problem.time_derivative(P)))
+    return problem
+
+
+def gain_inequality(
+    problem: LmiProblem, A: FloatArray, B: FloatArray, C: FloatArray, degree: int | tuple[int, ...]
+) -> tuple[MatrixPolynomial, MatrixPolynomial]:
+    """P and the bounded real block of x' = A x + B d, z = C x, both to be positive; minimises `gamma`."""
+    known = [problem.known(matrix) for matrix in (A, B, C)]
+    P = problem.symmetric("P", known[0].shape[0], degree)
+    gamma = problem.scalar("gamma")
+    problem.minimise("gamma")
+    product = P @ known[0]
+    corner_block = product + product.T + problem.time_derivative(P)
+    inputs = problem.constant(np.eye(known[1].shape[1])).scaled_by(gamma)
+    outputs = problem.constant(np.eye(known[2].shape[0])).scaled_by(gamma)
+    return P, -symmetric_block(
+        [[corner_block, P @ known[1], known[2].T], [None, -inputs, None], [None, None, -outputs]]
+    )
+
+
+def gain_problem(
+    parameters: Sequence[SchedulingParameter],
+    A: FloatArray,
+    B: FloatArray,
+    C: FloatArray,
+    degree: int | tuple[int, ...],
+) -> LmiProblem:
+    """The least L2 gain that some P of this degree proves."""
+    problem = LmiProblem(tuple(parameters))
+    P, block = gain_inequality(problem, A, B, C, degree)
+    problem.require("P > 0", P)
+    problem.require("gain", block)
+    return problem
+
+
+def reference_problem(model: LpvModel, degree: int, given: float, noise: float = 0.5) -> LmiProblem:
+    """The reference problem with the first state of the model as given multiplied by `given`.
+
+    e' = (A - L C) e + (E - L F) W d, z = e in the original units, W = diag(1, 1, noise); minimises gamma^2.
+    """
+    units = np.array([given, 1.0])
+    poly = model.polynomial.with_states_scaled(units)
+    scale = observer_scale(poly, model.parameters)
+    balanced = poly.with_states_scaled(scale)
+    problem = LmiProblem(model.parameters)
+    A, C, E, F = (problem.known(getattr(balanced, key)) for key in "ACEF")
+    weights = problem.constant(np.diag([1.0, 1.0, noise]))
+    P, X = problem.symmetric("P", 2, degree), problem.matrix("X", 2, 1, degree)
+    squared = problem.scalar("gamma^2")
+    problem.minimise("gamma^2")
+    closed = P @ A - X @ C
+    output = problem.constant(np.diag(1.0 / (units * scale) ** 2))
+    top = closed + closed.T + problem.time_derivative(P) + output
+    inputs = problem.constant(np.eye(3)).scaled_by(squared)
+    problem.require("P > 0", P)
+    problem.require("gain", -symmetric_block([[top, (P @ E - X @ F) @ weights], [None, -inputs]]))
+    return problem
