@@ -9,19 +9,24 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
-from synthesis.lmi.conic import ConicData
+from synthesis.lmi.conic import ConicData, triangle
 from synthesis.lmi.settings import LmiSettings
 from synthesis.polynomials.matrix import FloatArray
 
 
 @dataclass(frozen=True)
 class RawAnswer:
-    """A point and what the solver claims about it."""
+    """A point and what the solver claims about it.
+
+    `excluded` is what re-evaluation makes of a claim of infeasibility: no decisions of a 1-norm below it can satisfy the
+    inequalities (0: nothing is excluded, or nothing was claimed).
+    """
 
     solver: str
     decisions: FloatArray
     status: str
     infeasible: bool
+    excluded: float
     iterations: int
     seconds: float
     dual_bound: float
@@ -42,16 +47,40 @@ def solve_with_clarabel(data: ConicData, decisions: int, settings: LmiSettings) 
     solution = solver.solve()
     seconds = perf_counter() - start
     status = str(solution.status)
+    infeasible = status in ("PrimalInfeasible", "AlmostPrimalInfeasible")
     x, z = np.asarray(solution.x, float), np.asarray(solution.z, float)
     return RawAnswer(
         "clarabel",
         x[:decisions],
         status,
-        status in ("PrimalInfeasible", "AlmostPrimalInfeasible"),
+        infeasible,
+        _excluded_radius(data, z) if infeasible else 0.0,
         solution.iterations,
         seconds,
         _dual_bound(data, x, z),
     )
+
+
+def _excluded_radius(data: ConicData, z: FloatArray) -> float:
+    """Farkas, re-evaluated: with z in the dual cone, A x + s = b and s in the cone give -b'z <= |x|_1 |A'z|_inf.
+
+    The claimed certificate is first projected on the cone, so that no rounding of the solver's can refute anything.
+    """
+    z = z.copy()
+    start = data.equalities
+    for size in data.semidefinite:
+        rows, columns, weights = triangle(size)
+        part = slice(start, start + len(rows))
+        matrix = np.zeros((size, size))
+        matrix[rows, columns] = matrix[columns, rows] = z[part] / weights
+        values, vectors = np.linalg.eigh(matrix)
+        matrix = (vectors * np.maximum(values, 0.0)) @ vectors.T
+        z[part] = matrix[rows, columns] * weights
+        start += len(rows)
+    gap, residual = -float((data.b + data.slack) @ z), float(np.abs(data.A.T @ z).max())
+    if not gap > 0.0:
+        return 0.0
+    return float("inf") if residual == 0.0 else gap / residual
 
 
 def _dual_bound(data: ConicData, x: FloatArray, z: FloatArray) -> float:

@@ -51,7 +51,7 @@ def solve_with_cvxpy(relaxed: RelaxedProblem, solver: str, settings: LmiSettings
         try:
             problem.solve(solver=solver)
         except cp.error.SolverError as error:
-            return RawAnswer(f"cvxpy:{solver}", np.zeros(len(relaxed.cost)), str(error), False, 0, 0.0, -np.inf)
+            return RawAnswer(f"cvxpy:{solver}", np.zeros(len(relaxed.cost)), str(error), False, 0.0, 0, 0.0, -np.inf)
     stats = problem.solver_stats
     seconds = perf_counter() - start if stats is None or stats.solve_time is None else stats.solve_time
     found = x.value is not None
@@ -60,6 +60,7 @@ def solve_with_cvxpy(relaxed: RelaxedProblem, solver: str, settings: LmiSettings
         np.asarray(x.value, float) if found else np.zeros(len(relaxed.cost)),
         str(problem.status),
         problem.status in ("infeasible", "infeasible_inaccurate"),
+        0.0,  # no common form of the certificate either, so nothing can be re-evaluated
         0 if stats is None or stats.num_iters is None else int(stats.num_iters),
         float(seconds),
         -np.inf,  # cvxpy hands out no common form of the dual objective

@@ -18,6 +18,9 @@ from synthesis.polynomials.positivity import prove_positive
 # An objective on the boundary of feasibility is loosened by these fractions, in turn, until every inequality is proved.
 LOOSENING = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 
+# A re-evaluated certificate of infeasibility must exclude all decisions up to this size (they are of size one).
+EXCLUDED = 1e5
+
 
 def solve(problem: LmiProblem, settings: LmiSettings | None = None) -> LmiResult:
     """Relax, solve, substitute, re-evaluate every named inequality on the continuum, and return a verdict.
@@ -83,9 +86,12 @@ def margins_of(problem: LmiProblem, decisions: FloatArray, depth: int) -> tuple[
 
 def _judge(answer: RawAnswer, margins: tuple[Margin, ...], relaxed: RelaxedProblem) -> tuple[Verdict, str]:
     if answer.infeasible:
-        if relaxed.relaxation == "grid":
-            # The points are necessary, so their infeasibility refutes the whole for this degree of the unknowns.
-            return Verdict.REFUTED, f"refuted: no solution even at the grid points ({answer.solver}: {answer.status})"
+        if relaxed.relaxation in ("grid", "exact") and answer.excluded > EXCLUDED:
+            # Points are necessary and sums of squares exact, so this refutes the whole for this degree of the unknowns.
+            return Verdict.REFUTED, (
+                f"refuted: the {relaxed.relaxation} relaxation has no solution (certificate re-evaluated: none with decisions below "
+                f"{answer.excluded:.1e})"
+            )
         return Verdict.INCONCLUSIVE, (
             f"inconclusive: the {relaxed.relaxation} relaxation has no solution ({answer.solver}: {answer.status}); raise "
             "the degree or try the grid relaxation"
