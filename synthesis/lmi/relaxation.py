@@ -108,7 +108,8 @@ def _sample(problem: LmiProblem, entry: Inequality, axes: list[FloatArray], marg
     """Points of the parameters it depends on, times the vertices of the rates it depends on."""
     count = len(problem.parameters)
     used = [axis if degree else np.zeros(1) for axis, degree in zip(axes, entry.matrix.degrees[:count], strict=True)]
-    grid = np.array(list(product(*used))).reshape(-1, count)  # one empty point for an LMI without parameters
+    points = list(product(*used))  # one empty point for an LMI without parameters
+    grid = np.array(points, float).reshape(len(points), count)
     rates = np.array(rate_vertices(entry.matrix, count))
     places = np.hstack([np.tile(grid, (len(rates), 1)), np.repeat(rates, len(grid), axis=0)])
     values = widened(entry.matrix.at(places), problem.decisions)

@@ -100,7 +100,7 @@ def test_bad_files_are_refused_with_the_place(tmp_path: Path, old: str, new: str
     with pytest.raises(SpecError) as error:
         load_parameter_set(path)
     message = str(error.value)
-    assert "\n" not in message.removeprefix(str(path)).strip() or new == "[vehicle"
+    assert "\n" not in message
     for word in ("own.toml", *words):
         assert word in message
 
@@ -113,7 +113,7 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match=r"binary\.toml"):
         load_parameter_set(binary)
     empty = tmp_path / "empty.toml"
-    empty.write_text(GOOD.split("[tire")[0] + "[tire]\n")
+    empty.write_text(GOOD.split("[tire", maxsplit=1)[0] + "[tire]\n")
     with pytest.raises(SpecError, match="tire"):
         load_parameter_set(empty)
 
