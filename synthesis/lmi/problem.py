@@ -184,4 +184,4 @@ class LmiProblem:
             if not p.may_jump and p.rate_maximum > p.rate_minimum and point[count + i] != 0.0:
                 rate = 0.5 * (p.rate_minimum + p.rate_maximum + (p.rate_maximum - p.rate_minimum) * point[count + i])
                 words.append(f"rate = {rate:.4g} ({p.unit})/s")
-        return ", ".join(words)
+        return ", ".join(words) or "all parameters"
