@@ -6,59 +6,24 @@ The inequalities are those of `synthesis.verify`, which proves them exactly; her
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
+from synthesis.deployed_loop import DeployedLoop, segment_gain
+from synthesis.errors import ProblemError
 from synthesis.hinf_observer import Channel, ObserverDesign, channel_matrices
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
-from synthesis.lmi.scaling import error_scale
 from synthesis.lmi.solve import solve
-from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial, symmetric_block
+from synthesis.polynomials.matrix import FloatArray, symmetric_block
 
 POINTS_PER_SEGMENT = 5
 
 
 @dataclass(frozen=True)
-class DeployedLoop:
-    """A model in closed loop with a gain table (breakpoints, nx, ny), linear between its breakpoints."""
-
-    model: LpvModel
-    breakpoints: FloatArray
-    table: FloatArray
-
-    def scale(self) -> FloatArray:
-        """Diagonal balancing of the mid-range error matrix."""
-        middle = 0.5 * (self.breakpoints[0] + self.breakpoints[-1])
-        return error_scale(self.error_matrices(np.array([middle]))[0][0])
-
-    def error_matrices(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """A_e (g, nx, nx) and B_e (g, nx, nd) on a grid."""
-        flat = self.table.reshape(len(self.table), -1)
-        gain = np.stack([np.interp(points, self.breakpoints, column) for column in flat.T], axis=1)
-        return self.model.on(points).error_dynamics(gain.reshape(len(points), *self.table.shape[1:]))
-
-
-@dataclass(frozen=True)
-class Claim:
-    """One proved property; `P` holds coefficients (degree+1, nx, nx) in the physical parameter and states."""
-
-    name: str
-    kind: str
-    level: float
-    unit: str
-    P: FloatArray
-    channel: Channel | None = None
-    frozen_decay: float | None = None
-    growth: float | None = None
-    margin: float = 0.0
-    place: str = ""
-
-
-@dataclass(frozen=True)
-class _Request:
-    """A claim to be solved for: level None means: find the best one."""
+class Request:
+    """A claim to be solved for; level None means: find the best one (for the kind 'gain')."""
 
     name: str
     kind: str
@@ -67,71 +32,35 @@ class _Request:
     channel: Channel | None = None
     frozen_decay: float = 0.0
     growth: float = 0.0
+    open_growth: float = 0.0
 
 
-def frozen_gain(loop: DeployedLoop, channel: Channel, points: int = 281) -> float:
-    """Largest gain of the channel over constant parameters and a grid of frequencies: a bound from below.
+@dataclass(frozen=True)
+class Claim:
+    """One property that was solved for, with margin and tightest place.
 
-    A constant parameter is one of the admissible trajectories, and every frequency bounds the norm there from below.
+    `P` holds coefficients (degree+1, nx, nx) in the physical parameter and states.
     """
-    grid = np.linspace(loop.breakpoints[0], loop.breakpoints[-1], points)
-    A_e, B_e = loop.error_matrices(grid)
-    d, z = channel_matrices(loop.model, channel)
-    frequencies = np.concatenate([[0.0], np.geomspace(1e-2, 1e4, 61)])
-    resolvent = 1j * frequencies[:, None, None, None] * np.eye(A_e.shape[-1]) - A_e
-    response = z @ np.linalg.solve(resolvent, np.broadcast_to(B_e @ d, (len(frequencies), *(B_e @ d).shape)))
-    return float(np.linalg.norm(response, 2, axis=(-2, -1)).max())
+
+    request: Request
+    P: FloatArray
+    margin: float
+    place: str
+
+    @property
+    def name(self) -> str:
+        """As in the schedule file."""
+        return self.request.name
+
+    @property
+    def level(self) -> float:
+        """The claimed number."""
+        return float(self.request.level or 0.0)
 
 
-def claim_levels(loop: DeployedLoop, design: ObserverDesign) -> dict[str, float]:
-    """The least L2 gain of every channel that some P of this degree proves for the table."""
-    out = {}
-    for channel in design.channels:
-        result = _solve(loop, design, _Request(channel.name, "gain", "1", None, channel))
-        good = result.verdict is Verdict.CERTIFIED and result.objective is not None
-        out[channel.name] = float(np.sqrt(result.objective or 0.0)) if good else np.inf
-    return out
-
-
-def prove_claims(
-    loop: DeployedLoop, design: ObserverDesign, levels: dict[str, float], settle: float
-) -> tuple[Claim, ...] | None:
-    """P for every claim with the largest margin; None if one of them cannot be had for this table."""
-    requests = [_Request("decay rate", "decay", "1/s", design.decay_rate)] if design.decay_rate else []
-    if design.fastest_pole is not None:
-        requests.append(_Request("fastest pole", "fastest pole", "1/s", design.fastest_pole))
-    for channel in design.channels:
-        level = _round_up(levels[channel.name] * (1.0 + settle))
-        requests.append(_Request(f"gain {channel.name}", "gain", _gain_unit(loop.model, channel), level, channel))
-    claims = []
-    for request in requests:
-        claim = _claim(loop, design, request)
-        if claim is None:
-            return None
-        claims.append(claim)
-    sampled = _sampled_claim(loop, design)
-    return None if sampled is None else (*claims, sampled)
-
-
-def _sampled_claim(loop: DeployedLoop, design: ObserverDesign) -> Claim | None:
-    """The runtime's own update: the largest proved alpha - beta among a few splits of the slowest frozen pole."""
-    points = np.linspace(loop.breakpoints[0], loop.breakpoints[-1], 2001)
-    slowest = -float(np.linalg.eigvals(loop.error_matrices(points)[0]).real.max())
-    for share in (0.95, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1):
-        for growth in (0.001, 0.05, 0.2, 0.5):
-            alpha = _round_down(share * slowest)
-            beta = _round_down(growth * alpha)
-            if not 0.0 < beta < alpha:
-                continue
-            level = _round_down(0.999999 * (alpha - beta))
-            claim = _claim(loop, design, _Request("sampled decay rate", "sampled", "1/s", level, None, alpha, beta))
-            if claim is not None:
-                return claim
-    return None
-
-
-def _claim(loop: DeployedLoop, design: ObserverDesign, request: _Request) -> Claim | None:
-    result = _solve(loop, design, request)
+def find_claim(loop: DeployedLoop, design: ObserverDesign, request: Request) -> Claim | None:
+    """P for one claim with the largest margin, or None if there is none of this degree."""
+    result = solve_request(loop, design, request)
     if result.verdict is not Verdict.CERTIFIED:
         return None
     (parameter,) = loop.model.parameters
@@ -141,14 +70,10 @@ def _claim(loop: DeployedLoop, design: ObserverDesign, request: _Request) -> Cla
     )
     physical = result.values["P"].affine(offset, factor).coefficients[:, 0, ..., 0]
     scale = loop.scale()
-    tightest = result.tightest
-    return Claim(
-        request.name, request.kind, float(request.level or 0.0), request.unit, physical * np.outer(scale, scale),
-        request.channel, request.frozen_decay or None, request.growth or None, tightest.value, tightest.place,
-    )  # fmt: skip
+    return Claim(request, physical * np.outer(scale, scale), result.tightest.value, result.tightest.place)
 
 
-def _solve(loop: DeployedLoop, design: ObserverDesign, request: _Request) -> LmiResult:
+def solve_request(loop: DeployedLoop, design: ObserverDesign, request: Request) -> LmiResult:
     """Solve for P on all segments; with a level, P < I (or the output weight) normalises and a margin is maximised."""
     scale = loop.scale()
     problem = LmiProblem(loop.model.parameters, maximise_margin=request.level is not None)
@@ -160,12 +85,17 @@ def _solve(loop: DeployedLoop, design: ObserverDesign, request: _Request) -> Lmi
     elif request.kind != "gain":
         problem.require("P < 1", problem.constant(np.eye(size)) - P, strict=False)
     problem.require("P > 0", P)
-    if request.kind == "sampled":
+    if request.kind in ("sampled", "drops"):
         problem.require("growth of P", P * (2.0 * request.growth) - problem.time_derivative(P))
     scaled = loop.model.polynomial.with_states_scaled(scale)
     plant = {key: problem.known(getattr(scaled, key)) for key in ("A", "C", "E", "F", "denominator")}
     below = plant["denominator"]
-    for i, window in enumerate(zip(loop.breakpoints, loop.breakpoints[1:], strict=False)):
+    if request.kind == "drops":
+        coasting = P @ plant["A"]
+        problem.require(
+            "growth while coasting", P.scaled_by(below) * (2.0 * request.open_growth) - coasting - coasting.T
+        )
+    for i, window in enumerate(pairwise(loop.breakpoints)):
         gain = segment_gain(problem, loop, i, scale)
         A_e, B_e = plant["A"] - gain @ plant["C"], plant["E"] - gain @ plant["F"]
         product = P @ A_e
@@ -177,10 +107,11 @@ def _solve(loop: DeployedLoop, design: ObserverDesign, request: _Request) -> Lmi
             block = -(phi + weighted * (2.0 * level))
         elif request.kind == "fastest pole":
             block = S + weighted * (2.0 * level)
-        elif request.kind == "sampled":
+        elif request.kind in ("sampled", "drops"):
             block = -(S + weighted * (2.0 * request.frozen_decay))
+        elif request.channel is None:
+            raise ProblemError(f"claim '{request.name}' of the kind 'gain' needs a channel")
         else:
-            assert request.channel is not None
             d, z = channel_matrices(loop.model, request.channel)
             force = (P @ B_e) @ problem.constant(d)
             inputs = problem.constant(np.eye(d.shape[1]))
@@ -191,34 +122,3 @@ def _solve(loop: DeployedLoop, design: ObserverDesign, request: _Request) -> Lmi
     # A few points a segment are enough: whatever comes out is re-evaluated on the continuum, and proved exactly later.
     points = POINTS_PER_SEGMENT * (len(loop.breakpoints) - 1)
     return solve(problem, replace(design.settings, relaxation="grid", points=points))
-
-
-def segment_gain(problem: LmiProblem, loop: DeployedLoop, segment: int, scale: FloatArray) -> MatrixPolynomial:
-    """The linear gain between two breakpoints, in the scaled states."""
-    low, high = loop.breakpoints[segment : segment + 2]
-    first, second = (scale[:, None] * gain for gain in loop.table[segment : segment + 2])
-    slope = (second - first) / (high - low)
-    return problem.known(np.stack([first - slope * low, slope]))
-
-
-def _gain_unit(model: LpvModel, channel: Channel) -> str:
-    """Unit of the gain when all its disturbances and all its errors share one unit each, else '1' (mixed)."""
-    above = {s.unit for s in model.states if s.name in channel.errors}
-    below = {d.unit for d in model.disturbances if d.name in channel.disturbances}
-    if above == below or len(above) > 1 or len(below) > 1:
-        return "1"
-    (top,), (bottom,) = above, below
-    return top if bottom == "1" else f"({top})/({bottom})"
-
-
-def _round_up(value: float, digits: int = 4) -> float:
-    """Up to so many significant digits, so that a printed bound is a bound."""
-    step = 10.0 ** (np.floor(np.log10(value)) - digits + 1)
-    return float(f"{np.ceil(value / step) * step:.{digits}g}")
-
-
-def _round_down(value: float, digits: int = 4) -> float:
-    if not value > 0.0:
-        return 0.0
-    step = 10.0 ** (np.floor(np.log10(value)) - digits + 1)
-    return float(f"{np.floor(value / step) * step:.{digits}g}")

@@ -8,7 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-from synthesis.claims import Claim, DeployedLoop, claim_levels, prove_claims
+from synthesis.claim_search import claim_levels, prove_claims
+from synthesis.claims import Claim
+from synthesis.deployed_loop import DeployedLoop
 from synthesis.errors import ProblemError
 from synthesis.hinf_observer import ObserverGains
 from synthesis.lmi.result import Verdict
@@ -84,7 +86,7 @@ def deploy(
         cost = max(levels[name] / finer[name] - 1.0 for name in finer)
         if not cost < settings.interpolation_cost:
             continue
-        claims = prove_claims(loop, gains.design, levels, settings.settle)
+        claims = prove_claims(loop, gains.design, levels, settings.settle, settings.sample_time)
         if claims is not None:
             return Deployment(gains, settings, loop, claims, cost)
     raise ProblemError(

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from estimators.schedule import SCHEMA, canonical, write_content
-from synthesis.claims import Claim, DeployedLoop, frozen_gain
+from synthesis.claims import Claim
 from synthesis.deploy import Deployment
+from synthesis.deployed_loop import DeployedLoop, frozen_gain
 from synthesis.errors import ProblemError
 from synthesis.hinf_observer import channel_matrices
 from synthesis.models.extract import MATRICES
@@ -106,12 +107,15 @@ def _polynomial(coefficients: FloatArray) -> dict[str, Any]:
 
 
 def _claim(model: LpvModel, claim: Claim) -> dict[str, Any]:
-    out: dict[str, Any] = {"name": claim.name, "kind": claim.kind, "level": claim.level, "unit": claim.unit}
-    if claim.channel is not None:
-        d, z = channel_matrices(model, claim.channel)
+    request = claim.request
+    out: dict[str, Any] = {"name": claim.name, "kind": request.kind, "level": claim.level, "unit": request.unit}
+    if request.channel is not None:
+        d, z = channel_matrices(model, request.channel)
         out |= {"disturbances": d.tolist(), "errors": z.tolist()}
-    if claim.kind == "sampled":
-        out |= {"frozen_decay": claim.frozen_decay, "growth": claim.growth}
+    if request.kind in ("sampled", "drops"):
+        out |= {"frozen_decay": request.frozen_decay, "growth": request.growth}
+    if request.kind == "drops":
+        out |= {"open_growth": request.open_growth}
     return out | {"P": _polynomial(claim.P)}
 
 
@@ -123,7 +127,7 @@ def _guarantee(deployment: Deployment) -> dict[str, Any]:
     for channel in gains.design.channels:
         claim = claims[f"gain {channel.name}"]
         channels.append(
-            {"name": channel.name, "unit": claim.unit, "gamma_lower": frozen_gain(loop, channel),
+            {"name": channel.name, "unit": claim.request.unit, "gamma_lower": frozen_gain(loop, channel),
              "gamma_certified": claim.level, "design_bound": channel.bound or gains.gamma}
         )  # fmt: skip
     sampled = claims["sampled decay rate"].level

@@ -9,10 +9,13 @@ With V = e'P(w)e, S = A_e'P + P A_e, P' = dP/dw, and for both bounds q of the ra
     fastest pole  P > 0,  S + 2 r P > 0                                    every frozen pole has a real part above -r
     gain          P > 0,  g^2 (S + q P' + Z'Z) + (P B_e W)(P B_e W)' < 0   L2 gain from W d to Z e below g (Schur complement)
     sampled       P > 0,  S + 2 alpha P < 0,  2 beta P - q P' > 0, alpha > beta
+    drops         the same, and A'P + P A - 2 g P < 0: the loop without its measurement grows at most like exp(g t)
 
-The last one is about the update that the runtime performs: over one sample of length T it freezes w and moves the error by
+The claim `sampled` is about the update that the runtime performs: over one sample of length T it freezes w and moves the error by
 e^{A_e T}. Frozen decay gives |e^{A_e T} e|_P <= exp(-alpha T) |e|_P; while w moves on to its next value, P grows by at most
 exp(2 beta T). So V falls by exp(-2 (alpha - beta) T) in every sample, for every T, however w moves within its rate.
+With every measurement lost independently with probability p, the runtime coasts over that sample by e^{A T}, and the mean of V
+changes by at most exp(2 beta T) ((1 - p) exp(-2 alpha T) + p exp(2 g T)): below one, the error is mean-square stable.
 """
 
 from __future__ import annotations
@@ -22,7 +25,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpq_poly
+from flint import arb, fmpq, fmpq_mat, fmpq_poly
 
 from estimators.errors import ScheduleError
 from synthesis.polynomials.rational import (
@@ -38,7 +41,7 @@ from synthesis.polynomials.rational import (
     transpose,
 )
 
-KINDS = ("decay", "fastest pole", "gain", "sampled")
+KINDS = ("decay", "fastest pole", "gain", "sampled", "drops")
 
 
 @dataclass(frozen=True)
@@ -58,11 +61,12 @@ class Proof:
 
 @dataclass(frozen=True)
 class Segment:
-    """The closed loop between two breakpoints, in t on [0, 1]."""
+    """The closed loop between two breakpoints, in t on [0, 1]; A is the loop while it coasts."""
 
     low: fmpq
     high: fmpq
     inner: fmpq_poly  # w(t)
+    A: Matrix
     A_e: Matrix
     B_e: Matrix
 
@@ -89,7 +93,7 @@ def closed_loop(content: Mapping[str, Any]) -> list[Segment]:
         local = {key: compose(matrix, inner) for key, matrix in plant.items()}
         A_e = add(local["A"], scale(multiply(gain, local["C"]), fmpq(-1)))
         B_e = add(local["E"], scale(multiply(gain, local["F"]), fmpq(-1)))
-        out.append(Segment(low, high, inner, A_e, B_e))
+        out.append(Segment(low, high, inner, local["A"], A_e, B_e))
     return out
 
 
@@ -127,6 +131,10 @@ def inequalities(claim: Mapping[str, Any], segment: Segment, P: Matrix, P_dot: M
     if claim["kind"] == "sampled":
         alpha, beta = rational(claim["frozen_decay"]), rational(claim["growth"])
         return [P, scale(add(S, scale(P, 2 * alpha)), fmpq(-1)), add(scale(P, 2 * beta), scale(P_dot, fmpq(-1)))]
+    if claim["kind"] == "drops":
+        coasting = multiply(P, segment.A)
+        growth = add(scale(P, 2 * rational(claim["open_growth"])), scale(add(coasting, transpose(coasting)), fmpq(-1)))
+        return [growth, *inequalities({**claim, "kind": "sampled"}, segment, P, P_dot)]
     Z = polynomial_matrix([[0]], [claim["errors"]])
     W = polynomial_matrix([[0]], [claim["disturbances"]])
     force = multiply(multiply(P, segment.B_e), W)
@@ -147,6 +155,14 @@ def unstable_point(segment: Segment, parts: int = 32) -> fmpq | None:
     return None
 
 
+def falls_in_the_mean(claim: Mapping[str, Any], sample_time: float) -> bool:
+    """(1 - p) exp(-2 alpha T) + p exp(2 g T) < exp(-2 beta T), in ball arithmetic: true only if it is certain."""
+    period = arb(rational(sample_time))
+    alpha, beta, g, p = (arb(rational(claim[key])) for key in ("frozen_decay", "growth", "open_growth", "level"))
+    mean = (1 - p) * (-2 * alpha * period).exp() + p * (2 * g * period).exp()
+    return bool(p < 1) and bool(mean < (-2 * beta * period).exp())
+
+
 def check_consistency(content: Mapping[str, Any], where: str) -> None:
     """The certificate must speak about the range, the rates, the table and the guarantee of the same file."""
     (parameter,) = content["scheduling"]
@@ -162,27 +178,34 @@ def check_consistency(content: Mapping[str, Any], where: str) -> None:
         if not claims:
             raise ScheduleError(f"{where}: the certificate claims nothing")
         for i, claim in enumerate(claims):
-            place = f"{where}: certificate.claims[{i}]"
-            if claim["kind"] not in KINDS:
-                raise ScheduleError(f"{place}: unknown kind '{claim['kind']}'; this version proves {', '.join(KINDS)}")
-            if claim["kind"] == "sampled" and not 0.0 < claim["growth"] < claim["frozen_decay"]:
-                raise ScheduleError(
-                    f"{place}: growth {claim['growth']} must lie between 0 and frozen_decay {claim['frozen_decay']}"
-                )
-            if claim["kind"] == "sampled" and rational(claim["level"]) > rational(claim["frozen_decay"]) - rational(
-                claim["growth"]
-            ):
-                raise ScheduleError(f"{place}: level {claim['level']} exceeds frozen_decay - growth")
-            if not claim["level"] > 0.0:
-                raise ScheduleError(f"{place}: level {claim['level']} must be positive")
-            stated = guarantee["claims"].get(claim["name"])
-            if stated != claim["level"]:
-                raise ScheduleError(
-                    f"{place}: proves '{claim['name']}' at {claim['level']}, but the guarantee states {stated}"
-                )
+            check_claim(claim, f"{where}: certificate.claims[{i}]", guarantee["claims"], content["sample_time"])
         if set(guarantee["claims"]) != {claim["name"] for claim in claims}:
             raise ScheduleError(f"{where}: the guarantee states claims that the certificate does not prove")
         if not any(claim["kind"] == "sampled" for claim in claims):
             raise ScheduleError(f"{where}: no claim about the update that the runtime performs (kind 'sampled')")
     except (KeyError, TypeError, AttributeError) as error:
         raise ScheduleError(f"{where}: the certificate or the guarantee lacks a field ({error!r})") from None
+
+
+def check_claim(claim: Mapping[str, Any], place: str, stated: Mapping[str, Any], sample_time: float) -> None:
+    """One claim against itself and against what the guarantee states."""
+    if claim["kind"] not in KINDS:
+        raise ScheduleError(f"{place}: unknown kind '{claim['kind']}'; this version proves {', '.join(KINDS)}")
+    if not claim["level"] > 0.0:
+        raise ScheduleError(f"{place}: level {claim['level']} must be positive")
+    if stated.get(claim["name"]) != claim["level"]:
+        told = stated.get(claim["name"])
+        raise ScheduleError(f"{place}: proves '{claim['name']}' at {claim['level']}, but the guarantee states {told}")
+    if claim["kind"] not in ("sampled", "drops"):
+        return
+    if not 0.0 < claim["growth"] < claim["frozen_decay"]:
+        raise ScheduleError(
+            f"{place}: growth {claim['growth']} must lie between 0 and frozen_decay {claim['frozen_decay']}"
+        )
+    if claim["kind"] == "drops":
+        if not falls_in_the_mean(claim, sample_time):
+            raise ScheduleError(
+                f"{place}: with drop probability {claim['level']} its own rates do not make V fall in the mean"
+            )
+    elif rational(claim["level"]) > rational(claim["frozen_decay"]) - rational(claim["growth"]):
+        raise ScheduleError(f"{place}: level {claim['level']} exceeds frozen_decay - growth")

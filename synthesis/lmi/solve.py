@@ -87,10 +87,10 @@ def margins_of(problem: LmiProblem, decisions: FloatArray, depth: int) -> tuple[
 def _judge(answer: RawAnswer, margins: tuple[Margin, ...], relaxed: RelaxedProblem) -> tuple[Verdict, str]:
     if answer.infeasible:
         if relaxed.relaxation in ("grid", "exact") and answer.excluded > EXCLUDED:
-            # Points are necessary and sums of squares exact, so this refutes the whole for this degree of the unknowns.
+            # Points are necessary, sums of squares exact: this refutes the whole for this degree of the unknowns.
             return Verdict.REFUTED, (
-                f"refuted: the {relaxed.relaxation} relaxation has no solution (certificate re-evaluated: none with decisions below "
-                f"{answer.excluded:.1e})"
+                f"refuted: the {relaxed.relaxation} relaxation has no solution (certificate re-evaluated: none with "
+                f"decisions below {answer.excluded:.1e})"
             )
         return Verdict.INCONCLUSIVE, (
             f"inconclusive: the {relaxed.relaxation} relaxation has no solution ({answer.solver}: {answer.status}); raise "

@@ -163,6 +163,30 @@ def test_sampled_claim_needs_growth_below_decay(tmp_path: Path) -> None:
     assert "update that the runtime performs" in refusal(data, tmp_path)
 
 
+def test_overstated_drop_probability_is_refused(tmp_path: Path) -> None:
+    data = content("corner-estimation-longitudinal")
+    claim = next(c for c in data["certificate"]["claims"] if c["kind"] == "drops")
+    for level, words in ((0.9, "do not make V fall"), (1.5, "do not make V fall")):
+        claim["level"] = data["guarantee"]["claims"][claim["name"]] = level
+        assert words in refusal(data, tmp_path)
+    claim["level"] = data["guarantee"]["claims"][claim["name"]] = 0.45
+    claim["open_growth"] = 20.0  # the arithmetic of the rates is right, the rates themselves are not
+    assert "'drop probability' at 0.45 1 fails at wheel_speed" in refusal(data, tmp_path)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_drop_claim_agrees_with_the_second_moment(name: str) -> None:
+    """Frozen speeds are admissible: the second-moment radius at the proved drop probability is below one."""
+    data = content(name)
+    p, period = data["guarantee"]["claims"]["drop probability"], data["sample_time"]
+    coefficients = [np.array(c) for c in data["plant"]["A"]["coefficients"]]
+    for speed in np.linspace(0.0, 140.0, 29):
+        used = expm(closed_loop(data, speed)[0] * period)
+        lost = expm(sum(c * speed**k for k, c in enumerate(coefficients)) * period)
+        operator = (1 - p) * np.kron(used, used) + p * np.kron(lost, lost)
+        assert np.abs(np.linalg.eigvals(operator)).max() < 1.0
+
+
 def test_float32_table_is_stored_as_such() -> None:
     data = content("longitudinal-speed")
     table = np.array(data["gain"]["table"])

@@ -9,8 +9,9 @@ import pytest
 from scipy.linalg import expm
 
 from estimators.schedule import read_content
-from synthesis.claims import claim_levels, frozen_gain
+from synthesis.claim_search import claim_levels
 from synthesis.deploy import DeploySettings, deploy, tabulate
+from synthesis.deployed_loop import frozen_gain
 from synthesis.errors import ProblemError
 from synthesis.export import export, sampled_radius, schedule_content
 from synthesis.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
