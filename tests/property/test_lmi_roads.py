@@ -1,0 +1,168 @@
+"""Two roads to one answer: our conic data and cvxpy, floating-point verdicts and exact rational proofs."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from flint import fmpq, fmpq_poly
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from synthesis.lmi.problem import LmiProblem
+from synthesis.lmi.result import LmiResult, Verdict
+from synthesis.lmi.settings import LmiSettings, Relaxation
+from synthesis.lmi.solve import solve
+from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
+from synthesis.polynomials.rational import first_failure, rational
+from tests.unit.lmi_cases import gain_problem, lyapunov_problem, parameter
+
+SMALL = settings(deadline=None, max_examples=12)
+SEEDS = st.integers(0, 2**32 - 1)
+KINDS: tuple[Relaxation, ...] = ("grid", "exact")
+
+
+def exactly_positive(matrix: MatrixPolynomial) -> bool:
+    """M(u, r) > 0 on [-1, 1]^2 in exact arithmetic, for one parameter u and r affine: both vertices of r."""
+    line = fmpq_poly([-1, 2])
+    for rate in (-1, 1) if matrix.degrees[1] else (0,):
+        entries = [
+            [
+                sum(
+                    (
+                        fmpq_poly([rational(c) * fmpq(rate) ** j])(line) * line**i
+                        for (i, j), c in np.ndenumerate(matrix.coefficients[:, :, a, b, 0])
+                    ),
+                    fmpq_poly([0]),
+                )
+                for b in range(matrix.shape[1])
+            ]
+            for a in range(matrix.shape[0])
+        ]
+        if first_failure(entries, depth=40) is not None:
+            return False
+    return True
+
+
+def confirmed(problem: LmiProblem, result: LmiResult) -> bool:
+    """Every strict inequality at the decisions of the result, with the common margin taken out, proved exactly."""
+    decisions = problem.without_margin(result.decisions)
+    return all(exactly_positive(entry.matrix.substitute(decisions)) for entry in problem.inequalities if entry.strict)
+
+
+def random_plant(seed: int, shift: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """A(p) = A0 + p A1 with the largest frozen real part over the range at -shift; B and C constant."""
+    rng = np.random.default_rng(seed)
+    A = np.stack([rng.standard_normal((3, 3)), 0.3 * rng.standard_normal((3, 3))])
+    frozen = A[0] + np.linspace(-1.0, 1.0, 41)[:, None, None] * A[1]
+    A[0] -= (np.linalg.eigvals(frozen).real.max() + shift) * np.eye(3)
+    return A, rng.standard_normal((1, 3, 2)), rng.standard_normal((1, 1, 3))
+
+
+def frozen_gain(A: FloatArray, B: FloatArray, C: FloatArray) -> float:
+    """Largest gain over constant parameters and frequencies: a bound from below for every L2 gain."""
+    points = np.linspace(-1.0, 1.0, 41)[:, None, None, None]
+    frequencies = np.concatenate([[0.0], np.geomspace(1e-2, 1e2, 200)])[:, None, None]
+    resolvent = 1j * frequencies * np.eye(3) - (A[0] + points * A[1])
+    return float(
+        np.linalg.norm(C[0] @ np.linalg.solve(resolvent, B[0] + 0j * resolvent[..., :2]), 2, axis=(-2, -1)).max()
+    )
+
+
+@SMALL
+@given(SEEDS, st.sampled_from([0.0, 0.3]))
+def test_certified_gains_lie_above_frozen_ones_and_fall_with_the_degree(seed: int, rate: float) -> None:
+    A, B, C = random_plant(seed, 0.5)
+    floor = frozen_gain(A, B, C)
+    previous = np.inf
+    for degree in (0, 1, 2):
+        results = {
+            kind: solve(gain_problem((parameter(rate=rate),), A, B, C, degree), LmiSettings(relaxation=kind, points=41))
+            for kind in KINDS
+        }
+        exact = results["exact"]
+        if exact.report.status != "Solved":
+            return  # degree 0 need not have a solution: nothing to compare
+        assert exact.objective is not None
+        assert exact.lower_bound is not None
+        assert exact.lower_bound <= exact.objective * (1.0 + 1e-7)
+        assert exact.objective >= floor * (1.0 - 1e-6)
+        assert exact.objective <= previous * (1.0 + 1e-4)  # a higher degree is never worse
+        grid = results["grid"]
+        assert grid.objective is not None
+        assert grid.lower_bound is not None
+        assert grid.lower_bound <= exact.objective * (1.0 + 1e-7)  # fewer inequalities: a bound from below all the more
+        assert grid.objective == pytest.approx(exact.objective, rel=2e-3)
+        previous = exact.objective
+
+
+@SMALL
+@given(SEEDS, st.sampled_from([-0.05, 0.02, 0.2, 1.0]), st.sampled_from(["grid", "exact", "vertex"]))
+def test_certified_means_certified(seed: int, shift: float, kind: Relaxation) -> None:
+    """Whatever the solver says: a CERTIFIED verdict stands in exact arithmetic, and never with an unstable frozen loop."""
+    A, _, _ = random_plant(seed, shift)
+    problem = lyapunov_problem((parameter(rate=0.4),), A, 1)
+    result = solve(problem, LmiSettings(relaxation=kind, points=5))
+    if result.verdict is Verdict.CERTIFIED:
+        assert shift > 0.0
+        assert confirmed(problem, result)
+    if shift < 0.0:
+        assert result.verdict is not Verdict.CERTIFIED
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", ["grid", "vertex", "exact"])
+def test_cvxpy_comes_to_the_same_answer(seed: int, kind: Relaxation) -> None:
+    A, B, C = random_plant(seed, 1.5)
+    answers = []
+    for solver in ("CLARABEL", "cvxpy:CLARABEL"):
+        problem = gain_problem((parameter(rate=0.2),), A, B, C, 1)
+        answers.append(solve(problem, LmiSettings(relaxation=kind, points=7, solver=solver)))
+    first, second = answers
+    assert first.objective is not None
+    assert first.objective == pytest.approx(second.objective, rel=1e-5)
+    assert first.verdict == second.verdict
+    assert (first.report.solver, second.report.solver) == ("clarabel", "cvxpy:CLARABEL")
+    assert second.lower_bound is None  # cvxpy hands out no common form of the dual objective
+
+
+def test_cvxpy_takes_multi_convexity_as_the_same_equality() -> None:
+    """A1 with a zero column, as in the corner models: the (2,2) entry of the condition is zero for every P."""
+    A = np.array([[[-3.0, 1.0], [-1.0, -2.0]], [[-0.5, 0.0], [0.4, 0.0]]])
+    answers = [
+        solve(lyapunov_problem((parameter(rate=0.5),), A, 1), LmiSettings(relaxation="vertex", solver=solver))
+        for solver in ("CLARABEL", "cvxpy:CLARABEL")
+    ]
+    assert [answer.verdict for answer in answers] == [Verdict.CERTIFIED] * 2
+    assert answers[0].objective == pytest.approx(answers[1].objective, abs=1e-6)
+    slope = answers[0].values["P"].derivative(0).at(np.zeros((1, 2)))[0, ..., 0]
+    convexity = A[1].T @ slope + slope @ A[1]
+    assert abs(convexity[0, 1]) < 1e-7
+    assert convexity[0, 0] >= -1e-7
+
+
+@SMALL
+@given(SEEDS)
+def test_the_answer_does_not_depend_on_the_units_of_the_parameter(seed: int) -> None:
+    """p in rad/s or in rpm: the same problem, the same gain."""
+    A, B, C = random_plant(seed, 1.0)
+    gains = []
+    for unit in (1.0, 1e-3, 9.55e3):
+        scaled = np.stack([A[0], A[1] / unit])
+        problem = gain_problem((parameter("p", -unit, unit, 0.3 * unit),), scaled, B, C, 1)
+        gains.append(solve(problem, LmiSettings(relaxation="exact")).objective)
+    assert gains[1] == pytest.approx(gains[0], rel=1e-6)
+    assert gains[2] == pytest.approx(gains[0], rel=1e-6)
+
+
+@pytest.mark.parametrize(("first", "second"), list(product([1.0, 1e-3], [1.0, 1e4])))
+def test_parameters_of_very_different_size(first: float, second: float) -> None:
+    """x' = -(1 + a + b) x + d with a, b in [0, 1] in odd units: the gain is that of a = b = 0, which is 1."""
+    A = np.zeros((2, 2, 1, 1))
+    A[0, 0], A[1, 0], A[0, 1] = -1.0, -1.0 / first, -1.0 / second
+    ones = np.ones((1, 1, 1, 1))
+    parameters = (parameter("a", 0.0, first, first), parameter("b", 0.0, second, np.inf))
+    result = solve(gain_problem(parameters, A, ones, ones, (1, 0)), LmiSettings(relaxation="vertex"))
+    assert result.verdict is Verdict.CERTIFIED
+    assert result.objective == pytest.approx(1.0, abs=1e-6)
