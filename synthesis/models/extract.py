@@ -92,22 +92,24 @@ def _fraction(entry: sp.Expr, generators: list[sp.Symbol], where: str) -> tuple[
     for part in (above, below):
         if not part.is_polynomial(*generators):
             raise ModelError(f"{where} = {entry} is neither polynomial nor rational in the parameters")
-    if not (sp.Poly(above, *generators, domain="EX").free_symbols_in_domain <= set()):
+    if (above.free_symbols | below.free_symbols) - set(generators):
         raise ModelError(f"{where} = {entry} still contains a symbol without value")
     return above, below
 
 
 def _coefficients(rows: list[list[sp.Expr]], shape: tuple[int, int], generators: list[sp.Symbol]) -> FloatArray:
-    polynomials = [[sp.Poly(entry, *generators) for entry in row] for row in rows]
+    # A model without parameters still needs a variable for sympy to collect in; it never appears.
+    variables = generators or [sp.Symbol("constant")]
+    polynomials = [[sp.Poly(entry, *variables) for entry in row] for row in rows]
     degrees = [0] * len(generators)
     for row in polynomials:
         for polynomial in row:
-            degrees = [max(d, n, 0) for d, n in zip(degrees, polynomial.degree_list(), strict=True)]
+            degrees = [max(d, n, 0) for d, n in zip(degrees, polynomial.degree_list(), strict=False)]
     out = np.zeros((*(d + 1 for d in degrees), *shape))
     for i, row in enumerate(polynomials):
         for j, polynomial in enumerate(row):
             for powers, coefficient in polynomial.terms():
-                out[(*powers, i, j)] = float(coefficient)
+                out[(*powers[: len(generators)], i, j)] = float(coefficient)
     out.setflags(write=False)
     return out
 

@@ -261,3 +261,19 @@ def test_corner_model_needs_what_it_needs() -> None:
     bare = values.model_copy(update={"vehicle": {}})
     with pytest.raises(GainsmithError, match="effective_radius"):
         corner_velocity_model(bare, "lateral")
+
+
+def test_model_without_parameters_is_a_constant_one() -> None:
+    model = LpvModel(
+        name="lag",
+        source="closed form",
+        states=(Signal("x", "m"),),
+        outputs=(Signal("y", "m"),),
+        parameters=(),
+        constants={"rate": Constant(2.0, "1/s", "chosen")},
+        A=sp.Matrix([[-sp.Symbol("rate")]]),
+        C=sp.Matrix([[1]]),
+    )
+    numeric = model.on(np.zeros((1, 0)))
+    assert numeric.A.tolist() == [[[-2.0]]]
+    assert numeric.C.tolist() == [[[1.0]]]

@@ -6,6 +6,7 @@ from typing import Literal
 
 import sympy as sp
 
+from synthesis.errors import ModelError
 from synthesis.models.nonlinear import NonlinearModel
 from synthesis.models.param import Signal
 from synthesis.models.parameter_set import ParameterSet
@@ -24,6 +25,9 @@ def planar_force_model(
     P1 (10) prints the yaw rate r as third output, which is no function of these states: the row is then missing
     (`third_output="none"`); with r' the determinant is T_f sin(d)^2 / (2 m^2 I_z).
     """
+    missing = [name for name in NEEDED if name not in parameters.vehicle]
+    if missing:
+        raise ModelError(f"parameter set '{parameters.id}' has no vehicle.{', vehicle.'.join(missing)}; add it")
     constants = {name: parameters.vehicle[name].constant() for name in NEEDED}
     m, inertia, front, rear, front_track, rear_track = sp.symbols(" ".join(NEEDED))
     fyf, fyr, dfyf = sp.symbols("front_lateral_force rear_lateral_force front_lateral_difference")

@@ -1,0 +1,49 @@
+"""Exact rational matrices, for proofs that must not depend on rounding. Floats are read bit for bit."""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+from flint import fmpq, fmpq_mat
+
+from synthesis.polynomials.matrix import FloatArray
+from synthesis.polynomials.rational import is_positive_definite, rational
+
+Rational: TypeAlias = Any  # flint.fmpq_mat; flint has no type stubs
+
+
+def rationals(array: FloatArray) -> Rational:
+    """A matrix of floats as exact rationals."""
+    return fmpq_mat(array.shape[0], array.shape[1], [rational(float(x)) for x in array.ravel()])
+
+
+def congruence(left: Rational, middle: Rational) -> Rational:
+    """left middle left'."""
+    return left * middle * left.transpose()
+
+
+def total(matrices: list[Rational]) -> Rational:
+    """The sum of at least one matrix."""
+    out = matrices[0]
+    for matrix in matrices[1:]:
+        out = out + matrix
+    return out
+
+
+def is_positive(matrix: Rational) -> bool:
+    """Positive definite by Sylvester's criterion."""
+    rows = [[matrix[i, j] for j in range(matrix.ncols())] for i in range(matrix.nrows())]
+    return is_positive_definite(rows)
+
+
+def as_float_up(number: Any) -> float:
+    """The least float not below a rational number (so that a bound stays a bound)."""
+    from math import inf, nextafter
+
+    value = int(number.p) / int(number.q)
+    return value if rational(value) >= number else nextafter(value, inf)
+
+
+def absolute(number: Any) -> Any:
+    """|x| of a rational number."""
+    return number if number >= fmpq(0) else -number

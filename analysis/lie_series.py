@@ -1,0 +1,148 @@
+"""Sympy expressions evaluated on power series with ball arithmetic: Taylor coefficients with proved error bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import reduce
+from operator import add, mul
+from typing import Any
+
+import sympy as sp
+from flint import arb, arb_series, ctx, fmpq
+
+from analysis.errors import AnalysisError
+
+Series = Any  # flint.arb_series; flint has no type stubs
+
+FUNCTIONS: Mapping[type, Callable[[Series], Series]] = {
+    sp.sin: lambda s: s.sin(),
+    sp.cos: lambda s: s.cos(),
+    sp.tan: lambda s: s.tan(),
+    sp.atan: lambda s: s.atan(),
+    sp.exp: lambda s: s.exp(),
+    sp.log: lambda s: s.log(),
+}
+LOGICAL = (sp.core.relational.Relational, sp.And, sp.Or, sp.Not)
+
+
+@contextmanager
+def series_arithmetic(length: int, bits: int) -> Iterator[None]:
+    """Length and precision of flint's series, restored afterwards (they are global to flint)."""
+    before = ctx.cap, ctx.prec
+    ctx.cap, ctx.prec = length, bits
+    try:
+        yield
+    finally:
+        ctx.cap, ctx.prec = before
+
+
+def ball(number: sp.Rational) -> Any:
+    """A rational number as a ball."""
+    return arb(fmpq(int(number.p), int(number.q)))
+
+
+class Evaluator:
+    """Several expressions at once, shared subexpressions evaluated once; symbols are bound to series by name."""
+
+    def __init__(self, expressions: list[sp.Expr]) -> None:
+        self.steps, self.results = sp.cse(expressions, order="none")
+
+    def __call__(self, bound: Mapping[str, Series]) -> list[Series]:
+        """The series of every expression. Raises AnalysisError where one divides by zero or has no Taylor series."""
+        known = dict(bound)
+        try:
+            for symbol, expression in self.steps:
+                known[str(symbol)] = (_holds if isinstance(expression, LOGICAL) else _value)(expression, known)
+            return [_value(expression, known) for expression in self.results]
+        except _DivisionError as error:
+            divisor = error.divisor
+            for symbol, expression in reversed(self.steps):
+                divisor = divisor.xreplace({symbol: expression})
+            raise AnalysisError(
+                f"{divisor} = 0 divides at this point: the model is singular here; move off it"
+            ) from None
+
+
+class _DivisionError(Exception):
+    """Carries the divisor, still in terms of shared subexpressions."""
+
+    def __init__(self, divisor: sp.Expr) -> None:
+        super().__init__(str(divisor))
+        self.divisor = divisor
+
+
+def _value(expression: sp.Expr, known: Mapping[str, Series]) -> Series:
+    if expression.is_Symbol:
+        return known[str(expression)]
+    if expression.is_Rational:
+        return arb_series([ball(expression)])
+    if isinstance(expression, sp.Piecewise):
+        return _branch(expression, known)
+    if isinstance(expression, sp.Pow):
+        return _power(expression, known)
+    arguments = [_value(argument, known) for argument in expression.args]
+    if expression.is_Add:
+        return reduce(add, arguments)
+    if expression.is_Mul:
+        return reduce(mul, arguments)
+    function = FUNCTIONS.get(type(expression))
+    if function is None:
+        raise AnalysisError(
+            f"'{expression.func.__name__}' has no series here; known: {', '.join(sorted(f.__name__ for f in FUNCTIONS))}, "
+            "powers and Piecewise"
+        )
+    return _finite(function(arguments[0]), expression)
+
+
+def _power(expression: sp.Pow, known: Mapping[str, Series]) -> Series:
+    base, exponent = expression.args
+    value = _value(base, known)
+    if not exponent.is_Rational:
+        raise AnalysisError(f"{expression} has an exponent that is no number; write it with exp and log")
+    if exponent.q not in (1, 2):
+        raise AnalysisError(f"{expression}: only whole and half powers have a series here")
+    root = value if exponent.q == 1 else _finite(value.sqrt(), expression)
+    out = reduce(mul, [root] * abs(int(exponent.p)))
+    if exponent.p > 0:
+        return out
+    if out.length() == 0 or out[0].contains(0):
+        raise _DivisionError(base)
+    return _finite(1 / out, expression)
+
+
+def _branch(expression: sp.Piecewise, known: Mapping[str, Series]) -> Series:
+    for value, condition in expression.args:
+        if _holds(condition, known):
+            return _value(value, known)
+    raise AnalysisError(f"no branch of {expression} holds at this point")
+
+
+def _holds(condition: sp.Basic, known: Mapping[str, Series]) -> bool:
+    """Whether a comparison is true at the point itself; on the switching surface no Taylor series exists."""
+    if condition in (sp.true, True):
+        return True
+    if condition.is_Symbol:
+        return bool(known[str(condition)])
+    if isinstance(condition, sp.And | sp.Or | sp.Not):
+        parts = [_holds(part, known) for part in condition.args]
+        return (
+            all(parts)
+            if isinstance(condition, sp.And)
+            else any(parts)
+            if isinstance(condition, sp.Or)
+            else not parts[0]
+        )
+    if not condition.is_Relational or isinstance(condition, sp.Equality | sp.Unequality):
+        raise AnalysisError(f"the condition {condition} of a Piecewise must consist of inequalities")
+    difference = _value(condition.lts - condition.gts, known)
+    start = difference[0] if difference.length() else arb(0)
+    if start.contains(0):
+        raise AnalysisError(f"the point lies on the switching surface {condition}; move off it")
+    return bool(start < 0)
+
+
+def _finite(series: Series, expression: sp.Expr) -> Series:
+    if not all(coefficient.is_finite() for coefficient in series.coeffs()):
+        raise AnalysisError(f"{expression} has no Taylor series at this point; the model is singular here")
+    return series
