@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from analysis.dropout_schedule import frozen_critical_probability
 from estimators.errors import ScheduleError
-from estimators.schedule import read_content
+from estimators.schedule import GainSchedule, read_content
 from studies.spec import load_spec
 from synthesis.deploy import deploy
 from synthesis.errors import GainsmithError
@@ -88,6 +89,7 @@ def run_spec(name: str, out: Path, check: bool = False) -> ScheduleRun:
     gains = design_observer(spec.build_model(parameters), spec.observer_design())
     deployment = deploy(gains, spec.deploy_settings())
     content = schedule_content(deployment, spec.name, spec.description, spec.resolved(parameters))
+    content["guarantee"]["drop_tolerance"] = drop_tolerance(content)
     path = out / f"{spec.name}.json"
     published = _published_range(parameters, spec.model.id)
     state, message, drift = compare(path, content)
@@ -101,6 +103,21 @@ def run_spec(name: str, out: Path, check: bool = False) -> ScheduleRun:
         state, message = "written", ""
     state = "unchanged" if state == "same" and not check else state
     return ScheduleRun(spec.name, state, perf_counter() - start, message, content, proofs, published, drift)
+
+
+def drop_tolerance(content: dict[str, Any]) -> dict[str, Any]:
+    """How many measurements may be lost at random: two numbers that answer different questions (P3 section 6).
+
+    `frozen`: exact at every constant parameter, taken at the worst. `proved`: also while the parameter moves within its
+    rate, an exact claim of the certificate. Between the two lies what `analysis.mean_square_schedule` certifies in floating
+    point, which takes minutes for slow observers and is left to a study.
+    """
+    frozen = frozen_critical_probability(GainSchedule.from_content(content))
+    return {
+        "frozen_critical_probability": frozen.smallest,
+        "frozen_place": {"parameter": frozen.parameter, "value": frozen.place, "unit": frozen.unit},
+        "proved_probability": content["guarantee"]["claims"].get("drop probability"),
+    }
 
 
 def compare(path: Path, content: dict[str, Any]) -> tuple[str, str, float | None]:

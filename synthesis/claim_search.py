@@ -75,11 +75,11 @@ def _drops_claim(loop: DeployedLoop, design: ObserverDesign, slowest: float, sam
     Bisection on g (of ratios) is exact enough: any g that is proved is a valid claim, a smaller one only a better claim.
     """
     best: Claim | None = None
-    for share in (0.9, 0.75, 0.5):
+    for share in (0.9, 0.7):
         alpha = _round_down(share * slowest)
         beta = _round_down(0.01 * alpha)
-        low, high = slowest / 8.0, 16.0 * slowest
-        for _ in range(7):
+        low, high = slowest / 4.0, 8.0 * slowest
+        for _ in range(5):
             middle = float(np.sqrt(low * high))
             g = _round_up(middle)
             level = _round_down(0.9999 * drop_probability(alpha, beta, g, sample_time), 3)

@@ -79,6 +79,7 @@ def solve_request(loop: DeployedLoop, design: ObserverDesign, request: Request) 
     problem = LmiProblem(loop.model.parameters, maximise_margin=request.level is not None)
     size = len(loop.model.states)
     P = problem.symmetric("P", size, max(design.degree, 1))
+    P_dot = problem.time_derivative(P)
     squared = problem.scalar("gamma^2") if request.level is None else None
     if squared is not None:
         problem.minimise("gamma^2")
@@ -86,7 +87,7 @@ def solve_request(loop: DeployedLoop, design: ObserverDesign, request: Request) 
         problem.require("P < 1", problem.constant(np.eye(size)) - P, strict=False)
     problem.require("P > 0", P)
     if request.kind in ("sampled", "drops"):
-        problem.require("growth of P", P * (2.0 * request.growth) - problem.time_derivative(P))
+        problem.require("growth of P", P * (2.0 * request.growth) - P_dot)
     scaled = loop.model.polynomial.with_states_scaled(scale)
     plant = {key: problem.known(getattr(scaled, key)) for key in ("A", "C", "E", "F", "denominator")}
     below = plant["denominator"]
@@ -95,13 +96,13 @@ def solve_request(loop: DeployedLoop, design: ObserverDesign, request: Request) 
         problem.require(
             "growth while coasting", P.scaled_by(below) * (2.0 * request.open_growth) - coasting - coasting.T
         )
+    motion, weighted = P_dot.scaled_by(below), P.scaled_by(below)
     for i, window in enumerate(pairwise(loop.breakpoints)):
         gain = segment_gain(problem, loop, i, scale)
         A_e, B_e = plant["A"] - gain @ plant["C"], plant["E"] - gain @ plant["F"]
         product = P @ A_e
         S = product + product.T
-        phi = S + problem.time_derivative(P).scaled_by(below)
-        weighted = P.scaled_by(below)
+        phi = S + motion
         level = float(request.level or 0.0)
         if request.kind == "decay":
             block = -(phi + weighted * (2.0 * level))

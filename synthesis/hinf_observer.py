@@ -65,9 +65,11 @@ class ObserverDesign:
         for channel in self.channels:
             if channel.bound is not None and not channel.bound > 0.0:
                 raise ProblemError(f"channel '{channel.name}' has the bound {channel.bound}; give a positive number")
-        if self.decay_rate < 0.0:
-            raise ProblemError(f"decay rate {self.decay_rate} 1/s must not be negative")
-        if self.fastest_pole is not None and self.fastest_pole <= self.decay_rate:
+            if not channel.disturbances or not channel.errors:
+                raise ProblemError(f"channel '{channel.name}' needs at least one disturbance and one error")
+        if not 0.0 <= self.decay_rate < np.inf:
+            raise ProblemError(f"decay rate {self.decay_rate} 1/s must be a number and must not be negative")
+        if self.fastest_pole is not None and not self.decay_rate < self.fastest_pole < np.inf:
             raise ProblemError(f"fastest pole {self.fastest_pole} 1/s must exceed the decay rate {self.decay_rate} 1/s")
         for name in ("backoff", "reserve"):
             if not 0.0 <= getattr(self, name) < 1.0:

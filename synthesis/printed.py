@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, get_args
 
 from flint import fmpq, fmpq_poly
 
-from synthesis.errors import ProblemError
+from synthesis.errors import ProblemError, unknown
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.rational import (
     Matrix,
@@ -49,6 +49,17 @@ def judge(
     if len(model.parameters) != 1 or not model.polynomial.is_polynomial:
         raise ProblemError(f"model '{model.name}': only polynomial models of one parameter can be judged exactly")
     (parameter,) = model.parameters
+    if form not in get_args(Form):
+        raise ProblemError(unknown("form", form, get_args(Form)))
+    if parameter.may_jump:
+        raise ProblemError(
+            f"'{parameter.name}' may jump; a matrix that depends on it proves nothing then; bound its rate"
+        )
+    _check_numbers("gains", gains, (len(model.states), len(model.outputs)))
+    for k, matrix in enumerate(lyapunov):
+        _check_numbers(f"coefficient {k} of the matrix", matrix, (len(model.states),) * 2)
+        if any(rational(matrix[i][j]) != rational(matrix[j][i]) for i in range(len(matrix)) for j in range(i)):
+            raise ProblemError(f"coefficient {k} of the matrix is not symmetric; a Lyapunov matrix must be")
     low, high = search or (parameter.minimum, parameter.maximum)
     powers = [[k] for k in range(len(lyapunov))]
     M = polynomial_matrix(powers, lyapunov)
@@ -65,6 +76,17 @@ def judge(
         total = add(product, transpose(product), scale(derivative(M), sign * rational(rate)))
         matrices.append(scale(total, fmpq(-1)))
     return _intervals([minor for matrix in matrices for minor in leading_minors(matrix)], rational(low), rational(high))
+
+
+def _check_numbers(what: str, matrix: Sequence[Sequence[float | str]], shape: tuple[int, int]) -> None:
+    if len(matrix) != shape[0] or any(len(row) != shape[1] for row in matrix):
+        raise ProblemError(f"{what} must have the shape {shape}")
+    for row in matrix:
+        for entry in row:
+            try:
+                rational(entry)
+            except (ValueError, OverflowError, TypeError, AttributeError):
+                raise ProblemError(f"{what}: {entry!r} is not a finite number or printed decimal") from None
 
 
 def leading_minors(matrix: Matrix) -> list[fmpq_poly]:
@@ -99,10 +121,7 @@ def _intervals(minors: list[fmpq_poly], low: fmpq, high: fmpq) -> Judgement:
     for left, right in pairwise(edges):
         middle = (left + right) / 2
         if all(minor(middle) > 0 for minor in minors):
-            if pieces and pieces[-1][1] == left and all(minor(left) > 0 for minor in minors):
-                pieces[-1] = (pieces[-1][0], right)
-            else:
-                pieces.append((left, right))
+            pieces.append((left, right))  # never merged: every inner cut is a root, where strict positivity fails
     everywhere = (
         len(pieces) == 1 and pieces[0] == (low, high) and all(minor(x) > 0 for minor in minors for x in (low, high))
     )

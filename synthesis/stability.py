@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import product
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
-from synthesis.errors import ProblemError
+from synthesis.errors import ProblemError, unknown
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Margin, Verdict
 from synthesis.lmi.scaling import error_scale
@@ -36,7 +36,7 @@ class GainBox:
     def vertices(self) -> FloatArray:
         """The corner gains (2^k, nx, ny) over the k entries that vary."""
         lower, upper = np.asarray(self.lower, float), np.asarray(self.upper, float)
-        if lower.shape != upper.shape or not (lower <= upper).all():
+        if lower.shape != upper.shape or not (np.isfinite(lower) & np.isfinite(upper) & (lower <= upper)).all():
             raise ProblemError(f"gain box: lower {lower.tolist()} must not exceed upper {upper.tolist()}")
         options = [sorted({a, b}) for a, b in zip(lower.ravel(), upper.ravel(), strict=True)]
         return np.array(list(product(*options))).reshape(-1, *lower.shape)
@@ -78,6 +78,10 @@ def affine_quadratic_stability(
     """
     settings = settings or LmiSettings()
     box = gains if isinstance(gains, GainBox) else GainBox(np.asarray(gains, float), np.asarray(gains, float))
+    if form not in get_args(Form):
+        raise ProblemError(unknown("form", form, get_args(Form)))
+    if not 0.0 <= decay_rate < np.inf:
+        raise ProblemError(f"decay rate {decay_rate} 1/s must be a number >= 0")
     vertices = box.vertices()
     shape = (len(model.states), len(model.outputs))
     if vertices.shape[1:] != shape:

@@ -102,6 +102,8 @@ def prove_claim(content: Mapping[str, Any], claim: Mapping[str, Any], segments: 
     box = content["certificate"]["box"]
     name, unit = content["scheduling"][0]["name"], content["scheduling"][0]["unit"]
     P = polynomial_matrix(**claim["P"])
+    if transpose(P) != P:
+        raise ScheduleError(f"certificate: P of '{claim['name']}' is not symmetric; it proves nothing")
     slope = derivative(P)
     for segment in segments:
         for rate in (box["rate_min"], box["rate_max"]):
@@ -179,12 +181,39 @@ def check_consistency(content: Mapping[str, Any], where: str) -> None:
             raise ScheduleError(f"{where}: the certificate claims nothing")
         for i, claim in enumerate(claims):
             check_claim(claim, f"{where}: certificate.claims[{i}]", guarantee["claims"], content["sample_time"])
+        check_guarantee(content, where)
         if set(guarantee["claims"]) != {claim["name"] for claim in claims}:
             raise ScheduleError(f"{where}: the guarantee states claims that the certificate does not prove")
         if not any(claim["kind"] == "sampled" for claim in claims):
             raise ScheduleError(f"{where}: no claim about the update that the runtime performs (kind 'sampled')")
     except (KeyError, TypeError, AttributeError) as error:
         raise ScheduleError(f"{where}: the certificate or the guarantee lacks a field ({error!r})") from None
+
+
+def check_guarantee(content: Mapping[str, Any], where: str) -> None:
+    """Every number that the guarantee repeats elsewhere must be the one that is proved."""
+    guarantee, claims = content["guarantee"], {claim["name"]: claim for claim in content["certificate"]["claims"]}
+    repeated = {"decay_rate": "decay rate", "fastest_pole": "fastest pole", "sampled_decay_rate": "sampled decay rate"}
+    for key, name in repeated.items():
+        if name in claims and guarantee[key] != claims[name]["level"]:
+            raise ScheduleError(f"{where}: guarantee.{key} = {guarantee[key]} is not what '{name}' proves")
+    channels = {f"gain {channel['name']}": channel for channel in guarantee["channels"]}
+    for name, claim in claims.items():
+        if claim["kind"] != "gain":
+            continue
+        if name not in channels or channels[name]["gamma_certified"] != claim["level"]:
+            raise ScheduleError(f"{where}: guarantee.channels does not state what '{name}' proves")
+        words = name.removeprefix("gain ").split(" -> ")
+        sizes = [claim["disturbances"], list(zip(*claim["errors"], strict=True))]
+        for said, signals, rows in zip(words, ("disturbances", "states"), sizes, strict=True):
+            meant = {s["name"] for s, row in zip(content["model"][signals], rows, strict=True) if any(row)}
+            if set(said.split("+")) != meant:
+                raise ScheduleError(
+                    f"{where}: '{name}' is about {', '.join(sorted(meant)) or 'nothing'}, not about {said}"
+                )
+    contraction = arb(rational(guarantee["sampled_decay_rate"])) * arb(rational(content["sample_time"]))
+    if not (-contraction).exp() < arb(rational(guarantee["sampled_contraction"])) + arb("1e-12"):
+        raise ScheduleError(f"{where}: guarantee.sampled_contraction is better than the proved decay rate gives")
 
 
 def check_claim(claim: Mapping[str, Any], place: str, stated: Mapping[str, Any], sample_time: float) -> None:

@@ -42,16 +42,18 @@ def assemble(relaxed: RelaxedProblem) -> ConicData:
     equality_slack: list[FloatArray] = []
     cone_slack: list[FloatArray] = []
     sizes: list[int] = []
-    for sampled in relaxed.sampled:
-        free, fixed, size = _sampled_rows(sampled)
+    if relaxed.sampled:  # small and dense: stacked first, converted once
+        parts = [_sampled_rows(sampled) for sampled in relaxed.sampled]
+        free, fixed = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
         equalities.append(sparse.csc_array(-fixed[:, 1:]))
-        equality_b.append(fixed[:, 0])
         cone_rows.append(sparse.csc_array(-free[:, 1:]))
+        equality_b.append(fixed[:, 0])
         cone_b.append(free[:, 0])
-        rows, columns, _ = triangle(size)
         equality_slack.append(np.zeros(len(fixed)))
-        cone_slack.append(np.tile(sampled.margin * (rows == columns), len(sampled.values)))
-        sizes += [size] * (len(sampled.values) if size else 0)
+        for sampled, (_, _, size) in zip(relaxed.sampled, parts, strict=True):
+            rows, columns, _ = triangle(size)
+            cone_slack.append(np.tile(sampled.margin * (rows == columns), len(sampled.values)))
+            sizes += [size] * (len(sampled.values) if size else 0)
     extra = 0
     for sos in relaxed.sos:
         matching = gram_matrices(sos)

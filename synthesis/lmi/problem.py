@@ -12,6 +12,7 @@ from synthesis.models.param import SchedulingParameter
 from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial, constant, variable
 
 MARGIN = "margin"
+SYMMETRY = 1e-12  # relative; products of symmetric expressions differ from their transposes by rounding
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,8 @@ class LmiProblem:
         """A known matrix from its coefficients (d_1+1, ..., d_p+1, rows, columns) in the physical parameters."""
         count = len(self.parameters)
         array = np.asarray(coefficients, float)
+        if not np.isfinite(array).all():
+            raise ProblemError("a known matrix has coefficients that are not finite; look for NaN in the model")
         if array.ndim != count + 2:
             raise ProblemError(f"known matrix has {array.ndim} axes; {count} parameters need {count + 2}")
         shaped = array.reshape(*array.shape[:count], *(1,) * count, *array.shape[count:], 1)
@@ -93,6 +96,11 @@ class LmiProblem:
         if name in self.unknowns:
             raise ProblemError(f"the unknown '{name}' exists already; choose another name")
         count = len(self.parameters)
+        given = (degree,) if isinstance(degree, int) else degree
+        if min(given, default=0) < 0 or (not isinstance(degree, int) and len(degree) != count):
+            raise ProblemError(
+                f"degree {degree} of '{name}' must be one number >= 0, or one for each of {count} parameters"
+            )
         basis = chebyshev_basis(count, degree)
         functions, (number, rows, columns) = len(basis), entries.shape
         out = np.zeros((*basis.shape[1:], *(1,) * count, rows, columns, 1 + self.decisions + functions * number))
@@ -117,7 +125,9 @@ class LmiProblem:
                 )
             rate_middle = 0.5 * (p.rate_minimum + p.rate_maximum)
             rate_half = 0.5 * (p.rate_maximum - p.rate_minimum)
-            rate = self.constant(np.array([[rate_middle]])) + variable(count + i, self.variables) * rate_half
+            rate = self.constant(np.array([[rate_middle]]))
+            if rate_half > 0.0:  # a constant parameter needs no rate axis
+                rate = rate + variable(count + i, self.variables) * rate_half
             total = total + slope.scaled_by(rate) * (1.0 / p.half_width)
         return total
 
@@ -128,8 +138,15 @@ class LmiProblem:
 
         `window` is in physical units; with it the matrix may differ from window to window (a gain table).
         """
+        coefficients = matrix.coefficients
         if matrix.shape[0] != matrix.shape[1]:
             raise ProblemError(f"inequality '{name}' has the shape {matrix.shape}; it must be square and symmetric")
+        if not np.isfinite(coefficients).all():
+            raise ProblemError(
+                f"inequality '{name}' has coefficients that are not finite; look for NaN in its matrices"
+            )
+        if np.abs(coefficients - np.swapaxes(coefficients, -3, -2)).max() > SYMMETRY * np.abs(coefficients).max():
+            raise ProblemError(f"inequality '{name}' is not symmetric; add its transpose")
         if self.maximise_margin and strict:
             matrix = matrix - self.constant(np.eye(matrix.shape[0])).scaled_by(self.unknowns[MARGIN])
         offset, factor = np.zeros(self.variables), np.ones(self.variables)
@@ -137,6 +154,10 @@ class LmiProblem:
             if len(self.parameters) != 1:
                 raise ProblemError(
                     f"inequality '{name}': a window needs exactly one parameter, not {len(self.parameters)}"
+                )
+            if not self.parameters[0].minimum <= window[0] < window[1] <= self.parameters[0].maximum:
+                raise ProblemError(
+                    f"inequality '{name}': the window {window} is reversed or outside the parameter's range"
                 )
             low, high = ((edge - self.parameters[0].middle) / self.parameters[0].half_width for edge in window)
             offset[0], factor[0] = 0.5 * (low + high), 0.5 * (high - low)
@@ -181,7 +202,7 @@ class LmiProblem:
         count, words = len(self.parameters), []
         for i, p in enumerate(self.parameters):
             words.append(f"{p.name} = {p.middle + p.half_width * point[i]:.4g} {p.unit}")
-            if not p.may_jump and p.rate_maximum > p.rate_minimum and point[count + i] != 0.0:
+            if not p.may_jump and entry.matrix.degrees[count + i] > 0:
                 rate = 0.5 * (p.rate_minimum + p.rate_maximum + (p.rate_maximum - p.rate_minimum) * point[count + i])
                 words.append(f"rate = {rate:.4g} ({p.unit})/s")
         return ", ".join(words) or "all parameters"

@@ -6,6 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
+from synthesis.errors import ProblemError
 from synthesis.lmi.clarabel_road import RawAnswer, solve_with_clarabel
 from synthesis.lmi.conic import assemble
 from synthesis.lmi.problem import LmiProblem
@@ -18,8 +19,9 @@ from synthesis.polynomials.positivity import prove_positive
 # An objective on the boundary of feasibility is loosened by these fractions, in turn, until every inequality is proved.
 LOOSENING = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 
-# A re-evaluated certificate of infeasibility must exclude all decisions up to this size (they are of size one).
-EXCLUDED = 1e5
+# A re-evaluated certificate of infeasibility must exclude all decisions up to this size. Balanced problems have decisions of
+# size one, but badly scaled ones that are feasible with decisions of 1e9 have been seen.
+EXCLUDED = 1e12
 
 
 def solve(problem: LmiProblem, settings: LmiSettings | None = None) -> LmiResult:
@@ -28,6 +30,8 @@ def solve(problem: LmiProblem, settings: LmiSettings | None = None) -> LmiResult
     Raises ProblemError if the relaxation does not fit the problem or the solver is unknown.
     """
     settings = settings or LmiSettings()
+    if not problem.inequalities:
+        raise ProblemError("the problem has no inequality; require something")
     start = perf_counter()
     relaxed = relax(problem, settings)
     if settings.solver.startswith("cvxpy:"):
@@ -51,7 +55,9 @@ def solve(problem: LmiProblem, settings: LmiSettings | None = None) -> LmiResult
         relaxed.relaxation, answer.dual_bound,
     )  # fmt: skip
     objective = float(problem.cost @ decisions) * problem.sense if problem.objective else None
-    lower = answer.dual_bound * problem.sense if problem.objective and np.isfinite(answer.dual_bound) else None
+    # Vertices with multi-convexity only suffice: their optimum bounds nothing from below.
+    necessary = relaxed.relaxation in ("grid", "exact") and problem.objective is not None
+    lower = answer.dual_bound * problem.sense if necessary and np.isfinite(answer.dual_bound) else None
     values = {name: unknown.substitute(decisions) for name, unknown in problem.unknowns.items()}
     return LmiResult(verdict, message, margins, values, decisions, objective, lower, report)
 

@@ -60,6 +60,11 @@ def extract(
     constants: Mapping[str, Constant],
 ) -> PolynomialModel:
     """Substitute constants, clear denominators and collect coefficients; `where` names the model in messages."""
+    # Symbols are known by their names: assumptions a user put on them (real, positive) are of no interest here.
+    symbolic = {
+        key: matrix.subs({symbol: sp.Symbol(symbol.name) for symbol in matrix.free_symbols})
+        for key, matrix in symbolic.items()
+    }
     generators = [sp.Symbol(p.name) for p in parameters]
     values = {sp.Symbol(name): sp.Rational(str(c.value)) for name, c in constants.items()}
     matrices = {key: symbolic[key].subs(values) for key in MATRICES}
@@ -88,6 +93,8 @@ def extract(
 
 
 def _fraction(entry: sp.Expr, generators: list[sp.Symbol], where: str) -> tuple[sp.Expr, sp.Expr]:
+    if entry.has(sp.nan, sp.oo, -sp.oo, sp.zoo, sp.I):
+        raise ModelError(f"{where} = {entry} is not a finite real expression")
     above, below = sp.fraction(sp.cancel(sp.together(entry)))
     for part in (above, below):
         if not part.is_polynomial(*generators):

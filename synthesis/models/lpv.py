@@ -52,7 +52,10 @@ class LpvModel:
         self._check_names()
         for key, shape in shapes.items():
             given = getattr(self, key)
-            matrix = sp.zeros(*shape) if given is None else sp.Matrix(given)
+            try:
+                matrix = sp.zeros(*shape) if given is None else sp.Matrix(given)
+            except (TypeError, ValueError) as error:
+                raise ModelError(f"model '{self.name}': {key} is not a matrix ({error})") from None
             if matrix.shape != shape:
                 raise ModelError(
                     f"model '{self.name}': {key} has the shape {matrix.shape}, but {nx} states, {nu} inputs, {ny} outputs and "
@@ -98,10 +101,13 @@ class LpvModel:
         `grid` has shape (g, p), or (g,) for one parameter; the matrices come out read-only as (g, rows, columns).
         Raises ModelError for values outside the range or not finite.
         """
-        points = np.asarray(grid, float)
+        try:
+            points = np.asarray(grid, float)
+        except (TypeError, ValueError):
+            raise ModelError(f"model '{self.name}': the grid {grid!r} is not an array of numbers") from None
         count = len(self.parameters)
         points = points.reshape(-1, 1) if points.ndim <= 1 and count == 1 else np.atleast_2d(points)
-        if points.shape[-1] != count:
+        if points.ndim != 2 or points.shape[-1] != count:
             raise ModelError(f"model '{self.name}': a grid of shape {points.shape} does not fit {count} parameters")
         self._check_range(points)
         return evaluate(self.polynomial, points)

@@ -32,6 +32,12 @@ def check_unit(unit: str, where: str) -> str:
     return unit
 
 
+def check_name(name: str, what: str) -> None:
+    """Raise ModelError for a name that cannot be a symbol."""
+    if not name.isidentifier():
+        raise ModelError(f"{what} '{name}' needs a name of letters, digits and underscores, like wheel_speed")
+
+
 @dataclass(frozen=True)
 class Constant:
     """A number of the model with its unit and where it was published."""
@@ -42,7 +48,9 @@ class Constant:
 
     def __post_init__(self) -> None:
         check_unit(self.unit, "constant")
-        if not math.isfinite(self.value):
+        if not self.source.strip():
+            raise ModelError(f"constant {self.value} {self.unit} has no source; say where the number comes from")
+        if not isinstance(self.value, (int, float)) or not math.isfinite(self.value):
             raise ModelError(f"constant has the value {self.value}; give a finite number")
 
 
@@ -54,6 +62,7 @@ class Signal:
     unit: str
 
     def __post_init__(self) -> None:
+        check_name(self.name, "signal")
         check_unit(self.unit, f"signal '{self.name}'")
 
 
@@ -74,6 +83,7 @@ class SchedulingParameter:
     absolute: bool = False
 
     def __post_init__(self) -> None:
+        check_name(self.name, "scheduling parameter")
         where = f"scheduling parameter '{self.name}'"
         check_unit(self.unit, where)
         if not (math.isfinite(self.minimum) and math.isfinite(self.maximum)):

@@ -9,6 +9,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from synthesis.errors import ProblemError
+
 FloatArray: TypeAlias = NDArray[np.float64]
 IndexArray: TypeAlias = NDArray[np.intp]
 
@@ -54,7 +56,7 @@ class MatrixPolynomial:
 
     def __add__(self, other: MatrixPolynomial) -> MatrixPolynomial:
         if self.shape != other.shape:
-            raise ValueError(f"cannot add a {self.shape} and a {other.shape} matrix polynomial")
+            raise ProblemError(f"cannot add a {self.shape} and a {other.shape} matrix polynomial")
         leading = np.maximum(self.coefficients.shape[: self.variables], other.coefficients.shape[: self.variables])
         width = max(self.decisions, other.decisions) + 1
         shape = (*(int(n) for n in leading), *self.shape, width)
@@ -71,7 +73,7 @@ class MatrixPolynomial:
     def __matmul__(self, other: MatrixPolynomial) -> MatrixPolynomial:
         """Product of polynomials; at most one factor may contain decision variables (an LMI is affine in them)."""
         if self.shape[1] != other.shape[0]:
-            raise ValueError(f"cannot multiply a {self.shape} by a {other.shape} matrix polynomial")
+            raise ProblemError(f"cannot multiply a {self.shape} by a {other.shape} matrix polynomial")
         shape = (self.shape[0], other.shape[1])
         if other.decisions:
             return _convolve(self, other, shape, lambda known, unknown: np.einsum("ij,...jkm->...ikm", known, unknown))
@@ -128,7 +130,7 @@ def _convolve(
 ) -> MatrixPolynomial:
     """Sum over the few monomials of the known factor (never over grid points) of its matrix times the unknown one."""
     if known.decisions:
-        raise ValueError("a product of two unknown matrices is not affine: substitute a new variable for it")
+        raise ProblemError("a product of two unknown matrices is not affine: substitute a new variable for it")
     degrees = tuple(a + b + 1 for a, b in zip(known.degrees, unknown.degrees, strict=True))
     out = np.zeros((*degrees, *shape, unknown.decisions + 1))
     for index in np.ndindex(*known.coefficients.shape[: known.variables]):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from math import comb
 
 import numpy as np
 
+from synthesis.errors import ProblemError
 from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
 
 
@@ -26,14 +28,19 @@ def prove_positive(matrix: MatrixPolynomial, depth: int = 16) -> Positivity:
 
     M(u) = sum_k B_k(u) M_k with Bernstein polynomials B_k >= 0 that sum to one, so M_k > 0 for all k proves M > 0; corner
     coefficients are values of M, so a non-positive one refutes it. Boxes that decide nothing are halved, all at once.
+    The guard bounds every rounding error: conversion and halving are averages, so nothing grows beyond the sum of the
+    absolute coefficients. Raises ProblemError for coefficients that are not finite.
     """
     v = matrix.variables
-    local = matrix.affine(np.full(v, -1.0), np.full(v, 2.0)).coefficients[..., 0]  # on [0, 1]^v
+    local = matrix.coefficients[..., 0]
+    if not np.isfinite(local).all():
+        raise ProblemError("a matrix polynomial with coefficients that are not finite has no sign")
+    size = float(np.abs(local).sum(axis=tuple(range(v))).sum(axis=-1).max())
     for axis in range(v):
         local = np.moveaxis(np.tensordot(_to_bernstein(local.shape[axis] - 1), local, axes=(1, axis)), 0, axis)
     boxes, lower, width = local[None], np.zeros((1, v)), np.ones((1, v))
     scale = float(np.abs(np.linalg.eigvalsh(local)).max()) or 1.0
-    guard = 64 * np.finfo(float).eps * scale * local.shape[-1]
+    guard = 4 * np.finfo(float).eps * size * (local.shape[-1] + sum(local.shape[:v]))
     axes = [axis for axis in range(v) if local.shape[axis] > 1]
     smallest, place = np.inf, np.zeros(v)
     for level in range(depth * max(len(axes), 1) + 1):
@@ -45,7 +52,7 @@ def prove_positive(matrix: MatrixPolynomial, depth: int = 16) -> Positivity:
                 smallest, place = float(values[worst]), lower[worst] + width[worst] * np.array(corner)
         if smallest <= guard:
             break
-        open_boxes = eigenvalues.reshape(len(boxes), -1).min(axis=1) <= guard
+        open_boxes = ~(eigenvalues.reshape(len(boxes), -1).min(axis=1) > guard)
         if not open_boxes.any():
             return Positivity(True, False, *_refine(matrix, 2.0 * place - 1.0, smallest), scale)
         if not axes or level == depth * len(axes) or open_boxes.sum() > 200_000:
@@ -57,8 +64,17 @@ def prove_positive(matrix: MatrixPolynomial, depth: int = 16) -> Positivity:
 
 
 def _to_bernstein(degree: int) -> FloatArray:
-    """Matrix from monomial to Bernstein coefficients on [0, 1]: b_i = sum_k C(i,k)/C(d,k) a_k."""
-    return np.array([[comb(i, k) / comb(degree, k) for k in range(degree + 1)] for i in range(degree + 1)])
+    """Matrix from monomial to Bernstein coefficients on [-1, 1]; exact, and no entry is larger than one.
+
+    Entry (i, k) is the blossom of u^k with i arguments +1 and degree - i arguments -1.
+    """
+
+    def entry(i: int, k: int) -> float:
+        chosen = range(max(0, k - degree + i), min(i, k) + 1)
+        total = sum(comb(i, j) * comb(degree - i, k - j) * (-1) ** (k - j) for j in chosen)
+        return float(Fraction(total, comb(degree, k)))
+
+    return np.array([[entry(i, k) for k in range(degree + 1)] for i in range(degree + 1)])
 
 
 def _halve(

@@ -117,7 +117,12 @@ def halve(points: list[Matrix]) -> tuple[list[Matrix], list[Matrix]]:
 
 
 def is_positive_definite(matrix: Matrix) -> bool:
-    """Sylvester's criterion by elimination: all pivots positive. Entries are rational numbers."""
+    """Symmetric with all pivots positive (Sylvester's criterion by elimination). Entries are rational numbers.
+
+    Without symmetry the criterion says nothing: P = -A^-1 makes P A + (P A)' = -2 I for an unstable A as well.
+    """
+    if any(matrix[i][j] != matrix[j][i] for i in range(len(matrix)) for j in range(i)):
+        return False
     rows = [list(row) for row in matrix]
     for k in range(len(rows)):
         if not rows[k][k] > 0:

@@ -82,7 +82,9 @@ def test_metrics_are_those_of_the_closed_form(whole_run: tuple[RunResult, Path, 
     assert result.metrics["flagged_samples"] == {corner: {} for corner in CORNERS}
     assert "yaw rate is not measured: taken as 0" in result.metrics["assumptions"]
     rows = summary_rows(result)
-    assert [row[0] for row in rows[:3]] == ["corner observers", "mean wheel speed", "integrated acceleration"]
+    first = ["vx: pipeline", "vx: corner observers", "vx: mean wheel speed", "vx: integrated acceleration"]
+    assert [row[0] for row in rows[:4]] == first
+    assert velocity["pipeline"]["rms"] < 0.2 * velocity["mean_wheel_speed"]["rms"]
     assert {len(row) for row in rows} == {len(HEADER)}
 
 

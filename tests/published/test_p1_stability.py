@@ -33,7 +33,7 @@ def half_digit(printed: float) -> float:
 # ---- (26): poles ------------------------------------------------------------------------------------------------------
 
 # P1 sheet section 9: eigenvalues of A_e [1/s] with the printed gains, (real, imaginary) or the two real ones.
-POLES = {
+POLES: dict[Direction, dict[int, tuple[complex, ...]]] = {
     "longitudinal": {
         0: (-284.6 + 186.3j,), 40: (-311.2 + 137.6j,), 90: (-396.9, -291.8), 140: (-540.8, -214.2), 180: (-621.7, -186.4)
     },

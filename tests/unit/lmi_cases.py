@@ -7,14 +7,17 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from flint import fmpq, fmpq_poly
 
 from synthesis.lmi.problem import LmiProblem
+from synthesis.lmi.result import LmiResult
 from synthesis.lmi.scaling import observer_scale
 from synthesis.models.catalogue.corner import Direction, corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
 from synthesis.models.parameter_set import Published, load_parameter_set
 from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial, symmetric_block
+from synthesis.polynomials.rational import first_failure, rational
 
 
 def parameter(name: str = "p", low: float = -1.0, high: float = 1.0, rate: float = 1.0) -> SchedulingParameter:
@@ -117,3 +120,31 @@ def reference_problem(model: LpvModel, degree: int, given: float, noise: float =
     problem.require("P > 0", P)
     problem.require("gain", -symmetric_block([[top, (P @ E - X @ F) @ weights], [None, -inputs]]))
     return problem
+
+
+def exactly_positive(matrix: MatrixPolynomial) -> bool:
+    """M(u, r) > 0 on [-1, 1]^2 in exact arithmetic, for one parameter u and r affine: both vertices of r."""
+    line = fmpq_poly([-1, 2])
+    for rate in (-1, 1) if matrix.degrees[1] else (0,):
+        entries = [
+            [
+                sum(
+                    (
+                        fmpq_poly([rational(c) * fmpq(rate) ** j])(line) * line**i
+                        for (i, j), c in np.ndenumerate(matrix.coefficients[:, :, a, b, 0])
+                    ),
+                    fmpq_poly([0]),
+                )
+                for b in range(matrix.shape[1])
+            ]
+            for a in range(matrix.shape[0])
+        ]
+        if first_failure(entries, depth=40) is not None:
+            return False
+    return True
+
+
+def confirmed(problem: LmiProblem, result: LmiResult) -> bool:
+    """Every strict inequality at the decisions of the result, with the common margin taken out, proved exactly."""
+    decisions = problem.without_margin(result.decisions)
+    return all(exactly_positive(entry.matrix.substitute(decisions)) for entry in problem.inequalities if entry.strict)

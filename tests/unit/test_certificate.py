@@ -149,7 +149,7 @@ def test_overstated_levels_are_refused(tmp_path: Path) -> None:
         if claim["name"] == "decay rate":
             claim["level"] = 120.0
     assert "guarantee states 80" in refusal(data, tmp_path)
-    data["guarantee"]["claims"]["decay rate"] = 120.0
+    data["guarantee"]["claims"]["decay rate"] = data["guarantee"]["decay_rate"] = 120.0
     assert "'decay rate' at 120 1/s fails at wheel_speed" in refusal(data, tmp_path)
 
 
@@ -185,6 +185,36 @@ def test_drop_claim_agrees_with_the_second_moment(name: str) -> None:
         lost = expm(sum(c * speed**k for k, c in enumerate(coefficients)) * period)
         operator = (1 - p) * np.kron(used, used) + p * np.kron(lost, lost)
         assert np.abs(np.linalg.eigvals(operator)).max() < 1.0
+
+
+def test_unsymmetric_lyapunov_matrix_is_refused(tmp_path: Path) -> None:
+    """P = -A_e^-1 gives P A_e + (P A_e)' = -2 I for every invertible A_e; only its lack of symmetry gives it away."""
+    data = content("corner-estimation-longitudinal")
+    for gain in data["gain"]["table"]:
+        gain[0][0], gain[1][0] = -1.0, 10.0
+    matrix = -np.linalg.inv(closed_loop(data, 0.0)[0])
+    for claim in data["certificate"]["claims"]:
+        claim["P"] = {"monomials": [[0]], "coefficients": [matrix.tolist()]}
+    assert "not symmetric" in refusal(data, tmp_path)
+
+
+def test_gain_claim_must_be_about_what_it_says(tmp_path: Path) -> None:
+    data = content("corner-estimation-longitudinal")
+    claim = next(c for c in data["certificate"]["claims"] if c["name"] == "gain friction -> relative_velocity")
+    claim["errors"] = [[0.0, 0.0]]
+    assert "is about nothing" in refusal(data, tmp_path)
+    claim["errors"] = [[1.0, 0.0]]
+    assert "is about bristle_deflection" in refusal(data, tmp_path)
+
+
+@pytest.mark.parametrize("key", ["decay_rate", "fastest_pole", "sampled_decay_rate"])
+def test_guarantee_repeats_only_what_is_proved(tmp_path: Path, key: str) -> None:
+    data = content("corner-estimation-longitudinal")
+    data["guarantee"][key] *= 1.5
+    assert key in refusal(data, tmp_path)
+    data = content("corner-estimation-longitudinal")
+    data["guarantee"]["channels"][0]["gamma_certified"] = 0.5
+    assert "guarantee.channels" in refusal(data, tmp_path)
 
 
 def test_float32_table_is_stored_as_such() -> None:

@@ -76,8 +76,8 @@ def test_structural_zeros_become_equalities() -> None:
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2, 3, 4])
-def test_gram_matrices_are_sums_of_squares_at_every_point(degree: int) -> None:
-    """Any X_t >= 0 in the conic data gives M(u) = sum_t w_t(u) (b_t (x) I)' X_t (b_t (x) I) between the nodes too."""
+def test_gram_matrices_are_sums_of_squares_at_every_node(degree: int) -> None:
+    """Any X_t >= 0 in the conic data gives M(u) = sum_t w_t(u) (b_t (x) I)' X_t (b_t (x) I), node by node."""
     problem = LmiProblem((parameter(),))
     u = variable(0, 2)
     power = problem.constant(np.eye(2))
@@ -87,19 +87,16 @@ def test_gram_matrices_are_sums_of_squares_at_every_point(degree: int) -> None:
     (sos,) = relax(problem, LmiSettings(relaxation="exact")).sos
     rng = np.random.default_rng(degree)
     rows, columns, _ = triangle(2)
-    grams, entries = [], 0.0
+    grams, parts = [], []
     for matching, basis in zip(gram_matrices(sos), sos.bases, strict=True):
         size = 2 * basis.shape[1]
         root = rng.standard_normal((size, size))
         grams.append(root @ root.T)
-        entries = entries + matching @ svec(grams[-1])
-    entries = np.asarray(entries).reshape(-1, len(rows))
+        parts.append(matching @ svec(grams[-1]))
+    entries = np.sum(parts, axis=0).reshape(-1, len(rows))
     nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
     for k, node in enumerate(nodes):
-        if degree % 2:
-            weights = (1.0 + node, 1.0 - node)
-        else:
-            weights = (1.0, 1.0 - node**2)
+        weights = (1.0 + node, 1.0 - node) if degree % 2 else (1.0, 1.0 - node**2)
         total = np.zeros((2, 2))
         for gram, basis, weight in zip(grams, sos.bases, weights, strict=False):
             lift = np.kron(np.polynomial.chebyshev.chebvander(np.array([node]), basis.shape[1] - 1), np.eye(2))

@@ -102,9 +102,11 @@ def test_a_window_is_rewritten_on_the_unit_interval() -> None:
 
 def test_places_are_named_in_physical_units() -> None:
     problem = LmiProblem(BOTH)
-    problem.require("all", variable(0, 4))
-    place = problem.place(problem.inequalities[0], np.array([0.5, -1.0, 1.0, 0.0]))
-    assert place == "speed = 40 m/s, rate = 6 (m/s)/s, load = 1 kg"
+    problem.require("still", variable(0, 4))
+    problem.require("moving", variable(2, 4))
+    point = np.array([0.5, -1.0, 1.0, 0.0])
+    assert problem.place(problem.inequalities[0], point) == "speed = 40 m/s, load = 1 kg"
+    assert problem.place(problem.inequalities[1], point) == "speed = 40 m/s, rate = 6 (m/s)/s, load = 1 kg"
 
 
 def test_the_common_margin_enters_strict_inequalities_only() -> None:

@@ -14,8 +14,7 @@ from synthesis.lmi.scaling import error_scale
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import margins_of, solve
 from synthesis.polynomials.matrix import FloatArray
-from tests.property.test_lmi_roads import confirmed
-from tests.unit.lmi_cases import corner, gain_problem, lyapunov_problem, parameter
+from tests.unit.lmi_cases import confirmed, corner, gain_problem, lyapunov_problem, parameter
 
 STABLE = np.array([[[-1.0, 0.0], [0.0, -2.0]], [[0.0, 0.5], [-0.5, 0.0]]])
 ONE = np.ones((1, 1, 1))
@@ -61,7 +60,7 @@ def test_infeasibility_by_the_safety_margin_alone_refutes_nothing() -> None:
     problem.require("above", t)
     problem.require("below", problem.constant(np.array([[1e-9]])) - t)
     for kind in ("grid", "vertex", "exact"):
-        result = solve(problem, LmiSettings(relaxation=kind, points=3))  # type: ignore[arg-type]
+        result = solve(problem, LmiSettings(relaxation=kind, points=3))
         assert result.verdict is not Verdict.REFUTED
 
 

@@ -23,7 +23,7 @@ SPRING = small_model([[0, 1], [-4 - p, -1]], [[1, 0]], (parameter("p", -1.0, 3.0
 
 def values(result: StabilityResult, points: np.ndarray) -> np.ndarray:
     """The Lyapunov matrix at parameter values (g,)."""
-    return sum(c * points[:, None, None] ** k for k, c in enumerate(result.lyapunov))  # type: ignore[return-value]
+    return np.asarray(np.sum([c * points[:, None, None] ** k for k, c in enumerate(result.lyapunov)], axis=0))
 
 
 @pytest.mark.parametrize("form", ["primal", "dual"])
@@ -160,7 +160,8 @@ def test_judge_finds_the_exact_end_of_validity() -> None:
     found = judge(SCALAR, [[2]], [[["1"]], [["0.5"]]], "primal", search=(-4.0, 4.0))
     roots = np.sort(np.roots([-2 * m, 4 * m - 2, 4 - m]).real)  # where it becomes an equality
     assert not found.everywhere
-    assert found.intervals == (pytest.approx((max(roots[0], -1 / m), roots[1]), abs=1e-9),)
+    (interval,) = found.intervals
+    assert interval == pytest.approx((max(roots[0], -1 / m), roots[1]), abs=1e-9)
     inside = judge(SCALAR, [[2]], [[["1"]], [["0.5"]]], "primal")
     assert inside.everywhere
     assert inside.intervals == ((-1.0, 1.0),)

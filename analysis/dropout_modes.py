@@ -1,0 +1,93 @@
+r"""What the runtime observer does with a sample, received or dropped, as matrices for the error e = x - xhat.
+
+The observer integrates its closed loop exactly over one sample T with everything held (P1 section 9):
+
+    received           e+ = e^{(A - L C) T} e
+    dropped, coast     e+ = e^{A T} e                                       (L = 0: kinematics alone, P3 (24))
+    dropped, hold      e+ = e^{(A - L C) T} e + Gamma s,   s+ = s + C (x+ - x)   (the last measurement is used again)
+
+with Gamma = int_0^T e^{(A - L C) t} dt L and s = C x - (measurement used), the staleness, which a received sample resets to
+zero. Held, the loop stays closed: dropping cannot destabilise it, and every p < 1 leaves a bounded error for a bounded motion
+of the plant; but the error follows that motion, without bound on an unstable plant, where coasting has no such term.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+from scipy.linalg import expm
+
+from analysis.checks import as_stack, leading, positive, square
+from analysis.errors import AnalysisError
+from estimators.schedule import GainSchedule
+from synthesis.errors import unknown
+from synthesis.models.discretise import zero_order_hold
+from synthesis.polynomials.matrix import FloatArray
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+DropPolicy = Literal["coast", "hold", "hold with plant"]
+
+
+@dataclass(frozen=True)
+class DropModes:
+    """Update matrices (..., N, N) of a dropped and of a received sample on the states of the policy.
+
+    coast: e. hold: (e, s), the motion of the plant acting from outside. hold with plant: (e, x, measurement used last), an
+    autonomous system, with the error that the runtime makes by holding y over the sample: for plants that come to rest.
+    """
+
+    dropped: FloatArray
+    received: FloatArray
+    policy: DropPolicy
+
+
+def runtime_drop_modes(
+    A: ArrayLike, C: ArrayLike, gain: ArrayLike, sample_time: float, policy: DropPolicy = "coast"
+) -> DropModes:
+    """Both updates for A (..., n, n) in 1/s, C (..., k, n), gain (..., n, k) and the sample time in s.
+
+    Raises AnalysisError for arrays that do not fit or are not finite, a sample time that is not positive, an unknown policy.
+    """
+    if policy not in get_args(DropPolicy):
+        raise AnalysisError(unknown("drop policy", str(policy), get_args(DropPolicy)))
+    A, C, L = square("A", A), as_stack("C", C), as_stack("gain", gain)
+    T = positive("sample_time", sample_time)
+    n, k = A.shape[-1], C.shape[-2]
+    if C.shape[-1] != n or L.shape[-2:] != (n, k):
+        raise AnalysisError(
+            f"A {A.shape}, C {C.shape} and gain {L.shape} do not fit; they must be (..., n, n), (..., k, n), (..., n, k)"
+        )
+    lead = leading({"A": A, "C": C, "gain": L})
+    if policy == "coast":
+        return DropModes(expm(A * T), expm((A - L @ C) * T), policy)
+    phi, gamma = zero_order_hold(A - L @ C, np.broadcast_to(L, (*lead, n, k)), T)
+    if policy == "hold":
+        received, dropped = np.zeros((2, *lead, n + k, n + k))
+        received[..., :n, :n] = dropped[..., :n, :n] = phi
+        dropped[..., :n, n:] = gamma
+        dropped[..., n:, n:] = np.eye(k)
+        return DropModes(dropped, received, policy)
+    plant = expm(A * T)
+    received, dropped = np.zeros((2, *lead, 2 * n + k, 2 * n + k))
+    for update in (received, dropped):
+        update[..., :n, :n] = phi
+        update[..., n : 2 * n, n : 2 * n] = plant
+    received[..., :n, n : 2 * n] = plant - phi - gamma @ C
+    received[..., 2 * n :, n : 2 * n] = C
+    dropped[..., :n, n : 2 * n] = plant - phi
+    dropped[..., :n, 2 * n :] = -gamma
+    dropped[..., 2 * n :, 2 * n :] = np.eye(k)
+    return DropModes(dropped, received, policy)
+
+
+def schedule_drop_modes(schedule: GainSchedule, parameter: ArrayLike, policy: DropPolicy = "coast") -> DropModes:
+    """Both updates of a schedule with its stored table, at parameters (...).
+
+    Raises RangeError outside the certified range; AnalysisError for an unknown policy.
+    """
+    plant = schedule.plant_at(np.asarray(parameter, float))
+    return runtime_drop_modes(plant.A, plant.C, schedule.gain(parameter), schedule.sample_time, policy)

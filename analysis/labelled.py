@@ -1,0 +1,145 @@
+"""Arrays that know their axes: what a sensitivity study returns, plots from and saves."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.errors import AnalysisError
+from synthesis.errors import unknown
+from synthesis.polynomials.matrix import FloatArray
+
+SCHEMA = "gainsmith.labelled/1"
+Labels: TypeAlias = NDArray[np.float64] | NDArray[np.str_]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis: its name, its unit ('1' for words and pure numbers) and one label for each place, numbers or words."""
+
+    name: str
+    labels: Labels
+    unit: str = "1"
+
+
+@dataclass(frozen=True)
+class LabelledArray:
+    """`values` with one named axis for each dimension, a unit, and notes (plain text and numbers) on where it comes from.
+
+    Raises AnalysisError if an axis is repeated or does not have as many labels as the array has places.
+    """
+
+    name: str
+    values: FloatArray
+    axes: tuple[Axis, ...]
+    unit: str = "1"
+    notes: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        lengths = tuple(len(axis.labels) for axis in self.axes)
+        names = [axis.name for axis in self.axes]
+        if lengths != self.values.shape or len(set(names)) != len(names):
+            fit = dict(zip(names, lengths, strict=True))
+            raise AnalysisError(f"'{self.name}': axes {fit} do not fit the shape {self.values.shape}")
+
+    def axis(self, name: str) -> Axis:
+        """The axis of this name."""
+        for axis in self.axes:
+            if axis.name == name:
+                return axis
+        raise AnalysisError(unknown("axis", name, (axis.name for axis in self.axes)))
+
+    def at(self, **labels: str | float) -> LabelledArray:
+        """The array at one label of some axes: numbers must be met to 1e-12, words exactly."""
+        values, axes = self.values, list(self.axes)
+        for name, label in labels.items():
+            axis = self.axis(name)
+            place = _find(axis, label)
+            values = np.take(values, place, axis=axes.index(axis))
+            axes.remove(axis)
+        return LabelledArray(self.name, np.asarray(values), tuple(axes), self.unit, {**self.notes, **labels})
+
+    def item(self) -> float:
+        """The only value."""
+        return float(self.values.item())
+
+    def save(self, path: str | Path) -> tuple[Path, Path]:
+        """Write PATH.npz (values and labels, no pickles) and PATH.json (names, units, notes, checksum); returns both.
+
+        Each is written beside and renamed, the description last, so a torn pair is noticed when it is read.
+        """
+        arrays = {"values": self.values, **{f"axis_{i}": np.asarray(axis.labels) for i, axis in enumerate(self.axes)}}
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, allow_pickle=False, **arrays)
+        data = buffer.getvalue()
+        head = {
+            "schema": SCHEMA,
+            "name": self.name,
+            "unit": self.unit,
+            "axes": [{"name": a.name, "unit": a.unit, "labels": np.asarray(a.labels).tolist()} for a in self.axes],
+            "notes": dict(self.notes),
+            "sha256": hashlib.sha256(data).hexdigest(),
+        }
+        text = json.dumps(head, indent=1, allow_nan=False) + "\n"  # before anything is written: notes may not be plain
+        files = _pair(path)
+        _replace(files[0], data)
+        _replace(files[1], text.encode())
+        return files
+
+
+def load_labelled(path: str | Path) -> LabelledArray:
+    """Read what `save` wrote. Raises AnalysisError for files that are missing, edited, torn or of another schema."""
+    array_file, head_file = _pair(path)
+    try:
+        head = json.loads(head_file.read_text(encoding="utf-8"))
+        data = array_file.read_bytes()
+        if head.get("schema") != SCHEMA:
+            raise AnalysisError(f"{head_file}: schema {head.get('schema')!r} is not {SCHEMA}")
+        if hashlib.sha256(data).hexdigest() != head["sha256"]:
+            raise AnalysisError(f"{array_file}: checksum differs from {head_file.name}: edited or torn; save it again")
+        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+            values = np.asarray(arrays["values"], float)
+            axes = tuple(Axis(a["name"], arrays[f"axis_{i}"], a["unit"]) for i, a in enumerate(head["axes"]))
+        return LabelledArray(head["name"], values, axes, head["unit"], head["notes"])
+    except (OSError, KeyError, TypeError, AttributeError, ValueError) as error:
+        if isinstance(error, AnalysisError):
+            raise
+        raise AnalysisError(f"{head_file}: not a saved labelled array ({type(error).__name__}: {error})") from None
+
+
+def _find(axis: Axis, label: str | float) -> int:
+    labels = np.asarray(axis.labels)
+    if isinstance(label, str) != (labels.dtype.kind == "U"):
+        hits = np.zeros(0, int)
+    elif isinstance(label, str):
+        hits = np.flatnonzero(labels == label)
+    else:
+        hits = np.flatnonzero(np.isclose(labels.astype(float), label, rtol=1e-12, atol=1e-12))
+    if not len(hits):
+        raise AnalysisError(f"axis '{axis.name}': {unknown('label', str(label), map(str, labels.tolist()))}")
+    return int(hits[0])
+
+
+def _pair(path: str | Path) -> tuple[Path, Path]:
+    stem = Path(path)
+    if stem.suffix in {".npz", ".json"}:
+        stem = stem.with_suffix("")
+    return stem.with_name(stem.name + ".npz"), stem.with_name(stem.name + ".json")
+
+
+def _replace(path: Path, data: bytes) -> None:
+    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        beside.write_bytes(data)
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)

@@ -1,0 +1,108 @@
+"""Finite Markov chains, with any leading batch axes: checks, classes, stationary distribution, paths."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analysis.checks import probability, square
+from analysis.errors import AnalysisError
+from synthesis.polynomials.matrix import FloatArray
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+# How far the sum of a row of printed probabilities may lie from 1: accumulated rounding, not rounding to a few digits.
+ROW_SUM_TOLERANCE = 1e-9
+
+
+def stochastic(name: str, array: ArrayLike) -> FloatArray:
+    """Transition matrices (..., m, m), transition[i, j] = Pr(next = j | now = i), rows made to sum to 1 exactly.
+
+    Raises AnalysisError for negative entries or a row that does not sum to 1, with the place; a matrix whose columns sum to 1
+    instead is called transposed.
+    """
+    out = square(name, array)
+    if (out < 0.0).any():
+        place = tuple(int(i) for i in np.argwhere(out < 0.0)[0])
+        raise AnalysisError(f"{name}{list(place)} = {out[place]:g} is negative; probabilities lie between 0 and 1")
+    error = np.abs(out.sum(axis=-1) - 1.0)
+    if (error > ROW_SUM_TOLERANCE).any():
+        place = tuple(int(i) for i in np.argwhere(error > ROW_SUM_TOLERANCE)[0])
+        remedy = "give transition[i, j] = Pr(next = j | now = i), so that every row sums to 1"
+        if (np.abs(out.sum(axis=-2) - 1.0) <= ROW_SUM_TOLERANCE).all():
+            remedy = "its columns do, so it is transposed: pass its transpose"
+        raise AnalysisError(f"row {list(place)} of {name} sums to {out[place].sum():.12g}, not 1; {remedy}")
+    return np.asarray(out / out.sum(axis=-1, keepdims=True))
+
+
+def distribution(name: str, array: ArrayLike, modes: int) -> FloatArray:
+    """Probabilities (..., m) of the modes. Raises AnalysisError for negative ones, another length or a sum other than 1."""
+    out = stochastic_vector(name, array)
+    if out.shape[-1] != modes:
+        raise AnalysisError(f"{name} has {out.shape[-1]} entries for {modes} modes; give one probability a mode")
+    return out
+
+
+def stochastic_vector(name: str, array: ArrayLike) -> FloatArray:
+    """Non-negative numbers that sum to 1 along the last axis."""
+    out = probability(name, array)
+    if out.ndim == 0 or not out.shape[-1]:
+        raise AnalysisError(f"{name} is not a list of probabilities; give one a mode")
+    error = np.abs(out.sum(axis=-1) - 1.0)
+    if (error > ROW_SUM_TOLERANCE).any():
+        raise AnalysisError(f"{name} sums to {out.sum(axis=-1).flat[int(error.argmax())]:.12g}, not 1")
+    return np.asarray(out / out.sum(axis=-1, keepdims=True))
+
+
+def reachable(transition: FloatArray) -> NDArray[np.bool_]:
+    """Whether j can be reached from i in any number of steps, zero included."""
+    size = transition.shape[-1]
+    out = (transition > 0.0) | np.eye(size, dtype=bool)
+    for _ in range(max(size - 1, 1).bit_length()):
+        out = (out.astype(np.int64) @ out.astype(np.int64)) > 0
+    return np.asarray(out)
+
+
+def recurrent(transition: FloatArray) -> NDArray[np.bool_]:
+    """Modes that are visited for ever once entered: every mode that can be reached leads back."""
+    reach = reachable(transition)
+    return np.asarray((~reach | np.swapaxes(reach, -1, -2)).all(axis=-1))
+
+
+def stationary_distribution(transition: FloatArray) -> FloatArray:
+    """pi = pi P with sum 1, shape (..., m); zero on transient modes.
+
+    Raises AnalysisError if the chain has several closed classes (several absorbing modes): where it ends depends on where
+    it starts, and no single answer exists.
+    """
+    reach, home = reachable(transition), recurrent(transition)
+    apart = home[..., :, None] & home[..., None, :] & ~reach
+    if apart.any():
+        *where, i, j = (int(k) for k in np.argwhere(apart)[0])
+        place = f" (chain {where})" if where else ""
+        raise AnalysisError(
+            f"modes {i} and {j}{place} lie in different closed classes, so the stationary distribution is not unique; "
+            "propagate an initial distribution instead"
+        )
+    size = transition.shape[-1]
+    # pi (I - P + 1 1') = 1': the rank-one term makes the matrix regular exactly when pi is unique.
+    matrix = np.swapaxes(np.eye(size) - transition + 1.0, -1, -2)
+    pi = np.linalg.solve(matrix, np.ones((*transition.shape[:-2], size, 1)))[..., 0]
+    pi = np.where(home, np.maximum(pi, 0.0), 0.0)
+    return np.asarray(pi / pi.sum(axis=-1, keepdims=True))
+
+
+def sample_paths(
+    transition: FloatArray, start: FloatArray, steps: int, runs: int, generator: np.random.Generator
+) -> NDArray[np.int64]:
+    """Modes (steps + 1, runs) of independent runs of one chain; `start` (m,) is the distribution of the first one."""
+    cumulative = np.cumsum(transition, axis=-1)
+    modes = np.empty((steps + 1, runs), dtype=np.int64)
+    last = transition.shape[-1] - 1
+    modes[0] = np.minimum(np.searchsorted(np.cumsum(start), generator.random(runs), side="right"), last)
+    for k in range(steps):
+        draw = generator.random(runs)
+        modes[k + 1] = np.minimum((cumulative[modes[k]] <= draw[:, None]).sum(axis=1), last)
+    return modes

@@ -1,0 +1,126 @@
+"""How a measure of a model moves with its parameters: one at a time, on grids, on samples.
+
+A measure is any function from named samples, each an array (N,), to an array (N, ...): stability margin, norm, spectral
+radius, critical probability, gains. It is called once with all samples, never in a loop (see `analysis.perturbed` for
+models, and `one_by_one` for a function that knows no arrays).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from analysis.checks import as_stack
+from analysis.errors import AnalysisError
+from analysis.labelled import Axis, LabelledArray
+from analysis.sensitivity_designs import Design
+from synthesis.polynomials.matrix import FloatArray
+
+Measure: TypeAlias = Callable[[Mapping[str, FloatArray]], ArrayLike]
+
+
+@dataclass(frozen=True)
+class OneAtATime:
+    """`nominal` value, and `values` and `deviations` = values - nominal with the axes (parameter, factor, ...)."""
+
+    nominal: LabelledArray
+    values: LabelledArray
+    deviations: LabelledArray
+
+    def ranking(self) -> list[tuple[str, float]]:
+        """Parameters by their largest deviation in size, the strongest first."""
+        size = np.abs(self.deviations.values).reshape(len(self.deviations.axes[0].labels), -1).max(axis=1)
+        order = np.argsort(-size, kind="stable")
+        return [(str(self.deviations.axes[0].labels[i]), float(size[i])) for i in order]
+
+
+def evaluate(measure: Measure, columns: Mapping[str, FloatArray]) -> FloatArray:
+    """measure(columns) as an array (N, ...). Infinite values are answers (an unstable model); NaN is not.
+
+    Raises AnalysisError if the measure does not return one value for each sample, or returns NaN.
+    """
+    count = len(next(iter(columns.values())))
+    out = np.asarray(measure(columns), float)
+    if out.ndim < 1 or len(out) != count:
+        raise AnalysisError(
+            f"the measure returned the shape {out.shape} for {count} samples; its first axis must be the samples"
+        )
+    bad = np.isnan(out).reshape(count, -1).any(axis=1)
+    if bad.any():
+        first = int(np.argmax(bad))
+        sample = ", ".join(f"{name} = {values[first]:.6g}" for name, values in columns.items())
+        raise AnalysisError(f"the measure is not a number at {int(bad.sum())} of {count} samples, first at {sample}")
+    return out
+
+
+def one_by_one(function: Callable[[dict[str, float]], ArrayLike]) -> Measure:
+    """A measure from a function of one sample; as slow as its loop."""
+
+    def measure(columns: Mapping[str, FloatArray]) -> FloatArray:
+        count = len(next(iter(columns.values())))
+        return np.array([function({name: float(values[i]) for name, values in columns.items()}) for i in range(count)])
+
+    return measure
+
+
+def one_at_a_time(
+    measure: Measure,
+    nominal: Mapping[str, float],
+    factors: Sequence[float] = (0.8, 1.2),
+    axes: tuple[Axis, ...] = (),
+    name: str = "measure",
+    unit: str = "1",
+) -> OneAtATime:
+    """Each parameter times each factor, the others nominal (P3 Figs 3-5); `axes` name the measure's own axes, if any."""
+    names = tuple(nominal)
+    start = np.array([float(as_stack(key, value, ndim=0)) for key, value in nominal.items()])
+    scale = as_stack("factors", factors, ndim=1).ravel()
+    if not names or not len(scale):
+        raise AnalysisError("nothing to vary; give at least one parameter and one factor")
+    samples = np.tile(start, (1 + len(names) * len(scale), 1))
+    places = 1 + np.arange(len(names) * len(scale)).reshape(len(names), len(scale))
+    for i in range(len(names)):
+        samples[places[i], i] *= scale
+    values = evaluate(measure, {key: samples[:, i] for i, key in enumerate(names)})
+    own = axes or _plain_axes(values.shape[1:])
+    lead = (Axis("parameter", np.array(names)), Axis("factor", scale))
+    notes = {"design": "one at a time", "nominal": dict(zip(names, start.tolist(), strict=True))}
+    moved = values[places]
+    return OneAtATime(
+        LabelledArray(name, values[0], own, unit, notes),
+        LabelledArray(name, moved, (*lead, *own), unit, notes),
+        LabelledArray(f"deviation of {name}", moved - values[0], (*lead, *own), unit, notes),
+    )
+
+
+def sample(
+    measure: Measure, design: Design, axes: tuple[Axis, ...] = (), name: str = "measure", unit: str = "1"
+) -> LabelledArray:
+    """The measure over a design: a grid gives one axis for each parameter, other designs an axis `sample`.
+
+    The samples of the latter are in the notes, column by column, so that a saved result can be read alone.
+    """
+    values = evaluate(measure, design.columns())
+    own = axes or _plain_axes(values.shape[1:])
+    notes: dict[str, object] = {"design": design.kind, "seed": design.seed}
+    if design.kind == "grid":
+        lead = tuple(Axis(key, np.unique(column)) for key, column in design.columns().items())
+        if tuple(len(axis.labels) for axis in lead) == design.shape:
+            lead = tuple(Axis(key, _levels(design, i)) for i, key in enumerate(design.names))
+            return LabelledArray(name, values.reshape(*design.shape, *values.shape[1:]), (*lead, *own), unit, notes)
+    notes["samples"] = {key: column.tolist() for key, column in design.columns().items()}
+    return LabelledArray(name, values, (Axis("sample", np.arange(len(values), dtype=float)), *own), unit, notes)
+
+
+def _levels(design: Design, column: int) -> FloatArray:
+    """The levels of one column in the order in which they were given."""
+    table = design.samples[:, column].reshape(design.shape)
+    return np.asarray(np.moveaxis(table, column, 0).reshape(design.shape[column], -1)[:, 0])
+
+
+def _plain_axes(shape: tuple[int, ...]) -> tuple[Axis, ...]:
+    return tuple(Axis(f"output_{i}", np.arange(size, dtype=float)) for i, size in enumerate(shape))

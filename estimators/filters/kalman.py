@@ -1,0 +1,62 @@
+"""Kalman filter for time-varying linear models, over any batch."""
+
+from __future__ import annotations
+
+import numpy.typing as npt
+
+from estimators.faults import BoolArray
+from estimators.filters.joseph import CovarianceFilter
+from estimators.filters.step import FilterStep, numbers, quiet
+from estimators.interpolate import FloatArray
+
+
+class KalmanFilter(CovarianceFilter):
+    """x+ = A x + B u + w, y = C x + d + v with w ~ (0, Q), v ~ (0, R); the matrices may change at every call.
+
+    Matrices have any leading axes that broadcast against the batch. Source: Kalman (1960); correction in the form of
+    Bucy, Joseph (1968), which keeps P symmetric and positive definite.
+    """
+
+    @quiet
+    def predict(
+        self,
+        A: npt.ArrayLike,
+        Q: npt.ArrayLike,
+        B: npt.ArrayLike | None = None,
+        u: npt.ArrayLike | None = None,
+    ) -> BoolArray:
+        """xhat = A xhat + B u, P = A P A' + Q. Shapes A, Q (..., n, n), B (..., n, k), u (..., k).
+
+        Returns a mask (...) of the entries that stayed as they were because the prediction was not finite.
+
+        Raises:
+            EstimatorError: shapes that do not fit.
+        """
+        matrix = self._shaped(numbers(A, "A"), "A", self.size)
+        mean: FloatArray = (matrix @ self._mean[..., None])[..., 0]
+        if B is not None and u is not None:
+            mean = mean + (numbers(B, "B") @ numbers(u, "u")[..., None])[..., 0]
+        return self._advance(mean, matrix, Q)
+
+    @quiet
+    def correct(
+        self,
+        y: npt.ArrayLike,
+        C: npt.ArrayLike,
+        R: npt.ArrayLike,
+        offset: npt.ArrayLike | None = None,
+        gate: float | None = None,
+    ) -> FilterStep:
+        """Corrects with y = C x + offset + v. Shapes y, offset (..., m), C (..., m, n), R (..., m, m).
+
+        A channel that is not finite is missing: it is left out, for its batch entry alone. `gate` is the probability
+        with which a good channel passes: one with nu_i^2 / S_ii beyond that chi-square quantile is left out too.
+
+        Raises:
+            EstimatorError: shapes that do not fit, a gate outside (0, 1), C P C' + R singular.
+        """
+        matrix = self._shaped(numbers(C, "C"), "C", None)
+        expected: FloatArray = (matrix @ self._mean[..., None])[..., 0]
+        if offset is not None:
+            expected = expected + numbers(offset, "offset")
+        return self._correct(y, expected, matrix, R, gate)

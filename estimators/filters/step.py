@@ -1,0 +1,111 @@
+"""What a correction returns, and what it does with the measurement vector before it is used."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.errors import EstimatorError
+from estimators.faults import BoolArray
+from estimators.filters.chi_square import chi_square_quantile
+from estimators.interpolate import FloatArray
+
+LIMIT = 1e100  # a magnitude beyond it counts as not finite: no physical quantity, and products would overflow
+
+
+class FilterStep(NamedTuple):
+    """Estimate after a correction with what a log needs; `...` are the batch axes, n states, m channels."""
+
+    state: FloatArray  # (..., n)
+    covariance: FloatArray  # (..., n, n)
+    innovation: FloatArray  # (..., m) y - yhat; NaN where the channel is missing
+    innovation_covariance: FloatArray  # (..., m, m) of all channels, as predicted before any was left out
+    gain: FloatArray  # (..., n, m); zero columns for channels that were not used
+    used: BoolArray  # (..., m) whether the channel corrected the estimate
+    gated: BoolArray  # (..., m) present, but refused by the gate
+
+
+# Values that are not finite are found by comparison and handled; numpy need not warn of them as well.
+quiet = np.errstate(invalid="ignore", over="ignore", divide="ignore")
+
+
+@lru_cache(maxsize=64)
+def gate_threshold(gate: float | None) -> float | None:
+    """Largest squared normalised innovation of a channel: the chi-square quantile of one degree of freedom.
+
+    Raises:
+        EstimatorError: a gate that is not a probability inside (0, 1).
+    """
+    if gate is None:
+        return None
+    if not 0.0 < gate < 1.0:
+        raise EstimatorError(f"gate = {gate!r} must be a probability inside (0, 1), such as 0.999, or None")
+    return chi_square_quantile(gate, 1)
+
+
+def numbers(value: npt.ArrayLike, what: str) -> FloatArray:
+    """`value` as float64.
+
+    Raises:
+        EstimatorError: not numbers.
+    """
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise EstimatorError(f"{what} is not an array of numbers: {error}") from error
+
+
+def broadcast(value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> FloatArray:
+    """`value` broadcast to `shape` (a read-only view).
+
+    Raises:
+        EstimatorError: names the shapes that do not fit.
+    """
+    array = numbers(value, what)
+    if array.shape == shape:
+        return array
+    try:
+        return np.broadcast_to(array, shape)
+    except ValueError as error:
+        raise EstimatorError(f"{what} has shape {array.shape}, expected {shape} or what broadcasts to it") from error
+
+
+def fits(shape: tuple[int, ...], batch: tuple[int, ...]) -> bool:
+    """Whether leading axes broadcast to those of the batch without adding to them."""
+    return len(shape) <= len(batch) and all(
+        own in (1, full) for own, full in zip(reversed(shape), reversed(batch), strict=False)
+    )
+
+
+def bounded(array: FloatArray, *axes: int) -> BoolArray:
+    """Whether finite and of a representable size: entry by entry, or all of those along the axes."""
+    return np.asarray((np.absolute(array) <= LIMIT).all(axis=axes), dtype=np.bool_)
+
+
+def diagonal(matrix: FloatArray) -> FloatArray:
+    """(..., m) of (..., m, m), a view."""
+    return matrix.diagonal(0, -2, -1)
+
+
+def refused(
+    innovation: FloatArray, variance: FloatArray, missing: BoolArray | None, threshold: float | None
+) -> tuple[BoolArray, BoolArray | None]:
+    """The gated channels, and all that are left out (None: no channel at all); variance is that of the innovation."""
+    gated: BoolArray = np.zeros(innovation.shape, dtype=np.bool_)
+    if threshold is None:
+        return gated, missing
+    gated = innovation * innovation > threshold * variance
+    if missing is not None:
+        gated &= ~missing
+        return gated, missing | gated
+    return gated, gated if gated.any() else None
+
+
+def all_bounded(array: FloatArray) -> bool:
+    """Whether every entry is finite and of a representable size; comparisons with NaN are false."""
+    if not array.size:
+        return True
+    return bool(np.minimum.reduce(array, None) >= -LIMIT and np.maximum.reduce(array, None) <= LIMIT)

@@ -1,0 +1,147 @@
+"""Triangular factors over a batch, component axes first and the batch last: (n, k, b).
+
+Many small matrices are fastest as few array operations over a long last axis; a few matrices go through LAPACK
+elsewhere. Factors are lower triangular, and the signs of their columns are free.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimators.errors import EstimatorError
+from estimators.interpolate import FloatArray
+
+FEW = 48  # batch entries up to which LAPACK is faster
+_TINY = 1e-150
+_SAFE = 1e-5  # relative pivot above which products lose less than a digit of eleven
+
+
+def lower_factor(base: FloatArray, columns: FloatArray) -> FloatArray:
+    """L (n, n, b) with L L' = base base' + columns columns'; no product is formed (Householder, row by row).
+
+    Args:
+        base: (n, n, b) lower triangular, or (n, n, 1) for all.
+        columns: (n, k, b); overwritten.
+    """
+    n = base.shape[0]
+    lower = np.array(np.broadcast_to(base, (n, n, columns.shape[2])))
+    for k in range(n):
+        row, diagonal = columns[k], lower[k, k]
+        norm = np.einsum("kb,kb->b", row, row)
+        norm += diagonal * diagonal
+        np.sqrt(norm, norm)
+        np.maximum(norm, _TINY, out=norm)
+        beta = -np.copysign(norm, diagonal)
+        scale = diagonal - beta
+        if k + 1 < n:
+            row /= scale
+            below, rest = lower[k + 1 :, k], columns[k + 1 :]
+            moved = np.einsum("jkb,kb->jb", rest, row)
+            moved += below
+            scale /= -beta
+            moved *= scale
+            below -= moved
+            rest -= moved[:, None] * row
+        lower[k, k] = beta
+    return np.asarray(lower, dtype=np.float64)
+
+
+def upper_factor(rows: FloatArray) -> FloatArray:
+    """U (b, n, n), upper triangular, with U'U = rows'rows of (b, k, n)."""
+    return np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
+
+
+def right_divide(rows: FloatArray, lower: FloatArray, triangular: bool = False) -> FloatArray:
+    """X (r, n, b) with X L = rows, by back substitution over the columns; `rows` is overwritten.
+
+    With `triangular` the first n rows are a lower triangle, whose zeros are passed over.
+    """
+    for k in reversed(range(lower.shape[0])):
+        part = rows[k if triangular else 0 :]
+        if k + 1 < lower.shape[0]:
+            part[:, k] -= np.einsum("rjb,jb->rb", part[:, k + 1 :], lower[k + 1 :, k])
+        part[:, k] *= 1.0 / lower[k, k]
+    return rows
+
+
+def left_divide(lower: FloatArray, rows: FloatArray) -> FloatArray:
+    """X (n, k, b) with L X = rows, by forward substitution."""
+    out = rows.copy()
+    for k in range(lower.shape[0]):
+        if k:
+            out[k] -= np.einsum("jb,jkb->kb", lower[k, :k], out[:k])
+        out[k] /= lower[k, k]
+    return np.asarray(out, dtype=np.float64)
+
+
+def summed_factor(matrix: FloatArray, base: FloatArray, columns: FloatArray) -> FloatArray:
+    """L (n, n, b) with L L' = matrix + columns columns', matrix = base base'; `columns` (n, k, b) is overwritten.
+
+    A Cholesky factor of the sum costs a third of the orthogonal triangularisation and has its accuracy as long as no
+    pivot is small against its diagonal entry; where one is, `lower_factor` does it.
+    """
+    lower, safest = _cholesky(matrix, columns, _SAFE)
+    return lower if safest > _SAFE else lower_factor(base, columns)
+
+
+def cholesky(matrix: FloatArray, what: str) -> FloatArray:
+    """L (n, n, b) of a positive definite matrix (n, n, b).
+
+    Raises:
+        EstimatorError: not positive definite; names `what`.
+    """
+    lower, safest = _cholesky(matrix, None, 0.0)
+    if not safest > 0:
+        raise EstimatorError(f"{what} is not positive definite; give every channel a noise variance above zero")
+    return lower
+
+
+def _cholesky(matrix: FloatArray, columns: FloatArray | None, least: float) -> tuple[FloatArray, float]:
+    """L L' = matrix + columns columns', and the smallest pivot relative to its diagonal entry, -1 where that is not
+    above `least`."""
+    n = matrix.shape[0]
+    lower = np.zeros((n, n, matrix.shape[2] if columns is None else columns.shape[2]))
+    safest = np.inf
+    for k in range(n):
+        column = lower[k:, k]
+        column += matrix[k:, k]
+        if columns is not None:
+            column += np.einsum("rjb,jb->rb", columns[k:], columns[k])
+        if k:
+            diagonal = column[0].copy()
+            column -= np.einsum("rjb,jb->rb", lower[k:, :k], lower[k, :k])
+            np.divide(column[0], diagonal, diagonal)
+            safest = min(safest, float(np.minimum.reduce(diagonal)))
+        elif not np.minimum.reduce(column[0]) > 0:
+            return lower, -1.0
+        if not safest > least:  # NaN stops as well
+            return lower, -1.0
+        column *= 1.0 / np.sqrt(column[0])
+    return lower, safest
+
+
+def semidefinite_factor(matrix: FloatArray, what: str, definite: bool = False) -> FloatArray:
+    """L (..., n, n), lower triangular, with L L' = matrix (..., n, n), which may be singular unless `definite`.
+
+    Raises:
+        EstimatorError: not finite, not symmetric or indefinite; names `what`.
+    """
+    if not np.isfinite(matrix).all():
+        raise EstimatorError(f"{what} is not finite")
+    flipped = np.swapaxes(matrix, -1, -2)
+    if not np.allclose(matrix, flipped, rtol=1e-9, atol=1e-12 * float(np.absolute(matrix).max(initial=0.0))):
+        raise EstimatorError(f"{what} is not symmetric")
+    try:
+        return np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        if definite:
+            raise EstimatorError(
+                f"{what} is not positive definite; give every channel a noise variance above zero"
+            ) from None
+        variance = np.einsum("...ii->...i", matrix)
+        scale = np.sqrt(np.where(variance > 0, variance, 1.0))
+        values, vectors = np.linalg.eigh(matrix / scale[..., None] / scale[..., None, :])
+        if not (values >= -1e-9).all() or (variance < 0).any():
+            raise EstimatorError(f"{what} is not positive semidefinite; lowest eigenvalue {values.min():.3g}") from None
+        root = scale[..., None] * vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]
+        return upper_factor(root.swapaxes(-1, -2)).swapaxes(-1, -2)

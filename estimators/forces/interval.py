@@ -1,0 +1,85 @@
+"""The mean force over the time between two new wheel speeds, from the wheel equation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.faults import BoolArray
+from estimators.forces.wheel import WheelSignals
+from estimators.interpolate import FloatArray
+from estimators.signals.checks import mask
+from estimators.signals.memory import Memory
+
+
+class MeanForce(NamedTuple):
+    """Shapes as the batch; where `used` is false the numbers mean nothing."""
+
+    force: FloatArray  # N
+    torque: FloatArray  # N m, mean over the interval
+    before: FloatArray  # rad/s, wheel speed at its start
+    samples: FloatArray  # its length
+    used: BoolArray  # a new speed closed an interval in which the force was known throughout
+    waiting: BoolArray  # the interval is open: the speed is not new, or missing
+    complete: bool  # used everywhere
+
+
+class SpeedInterval(Memory):
+    """m = (mean T - I_w (w_k - w_j)/(n Ts))/R_e between two new wheel speeds, n samples apart.
+
+    The torque given with a sample is the one that acted since the sample before. Repeated and missing speeds leave the
+    interval open; a stopped wheel or a missing torque breaks it off.
+    """
+
+    memory = ("start", "torque", "samples")
+    unknowns = ("start",)
+
+    def __init__(self, batch_shape: tuple[int, ...], sample_time: float, radius: FloatArray, inertia: float) -> None:
+        self.batch_shape, self.sample_time, self.radius, self.inertia = batch_shape, sample_time, radius, inertia
+        self.start: FloatArray = np.full(batch_shape, np.nan)
+        self.torque: FloatArray = np.zeros(batch_shape)
+        self.samples: FloatArray = np.zeros(batch_shape)
+        self._rate = inertia / sample_time
+        self._closed = False  # every corner has its last speed, and an interval of one sample before it
+        self.one, self._all, self._none = np.ones(()), np.ones(batch_shape, np.bool_), np.zeros(batch_shape, np.bool_)
+
+    def __call__(self, signals: WheelSignals, fresh: npt.ArrayLike | None) -> MeanForce:
+        """One sample; `fresh` marks new wheel speeds (`Freshness`), None: all.
+
+        Raises:
+            EstimatorError: a mask of another shape.
+        """
+        if self._closed and signals.calm and fresh is None:
+            before, self.start = self.start, signals.speed
+            push = signals.torque - self._rate * (signals.speed - before)
+            return MeanForce(push / self.radius, signals.torque, before, self.one, self._all, self._none, True)
+        broken, new = signals.broken, ~signals.no_speed
+        if fresh is not None:
+            new = new & mask(fresh, self.batch_shape, "fresh")
+        self.samples = self.samples + 1.0
+        self.torque = self.torque + signals.torque
+        closes = new & ~broken & ~np.isnan(self.start)
+        mean = self.torque / self.samples
+        before = np.where(closes, self.start, signals.speed)
+        samples = self.samples
+        force = (mean - self.inertia * (signals.speed - before) / (samples * self.sample_time)) / self.radius
+        waiting = ~new & ~broken & ~np.isnan(self.start)
+        self.start = np.where(new, signals.speed, np.where(broken, np.nan, self.start))
+        again = new | broken
+        self.torque, self.samples = np.where(again, 0.0, self.torque), np.where(again, 0.0, samples)
+        self._closed = bool(new.all())
+        return MeanForce(force, mean, before, samples, closes, waiting, bool(closes.all()))
+
+    def forget(self, where: npt.ArrayLike | None) -> None:
+        """Breaks off the intervals of the entries `where`."""
+        chosen = mask(where, self.batch_shape, "where")
+        self.start = np.where(chosen, np.nan, self.start)
+        self.torque, self.samples = np.where(chosen, 0.0, self.torque), np.where(chosen, 0.0, self.samples)
+        self._closed = False
+
+    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+        super()._take(saved)
+        self._closed = False

@@ -1,0 +1,62 @@
+"""Corner forces that agree with the acceleration of the whole car: what single wheels cannot know, their sum does."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.faults import BoolArray
+from estimators.interpolate import FloatArray
+
+
+class Reconciled(NamedTuple):
+    """Leading axes are those of the batch."""
+
+    force: FloatArray  # (..., 4) N
+    deviation: FloatArray  # (..., 4) N
+    innovation: FloatArray  # (...) N, total minus the sum before; NaN where the total is missing
+    used: BoolArray  # (...) whether the total was there
+
+
+def reconcile(
+    force: FloatArray,
+    deviation: FloatArray,
+    total: npt.ArrayLike,
+    total_deviation: float,
+    load: FloatArray,
+    unknown: BoolArray,
+    unknown_share: float = 0.25,
+) -> Reconciled:
+    """Least squares between corner forces and their sum, F + w (total - sum F)/(sum w + s^2), w = deviation^2.
+
+    A corner that its wheel equation leaves `unknown` (wheel stopped, torque lost) first gets its share by load,
+    total F_z/sum F_z, with a deviation of `unknown_share` of its load: all wheels using the same part of their load is
+    a fair guess, and at standstill it is zero. Corners that changed much since the last sample are the uncertain ones
+    (`WheelForceStep.deviation`), and take most of the correction.
+
+    Where the total is missing, forces and deviations come back unchanged (an unknown one with its load as deviation).
+
+    Args:
+        force, deviation, load: (..., 4) N, load positive.
+        total: (...) N, m a_x of the level car, in the direction of the wheel planes: plus F_y,f sin(delta) with the front
+            wheels steered, plus drag and m g sin(grade) where known.
+        total_deviation: N; the mass times what the accelerometer may be wrong.
+        unknown: (..., 4) mask, `WheelForceStep.unknown`.
+        unknown_share: of the load.
+    """
+    given = np.asarray(total, dtype=np.float64)
+    weight, prior, there = deviation**2, force, np.isfinite(given)
+    calm = bool(there.all())
+    if not calm or unknown.any():
+        present = there[..., None]
+        share = np.where(there, given, 0.0)[..., None] * load / load.sum(axis=-1, keepdims=True)
+        prior = np.where(unknown & present, share, force)
+        weight = np.where(unknown, (np.where(present, unknown_share, 1.0) * load) ** 2, weight)
+    gap = given - np.add.reduce(prior, -1)
+    gain = weight / (np.add.reduce(weight, -1, keepdims=True) + total_deviation**2)
+    if not calm:
+        gain = np.where(there[..., None], gain, 0.0)
+    change = gain * (gap if calm else np.where(there, gap, 0.0))[..., None]
+    return Reconciled(prior + change, np.sqrt(weight * (1.0 - gain)), gap, there)

@@ -1,0 +1,123 @@
+"""Longitudinal force by an unknown-input observer: a virtual wheel that must be pushed to turn like the real one."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.faults import BoolArray
+from estimators.forces.interval import SpeedInterval
+from estimators.forces.wheel import WheelForceStep, WheelInputs
+from estimators.interpolate import FloatArray
+from estimators.signals.checks import setting
+from estimators.signals.memory import Memory
+from estimators.vehicle import VehicleParameters
+
+
+class UnknownInputForceObserver(Memory):
+    """I_w dwhat/dt = T - R_e f_0 + K_p (w - what),  F_x = f_0 - K_p (w - what)/R_e: P2 (1)-(3).
+
+    Equal to a first-order lag of the force, F_x = f_0 + K/(s + K) (F_x - f_0) with K = K_p/I_w, and without dw/dt. Here
+    it is integrated exactly for wheel speeds that are linear between samples and torques that are held:
+
+        F_k = F_j + (1 - e^(-K n Ts)) (m_k - F_j),   m_k = (mean T - I_w (w_k - w_j)/(n Ts))/R_e,
+
+    with the last new speed w_j, n samples ago (`SpeedInterval`). The state is F; the virtual speed follows from it,
+    w - what = (f_0 - F) R_e/K_p (`speed_error`). Theorem 1: |R_e (F_x - f_0)/I_w| < b bounds that error by b/K.
+
+    A force that cannot be known (wheel stopped, torque or speed missing) fades to f_0 and is flagged; what a speed that
+    is not new leaves open is decided when the next new one comes.
+
+    Args:
+        vehicle: radii, wheel inertia, rolling resistance.
+        sample_time: Ts, s.
+        batch_shape: ends with the four corners.
+        lag: 1/K, s. 0 takes the mean force of the last interval as it is.
+        nominal_force: f_0, N.
+        speed_deviation: rad/s, of the wheel speed sensor; for the reported deviation alone.
+        stopped_below, fade_time: as `WheelInputs`.
+
+    Raises:
+        EstimatorError: a shape without corners, a setting that is not positive (lag, f_0: not finite).
+    """
+
+    memory = ("force", "before", "deviation")
+    parts = ("inputs", "interval")
+
+    def __init__(
+        self,
+        vehicle: VehicleParameters,
+        sample_time: float,
+        batch_shape: tuple[int, ...] = (4,),
+        lag: float = 0.0025,
+        nominal_force: float = 0.0,
+        speed_deviation: float = 0.05,
+        stopped_below: float = 1.0,
+        fade_time: float = 0.2,
+    ) -> None:
+        self.inputs = WheelInputs(vehicle, sample_time, batch_shape, stopped_below, fade_time)
+        self.batch_shape = self.inputs.batch_shape
+        self.interval = SpeedInterval(self.batch_shape, sample_time, self.inputs.radius, self.inputs.inertia)
+        self.lag = setting(lag, "lag", "s", low_allowed=True)
+        self.nominal_force = setting(nominal_force, "nominal_force", "N", low=-math.inf)
+        self._keep = math.exp(-self.inputs.sample_time / self.lag) if self.lag > 0 else 0.0
+        self._noise = self.inputs.sensor_gain * setting(speed_deviation, "speed_deviation", "rad/s", low_allowed=True)
+        self.force: FloatArray = np.full(self.batch_shape, self.nominal_force)
+        self.before: FloatArray = np.zeros(self.batch_shape)
+        self.deviation: FloatArray = np.array(np.broadcast_to(vehicle.static_loads, self.batch_shape))
+
+    @property
+    def speed_error(self) -> FloatArray:
+        """w - what = (f_0 - F) R_e/K_p, rad/s, as the batch."""
+        error: FloatArray = (self.nominal_force - self.force) * self.inputs.radius * self.lag / self.inputs.inertia
+        return error
+
+    def step(
+        self,
+        wheel_speed: npt.ArrayLike,
+        torque: npt.ArrayLike,
+        vertical_load: npt.ArrayLike | None = None,
+        fresh: npt.ArrayLike | None = None,
+    ) -> WheelForceStep:
+        """Takes one sample of the batch shape: rad/s, N m (what acted since the last sample), N.
+
+        `fresh` marks new wheel speeds (`estimators.signals.Freshness`); None: all. The innovation is m - F, N.
+
+        Raises:
+            EstimatorError: another shape, or not numbers.
+        """
+        signals = self.inputs(wheel_speed, torque, vertical_load)
+        mean = self.interval(signals, fresh)
+        if mean.complete and mean.samples is self.interval.one:
+            gap: FloatArray = mean.force - self.force
+            self.force = self.force + (1.0 - self._keep) * gap
+            self.deviation = np.hypot(self._noise, 0.5 * (mean.force - self.before))
+            self.before = mean.force
+            none = signals.stopped.copy()
+            return WheelForceStep(
+                self.force.copy(), self.deviation.copy(), gap, mean.used.copy(), none, none.copy(), signals.flags
+            )
+        innovation: FloatArray = np.where(mean.used, mean.force - self.force, np.nan)
+        gain = 1.0 - self._keep**mean.samples
+        held = np.where(mean.waiting, self.force, self._faded())
+        self.force = np.where(mean.used, self.force + gain * (mean.force - self.force), held)
+        change = np.absolute(mean.force - self.before)
+        seen = np.where(mean.used, np.hypot(self._noise / mean.samples, 0.5 * change), signals.load)
+        self.deviation = np.where(mean.waiting, self.deviation, seen)
+        self.before = np.where(mean.used, mean.force, self.force)
+        unknown = ~(mean.used | mean.waiting)
+        return WheelForceStep(
+            self.force.copy(), self.deviation.copy(), innovation, mean.used, signals.stopped, unknown, signals.flags
+        )
+
+    def reset(self, where: npt.ArrayLike | None = None) -> None:
+        """Starts the entries `where` (bool mask of the batch shape; None: all) afresh at f_0; flagged RESET next."""
+        chosen: BoolArray = self.inputs.forget(where)
+        self.interval.forget(chosen)
+        self.force = np.where(chosen, self.nominal_force, self.force)
+        self.before = np.where(chosen, 0.0, self.before)
+
+    def _faded(self) -> FloatArray:
+        return self.nominal_force + self.inputs.fade * (self.force - self.nominal_force)

@@ -1,0 +1,229 @@
+"""Four-wheel sideslip observer: one model, an extended or an unscented filter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.errors import EstimatorError
+from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
+from estimators.filters import ExtendedKalmanFilter, FilterStep, UnscentedKalmanFilter
+from estimators.filters.step import broadcast, diagonal
+from estimators.interpolate import FloatArray
+from estimators.sideslip.dugoff import used_friction
+from estimators.sideslip.four_wheel_model import FourWheelModel
+from estimators.sideslip.inputs import HeldInput, check_saved, checked_noise
+from estimators.sideslip.vehicle import FourWheel, positive
+
+# Not published; declared choices. Process noise per second: (rad/s)^2, (m/s)^2, rad^2, N^2 (tires), N^2 (drive).
+PROCESS = (1e-4, 1e-2, 1e-4, 1e5, 1e5, 1e5, 1e5, 1e7)
+MEASUREMENT = (4e-6, 4e-2, 2.5e-3, 2.5e-3)  # (rad/s)^2, (m/s)^2, (m/s^2)^2, (m/s^2)^2
+INITIAL = (1e-2, 400.0, 1e-2, 1e6, 1e6, 1e6, 1e6, 1e6)
+STEERING_LIMIT = 1.0  # rad, of the front wheels
+LOAD_LIMIT = 1e5  # N
+_MOST = 100.0  # times its initial variance: an entry that knows so little starts again
+_CHUNK = 1000  # batch entries worked on at once: their sigma points stay in the cache
+
+
+class FourWheelStep(NamedTuple):
+    """What one sample returns; `...` are the batch axes, wheels in the order front left, front right, rear left, right.
+
+    `filter` holds innovation (..., 4), its covariance, gain, used and gated channels for the log.
+    """
+
+    state: FloatArray  # (..., 8), see `four_wheel_model.STATES`
+    sideslip: FloatArray  # (...) rad, positive to the left
+    forces: FloatArray  # (..., 4) lateral, tire axes, N
+    used_friction: FloatArray  # (..., 4) F_y / F_z, P4 (14)
+    flags: FlagArray  # (...) sums of `Flag`
+    at_rest: BoolArray  # (...) standstill or reverse: sideslip and lateral forces fade to zero
+    filter: FilterStep
+
+
+class FourWheelObserver:
+    """Yaw rate, speed, sideslip, four lateral forces and the front drive force from P4 (7)-(12).
+
+    Normal forces are inputs, friction is known. Euler steps, T = 0.01 s in the source.
+
+    Straight ahead (delta = 0) is not special while the car moves: the left-right difference in front, which no sensor
+    sees there, relaxes with sigma / V, so that its covariance stays bounded; nothing is set to zero (P4 sets F_y and
+    beta to zero, which fails when steering crosses zero). Below `standstill_speed` (and in reverse) the model is
+    singular: the entry is `at_rest`, sideslip and lateral forces fade to zero with 0.1 s and their variance settles.
+    Without measurements variances grow; an entry with one beyond 100 times its initial value starts again from zero and
+    the initial covariance, flagged RESET, as does one whose prediction is not finite.
+
+    Args:
+        vehicle: parameters.
+        kind: "unscented" or "extended".
+        batch_shape: shape of the steering input; () for one car.
+        sample_time: s.
+        process_noise: eight variances per second; see `PROCESS`.
+        measurement_noise: four variances of yaw rate, speed, a_x, a_y; see `MEASUREMENT`.
+        initial_covariance: eight variances.
+        gate: probability with which a good channel passes, or None.
+        standstill_speed: m/s.
+
+    Raises:
+        EstimatorError: an option that means nothing.
+    """
+
+    def __init__(
+        self,
+        vehicle: FourWheel,
+        kind: Literal["unscented", "extended"] = "unscented",
+        batch_shape: tuple[int, ...] = (),
+        sample_time: float = 0.01,
+        process_noise: npt.ArrayLike | None = None,
+        measurement_noise: npt.ArrayLike | None = None,
+        initial_covariance: npt.ArrayLike | None = None,
+        gate: float | None = None,
+        standstill_speed: float = 1.0,
+    ) -> None:
+        if kind not in ("unscented", "extended"):
+            raise EstimatorError(f"kind = {kind!r} is not known; use 'unscented' or 'extended'")
+        self.vehicle, self.batch_shape, self.gate = vehicle, tuple(batch_shape), gate
+        self.sample_time = positive(sample_time, "sample_time", "s")
+        self.standstill_speed = positive(standstill_speed, "standstill_speed", "m/s")
+        self._count = math.prod(self.batch_shape)
+        if self._count < 1:
+            raise EstimatorError(f"batch_shape = {batch_shape} holds no entries")
+        self._process = checked_noise(process_noise, PROCESS, "process_noise", True) * self.sample_time
+        self._sensor = checked_noise(measurement_noise, MEASUREMENT, "measurement_noise", False)
+        spread = checked_noise(initial_covariance, INITIAL, "initial_covariance", False)
+        self._most = _MOST * np.diag(spread)
+        build = UnscentedKalmanFilter if kind == "unscented" else ExtendedKalmanFilter
+        starts = range(0, self._count, _CHUNK)
+        self._parts = [slice(start, min(start + _CHUNK, self._count)) for start in starts]
+        self._filters: list[UnscentedKalmanFilter | ExtendedKalmanFilter] = [
+            build(np.zeros((part.stop - part.start, 8)), spread) for part in self._parts
+        ]
+        static = np.tile(vehicle.static_loads, (self._count, 1))
+        self._steering = HeldInput("steering", np.zeros(self._count), -STEERING_LIMIT, STEERING_LIMIT)
+        self._loads = HeldInput("loads", static, 0.0, LOAD_LIMIT, axes=1)
+        self._renewed = np.zeros(self._count, dtype=np.bool_)
+
+    @property
+    def state(self) -> FloatArray:
+        """A copy of the estimate, (..., 8)."""
+        return np.concatenate([each.state for each in self._filters]).reshape(*self.batch_shape, 8)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """A copy of the covariance, (..., 8, 8)."""
+        return np.concatenate([each.covariance for each in self._filters]).reshape(*self.batch_shape, 8, 8)
+
+    def step(self, steering: npt.ArrayLike, loads: npt.ArrayLike, measurement: npt.ArrayLike) -> FourWheelStep:
+        """Predicts with the inputs of the previous sample, then corrects with the measurement of this one.
+
+        Args:
+            steering: (...) rad, of the front wheels, at this sample.
+            loads: (..., 4) N.
+            measurement: (..., 4) yaw rate in rad/s, speed in m/s, a_x and a_y in m/s^2, gravity removed; a channel
+                that is not finite is missing.
+
+        Raises:
+            EstimatorError: shapes that do not fit, not numbers.
+        """
+        shape, count = self.batch_shape, self._count
+        flags: FlagArray = np.zeros(count, dtype=np.int32)
+        before = self._steering.value, self._loads.value
+        angle = self._steering(broadcast(steering, shape, "steering").reshape(count), flags)
+        load = self._loads(broadcast(loads, (*shape, 4), "loads").reshape(count, 4), flags)
+        measured = broadcast(measurement, (*shape, 4), "measurement").reshape(count, 4)
+        rest = np.empty(count, dtype=np.bool_)
+        found: list[FilterStep] = []
+        for part, each in zip(self._parts, self._filters, strict=True):
+            rest[part] = ~(each.state[:, 1] >= self.standstill_speed)
+            stands = rest[part] if rest[part].any() else None
+            old = FourWheelModel.at(
+                self.vehicle, self.sample_time, before[0][part], before[1][part], self.standstill_speed, stands
+            )
+            new = FourWheelModel.at(
+                self.vehicle, self.sample_time, angle[part], load[part], self.standstill_speed, stands
+            )
+            if isinstance(each, UnscentedKalmanFilter):
+                held = each.predict(old.transition_of_points, self._process)
+                result = each.correct(measured[part], new.measurement, self._sensor, self.gate)
+            else:
+                held = each.predict(old.transition, old.transition_jacobian, self._process)
+                result = each.correct(
+                    measured[part], new.measurement, new.measurement_jacobian, self._sensor, self.gate
+                )
+            lost = held | np.asarray((diagonal(result.covariance) > self._most).any(axis=-1))
+            if lost.any():
+                each.reset(lost)
+                self._renewed[part] |= lost
+                result = result._replace(state=each.state, covariance=each.covariance)
+            found.append(result)
+        joined = found[0] if len(found) == 1 else _joined(found)
+        raise_flag(flags, np.asarray(np.isnan(joined.innovation).any(axis=-1)), Flag.MISSING_MEASUREMENT)
+        raise_flag(flags, self._renewed, Flag.RESET)
+        self._renewed[:] = False
+        forces = joined.state[:, 3:7]
+        friction = used_friction(forces, load)
+        shaped = _reshaped(joined, shape)
+        return FourWheelStep(
+            shaped.state,
+            shaped.state[..., 2],
+            shaped.state[..., 3:7],
+            friction.reshape(*shape, 4),
+            flags.reshape(shape),
+            rest.reshape(shape),
+            shaped,
+        )
+
+    def reset(self, where: npt.ArrayLike | None = None, state: npt.ArrayLike = 0.0) -> None:
+        """Sets the entries `where` (mask of the batch shape; None: all) to `state`, (..., 8) or what broadcasts to it,
+        with the initial covariance, and forgets the inputs; flagged RESET at the next step.
+
+        Raises:
+            EstimatorError: another shape, or a state that is not finite.
+        """
+        mask = np.ones(self.batch_shape, dtype=np.bool_) if where is None else np.asarray(where)
+        if mask.dtype != np.bool_ or mask.shape != self.batch_shape:
+            raise EstimatorError(f"where: {mask.dtype} {mask.shape}, expected a bool mask of shape {self.batch_shape}")
+        full = broadcast(state, (*self.batch_shape, 8), "state").reshape(self._count, 8)
+        if not np.isfinite(full).all():
+            raise EstimatorError("state is not finite; reset to finite numbers")
+        chosen = mask.reshape(-1)
+        for part, each in zip(self._parts, self._filters, strict=True):
+            each.reset(chosen[part], state=full[part])
+        self._steering.forget(chosen)
+        self._loads.forget(chosen)
+        self._renewed |= chosen
+
+    def save(self) -> dict[str, npt.NDArray[Any]]:
+        """Everything needed to continue later, as plain arrays."""
+        saved: dict[str, npt.NDArray[Any]] = {
+            "steering": self._steering.value.copy(),
+            "loads": self._loads.value.copy(),
+            "renewed": self._renewed.copy(),
+        }
+        memories = [each.save() for each in self._filters]
+        return saved | {key: np.concatenate([memory[key] for memory in memories]) for key in memories[0]}
+
+    def restore(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Continues from `save`, bit for bit.
+
+        Raises:
+            EstimatorError: incomplete, of another shape, of another kind of filter or not finite; nothing is changed.
+        """
+        check_saved(saved, self.save())
+        for part, each in zip(self._parts, self._filters, strict=True):
+            each.restore({key: saved[key][part] for key in each.save()})
+        self._steering.value, self._loads.value = np.array(saved["steering"]), np.array(saved["loads"])
+        self._renewed = np.array(saved["renewed"], dtype=np.bool_)
+
+
+def _joined(steps: list[FilterStep]) -> FilterStep:
+    columns: list[Any] = [np.concatenate(arrays) for arrays in zip(*steps, strict=True)]
+    return FilterStep(*columns)
+
+
+def _reshaped(step: FilterStep, shape: tuple[int, ...]) -> FilterStep:
+    columns: list[Any] = [array.reshape(*shape, *array.shape[1:]) for array in step]
+    return FilterStep(*columns)

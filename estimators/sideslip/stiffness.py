@@ -1,0 +1,226 @@
+"""Sideslip observers on axle forces: with adaptive cornering stiffness by zones, and with fixed stiffness."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.errors import EstimatorError
+from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
+from estimators.filters import ExtendedKalmanFilter, FilterStep
+from estimators.filters.step import bounded, broadcast
+from estimators.interpolate import FloatArray
+from estimators.sideslip.cornering_model import CorneringModel
+from estimators.sideslip.inputs import HeldInput, check_saved
+from estimators.sideslip.vehicle import SingleTrack, positive
+
+GOOD_NOISE = (0.1, 0.1, 0.1)  # zones 5, 6: N^2, N^2, (m/s^2)^2, per sample; P5 section 4
+POOR_NOISE = (1e6, 1e6, 1e6)  # zones 1 to 4
+SIDESLIP_NOISE = 1e-13  # rad^2 per sample
+STIFFNESS_NOISE = 0.24  # (N/rad)^2 per sample, zones 5, 6 alone
+_LIMITS = ((-1.0, 1.0), (-10.0, 10.0), (0.0, 200.0), (-1e5, 1e5))  # rad, rad/s, m/s, N
+
+
+class StiffnessStep(NamedTuple):
+    """What one sample returns; `...` are the batch axes."""
+
+    sideslip: FloatArray  # (...) rad at the centre of gravity
+    rear_sideslip: FloatArray  # (...) rad, beta_2 of (11)
+    stiffness: FloatArray  # (..., 2) N/rad of front and rear axle
+    excited: BoolArray  # (..., 2) axle in zone 5 or 6
+    flags: FlagArray  # (...) sums of `Flag`
+    at_rest: BoolArray  # (...) standstill or reverse: sideslip fades to zero, stiffness is frozen
+    filter: FilterStep
+
+
+class AdaptiveStiffnessObserver:
+    """Extended Kalman filter on P5 (10)-(17): sideslip and the corrections of two axle stiffnesses.
+
+    Zones in the (slip angle, force) plane of each axle: 1, 2 where beta_i F_yi < 0; 3, 4 where |F_yi| < `threshold`;
+    5, 6 the rest. In zones 1 to 4 the stiffness is frozen by large measurement noise and no process noise. The paper
+    has one pair of matrices for both axles; here, declared, each axle switches for itself (`switching="axle"`), with
+    the acceleration channel poor as soon as one axle is; "both" makes both poor as soon as one is. An axle whose force
+    is missing gets no process noise either, so covariances stay bounded. Input noise (F_u Q_e F_u') is not published
+    and left out.
+
+    Stiffnesses are kept between 0.05 and 2 times the given ones. Below `standstill_speed`, where (16) is singular, the
+    entry is at rest: sideslip fades to zero with 0.1 s and measurements are not used.
+
+    Args:
+        vehicle: parameters; the stiffnesses are the starting ones.
+        batch_shape: shape of each input.
+        sample_time: s; the published covariances are per 0.01 s step.
+        threshold: lambda_i in N of front and rear axle (not published).
+        switching: "axle" or "both".
+        initial_covariance: variances rad^2, (N/rad)^2, (N/rad)^2 (not published).
+        standstill_speed: m/s.
+        gate: probability with which a good channel passes, or None.
+
+    Raises:
+        EstimatorError: an option that means nothing; a standstill speed at which Euler steps are unstable.
+    """
+
+    _states = 3
+
+    def __init__(
+        self,
+        vehicle: SingleTrack,
+        batch_shape: tuple[int, ...] = (),
+        sample_time: float = 0.01,
+        threshold: tuple[float, float] = (1000.0, 1000.0),
+        switching: Literal["axle", "both"] = "axle",
+        initial_covariance: tuple[float, float, float] = (1e-2, 1e6, 1e6),
+        standstill_speed: float = 3.0,
+        gate: float | None = None,
+    ) -> None:
+        if switching not in ("axle", "both"):
+            raise EstimatorError(f"switching = {switching!r} is not known; use 'axle' or 'both'")
+        self.vehicle, self.batch_shape, self.switching, self.gate = vehicle, tuple(batch_shape), switching, gate
+        self.sample_time = positive(sample_time, "sample_time", "s")
+        self.standstill_speed = positive(standstill_speed, "standstill_speed", "m/s")
+        rate = 2 * (vehicle.front_stiffness + vehicle.rear_stiffness) / (vehicle.mass * self.standstill_speed)
+        if rate * self.sample_time > 1.5:
+            raise EstimatorError(
+                f"standstill_speed = {standstill_speed} m/s is too low for Euler steps of {sample_time} s; use at least "
+                f"{rate * self.sample_time / 1.5 * self.standstill_speed:.3g} m/s"
+            )
+        self.threshold = np.array([positive(value, "threshold", "N") for value in threshold])
+        spread = [positive(value, "initial_covariance", "") for value in initial_covariance[: self._states]]
+        self._filter = ExtendedKalmanFilter(np.zeros((*self.batch_shape, self._states)), np.diag(spread))
+        names = ("steering", "yaw_rate", "speed", "drive_force")
+        self._inputs = [
+            HeldInput(name, np.zeros(self.batch_shape), *limits) for name, limits in zip(names, _LIMITS, strict=True)
+        ]
+        self._renewed = np.zeros(self.batch_shape, dtype=np.bool_)
+
+    @property
+    def state(self) -> FloatArray:
+        """A copy of the estimate, (..., 3): rad, N/rad, N/rad."""
+        return self._filter.state
+
+    @property
+    def covariance(self) -> FloatArray:
+        """A copy of the covariance, (..., 3, 3)."""
+        return self._filter.covariance
+
+    def step(
+        self,
+        steering: npt.ArrayLike,
+        yaw_rate: npt.ArrayLike,
+        speed: npt.ArrayLike,
+        drive_force: npt.ArrayLike,
+        measurement: npt.ArrayLike,
+    ) -> StiffnessStep:
+        """Predicts with the inputs (...) of the previous sample, corrects with those and the measurement of this one.
+
+        Measurement (..., 3): F_yw1 and F_yw2 in N, for instance of `SlidingModeObserver`, and the lateral acceleration in
+        m/s^2. Inputs in rad, rad/s, m/s and N (F_xw1).
+
+        Raises:
+            EstimatorError: shapes that do not fit, not numbers.
+        """
+        flags: FlagArray = np.zeros(self.batch_shape, dtype=np.int32)
+        before = self._model([held.value for held in self._inputs])
+        given = (steering, yaw_rate, speed, drive_force)
+        model = self._model([held(value, flags) for held, value in zip(self._inputs, given, strict=True)])
+        measured = broadcast(measurement, (*self.batch_shape, 3), "measurement")
+        present = bounded(measured)
+        excited = self._excited(model, measured, present)
+        self._filter.predict(before.transition, before.transition_jacobian, self._process(excited))
+        usable = np.where(model.at_rest[..., None], np.nan, measured)
+        noise = np.where(self._good(excited), GOOD_NOISE, POOR_NOISE)[..., None] * np.eye(3)
+        step = self._filter.correct(usable, model.measurement, model.measurement_jacobian, noise, self.gate)
+        step = self._limited(step)
+        raise_flag(flags, np.logical_not(bounded(measured, -1)), Flag.MISSING_MEASUREMENT)
+        raise_flag(flags, self._renewed, Flag.RESET)
+        self._renewed[...] = False
+        beta = step.state[..., 0]
+        stiffness = np.stack(model.stiffness(step.state), axis=-1)
+        return StiffnessStep(beta, model.slip_angles(beta)[1], stiffness, excited, flags, model.at_rest, step)
+
+    def reset(self, where: npt.ArrayLike | None = None, state: npt.ArrayLike = 0.0) -> None:
+        """Sets the entries `where` (mask of the batch shape; None: all) to `state`, with the initial covariance.
+
+        Raises:
+            EstimatorError: another shape, or a state that is not finite.
+        """
+        mask = np.ones(self.batch_shape, dtype=np.bool_) if where is None else np.asarray(where)
+        self._filter.reset(mask, state=broadcast(state, (*self.batch_shape, self._states), "state"))
+        for held in self._inputs:
+            held.forget(mask)
+        self._renewed |= mask
+
+    def save(self) -> dict[str, npt.NDArray[Any]]:
+        """Everything needed to continue later, as plain arrays."""
+        inputs = {held.what: np.array(held.value) for held in self._inputs}
+        return {**self._filter.save(), **inputs, "renewed": self._renewed.copy()}
+
+    def restore(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Continues from `save`, bit for bit.
+
+        Raises:
+            EstimatorError: incomplete, of another shape or not finite; nothing is changed then.
+        """
+        check_saved(saved, self.save())
+        self._filter.restore(saved)
+        for held in self._inputs:
+            held.value = np.array(saved[held.what])
+        self._renewed = np.array(saved["renewed"], dtype=np.bool_)
+
+    def _model(self, inputs: list[FloatArray]) -> CorneringModel:
+        steering, yaw_rate, speed, drive = inputs
+        at_rest = np.asarray(speed < self.standstill_speed)
+        floor = np.maximum(speed, self.standstill_speed)
+        return CorneringModel(self.vehicle, self.sample_time, steering, yaw_rate, floor, drive, at_rest)
+
+    def _excited(self, model: CorneringModel, measured: FloatArray, present: BoolArray) -> BoolArray:
+        """Axles in zone 5 or 6, (..., 2); the slip angles are those of the estimate before the step."""
+        slip = np.stack(model.slip_angles(self._filter.state[..., 0]), axis=-1)
+        force = np.where(present[..., :2], measured[..., :2], 0.0)
+        large = (slip * force > 0) & (np.absolute(force) >= self.threshold)
+        return np.asarray(large & ~model.at_rest[..., None])
+
+    def _good(self, excited: BoolArray) -> BoolArray:
+        """Channels (..., 3) with small measurement noise."""
+        both = excited.all(axis=-1, keepdims=True)
+        axles = excited if self.switching == "axle" else np.broadcast_to(both, excited.shape)
+        return np.concatenate((axles, both), axis=-1)
+
+    def _process(self, excited: BoolArray) -> FloatArray:
+        axles = self._good(excited)[..., :2]
+        variances = np.concatenate((np.full((*self.batch_shape, 1), SIDESLIP_NOISE), STIFFNESS_NOISE * axles), axis=-1)
+        return np.asarray(variances[..., None] * np.eye(3))
+
+    def _limited(self, step: FilterStep) -> FilterStep:
+        """Keeps the stiffnesses physical."""
+        nominal = np.array([self.vehicle.front_stiffness, self.vehicle.rear_stiffness])
+        clipped = step.state.copy()
+        clipped[..., 1:] = np.clip(clipped[..., 1:], -0.95 * nominal, nominal)
+        if np.array_equal(clipped, step.state):
+            return step
+        changed = (clipped != step.state).any(axis=-1)
+        self._filter.reset(np.asarray(changed), state=clipped, covariance=step.covariance)
+        return step._replace(state=clipped)
+
+
+class FixedStiffnessObserver(AdaptiveStiffnessObserver):
+    """The same observer with a fixed linear tire, F = C beta: ORL of P5 (12), for comparison.
+
+    Its only state is the sideslip, its measurement noise that of zones 5 and 6 everywhere; `excited` is reported and
+    not used. Right stiffnesses give good estimates, wrong ones do not: too small ones overestimate the sideslip, too
+    large ones underestimate it (the paper says overestimate twice).
+    """
+
+    _states = 1
+
+    def _good(self, excited: BoolArray) -> BoolArray:
+        return np.ones((*excited.shape[:-1], 3), dtype=np.bool_)
+
+    def _process(self, excited: BoolArray) -> FloatArray:
+        return np.array([[SIDESLIP_NOISE]])
+
+    def _limited(self, step: FilterStep) -> FilterStep:
+        return step

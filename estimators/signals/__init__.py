@@ -1,0 +1,8 @@
+"""Raw signals made fit for estimators: held, dated, differentiated, counted."""
+
+from estimators.signals.derivative import DerivativeStep, FilteredDerivative
+from estimators.signals.freshness import Freshness, FreshStep
+from estimators.signals.held import Held
+from estimators.signals.ticks import TickSpeed, TickStep
+
+__all__ = ["DerivativeStep", "FilteredDerivative", "FreshStep", "Freshness", "Held", "TickSpeed", "TickStep"]

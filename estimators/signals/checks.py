@@ -1,0 +1,96 @@
+"""Arguments of a step and settings of a constructor: accepted with their shape and unit, or refused in one line."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.errors import EstimatorError
+from estimators.faults import BoolArray
+from estimators.interpolate import FloatArray
+
+LIMIT = 1e100  # a magnitude beyond it is treated as not finite: no physical quantity, and products would overflow
+
+
+def entries(value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> FloatArray:
+    """`value` as float64 of `shape`; one number stands for all entries.
+
+    Raises:
+        EstimatorError: not numbers, or another shape.
+    """
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise EstimatorError(f"{what} is not an array of numbers: {error}") from error
+    if array.shape == shape:
+        return array
+    if array.ndim == 0:
+        return np.broadcast_to(array, shape)
+    raise EstimatorError(f"{what} has shape {array.shape}, expected {shape} or one number")
+
+
+def pair(
+    first: npt.ArrayLike, second: npt.ArrayLike, shape: tuple[int, ...], what: str = "first", other: str = "second"
+) -> FloatArray:
+    """Two signals of `shape` side by side on a new last axis."""
+    both: FloatArray = np.empty((*shape, 2))
+    both[..., 0], both[..., 1] = entries(first, shape, what), entries(second, shape, other)
+    return both
+
+
+def mask(value: npt.ArrayLike | None, shape: tuple[int, ...], what: str) -> BoolArray:
+    """A bool mask of `shape`; None: all.
+
+    Raises:
+        EstimatorError: another type or shape.
+    """
+    if value is None:
+        return np.ones(shape, dtype=np.bool_)
+    array = np.asarray(value)
+    if array.dtype != np.bool_ or array.shape != shape:
+        raise EstimatorError(f"{what}: {array.dtype} {array.shape}, expected a bool mask of shape {shape}")
+    return array
+
+
+def bounded(value: FloatArray) -> BoolArray:
+    """Which entries are finite and of a size that means something; comparisons with NaN are false."""
+    return np.absolute(value) <= LIMIT
+
+
+def quiet(value: FloatArray) -> bool:
+    """Whether all entries are `bounded`, as one dot product: what every step asks first. False for NaN."""
+    return bool(np.vdot(value, value) <= LIMIT * LIMIT)
+
+
+def any_missing(missing: BoolArray, shape: tuple[int, ...]) -> BoolArray:
+    """Which entries of `shape` miss any of their channels, all axes of `missing` beyond `shape`."""
+    return np.asarray(missing.reshape(*shape, -1).any(axis=-1), dtype=np.bool_)
+
+
+def batch(shape: tuple[int, ...], corners: bool = False) -> tuple[int, ...]:
+    """The batch shape of an estimator, as a tuple.
+
+    Raises:
+        EstimatorError: no entries, or not the four corners on the last axis where they are asked for.
+    """
+    given = tuple(int(size) for size in shape)
+    if math.prod(given) < 1:
+        raise EstimatorError(f"batch_shape = {given} holds no entries")
+    if corners and (not given or given[-1] != 4):
+        raise EstimatorError(f"batch_shape = {given} must end with the four corners fl, fr, rl, rr, such as (4,)")
+    return given
+
+
+def setting(value: float, what: str, unit: str, low: float = 0.0, low_allowed: bool = False) -> float:
+    """A finite number above `low` (or at it, if allowed).
+
+    Raises:
+        EstimatorError: names the setting, its value and unit, and the bound.
+    """
+    number = float(value)
+    if not math.isfinite(number) or number < low or (number == low and not low_allowed):
+        bound = "at least" if low_allowed else "above"
+        raise EstimatorError(f"{what} = {number:g} {unit} must be finite and {bound} {low:g} {unit}")
+    return number

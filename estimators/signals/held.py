@@ -1,0 +1,46 @@
+"""A signal that stays finite: what is missing is held at the last finite value."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.faults import BoolArray
+from estimators.interpolate import FloatArray
+from estimators.signals.checks import bounded, entries, quiet
+from estimators.signals.memory import Memory
+
+
+class Held(Memory):
+    """Holds each entry at its last finite value, `start` before the first.
+
+    Args:
+        shape: of the signal.
+        what: its name, for messages.
+        start: broadcasts to `shape`.
+    """
+
+    memory = ("last",)
+
+    def __init__(self, shape: tuple[int, ...], what: str, start: npt.ArrayLike = 0.0) -> None:
+        self.shape, self.what = shape, what
+        self._start: FloatArray = np.array(np.broadcast_to(np.asarray(start, dtype=np.float64), shape))
+        self.last: FloatArray = self._start.copy()
+
+    def __call__(self, value: npt.ArrayLike) -> tuple[FloatArray, BoolArray | None]:
+        """The held signal and which entries are missing (None: none of them).
+
+        Raises:
+            EstimatorError: not numbers, or another shape.
+        """
+        array = entries(value, self.shape, self.what)
+        if quiet(array):
+            self.last = array.copy()
+            return self.last, None
+        good = bounded(array)
+        self.last = np.where(good, array, self.last)
+        return self.last, ~good
+
+    def forget(self, where: BoolArray) -> None:
+        """Back to the start value for the entries `where`."""
+        self.last = np.where(where, self._start, self.last)

@@ -1,0 +1,87 @@
+"""Rigid-body kinematics of the four wheel centres: velocities and accelerations in the vehicle and tire frames.
+
+P1 section 6 with the steering-rate terms that the paper leaves out: 0.3 rad/s of steering at 12 m/s is 3.6 m/s^2.
+Corners in the order fl, fr, rl, rr on the last axis; frame x forward, y left, yaw rate and steering to the left.
+Accelerations at the centre of gravity without gravity, (11). SI units; leading axes broadcast.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.interpolate import FloatArray
+from estimators.vehicle import VehicleParameters
+
+
+class CornerVectors(NamedTuple):
+    """A vector at each corner, (..., 4) each: along x and along y of the frame that the function names."""
+
+    x: FloatArray
+    y: FloatArray
+
+
+def corner_velocity(
+    vehicle: VehicleParameters, vx: npt.ArrayLike, vy: npt.ArrayLike, yaw_rate: npt.ArrayLike
+) -> CornerVectors:
+    """V_xc = V_x - r y_c, V_yc = V_y + r x_c in the vehicle frame, m/s; arguments (...)."""
+    forward, left, turn = (_cornered(value) for value in (vx, vy, yaw_rate))
+    return CornerVectors(forward - turn * vehicle.corner_y, left + turn * vehicle.corner_x)
+
+
+def tire_frame(vector: CornerVectors, steer: npt.ArrayLike) -> CornerVectors:
+    """Turns vectors of the vehicle frame into those of the tires, steered by `steer` (..., 4) rad."""
+    angle = np.asarray(steer, dtype=np.float64)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    return CornerVectors(vector.x * cosine + vector.y * sine, vector.y * cosine - vector.x * sine)
+
+
+def vehicle_frame(vector: CornerVectors, steer: npt.ArrayLike) -> CornerVectors:
+    """The inverse of `tire_frame`: P1 (33), (42), P2 (28), P3 section 3."""
+    return tire_frame(vector, -np.asarray(steer, dtype=np.float64))
+
+
+def corner_acceleration(
+    vehicle: VehicleParameters,
+    ax: npt.ArrayLike,
+    ay: npt.ArrayLike,
+    yaw_rate: npt.ArrayLike,
+    yaw_acceleration: npt.ArrayLike,
+    vx: npt.ArrayLike,
+    vy: npt.ArrayLike,
+    steer: npt.ArrayLike,
+    steer_rate: npt.ArrayLike,
+) -> CornerVectors:
+    """Time derivatives of v_xt and v_yt (..., 4), m/s^2, the inputs -B u of the corner observers.
+
+        V_xc' = a_x + r V_y - r' y_c,      V_yc' = a_y - r V_x + r' x_c
+        v_xt' = V_xc' cos d + V_yc' sin d + d' v_yt,      v_yt' = V_yc' cos d - V_xc' sin d - d' v_xt
+
+    Args:
+        vehicle: lever arms x_c, y_c.
+        ax: (...) m/s^2; likewise `ay`, `yaw_rate` rad/s, `yaw_acceleration` rad/s^2, and the present `vx`, `vy` m/s.
+        ay: see `ax`.
+        yaw_rate: see `ax`.
+        yaw_acceleration: see `ax`.
+        vx: see `ax`.
+        vy: see `ax`.
+        steer: (..., 4) rad.
+        steer_rate: (..., 4) rad/s; 0 gives the paper's formula.
+    """
+    a, b, turn, swing = (_cornered(value) for value in (ax, ay, yaw_rate, yaw_acceleration))
+    forward, left = _cornered(vx), _cornered(vy)
+    body = CornerVectors(
+        a + turn * left - swing * vehicle.corner_y,
+        b - turn * forward + swing * vehicle.corner_x,
+    )
+    rotated = tire_frame(body, steer)
+    centre = tire_frame(corner_velocity(vehicle, vx, vy, yaw_rate), steer)
+    rate = np.asarray(steer_rate, dtype=np.float64)
+    return CornerVectors(rotated.x + rate * centre.y, rotated.y - rate * centre.x)
+
+
+def _cornered(value: npt.ArrayLike) -> FloatArray:
+    """(...) as (..., 1)."""
+    return np.asarray(value, dtype=np.float64)[..., None]

@@ -1,0 +1,151 @@
+"""Time-varying Kalman filter of a corner's relative velocity from its normalised force, P2 (19)-(23).
+
+Predictor form: correct with mu_k, then predict with u_k, which is (21)-(22) term by term. Q is one number in the paper;
+here it drives the model through its input, Q = q B B': errors of the acceleration move V_r (and with it z'), nothing
+else. q I_3 would let z absorb the correction and leave V_r to open-loop integration (P2 sheet, section 10 item 10).
+In high slip friction hides the slip velocity: there q and r change to values that follow the kinematics.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.errors import EstimatorError
+from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
+from estimators.filters import KalmanFilter
+from estimators.interpolate import FloatArray
+from estimators.signals.checks import batch, entries, mask, setting
+from estimators.signals.memory import Memory
+from estimators.velocity.ltv_model import BristleTire, sampled
+
+NORMAL = (2.5e-3, 1e-3)
+"""q in (m/s)^2 a sample and r, P2 section IV."""
+HIGH_SLIP = (3.3e-4, 2.1e-1)
+_LARGEST_SPREAD = 50.0  # m/s of standard deviation: an entry without a measurement for long knows nothing
+
+
+class LtvStep(NamedTuple):
+    """What one step returns, ready for a log; leading axes are those of the batch."""
+
+    estimate: FloatArray  # (..., n) states at the end of the sample; [..., 1] is V_r
+    relative_velocity: FloatArray  # (...) V_r at the end of the sample, m/s
+    innovation: FloatArray  # (...) mu - C x at its start; NaN where mu is missing
+    innovation_variance: FloatArray  # (...)
+    gain: FloatArray  # (..., n) predictor gain K_k of (21)
+    used: BoolArray
+    flags: FlagArray
+
+
+class LtvKalmanObserver(Memory):
+    """Bristle deflection and relative velocity of every corner.
+
+    Args:
+        tire: constants of the bristle model.
+        sample_time: T_s, s.
+        batch_shape: shape of every argument of `step`.
+        states: 3 as published, or 2, the same without its redundant state (`ltv_model`).
+        normal: (q, r) in normal driving.
+        high_slip: (q, r) where `step` is told so.
+        spread: initial standard deviation of V_r, m/s.
+
+    Raises:
+        EstimatorError: a value that is not above zero, another number of states.
+    """
+
+    memory = ("seen", "renewed")
+    parts = ("filter",)
+
+    def __init__(
+        self,
+        tire: BristleTire,
+        sample_time: float,
+        batch_shape: tuple[int, ...] = (4,),
+        states: Literal[2, 3] = 3,
+        normal: tuple[float, float] = NORMAL,
+        high_slip: tuple[float, float] = HIGH_SLIP,
+        spread: float = 1.0,
+    ) -> None:
+        if states not in (2, 3):
+            raise EstimatorError(f"states = {states!r}; use 3, as published, or 2")
+        self.tire, self.states, self.batch_shape = tire, states, batch(batch_shape)
+        self.sample_time = setting(sample_time, "sample_time", "s")
+        pairs = [
+            [setting(q, f"process noise of {name}", "(m/s)^2"), setting(r, f"measurement noise of {name}", "(no unit)")]
+            for name, (q, r) in (("normal", normal), ("high_slip", high_slip))
+        ]
+        self._noise = np.array(pairs)
+        self._entry = np.outer([0.0, 1.0, 1.0][:states], [0.0, 1.0, 1.0][:states])
+        wide = setting(spread, "spread", "m/s") ** 2
+        # z follows V_r within a hundredth of a metre; z' is V_r while z is unknown
+        self._initial = np.diag([1e-4, wide, wide][:states])
+        self.filter = KalmanFilter(np.zeros((*self.batch_shape, states)), self._initial)
+        self.seen: FloatArray = np.zeros((3, *self.batch_shape))  # last finite u, w, w'
+        self.renewed: BoolArray = np.zeros(self.batch_shape, dtype=np.bool_)
+
+    def step(
+        self,
+        relative_acceleration: npt.ArrayLike,
+        normalised_force: npt.ArrayLike,
+        wheel_speed: npt.ArrayLike,
+        wheel_acceleration: npt.ArrayLike = 0.0,
+        high_slip: npt.ArrayLike | bool = False,
+    ) -> LtvStep:
+        """u = R_e w' - v_xt' in m/s^2, mu, w in rad/s and w' in rad/s^2, each (...) or one number for all.
+
+        A missing mu is not used; a missing u, w or w' is held at its last value; both are flagged.
+
+        Raises:
+            EstimatorError: another shape.
+        """
+        shape = self.batch_shape
+        given = np.stack(
+            [
+                entries(value, shape, name)
+                for value, name in (
+                    (relative_acceleration, "relative_acceleration"),
+                    (wheel_speed, "wheel_speed"),
+                    (wheel_acceleration, "wheel_acceleration"),
+                )
+            ]
+        )
+        mu = entries(normalised_force, shape, "normalised_force")
+        high = np.broadcast_to(np.asarray(high_slip, dtype=np.bool_), shape)
+        flags: FlagArray = np.zeros(shape, dtype=np.int32)
+        good: BoolArray = np.absolute(given) < 1e6
+        raise_flag(flags, ~good[0], Flag.MISSING_INPUT)
+        raise_flag(flags, ~(good[1] & good[2]), Flag.MISSING_PARAMETER)
+        raise_flag(flags, ~np.isfinite(mu), Flag.MISSING_MEASUREMENT)
+        raise_flag(flags, self.renewed, Flag.RESET)
+        self.renewed = np.zeros(shape, dtype=np.bool_)
+        self.seen = np.where(good, given, self.seen)
+        u, w, dw = self.seen
+        q, r = np.moveaxis(self._noise[high.astype(np.intp)], -1, 0)
+        C = self.tire.output(w, self.states)
+        step = self.filter.correct(mu[..., None], C, r[..., None, None])
+        A, B = sampled(self.tire, w, dw, self.sample_time, self.states)
+        self.filter.predict(A, q[..., None, None] * self._entry, B[..., None], u[..., None])
+        self._bound()
+        gain = (A @ step.gain)[..., 0]
+        state = self.filter.state
+        innovation, used = step.innovation[..., 0], step.used[..., 0]
+        return LtvStep(state, state[..., 1], innovation, step.innovation_covariance[..., 0, 0], gain, used, flags)
+
+    def reset(self, where: npt.ArrayLike | None = None, state: npt.ArrayLike = 0.0) -> None:
+        """Sets the entries `where` (mask of the batch shape; None: all) to `state` (n,) with the initial covariance.
+
+        Raises:
+            EstimatorError: another shape, or a state that is not finite.
+        """
+        chosen = mask(where, self.batch_shape, "where")
+        self.filter.reset(chosen, state=np.broadcast_to(np.asarray(state, dtype=np.float64), (self.states,)))
+        self.seen[:, chosen] = 0.0
+        self.renewed = self.renewed | chosen
+
+    def _bound(self) -> None:
+        """An entry that has coasted until nothing is known keeps its estimate with the initial covariance."""
+        lost = ~(self.filter.covariance[..., 1, 1] < _LARGEST_SPREAD**2)
+        if lost.any():
+            self.filter.reset(lost, state=self.filter.state, covariance=self._initial)

@@ -1,0 +1,102 @@
+"""The bristle model of a corner, sampled exactly: P2 (19)-(20), and the same without its redundant state.
+
+    A(t) = [-a 1 0; 0 0 0; -a' 0 -a],  B = [0 1 1]',  C = [s0 s2 s1],   a = kappa R_e |w|,  a' = da/dt      x = [z V_r z']
+    A(t) = [-a 1; 0 0],                B = [0 1]',    C = [s0 - s1 a, s1 + s2]                              x = [z V_r]
+
+The third state of P2 is z' = V_r - a z written once more; at constant w it makes the pair unobservable, for both modes
+decay at a (P2 sheet, section 10 item 11), where the two-state form is observable unless a = s0/s1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from estimators.errors import EstimatorError
+from estimators.interpolate import FloatArray
+
+_SERIES_BELOW = 0.5  # a T below which the quotients lose digits and the series has converged
+_TERMS = 16
+
+
+@dataclass(frozen=True)
+class BristleTire:
+    """LuGre constants of one direction, for normalised forces; the defaults are P2 section IV.
+
+    Raises:
+        EstimatorError: names every value that is not finite and above zero.
+    """
+
+    sigma0: float = 612.0  # 1/m
+    sigma1: float = 0.87  # s/m
+    sigma2: float = 0.0016  # s/m
+    kappa: float = 8.0  # 1/m
+    radius: float = 0.33  # R_e, m: Table I (the text has 0.35)
+
+    def __post_init__(self) -> None:
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        bad = [f"{name} = {value!r}" for name, value in values.items() if not (math.isfinite(value) and value > 0)]
+        if bad:
+            raise EstimatorError(f"tire constants must be finite and above zero: {', '.join(bad)}")
+
+    def output(self, wheel_speed: FloatArray, states: int) -> FloatArray:
+        """C (..., 1, states), normalised force per state."""
+        if states == 3:
+            return np.broadcast_to([[self.sigma0, self.sigma2, self.sigma1]], (*wheel_speed.shape, 1, 3))
+        decay = self.kappa * self.radius * np.absolute(wheel_speed)
+        C = np.empty((*wheel_speed.shape, 1, 2))
+        C[..., 0, 0], C[..., 0, 1] = self.sigma0 - self.sigma1 * decay, self.sigma1 + self.sigma2
+        return C
+
+
+def sampled(
+    tire: BristleTire, wheel_speed: FloatArray, wheel_acceleration: FloatArray, time: float, states: int
+) -> tuple[FloatArray, FloatArray]:
+    """A_k = e^(A T) (..., states, states) and B_k = int_0^T e^(A s) B ds (..., states), w and w' held: (20).
+
+    With E = e^(-a T), p_k = int_0^T e^(-a (T - s)) s^k/k! ds:  z gains p_0 V_r + p_1 u;  z' gains, beside E z' + p_0 u,
+    -a' (T E z + q_1 V_r + q_2 u) with q_k the same integral of the bristle's own response.
+    """
+    direction = np.sign(wheel_speed)
+    decay = tire.kappa * tire.radius * np.absolute(wheel_speed)
+    E = np.exp(-decay * time)
+    p0, p1, q1, q2 = _integrals(decay * time)
+    p0, p1, q1, q2 = time * p0, time**2 * p1, time**2 * q1, time**3 * q2
+    A = np.zeros((*wheel_speed.shape, states, states))
+    B = np.empty((*wheel_speed.shape, states))
+    A[..., 0, 0], A[..., 0, 1], A[..., 1, 1] = E, p0, 1.0
+    B[..., 0], B[..., 1] = p1, time
+    if states == 3:
+        rise = tire.kappa * tire.radius * direction * wheel_acceleration
+        A[..., 2, 0], A[..., 2, 1], A[..., 2, 2] = -rise * time * E, -rise * q1, E
+        B[..., 2] = p0 - rise * q2
+    return A, B
+
+
+def _integrals(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """For x = a T >= 0, per unit of T:
+
+    p_0 = (1 - e^-x)/x = sum (-x)^n/(n+1)!,    p_1 = (1 - p_0)/x = sum (-x)^n/(n+2)!,
+    q_1 = (p_0 - e^-x)/x = sum (n+1) (-x)^n/(n+2)!,    q_2 = (p_1 - q_1)/x = sum (n+1) (-x)^n/(n+3)!.
+    """
+    safe = np.where(x < _SERIES_BELOW, 1.0, x)
+    p0 = -np.expm1(-safe) / safe
+    p1 = (1.0 - p0) / safe
+    q1 = (p0 - np.exp(-safe)) / safe
+    q2 = (p1 - q1) / safe
+    small = np.where(x < _SERIES_BELOW, x, 0.0)
+    s0, s1, r1, r2 = (np.zeros_like(x) for _ in range(4))
+    for n in reversed(range(_TERMS)):  # Horner
+        s0 = 1.0 / math.factorial(n + 1) - small * s0
+        s1 = 1.0 / math.factorial(n + 2) - small * s1
+        r1 = (n + 1.0) / math.factorial(n + 2) - small * r1
+        r2 = (n + 1.0) / math.factorial(n + 3) - small * r2
+    near = x < _SERIES_BELOW
+    return (
+        np.where(near, s0, p0),
+        np.where(near, s1, p1),
+        np.where(near, r1, q1),
+        np.where(near, r2, q2),
+    )

@@ -1,0 +1,160 @@
+"""Drop probabilities over a gain schedule: frozen, and proved while the parameter moves."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from analysis.dropout import critical_drop_probability
+from analysis.dropout_cells import Cells, curvature, exponents
+from analysis.dropout_modes import schedule_drop_modes
+from analysis.dropout_schedule import frozen_critical_probability
+from analysis.errors import AnalysisError
+from analysis.mean_square_schedule import certified_drop_probability, design, judge, mean_square_schedule
+from estimators import GainSchedule
+from synthesis.lmi.result import Verdict
+from tests.unit.schedule_content import polynomial, schedule_content
+
+SHIPPED = GainSchedule.shipped("corner-estimation-longitudinal")
+NAMES = [
+    "corner-estimation-longitudinal",
+    "corner-estimation-lateral",
+    "longitudinal-speed",
+    "resilient-velocity-longitudinal",
+    "resilient-velocity-lateral",
+]
+
+
+def rotating(rate: float) -> GainSchedule:
+    """x' = [[-1, w], [w - 10.1, -1]] x, w in [0.1, 10], gain 0: every frozen pole at -1 +- j; unstable if w may jump."""
+    content: dict[str, Any] = copy.deepcopy(schedule_content(gains=(0.0, 0.0), breakpoints=(0.1, 5.0, 10.0)))
+    content["plant"]["A"] = polynomial([[-1, 0], [-10.1, -1]], [[0, 1], [1, 0]])
+    content["plant"]["C"] = polynomial([[1, 0]])
+    content["scheduling"][0] |= {"rate_min": -rate, "rate_max": rate}
+    content["sample_time"] = 0.2
+    return GainSchedule.from_content(content)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_frozen_value_is_the_lowest_of_a_dense_grid(name: str) -> None:
+    schedule = GainSchedule.shipped(name)
+    found = frozen_critical_probability(schedule, points=101)
+    modes = schedule_drop_modes(schedule, np.linspace(0.0, 140.0, 561))
+    dense = critical_drop_probability(modes.dropped, modes.received)
+    assert found.smallest <= dense.min() + 1e-12
+    assert found.smallest == pytest.approx(dense.min(), abs=1e-6)
+    at = schedule_drop_modes(schedule, found.place)
+    assert critical_drop_probability(at.dropped, at.received) == pytest.approx(found.smallest, abs=1e-12)
+    assert found.parameter in found.message and "frozen" in found.message
+
+
+def test_frozen_minimum_inside_the_range_is_found() -> None:
+    """Gains that grow too fast for the kinematics: the minimum lies between two of 11 samples."""
+    schedule = GainSchedule.from_content(
+        schedule_content(gains=[(0.2, 20.0), (0.9, 380.0), (0.5, 60.0)], breakpoints=(0.0, 20.0, 140.0))
+    )
+    found = frozen_critical_probability(schedule, points=11)
+    modes = schedule_drop_modes(schedule, np.linspace(0.0, 140.0, 2801))
+    values = critical_drop_probability(modes.dropped, modes.received)
+    assert 0 < values.argmin() < 2800
+    assert found.smallest <= values.min() + 1e-12
+    assert found.smallest == pytest.approx(values.min(), abs=1e-4)
+
+
+def test_held_measurements_never_open_the_loop() -> None:
+    assert frozen_critical_probability(SHIPPED, "hold").smallest == 1.0
+
+
+def test_curvature_bounds_the_error_of_interpolation() -> None:
+    """Against the largest error seen on 200 points of each cell, with exponentials written out."""
+    schedule = GainSchedule.from_content(schedule_content())
+    scale = np.diag([300.0, 1.0])
+    cells = Cells(np.array([0.0, 31.0, 100.0]), np.array([4.0, 36.0, 120.0]))
+    bound = curvature(exponents(schedule, cells, scale))
+    P = np.array([[0.8, 0.1], [0.1, 0.3]])
+    P = P / np.linalg.eigvalsh(P)[-1]
+    for c in range(3):
+        t = np.linspace(0.0, 1.0, 201)
+        modes = schedule_drop_modes(schedule, cells.low[c] + t * (cells.high[c] - cells.low[c]))
+        for k, update in enumerate((modes.dropped, modes.received)):
+            phi = scale @ update @ np.linalg.inv(scale)
+            value = np.swapaxes(phi, 1, 2) @ P @ phi
+            chord = value[:1] + t[:, None, None] * (value[-1:] - value[:1])
+            seen = np.abs(np.linalg.eigvalsh(value - chord)).max()
+            assert 0.0 < seen <= bound[k, c]
+
+
+def test_certificate_survives_a_dense_check_written_out() -> None:
+    """Every pair (w, w+) within the rate on a grid that the proof does not use."""
+    found = mean_square_schedule(SHIPPED, 0.6)
+    assert found.verdict is Verdict.CERTIFIED, found.message
+    draw = np.random.default_rng(1)
+    reach = 800.0 * SHIPPED.sample_time
+    for w in draw.uniform(0.0, 140.0, 300):
+        after = np.clip(w + draw.choice([-1.0, 1.0, draw.uniform(-1, 1)]) * reach, 0.0, 140.0)
+        now, later = (
+            np.array([[np.interp(x, found.nodes, found.lyapunov[:, i, j]) for j in (0, 1)] for i in (0, 1)])
+            for x in (w, after)
+        )
+        plant, gain = SHIPPED.plant_at(w), SHIPPED.gain(w)
+        open_, closed = (expm(SHIPPED.sample_time * (plant.A - k * gain @ plant.C)) for k in (0, 1))
+        slack = now - 0.6 * open_.T @ later @ open_ - 0.4 * closed.T @ later @ closed
+        size = np.sqrt(np.diag(now))
+        assert np.linalg.eigvalsh(slack / np.outer(size, size))[0] > 0.0
+
+
+def test_certified_below_and_refuted_above_the_frozen_value() -> None:
+    frozen = frozen_critical_probability(SHIPPED)
+    assert mean_square_schedule(SHIPPED, 0.97 * frozen.smallest, frozen).verdict is Verdict.CERTIFIED
+    refuted = mean_square_schedule(SHIPPED, frozen.smallest + 1e-3, frozen)
+    assert refuted.verdict is Verdict.REFUTED
+    assert f"{frozen.place:.6g} rad/s" in refuted.message
+
+
+def test_spoiled_matrices_are_refused() -> None:
+    nodes, P, scale = design(SHIPPED, 0.6, 1)
+    assert judge(SHIPPED, 0.6, nodes, P, scale).verdict is Verdict.CERTIFIED
+    for spoiled in (P * np.where(np.arange(len(P)) == 3, 0.1, 1.0)[:, None, None], -P, 0.0 * P):
+        assert judge(SHIPPED, 0.6, nodes, spoiled, scale).verdict is Verdict.INCONCLUSIVE
+    # The same matrices do not prove more drops than there is room for.
+    assert judge(SHIPPED, 0.74, nodes, P, scale).verdict is Verdict.INCONCLUSIVE
+
+
+def test_frozen_stability_is_not_taken_for_stability_in_motion() -> None:
+    """All frozen values are stable, yet alternating between the ends grows: slow motion is proved, fast motion is not."""
+    fast = rotating(1e3)
+    ends = schedule_drop_modes(fast, np.array([0.1, 10.0])).received
+    frozen = np.abs(np.linalg.eigvals(schedule_drop_modes(fast, np.linspace(0.1, 10, 50)).received)).max()
+    assert frozen < 0.85
+    burst = np.linalg.matrix_power(ends[0], 2) @ np.linalg.matrix_power(ends[1], 2)
+    assert np.abs(np.linalg.eigvals(burst)).max() > 1.0
+    assert frozen_critical_probability(fast).smallest == 1.0
+    assert mean_square_schedule(fast, 0.5).verdict is Verdict.INCONCLUSIVE
+    assert mean_square_schedule(rotating(0.05), 0.5).verdict is Verdict.CERTIFIED
+
+
+def test_bracket_of_the_certified_probability() -> None:
+    best, upper = certified_drop_probability(SHIPPED, tolerance=0.02)
+    frozen = frozen_critical_probability(SHIPPED).smallest
+    assert best.verdict is Verdict.CERTIFIED
+    assert best.drop_probability < upper <= frozen
+    assert upper - best.drop_probability <= 0.02
+    assert best.drop_probability > 0.7
+
+
+def test_bad_questions_are_refused() -> None:
+    for p in (-0.1, 1.5, np.nan):
+        with pytest.raises(AnalysisError):
+            mean_square_schedule(SHIPPED, p)
+    with pytest.raises(AnalysisError, match="points = 1"):
+        frozen_critical_probability(SHIPPED, points=1)
+    with pytest.raises(AnalysisError, match="tolerance"):
+        certified_drop_probability(SHIPPED, tolerance=0.0)
+    unstable = replace(SHIPPED, table=-SHIPPED.table)
+    assert frozen_critical_probability(unstable).smallest == 0.0
+    assert mean_square_schedule(unstable, 0.0).verdict is Verdict.REFUTED
