@@ -119,7 +119,7 @@ class LateralFusion:
             C[:, axle, TIRES + 2 * axle + 1] = pace[:, 0] * cubed[:, axle]
         model = (pace * (s.side_floor + s.side_linear * np.absolute(side)) + s.slip_speed) ** 2
         white = self._yaw_noise + (speed * [s.steering_noise, 0.0]) ** 2
-        explained = np.einsum("bij,bij->bi", C @ self.filter.spread, C) + white + model
+        explained = ((C @ self.filter.spread) * C).sum(axis=2) + white + model
         used = usable & (innovation * innovation < s.gate**2 * explained)
         held = np.maximum(1.0, 2.0 * s.side_error_memory / elapsed)[:, None]
         self.filter.weigh(np.where(used, innovation, 0.0), C, np.where(used, white + model * held, NEVER))

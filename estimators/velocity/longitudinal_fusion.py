@@ -100,7 +100,7 @@ class LongitudinalFusion:
         strain = np.absolute(normalised_force)
         model = self._slip_error(pace, strain, surface, acceleration) ** 2
         white = (self.radius * s.wheel_speed_noise) ** 2
-        explained = np.einsum("bij,bij->bi", C @ self.filter.spread, C) + white + model
+        explained = ((C @ self.filter.spread) * C).sum(axis=2) + white + model
         limit = np.where(innovation * normalised_force > 0, s.gate, s.wrong_way_gate)
         gated = fresh & (innovation * innovation > limit * limit * explained)
         used = fresh & ~gated & ~slipping

@@ -62,9 +62,10 @@ class SpeedFilter(KalmanFilter):
         self._A[:, 0, 1:] = coupling
         self._Q_diagonal[:] = self._prior_variance * (1.0 - memory * memory)
         self._Q_diagonal[:, 0] = noise
-        mean = self.prior_mean + memory * (self._mean - self.prior_mean)
-        mean[:, 0] = self._mean[:, 0] + shift + np.einsum("bj,bj->b", coupling, self._mean[:, 1:])
-        self._advance(mean, self._A, self._Q)
+        mean: FloatArray = self.prior_mean + memory * (self._mean - self.prior_mean)
+        mean[:, 0] = self._mean[:, 0] + shift + (coupling * self._mean[:, 1:]).sum(axis=1)
+        self._mean = mean
+        self._spread = self._A @ self._spread @ np.swapaxes(self._A, 1, 2) + self._Q  # `weigh` keeps it symmetric
 
     def weigh(
         self, innovation: FloatArray, C: FloatArray, variance: FloatArray, learning: FloatArray | None = None

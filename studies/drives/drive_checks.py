@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from studies.drives.drive_tables import Align, Column, LogFile, Vehicle
+from studies.drives.drive_tables import Align, Column, Estimators, LogFile, Vehicle
 from studies.drives.quantities import CORNERS, REFERENCES, SIGNALS
 from synthesis.errors import unknown
 
@@ -83,3 +83,39 @@ def check_signals(signals: Mapping[str, Column], vehicle: Vehicle) -> None:
         raise ValueError(
             f"signals: {' and '.join(steering)} say the same thing; keep steering, hand_wheel, or steer_fl and steer_fr"
         )
+
+
+def check_estimators(chosen: Estimators, signals: Mapping[str, Column], vehicle: Vehicle) -> None:
+    """Every estimator that the file asks for by name has the vehicle data and the signals that it needs."""
+    wanted = {name: str(getattr(chosen, name)) for name in chosen.model_fields_set}
+    parameters, needed = _PARAMETERS, _SIGNALS
+    for place, estimator in wanted.items():
+        for parameter, example in parameters.get((place, estimator), ()):
+            if getattr(vehicle, parameter) is None:
+                raise ValueError(
+                    f"vehicle.{parameter}: missing, but estimators.{place} = '{estimator}' needs it; "
+                    f'add it, such as "{example}"'
+                )
+        for signal in needed.get((place, estimator), ()):
+            if signal not in signals:
+                raise ValueError(
+                    f"signals.{signal}: missing, but estimators.{place} = '{estimator}' needs it; add "
+                    f'{signal} = {{ column = "...", unit = "{SIGNALS[signal]}" }}'
+                )
+
+
+_YAW = ("yaw_inertia", "3900 kg*m^2")
+_STIFFNESS = (_YAW, ("cornering_stiffness_front", "160 kN/rad"), ("cornering_stiffness_rear", "180 kN/rad"))
+_TIRE = (*_STIFFNESS, ("relaxation_length", "0.5 m"))
+_PARAMETERS = {
+    ("lateral_force", "linear"): (_YAW,),
+    ("lateral_force", "unscented"): (_YAW,),
+    ("sideslip", "four-wheel-extended"): _TIRE,
+    ("sideslip", "four-wheel-unscented"): _TIRE,
+    ("sideslip", "adaptive-stiffness"): _STIFFNESS,
+    ("sideslip", "fixed-stiffness"): _STIFFNESS,
+}
+_SIGNALS = {
+    **{("longitudinal_force", name): TORQUES for name in ("unknown-input", "pid", "unscented")},
+    ("attitude", "gyro"): ("roll_rate", "pitch_rate"),
+}

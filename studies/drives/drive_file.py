@@ -13,8 +13,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from studies.drives.drive_checks import check_alignment, check_columns, check_logs, check_signals
-from studies.drives.drive_tables import Column, LogFile, Observer, Schedules, Table, Vehicle
+from studies.drives.drive_checks import check_alignment, check_columns, check_estimators, check_logs, check_signals
+from studies.drives.drive_tables import Column, Estimators, LogFile, Observer, Schedules, Table, Vehicle
 from studies.drives.quantities import Duration
 from studies.drives.validation import first_error
 from synthesis.errors import SpecError
@@ -30,6 +30,7 @@ class DriveFile(Table):
     vehicle: Vehicle
     schedules: Schedules
     observer: Observer = Observer()
+    estimators: Estimators = Estimators()
     log: Annotated[list[LogFile], Field(min_length=1)]
     signals: dict[str, Column]
     reference: dict[str, Column] = Field(default_factory=dict)
@@ -40,6 +41,7 @@ class DriveFile(Table):
         check_columns(self.signals, self.reference, self.log)
         check_alignment({**self.reference, **self.signals}, self.log)
         check_signals(self.signals, self.vehicle)
+        check_estimators(self.estimators, self.signals, self.vehicle)
         return self
 
     def log_of(self, column: Column) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
@@ -15,8 +16,10 @@ from studies.drives.quantities import (
     Mass,
     Offset,
     Rate,
+    Stiffness,
     factor_to,
 )
+from synthesis.errors import unknown
 
 
 def _a_time(unit: str) -> str:
@@ -88,6 +91,10 @@ class Vehicle(Table):
     wheel_inertia: Inertia | None = None
     rolling_resistance: float = Field(default=0.0, ge=0.0, le=0.2)
     steering_ratio: float | None = Field(default=None, gt=0.0)
+    yaw_inertia: Inertia | None = None
+    cornering_stiffness_front: Stiffness | None = None  # of the axle, both wheels
+    cornering_stiffness_rear: Stiffness | None = None
+    relaxation_length: Length | None = None
 
 
 class Observer(Table):
@@ -95,6 +102,31 @@ class Observer(Table):
 
     derivative_lag: Lag = 0.01
     stopped_below: AngularSpeed = 1.0
+
+
+def _one_of(*names: str) -> Callable[[str], str]:
+    def check(name: str) -> str:
+        if name not in names:
+            raise ValueError(unknown("estimator", name, names))
+        return name
+
+    return check
+
+
+class Estimators(Table):
+    """Which estimators make up the pipeline; the first name of each is the default."""
+
+    longitudinal_force: Annotated[str, AfterValidator(_one_of("unknown-input", "pid", "unscented"))] = "unknown-input"
+    vertical_load: Annotated[str, AfterValidator(_one_of("dynamic", "quasi-static"))] = "dynamic"
+    lateral_force: Annotated[str, AfterValidator(_one_of("linear", "unscented"))] = "linear"
+    attitude: Annotated[str, AfterValidator(_one_of("none", "gyro"))] = "none"
+    velocity: Annotated[str, AfterValidator(_one_of("fusion"))] = "fusion"
+    sideslip: Annotated[
+        str,
+        AfterValidator(
+            _one_of("none", "four-wheel-extended", "four-wheel-unscented", "adaptive-stiffness", "fixed-stiffness")
+        ),
+    ] = "none"
 
 
 class Schedules(Table):

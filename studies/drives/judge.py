@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntFlag
 from functools import cached_property
 from typing import Any
 
@@ -10,7 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from estimators import Flag, GainSchedule
+from estimators.pipeline import Check
+from studies.drives import comparison
 from studies.drives.baselines import integrated_acceleration, mean_wheel_speed
+from studies.drives.chain import Chain
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.metrics import deviation
@@ -35,6 +39,7 @@ class DriveData:
     log: DriveLog
     inputs: CornerInputs
     replay: Replay
+    chain: Chain | None = None
 
     @cached_property
     def baselines(self) -> dict[str, Array]:
@@ -70,12 +75,25 @@ def slip_ratio(surface_speed: Array, wheel_velocity: Array) -> Array:
 
 def judge(data: DriveData) -> dict[str, Any]:
     """The content of metrics.json: deviations from the references that the log has, counted flags, assumptions."""
+    chain = data.chain
+    pipeline: dict[str, Any] = {}
+    if chain is not None:
+        given = (chain, data.log, data.inputs, data.drive)
+        pipeline = {
+            "estimators": data.drive.estimators.model_dump(),
+            "rules": comparison.RULES,
+            "signals": comparison.lateral_motion(*given) | comparison.forces(*given),
+            "flagged_samples": _counts(chain.flags, Flag),
+            "failed_checks": _counts(chain.checks, Check),
+            "assumptions": list(chain.assumptions),
+        }
     return {
         "drive": data.drive.name,
         "schedule": _schedule_entry(data.schedule),
         "log": data.log.report,
         "velocity": _velocity(data),
         "force": _force(data),
+        "pipeline": pipeline,
         "flagged_samples": flag_counts(data.replay.flags),
         "force_sources": dict(zip(CORNERS, data.inputs.force_sources, strict=True)),
         "assumptions": list(data.inputs.assumptions),
@@ -96,7 +114,8 @@ def _velocity(data: DriveData) -> dict[str, Any]:
     if "vx" not in data.log.reference:
         return {}
     reference = data.log.reference["vx"]
-    estimates = {"corner_observers": data.replay.velocity, **data.baselines}
+    estimates = {"pipeline": data.chain.vx} if data.chain is not None else {}
+    estimates |= {"corner_observers": data.replay.velocity, **data.baselines}
     estimates |= {f"corner_{corner}": data.replay.corner_velocity[:, k] for k, corner in enumerate(CORNERS)}
     return {name: deviation(value, reference, "m/s").as_dict() for name, value in estimates.items()}
 
@@ -117,9 +136,9 @@ def _force(data: DriveData) -> dict[str, Any]:
 
 def flag_counts(flags: npt.NDArray[np.int64]) -> dict[str, dict[str, int]]:
     """How many samples of each corner carry each flag; flags that never rose are left out."""
-    return {
-        corner: {
-            str(flag.name).lower(): count for flag in Flag if (count := int(np.count_nonzero(flags[:, k] & flag.value)))
-        }
-        for k, corner in enumerate(CORNERS)
-    }
+    return {corner: _counts(flags[:, k], Flag) for k, corner in enumerate(CORNERS)}
+
+
+def _counts(flags: npt.NDArray[np.int64], names: type[IntFlag]) -> dict[str, int]:
+    counted = {str(flag.name).lower(): int(np.count_nonzero(flags & flag.value)) for flag in names}
+    return {name: count for name, count in counted.items() if count}

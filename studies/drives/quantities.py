@@ -31,7 +31,10 @@ SIGNALS: dict[str, str] = {
     "hand_wheel": "rad",
     "ax": "m/s^2",
     "ay": "m/s^2",
+    "az": "m/s^2",
     "yaw_rate": "rad/s",
+    "roll_rate": "rad/s",
+    "pitch_rate": "rad/s",
     "vy": "m/s",
 }
 """What the observers may use, and its SI unit."""
@@ -41,6 +44,7 @@ REFERENCES: dict[str, str] = {
     "vy": "m/s",
     "ax": "m/s^2",
     **_corners("force_x", "N"),
+    **_corners("force_y", "N"),
     **_corners("force_z", "N"),
 }
 """What the estimates may be judged against, and its SI unit; never an input."""
@@ -55,6 +59,7 @@ _EXAMPLES = {
     "m/s": "m/s, km/h, mph",
     "m/s^2": "m/s^2, standard_gravity",
     "N": "N, kN",
+    "N/rad": "N/rad, kN/rad",
     "N*m": "N*m, kN*m",
     "kg": "kg, t",
     "kg*m^2": "kg*m^2",
@@ -125,6 +130,7 @@ Mass = Annotated[float, BeforeValidator(_quantity("kg", 0.0, inclusive=False))]
 Length = Annotated[float, BeforeValidator(_quantity("m", 0.0, inclusive=False))]
 Inertia = Annotated[float, BeforeValidator(_quantity("kg*m^2", 0.0, inclusive=False))]
 Duration = Annotated[float, BeforeValidator(_quantity("s", 0.0, inclusive=False))]
+Stiffness = Annotated[float, BeforeValidator(_quantity("N/rad", 0.0, inclusive=False))]
 Lag = Annotated[float, BeforeValidator(_quantity("s", 0.0, inclusive=True))]
 Offset = Annotated[float, BeforeValidator(_quantity("s", -math.inf, inclusive=False))]
 Rate = Annotated[float, BeforeValidator(_quantity("Hz", 0.0, inclusive=False))]

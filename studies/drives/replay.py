@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +18,7 @@ from synthesis.errors import SpecError
 
 Array = npt.NDArray[np.float64]
 PROGRESS_STEPS = 50
-MODEL = "corner-velocity-longitudinal"
+MODEL = "corner-velocity-{}"
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,10 @@ class Replay:
     flags: npt.NDArray[np.int64]
 
 
-def load_schedule(name: str, folder: Path, sample_time: float) -> GainSchedule:
-    """The longitudinal schedule by shipped name, or by path relative to ``folder`` when the name ends in .json.
+def load_schedule(
+    name: str, folder: Path, sample_time: float, direction: Literal["longitudinal", "lateral"] = "longitudinal"
+) -> GainSchedule:
+    """The schedule of a direction by shipped name, or by path relative to ``folder`` when the name ends in .json.
 
     Raises SpecError, before anything runs: unreadable or edited, another model or direction, another sample time.
     """
@@ -49,13 +52,14 @@ def load_schedule(name: str, folder: Path, sample_time: float) -> GainSchedule:
         content = read_content(path)
         schedule = GainSchedule.from_content(content, path.name)
     except EstimatorError as error:
-        raise SpecError(f"schedules.longitudinal: {error}") from error
+        raise SpecError(f"schedules.{direction}: {error}") from error
     model = content["model"]["id"]
-    if model != MODEL:
-        raise SpecError(f"schedules.longitudinal: '{name}' is a schedule of {model}; this run needs one of {MODEL}")
+    wanted = MODEL.format(direction)
+    if model != wanted:
+        raise SpecError(f"schedules.{direction}: '{name}' is a schedule of {model}; this run needs one of {wanted}")
     if abs(schedule.sample_time - sample_time) > 1e-9 * sample_time:
         raise SpecError(
-            f"schedules.longitudinal: '{name}' was proved at sample_time = {schedule.sample_time:g} s, the drive file "
+            f"schedules.{direction}: '{name}' was proved at sample_time = {schedule.sample_time:g} s, the drive file "
             f'asks for {sample_time:g} s; set sample_time = "{schedule.sample_time * 1e3:g} ms" or synthesise another'
         )
     return schedule

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from studies.drives.chain import Chain, pipeline_of, run_chain
 from studies.drives.drive_file import read_drive
 from studies.drives.judge import DriveData, judge
 from studies.drives.log import read_log
@@ -30,7 +31,7 @@ class RunResult:
 
 
 def run_drive(logs: Sequence[Path], drive: Path, out: Path, *, progress: Progress | None = None) -> RunResult:
-    """Run the four-corner longitudinal observers over the ``logs`` that the ``drive`` file describes.
+    """Run the pipeline and the four-corner longitudinal observers over the ``logs`` that the ``drive`` file describes.
 
     Writes estimates.csv, metrics.json and the plots (svg and png) to ``out``, each whole or not at all. ``progress``
     is called with the fraction done. Raises SpecError (drive file, schedule) or LogError (logs, ``out``), one line
@@ -52,12 +53,16 @@ def replay_drive(logs: Sequence[Path], drive: Path, *, progress: Progress | None
     """As :func:`run_drive`, but the arrays are returned and nothing is written."""
     told = progress if progress is not None else _silent
     description = read_drive(drive)
-    schedule = load_schedule(description.schedules.longitudinal, drive.parent, description.sample_time)
+    names, time = description.schedules, description.sample_time
+    schedule = load_schedule(names.longitudinal, drive.parent, time)
+    lateral = load_schedule(names.lateral, drive.parent, time, "lateral") if names.lateral is not None else None
+    pipeline, assumptions = pipeline_of(description, schedule, lateral)
     log = read_log(logs, description)
     told(0.2)
     inputs = corner_inputs_of(log, description)
-    replayed = replay(inputs, schedule, lambda done: told(0.2 + 0.8 * done))
-    return DriveData(description, schedule, log, inputs, replayed)
+    replayed = replay(inputs, schedule, lambda done: told(0.2 + 0.1 * done))
+    chain = run_chain(log, inputs, pipeline, assumptions, lambda done: told(0.3 + 0.7 * done))
+    return DriveData(description, schedule, log, inputs, replayed, chain)
 
 
 def _silent(_done: float) -> None:
@@ -80,8 +85,32 @@ def estimate_columns(data: DriveData) -> dict[str, np.ndarray[Any, Any]]:
     }
     for pattern, values in per_corner.items():
         columns |= {pattern.format(corner): values[:, k] for k, corner in enumerate(CORNERS)}
+    if data.chain is not None:
+        columns |= chain_columns(data.chain)
     units = {"v": "mps", "a": "mps2", "f": "N"}
     columns |= {f"reference_{name}_{units[name[0]]}": value for name, value in data.log.reference.items()}
+    return columns
+
+
+def chain_columns(chain: Chain) -> dict[str, np.ndarray[Any, Any]]:
+    """The pipeline's columns of estimates.csv."""
+    columns: dict[str, np.ndarray[Any, Any]] = {
+        "pipeline_vx_mps": chain.vx,
+        "pipeline_vy_mps": chain.vy,
+        "pipeline_sideslip_rad": chain.sideslip,
+        "pipeline_force_y_front_N": chain.axle_force_y[:, 0],
+        "pipeline_force_y_rear_N": chain.axle_force_y[:, 1],
+        "pipeline_flags": chain.flags,
+        "pipeline_checks": chain.checks,
+    }
+    per_corner = {
+        "pipeline_force_x_{}_N": chain.force_x,
+        "pipeline_force_z_{}_N": chain.force_z,
+        "pipeline_slip_{}": chain.slip,
+        "pipeline_slip_angle_{}_rad": chain.slip_angle,
+    }
+    for pattern, values in per_corner.items():
+        columns |= {pattern.format(corner): values[:, k] for k, corner in enumerate(CORNERS)}
     return columns
 
 

@@ -10,13 +10,21 @@ HEADER = ("quantity", "NRMS (%)", "RMS", "maximum", "reference peak", "unit", "s
 
 
 def summary_rows(result: RunResult) -> list[tuple[str, ...]]:
-    """One row a compared quantity in the columns of ``HEADER``, velocities first; none without references."""
-    named = {**result.metrics["velocity"], **result.metrics["force"]}
-    return [(name.replace("_", " "), *_cells(entry)) for name, entry in named.items()]
+    """One row an estimate of a quantity in the columns of ``HEADER``, V_x first; none without references.
+
+    Forces that never exceed the least one of the rule have nothing to compare, and no row.
+    """
+    signals = {"vx": result.metrics["velocity"], **result.metrics["pipeline"].get("signals", {})}
+    rows = []
+    for signal, estimates in signals.items():
+        for name, entry in estimates.items():
+            if entry["samples"]:
+                rows.append((f"{signal.replace('_', ' ')}: {name.replace('_', ' ')}", *_cells(entry)))
+    return rows
 
 
 def _cells(entry: dict[str, Any]) -> tuple[str, ...]:
-    digits = 3 if entry["unit"] == "m/s" else 0
+    digits = {"m/s": 3, "rad": 4}.get(entry["unit"], 0)
     sizes = [_number(entry[key], digits) for key in ("rms", "max_error", "reference_peak")]
     return (_number(entry["nrms_percent"], 2), *sizes, entry["unit"], str(entry["samples"]))
 

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from studies.drives.judge import DriveData
+from studies.drives.judge import LEAST_SPEED, DriveData
 from studies.drives.quantities import CORNERS
 
 Array = npt.NDArray[np.float64]
@@ -22,6 +22,7 @@ Save = Callable[[Path], None]
 
 REFERENCE = {"color": "0.1", "linewidth": 1.8, "label": "reference"}
 ESTIMATE = {"color": "#0b62a4", "linewidth": 1.1, "label": "corner observers"}
+PIPELINE = {"color": "#c1272d", "linewidth": 1.2, "label": "pipeline"}
 BASELINES = {
     "mean_wheel_speed": {"color": "#f4a261", "linewidth": 2.4, "label": "mean wheel speed"},
     "integrated_acceleration": {
@@ -56,6 +57,8 @@ def velocity(data: DriveData) -> Figure:
     reference = data.log.reference.get("vx")
     lines = [(name, data.baselines[name], style) for name, style in BASELINES.items()]
     lines.append(("corner_observers", data.replay.velocity, ESTIMATE))
+    if data.chain is not None:
+        lines.append(("pipeline", data.chain.vx, PIPELINE))
     figure = _figure(9.0, 5.6 if reference is not None else 3.6)
     axes = np.atleast_1d(figure.subplots(1 + (reference is not None), 1, sharex=True))
     if reference is not None:
@@ -80,6 +83,9 @@ def slip(data: DriveData) -> Figure:
         if data.reference_slip is not None:
             ax.plot(data.log.time, data.reference_slip[:, k], **REFERENCE)
         ax.plot(data.log.time, data.slip[:, k], **ESTIMATE)
+        if data.chain is not None:
+            fast = np.where(np.abs(data.chain.vx) >= LEAST_SPEED, data.chain.slip[:, k], np.nan)
+            ax.plot(data.log.time, fast, **PIPELINE)
     _label_corners(axes, "slip ratio (1)")
     _finish(figure, axes[0, 0], data, "slip ratio from the velocity at the centre of gravity")
     return figure
@@ -95,6 +101,8 @@ def forces(data: DriveData) -> Figure:
         if measured is not None:
             ax.plot(data.log.time, measured / scale, **REFERENCE)
         ax.plot(data.log.time, data.inputs.force[:, k] / scale, **{**ESTIMATE, "label": "observer input"})
+        if data.chain is not None:
+            ax.plot(data.log.time, data.chain.force_x[:, k] / scale, **PIPELINE)
     _label_corners(axes, f"longitudinal force ({unit})")
     sources = ", ".join(sorted(set(data.inputs.force_sources)))
     _finish(figure, axes[0, 0], data, f"longitudinal force ({sources})")

@@ -1,0 +1,108 @@
+"""The papers' sideslip observers in one dress, to run beside the fusion.
+
+A sideslip part has `step(steer, yaw_rate, vx, ax, ay, force_x, force_z, axle_force_y)` with the front road-wheel angle
+(rad), rad/s, m/s, m/s^2, m/s^2, (..., 4) N, (..., 4) N and (..., 2) N, and returns something with `sideslip` (rad) and `flags`.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.interpolate import FloatArray
+from estimators.sideslip import (
+    AdaptiveStiffnessObserver,
+    FixedStiffnessObserver,
+    FourWheel,
+    FourWheelObserver,
+    SingleTrack,
+)
+from estimators.sideslip.four_wheel import FourWheelStep
+from estimators.sideslip.stiffness import StiffnessStep
+from estimators.signals.memory import Memory
+
+
+class FourWheelSideslip(Memory):
+    """`FourWheelObserver` (P4) with the loads of the pipeline.
+
+    Args:
+        vehicle: tires and lengths.
+        sample_time: s.
+        batch_shape: () for one car.
+        method: "extended" or "unscented".
+    """
+
+    parts = ("observer",)
+
+    def __init__(
+        self,
+        vehicle: FourWheel,
+        sample_time: float,
+        batch_shape: tuple[int, ...] = (),
+        method: Literal["extended", "unscented"] = "extended",
+    ) -> None:
+        self.batch_shape = batch_shape
+        self.observer = FourWheelObserver(vehicle, method, batch_shape, sample_time)
+
+    def step(
+        self,
+        steer: FloatArray,
+        yaw_rate: FloatArray,
+        vx: FloatArray,
+        ax: FloatArray,
+        ay: FloatArray,
+        force_x: FloatArray,
+        force_z: FloatArray,
+        axle_force_y: FloatArray,
+    ) -> FourWheelStep:
+        """One sample."""
+        measurement = np.stack([yaw_rate, vx, ax, ay], axis=-1)
+        return self.observer.step(steer, force_z, measurement)
+
+    def reset(self, where: npt.ArrayLike | None = None) -> None:
+        """Starts the entries `where` (bool mask of the batch shape; None: all) afresh."""
+        self.observer.reset(where)
+
+
+class StiffnessSideslip(Memory):
+    """`AdaptiveStiffnessObserver` or `FixedStiffnessObserver` (P5) on the pipeline's axle forces.
+
+    The paper's sliding-mode observer of these forces is `estimators.sideslip.SlidingModeObserver`; the pipeline has them
+    already.
+
+    Args:
+        vehicle: single track.
+        sample_time: s.
+        batch_shape: () for one car.
+        adaptive: False keeps the stiffnesses given.
+    """
+
+    parts = ("observer",)
+
+    def __init__(
+        self, vehicle: SingleTrack, sample_time: float, batch_shape: tuple[int, ...] = (), adaptive: bool = True
+    ) -> None:
+        self.batch_shape = batch_shape
+        kind = AdaptiveStiffnessObserver if adaptive else FixedStiffnessObserver
+        self.observer = kind(vehicle, batch_shape, sample_time=sample_time)
+
+    def step(
+        self,
+        steer: FloatArray,
+        yaw_rate: FloatArray,
+        vx: FloatArray,
+        ax: FloatArray,
+        ay: FloatArray,
+        force_x: FloatArray,
+        force_z: FloatArray,
+        axle_force_y: FloatArray,
+    ) -> StiffnessStep:
+        """One sample."""
+        measurement = np.concatenate([axle_force_y, np.asarray(ay)[..., None]], axis=-1)
+        return self.observer.step(steer, yaw_rate, vx, force_x[..., :2].sum(axis=-1), measurement)
+
+    def reset(self, where: npt.ArrayLike | None = None) -> None:
+        """Starts the entries `where` (bool mask of the batch shape; None: all) afresh."""
+        self.observer.reset(where)

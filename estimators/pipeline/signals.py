@@ -1,0 +1,49 @@
+"""One sample of everything that a car measures, as it comes: anything may be missing, late or wrong."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.interpolate import FloatArray
+from estimators.signals.checks import entries
+
+
+class VehicleSignals(NamedTuple):
+    """Arrays of the batch shape `...`, or one number for all; NaN (or infinite) where missing. ISO frame, SI units.
+
+    None says that the car has no such sensor: nothing is flagged then.
+    """
+
+    wheel_speed: npt.ArrayLike  # (..., 4) rad/s, signed: backwards is negative
+    ax: npt.ArrayLike  # (...) m/s^2, specific force at the centre of gravity
+    ay: npt.ArrayLike = 0.0  # (...) m/s^2
+    yaw_rate: npt.ArrayLike = 0.0  # (...) rad/s
+    steer: npt.ArrayLike = 0.0  # (..., 4) rad, road-wheel angles; hand wheel divided by its ratio
+    torque: npt.ArrayLike = np.nan  # (..., 4) N m, drive minus brake
+    az: npt.ArrayLike | None = None  # (...) m/s^2, +g at rest
+    roll_rate: npt.ArrayLike | None = None  # (...) rad/s, about x
+    pitch_rate: npt.ArrayLike | None = None  # (...) rad/s, about y
+    grade: npt.ArrayLike = 0.0  # (...) rad, of the road, uphill positive
+    bank: npt.ArrayLike = 0.0  # (...) rad, left side up positive
+    elapsed: npt.ArrayLike | None = None  # (...) s since the last sample, where it is not the sample time
+
+    def arrays(
+        self, shape: tuple[int, ...]
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """wheel_speed, steer, torque (..., 4) and ax, ay, yaw_rate (...).
+
+        Raises:
+            EstimatorError: another shape, or not numbers.
+        """
+        four = (*shape, 4)
+        return (
+            entries(self.wheel_speed, four, "wheel_speed"),
+            entries(self.steer, four, "steer"),
+            entries(self.torque, four, "torque"),
+            entries(self.ax, shape, "ax"),
+            entries(self.ay, shape, "ay"),
+            entries(self.yaw_rate, shape, "yaw_rate"),
+        )

@@ -1,0 +1,180 @@
+"""The estimation pipeline over a recorded drive: forces, loads, velocities and sideslip of every sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators import EstimatorError, GainSchedule
+from estimators.forces import (
+    AttitudeObserver,
+    LateralForceEstimator,
+    UnknownInputForceObserver,
+    VerticalLoads,
+    WheelForceFilter,
+)
+from estimators.pipeline import (
+    CornerObservers,
+    DifferentiatedPid,
+    EstimationPipeline,
+    FourWheelSideslip,
+    StiffnessSideslip,
+    VehicleSignals,
+)
+from estimators.pipeline.pipeline import REAL_SENSORS
+from estimators.sideslip import FourWheel, SingleTrack
+from estimators.vehicle import VehicleParameters
+from studies.drives.drive_file import DriveFile
+from studies.drives.log import DriveLog
+from studies.drives.prepare import CornerInputs
+from studies.drives.quantities import CORNERS
+from synthesis.errors import SpecError
+
+Array = npt.NDArray[np.float64]
+PROGRESS_STEPS = 50
+WHEEL_INERTIA = 1.0
+"""kg m^2 where the drive has none: without torques it has nothing to act on."""
+
+
+@dataclass(frozen=True)
+class Chain:
+    """What the pipeline made of n samples; corner order fl, fr, rl, rr, SI.
+
+    ``corner_vy`` is V_y of the corner observers, ``sideslip_part`` that of the chosen sideslip estimator: NaN without
+    them. ``flags`` and ``checks`` (n,) are sums of ``estimators.Flag`` and ``estimators.pipeline.Check``.
+    """
+
+    vx: Array
+    vy: Array
+    sideslip: Array
+    sideslip_part: Array
+    corner_vy: Array
+    force_x: Array
+    axle_force_y: Array
+    force_z: Array
+    slip: Array
+    slip_angle: Array
+    flags: npt.NDArray[np.int64]
+    checks: npt.NDArray[np.int64]
+    assumptions: tuple[str, ...]
+
+
+def pipeline_of(
+    drive: DriveFile, longitudinal: GainSchedule, lateral: GainSchedule | None = None
+) -> tuple[EstimationPipeline, tuple[str, ...]]:
+    """The pipeline that the drive file asks for, for one car, and what had to be assumed.
+
+    Raises SpecError, one line, on vehicle data that no car has.
+    """
+    try:
+        return _pipeline_of(drive, longitudinal, lateral)
+    except EstimatorError as error:
+        raise SpecError(f"estimators: {error}") from error
+
+
+def vehicle_of(drive: DriveFile) -> tuple[VehicleParameters, tuple[str, ...]]:
+    """The car of the drive file for the estimators, and what had to be assumed of it."""
+    car, assumptions = drive.vehicle, []
+    if car.yaw_inertia is None:
+        assumptions.append("yaw inertia is not given: taken as m L_f L_r")
+    vehicle = VehicleParameters(
+        mass=car.mass,
+        yaw_inertia=car.yaw_inertia or car.mass * car.front_axle_to_cg * car.rear_axle_to_cg,
+        wheel_inertia=car.wheel_inertia or WHEEL_INERTIA,
+        front_axle_distance=car.front_axle_to_cg,
+        rear_axle_distance=car.rear_axle_to_cg,
+        cg_height=car.cg_height,
+        front_track=car.track_front,
+        rear_track=car.track_rear,
+        effective_radius=(car.effective_radius_front, car.effective_radius_rear),
+        rolling_resistance=car.rolling_resistance,
+    )
+    return vehicle, tuple(assumptions)
+
+
+def _pipeline_of(
+    drive: DriveFile, longitudinal: GainSchedule, lateral: GainSchedule | None
+) -> tuple[EstimationPipeline, tuple[str, ...]]:
+    vehicle, assumptions = vehicle_of(drive)
+    time, chosen = drive.sample_time, drive.estimators
+    forces: dict[str, Callable[..., Any]] = {
+        "unknown-input": UnknownInputForceObserver,
+        "pid": DifferentiatedPid,
+        "unscented": WheelForceFilter,
+    }
+    dynamic = chosen.vertical_load == "dynamic"
+    method: Any = chosen.lateral_force
+    corners = CornerObservers(vehicle, longitudinal, lateral) if lateral is not None else None
+    pipeline = EstimationPipeline(
+        vehicle,
+        time,
+        longitudinal_force=forces[chosen.longitudinal_force](vehicle, time),
+        loads=VerticalLoads(vehicle, time, dynamic=dynamic),
+        attitude=AttitudeObserver(time) if chosen.attitude == "gyro" else None,
+        lateral_force=LateralForceEstimator(vehicle, time, method=method, measurement_deviation=REAL_SENSORS),
+        corner_observers=corners,
+        sideslip=_sideslip_of(drive, vehicle),
+    )
+    return pipeline, assumptions
+
+
+def _sideslip_of(drive: DriveFile, vehicle: VehicleParameters) -> Any:
+    kind, car = drive.estimators.sideslip, drive.vehicle
+    front, rear = car.cornering_stiffness_front, car.cornering_stiffness_rear
+    if kind == "none" or front is None or rear is None:
+        return None
+    base = (vehicle.mass, vehicle.yaw_inertia, vehicle.front_axle_distance, vehicle.rear_axle_distance)
+    if kind.endswith("stiffness"):
+        adaptive = kind == "adaptive-stiffness"
+        return StiffnessSideslip(SingleTrack(*base, front, rear), drive.sample_time, adaptive=adaptive)
+    track, length = 0.5 * (vehicle.front_track + vehicle.rear_track), car.relaxation_length or 0.5
+    wheels = FourWheel(*base, track, front / 2, rear / 2, length, length)
+    method: Any = kind.removeprefix("four-wheel-")
+    return FourWheelSideslip(wheels, drive.sample_time, method=method)
+
+
+def run_chain(
+    log: DriveLog,
+    inputs: CornerInputs,
+    pipeline: EstimationPipeline,
+    assumptions: tuple[str, ...] = (),
+    progress: Callable[[float], None] | None = None,
+) -> Chain:
+    """Every sample through the pipeline; signals that the log lacks are not flagged, missing samples are."""
+    n, signals = log.time.size, log.signals
+    nothing, zero = np.full(n, np.nan), np.zeros(n)
+    torque = np.stack([signals.get(f"torque_{corner}", nothing) for corner in CORNERS], axis=-1)
+    ay, turn = signals.get("ay", zero), signals.get("yaw_rate", zero)
+    optional = {name: signals[name] for name in ("az", "roll_rate", "pitch_rate") if name in signals}
+    rows: list[tuple[Any, ...]] = []
+    for k in range(n):
+        extra = {name: value[k] for name, value in optional.items()}
+        step = pipeline.step(
+            VehicleSignals(inputs.wheel_speed[k], signals["ax"][k], ay[k], turn[k], inputs.steer[k], torque[k], **extra)
+        )
+        part = np.nan if step.sideslip_step is None else step.sideslip_step.sideslip
+        corner = np.nan if step.corners is None else step.corners.vy
+        rows.append(
+            (
+                step.vx,
+                step.vy,
+                step.sideslip,
+                part,
+                corner,
+                step.force_x,
+                step.axle_force_y,
+                step.force_z,
+                step.slip,
+                step.slip_angle,
+                int(step.flags),
+                int(step.consistency.failed),
+            )
+        )
+        if progress is not None and k % max(1, n // PROGRESS_STEPS) == 0:
+            progress(k / n)
+    columns: list[Any] = [np.array(column) for column in zip(*rows, strict=True)]
+    return Chain(*[*columns, assumptions])

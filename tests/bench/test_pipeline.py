@@ -1,0 +1,50 @@
+"""Cost of one step of the pipeline: the default composition, with corner observers, and a batch; reported, not asserted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimators import GainSchedule
+from estimators.pipeline import CornerObservers, EstimationPipeline, VehicleSignals
+from estimators.vehicle import VehicleParameters
+from tests.unit.schedule_content import schedule_content
+
+CAR, TIME = VehicleParameters.published_suv(), 0.005
+
+
+def samples(batch: tuple[int, ...], count: int = 64) -> list[VehicleSignals]:
+    rng = np.random.default_rng(0)
+
+    def noise(size: float, *tail: int) -> Any:
+        return size * rng.normal(size=(*batch, *tail))
+
+    return [
+        VehicleSignals(
+            60.0 + noise(0.05, 4), noise(0.05), noise(0.05), noise(0.002), noise(0.002, 4), 50.0 + noise(1.0, 4)
+        )
+        for _ in range(count)
+    ]
+
+
+@pytest.mark.parametrize("parts", ["default", "with corner observers"])
+def test_one_step_for_four_corners(benchmark: Any, parts: str) -> None:
+    corners = None
+    if parts != "default":
+        along, across = (GainSchedule.from_content(schedule_content(n), n) for n in ("longitudinal", "lateral"))
+        corners = CornerObservers(CAR, along, across)
+    pipeline = EstimationPipeline(CAR, TIME, corner_observers=corners)
+    given = samples(())
+    turn = iter(range(10**9))
+    step = benchmark(lambda: pipeline.step(given[next(turn) % len(given)]))
+    assert np.isfinite(step.vx)
+
+
+def test_a_thousand_cars(benchmark: Any) -> None:
+    pipeline = EstimationPipeline(CAR, TIME, (1000,))
+    given = samples((1000,), 4)
+    turn = iter(range(10**9))
+    step = benchmark(lambda: pipeline.step(given[next(turn) % len(given)]))
+    assert np.isfinite(step.vx).all()
