@@ -147,6 +147,7 @@ class LmiProblem:
             )
         if np.abs(coefficients - np.swapaxes(coefficients, -3, -2)).max() > SYMMETRY * np.abs(coefficients).max():
             raise ProblemError(f"inequality '{name}' is not symmetric; add its transpose")
+        matrix = (matrix + matrix.T) * 0.5  # takes off the rounding, so that no triangle is preferred
         if self.maximise_margin and strict:
             matrix = matrix - self.constant(np.eye(matrix.shape[0])).scaled_by(self.unknowns[MARGIN])
         offset, factor = np.zeros(self.variables), np.ones(self.variables)

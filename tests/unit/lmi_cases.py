@@ -123,7 +123,10 @@ def reference_problem(model: LpvModel, degree: int, given: float, noise: float =
 
 
 def exactly_positive(matrix: MatrixPolynomial) -> bool:
-    """M(u, r) > 0 on [-1, 1]^2 in exact arithmetic, for one parameter u and r affine: both vertices of r."""
+    """M(u, r) > 0 on [-1, 1]^2 in exact arithmetic, for one parameter u and r affine: both vertices of r.
+
+    The upper triangle is read twice: in floating point the lower one may differ from it by the last bit.
+    """
     line = fmpq_poly([-1, 2])
     for rate in (-1, 1) if matrix.degrees[1] else (0,):
         entries = [
@@ -131,7 +134,7 @@ def exactly_positive(matrix: MatrixPolynomial) -> bool:
                 sum(
                     (
                         fmpq_poly([rational(c) * fmpq(rate) ** j])(line) * line**i
-                        for (i, j), c in np.ndenumerate(matrix.coefficients[:, :, a, b, 0])
+                        for (i, j), c in np.ndenumerate(matrix.coefficients[:, :, min(a, b), max(a, b), 0])
                     ),
                     fmpq_poly([0]),
                 )
