@@ -22,9 +22,13 @@ def run_schedules(specs: list[str], out: Path | None, check: bool, figures: Path
     for name in names:
         load_spec(name)  # bad input is refused before anything is designed or written
     folder = out or Path("schedules")
+    pending = regenerate(names, folder, check)
+    runs: list[ScheduleRun] = []
     with progress_bar() as progress:
         task = progress.add_task("designing and proving", total=len(names))
-        runs = regenerate(names, folder, check, lambda run: progress.advance(task))
+        for run in pending:
+            runs.append(run)
+            progress.advance(task)
     if figures is not None:
         from studies.report.gain_plots import plot_schedules
 
