@@ -1,0 +1,74 @@
+"""A claim of a paper: what is printed, what we compute, and what follows from the two."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+JsonValue = Any
+"""Numbers, texts, lists and dictionaries of them: what a JSON file can hold."""
+
+
+class Verdict(StrEnum):
+    """What became of a published claim."""
+
+    REPRODUCED = "reproduced"
+    PARTLY = "partly reproduced"
+    NOT_REPRODUCED = "not reproduced"
+    ERRATUM = "erratum"
+    UNDER_SPECIFIED = "under-specified"
+    DERIVED = "derived (not claimed)"
+
+
+@dataclass(frozen=True)
+class Published:
+    """A claim as the paper prints it: the fixed half, kept as data in the ``claims.toml`` of its study."""
+
+    id: str
+    paper: str
+    where: str
+    statement: str
+    published: JsonValue
+    tolerance: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Our half: the value computed now, the verdict that follows from it, and the reading under which it holds."""
+
+    computed: JsonValue
+    verdict: Verdict
+    reading: str
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A published claim beside our finding."""
+
+    published: Published
+    finding: Finding
+
+    def row(self) -> dict[str, JsonValue]:
+        """The entry of ``claims.json``."""
+        p, f = self.published, self.finding
+        return {
+            "id": p.id, "paper": p.paper, "where": p.where, "statement": p.statement, "published": p.published,
+            "computed": f.computed, "tolerance": p.tolerance, "verdict": str(f.verdict), "reading": f.reading,
+        }  # fmt: skip
+
+
+ClaimFunction = Callable[[], Finding]
+"""Computes one claim from the models and analyses; takes nothing and reads no stored result."""
+
+
+def judged(holds: bool, otherwise: Verdict = Verdict.NOT_REPRODUCED) -> Verdict:
+    """REPRODUCED when the computed value ``holds``, else ``otherwise``: a verdict follows from a comparison."""
+    return Verdict.REPRODUCED if holds else otherwise
+
+
+def agrees(computed: float, published: float, half_last_digit: float) -> bool:
+    """Whether ``computed`` rounds to what is printed: closer than half the last printed digit (and never for NaN)."""
+    return math.isfinite(computed) and abs(computed - published) <= half_last_digit * (1 + 1e-12)

@@ -1,0 +1,37 @@
+"""Output of `gainsmith identify`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from studies.commands.progress import progress_bar
+from studies.identify.identify import identify_drive
+from studies.identify.result import HEADER, content, rows, warnings
+from studies.identify.write import write_identification
+
+
+def run_identify(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int:
+    """Identify the car from the log, write the files, print the table; 0 when done, warnings to standard error."""
+    with progress_bar() as progress:
+        task = progress.add_task("identifying", total=1.0)
+        found = identify_drive(logs, drive, progress=lambda done: progress.update(task, completed=0.95 * done))
+        write_identification(found, out)
+        progress.update(task, completed=1.0)
+    if as_json:
+        print(json.dumps(content(found), indent=1, allow_nan=False))
+        return 0
+    table = Table(title=f"{found.drive.name}: identified", caption=f"velocity reference: {found.velocity_reference}")
+    for i, heading in enumerate(HEADER):
+        table.add_column(heading, justify="left" if i == 0 else "right")
+    for row in rows(found):
+        table.add_row(*row)
+    Console(width=None if sys.stdout.isatty() else 120).print(table)
+    for line in warnings(found):
+        print(f"warning: {line}", file=sys.stderr)
+    print(f"written to {out}")
+    return 0

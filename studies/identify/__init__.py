@@ -1,0 +1,1 @@
+"""Tire parameters of the corner models, effective radius and wheel inertia from a recorded drive."""

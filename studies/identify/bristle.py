@@ -1,0 +1,87 @@
+"""The LuGre corner model solved for the slip velocity that belongs to a measured force.
+
+P1 (18)-(19) in the quantities that a drive determines, C = sigma0/kappa (slip stiffness), l = 1/kappa (relaxation length),
+T1 = sigma1/sigma0 (damping time), 1/(theta g) = s. With z = mu/sigma0 (mu freed of damping and viscous part) (18) reads
+v_r (1 - s |mu|) = dz/dt + kappa R|w| z, so
+
+    F[v_r] = (1/C) ( l D[G(mu)] + F[R|w| mu/(1 - s |mu|)] ),   G(mu) = -sign(mu) ln(1 - s |mu|)/s,   dG/dmu = 1/(1 - s|mu|),
+
+linear in 1/C and l/C. Where a log does not tell s it is 0: then C is the stiffness of the linear corner model (20)-(23)
+that the observers use, over the slip range of the log, and its interval allows for the curvature of a straight tire. At one
+speed v only l - T1 v shows: damping is held at the prior unless the log tells it apart.
+
+The slip velocity, which carries the noise of the velocity reference, is what is predicted; the normalised force, which is
+far better known against its range, is the regressor: the other way round the noise of slip would pull the stiffness down
+(errors in variables).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from studies.identify.prefilter import Prefilter, first_order_lag
+from studies.identify.settings import IdentifySettings
+from studies.identify.unknowns import Unknown
+from synthesis.models.parameter_set import Tire
+
+Array = npt.NDArray[np.float64]
+MOST_USED = 0.9
+"""s |mu| above this is a sliding wheel: no slip velocity belongs to its force."""
+MOST_DAMPING = 0.01
+"""s: bristles of rubber rest within a few ms; more is noise of the regressor that a slow filter would take away."""
+
+
+def tire_unknowns(tire: Tire, settings: IdentifySettings) -> tuple[Unknown, ...]:
+    """C [1], l [m], T1 [s] and s [1] with the values of ``tire`` as prior (s: linear)."""
+    stiffness = tire.sigma0.value / tire.kappa.value
+    far = (float(np.log(2.0 / stiffness)), float(np.log(300.0 / stiffness)))
+    relaxation = 1.0 / tire.kappa.value
+    near = (float(np.log(0.01 / relaxation)), float(np.log(1.5 / relaxation)))
+    damping = tire.sigma1.value / tire.sigma0.value
+    return (
+        Unknown(
+            "slip_stiffness",
+            stiffness,
+            settings.stiffness_spread,
+            settings.stiffness_width,
+            far,
+            informed=False,
+            starts=(-1.2,),
+        ),
+        Unknown(
+            "relaxation_length", relaxation, settings.relaxation_spread, settings.relaxation_width, near, informed=False
+        ),
+        Unknown(
+            "damping_time",
+            damping,
+            damping,
+            settings.damping_width,
+            (0.0, MOST_DAMPING),
+            positive=False,
+            informed=False,
+            relative=True,
+        ),
+        Unknown(
+            "saturation",
+            0.0,
+            settings.saturation_spread,
+            settings.saturation_width,
+            (-0.1, 5.0),
+            positive=False,
+            informed=False,
+            considered=settings.curvature / settings.saturation_spread,
+        ),
+    )
+
+
+def slip_velocity(p: Mapping[str, float], mu: Array, rolling: Array, filter_: Prefilter, step: float) -> Array:
+    """F[v_r] (n, k), m/s, that belongs to the normalised force mu (n, k) [1] at the rolling speed R|w| (n, k), m/s."""
+    s = p["saturation"]
+    lagged = first_order_lag(mu, step, p["damping_time"], filter_.runs)
+    left = 1.0 - np.minimum(s * np.abs(lagged), MOST_USED)
+    stretched = lagged if abs(s) < 1e-6 else -np.sign(lagged) * np.log(left) / s
+    moved = p["relaxation_length"] * filter_.rate(stretched)
+    return np.asarray((moved + filter_.smooth(rolling * lagged / left)) / p["slip_stiffness"])

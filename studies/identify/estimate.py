@@ -1,0 +1,214 @@
+"""Nonlinear least squares with intervals that can be believed, and parameters held where a log says nothing of them.
+
+All unknowns are fitted together, informed ones with their prior as one more measurement, weighed by the residual size and
+its correlation time. The uninformed unknown whose interval is widest against its prior's is then held at the prior and the
+rest fitted again, until the log says more than the prior of every one left; excited are those with narrow intervals. What
+stays in the fit without being excited keeps its uncertainty in the intervals of the rest. What is held is not known
+either: with its spread s it adds S s^2 S', S = -H^-1 J'J_held, to the covariance of the rest (consider analysis; Schmidt
+1966).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from studies.identify.autocorrelation import correlation_time, long_run_covariance
+from studies.identify.unknowns import Estimate, Unknown
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+PASSES = 2
+"""The first weighs the priors by a guess of the residual, the second by the residual of the first."""
+
+STOP: Any = {"xtol": 1e-5, "ftol": 1e-6, "max_nfev": 40}
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What an interval means.
+
+    ``confidence`` of the intervals, ``floor`` of the residual in its unit (simulated logs have no noise of their own),
+    ``correlation``: samples over which the prefilter alone makes the residual correlated, ``freedom``: independent stretches
+    without which nothing counts as excited.
+    """
+
+    confidence: float
+    floor: float
+    correlation: int
+    freedom: float
+
+
+@dataclass(frozen=True)
+class _Problem:
+    residual: Callable[[Mapping[str, float]], Array]
+    mask: Mask
+    unknowns: tuple[Unknown, ...]
+    rules: Rules
+
+    @property
+    def home(self) -> Array:
+        return np.array([u.home for u in self.unknowns])
+
+    @property
+    def spread(self) -> Array:
+        return np.array([u.spread for u in self.unknowns])
+
+    def all_rows(self, x: Array) -> Array:
+        return self.residual({u.name: u.value(float(v)) for u, v in zip(self.unknowns, x, strict=True)})
+
+    def rows(self, x: Array) -> Array:
+        return self.all_rows(x)[self.mask]
+
+    def thinned(self) -> Mask:
+        """One row in half a correlation length of the prefilter: enough to come near."""
+        out = np.zeros_like(self.mask)
+        step = max(self.rules.correlation // 2, 1)
+        out[::step] = self.mask[::step]
+        return out if np.count_nonzero(out) > 20 * len(self.unknowns) else self.mask
+
+    def size(self, x: Array) -> tuple[float, float]:
+        """Residual size, not below the floor, and its correlation time in samples."""
+        e = np.zeros(self.mask.shape)
+        e[self.mask] = self.rows(x)
+        rms = float(np.sqrt(np.mean(e[self.mask] ** 2)))
+        time = correlation_time(e, self.rules.correlation) if rms > 0 else 1.0
+        return max(rms, self.rules.floor), max(time, float(self.rules.correlation) / 2)
+
+
+def estimate(
+    residual: Callable[[Mapping[str, float]], Array],
+    mask: Mask,
+    unknowns: Sequence[Unknown],
+    rules: Rules,
+    start: Mapping[str, float] | None = None,
+) -> Estimate:
+    """Fit the ``unknowns`` to the rows of ``residual`` (n, k) that ``mask`` (n, k) lets in, from ``start`` (x by name)."""
+    problem = _Problem(residual, mask, tuple(unknowns), rules)
+    if not mask.any():
+        return _nothing(problem)
+    active = np.ones(len(problem.unknowns), dtype=bool)
+    x = np.array([(start or {}).get(u.name, u.home) for u in problem.unknowns])
+    refused: dict[str, float] = {}
+    singular: tuple[float, ...] = ()
+    while True:
+        x = _fit(problem, active, np.where(active, x, problem.home), many=not singular and start is None)
+        found = _judge(problem, active, x)
+        singular = singular or found.singular_values
+        half = found.half
+        silence = {
+            u.name: u.silence(float(v), half[u.name])
+            for u, v, a in zip(problem.unknowns, x, active, strict=True)
+            if a and not u.informed
+        }
+        worst = max(silence, key=lambda name: silence[name], default="")
+        if not worst or silence[worst] <= 1.0:
+            break
+        refused[worst] = half[worst]
+        active[found.index(worst)] = False
+    enough = found.freedom >= rules.freedom
+    excited = {
+        u.name: enough and u.name not in refused and u.narrow(float(v), half[u.name])
+        for u, v in zip(problem.unknowns, x, strict=True)
+    }
+    return replace(found, excited=excited, half={**half, **refused}, singular_values=singular)
+
+
+def _fit(problem: _Problem, active: Mask, x: Array, many: bool) -> Array:
+    free = np.flatnonzero(active)
+    unknowns = [problem.unknowns[i] for i in free]
+    low, high = (np.array([u.reach[side] for u in unknowns]) for side in (0, 1))
+    home, spread = problem.home[free], problem.spread[free]
+    informed = np.array([u.informed for u in unknowns])
+    margin = 1e-9 * (high - low)
+    size, time = 10 * problem.rules.floor, float(problem.rules.correlation)
+    for k in range(PASSES if free.size else 0):
+        mask = problem.mask if k else problem.thinned()
+        share = np.count_nonzero(mask) / np.count_nonzero(problem.mask)
+        weight = np.where(informed, size * np.sqrt(time * share), 0.0) / spread
+
+        def cost(part: Array, weight: Array = weight, held: Array = x, mask: Mask = mask) -> Array:
+            full = held.copy()
+            full[free] = part
+            return np.concatenate([problem.all_rows(full)[mask], (weight * (part - home))[informed]])
+
+        starts = [np.clip(x[free], low + margin, high - margin)]
+        if many and k == 0:
+            for place, u in enumerate(unknowns):
+                starts += [np.concatenate([starts[0][:place], [s], starts[0][place + 1 :]]) for s in u.starts]
+        fits = [least_squares(cost, s, bounds=(low, high), x_scale=spread, **STOP) for s in starts]
+        x = x.copy()
+        x[free] = min(fits, key=lambda fit: float(fit.cost)).x
+        size, time = problem.size(x)
+    return x
+
+
+def _judge(problem: _Problem, active: Mask, x: Array) -> Estimate:
+    """Covariance of :mod:`.autocorrelation`, with the prior as one more measurement, and the consider part."""
+    spread, mask = problem.spread, problem.mask
+    e = problem.rows(x)
+    jacobian = np.empty((e.size, x.size))  # times spread: d(residual)/d(x/spread)
+    for i, s in enumerate(spread):
+        side = np.zeros(x.size)
+        side[i] = 1e-3 * s
+        jacobian[:, i] = (problem.rows(x + side) - problem.rows(x - side)) / 2e-3
+    size, time = problem.size(x)
+    singular = np.linalg.svd(jacobian, compute_uv=False) / (size * np.sqrt(time))
+    free, held = np.flatnonzero(active), np.flatnonzero(~active)
+    covariance = np.diag(np.ones(x.size))
+    scores = np.zeros((mask.shape[0], free.size))
+    np.add.at(scores, np.nonzero(mask)[0], jacobian[:, free] * e[:, None])
+    run = long_run_covariance(scores, problem.rules.correlation)
+    if free.size:
+        J = jacobian[:, free]
+        informed = np.array([problem.unknowns[i].informed for i in free], dtype=float)
+        prior = np.diag(informed * size**2 * time)
+        weak = 1e-6 * size**2 * np.eye(free.size)  # a direction of which nothing is known gets a thousand spreads
+        inverse = np.linalg.inv(J.T @ J + prior + weak)
+        known = prior * size**2 * time + weak * size**2
+        part = inverse @ (size**2 * time * (J.T @ J) + known) @ inverse
+        robust = inverse @ (run.covariance + known) @ inverse
+        wider = np.sqrt(np.maximum(np.diag(robust) / np.diag(part), 1.0))
+        part = part * np.outer(wider, wider)
+        considered = np.array([problem.unknowns[i].considered for i in held])
+        pull = inverse @ J.T @ (jacobian[:, held] * considered)
+        covariance[np.ix_(free, free)] = part + pull @ pull.T
+    covariance *= np.outer(spread, spread)
+    freedom = max(e.size / time - free.size, 2.0)
+    factor = float(student.ppf(0.5 + problem.rules.confidence / 2, freedom))
+    half = factor * np.sqrt(np.diag(covariance))
+    out = np.full(mask.shape, np.nan)
+    out[mask] = e
+    names = [u.name for u in problem.unknowns]
+    return Estimate(
+        unknowns=problem.unknowns,
+        x=x,
+        covariance=covariance,
+        excited={},
+        half={name: float(h) for name, h in zip(names, half, strict=True)},
+        residual=out,
+        samples=e.size,
+        rms=float(np.sqrt(np.mean(e**2))),
+        correlation=time,
+        freedom=freedom,
+        factor=factor,
+        singular_values=tuple(float(v) for v in singular),
+    )
+
+
+def _nothing(problem: _Problem) -> Estimate:
+    """No row is usable: everything is its prior, nothing is excited."""
+    factor = float(student.ppf(0.5 + problem.rules.confidence / 2, 1e6))
+    names = [u.name for u in problem.unknowns]
+    half = {u.name: factor * u.spread for u in problem.unknowns}
+    empty = np.full(problem.mask.shape, np.nan)
+    covariance = np.diag(problem.spread**2)
+    off = dict.fromkeys(names, False)
+    none = (0.0,) * len(names)
+    return Estimate(problem.unknowns, problem.home, covariance, off, half, empty, 0, 0.0, 1.0, 0.0, factor, none)

@@ -1,0 +1,122 @@
+"""The slip equation of every wheel: R_e w - v_xt is the slip velocity that its longitudinal force asks for.
+
+Force and load as in a replay: F_x = (T - I_w dw/dt)/R_e - c_rr F_z, or, without torques, m a_x shared by load. Shared
+forces are right in sum only: then the load-weighted mean of the four equations is used, and each single one only in free
+rolling, |mu| < 0.05, where there is no force to share wrongly. That is also what tells the radii of the axles apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from studies.drives.corner_inputs import GRAVITY, shared_forces, wheel_forces
+from studies.identify.bristle import slip_velocity, tire_unknowns
+from studies.identify.data import DriveSignals
+from studies.identify.prefilter import first_order_lag
+from studies.identify.settings import IdentifySettings
+from studies.identify.unknowns import Unknown
+from synthesis.models.parameter_set import Tire
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+RADII = ("radius_front", "radius_rear")
+
+
+class LongitudinalSlip:
+    """Rows (n, 5): the four corners and their load-weighted mean, m/s.
+
+    Unknowns: the tire, R_e of both axles relative to the drive file, and the lag of load transfer: the quasi-static loads of
+    a replay are too early, which would look like a longer relaxation.
+    """
+
+    direction = "longitudinal"
+
+    def __init__(self, data: DriveSignals, tire: Tire, inertia: float, settings: IdentifySettings) -> None:
+        self.data, self.settings = data, settings
+        self.unknowns: tuple[Unknown, ...] = tire_unknowns(tire, settings)
+        reach = (-0.1, 0.1)
+        self.unknowns += tuple(
+            Unknown(name, 1.0, settings.radius_spread, settings.radius_width, reach) for name in RADII
+        )
+        inputs, load = data.inputs, data.load
+        self.unknowns += (
+            Unknown(
+                "pitch_lag", settings.pitch_lag, settings.pitch_lag, settings.pitch_lag, (0.0, 0.5), positive=False
+            ),
+        )
+        self.along, self.surface = data.along, inputs.surface_speed
+        self.torques_known = data.torque is not None
+        force = wheel_force(data, inertia)
+        self.force = np.where(np.isfinite(force), force, 0.0)
+        self.viscous = tire.sigma2.value * (self.surface - self.along)
+        self.mu = self.force / load - self.viscous
+        car, g = data.drive.vehicle, GRAVITY
+        ends = np.array([car.rear_axle_to_cg, car.front_axle_to_cg]) / (car.front_axle_to_cg + car.rear_axle_to_cg)
+        self._static = np.repeat(ends * car.mass * g / 2, 2)
+        self._least = 0.05 * car.mass * g / 4
+        self.share = load / load.sum(axis=1, keepdims=True)
+        ay = data.ay if data.ay is not None else np.zeros_like(data.vx)
+        self._turning = np.abs(data.filter.smooth(ay)) > settings.cross_force * GRAVITY
+        self._measured = data.filter.smooth(self.surface), data.filter.smooth(self.along)
+
+    def residual(self, p: Mapping[str, float]) -> Array:
+        """F[R_e w - v_xt] minus what the force asks for, m/s."""
+        ratio = np.repeat([p[name] for name in RADII], 2)
+        surface, along = self._measured
+        mu = self._friction(p["pitch_lag"]) / (ratio if self.torques_known else 1.0)
+        asked = slip_velocity(p, mu, np.abs(self.surface) * ratio, self.data.filter, self.data.step)
+        corners = surface * ratio - along - asked
+        return np.concatenate([corners, np.sum(self.share * corners, axis=1, keepdims=True)], axis=1)
+
+    def _friction(self, lag: float) -> Array:
+        """mu (n, 4): transferred load follows acceleration with the lag of the pitching body, s."""
+        if not self.torques_known:
+            return self.mu  # shared by load: mu is a_x/g at every wheel
+        moved = first_order_lag(self.data.load - self._static, self.data.step, lag, self.data.filter.runs)
+        return np.asarray(self.force / np.maximum(self._static + moved, self._least) - self.viscous)
+
+    def slip(self, p: Mapping[str, float]) -> Array:
+        """F[R_e w - v_xt]/F[v_xt] (n, 4) [1]: what the slip limit is compared with."""
+        ratio = np.repeat([p.get(name, 1.0) for name in RADII], 2)
+        surface, along = self._measured
+        size = np.maximum(np.abs(along), self.settings.least_speed)
+        return np.asarray((surface * ratio - along) / size)
+
+    def mask(self, limit: float, p: Mapping[str, float]) -> Mask:
+        """Rows within the slip ``limit`` ever since the filters remember."""
+        beyond = ~(np.abs(self.slip(p)) <= limit) | self.data.bad | self._turning[:, None]
+        good = self.data.filter.settled(beyond)
+        if self.torques_known:
+            return np.concatenate([good, np.zeros((len(good), 1), dtype=bool)], axis=1)
+        all_good = good.all(axis=1, keepdims=True)
+        pushed = np.abs(self.mu).max(axis=1, keepdims=True) >= self.settings.free_rolling
+        rolling = good & self.data.filter.settled(pushed)
+        return np.concatenate([rolling, all_good & ~rolling.any(axis=1, keepdims=True)], axis=1)
+
+    def picture(self) -> tuple[Array, Array]:
+        """Filtered normalised force and rolling speed (n, k), of the corners, or of their mean without torques."""
+        mu, speed = self.data.filter.smooth(self.mu), self.data.filter.smooth(np.abs(self.along))
+        mean = [np.sum(self.share * value, axis=1, keepdims=True) for value in (mu, speed)]
+        return np.concatenate([mu, mean[0]], axis=1), np.concatenate([speed, mean[1]], axis=1)
+
+
+def wheel_force(data: DriveSignals, inertia: float) -> Array:
+    """F_x (n, 4), N; NaN at held wheels. Central differences of w: the prefilter comes after them."""
+    car, inputs = data.drive.vehicle, data.inputs
+    nothing = np.zeros((len(data.vx), 4))
+    if data.torque is None:
+        known = np.zeros(4, dtype=bool)
+        return shared_forces(inputs.ax, data.load, car.mass, nothing, known)
+    return wheel_forces(
+        data.torque,
+        inputs.wheel_speed,
+        np.gradient(inputs.wheel_speed, data.step, axis=0),
+        data.load,
+        inertia,
+        inputs.radius,
+        car.rolling_resistance,
+        data.drive.observer.stopped_below,
+    )

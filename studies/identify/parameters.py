@@ -1,0 +1,138 @@
+"""From fits to named values with unit, interval and source: what the reports and the parameter file are made of."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from studies.identify.identify import Identification, yaw_inertia_prior
+from studies.identify.slip_limit import LimitedFit
+from studies.identify.unknowns import Estimate
+
+
+@dataclass(frozen=True)
+class Identified:
+    """One parameter: ``interval`` is None where the value is not from the log; ``half_width`` what the log allowed, relative."""
+
+    value: float
+    unit: str
+    interval: tuple[float, float] | None
+    excited: bool
+    samples: int
+    source: str
+    half_width: float | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, for a JSON file."""
+        return asdict(self)
+
+
+def tire_parameters(found: Identification, direction: str) -> dict[str, Identified]:
+    """slip_stiffness = sigma0/kappa, kappa, sigma0, sigma1, sigma2 and the saturation of one direction.
+
+    Not excited: the value of the base set, with two dependent ones that follow the identified ones: sigma0 = C*kappa keeps an
+    identified ratio, and sigma1 = T1*sigma0 keeps the damping time of the bristles (a sigma1 made for another sigma0 is
+    another tire: at sigma0/sigma1 = kappa R|w| bristles leave the output, P1 section 11 item 18).
+    """
+    tire = found.base.tire[direction]
+    base = f"{found.base.id}"
+    limited = found.fits.get(direction)
+    if limited is None:
+        why = f"prior: {base}; {found.absent.get(direction, 'not fitted')}"
+        values = {"kappa": tire.kappa, "sigma0": tire.sigma0, "sigma1": tire.sigma1, "sigma2": tire.sigma2}
+        out = {n: Identified(q.value, q.unit, None, False, 0, why) for n, q in values.items()}
+        ratio = tire.sigma0.value / tire.kappa.value
+        return {"slip_stiffness": Identified(ratio, "1", None, False, 0, why), **out}
+    fit, where = limited.fit, _place(found, limited)
+    stiff, relaxed = fit.excited["slip_stiffness"], fit.excited["relaxation_length"]
+    damped = fit.excited["damping_time"] and stiff and relaxed
+    ratio = fit.value("slip_stiffness") if stiff else tire.sigma0.value / tire.kappa.value
+    kappa = 1.0 / fit.value("relaxation_length") if relaxed else tire.kappa.value
+    time = fit.value("damping_time") if damped else tire.sigma1.value / tire.sigma0.value
+    low, high = fit.interval("relaxation_length")
+
+    def entry(value: float, unit: str, interval: tuple[float, float], yes: bool, half: float, prior: str) -> Identified:
+        source = where if yes else f"not excited by {', '.join(found.logs)}; {prior}"
+        return Identified(value, unit, interval if yes else None, yes, fit.samples, source, _finite(half))
+
+    half0 = fit.factor * fit.deviation(slip_stiffness=1.0, relaxation_length=-1.0)
+    if not (stiff and relaxed):
+        half0 = max(fit.half["slip_stiffness"], fit.half["relaxation_length"])
+    sigma0 = ratio * kappa
+    follows = (
+        f"sigma0/kappa = {ratio:.4g} identified, times kappa of {base}" if stiff else f"kappa times ratio of {base}"
+    )
+    half1 = fit.half["damping_time"] / max(fit.value("damping_time"), 1e-12)
+    keeps = f"sigma1/sigma0 = {1e3 * time:.3g} ms of {base}, times sigma0"
+    return {
+        "slip_stiffness": entry(
+            ratio, "1", fit.interval("slip_stiffness"), stiff, fit.half["slip_stiffness"], f"prior: {base}"
+        ),
+        "kappa": entry(kappa, "1/m", (1 / high, 1 / max(low, 1e-9)), relaxed, fit.half["relaxation_length"], f"prior: {base}"),
+        "sigma0": entry(
+            sigma0, "1/m", (sigma0 * np.exp(-half0), sigma0 * np.exp(min(half0, 300.0))), stiff and relaxed, half0,
+            follows if stiff != relaxed else f"prior: {base}",
+        ),
+        "sigma1": entry(time * sigma0, "s/m", _times(fit.interval("damping_time"), sigma0), damped, half1, keeps),
+        "sigma2": Identified(
+            tire.sigma2.value, "s/m", None, False, fit.samples,
+            f"prior: {base}; viscous friction acts like slip stiffness and is not told from it",
+        ),
+        "saturation": Identified(
+            fit.value("saturation") if fit.excited["saturation"] else 0.0, "1",
+            fit.interval("saturation") if fit.excited["saturation"] else None, fit.excited["saturation"], fit.samples,
+            "1/(theta g) of this road" if fit.excited["saturation"] else "not excited; linear within the slip limit",
+        ),
+    }  # fmt: skip
+
+
+def vehicle_parameters(found: Identification) -> dict[str, Identified]:
+    """Effective radius per axle, wheel inertia, yaw inertia: identified, or as the drive file has them."""
+    car, name = found.drive.vehicle, f"drive file '{found.drive.name}'"
+    along = found.fits["longitudinal"]
+    out: dict[str, Identified] = {}
+    for axle, nominal in (("front", car.effective_radius_front), ("rear", car.effective_radius_rear)):
+        out[f"effective_radius_{axle}"] = _scaled(found, along, f"radius_{axle}", nominal, "m", name)
+    prior = name if car.wheel_inertia is not None else found.base.id
+    spin = found.inertia
+    if spin is None:
+        source = f"not excited: no torques; prior: {prior}"
+        out["wheel_inertia"] = Identified(found.wheel_inertia, "kg*m^2", None, False, 0, source)
+    else:
+        out["wheel_inertia"] = _plain(found, spin, "wheel_inertia", found.wheel_inertia, prior)
+    across = found.fits.get("lateral")
+    if across is not None:
+        given = "m L_f L_r" if getattr(car, "yaw_inertia", None) is None else name
+        out["yaw_inertia"] = _plain(found, across.fit, "yaw_inertia", yaw_inertia_prior(found.drive), given)
+    return out
+
+
+def _plain(found: Identification, fit: Estimate, name: str, prior: float, given: str) -> Identified:
+    yes, logs = fit.excited[name], ", ".join(found.logs)
+    source = f"identified from {logs}" if yes else f"not excited by {logs}; prior: {given}"
+    value = fit.value(name) if yes else prior
+    interval = fit.interval(name) if yes else None
+    return Identified(value, "kg*m^2", interval, yes, fit.samples, source, _finite(fit.half[name]))
+
+
+def _scaled(found: Identification, limited: LimitedFit, name: str, nominal: float, unit: str, given: str) -> Identified:
+    fit, yes = limited.fit, limited.fit.excited[name]
+    source = _place(found, limited) if yes else f"not excited by {', '.join(found.logs)}; prior: {given}"
+    value = nominal * fit.value(name) if yes else nominal
+    interval = _times(fit.interval(name), nominal) if yes else None
+    return Identified(value, unit, interval, yes, fit.samples, source, _finite(fit.half[name]))
+
+
+def _place(found: Identification, limited: LimitedFit) -> str:
+    logs = ", ".join(found.logs)
+    return f"identified from {logs}: {limited.model.direction} fit, slip below {limited.limit:g}, {limited.fit.samples} rows"
+
+
+def _times(interval: tuple[float, float], factor: float) -> tuple[float, float]:
+    return interval[0] * factor, interval[1] * factor
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,78 @@
+"""One low-pass for both sides of a differential equation, so that derivatives are taken of filtered signals only.
+
+A linear equation y' + a y = u with constant a holds as well between F[y], F[u] and D[y], with F = 1/(T s + 1)^2 and
+D = s F: the equation is filtered, not changed, and no signal is differentiated raw (state-variable filter; Young 1981).
+Products such as omega*mu are formed before they are filtered.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import bilinear, lfilter, lfilter_zi
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+
+class Prefilter:
+    """F and D with lag T, s, at ``step``, s, by the trapezoidal rule (bilinear transform), over runs of known samples.
+
+    Every run of ``known`` (n,) starts at rest. :meth:`settled` is False until ``settling`` lags after
+    every bad sample, and a third of that after a run began: until then the filters remember what was before.
+    """
+
+    def __init__(self, known: Mask, step: float, lag: float, settling: float) -> None:
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
+        self.runs = [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+        self.known = known
+        self.memory = int(np.ceil(settling * lag / step))
+        self.start = self.memory // 3  # a run starts at rest at its first sample: only its slope is forgotten
+        self.correlation = max(1, int(np.ceil(2 * lag / step)))
+        denominator = [lag**2, 2 * lag, 1.0]
+        self._smooth = bilinear([1.0], denominator, fs=1.0 / step)
+        self._rate = bilinear([1.0, 0.0], denominator, fs=1.0 / step)
+
+    def smooth(self, value: Array) -> Array:
+        """F[value] of (n,) or (n, k); NaN outside the runs."""
+        return self._apply(self._smooth, value)
+
+    def rate(self, value: Array) -> Array:
+        """D[value] = F[d value/dt], per second."""
+        return self._apply(self._rate, value)
+
+    def settled(self, bad: Mask) -> Mask:
+        """Where neither a bad sample (n,) or (n, k) nor the start of a run is remembered."""
+        out = np.zeros(bad.shape, dtype=bool)
+        for run in self.runs:
+            marks = bad[run].copy()
+            count = np.cumsum(marks, axis=0)
+            before = np.zeros_like(count)
+            before[self.memory :] = count[: -self.memory]
+            out[run] = count == before
+            out[run.start : run.start + self.start] = False
+        return out
+
+    def _apply(self, filter_: tuple[Array, Array], value: Array) -> Array:
+        numerator, denominator = filter_
+        out = np.full(value.shape, np.nan)
+        rest = lfilter_zi(numerator, denominator)
+        for run in self.runs:
+            part = value[run]
+            start = rest.reshape(-1, *[1] * (part.ndim - 1)) * part[:1]
+            out[run] = lfilter(numerator, denominator, part, axis=0, zi=start)[0]
+        return out
+
+
+def first_order_lag(value: Array, step: float, lag: float, runs: list[slice]) -> Array:
+    """value/(lag s + 1) of (n, k), exact for linear interpolation between samples; lag 0 returns the value."""
+    if lag < 1e-9:
+        return value
+    a = float(np.exp(-step / lag))
+    b = lag / step * (1 - a)
+    out = np.full(value.shape, np.nan)
+    for run in runs:
+        part = value[run]
+        # y[k] = a y[k-1] + (b - a) x[k-1] + (1 - b) x[k]; at rest before the run
+        out[run] = lfilter([1 - b, b - a], [1.0, -a], part, axis=0, zi=b * part[:1])[0]
+    return out

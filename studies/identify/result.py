@@ -1,0 +1,111 @@
+"""What an identification found as plain data: identification.json, warnings, and the rows of a table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from studies.identify.evaluate import tire_residual
+from studies.identify.identify import Identification
+from studies.identify.parameters import Identified, tire_parameters, vehicle_parameters
+from studies.identify.slip_limit import LimitedFit
+from synthesis.models.parameter_set import Quantity, Tire
+
+SCHEMA = "gainsmith.identification/1"
+HEADER = ("parameter", "value", "95 % interval", "unit", "excited", "rows")
+
+
+def all_parameters(found: Identification) -> dict[str, dict[str, Identified]]:
+    """By group: vehicle, longitudinal, lateral."""
+    groups: dict[str, dict[str, Identified]] = {"vehicle": vehicle_parameters(found)}
+    for direction in ("longitudinal", "lateral"):
+        if direction in found.base.tire:
+            groups[direction] = tire_parameters(found, direction)
+    return groups
+
+
+def identified_tire(found: Identification, direction: str) -> Tire:
+    """The tire that the parameter file holds."""
+    named = tire_parameters(found, direction)
+    named = {name: entry for name, entry in named.items() if name in Tire.model_fields}
+    values = {n: Quantity(value=e.value, unit=e.unit, source=e.source) for n, e in named.items()}
+    return Tire.model_validate(values)
+
+
+def content(found: Identification) -> dict[str, Any]:
+    """The content of identification.json."""
+    return {
+        "schema": SCHEMA,
+        "drive": found.drive.name,
+        "logs": list(found.logs),
+        "base": found.base.id,
+        "velocity_reference": found.velocity_reference,
+        "force_sources": list(found.data.inputs.force_sources),
+        "assumptions": list(found.data.inputs.assumptions),
+        "confidence": found.settings.confidence,
+        "parameters": {
+            group: {name: entry.as_dict() for name, entry in entries.items()}
+            for group, entries in all_parameters(found).items()
+        },
+        "fits": {direction: _fit(limited) for direction, limited in found.fits.items()},
+        "residuals": {direction: _residuals(found, direction) for direction in found.fits},
+        "warnings": warnings(found),
+    }
+
+
+def warnings(found: Identification) -> list[str]:
+    """One sentence for every parameter that the log does not say, and for a direction without a fit."""
+    lines = [f"{direction}: {why}" for direction, why in found.absent.items()]
+    for group, entries in all_parameters(found).items():
+        for name, entry in entries.items():
+            if entry.excited or name in ("sigma2", "saturation") or group in found.absent:
+                continue
+            half = entry.half_width
+            width = "no trace in the log" if half is None or half > 10 else f"half width {100 * half:.0f} %"
+            lines.append(f"{group} {name}: not excited ({width}); {entry.source.split('; ', 1)[-1]}")
+    return lines
+
+
+def rows(found: Identification) -> list[tuple[str, ...]]:
+    """One row a parameter in the columns of ``HEADER``."""
+    out: list[tuple[str, ...]] = []
+    for group, entries in all_parameters(found).items():
+        for name, entry in entries.items():
+            between = "" if entry.interval is None else f"{entry.interval[0]:.4g} .. {entry.interval[1]:.4g}"
+            yes = "yes" if entry.excited else "no"
+            label = name.replace("_", " ") if group == "vehicle" else f"{group} {name.replace('_', ' ')}"
+            out.append((label, f"{entry.value:.4g}", between, entry.unit, yes, str(entry.samples)))
+    return out
+
+
+def _fit(limited: LimitedFit) -> dict[str, Any]:
+    fit = limited.fit
+    return {
+        "slip_limit": limited.limit,
+        "stiffness_by_slip_limit": {f"{limit:g}": value for limit, value in limited.tried.items()},
+        "rows": fit.samples,
+        "residual_rms_mps": fit.rms,
+        "residual_correlation_rows": fit.correlation,
+        "degrees_of_freedom": fit.freedom,
+        "singular_values": list(fit.singular_values),
+        "nuisances": {
+            u.name: u.value(float(x)) for u, x in zip(fit.unknowns, fit.x, strict=True) if u.name.startswith("angle")
+        },
+    }
+
+
+def _residuals(found: Identification, direction: str) -> dict[str, Any]:
+    """Of the tire in the file and of the base set on this very drive, at low slip."""
+    out: dict[str, Any] = {}
+    for name, tire in (("identified", identified_tire(found, direction)), (found.base.id, found.base.tire[direction])):
+        result = tire_residual(found, direction, tire)
+        out[name] = None
+        if result is not None:
+            force = result.force if np.isfinite(result.force) else None
+            out[name] = {
+                "slip_velocity_rms_mps": result.velocity,
+                "normalised_force_rms": force,
+                "rows": result.samples,
+            }
+    return out

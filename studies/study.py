@@ -1,0 +1,83 @@
+"""A study: named parts, each of which computes claims, tables and figures and can be run, stored and resumed alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from studies.claim import Claim
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Cell = str | int | float | bool | None
+
+
+@dataclass(frozen=True)
+class Scope:
+    """How much is computed: ``seeds`` Monte Carlo runs, coarse grids when ``quick``."""
+
+    quick: bool = False
+    seeds: int = 200
+
+
+QUICK = Scope(quick=True, seeds=12)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with a caption that stands on its own; units belong into the column names: ``speed [m/s]``."""
+
+    name: str
+    caption: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Cell]]
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure with the caption that stands on its own; the runner writes it as SVG and PNG.
+
+    ``alternative`` is the text for readers who cannot see it.
+    """
+
+    name: str
+    caption: str
+    alternative: str
+    figure: Figure
+
+
+@dataclass(frozen=True)
+class PartResult:
+    """What one part found; ``notes`` are paragraphs of the report, ``measures`` single numbers for machines."""
+
+    claims: Sequence[Claim] = ()
+    tables: Sequence[Table] = ()
+    drawings: Sequence[Drawing] = ()
+    notes: Sequence[str] = ()
+    measures: dict[str, float] = field(default_factory=dict)
+
+
+PartFunction = Callable[[Scope], PartResult]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A named piece of a study; ``cost`` in rough seconds of one core lets the runner start the longest first."""
+
+    name: str
+    title: str
+    run: PartFunction
+    cost: float = 1.0
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study as users select it by ``id``; ``paper`` is P1..P5, or empty for studies beyond the papers."""
+
+    id: str
+    title: str
+    paper: str
+    summary: str
+    parts: tuple[Part, ...]
