@@ -5,7 +5,7 @@ With R = gamma^2 I - D'D > 0, gamma is a singular value of G(j omega) if and onl
     H(gamma) = [[A + B R^-1 D'C,            gamma B R^-1 B'       ],
                 [-C'(I + D R^-1 D')C/gamma,  -(A + B R^-1 D'C)'   ]]
 
-(Boyd, Balakrishnan, Kabamba 1989, Theorem 2; the factors gamma are a similarity that balances the blocks). A discrete
+(Boyd, Balakrishnan, Kabamba 1989; the factors gamma are a similarity that balances the blocks). A discrete
 system is mapped to a continuous one of the same norm by z = (1 + s)/(1 - s), which needs no inverse of A: a singular A
 (a pole at the origin) is as good as any other.
 """

@@ -9,7 +9,7 @@ x+ = A x + w, y = C x + v, measurements arriving independently with probability 
 
 * Kalman filter: is E P(k) bounded, with the gain that follows every realisation of the arrivals? Its critical rate lies between
   1 - 1/max|lambda|^2 and lambda-bar, and equals the lower bound where unstable eigenvalues of one modulus are told apart by one
-  measurement (non-degenerate systems, Mo and Sinopoli 2012, Theorem 2).
+  measurement (non-degenerate systems, Mo and Sinopoli 2012).
 
 Beside the LMI stands its nonlinear Perron problem, Phi_a(X) = min over K of (1-a) A X A' + a (A - K C) X (A - K C)'. A matrix
 X >= 0, X != 0 with Phi_a(X) >= X shows that no gain whatever is stable at a: a refutation without a solver.

@@ -1,6 +1,6 @@
 r"""H-infinity norm with its peak frequency, and stability margin, of stacks of systems.
 
-The whole batch is treated at once by the two-step method (Boyd, Balakrishnan 1990; Bruinsma, Steinbuch 1990): a lower
+The whole batch is treated at once by the two-step method (Bruinsma, Steinbuch 1990): a lower
 bound gamma is raised to the largest gain found between the frequencies at which the level (1 + tolerance) gamma is
 crossed; these are imaginary eigenvalues of a Hamiltonian matrix, so no peak can hide between the points of a grid.
 Convergence is quadratic: three or four rounds, and only systems that are not finished take part in the next one.
