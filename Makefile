@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: schedules test lint bench clean
+.PHONY: schedules test lint bench studies sweep clean
 
 schedules: $(STAMP)
 	$(BIN)/gainsmith schedules --out estimators/schedules
@@ -17,7 +17,18 @@ lint: $(STAMP)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+studies: $(STAMP)
+	$(BIN)/gainsmith study --all --out out/studies
+
+sweep: $(STAMP)
+	rm -rf out/sweep/check
+	for name in tire-vehicle gain-box drop-tolerance; do \
+	  $(BIN)/gainsmith sweep $$name --quick --out out/sweep/check/$$name \
+	    --baseline studies/sweeps/baselines/$$name.quick.toml || exit 1; \
+	done
+
 bench: $(STAMP)
+	$(BIN)/python -m pip install -qq --editable '.[bench]'
 	$(BIN)/pytest tests/bench --benchmark-only --benchmark-columns=min,median,max,rounds
 
 $(STAMP): pyproject.toml

@@ -25,7 +25,16 @@ class Flag(IntFlag):
     MISSING_PARAMETER = 8  # not finite: held at the last finite one
     PARAMETER_OUT_OF_RANGE = 16  # outside the certified range: clipped to it
     RATE_OUT_OF_RANGE = 32  # faster than the certified rates: used, without the guarantee
-    RESET = 64  # the state was set anew: by `reset`, or because it had left the representable range
+    RESET = 64  # the state was set anew: by `reset`, because it was lost, or had left the representable range
+    WHEEL_STOPPED = 128  # a wheel does not turn though the car moves: locked, or its sensor is dead
+    HIGH_SLIP = 256  # a wheel's surface leaves the car: not used
+    GATED = 512  # further from the estimate than its model explains: not used
+    STANDING = 1024  # standstill was recognised: speeds and yaw rate are zero
+    NOT_EXCITED = 2048  # nothing excites a parameter (no steering, no side force): it is not observable, and keeps
+
+
+DRIVING = Flag.STANDING | Flag.NOT_EXCITED
+"""What the car does, not what is wrong with a signal: most of a drive carries one of these."""
 
 
 def raise_flag(flags: FlagArray, where: npt.NDArray[Any], flag: Flag) -> None:

@@ -54,6 +54,31 @@ def parser() -> argparse.ArgumentParser:
         )
         reader.add_argument("--out", required=True, type=Path, metavar="DIR", help=f"where {text} go")
 
+    study = command("study", "recompute the papers and the studies beyond them", "study.run_study")
+    study.add_argument("studies", nargs="*", metavar="ID", help="studies to run (see gainsmith list)")
+    study.add_argument("--all", action="store_true", dest="every", help="every study")
+    study.add_argument("--quick", action="store_true", help="few seeds and coarse grids")
+    study.add_argument("--seeds", type=int, metavar="N", help="Monte Carlo runs (default 200, quick 12)")
+    study.add_argument("--workers", type=int, metavar="N", help="processes (default: all cores)")
+    study.add_argument(
+        "--out", type=Path, metavar="DIR", help="where results and report.html go (default: out/studies)"
+    )
+
+    sweep = command("sweep", "margins under parameter changes, against a committed baseline", "sweep.run_sweep")
+    sweep.add_argument("spec", metavar="SPEC", help="shipped name or .toml file")
+    place = sweep.add_mutually_exclusive_group()
+    place.add_argument("--workers", type=int, metavar="N", help="processes (default: all cores)")
+    place.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler, tcp://host:port")
+    sweep.add_argument("--quick", action="store_true", help="the quick form of the specification")
+    sweep.add_argument("--resume", action="store_true", help="go on with an interrupted sweep in DIR")
+    sweep.add_argument(
+        "--out", type=Path, metavar="DIR", help="where chunks, summary and pictures go (default: out/sweep)"
+    )
+    sweep.add_argument("--baseline", type=Path, metavar="FILE", help="fail when a figure shrank beyond its tolerance")
+    sweep.add_argument("--update-baseline", action="store_true", help="write the baseline instead of comparing")
+    sweep.add_argument("--junit", type=Path, metavar="FILE", help="the gate as JUnit XML")
+    sweep.add_argument("--summary", type=Path, metavar="FILE", help="the gate as Markdown")
+
     command("list", "shipped specifications, parameter sets, models and schedules", "listing.run_list")
     return top
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from difflib import get_close_matches
-from importlib import import_module
+from importlib import import_module, resources
 
 from studies.study import Study
 from synthesis.errors import SpecError
@@ -21,12 +23,40 @@ MODULES = {
 }
 
 
+@dataclass(frozen=True)
+class Registry:
+    """Studies by id, each the name of a module with ``STUDY``, or ``module:NAME``."""
+
+    modules: Mapping[str, str]
+
+    def check(self, study_id: str) -> None:
+        """Raises SpecError that offers the nearest names when there is no study ``study_id``."""
+        if study_id not in self.modules:
+            near = get_close_matches(study_id, self.modules, n=3) or list(self.modules)
+            raise SpecError(f"study '{study_id}' does not exist; there are: {', '.join(near)}")
+
+    def load(self, study_id: str) -> Study:
+        """The study named ``study_id``. Raises SpecError for an unknown one."""
+        self.check(study_id)
+        module, _, name = self.modules[study_id].partition(":")
+        study = getattr(import_module(module), name or "STUDY")
+        if not isinstance(study, Study):
+            raise SpecError(f"module {module}: {name or 'STUDY'} is no Study")
+        return study
+
+    def claim_ids(self, study_id: str) -> tuple[str, ...]:
+        """Ids of the claims in the ``claims.toml`` beside the study's module; none where there is no such file."""
+        from studies.papers.claims_file import published_claims
+
+        package = self.modules[study_id].partition(":")[0].rpartition(".")[0]
+        if not (resources.files(package) / "claims.toml").is_file():
+            return ()
+        return tuple(published_claims(package))
+
+
+SHIPPED = Registry(MODULES)
+
+
 def load_study(study_id: str) -> Study:
-    """The study named ``study_id``. Raises SpecError that offers the nearest names."""
-    if study_id not in MODULES:
-        near = get_close_matches(study_id, MODULES, n=3) or list(MODULES)
-        raise SpecError(f"study '{study_id}' does not exist; there are: {', '.join(near)}")
-    study = import_module(MODULES[study_id]).STUDY
-    if not isinstance(study, Study):
-        raise SpecError(f"module {MODULES[study_id]}: STUDY is no Study")
-    return study
+    """The shipped study named ``study_id``. Raises SpecError that offers the nearest names."""
+    return SHIPPED.load(study_id)

@@ -35,3 +35,7 @@ class SigmaWeights(NamedTuple):
         eta = spread**2 * size - size
         centre = eta / (size + eta)
         return cls(math.sqrt(size + eta), centre, centre + 1 - spread**2 + beta)
+
+    def centre_weight(self, single: int) -> float:
+        """W0c where `single` columns have no even part of their own: theirs is c_0, of weight 1/tau^2 each."""
+        return self.centre_spread + single / self.tau**2

@@ -12,8 +12,21 @@ from estimators.errors import EstimatorError
 from estimators.faults import BoolArray
 from estimators.filters.chi_square import chi_square_quantile
 from estimators.interpolate import FloatArray
+from estimators.signals.checks import LIMIT
+from estimators.signals.checks import quiet as all_bounded  # `quiet` is the decorator here
 
-LIMIT = 1e100  # a magnitude beyond it counts as not finite: no physical quantity, and products would overflow
+__all__ = [
+    "LIMIT",
+    "FilterStep",
+    "all_bounded",
+    "bounded",
+    "broadcast",
+    "diagonal",
+    "fits",
+    "gate_threshold",
+    "numbers",
+]
+__all__ += ["quiet", "refused"]
 
 
 class FilterStep(NamedTuple):
@@ -102,10 +115,3 @@ def refused(
         gated &= ~missing
         return gated, missing | gated
     return gated, gated if gated.any() else None
-
-
-def all_bounded(array: FloatArray) -> bool:
-    """Whether every entry is finite and of a representable size; comparisons with NaN are false."""
-    if not array.size:
-        return True
-    return bool(np.minimum.reduce(array, None) >= -LIMIT and np.maximum.reduce(array, None) <= LIMIT)

@@ -64,9 +64,10 @@ def right_divide(rows: FloatArray, lower: FloatArray, triangular: bool = False) 
     return rows
 
 
-def left_divide(lower: FloatArray, rows: FloatArray) -> FloatArray:
-    """X (n, k, b) with L X = rows, by forward substitution."""
-    out = rows.copy()
+def left_divide(lower: FloatArray, rows: FloatArray, out: FloatArray | None = None) -> FloatArray:
+    """X (n, k, b) with L X = rows, by forward substitution; `out` may hold the memory for it."""
+    out = np.empty(rows.shape) if out is None else out
+    out[:] = rows
     for k in range(lower.shape[0]):
         if k:
             out[k] -= np.einsum("jb,jkb->kb", lower[k, :k], out[:k])
@@ -74,13 +75,17 @@ def left_divide(lower: FloatArray, rows: FloatArray) -> FloatArray:
     return np.asarray(out, dtype=np.float64)
 
 
-def summed_factor(matrix: FloatArray, base: FloatArray, columns: FloatArray) -> FloatArray:
+def summed_factor(
+    matrix: FloatArray, base: FloatArray, columns: FloatArray, out: FloatArray | None = None
+) -> FloatArray:
     """L (n, n, b) with L L' = matrix + columns columns', matrix = base base'; `columns` (n, k, b) is overwritten.
+
+    `out` may hold the memory for it: what is above the diagonal stays there.
 
     A Cholesky factor of the sum costs a third of the orthogonal triangularisation and has its accuracy as long as no
     pivot is small against its diagonal entry; where one is, `lower_factor` does it.
     """
-    lower, safest = _cholesky(matrix, columns, _SAFE)
+    lower, safest = _cholesky(matrix, columns, _SAFE, out)
     return lower if safest > _SAFE else lower_factor(base, columns)
 
 
@@ -96,17 +101,20 @@ def cholesky(matrix: FloatArray, what: str) -> FloatArray:
     return lower
 
 
-def _cholesky(matrix: FloatArray, columns: FloatArray | None, least: float) -> tuple[FloatArray, float]:
+def _cholesky(
+    matrix: FloatArray, columns: FloatArray | None, least: float, out: FloatArray | None = None
+) -> tuple[FloatArray, float]:
     """L L' = matrix + columns columns', and the smallest pivot relative to its diagonal entry, -1 where that is not
     above `least`."""
     n = matrix.shape[0]
-    lower = np.zeros((n, n, matrix.shape[2] if columns is None else columns.shape[2]))
+    lower = np.zeros((n, n, matrix.shape[2] if columns is None else columns.shape[2])) if out is None else out
     safest = np.inf
     for k in range(n):
         column = lower[k:, k]
-        column += matrix[k:, k]
-        if columns is not None:
-            column += np.einsum("rjb,jb->rb", columns[k:], columns[k])
+        if columns is None:
+            column[:] = matrix[k:, k]
+        else:
+            np.add(np.einsum("rjb,jb->rb", columns[k:], columns[k]), matrix[k:, k], column)
         if k:
             diagonal = column[0].copy()
             column -= np.einsum("rjb,jb->rb", lower[k:, :k], lower[k, :k])

@@ -38,6 +38,11 @@ class UnscentedKalmanFilter(GaussianFilter):
     Drawing anew makes the filter equal the Kalman filter on a linear model; the listing of the source reuses the
     propagated points for y and so leaves Q out of Pyy.
 
+    A function that is affine in its last states, from index k on with those before them held, has no even part along
+    the columns k, k+1, ... of a lower triangular factor, for these move the last states alone: `affine_from=k` takes
+    one point a column there, x + S_i (k = 0: the function is affine), and the function gets 1 + n + k of them. The
+    result is the same; whether the function is affine is not checked.
+
     Source: weights of the corner estimation paper (P1 section 3, with W_i = 1/(2 (N + eta))); Van der Merwe, Wan (2001)
     for the square-root form; Kaminski, Bryson, Schmidt (1971) for square-root measurement updates.
 
@@ -70,28 +75,37 @@ class UnscentedKalmanFilter(GaussianFilter):
         return self._points.arrays()[0].copy().reshape(*self.batch_shape, self.size)
 
     @quiet
-    def predict(self, transition: StateFunction, Q: npt.ArrayLike) -> BoolArray:
+    def predict(self, transition: StateFunction, Q: npt.ArrayLike, affine_from: int | None = None) -> BoolArray:
         """xhat = sum W f(X_i), P = sum W (f(X_i) - xhat)(.)' + Q; Q (..., n, n) positive semidefinite.
+
+        `affine_from`: the first state in which f is affine, see the class; None: in none.
 
         Returns a mask (...) of the entries that stayed as they were because the prediction was not finite.
 
         Raises:
-            EstimatorError: shapes that do not fit, Q not positive semidefinite.
+            EstimatorError: shapes that do not fit, Q not positive semidefinite, no such state.
         """
         noise = numbers(Q, "Q")
         if not self._process.holds(noise):
             self._process = self._factored(noise, self.size, "Q", definite=False)
-        moved = self._through(transition, self.size, "transition")
+        moved = self._through(transition, self.size, "transition", affine_from)
         return self._points.absorb(moved, self._process.each, self._process.factor).reshape(self.batch_shape)
 
     @quiet
     def correct(
-        self, y: npt.ArrayLike, measurement: StateFunction, R: npt.ArrayLike, gate: float | None = None
+        self,
+        y: npt.ArrayLike,
+        measurement: StateFunction,
+        R: npt.ArrayLike,
+        gate: float | None = None,
+        affine_from: int | None = None,
     ) -> FilterStep:
         """Corrects with y = h(x) + v, y (..., m), R (..., m, m); missing channels and gate as `KalmanFilter`.
 
+        `affine_from`: the first state in which h is affine, as for `predict`.
+
         Raises:
-            EstimatorError: shapes that do not fit, a gate outside (0, 1), R not positive definite.
+            EstimatorError: shapes that do not fit, a gate outside (0, 1), R not positive definite, no such state.
         """
         noise = numbers(R, "R")
         m = noise.shape[-1] if noise.ndim else 0
@@ -99,7 +113,7 @@ class UnscentedKalmanFilter(GaussianFilter):
             self._sensor = self._factored(noise, m, "R", definite=True)
         shape = self.batch_shape
         measured = broadcast(y, (*shape, m), "y").reshape(self._count, m)
-        seen = self._through(measurement, m, "measurement")
+        seen = self._through(measurement, m, "measurement", affine_from)
         innovation, total, gain, used, gated = self._points.correct(
             seen, measured, self._sensor.each, self._sensor.factor, gate_threshold(gate)
         )
@@ -112,12 +126,16 @@ class UnscentedKalmanFilter(GaussianFilter):
             gated.reshape(*shape, m),
         )
 
-    def _through(self, function: StateFunction, rows: int, what: str) -> FloatArray:
-        """The sigma points through f or h, shape (2n+1, b, rows)."""
-        points, n, shape = self._points.points(), self.size, self.batch_shape
-        found = function(points.reshape(2 * n + 1, *shape, n))
-        found = broadcast(found, (2 * n + 1, *shape, rows), what)
-        return found.reshape(2 * n + 1, self._count, rows)
+    def _through(self, function: StateFunction, rows: int, what: str, affine_from: int | None) -> FloatArray:
+        """The sigma points through f or h, shape (1+n+k, b, rows)."""
+        n, shape = self.size, self.batch_shape
+        k = n if affine_from is None else affine_from
+        if not 0 <= k <= n:
+            raise EstimatorError(f"affine_from = {affine_from!r} must be the index of a state, 0 to {n - 1}, or None")
+        count = 1 + n + k
+        found = function(self._points.points(k).reshape(count, *shape, n))
+        found = broadcast(found, (count, *shape, rows), what)
+        return found.reshape(count, self._count, rows)
 
     def _factored(self, noise: FloatArray, rows: int, what: str, definite: bool) -> _Remembered:
         """Factor of a noise covariance; one that stays the same is factored once."""

@@ -15,7 +15,7 @@ Corrected = tuple[FloatArray, FloatArray, FloatArray, BoolArray, BoolArray]
 
 
 class FewPoints:
-    """Mean (b, n) and upper factor U (b, n, n) of P = U'U; values of functions are (2n+1, b, r)."""
+    """Mean (b, n) and upper factor U (b, n, n) of P = U'U; values of functions are (1+n+k, b, r), see `points`."""
 
     def __init__(self, weights: SigmaWeights, count: int, size: int) -> None:
         self.weights, self.size = weights, size
@@ -26,13 +26,14 @@ class FewPoints:
         """(b, r, r) from a noise covariance or its factor, of one size for all (r, r) or (b, r, r)."""
         return np.array(np.broadcast_to(matrix, (len(self.mean), *matrix.shape[-2:])))
 
-    def points(self) -> FloatArray:
-        """(2n+1, b, n)."""
-        n = self.size
-        out = np.empty((2 * n + 1, *self.mean.shape))
-        offset = (self.weights.tau * self.upper).swapaxes(0, 1)
+    def points(self, pairs: int) -> FloatArray:
+        """(1+n+k, b, n): x, x + tau S_i and x - tau S_i for the first k columns (`pairs`), x + S_i for the others."""
+        n, columns = self.size, self.upper.swapaxes(0, 1)
+        out = np.empty((1 + n + pairs, *self.mean.shape))
+        offset = self.weights.tau * columns[:pairs]
         out[0] = self.mean
-        np.add(self.mean, offset, out[1 : n + 1])
+        np.add(self.mean, offset, out[1 : 1 + pairs])
+        np.add(self.mean, columns[pairs:], out[1 + pairs : 1 + n])
         np.subtract(self.mean, offset, out[n + 1 :])
         return out
 
@@ -41,17 +42,18 @@ class FewPoints:
 
         The noise covariance, as `prepared`, comes with its lower factor, which is all that is needed here.
         """
-        mean, odd, even = _parts(self.weights, values)
+        mean, odd, even = _parts(self.weights, values, self.size)
+        weight = self.weights.centre_weight(2 * self.size + 1 - len(values))
         centre = even[:, -1].copy()
-        even[:, -1] *= np.sqrt(max(self.weights.centre_spread, 0.0))
+        even[:, -1] *= np.sqrt(max(weight, 0.0))
         stack = np.concatenate((odd, even, root.swapaxes(1, 2)), axis=1)
         if all_bounded(stack) and all_bounded(mean):
-            self.mean, self.upper = mean, self._less(upper_factor(stack), centre)
+            self.mean, self.upper = mean, _less(upper_factor(stack), centre, weight)
             return np.zeros(len(mean), dtype=np.bool_)
         good = bounded(stack, 1, 2) & bounded(mean, 1)
         stack[~good] = 1.0
         centre[~good] = 0.0
-        upper = self._less(upper_factor(stack), centre)
+        upper = _less(upper_factor(stack), centre, weight)
         self.mean = np.where(good[:, None], mean, self.mean)
         self.upper = np.where(good[:, None, None], upper, self.upper)
         return np.logical_not(good)
@@ -64,21 +66,22 @@ class FewPoints:
         QR of [[L_R', 0], [even, 0], [odd, U]] = [[L_yy', Kbar'], [0, U+]], K = Kbar L_yy^-1.
         """
         n, m = self.size, values.shape[2]
-        expected, odd, even = _parts(self.weights, values)
+        expected, odd, even = _parts(self.weights, values, n)
         innovation = measured - expected
         missing: BoolArray | None = None
         if not (all_bounded(innovation) and all_bounded(odd) and all_bounded(even)):
             bad = ~(bounded(odd, 1) & bounded(even, 1))
             missing = bad | ~bounded(innovation)
             odd, even = (np.where(bad[:, None], 0.0, part) for part in (odd, even))
-        wide, even = self._widened(noise, even)
+        weight = self.weights.centre_weight(2 * n + 1 - len(values))
+        wide, even = _widened(noise, even, weight)
         total = odd.swapaxes(1, 2) @ odd + wide
         gated, out = refused(innovation, diagonal(total), missing, threshold)
         clean = innovation
         if out is not None:
             wide = np.where(out[:, :, None] | out[:, None], np.eye(m), wide)
             odd, clean = np.where(out[:, None], 0.0, odd), np.where(out, 0.0, innovation)
-        if out is not None or self.weights.centre_spread < 0:
+        if out is not None or weight < 0:
             root, even = np.asarray(np.linalg.cholesky(wide), dtype=np.float64), even[:, :0]
         split = m + even.shape[1]
         array = np.zeros((len(clean), split + n, m + n))
@@ -106,42 +109,45 @@ class FewPoints:
         self.upper = np.array(self.upper)
         return self.mean, self.upper.swapaxes(1, 2)
 
-    def _widened(self, noise: FloatArray, even: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """R_e (b, m, m) and the weighted even rows that it contains."""
-        weight = self.weights.centre_spread
-        if weight >= 0:
-            even[:, -1] *= np.sqrt(weight)
-            return noise + even.swapaxes(1, 2) @ even, even
-        centre, even = even[:, -1], even[:, :-1]
-        wide = noise + even.swapaxes(1, 2) @ even
-        share = -weight * (centre * np.linalg.solve(wide, centre[..., None])[..., 0]).sum(axis=1)
-        taken = weight * np.minimum(1.0, MOST / np.maximum(share, 1e-300))
-        return wide + taken[:, None, None] * centre[:, :, None] * centre[:, None], even
 
-    def _less(self, upper: FloatArray, centre: FloatArray) -> FloatArray:
-        """Factor of U'U - |W0c| c c' where W0c is negative; see `sigma.MOST`."""
-        if self.weights.centre_spread >= 0:
-            return upper
-        column = np.sqrt(-self.weights.centre_spread) * centre[..., None]
-        try:
-            v = np.linalg.solve(upper.swapaxes(1, 2), column)
-        except np.linalg.LinAlgError as error:
-            raise EstimatorError("the predicted covariance is singular; give Q a variance above zero") from error
-        size = (v * v).sum(axis=1, keepdims=True)
-        allowed = np.minimum(size, MOST)
-        v *= np.sqrt(allowed / np.maximum(size, 1e-300))
-        g = 1.0 / (1.0 + np.sqrt(1.0 - allowed))
-        return upper_factor(upper - g * v @ (v.swapaxes(1, 2) @ upper))
+def _widened(noise: FloatArray, even: FloatArray, weight: float) -> tuple[FloatArray, FloatArray]:
+    """R_e (b, m, m) and the weighted even rows that it contains; `weight` of the last one."""
+    if weight >= 0:
+        even[:, -1] *= np.sqrt(weight)
+        return noise + even.swapaxes(1, 2) @ even, even
+    centre, even = even[:, -1], even[:, :-1]
+    wide = noise + even.swapaxes(1, 2) @ even
+    share = -weight * (centre * np.linalg.solve(wide, centre[..., None])[..., 0]).sum(axis=1)
+    taken = weight * np.minimum(1.0, MOST / np.maximum(share, 1e-300))
+    return wide + taken[:, None, None] * centre[:, :, None] * centre[:, None], even
 
 
-def _parts(weights: SigmaWeights, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Mean (b, r), odd rows b_i / tau (b, n, r), even rows [a_i / tau, c_0] (b, n+1, r) of values (2n+1, b, r)."""
-    n = len(values) // 2
+def _less(upper: FloatArray, centre: FloatArray, weight: float) -> FloatArray:
+    """Factor of U'U - |W0c| c c' where the weight W0c is negative; see `sigma.MOST`."""
+    if weight >= 0:
+        return upper
+    column = np.sqrt(-weight) * centre[..., None]
+    try:
+        v = np.linalg.solve(upper.swapaxes(1, 2), column)
+    except np.linalg.LinAlgError as error:
+        raise EstimatorError("the predicted covariance is singular; give Q a variance above zero") from error
+    size = (v * v).sum(axis=1, keepdims=True)
+    allowed = np.minimum(size, MOST)
+    v *= np.sqrt(allowed / np.maximum(size, 1e-300))
+    g = 1.0 / (1.0 + np.sqrt(1.0 - allowed))
+    return upper_factor(upper - g * v @ (v.swapaxes(1, 2) @ upper))
+
+
+def _parts(weights: SigmaWeights, values: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Mean (b, r), odd rows b_i / tau (b, n, r), even rows [a_i / tau, c_0] (b, k+1, r) of values (1+n+k, b, r)."""
+    k = len(values) - 1 - n
     centre, plus, minus = values[0], values[1 : n + 1], values[n + 1 :]
-    odd = (plus - minus) * (0.5 / weights.tau)
-    pairs = (plus + minus) * 0.5 - centre  # differences from the centre: nothing cancels on a linear function
+    odd = np.empty((values.shape[1], n, values.shape[2]))
+    odd[:, :k] = ((plus[:k] - minus) * (0.5 / weights.tau)).swapaxes(0, 1)
+    odd[:, k:] = (plus[k:] - centre).swapaxes(0, 1)
+    pairs = (plus[:k] + minus) * 0.5 - centre  # differences from the centre: nothing cancels on a linear function
     shift = np.add.reduce(pairs, 0) / weights.tau**2
-    even = np.empty((values.shape[1], n + 1, values.shape[2]))
-    even[:, :n] = ((pairs - shift) / weights.tau).swapaxes(0, 1)
-    even[:, n] = -shift
-    return centre + shift, odd.swapaxes(0, 1), even
+    even = np.empty((values.shape[1], k + 1, values.shape[2]))
+    even[:, :k] = ((pairs - shift) / weights.tau).swapaxes(0, 1)
+    even[:, k] = -shift
+    return centre + shift, odd, even

@@ -9,20 +9,28 @@ from estimators.filters.sigma import MOST, SigmaWeights
 from estimators.filters.step import all_bounded, bounded, refused
 from estimators.filters.triangular import cholesky, left_divide, lower_factor, right_divide, summed_factor
 from estimators.filters.unscented_few import Corrected
+from estimators.filters.workspace import Workspace
 from estimators.interpolate import FloatArray
 
 
 class ManyPoints:
-    """Mean (n, b) and lower factor S (n, n, b) of P = S S'; values of functions are (2n+1, b, r)."""
+    """Mean (n, b) and lower factor S (n, n, b) of P = S S'; values of functions are (1+n+k, b, r), see `points`.
+
+    S is kept in the first rows of a block that has room for what the correction appends to it. Sigma points, columns and
+    the inner factor take the same memory one after the other: what does not fit in the cache costs more than arithmetic.
+    """
 
     def __init__(self, weights: SigmaWeights, count: int, size: int) -> None:
         self.weights, self.size = weights, size
         self.mean = np.zeros((size, count))
-        self.lower = np.zeros((size, size, count))
-        self._sigma = np.empty((size, 2 * size + 1, count))  # scratch that stays in the cache
-        self._columns = np.empty((size, 2 * size + 1, count))
-        self.identity = np.zeros((size, size, count))
-        self.identity[np.arange(size), np.arange(size)] = 1.0
+        self._block = np.zeros((size, size, count))
+        self._memory = Workspace()
+        self.identity = np.eye(size)[:, :, None]
+
+    @property
+    def lower(self) -> FloatArray:
+        """S (n, n, b), zero above the diagonal: a view."""
+        return self._block[: self.size]
 
     def prepared(self, matrix: FloatArray) -> FloatArray:
         """(r, r, 1) or (r, r, b) from a noise covariance or its factor, of one size for all (r, r) or (b, r, r)."""
@@ -30,14 +38,19 @@ class ManyPoints:
             return matrix[:, :, None].copy()
         return np.ascontiguousarray(matrix.transpose(1, 2, 0))
 
-    def points(self) -> FloatArray:
-        """(2n+1, b, n), a view of component-first scratch memory: good until the next call."""
-        n, out = self.size, self._sigma
-        offset = self.weights.tau * self.lower
-        mean = self.mean[:, None]
+    def points(self, pairs: int) -> FloatArray:
+        """(1+n+k, b, n): x, x + tau S_i and x - tau S_i for the first k columns (`pairs`), x + S_i for the others.
+
+        A view of component-first scratch memory: good until the next call.
+        """
+        n, tau = self.size, self.weights.tau
+        out = self._memory("points", (n, 1 + n + pairs, self.mean.shape[1]))
+        mean, ahead, lower = self.mean[:, None], out[:, 1 : n + 1], self.lower
+        np.multiply(lower[:, :pairs], tau, ahead[:, :pairs])
+        np.subtract(mean, ahead[:, :pairs], out[:, n + 1 :])
+        np.add(mean, ahead[:, :pairs], ahead[:, :pairs])
+        np.add(mean, lower[:, pairs:], ahead[:, pairs:])
         out[:, 0] = self.mean
-        np.add(mean, offset, out[:, 1 : n + 1])
-        np.subtract(mean, offset, out[:, n + 1 :])
         return out.transpose(1, 2, 0)
 
     def absorb(self, values: FloatArray, noise: FloatArray, root: FloatArray) -> BoolArray:
@@ -45,21 +58,23 @@ class ManyPoints:
 
         The noise covariance, as `prepared`, comes with its lower factor.
         """
-        n, weight = self.size, self.weights.centre_spread
-        mean, columns = _parts(self.weights, values, self._columns)
-        columns *= 0.5 / self.weights.tau
-        columns[:, 2 * n] *= np.sqrt(abs(weight))
+        mean, columns, weight = self._parts(values)
+        if weight != 0:
+            columns[:, -1] *= np.sqrt(abs(weight))
         bad = None if all_bounded(mean) and all_bounded(columns) else ~(bounded(mean, 0) & bounded(columns, 0, 1))
         if bad is not None:
             columns[:, :, bad] = 0.0
-        lower = summed_factor(noise, root, columns[:, : 2 * n + (weight >= 0)])
+        own = self.lower if bad is None else self.lower.copy()
+        lower = summed_factor(noise, root, columns[:, :-1] if weight < 0 else columns, own)
         if weight < 0:
-            lower = _downdated(lower, columns[:, 2 * n])
-        if bad is None:
-            self.mean, self.lower = mean, lower
-            return np.zeros(mean.shape[1], dtype=np.bool_)
-        self.mean, self.lower = np.where(bad, self.mean, mean), np.where(bad, self.lower, lower)
-        return bad
+            lower = _downdated(lower, columns[:, -1])
+        if bad is not None:
+            self.mean, lower = np.where(bad, self.mean, mean), np.where(bad, self.lower, lower)
+        else:
+            self.mean = mean
+        if lower is not own or bad is not None:
+            self.lower[:] = lower
+        return np.zeros(mean.shape[1], dtype=np.bool_) if bad is None else bad
 
     def correct(
         self, values: FloatArray, measured: FloatArray, noise: FloatArray, root: FloatArray, threshold: float | None
@@ -69,23 +84,25 @@ class ManyPoints:
         Z = L_e^-1 G' with L_e L_e' = R_e; M'M = I + Z'Z with M lower triangular; S+ = S M^-1, K = S+ (Z M^-1)' L_e^-1.
         """
         n, m = self.size, values.shape[2]
-        expected, columns = _parts(self.weights, values, np.empty((m, 2 * n + 1, len(measured))))
-        columns *= 0.5 / self.weights.tau
+        expected, columns, weight = self._parts(values)
         innovation = measured.T - expected
         missing: BoolArray | None = None
         if not (all_bounded(innovation) and all_bounded(columns)):
             bad = ~bounded(columns, 1)
             missing = bad | ~bounded(innovation)
             columns = np.where(bad[:, None], 0.0, columns)
-        odd = columns[:, :n]
-        wide = self._widened(noise, columns[:, n:])
+        odd, wide, factor = columns[:, :n], noise, root
+        if weight != 0:
+            wide = _widened(noise, columns[:, n:-1], columns[:, -1], weight)
         total = np.einsum("ikb,jkb->ijb", odd, odd) + wide
         gated, out = refused(innovation, np.einsum("iib->ib", total), missing, threshold)
         clean = innovation
         if out is not None:
             wide = np.where(out[:, None] | out, np.eye(m)[:, :, None], wide)
             odd, clean = np.where(out[:, None], 0.0, odd), np.where(out, 0.0, innovation)
-        gain = self._contract(odd, cholesky(wide, "R"))
+        if wide is not noise:
+            factor = cholesky(wide, "R")
+        gain = self._contract(odd, factor)
         self.mean = self.mean + np.einsum("imb,mb->ib", gain, clean)
         if missing is not None:
             innovation = np.where(missing, np.nan, innovation)
@@ -107,44 +124,55 @@ class ManyPoints:
 
     def _contract(self, odd: FloatArray, root: FloatArray) -> FloatArray:
         """Replaces S by S+ and returns K (n, m, b)."""
-        n, m = self.size, odd.shape[0]
-        whitened = left_divide(root, odd)  # (m, n, b)
+        n, m, count = self.size, odd.shape[0], odd.shape[2]
+        if len(self._block) < n + m:
+            self._block = np.concatenate((self.lower, np.zeros((m, n, count))))
+        rows = self._block[: n + m]
+        whitened = left_divide(root, odd, rows[n:])
         # rows in reverse order: lower times upper becomes upper times lower
-        reverse = summed_factor(self.identity, self.identity, np.ascontiguousarray(whitened[:, ::-1].swapaxes(0, 1)))
-        inner = reverse[::-1, ::-1].swapaxes(0, 1)
-        divided = right_divide(np.concatenate((self.lower, whitened)), inner, triangular=True)
-        self.lower = divided[:n]
-        small = np.einsum("ikb,mkb->imb", self.lower, divided[n:])
+        reverse = self._memory("reverse", (n, m, count))
+        reverse[:] = whitened[:, ::-1].swapaxes(0, 1)
+        inner = summed_factor(self.identity, self.identity, reverse, self._memory("points", (n, n, count)))
+        right_divide(rows, inner[::-1, ::-1].swapaxes(0, 1), triangular=True)
+        small = np.einsum("ikb,mkb->imb", rows[:n], rows[n:])
         return right_divide(small, root) if m > 1 else small / root
 
-    def _widened(self, noise: FloatArray, even: FloatArray) -> FloatArray:
-        """R_e = R + sum a_i a_i' / tau^2 + W0c c_0 c_0', (m, m, b); see `sigma.MOST` for a negative W0c."""
-        weight, n = self.weights.centre_spread, self.size
-        tail = even[:, n]
-        wide = noise + np.einsum("ikb,jkb->ijb", even[:, :n], even[:, :n])
-        if weight >= 0:
-            return np.asarray(wide + weight * tail[:, None] * tail)
-        whitened = left_divide(cholesky(wide, "R"), tail[:, None])[:, 0]
-        share = -weight * np.einsum("mb,mb->b", whitened, whitened)
-        return np.asarray(wide + weight * np.minimum(1.0, MOST / np.maximum(share, 1e-300)) * tail[:, None] * tail)
+    def _parts(self, values: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+        """Mean (r, b), columns [b_i / tau, a_i / tau, c_0] (r, n+k+1, b), and the weight of c_0.
+
+        From values (1+n+k, b, r). Without pairs (k = 0) the columns are b_i / tau alone, and the weight is 0.
+        """
+        n, tau, (count, b, r) = self.size, self.weights.tau, values.shape
+        k = count - 1 - n
+        columns = self._memory("points", (r, n + k + (k > 0), b))
+        given = (values.copy() if np.may_share_memory(values, columns) else values).transpose(2, 0, 1)
+        centre, plus, minus = given[:, 0], given[:, 1 : n + 1], given[:, n + 1 :]
+        odd, even = columns[:, :n], columns[:, n : n + k]
+        np.subtract(plus[:, k:], centre[:, None], odd[:, k:])
+        if k == 0:
+            return centre.copy(), columns, 0.0
+        np.subtract(plus[:, :k], minus, odd[:, :k])
+        np.add(plus[:, :k], minus, even)
+        even -= (2.0 * centre)[:, None]  # differences from the centre: nothing cancels on a linear function
+        shift = np.add.reduce(even, 1)
+        shift *= 1.0 / tau**2  # twice the mean minus the centre
+        even -= shift[:, None]
+        odd[:, :k] *= 0.5 / tau
+        even *= 0.5 / tau
+        shift *= 0.5
+        np.negative(shift, columns[:, -1])
+        shift += centre
+        return shift, columns, self.weights.centre_weight(n - k)
 
 
-def _parts(weights: SigmaWeights, values: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean (r, b), and into `columns` [b_i, a_i, c_0] 2 tau (r, 2n+1, b) of values (2n+1, b, r), b_i and a_i over tau."""
-    given = values.transpose(2, 0, 1)
-    n = given.shape[1] // 2
-    centre, plus, minus = given[:, 0], given[:, 1 : n + 1], given[:, n + 1 :]
-    odd, even = columns[:, :n], columns[:, n : 2 * n]
-    np.subtract(plus, minus, odd)
-    np.add(plus, minus, even)
-    even -= (2.0 * centre)[:, None]  # differences from the centre: nothing cancels on a linear function
-    shift = even.sum(axis=1)
-    shift *= 1.0 / weights.tau**2  # twice the mean minus the centre
-    even -= shift[:, None]
-    np.multiply(shift, -weights.tau, columns[:, 2 * n])
-    shift *= 0.5
-    shift += centre
-    return shift, columns
+def _widened(noise: FloatArray, even: FloatArray, tail: FloatArray, weight: float) -> FloatArray:
+    """R_e = R + sum a_i a_i' / tau^2 + W0c c_0 c_0', (m, m, b); see `sigma.MOST` for a negative W0c."""
+    wide = noise + np.einsum("ikb,jkb->ijb", even, even)
+    if weight >= 0:
+        return np.asarray(wide + weight * tail[:, None] * tail)
+    whitened = left_divide(cholesky(wide, "R"), tail[:, None])[:, 0]
+    share = -weight * np.einsum("mb,mb->b", whitened, whitened)
+    return np.asarray(wide + weight * np.minimum(1.0, MOST / np.maximum(share, 1e-300)) * tail[:, None] * tail)
 
 
 def _downdated(lower: FloatArray, column: FloatArray) -> FloatArray:

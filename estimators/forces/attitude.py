@@ -8,21 +8,21 @@ rate about x: P1 (11), a_x = (vehicle part) + g sin(pitch), a_y = (vehicle part)
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.interpolate import FloatArray
-from estimators.signals.checks import any_missing, batch, bounded, mask, pair, quiet, setting
+from estimators.signals.checks import LIMIT, any_missing, batch, bounded, mask, number, pair, quiet, setting
 from estimators.signals.held import Held
-from estimators.signals.memory import Memory
+from estimators.signals.renewable import Renewable
 from estimators.vehicle import GRAVITY
 
 STEEPEST = math.sin(math.radians(60.0))
 """Sine of the largest tilt; beyond it a car lies on its side, and the difference of accelerations is an error."""
+Number = TypeVar("Number", float, FloatArray)
 _SIGNS = np.array([1.0, -1.0])  # roll grows with the rate about x, pitch falls with that about y
 
 
@@ -45,7 +45,21 @@ def without_gravity(
     return ax - GRAVITY * np.sin(total_pitch), ay - GRAVITY * np.sin(total_roll)
 
 
-class AttitudeObserver(Memory):
+class _Read(NamedTuple):
+    """What the inertial unit reads, what of it is the motion of the car, and how the road lies."""
+
+    rate_x: npt.ArrayLike
+    rate_y: npt.ArrayLike
+    ay: npt.ArrayLike
+    ax: npt.ArrayLike
+    motion_y: npt.ArrayLike
+    motion_x: npt.ArrayLike
+    yaw_rate: npt.ArrayLike
+    bank: npt.ArrayLike
+    grade: npt.ArrayLike
+
+
+class AttitudeObserver(Renewable):
     """phi' = p - r sin(theta) + L e_phi, theta' = -q + r sin(phi) + L e_theta, e = F(s) (stationary - estimate): P2, after Rehm.
 
     The stationary angles are those at which gravity explains what the accelerometers read beyond the motion of the car,
@@ -80,14 +94,13 @@ class AttitudeObserver(Memory):
         self.sample_time = setting(sample_time, "sample_time", "s")
         self.time_constant = setting(time_constant, "time_constant", "s")
         self.gain = 0.5 / self.time_constant if gain is None else setting(gain, "gain", "1/s")
-        self.batch_shape = batch(batch_shape)
+        super().__init__(batch(batch_shape))
         self._keep = math.exp(-self.sample_time / self.time_constant)
         self.yaw_rate = Held(self.batch_shape, "yaw_rate")
         self.road = Held((*self.batch_shape, 2), "bank and grade")
         self.angle: FloatArray = np.zeros((*self.batch_shape, 2))  # sin of roll and pitch, against the horizon
         self.lagged: FloatArray = np.zeros((*self.batch_shape, 2))  # F(s) (stationary - estimate)
-        self.renewed: BoolArray = np.zeros(self.batch_shape, dtype=np.bool_)
-        self._any_renewed = False
+        self._single = math.prod(self.batch_shape) == 1
 
     def step(
         self,
@@ -115,36 +128,15 @@ class AttitudeObserver(Memory):
         """
         shape = self.batch_shape
         flags: FlagArray = np.zeros(shape, dtype=np.int32)
-        gyro = pair(rate_x, rate_y, shape, "rate_x", "rate_y")
-        read = pair(ay, ax, shape, "ay", "ax")
-        nothing = np.nan
-        moving = pair(nothing if motion_y is None else motion_y, nothing if motion_x is None else motion_x, shape)
-        turn, no_turn = self.yaw_rate(yaw_rate)
-        road, no_road = self.road(pair(bank, grade, shape, "bank", "grade"))
-        for lost in (no_turn, no_road):
-            if lost is not None:
-                raise_flag(flags, any_missing(lost, shape), Flag.MISSING_INPUT)
-        with np.errstate(invalid="ignore", over="ignore"):
-            tilt: FloatArray = (read - moving) / GRAVITY
-        used: BoolArray | None = None
-        if not quiet(tilt):
-            used = bounded(tilt)
-            tilt = np.where(used, tilt, 0.0)
-            raise_flag(flags, any_missing(~used, shape), Flag.MISSING_MEASUREMENT)
-        if not quiet(gyro):
-            spins = bounded(gyro)
-            gyro = np.where(spins, gyro, 0.0)
-            raise_flag(flags, any_missing(~spins, shape), Flag.MISSING_INPUT)
-        if self._any_renewed:
-            raise_flag(flags, self.renewed, Flag.RESET)
-            self.renewed, self._any_renewed = np.zeros(shape, dtype=np.bool_), False
-        self._move(gyro, turn, _limited(tilt), used)
-        total = np.arcsin(self.angle)
-        body = total - road
+        self._flag_renewed(flags)
+        across, along = np.nan if motion_y is None else motion_y, np.nan if motion_x is None else motion_x
+        read = _Read(rate_x, rate_y, ay, ax, across, along, yaw_rate, bank, grade)
+        used = self._one(read, flags) if self._single else None
         if used is None:
-            innovation, used = self.lagged.copy(), np.ones((*shape, 2), dtype=np.bool_)
-        else:
-            innovation = np.where(used, self.lagged, np.nan)
+            used = self._many(read, flags)
+        total = np.arcsin(self.angle)
+        body = total - self.road.last
+        innovation = np.where(used, self.lagged, np.nan)
         return AttitudeStep(body[..., 0], body[..., 1], total[..., 0], total[..., 1], innovation, used, flags)
 
     def reset(self, where: npt.ArrayLike | None = None, roll: float = 0.0, pitch: float = 0.0) -> None:
@@ -159,25 +151,73 @@ class AttitudeObserver(Memory):
         self.lagged = np.where(chosen[..., None], 0.0, self.lagged)
         self.yaw_rate.forget(chosen)
         self.road.forget(chosen[..., None])
-        self.renewed = self.renewed | chosen
-        self._any_renewed = bool(self.renewed.any())
+        self._renew(chosen)
 
-    def _move(self, gyro: FloatArray, turn: FloatArray, stationary: FloatArray, used: BoolArray | None) -> None:
-        """One sample of the direction of gravity u = (sin pitch, sin roll, u_z): u' = -w x u, plus the correction."""
-        angle, keep = self.angle, self._keep
+    def _many(self, read: _Read, flags: FlagArray) -> BoolArray:
+        """Moves `angle` and `lagged` by one sample and flags what is missing; returns `used`.
+
+        The direction of gravity u = (sin pitch, sin roll, up) turns with u' = -w x u.
+        """
+        shape = self.batch_shape
+        turn, no_turn = self.yaw_rate(read.yaw_rate)
+        _, no_road = self.road(pair(read.bank, read.grade, shape, "bank", "grade"))
+        for lost in (no_turn, no_road):
+            if lost is not None:
+                raise_flag(flags, any_missing(lost, shape), Flag.MISSING_INPUT)
+        gyro = pair(read.rate_x, read.rate_y, shape, "rate_x", "rate_y")
+        with np.errstate(invalid="ignore", over="ignore"):
+            tilt = pair(read.ay, read.ax, shape, "ay", "ax")
+            tilt = (tilt - pair(read.motion_y, read.motion_x, shape, "motion_y", "motion_x")) / GRAVITY
+        used: BoolArray = np.ones((*shape, 2), dtype=np.bool_)
+        if not quiet(tilt):
+            used = bounded(tilt)
+            tilt = np.where(used, tilt, 0.0)
+            raise_flag(flags, any_missing(~used, shape), Flag.MISSING_MEASUREMENT)
+        if not quiet(gyro):
+            spins = bounded(gyro)
+            gyro = np.where(spins, gyro, 0.0)
+            raise_flag(flags, any_missing(~spins, shape), Flag.MISSING_INPUT)
+        angle = self.angle
         up = np.sqrt(1.0 - np.minimum((angle * angle).sum(axis=-1), 1.0))
         spin = gyro * up[..., None] * _SIGNS + turn[..., None] * (_SIGNS * angle)[..., ::-1]
-        lagged = keep * self.lagged + (1.0 - keep) * (stationary - angle)
-        correction = lagged
-        if used is not None:
-            lagged = np.where(used, lagged, keep * self.lagged)
-            correction = np.where(used, lagged, 0.0)
-        self.lagged = lagged
-        self.angle = _limited(angle + self.sample_time * (spin + self.gain * correction))
+        moved, self.lagged = self._followed(angle, self.lagged, spin, _limited(tilt), used)
+        self.angle = _limited(moved)
+        return used
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        super()._take(saved)
-        self._any_renewed = bool(self.renewed.any())
+    def _one(self, read: _Read, flags: FlagArray) -> BoolArray | None:
+        """`_many` for one car, in plain numbers; None, and nothing done, where a gyro or the road is missing."""
+        shape = self.batch_shape
+        p, q, side, ahead, across, along, turn, bank, grade = (
+            number(value, shape, name) for name, value in zip(_Read._fields, read, strict=True)
+        )
+        if not abs(p) + abs(q) + abs(turn) + abs(bank) + abs(grade) <= LIMIT:
+            return None
+        self.yaw_rate.last, self.road.last = np.full(shape, turn), np.array((bank, grade)).reshape(*shape, 2)
+        side, ahead = (side - across) / GRAVITY, (ahead - along) / GRAVITY
+        used = [-LIMIT <= value <= LIMIT for value in (side, ahead)]
+        if not (used[0] and used[1]):
+            flags |= int(Flag.MISSING_MEASUREMENT)
+        angles = self.angle.reshape(2).tolist()
+        roll, pitch = angles
+        up = math.sqrt(1.0 - min(roll * roll + pitch * pitch, 1.0))
+        rates = p * up - turn * pitch, turn * roll - q * up
+        moved, lags = [], []
+        for angle, lagged, spin, sine, good in zip(
+            angles, self.lagged.reshape(2).tolist(), rates, (side, ahead), used, strict=True
+        ):
+            stationary = min(max(sine, -STEEPEST), STEEPEST) if good else 0.0
+            new, lag = self._followed(angle, lagged, spin, stationary, good)
+            moved.append(min(max(new, -STEEPEST), STEEPEST))
+            lags.append(lag)
+        self.angle, self.lagged = np.array(moved).reshape(*shape, 2), np.array(lags).reshape(*shape, 2)
+        return np.array(used).reshape(*shape, 2)
+
+    def _followed(
+        self, angle: Number, lagged: Number, spin: Number, stationary: Number, used: Any
+    ) -> tuple[Number, Number]:
+        """`angle` and `lagged` one sample on, of numbers or of arrays; `spin` is what the gyros make of the angle, 1/s."""
+        lagged = self._keep * lagged + used * ((1.0 - self._keep) * (stationary - angle))
+        return angle + self.sample_time * (spin + used * (self.gain * lagged)), lagged
 
 
 def _limited(sine: FloatArray) -> FloatArray:

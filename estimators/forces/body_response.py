@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,9 @@ PITCH = (1.4, 0.4)
 """Hz, damping ratio."""
 ROLL = (1.7, 0.3)
 """Hz, damping ratio."""
+
+Number = TypeVar("Number", float, FloatArray)
+_Mode = tuple[Number, Number, Number, Number, Number, Number, Number, Number]
 
 
 class BodyResponse(Memory):
@@ -59,8 +62,9 @@ class BodyResponse(Memory):
         w = 2.0 * math.pi * np.array([setting(f, "frequency", "Hz") for f, _ in modes])
         zeta = np.array([setting(z, "damping", "(no unit)") for _, z in modes])
         self._stiffness, self._damping = w * w, 2.0 * zeta * w
-        moved = [_exact(float(k), float(c), time) for k, c in zip(self._stiffness, self._damping, strict=True)]
-        self._A, self._B = np.stack([A for A, _ in moved], axis=-1), np.stack([B for _, B in moved], axis=-1)
+        self._modes = [_mode(float(k), float(c), time) for k, c in zip(self._stiffness, self._damping, strict=True)]
+        self._all: _Mode[Any] = tuple(np.array(self._modes).T)
+        self._single = math.prod(self.batch_shape) == 1
         shape = (*self.batch_shape, len(modes))
         self.input = Held(shape, "acceleration")
         self.deflection: FloatArray = np.zeros(shape)
@@ -78,17 +82,31 @@ class BodyResponse(Memory):
         """
         before = self.input.last
         value, _ = self.input(acceleration)
-        (a, b), (c, d) = self._A
-        deflection = a * self.deflection + b * self.speed + self._B[0] * before
-        speed = c * self.deflection + d * self.speed + self._B[1] * before
         if self._any_start:
             fresh = self.starts[..., None]
-            deflection = np.where(fresh, value / self._stiffness, deflection)
-            speed = np.where(fresh, 0.0, speed)
+            before = np.where(fresh, value, before)
+            self.deflection = np.where(fresh, value / self._stiffness, self.deflection)
+            self.speed = np.where(fresh, 0.0, self.speed)
             self.starts, self._any_start = np.zeros(self.batch_shape, dtype=np.bool_), False
-        self.deflection, self.speed = deflection, speed
-        out: FloatArray = self._stiffness * deflection + self._damping * speed
+        if self._single:
+            return np.array(self._advance(before.reshape(-1).tolist())).reshape(value.shape)
+        self.deflection, self.speed, out = _moved(self._all, self.deflection, self.speed, before)
         return out
+
+    def one(self, acceleration: list[float]) -> list[float]:
+        """`step` for a single car, on finite plain numbers."""
+        if self._any_start:
+            return self.step(np.reshape(acceleration, self.input.shape)).reshape(-1).tolist()
+        before = self.input.last.reshape(-1).tolist()
+        self.input.last = np.array(acceleration).reshape(self.input.shape)
+        return self._advance(before)
+
+    def _advance(self, before: list[float]) -> list[float]:
+        columns = (before, self.deflection.reshape(-1).tolist(), self.speed.reshape(-1).tolist())
+        moved = [_moved(mode, x, v, force) for mode, force, x, v in zip(self._modes, *columns, strict=True)]
+        x, v, out = zip(*moved, strict=True)
+        self.deflection, self.speed = np.array(x).reshape(self.input.shape), np.array(v).reshape(self.input.shape)
+        return list(out)
 
     def reset(self, where: npt.ArrayLike | None = None) -> None:
         """Starts the entries `where` (bool mask; None: all) afresh: the next sample is taken as settled."""
@@ -102,11 +120,20 @@ class BodyResponse(Memory):
         self._any_start = bool(self.starts.any())
 
 
-def _exact(stiffness: float, damping: float, time: float) -> tuple[FloatArray, FloatArray]:
-    """e^(A Ts) and int e^(A t) dt (0, 1)' of x'' = a - C x' - K x, from e^M = 1 + M phi(M)."""
+def _moved(mode: _Mode[Number], x: Number, speed: Number, force: Number) -> tuple[Number, Number, Number]:
+    """x and x' at the end of the sample, and K x + C x' there; of numbers or of arrays."""
+    a, b, c, d, e, f, stiffness, damping = mode
+    x, speed = a * x + b * speed + e * force, c * x + d * speed + f * force
+    return x, speed, stiffness * x + damping * speed
+
+
+def _mode(stiffness: float, damping: float, time: float) -> _Mode[float]:
+    """e^(A Ts) by rows, int e^(A t) dt (0, 1)', K and C of x'' = a - C x' - K x, from e^M = 1 + M phi(M)."""
     M = time * np.array([[0.0, 1.0], [-stiffness, -damping]])
     mean = 0.5 * float(M[0, 0] + M[1, 1])
     N = M - mean * np.eye(2)
     alpha, beta = phi(mean, float((N @ N)[0, 0]))
     integral = alpha * np.eye(2) + beta * N
-    return np.eye(2) + M @ integral, time * integral[:, 1]
+    a, b, c, d = (np.eye(2) + M @ integral).reshape(-1).tolist()
+    e, f = (time * integral[:, 1]).tolist()
+    return a, b, c, d, e, f, stiffness, damping

@@ -9,10 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from estimators.faults import BoolArray
-from estimators.forces.wheel import WheelSignals
+from estimators.forces.wheel import WheelForceStep, WheelInputs, WheelSignals
 from estimators.interpolate import FloatArray
 from estimators.signals.checks import mask
 from estimators.signals.memory import Memory
+from estimators.vehicle import VehicleParameters
 
 
 class MeanForce(NamedTuple):
@@ -83,3 +84,57 @@ class SpeedInterval(Memory):
     def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
         super()._take(saved)
         self._closed = False
+
+
+class IntervalObserver(Memory):
+    """A wheel force observer that works from one new wheel speed to the next: what `step` and `reset` do for each.
+
+    Args:
+        vehicle, sample_time, batch_shape, stopped_below, fade_time: as `WheelInputs`.
+
+    Raises:
+        EstimatorError: a shape without corners, a setting that is not positive.
+    """
+
+    parts: tuple[str, ...] = ("inputs", "interval")
+
+    def __init__(
+        self,
+        vehicle: VehicleParameters,
+        sample_time: float,
+        batch_shape: tuple[int, ...],
+        stopped_below: float,
+        fade_time: float,
+    ) -> None:
+        self.inputs = WheelInputs(vehicle, sample_time, batch_shape, stopped_below, fade_time)
+        self.batch_shape = self.inputs.batch_shape
+        self.interval = SpeedInterval(self.batch_shape, sample_time, self.inputs.radius, self.inputs.inertia)
+
+    def step(
+        self,
+        wheel_speed: npt.ArrayLike,
+        torque: npt.ArrayLike,
+        vertical_load: npt.ArrayLike | None = None,
+        fresh: npt.ArrayLike | None = None,
+    ) -> WheelForceStep:
+        """Takes one sample of the batch shape: rad/s, N m (what acted since the last sample), N.
+
+        `fresh` marks new wheel speeds (`estimators.signals.Freshness`); None: all.
+
+        Raises:
+            EstimatorError: another shape, or not numbers.
+        """
+        signals = self.inputs(wheel_speed, torque, vertical_load)
+        return self._observed(signals, self.interval(signals, fresh))
+
+    def reset(self, where: npt.ArrayLike | None = None) -> None:
+        """Starts the entries `where` (bool mask of the batch shape; None: all) afresh; flagged RESET at the next step."""
+        chosen = self.inputs.forget(where)
+        self.interval.forget(chosen)
+        self._restart(chosen)
+
+    def _observed(self, signals: WheelSignals, mean: MeanForce) -> WheelForceStep:
+        raise NotImplementedError
+
+    def _restart(self, chosen: BoolArray) -> None:
+        raise NotImplementedError

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,11 +11,13 @@ import numpy.typing as npt
 from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.filters import FilterStep, KalmanFilter, UnscentedKalmanFilter
+from estimators.filters.step import gate_threshold
+from estimators.forces.lateral_few import FEW, KILO, LateralFew
 from estimators.forces.planar import PlanarModel, planar_model
 from estimators.interpolate import FloatArray
 from estimators.signals.checks import any_missing, batch, bounded, entries, mask, quiet, setting
 from estimators.signals.held import Held
-from estimators.signals.memory import Memory
+from estimators.signals.renewable import Renewable
 from estimators.vehicle import VehicleParameters
 
 PUBLISHED_PROCESS = 0.13
@@ -25,7 +26,6 @@ PUBLISHED_MEASUREMENT = (0.012, 0.012, 0.012)
 """m/s^2, m/s^2, rad/s^2: R = 0.012^2 I of P1 section 1. Real sensors need more, see the class."""
 _EYE = np.eye(3)
 _DIAGONAL = np.arange(3)
-_KILO = 1000.0  # the filter works in kN: with newtons the covariances would span eleven decades
 
 
 class LateralForceStep(NamedTuple):
@@ -39,7 +39,7 @@ class LateralForceStep(NamedTuple):
     flags: FlagArray  # (...) MISSING_MEASUREMENT, MISSING_INPUT (steering, F_x, load), RESET
 
 
-class LateralForceEstimator(Memory):
+class LateralForceEstimator(Renewable):
     """x = (F_yf, F_yr, dF_yf), a random walk, seen through y = (a_x, a_y, dr/dt) = C(delta) x + d: P1 (9)-(13).
 
     With the front wheels straight the front difference does not show in y (rank 2), and would wander without bounds.
@@ -72,7 +72,6 @@ class LateralForceEstimator(Memory):
     """
 
     parts = ("filter", "steer", "force_x", "load")
-    memory = ("renewed",)
 
     def __init__(
         self,
@@ -80,7 +79,7 @@ class LateralForceEstimator(Memory):
         sample_time: float,
         batch_shape: tuple[int, ...] = (),
         method: Literal["unscented", "linear"] = "unscented",
-        process_deviation: float = PUBLISHED_PROCESS * _KILO,
+        process_deviation: float = PUBLISHED_PROCESS * KILO,
         measurement_deviation: tuple[float, float, float] = PUBLISHED_MEASUREMENT,
         split_deviation: float = 1000.0,
         fade_time: float = 0.5,
@@ -89,26 +88,30 @@ class LateralForceEstimator(Memory):
         if method not in ("unscented", "linear"):
             raise EstimatorError(f"method = {method!r} is not known; use 'unscented' or 'linear'")
         self.vehicle, self.method, self.gate = vehicle, method, gate
-        self.batch_shape = batch(batch_shape)
+        super().__init__(batch(batch_shape))
         time = setting(sample_time, "sample_time", "s")
         self._fade = math.exp(-time / setting(fade_time, "fade_time", "s"))
-        variance = (setting(process_deviation, "process_deviation", "N") / _KILO) ** 2
+        variance = (setting(process_deviation, "process_deviation", "N") / KILO) ** 2
         units = ("m/s^2", "m/s^2", "rad/s^2")
         sensors = [setting(v, "measurement_deviation", u) for v, u in zip(measurement_deviation, units, strict=True)]
-        split = setting(split_deviation, "split_deviation", "N") / _KILO
-        axles = vehicle.static_loads.reshape(2, 2).sum(axis=-1)[[0, 1, 0]] / _KILO
+        split = setting(split_deviation, "split_deviation", "N") / KILO
+        axles = vehicle.static_loads.reshape(2, 2).sum(axis=-1)[[0, 1, 0]] / KILO
         self._prior = np.diag(axles**2)
         self._walk = variance * np.eye(3)
-        self._R = np.diag([*(value**2 for value in sensors), split**2])
+        noise = [*(value**2 for value in sensors), split**2]
+        self._R = np.diag(noise)
+        self._threshold = gate_threshold(gate)
         start = np.zeros((*self.batch_shape, 3))
-        self.filter: UnscentedKalmanFilter | KalmanFilter = (
-            UnscentedKalmanFilter(start, self._prior) if method == "unscented" else KalmanFilter(start, self._prior)
-        )
+        self.filter: UnscentedKalmanFilter | KalmanFilter | LateralFew
+        if method == "unscented":
+            self.filter = UnscentedKalmanFilter(start, self._prior)
+        elif math.prod(self.batch_shape) <= FEW:
+            self.filter = LateralFew(axles**2, self.batch_shape, vehicle, variance, noise, self._fade)
+        else:
+            self.filter = KalmanFilter(start, self._prior)
         self.steer = Held(self.batch_shape, "steer")
         self.force_x = Held((*self.batch_shape, 4), "longitudinal_force")
         self.load = Held((*self.batch_shape, 4), "vertical_load", vehicle.static_loads)
-        self.renewed: BoolArray = np.zeros(self.batch_shape, dtype=np.bool_)
-        self._any_renewed = False
         self._stay = np.ones((*self.batch_shape, 1))
 
     def step(
@@ -129,7 +132,7 @@ class LateralForceEstimator(Memory):
         """
         shape = self.batch_shape
         flags: FlagArray = np.zeros(shape, dtype=np.int32)
-        y: FloatArray = np.zeros((*shape, 4))  # the fourth channel is the split by load: measured 0
+        y: FloatArray = np.empty((*shape, 3))
         y[..., 0] = entries(acceleration_x, shape, "acceleration_x")
         y[..., 1] = entries(acceleration_y, shape, "acceleration_y")
         y[..., 2] = entries(yaw_acceleration, shape, "yaw_acceleration")
@@ -144,15 +147,15 @@ class LateralForceEstimator(Memory):
             missing = ~bounded(y)
             raise_flag(flags, any_missing(missing, shape), Flag.MISSING_MEASUREMENT)
             unseen = any_missing(missing[..., 1:], shape)
-        if self._any_renewed:
-            raise_flag(flags, self.renewed, Flag.RESET)
-            self.renewed, self._any_renewed = np.zeros(shape, dtype=np.bool_), False
-        found = self._filtered(y, planar_model(self.vehicle, angle, force_x), load, unseen)
-        forces = found.state * _KILO
-        deviation: FloatArray = _KILO * np.sqrt(found.covariance[..., _DIAGONAL, _DIAGONAL])
-        corners = _corners(forces, load)
+        self._flag_renewed(flags)
+        if isinstance(self.filter, LateralFew):
+            told, used = self.filter.step(y, angle, force_x, load, unseen, self._threshold)
+            return LateralForceStep(told[..., :2], told[..., 2:6], told[..., 6:9], told[..., 9:12], used, flags)
+        found = self._filtered(self.filter, y, planar_model(self.vehicle, angle, force_x), load, unseen)
+        forces = found.state * KILO
+        deviation: FloatArray = KILO * np.sqrt(found.covariance[..., _DIAGONAL, _DIAGONAL])
         return LateralForceStep(
-            forces[..., :2], corners, deviation, found.innovation[..., :3], found.used[..., :3], flags
+            forces[..., :2], _corners(forces, load), deviation, found.innovation[..., :3], found.used[..., :3], flags
         )
 
     def reset(self, where: npt.ArrayLike | None = None) -> None:
@@ -162,14 +165,21 @@ class LateralForceEstimator(Memory):
         self.steer.forget(chosen)
         self.force_x.forget(chosen[..., None])
         self.load.forget(chosen[..., None])
-        self.renewed = self.renewed | chosen
-        self._any_renewed = bool(self.renewed.any())
+        self._renew(chosen)
 
-    def _filtered(self, y: FloatArray, model: PlanarModel, load: FloatArray, unseen: BoolArray | None) -> FilterStep:
-        """Prediction and correction in kN, with the split by load as fourth channel; `unseen` axles fade."""
+    def _filtered(
+        self,
+        kalman: KalmanFilter | UnscentedKalmanFilter,
+        y: FloatArray,
+        model: PlanarModel,
+        load: FloatArray,
+        unseen: BoolArray | None,
+    ) -> FilterStep:
+        """Prediction and correction in kN, with the split by load, measured 0, as fourth channel; `unseen` axles fade."""
         shape = self.batch_shape
+        y = np.concatenate((y, np.zeros((*shape, 1))), axis=-1)
         C: FloatArray = np.zeros((*shape, 4, 3))
-        np.multiply(model.C, _KILO, C[..., :3, :])
+        np.multiply(model.C, KILO, C[..., :3, :])
         C[..., 3, 0], C[..., 3, 2] = 2.0 * _left_share(load, 0) - 1.0, 1.0
         offset: FloatArray = np.zeros((*shape, 4))
         offset[..., :3] = model.d
@@ -177,15 +187,11 @@ class LateralForceEstimator(Memory):
         if unseen is not None:
             fade = np.where(unseen, self._fade, 1.0)[..., None]
             noise = np.where(unseen[..., None, None], (1.0 - self._fade**2) * self._prior, self._walk)
-        if isinstance(self.filter, KalmanFilter):
-            self.filter.predict(fade[..., None] * _EYE, noise)
-            return self.filter.correct(y, C, self._R, offset, self.gate)
-        self.filter.predict(lambda x: fade * x, noise)
-        return self.filter.correct(y, lambda x: (C @ x[..., None])[..., 0] + offset, self._R, self.gate)
-
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        super()._take(saved)
-        self._any_renewed = bool(self.renewed.any())
+        if isinstance(kalman, KalmanFilter):
+            kalman.predict(fade[..., None] * _EYE, noise)
+            return kalman.correct(y, C, self._R, offset, self.gate)
+        kalman.predict(lambda x: fade * x, noise)
+        return kalman.correct(y, lambda x: (C @ x[..., None])[..., 0] + offset, self._R, self.gate)
 
 
 def _left_share(load: FloatArray, first: int) -> FloatArray:

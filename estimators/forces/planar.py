@@ -7,12 +7,14 @@ left. So a positive slip angle v_yt/v_xt goes with a negative F_y.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from estimators.interpolate import FloatArray
 from estimators.vehicle import VehicleParameters
+
+Number = TypeVar("Number", float, FloatArray)
 
 
 class PlanarModel(NamedTuple):
@@ -27,22 +29,34 @@ def planar_model(vehicle: VehicleParameters, steer: FloatArray, longitudinal_for
 
     det C = T_f sin^2(delta)/(2 m^2 I_z): with the wheels straight the difference of the front axle does not show.
     """
+    rows, d = planar_entries(vehicle, np.sin(steer), np.cos(steer), *(longitudinal_force[..., i] for i in range(4)))
+    C, offset = np.zeros((*np.shape(steer), 3, 3)), np.empty((*np.shape(steer), 3))
+    C[..., 0, 0], C[..., 1, 0], C[..., 1, 1], C[..., 2, 0], C[..., 2, 1], C[..., 2, 2] = rows
+    offset[..., 0], offset[..., 1], offset[..., 2] = d
+    return PlanarModel(C, offset)
+
+
+def planar_entries(
+    vehicle: VehicleParameters, sine: Number, cosine: Number, fl: Number, fr: Number, rl: Number, rr: Number
+) -> tuple[tuple[Number, Number, float, Number, float, Number], tuple[Number, Number, Number]]:
+    """C11, C21, C22, C31, C32, C33 (the others are zero) and d of `planar_model`, of numbers or of arrays.
+
+    `sine` and `cosine` are those of the steering angle, the forces F_x of the four corners.
+    """
     m, inertia = vehicle.mass, vehicle.yaw_inertia
-    front, rear = vehicle.front_axle_distance, vehicle.rear_axle_distance
-    half_front, half_rear = vehicle.front_track / 2.0, vehicle.rear_track / 2.0
-    sine, cosine = np.sin(steer), np.cos(steer)
-    C = np.zeros((*np.shape(steer), 3, 3))
-    C[..., 0, 0] = -sine / m
-    C[..., 1, 0], C[..., 1, 1] = cosine / m, 1.0 / m
-    C[..., 2, 0], C[..., 2, 1] = front * cosine / inertia, -rear / inertia
-    C[..., 2, 2] = -half_front * sine / inertia
-    fl, fr, rl, rr = (longitudinal_force[..., i] for i in range(4))
+    front, half_front = vehicle.front_axle_distance, vehicle.front_track / 2.0
+    rows = (
+        -sine / m,
+        cosine / m,
+        1.0 / m,
+        front * cosine / inertia,
+        -vehicle.rear_axle_distance / inertia,
+        -half_front * sine / inertia,
+    )
     both = fl + fr
-    d: FloatArray = np.empty((*np.shape(steer), 3))
-    d[..., 0] = (both * cosine + rl + rr) / m
-    d[..., 1] = across = both * sine / m
-    d[..., 2] = (front * m * across + half_front * (fr - fl) * cosine + half_rear * (rr - rl)) / inertia
-    return PlanarModel(C, d)
+    across = both * sine / m
+    turn = front * m * across + half_front * (fr - fl) * cosine + vehicle.rear_track / 2.0 * (rr - rl)
+    return rows, ((both * cosine + rl + rr) / m, across, turn / inertia)
 
 
 def planar_outputs(

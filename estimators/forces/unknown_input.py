@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from estimators.faults import BoolArray
-from estimators.forces.interval import SpeedInterval
-from estimators.forces.wheel import WheelForceStep, WheelInputs
+from estimators.forces.interval import IntervalObserver, MeanForce
+from estimators.forces.wheel import WheelForceStep, WheelSignals
 from estimators.interpolate import FloatArray
 from estimators.signals.checks import setting
-from estimators.signals.memory import Memory
 from estimators.vehicle import VehicleParameters
 
 
-class UnknownInputForceObserver(Memory):
+class UnknownInputForceObserver(IntervalObserver):
     """I_w dwhat/dt = T - R_e f_0 + K_p (w - what),  F_x = f_0 - K_p (w - what)/R_e: P2 (1)-(3).
 
     Equal to a first-order lag of the force, F_x = f_0 + K/(s + K) (F_x - f_0) with K = K_p/I_w, and without dw/dt. Here
@@ -28,7 +26,7 @@ class UnknownInputForceObserver(Memory):
     w - what = (f_0 - F) R_e/K_p (`speed_error`). Theorem 1: |R_e (F_x - f_0)/I_w| < b bounds that error by b/K.
 
     A force that cannot be known (wheel stopped, torque or speed missing) fades to f_0 and is flagged; what a speed that
-    is not new leaves open is decided when the next new one comes.
+    is not new leaves open is decided when the next new one comes. The innovation of a step is m - F, N.
 
     Args:
         vehicle: radii, wheel inertia, rolling resistance.
@@ -44,7 +42,6 @@ class UnknownInputForceObserver(Memory):
     """
 
     memory = ("force", "before", "deviation")
-    parts = ("inputs", "interval")
 
     def __init__(
         self,
@@ -57,9 +54,7 @@ class UnknownInputForceObserver(Memory):
         stopped_below: float = 1.0,
         fade_time: float = 0.2,
     ) -> None:
-        self.inputs = WheelInputs(vehicle, sample_time, batch_shape, stopped_below, fade_time)
-        self.batch_shape = self.inputs.batch_shape
-        self.interval = SpeedInterval(self.batch_shape, sample_time, self.inputs.radius, self.inputs.inertia)
+        super().__init__(vehicle, sample_time, batch_shape, stopped_below, fade_time)
         self.lag = setting(lag, "lag", "s", low_allowed=True)
         self.nominal_force = setting(nominal_force, "nominal_force", "N", low=-math.inf)
         self._keep = math.exp(-self.inputs.sample_time / self.lag) if self.lag > 0 else 0.0
@@ -74,22 +69,7 @@ class UnknownInputForceObserver(Memory):
         error: FloatArray = (self.nominal_force - self.force) * self.inputs.radius * self.lag / self.inputs.inertia
         return error
 
-    def step(
-        self,
-        wheel_speed: npt.ArrayLike,
-        torque: npt.ArrayLike,
-        vertical_load: npt.ArrayLike | None = None,
-        fresh: npt.ArrayLike | None = None,
-    ) -> WheelForceStep:
-        """Takes one sample of the batch shape: rad/s, N m (what acted since the last sample), N.
-
-        `fresh` marks new wheel speeds (`estimators.signals.Freshness`); None: all. The innovation is m - F, N.
-
-        Raises:
-            EstimatorError: another shape, or not numbers.
-        """
-        signals = self.inputs(wheel_speed, torque, vertical_load)
-        mean = self.interval(signals, fresh)
+    def _observed(self, signals: WheelSignals, mean: MeanForce) -> WheelForceStep:
         if mean.complete and mean.samples is self.interval.one:
             gap: FloatArray = mean.force - self.force
             self.force = self.force + (1.0 - self._keep) * gap
@@ -112,10 +92,7 @@ class UnknownInputForceObserver(Memory):
             self.force.copy(), self.deviation.copy(), innovation, mean.used, signals.stopped, unknown, signals.flags
         )
 
-    def reset(self, where: npt.ArrayLike | None = None) -> None:
-        """Starts the entries `where` (bool mask of the batch shape; None: all) afresh at f_0; flagged RESET next."""
-        chosen: BoolArray = self.inputs.forget(where)
-        self.interval.forget(chosen)
+    def _restart(self, chosen: BoolArray) -> None:
         self.force = np.where(chosen, self.nominal_force, self.force)
         self.before = np.where(chosen, 0.0, self.before)
 

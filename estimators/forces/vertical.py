@@ -11,8 +11,8 @@ takes the lateral transfer of its own mass share), anti-dive.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+import math
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -20,13 +20,15 @@ import numpy.typing as npt
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.forces.body_response import PITCH, ROLL, BodyResponse
 from estimators.interpolate import FloatArray
-from estimators.signals.checks import any_missing, batch, mask, pair
+from estimators.signals.checks import LIMIT, any_missing, batch, mask, number, pair
 from estimators.signals.held import Held
-from estimators.signals.memory import Memory
+from estimators.signals.renewable import Renewable
 from estimators.vehicle import GRAVITY, VehicleParameters
 
 LEAST_GRAVITY = 0.1 * GRAVITY
 """m/s^2: below this vertical specific force the car flies, and lateral transfer no longer has the meaning of (17)."""
+
+Number = TypeVar("Number", float, FloatArray)
 
 
 class LoadStep(NamedTuple):
@@ -44,9 +46,15 @@ def levelled(
 
     a_x' = a_x cos(pitch) - a_z sin(pitch), a_z' = a_z cos(pitch) + a_x sin(pitch); the same with a_y, a_z' and roll.
     """
-    along = ax * np.cos(pitch) - az * np.sin(pitch)
-    up = az * np.cos(pitch) + ax * np.sin(pitch)
-    return along, ay * np.cos(roll) - up * np.sin(roll), up * np.cos(roll) + ay * np.sin(roll)
+    return _levelled(ax, ay, az, np.sin(pitch), np.cos(pitch), np.sin(roll), np.cos(roll))
+
+
+def _levelled(
+    ax: Number, ay: Number, az: Number, sin_p: Number, cos_p: Number, sin_r: Number, cos_r: Number
+) -> tuple[Number, Number, Number]:
+    """`levelled` of numbers or of arrays, from the sines and cosines of pitch and roll."""
+    up = az * cos_p + ax * sin_p
+    return ax * cos_p - az * sin_p, ay * cos_r - up * sin_r, up * cos_r + ay * sin_r
 
 
 def vertical_loads(
@@ -84,8 +92,11 @@ class _Transfer:
         self.across = np.array([-1.0, 1.0, -1.0, 1.0]) / tracks
 
     def __call__(self, ax: FloatArray, lean: FloatArray, az: FloatArray) -> FloatArray:
-        axle = self.up * az[..., None] + self.along * ax[..., None]
-        load: FloatArray = axle * (0.5 + self.across * lean[..., None])
+        return self.of(ax[..., None], lean[..., None], az[..., None])
+
+    def of(self, ax: FloatArray | float, lean: FloatArray | float, az: FloatArray | float) -> FloatArray:
+        """The same of one car's numbers."""
+        load: FloatArray = (self.up * az + self.along * ax) * (0.5 + self.across * lean)
         return load
 
 
@@ -101,7 +112,7 @@ def without_negative(load: FloatArray) -> FloatArray:
     return np.stack((fl, front - fl, rl, total - front - rl), axis=-1)
 
 
-class VerticalLoads(Memory):
+class VerticalLoads(Renewable):
     """`vertical_loads` sample by sample: missing signals held, lifted wheels at zero, the body's own dynamics.
 
     Args:
@@ -115,7 +126,6 @@ class VerticalLoads(Memory):
         EstimatorError: a setting that is not positive.
     """
 
-    memory = ("renewed",)
     parts = ("along", "up", "angles", "response")
 
     def __init__(
@@ -127,16 +137,16 @@ class VerticalLoads(Memory):
         pitch: tuple[float, float] = PITCH,
         roll: tuple[float, float] = ROLL,
     ) -> None:
-        self.vehicle, self.dynamic, self.batch_shape = vehicle, dynamic, batch(batch_shape)
+        super().__init__(batch(batch_shape))
+        self.vehicle, self.dynamic = vehicle, dynamic
         self.response = BodyResponse(sample_time, self.batch_shape, (pitch, roll))
         self.along = Held((*self.batch_shape, 2), "ax and ay")
         self.up = Held(self.batch_shape, "az", GRAVITY)
         self.angles = Held((*self.batch_shape, 2), "pitch and roll")
-        self.renewed: BoolArray = np.zeros(self.batch_shape, dtype=np.bool_)
-        self._any_renewed = False
         self._transfer = _Transfer(vehicle)
         self._level = np.full(self.batch_shape, GRAVITY)
         self._nowhere: BoolArray = np.zeros((*self.batch_shape, 4), dtype=np.bool_)
+        self._single = math.prod(self.batch_shape) == 1
 
     def step(
         self,
@@ -155,6 +165,10 @@ class VerticalLoads(Memory):
         """
         shape = self.batch_shape
         flags: FlagArray = np.zeros(shape, dtype=np.int32)
+        if self._single and not self._any_renewed:
+            calm = self._calm(ax, ay, az, pitch, roll)
+            if calm is not None:
+                return self._limited(calm, flags)
         both, missing = self.along(pair(ax, ay, shape, "ax", "ay"))
         if missing is not None:
             raise_flag(flags, any_missing(missing, shape), Flag.MISSING_MEASUREMENT)
@@ -172,13 +186,40 @@ class VerticalLoads(Memory):
             a_x, a_y, a_z = levelled(both[..., 0], both[..., 1], a_z, angles[..., 0], angles[..., 1])
             both = np.stack((a_x, a_y), axis=-1)
             sway = self.vehicle.roll_center_height * np.sin(angles[..., 1])
-        if self._any_renewed:
-            raise_flag(flags, self.renewed, Flag.RESET)
-            self.renewed, self._any_renewed = np.zeros(shape, dtype=np.bool_), False
+        self._flag_renewed(flags)
         if self.dynamic:
             both = self.response.step(both)
         lean = self.vehicle.cg_height * both[..., 1] / np.maximum(a_z, LEAST_GRAVITY)
-        load = self._transfer(both[..., 0], lean if sway is None else lean + sway, a_z)
+        return self._limited(self._transfer(both[..., 0], lean if sway is None else lean + sway, a_z), flags)
+
+    def _calm(
+        self,
+        ax: npt.ArrayLike,
+        ay: npt.ArrayLike,
+        az: npt.ArrayLike | None,
+        pitch: npt.ArrayLike | None,
+        roll: npt.ArrayLike | None,
+    ) -> FloatArray | None:
+        """The loads of one car, in plain numbers; None where something is missing."""
+        shape = self.batch_shape
+        along, across = number(ax, shape, "ax"), number(ay, shape, "ay")
+        up = GRAVITY if az is None else number(az, shape, "az")
+        nose, lean = (0.0 if angle is None else number(angle, shape, "angle") for angle in (pitch, roll))
+        if not abs(along) + abs(across) + abs(up) + abs(nose) + abs(lean) <= LIMIT:
+            return None
+        self.along.last = np.array((along, across)).reshape(*shape, 2)
+        if az is not None:
+            self.up.last = np.full(shape, up)
+        if pitch is not None or roll is not None:
+            self.angles.last = np.array((nose, lean)).reshape(*shape, 2)
+        sine = math.sin(lean)
+        along, across, up = _levelled(along, across, up, math.sin(nose), math.cos(nose), sine, math.cos(lean))
+        if self.dynamic:
+            along, across = self.response.one([along, across])
+        shift = self.vehicle.cg_height * across / max(up, LEAST_GRAVITY) + self.vehicle.roll_center_height * sine
+        return self._transfer.of(along, shift, up).reshape(*shape, 4)
+
+    def _limited(self, load: FloatArray, flags: FlagArray) -> LoadStep:
         if np.minimum.reduce(load, None) >= 0.0:
             return LoadStep(load, self._nowhere.copy(), flags)
         return LoadStep(without_negative(load), load < 0.0, flags)
@@ -190,9 +231,4 @@ class VerticalLoads(Memory):
         self.up.forget(chosen)
         self.angles.forget(chosen[..., None])
         self.response.reset(chosen)
-        self.renewed = self.renewed | chosen
-        self._any_renewed = bool(self.renewed.any())
-
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        super()._take(saved)
-        self._any_renewed = bool(self.renewed.any())
+        self._renew(chosen)

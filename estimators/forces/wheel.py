@@ -20,7 +20,7 @@ from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.interpolate import FloatArray
 from estimators.signals.checks import batch, mask, setting
 from estimators.signals.held import Held
-from estimators.signals.memory import Memory
+from estimators.signals.renewable import Renewable
 from estimators.vehicle import VehicleParameters
 
 
@@ -49,7 +49,7 @@ class WheelSignals(NamedTuple):
     calm: bool  # nothing is missing, and no wheel stopped
 
 
-class WheelInputs(Memory):
+class WheelInputs(Renewable):
     """Holds what is missing, takes off the rolling resistance, and finds the wheels that stand still.
 
     A wheel below `stopped_below` is stopped, and for one sample more: dw/dt behind a stop spans a time with the wheel
@@ -77,7 +77,7 @@ class WheelInputs(Memory):
         stopped_below: float = 1.0,
         fade_time: float = 0.2,
     ) -> None:
-        self.batch_shape = batch(batch_shape, corners=True)
+        super().__init__(batch(batch_shape, corners=True))
         self.sample_time = setting(sample_time, "sample_time", "s")
         self.stopped_below = setting(stopped_below, "stopped_below", "rad/s")
         self.fade = math.exp(-self.sample_time / setting(fade_time, "fade_time", "s"))
@@ -89,8 +89,7 @@ class WheelInputs(Memory):
         self.torque = Held(self.batch_shape, "torque")
         self.load = Held(self.batch_shape, "vertical_load", vehicle.static_loads)
         self.slow: BoolArray = np.zeros(self.batch_shape, dtype=np.bool_)
-        self.renewed: BoolArray = np.zeros(self.batch_shape, dtype=np.bool_)
-        self._any_slow = self._any_renewed = False
+        self._any_slow = False
         self._none: BoolArray = np.zeros(self.batch_shape, dtype=np.bool_)
         self._none.flags.writeable = False
 
@@ -128,8 +127,7 @@ class WheelInputs(Memory):
         if no_torque is not None:
             raise_flag(flags, no_torque, Flag.MISSING_INPUT)
             broken = stopped | no_torque
-        raise_flag(flags, self.renewed, Flag.RESET)
-        self.renewed, self._any_renewed = np.zeros(self.batch_shape, dtype=np.bool_), False
+        self._flag_renewed(flags)
         return WheelSignals(speed, moment, load, no_speed, broken, stopped, flags, False)
 
     def forget(self, where: npt.ArrayLike | None) -> BoolArray:
@@ -138,10 +136,9 @@ class WheelInputs(Memory):
         for part in (self.speed, self.torque, self.load):
             part.forget(chosen)
         self.slow = self.slow & ~chosen
-        self.renewed = self.renewed | chosen
-        self._any_renewed = bool(self.renewed.any())
+        self._renew(chosen)
         return chosen
 
     def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
         super()._take(saved)
-        self._any_slow, self._any_renewed = bool(self.slow.any()), bool(self.renewed.any())
+        self._any_slow = bool(self.slow.any())

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.errors import EstimatorError
+from estimators.faults import BoolArray
 from estimators.filters import UnscentedKalmanFilter
-from estimators.forces.interval import SpeedInterval
-from estimators.forces.wheel import WheelForceStep, WheelInputs
+from estimators.filters.scalar import ScalarKalmanFilter, ScalarStep
+from estimators.forces.interval import IntervalObserver, MeanForce
+from estimators.forces.wheel import WheelForceStep, WheelSignals
 from estimators.interpolate import FloatArray
 from estimators.signals.checks import setting
-from estimators.signals.memory import Memory
 from estimators.vehicle import VehicleParameters
 
+METHODS = ("unscented", "linear")
 
-class WheelForceFilter(Memory):
+
+class WheelForceFilter(IntervalObserver):
     """f_k+1 = f_k + rho_k, z_k = w_k = w_j + n Ts/I_w (T - R_e f - C_b w_j) + nu_k: P2 (10)-(12), per corner.
 
     w_j is the last new wheel speed, n samples ago, T the mean torque since then; with n = 1 this is P2 with its function
@@ -28,7 +32,8 @@ class WheelForceFilter(Memory):
 
     While a force cannot be known (wheel stopped, torque or speed missing) it fades to zero, with a variance that
     returns to the square of the load (friction about 1): covariances do not run away. The reported deviation adds to the
-    filter's own half of what the measured force changed since the last sample: m is a mean over the interval.
+    filter's own half of what the measured force changed since the last sample: m is a mean over the interval. The
+    innovation of a step is w - what, rad/s.
 
     Args:
         vehicle: radii, wheel inertia, rolling resistance.
@@ -38,9 +43,10 @@ class WheelForceFilter(Memory):
         speed_deviation: rad/s, of the wheel speed sensor.
         bearing_friction: C_b, N m s/rad.
         stopped_below, fade_time: as `WheelInputs`.
+        method: "unscented", as published, or "linear": the same filter, faster, as the model is linear.
 
     Raises:
-        EstimatorError: a shape without corners, a setting that is not positive.
+        EstimatorError: a shape without corners, a setting that is not positive, an unknown method.
     """
 
     memory = ("before",)
@@ -56,59 +62,70 @@ class WheelForceFilter(Memory):
         bearing_friction: float = 0.0,
         stopped_below: float = 1.0,
         fade_time: float = 0.2,
+        method: Literal["unscented", "linear"] = "unscented",
     ) -> None:
-        self.inputs = WheelInputs(vehicle, sample_time, batch_shape, stopped_below, fade_time)
-        self.batch_shape = self.inputs.batch_shape
-        self.interval = SpeedInterval(self.batch_shape, sample_time, self.inputs.radius, self.inputs.inertia)
+        if method not in METHODS:
+            raise EstimatorError(f"method = {method!r} is not known; use 'unscented' or 'linear'")
+        super().__init__(vehicle, sample_time, batch_shape, stopped_below, fade_time)
+        self.method = method
         self.process_variance = setting(force_rate, "force_rate", "N/sqrt(s)") ** 2 * self.inputs.sample_time
         self.measurement_variance = 2.0 * setting(speed_deviation, "speed_deviation", "rad/s") ** 2
         self._friction = setting(bearing_friction, "bearing_friction", "N m s/rad", low_allowed=True)
-        self._prior = np.broadcast_to(vehicle.static_loads**2, self.batch_shape)[..., None, None]
+        self._prior = np.broadcast_to(vehicle.static_loads**2, self.batch_shape)
         self.before: FloatArray = np.zeros(self.batch_shape)
-        self.filter = UnscentedKalmanFilter(np.zeros((*self.batch_shape, 1)), self._prior)
-
-    def step(
-        self,
-        wheel_speed: npt.ArrayLike,
-        torque: npt.ArrayLike,
-        vertical_load: npt.ArrayLike | None = None,
-        fresh: npt.ArrayLike | None = None,
-    ) -> WheelForceStep:
-        """Takes one sample of the batch shape: rad/s, N m (what acted since the last sample), N.
-
-        `fresh` marks new wheel speeds; None: all. The innovation is w - what, rad/s.
-
-        Raises:
-            EstimatorError: another shape, or not numbers.
-        """
-        signals = self.inputs(wheel_speed, torque, vertical_load)
-        mean = self.interval(signals, fresh)
-        lost = ~(mean.used | mean.waiting)
-        fade = np.where(lost, self.inputs.fade, 1.0)[..., None]
-        noise = np.where(lost, (1.0 - self.inputs.fade**2) * self._prior[..., 0, 0], self.process_variance)
-        self.filter.predict(lambda f: fade * f, noise[..., None, None])
-        reach = mean.samples * self.inputs.sample_time / self.inputs.inertia
-        free = mean.before + reach * (mean.torque - self._friction * mean.before)
-        pull = reach * self.inputs.radius
-        y = np.where(mean.used, signals.speed, np.nan)[..., None]
-        n = mean.samples
-        within = self.process_variance * pull**2 * (n - 1.0) * (2.0 * n - 1.0) / (6.0 * n)
-        noise = (self.measurement_variance + within)[..., None, None]
-        found = self.filter.correct(y, lambda f: free[..., None] - pull[..., None] * f, noise)
-        used = found.used[..., 0]
-        change = np.where(used, 0.5 * np.absolute(mean.force - self.before), 0.0)
-        deviation: FloatArray = np.sqrt(found.covariance[..., 0, 0] + change**2)
-        self.before = np.where(used, mean.force, found.state[..., 0])
-        return WheelForceStep(
-            found.state[..., 0], deviation, found.innovation[..., 0], used, signals.stopped, lost, signals.flags
+        start, spread = np.zeros((*self.batch_shape, 1)), self._prior[..., None, None]
+        self.filter: UnscentedKalmanFilter | ScalarKalmanFilter = (
+            UnscentedKalmanFilter(start, spread) if method == "unscented" else ScalarKalmanFilter(start, spread)
         )
 
-    def reset(self, where: npt.ArrayLike | None = None) -> None:
-        """Starts the entries `where` (bool mask of the batch shape; None: all) afresh; flagged RESET at the next step."""
-        chosen = self.inputs.forget(where)
-        self.interval.forget(chosen)
+    def _observed(self, signals: WheelSignals, mean: MeanForce) -> WheelForceStep:
+        n, walk = mean.samples, self.process_variance
+        reach = n * (self.inputs.sample_time / self.inputs.inertia)
+        free = mean.before + reach * (mean.torque - self._friction * mean.before)
+        pull = reach * self.inputs.radius
+        if mean.complete and n is self.interval.one:
+            lost = np.zeros(self.batch_shape, dtype=np.bool_)
+            found = self._filtered(1.0, walk, signals.speed, pull, free, self.measurement_variance)
+            change = 0.5 * (mean.force - self.before)
+            self.before = mean.force
+        else:
+            lost = ~(mean.used | mean.waiting)
+            fade = np.where(lost, self.inputs.fade, 1.0)
+            process = np.where(lost, (1.0 - self.inputs.fade**2) * self._prior, walk)
+            within = walk * pull**2 * (n - 1.0) * (2.0 * n - 1.0) / (6.0 * n)
+            speed = np.where(mean.used, signals.speed, np.nan)
+            found = self._filtered(fade, process, speed, pull, free, self.measurement_variance + within)
+            change = np.where(found.used, 0.5 * (mean.force - self.before), 0.0)
+            self.before = np.where(found.used, mean.force, found.state)
+        deviation: FloatArray = np.sqrt(found.variance + change * change)
+        return WheelForceStep(
+            found.state, deviation, found.innovation, found.used, signals.stopped.copy(), lost, signals.flags
+        )
+
+    def _restart(self, chosen: BoolArray) -> None:
         self.filter.reset(chosen)
         self.before = np.where(chosen, 0.0, self.before)
+
+    def _filtered(
+        self,
+        fade: FloatArray | float,
+        process: FloatArray | float,
+        speed: FloatArray,
+        pull: FloatArray,
+        free: FloatArray,
+        noise: FloatArray | float,
+    ) -> ScalarStep:
+        """f = fade f + rho, then speed = free - pull f + nu."""
+        if isinstance(self.filter, ScalarKalmanFilter):
+            self.filter.predict(fade, process)
+            return self.filter.correct(speed, -pull, noise, free)
+        kept, drag, offset = (np.asarray(value)[..., None] for value in (fade, pull, free))
+        Q, R = (np.asarray(value)[..., None, None] for value in (process, noise))
+        self.filter.predict(lambda f: kept * f, Q)
+        found = self.filter.correct(speed[..., None], lambda f: offset - drag * f, R)
+        return ScalarStep(
+            found.state[..., 0], found.covariance[..., 0, 0], found.innovation[..., 0], found.used[..., 0]
+        )
 
     @staticmethod
     def steady_gain(process_variance: float, noise_variance: float) -> float:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.faults import BoolArray
-from estimators.interpolate import FloatArray
 from estimators.pipeline.result import Check, Consistency
 from estimators.signals.checks import batch, entries, mask, setting
 from estimators.signals.memory import Memory
 from estimators.vehicle import GRAVITY, VehicleParameters
+from estimators.velocity.arithmetic import Number, arithmetic, kept_signals
 
 BALANCE = 0.6
 """m/s^2 that sum of F/m and acceleration may stay apart: 0.15 of bias, 2 % of torque at 0.5 g, drag at 30 m/s (0.3)."""
@@ -21,6 +21,8 @@ LOAD = 0.05
 """Relative."""
 VELOCITY = (0.5, 0.05)
 """m/s, and share of the speed."""
+_BITS = [int(check) for check in (Check.FORCE_BALANCE, Check.LATERAL_BALANCE, Check.LOAD_SUM, Check.CORNERS_DISAGREE)]
+_BITS += [int(check) for check in (Check.NO_WHEEL, Check.UNKNOWN_FORCE, Check.LATE_SAMPLE)]
 
 
 class CrossChecks(Memory):
@@ -49,7 +51,8 @@ class CrossChecks(Memory):
         self._gain = 1.0 - math.exp(
             -setting(sample_time, "sample_time", "s") / setting(memory_time, "memory_time", "s")
         )
-        self.gaps: FloatArray = np.zeros((*self.batch_shape, 3))
+        self._kit = arithmetic(self.batch_shape)
+        self.gaps: list[Number] = [self._kit.full(0.0)] * 3
 
     def __call__(
         self,
@@ -59,42 +62,46 @@ class CrossChecks(Memory):
         moved: Any,
         corners: Any,
         az: npt.ArrayLike | None,
-        unknown: BoolArray,
-        late: BoolArray | None,
+        unknown: Number,
+        late: Number,
     ) -> Consistency:
-        """One sample of the parts' steps; a gap that nobody measured is held."""
-        shape = self.batch_shape
-        new = np.empty((*shape, 3))
-        new[..., 0] = agreed.innovation / self.vehicle.mass
-        new[..., 1] = lateral.innovation[..., 1]
-        new[..., 2] = 0.0 if corners is None else moved.vx - corners.vx
-        change = self._gain * (new - self.gaps)
-        if not math.isfinite(float(change.sum())):
-            change = np.where(np.isfinite(change), change, 0.0)
-        self.gaps = self.gaps + change
-        up = GRAVITY if az is None else entries(az, shape, "az")
-        known = np.isfinite(up) & (np.absolute(up) > 0.1 * GRAVITY)
-        weight = self.vehicle.mass * np.where(known, up, GRAVITY)
-        load_gap = np.where(known, np.add.reduce(loads.load, -1) / weight - 1.0, 0.0)
-        size = np.absolute(self.gaps)
-        failed = np.zeros(shape, dtype=np.int32)
-        limit = VELOCITY[0] + VELOCITY[1] * np.absolute(moved.vx)
+        """One sample of the parts' steps; a gap that nobody measured is held. `unknown`: the force of any wheel is."""
+        kit, shape, choose, mass = self._kit, self.batch_shape, self._kit.where, self.vehicle.mass
+        own, speed = kit.own, kit.own(moved.vx)
+        apart = 0.0 if corners is None else speed - own(corners.vx)
+        new = (own(agreed.innovation) / mass, own(lateral.innovation[..., 1]), apart)
+        gaps = []
+        for value, gap in zip(new, self.gaps, strict=True):
+            change = self._gain * (value - gap)
+            gaps.append(gap + choose(abs(change) < math.inf, change, 0.0))
+        self.gaps = gaps
+        up = GRAVITY if az is None else own(entries(az, shape, "az"))
+        known = (abs(up) > 0.1 * GRAVITY) & (abs(up) < math.inf)
+        load = kit.rows(loads.load, 4)
+        weight = mass * choose(known, up, GRAVITY)
+        load_gap = choose(known, (load[0] + load[1] + load[2] + load[3]) / weight - 1.0, 0.0)
+        wheels = kit.rows(moved.used, 4)
+        supported = wheels[0] | wheels[1] | wheels[2] | wheels[3] | own(moved.standing)
         found = (
-            (Check.FORCE_BALANCE, size[..., 0] > BALANCE),
-            (Check.LATERAL_BALANCE, size[..., 1] > BALANCE),
-            (Check.LOAD_SUM, np.absolute(load_gap) > LOAD),
-            (Check.CORNERS_DISAGREE, size[..., 2] > limit),
-            (Check.NO_WHEEL, ~(np.logical_or.reduce(moved.used, -1) | moved.standing)),
-            (Check.UNKNOWN_FORCE, np.logical_or.reduce(unknown, -1)),
+            abs(gaps[0]) > BALANCE,
+            abs(gaps[1]) > BALANCE,
+            abs(load_gap) > LOAD,
+            abs(gaps[2]) > VELOCITY[0] + VELOCITY[1] * abs(speed),
+            kit.no(supported),
+            unknown,
+            late,
         )
-        for check, bad in found:
-            failed |= int(check) * np.asarray(bad).astype(np.int32)
-        if late is not None:
-            failed |= int(Check.LATE_SAMPLE) * late.astype(np.int32)
-        gaps = self.gaps.copy()
-        return Consistency(gaps[..., 0], gaps[..., 1], load_gap, gaps[..., 2], failed)
+        failed = 0
+        for bit, bad in zip(_BITS, found, strict=True):
+            failed = failed | choose(bad, bit, 0)
+        told = kit.table(((gaps[0], gaps[1], load_gap, gaps[2]),), shape)
+        sums = np.asarray(failed, dtype=np.int32).reshape(shape)
+        return Consistency(told[..., 0], told[..., 1], told[..., 2], told[..., 3], sums)
 
     def reset(self, where: npt.ArrayLike | None = None) -> None:
         """Forgets the gaps of the entries `where` (bool mask; None: all)."""
-        chosen = mask(where, self.batch_shape, "where")
-        self.gaps = np.where(chosen[..., None], 0.0, self.gaps)
+        chosen = self._kit.own(mask(where, self.batch_shape, "where"))
+        self.gaps = [self._kit.where(chosen, 0.0, gap) for gap in self.gaps]
+
+    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+        self.gaps = list(kept_signals(saved["gaps"], math.prod(self.batch_shape) == 1))

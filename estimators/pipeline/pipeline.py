@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray
 from estimators.forces import (
     LateralForceEstimator,
@@ -19,19 +20,21 @@ from estimators.forces import (
 )
 from estimators.interpolate import FloatArray
 from estimators.pipeline.checks import CrossChecks
+from estimators.pipeline.parts import CORNER_PARTS, check_parts
+from estimators.pipeline.readings import WheelReadings
 from estimators.pipeline.result import PipelineStep
 from estimators.pipeline.signals import VehicleSignals
 from estimators.signals import FilteredDerivative
-from estimators.signals.checks import any_missing, batch, entries, mask, quiet, setting
-from estimators.signals.held import Held
+from estimators.signals.checks import batch, entries, mask, setting
 from estimators.signals.memory import Memory
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity import VelocityFusion
+from estimators.velocity.arithmetic import Arithmetic, Number, arithmetic, kept_signals
+from estimators.velocity.slip import LEAST_SPEED
 
 REAL_SENSORS = (0.3, 0.1, 0.3)
 """m/s^2, m/s^2, rad/s^2: deviations of a_x, a_y, dr/dt for the lateral forces, sensors and model together."""
 _LIFTED = 0.05  # share of its static load below which a wheel's F/F_z means nothing
-_LEAST_SPEED = 0.5  # m/s by which V_y is divided at least
 _LATE = 0.5  # relative error of the sample time beyond which a difference quotient of wheel speeds is no acceleration
 _FASTEST_BODY = 100.0  # m/s^2: an accelerometer of a car reads no more
 
@@ -71,8 +74,8 @@ class EstimationPipeline(Memory):
         EstimatorError: a setting that is not positive, a part for another batch or sample time.
     """
 
-    memory = ("bias", "front", "speed", "last", "age", "drive")
-    unknowns = ("last", "drive")
+    memory = ("bias", "front", "angle", "speed", "drive")
+    unknowns = ("drive",)
 
     def __init__(
         self,
@@ -102,22 +105,22 @@ class EstimationPipeline(Memory):
         self.attitude, self.corner_observers, self.sideslip = attitude, corner_observers, sideslip
         self.yaw_slope = FilteredDerivative(time, 0.02, shape)
         self.checks = CrossChecks(vehicle, time, shape)
-        self.angle = Held(shape, "steer")
-        self._four = ("longitudinal_force",)  # parts whose batch has the corners on a last axis
+        self.readings = WheelReadings(four, max(1, round(setting(repeat_time, "repeat_time", "s") / time)))
         names = ("longitudinal_force", "loads", "attitude", "lateral_force", "velocity", "corner_observers", "sideslip")
-        self._named = (*(name for name in names if getattr(self, name) is not None), "yaw_slope", "checks", "angle")
-        self._check_parts()
+        own = ("yaw_slope", "checks", "readings")
+        self._named = (*(name for name in names if getattr(self, name) is not None), *own)
+        check_parts({name: getattr(self, name) for name in self._named}, shape, time, CORNER_PARTS)
         self.parts = tuple(name for name in self._named if hasattr(getattr(self, name), "save"))
         self._total_deviation = vehicle.mass * setting(acceleration_deviation, "acceleration_deviation", "m/s^2")
-        self._hold = max(1, round(setting(repeat_time, "repeat_time", "s") / time))
         self._least_load = _LIFTED * vehicle.static_loads
-        self._level = np.zeros(shape)
-        self.bias: FloatArray = np.zeros((*shape, 2))  # of a_x, a_y, m/s^2, up to the last sample
-        self.front: FloatArray = np.zeros(shape)  # F_yf of the last sample, N
-        self.speed: FloatArray = np.zeros((*shape, 3))  # V_x, V_y, r of the last sample
-        self.last: FloatArray = np.full(four, np.nan)  # wheel speeds of the last sample, as read
-        self.age: npt.NDArray[np.int64] = np.zeros(four, dtype=np.int64)
-        self.drive: FloatArray = np.full(shape, np.nan)  # sum of the wheels' own F_x over m, m/s^2, where all are known
+        self._kit = kit = arithmetic(shape)
+        self._single = math.prod(shape) == 1
+        self._level, self._never = np.zeros(shape), kit.full(False)
+        self.bias: list[Number] = [kit.full(0.0)] * 2  # of a_x, a_y, m/s^2, up to the last sample
+        self.front: Number = kit.full(0.0)  # F_yf of the last sample, N
+        self.angle: Number = kit.full(0.0)  # the last known steering of the front wheels, rad
+        self.speed: list[Number] = [kit.full(0.0)] * 3  # V_x, V_y, r of the last sample
+        self.drive: Number = kit.full(math.nan)  # sum of the wheels' own F_x over m, m/s^2, where all are known
 
     def step(self, signals: VehicleSignals) -> PipelineStep:
         """One sample on.
@@ -125,31 +128,30 @@ class EstimationPipeline(Memory):
         Raises:
             EstimatorError: a signal of another shape, or not numbers.
         """
-        shape, car = self.batch_shape, self.vehicle
-        w, steer, torque, ax, ay, turn = signals.arrays(shape)
-        read_x, read_y = _possible(ax), _possible(ay)
+        kit, shape, car, choose = self._kit, self.batch_shape, self.vehicle, self._kit.where
+        w, steer, torque, *body = signals.arrays(shape)
+        ax, ay, turn = (kit.own(value) for value in body)
+        read_x, read_y = _possible(kit, ax), _possible(kit, ay)
         late = self._late(signals.elapsed)
-        fresh = self._fresh(w)
+        fresh = self.readings.step(w)
         tilt, own_x, own_y, free_x, free_y = self._tilted(signals, read_x, read_y, turn)
-        own_x, own_y = own_x - self.bias[..., 0], own_y - self.bias[..., 1]
-        loads = self.loads.step(
-            read_x - self.bias[..., 0],
-            read_y - self.bias[..., 1],
-            signals.az,
-            None if tilt is None else tilt.pitch,
-            None if tilt is None else tilt.roll,
-        )
+        own_x, own_y = own_x - self.bias[0], own_y - self.bias[1]
+        lean, rise = (None, None) if tilt is None else (tilt.roll, tilt.pitch)
+        loads = self.loads.step(read_x - self.bias[0], read_y - self.bias[1], signals.az, rise, lean)
         wheels = self.longitudinal_force.step(w, torque, loads.load, fresh=fresh)
-        unknown = wheels.unknown if late is None else wheels.unknown | late[..., None]
-        angle = self._front_angle(steer)
-        total = car.mass * own_x + self.front * np.sin(self.angle(angle)[0])
+        delayed = kit.some(late)
+        unknown = wheels.unknown | np.asarray(late)[..., None] if delayed else wheels.unknown
+        front = kit.rows(steer, 4)
+        angle = 0.5 * (front[0] + front[1])
+        self.angle = choose(abs(angle) < math.inf, angle, self.angle)
+        total = car.mass * own_x + self.front * kit.sin(self.angle)
         agreed = reconcile(wheels.force, wheels.deviation, total, self._total_deviation, loads.load, unknown)
         use = self._normalised(agreed.force, loads.load, unknown)
         if tilt is None:  # untouched: the velocity part tells the impossible from the missing
             free_x, free_y = ax, ay
         moved = self.velocity.step(w, steer, free_x, free_y, turn, use, signals.elapsed)
-        swing = self.yaw_slope.step(turn if late is None else np.where(late, np.nan, turn)).derivative
-        swing = swing if quiet(turn) else np.where(np.isfinite(turn), swing, np.nan)
+        swing = self.yaw_slope.step(choose(late, math.nan, turn) if delayed else turn).derivative
+        swing = choose(abs(turn) < math.inf, kit.own(swing), math.nan)
         lateral = self.lateral_force.step(own_x, own_y, swing, angle, agreed.force, loads.load)
         corners = None
         if self.corner_observers is not None:
@@ -157,26 +159,27 @@ class EstimationPipeline(Memory):
             corners = self.corner_observers.step(w, steer, own_x, own_y, turn, use, across, moved.vy)
         beside = None
         if self.sideslip is not None:
-            beside = self.sideslip.step(
-                angle, turn, moved.vx, own_x, own_y, agreed.force, loads.load, lateral.axle_force
-            )
-        consistency = self.checks(agreed, lateral, loads, moved, corners, signals.az, unknown, late)
-        self.bias = np.array(moved.sensor_bias[..., :2])
-        self.front = lateral.axle_force[..., 0].copy()
-        self.speed = np.stack([moved.vx, moved.vy, moved.yaw_rate], axis=-1)
-        if tilt is not None:
-            self.drive = np.where(unknown.any(axis=-1), np.nan, wheels.force.sum(axis=-1) / car.mass)
+            bare = np.asarray(angle), np.asarray(turn), moved.vx, np.asarray(own_x), np.asarray(own_y)
+            beside = self.sideslip.step(*bare, agreed.force, loads.load, lateral.axle_force)
+        lost = kit.own(np.logical_or.reduce(unknown, -1))
+        consistency = self.checks(agreed, lateral, loads, moved, corners, signals.az, lost, late)
+        self.bias = kit.rows(moved.sensor_bias, 3)[:2]
+        self.front = kit.own(lateral.axle_force[..., 0])
+        vx, vy = self.speed[:2] = kit.own(moved.vx), kit.own(moved.vy)
+        self.speed[2] = kit.own(moved.yaw_rate)
         flags: FlagArray = moved.flags | loads.flags | lateral.flags
         if tilt is not None:
+            self.drive = choose(lost, math.nan, kit.own(wheels.force.sum(axis=-1)) / car.mass)
             flags = flags | tilt.flags
-        if late is not None:
-            flags = flags | np.where(late, np.int32(Flag.STALE_MEASUREMENT), np.int32(0))
+        if delayed:
+            flags = flags | np.asarray(choose(late, int(Flag.STALE_MEASUREMENT), 0), dtype=np.int32)
+        sideslip = kit.atan(vy / kit.maximum(abs(vx), LEAST_SPEED))
         return PipelineStep(
             vx=moved.vx,
             vy=moved.vy,
             vx_deviation=moved.vx_deviation,
             vy_deviation=moved.vy_deviation,
-            sideslip=np.arctan(moved.vy / np.maximum(np.absolute(moved.vx), _LEAST_SPEED)),
+            sideslip=np.asarray(sideslip).reshape(shape),
             yaw_rate=moved.yaw_rate,
             force_x=agreed.force,
             force_x_deviation=agreed.deviation,
@@ -212,59 +215,31 @@ class EstimationPipeline(Memory):
         corners = np.repeat(chosen[..., None], 4, axis=-1)
         for name in self._named:
             part = getattr(self, name)
-            if isinstance(part, Held):
-                part.forget(chosen)
             if not hasattr(part, "reset"):
                 continue
             if name == "velocity":
                 part.reset(chosen, vx, vy)
             else:
-                part.reset(corners if name in self._four else chosen)
-        self.bias = np.where(chosen[..., None], 0.0, self.bias)
-        self.front = np.where(chosen, 0.0, self.front)
-        self.speed = np.where(chosen[..., None], 0.0, self.speed)
-        self.last, self.age = np.where(corners, np.nan, self.last), np.where(corners, 0, self.age)
-        self.drive = np.where(chosen, np.nan, self.drive)
+                part.reset(corners if name in CORNER_PARTS else chosen)
+        here, choose = self._kit.own(chosen), self._kit.where
+        self.bias = [choose(here, 0.0, value) for value in self.bias]
+        self.speed = [choose(here, 0.0, value) for value in self.speed]
+        self.front, self.angle = choose(here, 0.0, self.front), choose(here, 0.0, self.angle)
+        self.drive = choose(here, math.nan, self.drive)
 
-    def _check_parts(self) -> None:
-        for name in self._named:
-            part, shape = getattr(self, name), self.batch_shape
-            own = getattr(part, "batch_shape", None)
-            wanted = (*shape, 4) if name in self._four else shape
-            if own is not None and tuple(own) != wanted:
-                raise EstimatorError(f"{name} has batch_shape {tuple(own)}, expected {wanted}; build it for that batch")
-            time = getattr(part, "sample_time", None)
-            if time is not None and abs(time - self.sample_time) > 1e-9 * self.sample_time:
-                raise EstimatorError(
-                    f"{name} is for sample_time = {time:g} s, the pipeline runs at {self.sample_time:g} s; build both for one"
-                )
+    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+        super()._take(saved)
+        for name in ("bias", "speed"):
+            setattr(self, name, list(kept_signals(saved[name], self._single)))
+        for name in ("front", "angle", "drive"):
+            setattr(self, name, self._kit.own(saved[name].copy()))
 
-    def _late(self, elapsed: npt.ArrayLike | None) -> BoolArray | None:
-        """Where the sample came so early or late that a difference quotient over it is no derivative; None: nowhere."""
+    def _late(self, elapsed: npt.ArrayLike | None) -> Number:
+        """Where the sample came so early or late that a difference quotient over it is no derivative."""
         if elapsed is None:
-            return None
-        given = entries(elapsed, self.batch_shape, "elapsed")
-        with np.errstate(invalid="ignore"):
-            odd: BoolArray = ~(np.absolute(given / self.sample_time - 1.0) <= _LATE)
-        return odd if odd.any() else None
-
-    def _fresh(self, wheel_speed: FloatArray) -> BoolArray | None:
-        """Which wheel speeds are new; None: all of them."""
-        same: BoolArray = wheel_speed == self.last
-        self.last = wheel_speed.copy()
-        if self._hold == 1 or not np.count_nonzero(same):
-            if self.age.any():
-                self.age = np.zeros_like(self.age)
-            return None
-        age = np.where(same, self.age + 1, 0)
-        fresh = ~same | (age >= self._hold)
-        self.age = np.where(fresh, 0, age)
-        return fresh
-
-    def _front_angle(self, steer: FloatArray) -> FloatArray:
-        """(...) rad, mean of both front wheels; NaN where one is missing."""
-        angle: FloatArray = 0.5 * (steer[..., 0] + steer[..., 1])
-        return angle
+            return self._never
+        given = self._kit.own(entries(elapsed, self.batch_shape, "elapsed"))
+        return self._kit.no(abs(given / self.sample_time - 1.0) <= _LATE)
 
     def _normalised(self, force: FloatArray, load: FloatArray, unknown: BoolArray | None) -> FloatArray:
         """F/F_z (..., 4); NaN where a wheel is off the ground, or its force is a mere share of the total."""
@@ -277,33 +252,30 @@ class EstimationPipeline(Memory):
         return np.where(lifted, np.nan, force / np.where(lifted, 1.0, load))
 
     def _tilted(
-        self, signals: VehicleSignals, ax: FloatArray, ay: FloatArray, turn: FloatArray
-    ) -> tuple[Any, FloatArray, FloatArray, FloatArray, FloatArray]:
+        self, signals: VehicleSignals, ax: Number, ay: Number, turn: Number
+    ) -> tuple[Any, Number, Number, Number, Number]:
         """The attitude step, a_x and a_y level with the road (forces), and without gravity (velocities), m/s^2."""
         if self.attitude is None:
             return None, ax, ay, ax, ay
-        spin = self.speed[..., 2]
-        nothing = np.nan
+        nothing, shape, kit = math.nan, self.batch_shape, self._kit
         tilt = self.attitude.step(
             nothing if signals.roll_rate is None else signals.roll_rate,
             nothing if signals.pitch_rate is None else signals.pitch_rate,
-            ax - self.bias[..., 0],
-            ay - self.bias[..., 1],
+            ax - self.bias[0],
+            ay - self.bias[1],
             motion_x=self.drive,
-            motion_y=spin * self.speed[..., 0],
+            motion_y=self.speed[2] * self.speed[0],
             yaw_rate=turn,
             grade=signals.grade,
             bank=signals.bank,
         )
-        up = np.full(self.batch_shape, GRAVITY) if signals.az is None else entries(signals.az, self.batch_shape, "az")
-        if any_missing(~np.isfinite(up)[..., None], self.batch_shape).any():
-            up = np.where(np.isfinite(up), up, GRAVITY)
+        up = GRAVITY if signals.az is None else kit.own(entries(signals.az, shape, "az"))
+        up = kit.where(abs(up) < math.inf, up, GRAVITY)
         own_x, own_y, _ = levelled(ax, ay, up, tilt.pitch, tilt.roll)
-        return tilt, own_x, own_y, *without_gravity(ax, ay, tilt.total_roll, tilt.total_pitch)
+        free = without_gravity(ax, ay, tilt.total_roll, tilt.total_pitch)
+        return tilt, *(kit.own(value) for value in (own_x, own_y, *free))
 
 
-def _possible(value: FloatArray) -> FloatArray:
+def _possible(kit: Arithmetic, value: Number) -> Number:
     """NaN for what no accelerometer of a car reads."""
-    if quiet(value) and np.maximum.reduce(np.absolute(value), None) <= _FASTEST_BODY:
-        return value
-    return np.where(np.absolute(value) <= _FASTEST_BODY, value, np.nan)
+    return kit.where(abs(value) <= _FASTEST_BODY, value, math.nan)

@@ -13,9 +13,10 @@ from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.filters import ExtendedKalmanFilter, FilterStep, UnscentedKalmanFilter
 from estimators.filters.step import broadcast, diagonal
+from estimators.filters.workspace import Workspace
 from estimators.interpolate import FloatArray
 from estimators.sideslip.dugoff import used_friction
-from estimators.sideslip.four_wheel_model import FourWheelModel
+from estimators.sideslip.four_wheel_model import AFFINE_FROM, FourWheelModel
 from estimators.sideslip.inputs import HeldInput, check_saved, checked_noise
 from estimators.sideslip.vehicle import FourWheel, positive
 
@@ -105,6 +106,7 @@ class FourWheelObserver:
         self._steering = HeldInput("steering", np.zeros(self._count), -STEERING_LIMIT, STEERING_LIMIT)
         self._loads = HeldInput("loads", static, 0.0, LOAD_LIMIT, axes=1)
         self._renewed = np.zeros(self._count, dtype=np.bool_)
+        self._memory = Workspace()
 
     @property
     def state(self) -> FloatArray:
@@ -139,15 +141,12 @@ class FourWheelObserver:
         for part, each in zip(self._parts, self._filters, strict=True):
             rest[part] = ~(each.state[:, 1] >= self.standstill_speed)
             stands = rest[part] if rest[part].any() else None
-            old = FourWheelModel.at(
-                self.vehicle, self.sample_time, before[0][part], before[1][part], self.standstill_speed, stands
-            )
-            new = FourWheelModel.at(
-                self.vehicle, self.sample_time, angle[part], load[part], self.standstill_speed, stands
-            )
+            rest_of_model = self.standstill_speed, stands, self._memory
+            old = FourWheelModel.at(self.vehicle, self.sample_time, before[0][part], before[1][part], *rest_of_model)
+            new = FourWheelModel.at(self.vehicle, self.sample_time, angle[part], load[part], *rest_of_model)
             if isinstance(each, UnscentedKalmanFilter):
-                held = each.predict(old.transition_of_points, self._process)
-                result = each.correct(measured[part], new.measurement, self._sensor, self.gate)
+                held = each.predict(old.transition_of_points, self._process, AFFINE_FROM)
+                result = each.correct(measured[part], new.measurement_of_points, self._sensor, self.gate, affine_from=0)
             else:
                 held = each.predict(old.transition, old.transition_jacobian, self._process)
                 result = each.correct(

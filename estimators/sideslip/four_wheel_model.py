@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimators.faults import BoolArray
+from estimators.filters.workspace import Workspace
 from estimators.interpolate import FloatArray
 from estimators.sideslip.dugoff import LEAST_KNEE, dugoff_force, dugoff_slope
 from estimators.sideslip.vehicle import FourWheel
@@ -25,7 +26,9 @@ STATES = (
     ("lateral_force_rear_right", "N"),
     ("longitudinal_force_front", "N"),
 )
-_DISTINCT = [0, 1, 2, 3, 9, 10, 11]  # sigma points that differ in the first three states
+AFFINE_FROM = 3
+"""The first state in which the transition is affine while those before it are held: the forces."""
+_DISTINCT = [0, 1, 2, 3, 9, 10, 11]  # of the sigma points, those that differ in the first three states
 REST_TIME = 0.1  # s, with which sideslip and lateral forces fade away at standstill
 
 
@@ -46,6 +49,7 @@ class FourWheelModel(NamedTuple):
     knees: FloatArray  # (4, b) tan(alpha) = mu F_z / (2 C) up to which a tire is linear
     slow: float  # m/s
     at_rest: BoolArray | None  # (b); None: nowhere
+    memory: Workspace  # of `transition_of_points`
 
     @classmethod
     def at(
@@ -56,21 +60,24 @@ class FourWheelModel(NamedTuple):
         loads: FloatArray,
         slow: float,
         at_rest: BoolArray | None = None,
+        memory: Workspace | None = None,
     ) -> FourWheelModel:
-        """From the steering angle (b) in rad and the loads (b, 4) in N."""
+        """From the steering angle (b) in rad and the loads (b, 4) in N; `memory` None: fresh."""
         limits = np.moveaxis(loads, -1, 0) * (0.5 * vehicle.friction)
         knees = np.maximum(limits / _stiffness(vehicle, steering.ndim), LEAST_KNEE)
-        return cls(vehicle, sample_time, np.sin(steering), np.cos(steering), knees, slow, at_rest)
+        return cls(
+            vehicle, sample_time, np.sin(steering), np.cos(steering), knees, slow, at_rest, memory or Workspace()
+        )
 
     def transition(self, x: FloatArray) -> FloatArray:
         """X + T f(X, U), P4 (11); x (..., 8)."""
         return self._moved(x, None)
 
     def transition_of_points(self, x: FloatArray) -> FloatArray:
-        """`transition` of the sigma points (17, ..., 8) of a lower triangular factor.
+        """`transition` of the sigma points (12, ..., 8) of a lower triangular factor with `AFFINE_FROM`.
 
         Its last five columns leave yaw rate, speed and sideslip as they are at the centre, and with them the slip
-        angles: the tires are evaluated at seven points instead of seventeen.
+        angles: the tires are evaluated at seven points instead of twelve. The result is good until the next call.
         """
         return self._moved(x, _DISTINCT)
 
@@ -78,7 +85,8 @@ class FourWheelModel(NamedTuple):
         v, time = self.vehicle, self.sample_time
         yaw, beta, drive = x[..., 0], x[..., 2], x[..., 7]
         forces = x.transpose(x.ndim - 1, *range(x.ndim - 1))[3:7]
-        out = np.empty((8, *x.shape[:-1]))
+        shape = x.shape[:-1]
+        out = np.empty((8, *shape)) if distinct is None else self.memory("moved", (8, *shape))
         targets = out[3:7]
         if distinct is None:
             speed = np.maximum(x[..., 1], self.slow)
@@ -86,9 +94,10 @@ class FourWheelModel(NamedTuple):
             self._tangents(yaw, speed, beta, targets)
             self._saturate(targets)
         else:
-            pick = x[..., :3].transpose(x.ndim - 1, *range(x.ndim - 1))[:, distinct]
+            pick = self.memory("pick", (3, len(distinct), *shape[1:]))
+            x[..., :3].transpose(x.ndim - 1, *range(x.ndim - 1)).take(distinct, 1, pick)
             np.maximum(pick[1], self.slow, out=pick[1])
-            few = np.empty((4, *pick.shape[1:]))
+            few = self.memory("few", (4, *pick.shape[1:]))
             self._tangents(pick[0], pick[1], pick[2], few)
             self._saturate(few)
             speed, sine, cosine = (_all_points(part) for part in (pick[1:2], np.sin(pick[2:]), np.cos(pick[2:])))
@@ -178,12 +187,26 @@ class FourWheelModel(NamedTuple):
 
     def measurement(self, x: FloatArray) -> FloatArray:
         """Yaw rate, speed, a_x, a_y, P4 (12) with x_8 sin(u_1) in the last line; (..., 4)."""
-        front, rear, drive = x[..., 3] + x[..., 4], x[..., 5] + x[..., 6], x[..., 7]
-        out = np.empty((4, *x.shape[:-1]))
+        return self._measured(x, np.empty((4, *x.shape[:-1])))
+
+    def measurement_of_points(self, x: FloatArray) -> FloatArray:
+        """`measurement`, which is affine, of sigma points; good until the next call."""
+        return self._measured(x, self.memory("measured", (4, *x.shape[:-1])))
+
+    def _measured(self, x: FloatArray, out: FloatArray) -> FloatArray:
+        front, drive = x[..., 3] + x[..., 4], x[..., 7]
         out[0], out[1] = x[..., 0], x[..., 1]
-        out[2] = (drive * self.cosine - front * self.sine) / self.vehicle.mass
-        out[3] = (front * self.cosine + drive * self.sine + rear) / self.vehicle.mass
-        return np.moveaxis(out, 0, -1)
+        inverse = 1.0 / self.vehicle.mass
+        sine, cosine = self.sine * inverse, self.cosine * inverse
+        along, across = out[2, ...], out[3, ...]
+        np.multiply(drive, cosine, along)
+        along -= front * sine
+        np.add(x[..., 5], x[..., 6], across)
+        across *= inverse
+        front *= cosine
+        across += front
+        across += drive * sine
+        return out.transpose(*range(1, out.ndim), 0)
 
     def measurement_jacobian(self, x: FloatArray) -> FloatArray:
         """Derivative of `measurement`, (..., 4, 8)."""
@@ -251,10 +274,10 @@ class FourWheelModel(NamedTuple):
 
 
 def _all_points(few: FloatArray, out: FloatArray | None = None) -> FloatArray:
-    """From the points `_DISTINCT` (k, 7, ...) to all (k, 17, ...)."""
-    full = np.empty((few.shape[0], 17, *few.shape[2:])) if out is None else out
-    full[:, :4], full[:, 9:12] = few[:, :4], few[:, 4:]
-    full[:, 4:9] = full[:, 12:] = few[:, :1]
+    """From the points `_DISTINCT` (k, 7, ...) to all (k, 12, ...)."""
+    full = np.empty((few.shape[0], 12, *few.shape[2:])) if out is None else out
+    full[:, :4], full[:, 9:] = few[:, :4], few[:, 4:]
+    full[:, 4:9] = few[:, :1]
     return full
 
 

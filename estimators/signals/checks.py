@@ -12,6 +12,7 @@ from estimators.faults import BoolArray
 from estimators.interpolate import FloatArray
 
 LIMIT = 1e100  # a magnitude beyond it is treated as not finite: no physical quantity, and products would overflow
+_SMALL = 4096  # entries
 
 
 def entries(value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> FloatArray:
@@ -29,6 +30,15 @@ def entries(value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> FloatArr
     if array.ndim == 0:
         return np.broadcast_to(array, shape)
     raise EstimatorError(f"{what} has shape {array.shape}, expected {shape} or one number")
+
+
+def number(value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> float:
+    """`entries` for a shape of one entry, as a plain number.
+
+    Raises:
+        EstimatorError: not a number, or another shape.
+    """
+    return float(value) if isinstance(value, float) else float(entries(value, shape, what).item())
 
 
 def pair(
@@ -60,8 +70,13 @@ def bounded(value: FloatArray) -> BoolArray:
 
 
 def quiet(value: FloatArray) -> bool:
-    """Whether all entries are `bounded`, as one dot product: what every step asks first. False for NaN."""
-    return bool(np.vdot(value, value) <= LIMIT * LIMIT)
+    """Whether all entries are `bounded`: what every step asks first. False for NaN.
+
+    One dot product for small arrays; for large ones BLAS would start threads, and extrema are as fast.
+    """
+    if value.size <= _SMALL:
+        return bool(np.vdot(value, value) <= LIMIT * LIMIT)
+    return bool(np.minimum.reduce(value, None) >= -LIMIT and np.maximum.reduce(value, None) <= LIMIT)
 
 
 def any_missing(missing: BoolArray, shape: tuple[int, ...]) -> BoolArray:

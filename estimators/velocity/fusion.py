@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
-from estimators.interpolate import FloatArray
-from estimators.signals.checks import batch, entries, mask, setting
+from estimators.faults import Flag
+from estimators.signals.checks import batch, entries, mask, number, setting
 from estimators.signals.memory import Memory
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity import lateral_fusion as lateral
 from estimators.velocity import longitudinal_fusion as longitudinal
+from estimators.velocity.arithmetic import Number, Signals, arithmetic, kept_signals
+from estimators.velocity.fusion_lost import FusionLost
+from estimators.velocity.fusion_report import Judged, reported
 from estimators.velocity.fusion_screen import FusionScreen, Screened
 from estimators.velocity.fusion_settings import FusionSettings
+from estimators.velocity.fusion_standing import FusionStanding
 from estimators.velocity.fusion_step import FusionStep
-from estimators.velocity.slip import side_slip_angle, slip_ratio
 
+_MISSING_INPUT, _RESET = int(Flag.MISSING_INPUT), int(Flag.RESET)
 _LARGEST_FRICTION = 1.5  # a larger |F/F_z| is no tire's
 _FASTEST = 200.0  # m/s: an estimate beyond it is lost
+_FORGET = 0.05  # s after which parameters forget; they remember for 5 s at least, the slopes of the road at 40 m/s
 _WIDEST = 50.0  # m/s of standard deviation: a wider one says no more, and is kept from growing
 
 
@@ -30,7 +36,10 @@ class VelocityFusion(Memory):
 
     Which wheel to believe is decided at every sample from what its force explains (`longitudinal_fusion`); V_y comes
     from the kinematics and from the side slip that the axle forces demand (`lateral_fusion`). At standstill both
-    speeds and the yaw rate are zero, which gives the biases. Wheel speeds are signed: backwards is negative.
+    speeds and the yaw rate are zero, which gives the biases. An estimate that rolling wheels contradict for long is
+    lost and starts again from them (`fusion_lost`). Wheel speeds are signed: backwards is negative.
+
+    One car runs on plain numbers, several on arrays, by the same formulas (`arithmetic`).
 
     Args:
         vehicle: masses and lengths; `effective_radius` is where learning starts.
@@ -42,8 +51,8 @@ class VelocityFusion(Memory):
         EstimatorError: a sample time outside (0, 1] s, a batch without entries.
     """
 
-    memory = ("new", "renewed", "start", "calm")
-    parts = ("screen", "longitudinal_filter", "lateral_filter")
+    memory = ("new", "renewed", "start")
+    parts = ("screen", "longitudinal_filter", "lateral_filter", "lost", "standing")
     unknowns = ("start",)
 
     def __init__(
@@ -57,18 +66,22 @@ class VelocityFusion(Memory):
         self.sample_time = setting(sample_time, "sample_time", "s")
         if self.sample_time > 1.0:
             raise EstimatorError(f"sample_time = {self.sample_time:g} s is above 1 s; 0.005 s is usual, give seconds")
-        count = math.prod(self.batch_shape)
+        self._count = count = math.prod(self.batch_shape)
         self.settings = settings if settings is not None else FusionSettings()
-        self._x, self._y = vehicle.corner_x, vehicle.corner_y
-        self._radius = vehicle.radius
-        self._along = longitudinal.LongitudinalFusion(vehicle.radius, self.settings, count)
-        self._across = lateral.LateralFusion(vehicle, self.settings, count)
+        self._kit = kit = arithmetic((count,))
+        self._radius = kit.signals(vehicle.radii)
+        self._places = kit.signals(vehicle.corner_x.tolist()), kit.signals(vehicle.corner_y.tolist())
+        every = max(1, round(_FORGET / self.sample_time))
+        self._along = longitudinal.LongitudinalFusion(self._radius, self.settings, every, count)
+        self._across = lateral.LateralFusion(vehicle, self.settings, every, count)
         self.longitudinal_filter, self.lateral_filter = self._along.filter, self._across.filter
-        self.screen = FusionScreen(vehicle.radius, self.settings, count)
-        self.new: BoolArray = np.ones(count, dtype=np.bool_)  # waits for a first wheel speed
-        self.renewed: BoolArray = np.zeros(count, dtype=np.bool_)
-        self.start: FloatArray = np.full((count, 2), np.nan)  # V_x, V_y asked for by `reset`
-        self.calm: FloatArray = np.zeros(count)  # s of silent wheels and calm body
+        self.screen = FusionScreen(self._radius, self.settings, count)
+        self.lost = FusionLost(self.settings, count)
+        self.standing = FusionStanding(self.settings, self._along, self._across, count)
+        self.new: Number = kit.full(True)  # waits for a first wheel speed
+        self.renewed: Number = kit.full(False)
+        self.start: Signals = kit.stacked([kit.full(math.nan)] * 2)  # V_x, V_y asked for by `reset`
+        self._usual, self._never = kit.full(self.sample_time), kit.full(False)
 
     def step(
         self,
@@ -96,37 +109,44 @@ class VelocityFusion(Memory):
         Raises:
             EstimatorError: another shape, or not numbers.
         """
-        wheels, turned = self._entries(wheel_speed, "wheel_speed", 4), self._entries(steer, "steer", 4)
+        kit, along, across = self._kit, self._along, self._across
+        wheels, turned = self._four(wheel_speed, "wheel_speed"), self._four(steer, "steer")
         named = ((ax, "ax"), (ay, "ay"), (yaw_rate, "yaw_rate"))
-        inertial = np.concatenate([self._entries(value, name, 1) for value, name in named], axis=1)
+        inertial = kit.stacked([self._one(value, name) for value, name in named])
         dt, odd = self._elapsed(elapsed)
         seen = self.screen(inertial, wheels, turned, dt)
-        raise_flag(seen.flags, odd, Flag.MISSING_INPUT)
-        self._begin(seen.wheel_speed, seen.fresh)
-        a, b, r = seen.inertial.T
-        along, across = self._along, self._across
-        turn = across.yaw_rate(r)
-        before = along.speed.copy()
-        along.predict(dt, a, seen.noise[:, 0], turn, across.speed)
-        across.predict(dt, b, seen.noise[:, 1], r, seen.noise[:, 2], before)
-        force = self._force(normalised_force, a)
-        swing = self.screen.slope[:, 4]
-        left, spin = across.speed[:, None], turn[:, None]
-        pull = along.acceleration(a)[:, None] + spin * left - swing[:, None] * self._y
-        slipping = self.screen.slipping(pull, dt) & seen.fresh
-        sine, cosine = np.sin(seen.steer), np.cos(seen.steer)
-        shift = -spin * self._y * cosine + (left + spin * self._x) * sine
-        wheel = along.correct(dt, seen.wheel_speed, seen.fresh, slipping, force, (cosine, shift), pull)
-        standing = self._standing(seen.wheel_speed, seen.fresh, a, turn, seen.present, dt)
+        self._begin(seen)
+        a, b, r = seen.inertial
+        turn, before = across.yaw_rate(r), along.speed
+        along.predict(dt, a, seen.noise[0], turn, across.speed)
+        across.predict(dt, b, seen.noise[1], r, seen.noise[2], before)
+        mu = self._force(normalised_force, a)
+        swing, left, own = self.screen.swing, across.speed, along.acceleration(a) + turn * across.speed
+
+        def moves(angle: Number, x: Number, y: Number) -> tuple[Number, ...]:
+            sine, cosine = kit.sin(angle), kit.cos(angle)
+            return cosine, (left + turn * x) * sine - turn * y * cosine, own - swing * y, sine
+
+        *course, sine = kit.each(moves, seen.steer, *self._places)
+        slipping = self.screen.slipping(course[2], seen.fresh, dt)
+        wheel = along.correct(dt, seen, slipping, mu, b / GRAVITY, longitudinal.WheelCourse(*course))
+        standing, lost = self.standing(seen, a, turn, dt)
+        lost = lost | self.lost(dt, standing, seen, wheel, slipping, mu, self._radius)
         along.stand(standing)
-        usable = ~(slipping | wheel.gated).reshape(-1, 2, 2).any(axis=2) & seen.present[:, None]
-        usable[:, 0] &= seen.steered
-        steered = seen.steer.reshape(-1, 2, 2).mean(axis=2)
-        axle = across.correct(dt, b, r, swing, steered, along.speed, a, usable)
+        front = slipping[0] | slipping[1] | wheel.gated[0] | wheel.gated[1]
+        rear = slipping[2] | slipping[3] | wheel.gated[2] | wheel.gated[3]
+        usable = kit.stacked((seen.present & seen.steered & kit.no(front), seen.present & kit.no(rear)))
+        fl, fr, rl, rr = seen.steer
+        angles = kit.stacked((0.5 * (fl + fr), 0.5 * (rl + rr)))
+        axle = across.correct(dt, b, r, swing, angles, along.speed, a, usable)
         across.blind(dt, seen.blind)
         across.stand(standing, r)
-        self._guard(seen.flags, seen.wheel_speed)
-        return self._reported(seen, (sine, cosine), wheel, slipping, axle, standing)
+        flags = seen.flags | kit.where(odd, _MISSING_INPUT, 0) | kit.where(self.renewed, _RESET, 0)
+        self.renewed = self._never
+        self._guard(seen, lost)
+        judged = Judged(slipping, wheel, axle, standing, self.standing.stopped(seen.silent))
+        geometry = (sine, course[0], *self._places)
+        return reported(kit, self.batch_shape, along, across, seen, geometry, judged, flags)
 
     def reset(self, where: npt.ArrayLike | None = None, vx: npt.ArrayLike = np.nan, vy: npt.ArrayLike = 0.0) -> None:
         """Forgets the entries `where` (mask of the batch shape; None: all) and starts them at `vx`, `vy`, m/s.
@@ -136,132 +156,91 @@ class VelocityFusion(Memory):
         Raises:
             EstimatorError: a mask or speeds of another shape.
         """
-        chosen = mask(where, self.batch_shape, "where").reshape(-1)
-        start = entries(vx, self.batch_shape, "vx"), entries(vy, self.batch_shape, "vy")
-        for row, value in enumerate(start):
-            self.start[chosen, row] = value.reshape(-1)[chosen]
+        chosen = self._kit.rows(mask(where, self.batch_shape, "where"), 1)[0]
+        asked = self._one(vx, "vx"), self._one(vy, "vy")
+        start = [self._kit.where(chosen, new, old) for new, old in zip(asked, self.start, strict=True)]
+        self.start = self._kit.stacked(start)
         self._forget(chosen)
 
-    def _entries(self, value: npt.ArrayLike, what: str, width: int) -> FloatArray:
-        """`value` as (b, width)."""
-        shape = (*self.batch_shape, width) if width > 1 else self.batch_shape
-        return entries(value, shape, what).reshape(-1, width)
+    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+        super()._take(saved)
+        self.start = kept_signals(saved["start"], self._count == 1)
+        self.new, self.renewed = (self._kit.own(saved[name].copy()) for name in ("new", "renewed"))
 
-    def _elapsed(self, elapsed: npt.ArrayLike | None) -> tuple[FloatArray, BoolArray]:
-        """Seconds (b,), and where they were unusable and replaced by the sample time."""
-        count = self.new.size
+    def _four(self, value: npt.ArrayLike, what: str) -> Signals:
+        """The four wheels of a signal."""
+        return self._kit.rows(entries(value, (*self.batch_shape, 4), what), 4)
+
+    def _one(self, value: npt.ArrayLike, what: str) -> Number:
+        """A signal of the car."""
+        if self._count == 1:
+            return number(value, self.batch_shape, what)
+        return entries(value, self.batch_shape, what).reshape(-1)
+
+    def _elapsed(self, elapsed: npt.ArrayLike | None) -> tuple[Number, Number]:
+        """Seconds, and where they were unusable and replaced by the sample time."""
         if elapsed is None:
-            return np.full(count, self.sample_time), np.zeros(count, dtype=np.bool_)
-        given = entries(elapsed, self.batch_shape, "elapsed").reshape(-1)
-        odd = ~((given > 0.0) & (given < 1e6))
-        return np.where(odd, self.sample_time, given), odd
+            return self._usual, self._never
+        given = self._one(elapsed, "elapsed")
+        odd = self._kit.no((given > 0.0) & (given < 1e6))
+        return self._kit.where(odd, self._usual, given), odd
 
-    def _begin(self, wheel_speed: FloatArray, fresh: BoolArray) -> None:
-        """Entries that wait start from the mean wheel speed, or from what `reset` asked for."""
-        if not self.new.any():
+    def _begin(self, seen: Screened) -> None:
+        """Cars that wait start from the middle of the wheel speeds, or from what `reset` asked for."""
+        kit, choose = self._kit, self._kit.where
+        if not kit.some(self.new):
             return
-        surface = np.where(fresh, self._radius * wheel_speed, 0.0).sum(axis=1) / np.maximum(fresh.sum(axis=1), 1)
-        asked = np.isfinite(self.start[:, 0])
-        first = np.where(asked, self.start[:, 0], surface)
-        ready = self.new & (asked | fresh.any(axis=1))
-        blind = self.new & ~ready
-        unsure = np.where(blind, 30.0, 0.1 + 0.03 * np.absolute(first))  # without any wheel: any speed of a road
-        self._along.filter.renew(self.new, first, unsure**2)
-        beside = np.where(np.isfinite(self.start[:, 1]), self.start[:, 1], 0.0)
-        self._across.filter.renew(self.new, beside, (0.05 + 0.02 * np.absolute(first)) ** 2)
+        fresh = seen.fresh[0] | seen.fresh[1] | seen.fresh[2] | seen.fresh[3]
+        asked = abs(self.start[0]) < math.inf
+        first = choose(asked, self.start[0], self._middle(seen))
+        blind = self.new & kit.no(asked | fresh)
+        unsure = choose(blind, 30.0, 0.1 + 0.03 * abs(first))  # without any wheel: any speed of a road
+        self.longitudinal_filter.renew(self.new, first, unsure * unsure)
+        beside = choose(abs(self.start[1]) < math.inf, self.start[1], 0.0)
+        unsure = 0.05 + 0.02 * abs(first)
+        self.lateral_filter.renew(self.new, beside, unsure * unsure)
         self.new = blind
 
-    def _force(self, normalised_force: npt.ArrayLike | None, ax: FloatArray) -> FloatArray:
-        """F_x/F_z (b, 4), of a size that a tire can have; a_x/g where unknown: all wheels use the same share."""
-        x = self._along.filter.mean
-        share = (ax * (1.0 - x[:, longitudinal.SCALE]) - x[:, longitudinal.BIAS]) / GRAVITY
-        mu = np.repeat(share[:, None], 4, axis=1)
-        if normalised_force is not None:
-            given = self._entries(normalised_force, "normalised_force", 4)
-            mu = np.where(np.isfinite(given), given, mu)
-        return np.clip(mu, -_LARGEST_FRICTION, _LARGEST_FRICTION)
+    def _middle(self, seen: Screened) -> Number:
+        """Median surface speed of the fresh wheels, m/s: one that stands or spins alone does not count; 0 without any."""
+        surfaces = [R * w for R, w in zip(self._radius, seen.wheel_speed, strict=True)]
+        known = np.where(np.array(seen.fresh), np.array(surfaces), math.nan).reshape(4, -1)
+        middle = np.nanmedian(np.where(np.isfinite(known).any(axis=0), known, 0.0), axis=0)
+        return middle.item() if self._count == 1 else middle
 
-    def _standing(
-        self,
-        wheel_speed: FloatArray,
-        fresh: BoolArray,
-        ax: FloatArray,
-        turn: FloatArray,
-        present: BoolArray,
-        elapsed: FloatArray,
-    ) -> BoolArray:
-        """All wheels that speak are silent, and the body is calm, for long enough: a sliding car would decelerate."""
-        s = self.settings
-        moving = (fresh & (np.absolute(self._radius * wheel_speed) >= s.still_speed)).any(axis=1)
-        unsure = np.sqrt(self._across.filter.spread[:, lateral.YAW_BIAS, lateral.YAW_BIAS])
-        calm = present & ~moving & (fresh.sum(axis=1) >= 2) & self._along.calm(ax)
-        calm &= np.absolute(turn) < s.still_yaw_rate + 3.0 * unsure
-        self.calm = np.where(calm, self.calm + elapsed, 0.0)
-        out: BoolArray = self.calm > s.still_time
-        return out
+    def _force(self, normalised_force: npt.ArrayLike | None, ax: Number) -> Signals:
+        """F_x/F_z, of a size that a tire can have; a_x/g where unknown: all wheels use the same share."""
+        x, kit = self.longitudinal_filter.mean, self._kit
+        share = (ax * (1.0 - x[longitudinal.SCALE]) - x[longitudinal.BIAS]) / GRAVITY
+        share = kit.maximum(kit.minimum(share, _LARGEST_FRICTION), -_LARGEST_FRICTION)
+        if normalised_force is None:
+            return kit.stacked((share,) * 4)
 
-    def _forget(self, where: BoolArray) -> None:
+        def limited(given: Number) -> tuple[Number, ...]:
+            large = abs(given) > _LARGEST_FRICTION
+            bound = kit.where(large, kit.where(given > 0.0, _LARGEST_FRICTION, -_LARGEST_FRICTION), given)
+            return (kit.where(abs(given) < math.inf, bound, share),)
+
+        return kit.each(limited, self._four(normalised_force, "normalised_force"))[0]
+
+    def _forget(self, where: Number) -> None:
         self.screen.forget(where)
-        self.calm[where] = 0.0
-        self.new |= where
-        self.renewed |= where
+        self.lost.forget(where)
+        self.standing.forget(where)
+        self.new, self.renewed = self.new | where, self.renewed | where
 
-    def _guard(self, flags: FlagArray, wheel_speed: FloatArray) -> None:
-        """An estimate that is lost starts again at the next step, from the wheels; until then it is their mean."""
-        if self.renewed.any():
-            raise_flag(flags, self.renewed, Flag.RESET)
-            self.renewed = np.zeros_like(self.renewed)
-        lost = ~(np.absolute(self._along.speed) + np.absolute(self._across.speed) < _FASTEST)
-        if lost.any():
-            self.start[lost] = np.nan
+    def _guard(self, seen: Screened, lost: Number) -> None:
+        """An estimate that is lost starts again at the next step, from the wheels; until then it is their middle."""
+        kit, choose = self._kit, self._kit.where
+        lost = lost | kit.no(abs(self._along.speed) + abs(self._across.speed) < _FASTEST)
+        if kit.some(lost):
+            self.start = kit.stacked([choose(lost, math.nan, value) for value in self.start])
+            middle = self._middle(seen)
             self._forget(lost)
-            surface = np.clip((self._radius * wheel_speed).mean(axis=1), -0.5 * _FASTEST, 0.5 * _FASTEST)
-            self.longitudinal_filter.renew(lost, surface, np.full(lost.size, _WIDEST**2))
-            self.lateral_filter.renew(lost, np.zeros(lost.size), np.ones(lost.size))
+            surface = kit.maximum(kit.minimum(middle, 0.5 * _FASTEST), -0.5 * _FASTEST)
+            self.longitudinal_filter.renew(lost, surface, _WIDEST**2)
+            self.lateral_filter.renew(lost, 0.0, 1.0)
         for speed in (self.longitudinal_filter, self.lateral_filter):
-            unsure = ~(speed.spread[:, 0, 0] < _WIDEST**2)
-            if unsure.any():
-                speed.renew(unsure, speed.mean[:, 0].copy(), np.full(unsure.size, 0.25 * _WIDEST**2))
-
-    def _reported(
-        self,
-        seen: Screened,
-        direction: tuple[FloatArray, FloatArray],
-        wheel: longitudinal.WheelVerdict,
-        slipping: BoolArray,
-        axle: lateral.AxleVerdict,
-        standing: BoolArray,
-    ) -> FusionStep:
-        """The estimate, mapped back to the corners, in the batch shape; `direction` sine and cosine of the steering."""
-        shape = self.batch_shape
-        wheels, axles = (*shape, 4), (*shape, 2)
-        sine, cosine = direction
-        x, y = self.longitudinal_filter.mean, self.lateral_filter.mean
-        turn = self._across.yaw_rate(seen.inertial[:, 2])
-        spin = turn[:, None]
-        forward, left = x[:, :1] - spin * self._y, y[:, :1] + spin * self._x
-        along, across = forward * cosine + left * sine, left * cosine - forward * sine
-        radius = self._radius * (1.0 + x[:, longitudinal.RADIUS :])
-        return FusionStep(
-            vx=x[:, 0].copy().reshape(shape),
-            vy=y[:, 0].copy().reshape(shape),
-            vx_deviation=np.sqrt(self.longitudinal_filter.spread[:, 0, 0]).reshape(shape),
-            vy_deviation=np.sqrt(self.lateral_filter.spread[:, 0, 0]).reshape(shape),
-            yaw_rate=turn.reshape(shape),
-            sensor_bias=np.concatenate(
-                [x[:, [longitudinal.BIAS]], y[:, [lateral.BIAS, lateral.YAW_BIAS]]], axis=1
-            ).reshape(*shape, 3),
-            gravity=np.concatenate([x[:, [longitudinal.GRADE]], y[:, [lateral.BANK]]], axis=1).reshape(axles),
-            radius=radius.reshape(wheels),
-            slip=slip_ratio(radius * seen.wheel_speed, along).reshape(wheels),
-            slip_angle=side_slip_angle(along, across).reshape(wheels),
-            innovation=wheel.innovation.reshape(wheels),
-            used=wheel.used.reshape(wheels),
-            gated=wheel.gated.reshape(wheels),
-            high_slip=slipping.reshape(wheels),
-            axle_innovation=axle.innovation.reshape(axles),
-            axle_used=axle.used.reshape(axles),
-            standing=standing.reshape(shape),
-            flags=seen.flags.reshape(shape),
-            wheel_flags=seen.wheel_flags.reshape(wheels),
-        )
+            unsure = kit.no(speed.variance(0) < _WIDEST**2)
+            if kit.some(unsure):
+                speed.renew(unsure, speed.mean[0], 0.25 * _WIDEST**2)

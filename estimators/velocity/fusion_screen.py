@@ -9,127 +9,168 @@ inertial signal that is missing is held for a while, and then counts as zero: he
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
-import numpy as np
+import numpy.typing as npt
 
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
-from estimators.interpolate import FloatArray
-from estimators.signals.checks import any_missing
+from estimators.faults import Flag
 from estimators.signals.memory import Memory
+from estimators.velocity.arithmetic import Number, Signals, arithmetic, kept_signals
 from estimators.velocity.fusion_settings import FusionSettings
 
-_LIMITS = np.array([100.0, 100.0, 20.0])  # m/s^2, m/s^2, rad/s: beyond, a signal is not that of a car
+_LIMITS = (100.0, 100.0, 20.0)  # m/s^2, m/s^2, rad/s: beyond, a signal is not that of a car
 _LARGEST_WHEEL_SPEED = 1000.0  # rad/s
 _LARGEST_STEER = 1.5  # rad
-_LONGEST_RUN = 40  # samples a signal may repeat before it counts as stale; its noise grows no further
+_LONGEST_RUN = 40.0  # samples a signal may repeat before it counts as stale; its noise grows no further
+_MISSING_INPUT, _OUT_OF_RANGE = int(Flag.MISSING_INPUT), int(Flag.PARAMETER_OUT_OF_RANGE)
+_MISSING, _STALE = int(Flag.MISSING_MEASUREMENT), int(Flag.STALE_MEASUREMENT)
 
 
 class Screened(NamedTuple):
-    """Inertial signals (b, 3): a_x, a_y, r; wheels (b, 4)."""
+    """Three inertial signals a_x, a_y, r, or four wheels."""
 
-    inertial: FloatArray
-    noise: FloatArray  # (b, 3) standard deviation of the mean over this sample
-    wheel_speed: FloatArray
-    fresh: BoolArray  # (b, 4) a wheel speed that says something new
-    steer: FloatArray
-    steered: BoolArray  # (b,) whether all steering angles were there
-    present: BoolArray  # (b,) whether all inertial signals were there
-    blind: BoolArray  # (b,) a_y or r has been missing for long: both are given as 0
-    flags: FlagArray  # (b,)
-    wheel_flags: FlagArray  # (b, 4)
+    inertial: Signals
+    noise: Signals  # standard deviations of the means over this sample
+    wheel_speed: Signals
+    fresh: Signals  # a wheel speed that says something new
+    gap: Signals  # s since the wheel last said something new
+    silent: Signals  # a wheel that hardly turns
+    steer: Signals
+    steered: Number  # whether all steering angles were there
+    present: Number  # whether all inertial signals were there
+    blind: Number  # a_y or r has been missing for long: both are given as 0
+    flags: Number
+    wheel_flags: Signals
 
 
 class FusionScreen(Memory):
-    """Remembers the last good values of b runs."""
+    """Remembers the last good values of `count` cars."""
 
-    memory = ("inertial", "run", "wheel_speed", "age", "steer", "slope", "slip_left")
+    memory = ("inertial", "run", "wheel_speed", "age", "steer", "slope", "swing", "slip_left")
     unknowns = ("wheel_speed",)
 
-    def __init__(self, radius: FloatArray, settings: FusionSettings, count: int) -> None:
+    def __init__(self, radius: Signals, settings: FusionSettings, count: int) -> None:
         s = self.settings = settings
-        self.radius = radius.copy()
-        self.quiet = np.array([s.acceleration_noise, s.acceleration_noise, s.yaw_rate_noise])
-        self.loud = np.array([s.missing_acceleration, s.missing_acceleration, s.missing_yaw_rate])
-        self.inertial: FloatArray = np.zeros((count, 3))
-        self.run: FloatArray = np.zeros((count, 3))
-        self.wheel_speed: FloatArray = np.full((count, 4), np.nan)
-        self.age: FloatArray = np.zeros((count, 4))  # s since the wheel last said something new
-        self.steer: FloatArray = np.zeros((count, 4))
-        self.slope: FloatArray = np.zeros((count, 5))  # filtered derivatives: wheels, then the yaw rate, rad/s^2
-        self.slip_left: FloatArray = np.zeros((count, 4))  # s for which high slip is still believed
+        self.radius, self.count = radius, count
+        self.kit = kit = arithmetic((count,))
+        self._limits = kit.signals(_LIMITS)
+        self._quiet = kit.signals((s.acceleration_noise, s.acceleration_noise, s.yaw_rate_noise))
+        self._loud = kit.signals((s.missing_acceleration, s.missing_acceleration, s.missing_yaw_rate))
+        three, four = kit.signals((0.0,) * 3), kit.signals((0.0,) * 4)
+        zero = kit.full(0.0)
+        self.inertial, self.run = kit.each(lambda v: (v + zero, v + zero), three)
+        # of the wheels: s since each last said something new, filtered derivative rad/s^2, s of high slip still believed
+        wheels = kit.each(lambda v: (v + zero, v + zero, v + zero, v + zero, v + zero + math.nan), four)
+        self.steer, self.age, self.slope, self.slip_left, self.wheel_speed = wheels
+        self.swing: Number = zero  # filtered yaw acceleration, rad/s^2
 
-    def forget(self, where: BoolArray) -> None:
-        """Starts the entries `where` (b,) afresh."""
-        for array in (self.inertial, self.run, self.age, self.steer, self.slope, self.slip_left):
-            array[where] = 0.0
-        self.wheel_speed[where] = np.nan
+    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+        for name in self.memory:
+            if name == "swing":
+                self.swing = self.kit.own(saved[name].copy())
+            else:
+                setattr(self, name, kept_signals(saved[name], self.count == 1))
 
-    def __call__(
-        self, inertial: FloatArray, wheel_speed: FloatArray, steer: FloatArray, elapsed: FloatArray
-    ) -> Screened:
-        """Raw arrays (b, 3), (b, 4), (b, 4), (b,); all may hold anything but `elapsed`."""
-        count = elapsed.size
-        flags: FlagArray = np.zeros(count, dtype=np.int32)
-        wheel_flags: FlagArray = np.zeros((count, 4), dtype=np.int32)
-        good: BoolArray = np.absolute(inertial) <= _LIMITS
-        same = good & (inertial == self.inertial) & (self.run > 0)
-        value = np.where(good, inertial, self.inertial)
-        run = np.where(good & ~same, 1.0, np.minimum(self.run + 1.0, _LONGEST_RUN))
-        noise = np.where(good, self.quiet, self.loud) * np.sqrt(2.0 * run - 1.0)
-        blind: BoolArray = np.zeros(count, dtype=np.bool_)
-        if not good.all():
-            finite: BoolArray = np.isfinite(inertial)
-            raise_flag(flags, any_missing(~finite, (count,)), Flag.MISSING_INPUT)
-            raise_flag(flags, any_missing(finite & ~good, (count,)), Flag.PARAMETER_OUT_OF_RANGE)
-            gone = ~good & (run >= _LONGEST_RUN)
-            gone[:, 1:] |= gone[:, 1:].any(axis=1, keepdims=True)  # a_y without r, or r without a_y, misleads V_y
-            value = np.where(gone, 0.0, value)
-            blind = gone[:, 1]
-        if same.any():
-            raise_flag(flags, any_missing(same & (run >= _LONGEST_RUN), (count,)), Flag.STALE_MEASUREMENT)
-        turned: BoolArray = np.absolute(steer) <= _LARGEST_STEER
-        steered = ~any_missing(~turned, (count,))
-        if not steered.all():
-            raise_flag(flags, ~steered, Flag.MISSING_INPUT)
-        self.steer = np.where(turned, steer, self.steer)
-        yaw_step = np.where((self.run[:, 2] > 0) & good[:, 2], value[:, 2] - self.inertial[:, 2], 0.0) / elapsed
+    def forget(self, where: Number) -> None:
+        """Starts the cars `where` afresh."""
+        choose = self.kit.where
+        for name in self.memory:
+            nothing, value = math.nan if name in self.unknowns else 0.0, getattr(self, name)
+            if name == "swing":
+                self.swing = choose(where, 0.0, value)
+            else:
+                setattr(self, name, self.kit.each(lambda v, n=nothing: (choose(where, n, v),), value)[0])
+
+    def __call__(self, inertial: Signals, wheel_speed: Signals, steer: Signals, elapsed: Number) -> Screened:
+        """Raw signals, which may be anything; `elapsed` s, above zero."""
+        kit, choose, no, some = self.kit, self.kit.where, self.kit.no, self.kit.some
+        flags, blind, last = kit.full(0), kit.full(False), self.inertial[2]
+        knew = self.run[2] > 0.0
+        value, run, noise, good, stale = kit.each(
+            self._inertial, inertial, self.inertial, self.run, self._limits, self._quiet, self._loud
+        )
+        present, tired = good[0] & good[1] & good[2], stale[0] | stale[1] | stale[2]
+        if some(tired):
+            flags = flags | choose(tired, _STALE, 0)
+        if some(no(present)):
+            flags = flags | self._missing(inertial, good)
+            gone = [no(fine) & (count >= _LONGEST_RUN) for fine, count in zip(good, run, strict=True)]
+            blind = gone[1] | gone[2]  # a_y without r, or r without a_y, misleads V_y
+            lost = zip((gone[0], blind, blind), value, strict=True)
+            value = kit.stacked([choose(nothing, 0.0, v) for nothing, v in lost])
+        self.steer, turned = kit.each(self._held, steer, self.steer)
+        steered = turned[0] & turned[1] & turned[2] & turned[3]
+        if some(no(steered)):
+            flags = flags | choose(steered, 0, _MISSING_INPUT)
+        yaw_step = choose(knew & good[2], value[2] - last, 0.0) / elapsed
+        self.swing = self._smooth(self.swing, yaw_step, elapsed)
         self.inertial, self.run = value, run
-        speed, fresh = self._wheels(wheel_speed, elapsed, wheel_flags)
-        self._smooth(slice(4, 5), yaw_step[:, None], elapsed[:, None])
-        present = ~any_missing(~good, (count,))
-        return Screened(value, noise, speed, fresh, self.steer, steered, present, blind, flags, wheel_flags)
 
-    def _wheels(self, given: FloatArray, elapsed: FloatArray, flags: FlagArray) -> tuple[FloatArray, BoolArray]:
-        good: BoolArray = np.absolute(given) <= _LARGEST_WHEEL_SPEED
-        if not good.all():
-            raise_flag(flags, ~good, Flag.MISSING_MEASUREMENT)
-        age: FloatArray = self.age + elapsed[:, None]
-        silent = np.absolute(self.radius * given) < self.settings.still_speed
-        repeated = good & (given == self.wheel_speed)
-        fresh: BoolArray = good & (~repeated | silent | (age >= self.settings.error_memory))
-        if not fresh.all():
-            raise_flag(flags, good & ~fresh, Flag.STALE_MEASUREMENT)
-        known = np.isfinite(self.wheel_speed)
-        step = np.where(fresh & known, given - np.where(known, self.wheel_speed, 0.0), 0.0) / age
-        self._smooth(slice(0, 4), step, np.where(fresh, age, 0.0))
-        self.age = np.where(fresh, 0.0, age)
-        self.wheel_speed = np.where(good, given, self.wheel_speed)
-        return np.where(np.isfinite(self.wheel_speed), self.wheel_speed, 0.0), fresh
+        def wheel(new: Number, before: Number, age: Number, slope: Number, radius: Number) -> tuple[Number, ...]:
+            good = abs(new) <= _LARGEST_WHEEL_SPEED
+            gap, still = age + elapsed, abs(radius * new) < self.settings.still_speed
+            fresh = good & ((new != before) | still | (gap >= self.settings.error_memory))
+            known = abs(before) < math.inf  # NaN: never seen
+            rate = choose(fresh & known, new - before, 0.0) / gap
+            held = choose(good, new, before)
+            return (
+                held,
+                choose(fresh, 0.0, gap),
+                self._smooth(slope, rate, choose(fresh, gap, 0.0)),
+                choose(abs(held) < math.inf, held, 0.0),
+                fresh,
+                gap,
+                good & still,
+                choose(fresh, 0, choose(good, _STALE, _MISSING)),
+            )
 
-    def _smooth(self, part: slice, slope: FloatArray, elapsed: FloatArray) -> None:
-        """First-order filter y' = (x' - y)/lag, exact for piecewise linear x; no time, no change."""
-        kept = np.exp(-elapsed / self.settings.wheel_lag)
-        self.slope[:, part] = kept * self.slope[:, part] + (1.0 - kept) * slope
+        self.wheel_speed, self.age, self.slope, speed, fresh, gap, silent, wheel_flags = kit.each(
+            wheel, wheel_speed, self.wheel_speed, self.age, self.slope, self.radius
+        )
+        wheels = (speed, fresh, gap, silent, self.steer)
+        return Screened(value, noise, *wheels, steered, present, blind, flags, wheel_flags)
 
-    def slipping(self, acceleration: FloatArray, elapsed: FloatArray) -> BoolArray:
-        """Wheels (b, 4) whose surface leaves the car, |R w' - a| too large, now or within the hold time.
+    def slipping(self, acceleration: Signals, fresh: Signals, elapsed: Number) -> Signals:
+        """Fresh wheels whose surface leaves the car, |R w' - a| too large, now or within the hold time.
 
         The wheel-acceleration criterion of P2 section 7, relative to the measured acceleration of the car.
         """
-        excess = np.absolute(self.radius * self.slope[:, :4] - acceleration) > self.settings.excess_acceleration
-        self.slip_left = np.where(
-            excess, self.settings.high_slip_hold, np.maximum(self.slip_left - elapsed[:, None], 0.0)
-        )
-        out: BoolArray = self.slip_left > 0.0
-        return out
+        s, choose, largest = self.settings, self.kit.where, self.kit.maximum
+
+        def wheel(slope: Number, pull: Number, left: Number, new: Number, radius: Number) -> tuple[Number, ...]:
+            excess = abs(radius * slope - pull) > s.excess_acceleration
+            left = choose(excess, s.high_slip_hold, largest(left - elapsed, 0.0))
+            return left, new & (left > 0.0)
+
+        self.slip_left, slips = self.kit.each(wheel, self.slope, acceleration, self.slip_left, fresh, self.radius)
+        return slips
+
+    def _inertial(
+        self, given: Number, last: Number, run: Number, limit: Number, quiet: Number, loud: Number
+    ) -> tuple[Number, ...]:
+        """Value, samples that it has been the same, noise, good, stale."""
+        choose = self.kit.where
+        good = abs(given) <= limit
+        same = good & (given == last) & (run > 0.0)
+        run = choose(good & self.kit.no(same), 1.0, self.kit.minimum(run + 1.0, _LONGEST_RUN))
+        noise = choose(good, quiet, loud) * self.kit.sqrt(2.0 * run - 1.0)
+        return choose(good, given, last), run, noise, good, same & (run >= _LONGEST_RUN)
+
+    def _held(self, given: Number, last: Number) -> tuple[Number, ...]:
+        good = abs(given) <= _LARGEST_STEER
+        return self.kit.where(good, given, last), good
+
+    def _missing(self, inertial: Signals, good: Signals) -> Number:
+        """Flags of inertial signals that are not usable."""
+        flags, choose, no = self.kit.full(0), self.kit.where, self.kit.no
+        for given, fine in zip(inertial, good, strict=True):
+            finite = abs(given) < math.inf
+            flags = flags | choose(finite, 0, _MISSING_INPUT) | choose(finite & no(fine), _OUT_OF_RANGE, 0)
+        return flags
+
+    def _smooth(self, last: Number, slope: Number, elapsed: Number) -> Number:
+        """First-order filter y' = (x' - y)/lag, exact for piecewise linear x; no time, no change."""
+        kept = self.kit.exp(-elapsed / self.settings.wheel_lag)
+        return kept * last + (1.0 - kept) * slope

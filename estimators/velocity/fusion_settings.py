@@ -25,6 +25,9 @@ class FusionSettings:
     acceleration_bias: float = 0.15  # m/s^2: an automotive MEMS unit over its temperature range
     yaw_rate_bias: float = 0.006  # rad/s, 0.35 deg/s
     scale: float = 0.01  # of both accelerations and of the yaw rate
+    body_roll: float = (
+        0.02  # rad per g, 1.1 deg: a body rolls by 3 to 6 deg per g, and attitude leaves part of it in a_y
+    )
     sensor_memory: float = 3600.0  # s: biases and scales drift with temperature
     missing_acceleration: float = 2.0  # m/s^2: how far a held acceleration may be off
     missing_yaw_rate: float = 0.1  # rad/s
@@ -65,6 +68,12 @@ class FusionSettings:
     excess_acceleration: float = 3.0  # m/s^2 by which a wheel's surface may leave the car before it counts as slipping
     wheel_lag: float = 0.03  # s of the filter that differentiates wheel speeds
     high_slip_hold: float = 0.05  # s for which high slip is believed to last
+    agreement: float = (
+        0.03  # relative, within which the speeds of rolling wheels agree: radius, free-rolling slip, turn
+    )
+    rolling: float = 0.5  # m/s^2 by which rolling wheels and accelerometer may differ: its bias and the grade
+    unloaded: float = 0.05  # |mu| below which a tire does not slip far on any road
+    lost_time: float = 1.0  # s of rolling wheels that contradict the estimate: no wheel slips for as long unloaded
     still_time: float = 0.2  # s of silent wheels and a calm body before the car counts as standing
     still_speed: float = 0.05  # m/s below which a wheel is silent
     still_acceleration: float = 0.1  # m/s^2 of a body that stands: noise, idling engine

@@ -8,6 +8,7 @@ In high slip friction hides the slip velocity: there q and r change to values th
 
 from __future__ import annotations
 
+import math
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -17,14 +18,15 @@ from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.filters import KalmanFilter
 from estimators.interpolate import FloatArray
-from estimators.signals.checks import batch, entries, mask, setting
-from estimators.signals.memory import Memory
+from estimators.signals.checks import batch, entries, mask, quiet, setting
+from estimators.signals.renewable import Renewable
+from estimators.velocity.ltv_few import FEW, LARGEST_SPREAD, LtvFew
 from estimators.velocity.ltv_model import BristleTire, sampled
 
 NORMAL = (2.5e-3, 1e-3)
 """q in (m/s)^2 a sample and r, P2 section IV."""
 HIGH_SLIP = (3.3e-4, 2.1e-1)
-_LARGEST_SPREAD = 50.0  # m/s of standard deviation: an entry without a measurement for long knows nothing
+_LARGEST = 1e6  # of u, w and dw/dt: more is not a reading
 
 
 class LtvStep(NamedTuple):
@@ -39,7 +41,7 @@ class LtvStep(NamedTuple):
     flags: FlagArray
 
 
-class LtvKalmanObserver(Memory):
+class LtvKalmanObserver(Renewable):
     """Bristle deflection and relative velocity of every corner.
 
     Args:
@@ -70,7 +72,8 @@ class LtvKalmanObserver(Memory):
     ) -> None:
         if states not in (2, 3):
             raise EstimatorError(f"states = {states!r}; use 3, as published, or 2")
-        self.tire, self.states, self.batch_shape = tire, states, batch(batch_shape)
+        super().__init__(batch(batch_shape))
+        self.tire, self.states = tire, states
         self.sample_time = setting(sample_time, "sample_time", "s")
         pairs = [
             [setting(q, f"process noise of {name}", "(m/s)^2"), setting(r, f"measurement noise of {name}", "(no unit)")]
@@ -81,9 +84,12 @@ class LtvKalmanObserver(Memory):
         wide = setting(spread, "spread", "m/s") ** 2
         # z follows V_r within a hundredth of a metre; z' is V_r while z is unknown
         self._initial = np.diag([1e-4, wide, wide][:states])
-        self.filter = KalmanFilter(np.zeros((*self.batch_shape, states)), self._initial)
+        self.filter: KalmanFilter | LtvFew
+        if math.prod(self.batch_shape) <= FEW:
+            self.filter = LtvFew(self._initial, self.batch_shape, tire, self.sample_time)
+        else:
+            self.filter = KalmanFilter(np.zeros((*self.batch_shape, states)), self._initial)
         self.seen: FloatArray = np.zeros((3, *self.batch_shape))  # last finite u, w, w'
-        self.renewed: BoolArray = np.zeros(self.batch_shape, dtype=np.bool_)
 
     def step(
         self,
@@ -101,33 +107,35 @@ class LtvKalmanObserver(Memory):
             EstimatorError: another shape.
         """
         shape = self.batch_shape
-        given = np.stack(
-            [
-                entries(value, shape, name)
-                for value, name in (
-                    (relative_acceleration, "relative_acceleration"),
-                    (wheel_speed, "wheel_speed"),
-                    (wheel_acceleration, "wheel_acceleration"),
-                )
-            ]
-        )
+        given: FloatArray = np.empty((3, *shape))
+        given[0] = entries(relative_acceleration, shape, "relative_acceleration")
+        given[1] = entries(wheel_speed, shape, "wheel_speed")
+        given[2] = entries(wheel_acceleration, shape, "wheel_acceleration")
         mu = entries(normalised_force, shape, "normalised_force")
         high = np.broadcast_to(np.asarray(high_slip, dtype=np.bool_), shape)
         flags: FlagArray = np.zeros(shape, dtype=np.int32)
-        good: BoolArray = np.absolute(given) < 1e6
-        raise_flag(flags, ~good[0], Flag.MISSING_INPUT)
-        raise_flag(flags, ~(good[1] & good[2]), Flag.MISSING_PARAMETER)
-        raise_flag(flags, ~np.isfinite(mu), Flag.MISSING_MEASUREMENT)
-        raise_flag(flags, self.renewed, Flag.RESET)
-        self.renewed = np.zeros(shape, dtype=np.bool_)
-        self.seen = np.where(good, given, self.seen)
+        if np.vdot(given, given) < _LARGEST**2:  # False for NaN
+            self.seen = given
+        else:
+            good: BoolArray = np.absolute(given) < _LARGEST
+            raise_flag(flags, ~good[0], Flag.MISSING_INPUT)
+            raise_flag(flags, ~(good[1] & good[2]), Flag.MISSING_PARAMETER)
+            self.seen = np.where(good, given, self.seen)
+        if not quiet(mu):
+            raise_flag(flags, ~np.isfinite(mu), Flag.MISSING_MEASUREMENT)
+        self._flag_renewed(flags)
+        noise = self._noise[high.astype(np.intp)]
+        if isinstance(self.filter, LtvFew):
+            told, used = self.filter.step(self.seen, mu, noise)
+            state = self.filter.state
+            return LtvStep(state, state[..., 1], told[..., 0], told[..., 1], told[..., 2:], used, flags)
         u, w, dw = self.seen
-        q, r = np.moveaxis(self._noise[high.astype(np.intp)], -1, 0)
+        q, r = noise[..., 0], noise[..., 1]
         C = self.tire.output(w, self.states)
         step = self.filter.correct(mu[..., None], C, r[..., None, None])
         A, B = sampled(self.tire, w, dw, self.sample_time, self.states)
         self.filter.predict(A, q[..., None, None] * self._entry, B[..., None], u[..., None])
-        self._bound()
+        self._bound(self.filter)
         gain = (A @ step.gain)[..., 0]
         state = self.filter.state
         innovation, used = step.innovation[..., 0], step.used[..., 0]
@@ -142,10 +150,10 @@ class LtvKalmanObserver(Memory):
         chosen = mask(where, self.batch_shape, "where")
         self.filter.reset(chosen, state=np.broadcast_to(np.asarray(state, dtype=np.float64), (self.states,)))
         self.seen[:, chosen] = 0.0
-        self.renewed = self.renewed | chosen
+        self._renew(chosen)
 
-    def _bound(self) -> None:
+    def _bound(self, kalman: KalmanFilter) -> None:
         """An entry that has coasted until nothing is known keeps its estimate with the initial covariance."""
-        lost = ~(self.filter.covariance[..., 1, 1] < _LARGEST_SPREAD**2)
+        lost = ~(kalman.covariance[..., 1, 1] < LARGEST_SPREAD**2)
         if lost.any():
-            self.filter.reset(lost, state=self.filter.state, covariance=self._initial)
+            kalman.reset(lost, state=kalman.state, covariance=self._initial)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from typing import TypeVar
 
 import numpy as np
 
@@ -18,7 +19,8 @@ from estimators.errors import EstimatorError
 from estimators.interpolate import FloatArray
 
 _SERIES_BELOW = 0.5  # a T below which the quotients lose digits and the series has converged
-_TERMS = 16
+_TERMS = [(1.0 / math.factorial(n + 2), (n + 1.0) / math.factorial(n + 3)) for n in reversed(range(16))]
+Number = TypeVar("Number", float, FloatArray)
 
 
 @dataclass(frozen=True)
@@ -75,28 +77,34 @@ def sampled(
     return A, B
 
 
-def _integrals(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def integrals(x: float) -> tuple[float, float, float, float]:
     """For x = a T >= 0, per unit of T:
 
-    p_0 = (1 - e^-x)/x = sum (-x)^n/(n+1)!,    p_1 = (1 - p_0)/x = sum (-x)^n/(n+2)!,
-    q_1 = (p_0 - e^-x)/x = sum (n+1) (-x)^n/(n+2)!,    q_2 = (p_1 - q_1)/x = sum (n+1) (-x)^n/(n+3)!.
+    p_0 = (1 - e^-x)/x,    p_1 = (1 - p_0)/x = sum (-x)^n/(n+2)!,
+    q_1 = (p_0 - e^-x)/x,    q_2 = (p_1 - q_1)/x = sum (n+1) (-x)^n/(n+3)!.
     """
-    safe = np.where(x < _SERIES_BELOW, 1.0, x)
-    p0 = -np.expm1(-safe) / safe
-    p1 = (1.0 - p0) / safe
-    q1 = (p0 - np.exp(-safe)) / safe
-    q2 = (p1 - q1) / safe
-    small = np.where(x < _SERIES_BELOW, x, 0.0)
-    s0, s1, r1, r2 = (np.zeros_like(x) for _ in range(4))
-    for n in reversed(range(_TERMS)):  # Horner
-        s0 = 1.0 / math.factorial(n + 1) - small * s0
-        s1 = 1.0 / math.factorial(n + 2) - small * s1
-        r1 = (n + 1.0) / math.factorial(n + 2) - small * r1
-        r2 = (n + 1.0) / math.factorial(n + 3) - small * r2
+    return _series(x) if x < _SERIES_BELOW else _quotients(x, math.exp(-x), math.expm1(-x))
+
+
+def _integrals(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """`integrals` of an array."""
     near = x < _SERIES_BELOW
-    return (
-        np.where(near, s0, p0),
-        np.where(near, s1, p1),
-        np.where(near, r1, q1),
-        np.where(near, r2, q2),
-    )
+    far = np.where(near, 1.0, x)
+    small, large = _series(np.where(near, x, 0.0)), _quotients(far, np.exp(-far), np.expm1(-far))
+    p0, p1, q1, q2 = (np.where(near, first, second) for first, second in zip(small, large, strict=True))
+    return p0, p1, q1, q2
+
+
+def _quotients(x: Number, decayed: Number, change: Number) -> tuple[Number, Number, Number, Number]:
+    """With e^-x and e^-x - 1."""
+    p0 = -change / x
+    p1, q1 = (1.0 - p0) / x, (p0 - decayed) / x
+    return p0, p1, q1, (p1 - q1) / x
+
+
+def _series(x: Number) -> tuple[Number, Number, Number, Number]:
+    """By Horner; p_0 and q_1 follow without loss of digits."""
+    p1 = q2 = 0.0 * x
+    for first, second in _TERMS:
+        p1, q2 = first - x * p1, second - x * q2
+    return 1.0 - x * p1, p1, p1 - x * q2, q2

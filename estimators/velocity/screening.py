@@ -59,8 +59,14 @@ class Screen:
             RangeError: a parameter or rate outside the certified box, if the observer refuses these.
         """
         value = np.absolute(p) if self.box.absolute else p.copy()
-        calm = self._calm_few(u, y, p) if p.size <= FEW else self._calm(u, y, p, value)
-        if not calm:
+        if p.size <= FEW:
+            missing = self._missing_few(u, y, p)
+            if missing is None or (missing and self.stale_after is not None):
+                return self._repaired(u, y, p, sample, shape)
+            if missing:
+                self.input[:], self.raw[:] = u, p
+                return _without(missing, u, y, value)
+        elif not self._calm(u, y, p, value):
             return self._repaired(u, y, p, sample, shape)
         if self.stale_after is not None:
             np.equal(y, self.measurement, self.repeats)
@@ -85,16 +91,22 @@ class Screen:
             and largest(np.absolute(np.subtract(p, self.raw, scratch), scratch)) <= self.calm
         )
 
-    def _calm_few(self, u: FloatArray, y: FloatArray, p: FloatArray) -> bool:
-        """`_calm` on plain numbers, which is faster for a handful."""
+    def _missing_few(self, u: FloatArray, y: FloatArray, p: FloatArray) -> list[int] | None:
+        """Which measurements are missing where nothing else is wrong (None: something is), on plain numbers.
+
+        For a handful of entries this is faster than `_calm`; a lost measurement is too common for the careful road.
+        """
         if self.gaps:
-            return False
+            return None
         low, high, calm, absolute = self.box.min, self.box.max, self.calm, self.box.absolute
-        for a, b, c, before in zip(u.tolist(), y.tolist(), p.tolist(), self.raw.tolist(), strict=True):
-            value = abs(c) if absolute else c
-            if not (low <= value <= high and -LIMIT <= a <= LIMIT and -LIMIT <= b <= LIMIT and abs(c - before) <= calm):
-                return False
-        return True
+        missing = []
+        entries = zip(u.tolist(), y.tolist(), p.tolist(), self.raw.tolist(), strict=True)
+        for place, (a, b, c, before) in enumerate(entries):
+            if not (low <= (abs(c) if absolute else c) <= high and -LIMIT <= a <= LIMIT and abs(c - before) <= calm):
+                return None
+            if not -LIMIT <= b <= LIMIT:
+                missing.append(place)
+        return missing
 
     def _repaired(self, u: FloatArray, y: FloatArray, p: FloatArray, sample: int, shape: tuple[int, ...]) -> Screened:
         """The careful road; nothing is remembered before every refusal has been considered."""
@@ -170,6 +182,16 @@ class Screen:
         stale: BoolArray = (self.run > self.stale_after) & ~missing
         raise_flag(flags, stale, Flag.STALE_MEASUREMENT)
         return stale
+
+
+def _without(missing: list[int], u: FloatArray, y: FloatArray, value: FloatArray) -> Screened:
+    """What is left when the measurements `missing` are all that is wrong."""
+    coast: BoolArray = np.zeros(u.size, dtype=np.bool_)
+    flags: FlagArray = np.zeros(u.size, dtype=np.int32)
+    measured = y.copy()
+    for place in missing:
+        coast[place], flags[place], measured[place] = True, Flag.MISSING_MEASUREMENT, 0.0
+    return Screened(u, measured, value, coast, coast, flags)
 
 
 def _place(sample: int, entry: int, shape: tuple[int, ...]) -> str:

@@ -2,97 +2,183 @@
 
 The speed, the first state, moves by its own input and by the others, which keep to themselves:
 
-    x_0+ = x_0 + sum_j a_j x_j + u + w_0,      x_i+ = m_i + phi_i (x_i - m_i) + w_i,   Var w_i = s_i^2 (1 - phi_i^2).
+    x_0+ = x_0 + sum_j a_j x_j + u + w_0,      x_i+ = m_i + phi_i (x_i - m_i) + w_i,   Cov w = P0 - Phi P0 Phi.
 
-Every parameter is a first-order Gauss-Markov process around its prior mean m_i: however long nothing excites it, its
-variance never grows beyond the prior s_i^2.
+Parameters change slowly, and forget every `every` samples for all of these at once: between, only the speed moves. Every
+parameter is a first-order Gauss-Markov process around its prior mean m_i: however long nothing excites it, its
+covariance never grows beyond the prior P0. A correction takes several channels that are independent of each other, by the
+Cholesky factor of their covariance, S = H P H' + R = L L', found row by row together with
+
+    U = L^-1 H P,   z = L^-1 nu,   x+ = x + U' z,   P+ = P - U' U;
+
+a channel that is not used leaves its row of U at zero. States behind the `learned` first ones may be only considered by a
+correction: they do not move, and the block of P that is theirs alone stays (Schmidt (1966)).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from estimators.faults import BoolArray
-from estimators.filters import KalmanFilter
 from estimators.interpolate import FloatArray
+from estimators.signals.memory import Memory
+from estimators.velocity.arithmetic import Number, Signals
 
-NEVER = 1e12
-"""Noise variance of a channel that is not used: next to it, that of any estimate is nothing."""
+Columns = tuple[tuple[int, ...], ...]
+"""Of each channel, the states that it sees: as many of each."""
+Values = Sequence[Sequence[Number]]
+"""What it sees of the first state, of the second ...: h by column, each over all channels."""
 
 
-class SpeedFilter(KalmanFilter):
-    """Mean (b, n) and covariance (b, n, n) of b runs.
+class SpeedFilter(Memory):
+    """Mean (n, b) and covariance of b cars, as its upper triangle row by row (n (n + 1)/2, b).
 
     Args:
         mean: (n,) prior means m.
-        spread: (n, n) prior covariance.
-        rates: (n,) 1/s and `spatial`: (n,) 1/m, how fast the parameters forget in time and along the road; phi =
-            exp(-elapsed (rate + spatial |speed|)). The first entries are not used.
+        spread: (n, n) prior covariance P0; only parameters that forget alike may be correlated.
+        rates: (n,) 1/s, how fast the parameters forget in time; the first entry is not used.
+        spatial: the one state that forgets along the road instead, and its 1/m.
+        learned: how many states every correction moves.
+        every: samples after which the parameters forget.
         count: b.
     """
 
+    memory = ("mean", "spread", "waiting", "waited")
+
     def __init__(
-        self, mean: FloatArray, spread: FloatArray, rates: FloatArray, spatial: FloatArray, count: int
+        self,
+        mean: FloatArray,
+        spread: FloatArray,
+        rates: FloatArray,
+        spatial: tuple[int, float],
+        learned: int,
+        every: int,
+        count: int,
     ) -> None:
-        n = mean.size
-        super().__init__(np.broadcast_to(mean, (count, n)), spread)
-        self.prior_mean = mean.copy()
-        self._prior_variance = np.diagonal(spread).copy()
-        self._rates, self._spatial = rates.copy(), spatial.copy()
-        self._rates[0] = self._spatial[0] = 0.0
-        self._A, self._Q = np.zeros((2, count, n, n))
-        self._A_diagonal, self._Q_diagonal = np.einsum("bii->bi", self._A), np.einsum("bii->bi", self._Q)
+        self.size, self.learned, self.every, self.count = mean.size, learned, every, count
+        self.place, self.per_metre = spatial
+        self.rates = rates.copy()
+        self.rates[0] = self.rates[self.place] = 0.0
+        self.prior_mean, self.prior = mean.copy(), spread.copy()
+        self.waited: Number = np.array(0)
+        self._start()
+
+    def _start(self) -> None:
+        n = self.size
+        self._upper = rows, columns = np.triu_indices(n)
+        packed = np.zeros((n, n), dtype=np.int64)
+        packed[rows, columns] = packed[columns, rows] = np.arange(rows.size)
+        self._at = packed  # where each entry of P is kept
+        self._kept = int(packed[self.learned, self.learned]) if self.learned < n else rows.size
+        self._packed = self.prior[rows, columns][:, None]
+        self.mean: Number = np.repeat(self.prior_mean[:, None], self.count, axis=1)
+        self.spread: Number = np.repeat(self._packed, self.count, axis=1)
+        self.waiting: Number = np.zeros((2, self.count))  # s and m since the parameters last forgot
 
     @property
-    def mean(self) -> FloatArray:
-        """The state (b, n) itself: not to be written to."""
-        return self._mean
+    def state(self) -> FloatArray:
+        """A copy of the mean, (b, n)."""
+        out: FloatArray = self.mean.T.copy()
+        return out
 
     @property
-    def spread(self) -> FloatArray:
-        """The covariance (b, n, n) itself: not to be written to."""
-        return self._spread
+    def covariance(self) -> FloatArray:
+        """P as (b, n, n)."""
+        out: FloatArray = np.moveaxis(self.spread[self._at], 2, 0).copy()
+        return out
+
+    def variance(self, place: int, other: int | None = None) -> Number:
+        """An entry of P."""
+        return self.spread[self._at[place, place if other is None else other]]
 
     def move(
-        self, elapsed: FloatArray, pace: FloatArray, coupling: FloatArray, shift: FloatArray, noise: FloatArray
+        self,
+        elapsed: Number,
+        pace: Number,
+        columns: tuple[int, ...],
+        coupling: tuple[Number, ...],
+        shift: Number,
+        noise: Number,
     ) -> None:
-        """One sample on: `elapsed` s, `pace` m/s, `shift` u and `noise` Var w_0 (b,); `coupling` (b, n - 1) a_j."""
-        memory = np.exp(-elapsed[:, None] * (self._rates + self._spatial * pace[:, None]))
-        self._A_diagonal[:] = memory
-        self._A[:, 0, 1:] = coupling
-        self._Q_diagonal[:] = self._prior_variance * (1.0 - memory * memory)
-        self._Q_diagonal[:, 0] = noise
-        mean: FloatArray = self.prior_mean + memory * (self._mean - self.prior_mean)
-        mean[:, 0] = self._mean[:, 0] + shift + (coupling * self._mean[:, 1:]).sum(axis=1)
-        self._mean = mean
-        self._spread = self._A @ self._spread @ np.swapaxes(self._A, 1, 2) + self._Q  # `weigh` keeps it symmetric
+        """One sample on: `elapsed` s, `pace` m/s, `coupling` a_j of the states `columns`, `shift` u, `noise` Var w_0."""
+        n, x, P = self.size, self.mean, self.spread
+        first, speed = P[:n].copy(), x[0] + shift
+        for place, value in zip(columns, coupling, strict=True):
+            first += value * P[self._at[place]]
+            speed = speed + value * x[place]
+        variance = first[0] + noise
+        for place, value in zip(columns, coupling, strict=True):
+            variance = variance + value * first[place]
+        first[0] = variance
+        P[:n], self.mean = first, np.concatenate((speed[None], x[1:]))
+        self.waiting = self.waiting + np.stack((elapsed, elapsed * pace))
+        self.waited = self.waited + 1
+        if self.waited >= self.every:
+            self._forget()
+            self.waiting, self.waited = np.zeros((2, self.count)), np.array(0)
+
+    def _forget(self) -> None:
+        """The parameters return towards their priors; the speed has none."""
+        time, way = self.waiting
+        memory = np.exp(-self.rates[:, None] * time)
+        memory[self.place] = np.exp(-self.per_metre * way)
+        rows, columns = self._upper
+        prior = np.where(rows[:, None] > 0, self._packed, 0.0)
+        self.spread = memory[rows] * memory[columns] * (self.spread - prior) + prior
+        mean = self.prior_mean[:, None]
+        self.mean = np.concatenate((self.mean[:1], (mean + memory * (self.mean - mean))[1:]))
+
+    def expect(self, columns: Columns, values: Values) -> Signals:
+        """h P h' of each channel; `weigh` takes the channels from here."""
+        places = np.array(columns)
+        shape = (len(columns), self.count)
+        H = [np.broadcast_to(np.asarray(value), shape) for value in values]
+        W = sum(h[:, None] * self.spread[self._at[place]] for h, place in zip(H, places.T, strict=True))
+        self._W: Number = W  # (m, n, b) P h'
+        self._S: Number = sum(h * W[:, place] for h, place in zip(H, places.T, strict=True))  # (m, m, b) H P H'
+        out: Signals = np.einsum("kkb->kb", self._S)
+        return out
 
     def weigh(
-        self, innovation: FloatArray, C: FloatArray, variance: FloatArray, learning: FloatArray | None = None
+        self,
+        innovation: Sequence[Number],
+        variance: Sequence[Number],
+        used: Sequence[Number],
+        learning: Number = True,
     ) -> None:
-        """Corrects with independent channels: innovation, variance (b, m), C (b, m, n), all finite.
+        """Corrects with the channels of `expect` that are `used`; `learning`: not only the `learned` first states."""
+        S = self._S
+        U: list[Number] = []
+        z: list[Number] = []
+        factor: list[list[Number]] = []  # L, with the reciprocals of its diagonal
+        for k, counts in enumerate(used):
+            gap, rest, w = innovation[k], variance[k] + S[k, k], self._W[k]
+            row: list[Number] = []
+            for i, (u, known) in enumerate(zip(U, z, strict=True)):
+                entry = S[k, i]  # of L, from those to the left of it
+                for left, above in zip(row, factor[i], strict=False):
+                    entry = entry - left * above
+                entry = entry * factor[i][i]
+                row.append(entry)
+                rest, gap, w = rest - entry * entry, gap - entry * known, w - entry * u
+            scale = np.where(counts, 1.0 / np.sqrt(rest), 0.0)
+            factor.append([*row, scale])
+            U.append(w * scale)
+            z.append(gap * scale)
+        all_U = np.stack(U)
+        change = (all_U[:, self._upper[0]] * all_U[:, self._upper[1]]).sum(axis=0)
+        moved = (all_U * np.stack(z)[:, None]).sum(axis=0)
+        if learning is not True:
+            change[self._kept :] *= learning
+            moved[self.learned :] *= learning
+        self.spread = self.spread - change
+        self.mean = self.mean + moved
 
-        `learning` (b, m, n) is 0 where a channel must not move a state: the error of that state is considered, but
-        not corrected (Schmidt (1966)); 1 elsewhere. The Joseph form holds for any gain.
-        """
-        cross = self._spread @ np.swapaxes(C, 1, 2)
-        total = C @ cross
-        diagonal = np.einsum("bii->bi", total)
-        diagonal += variance
-        gain = np.linalg.solve(total, np.swapaxes(cross, 1, 2))  # (b, m, n), transposed
-        if learning is not None:
-            gain *= learning
-        moved = np.einsum("bm,bmn->bn", innovation, gain)
-        left = self._identity - np.swapaxes(gain, 1, 2) @ C
-        spread = left @ self._spread @ np.swapaxes(left, 1, 2)
-        spread += np.swapaxes(gain, 1, 2) @ (variance[:, :, None] * gain)
-        self._mean += moved
-        self._spread = 0.5 * (spread + np.swapaxes(spread, 1, 2))
-
-    def renew(self, where: BoolArray, first: FloatArray, first_variance: FloatArray) -> None:
-        """Back to the priors for the entries `where` (b,), with the speed and its variance (b,)."""
-        self.reset(where)
-        self._mean[where, 0] = first[where]
-        self._spread[where, 0, :] = 0.0
-        self._spread[where, :, 0] = 0.0
-        self._spread[where, 0, 0] = first_variance[where]
+    def renew(self, where: Number, first: Number, variance: Number) -> None:
+        """Back to the priors where the condition `where` holds, with the speed `first` and its variance."""
+        self.mean = np.where(where, self.prior_mean[:, None], self.mean)
+        self.spread = np.where(where, self._packed, self.spread)
+        self.spread[1 : self.size, where] = 0.0
+        self.mean[0] = np.where(where, first, self.mean[0])
+        self.spread[0] = np.where(where, variance, self.spread[0])

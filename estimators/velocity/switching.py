@@ -21,10 +21,11 @@ from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.interpolate import FloatArray
 from estimators.schedule import GainSchedule
-from estimators.signals.checks import any_missing, batch, entries, mask
+from estimators.signals.checks import any_missing, batch, entries, mask, quiet
 from estimators.signals.memory import Memory
 from estimators.velocity.exact_update import ExactUpdate, refuse_explosive
-from estimators.velocity.screening import LIMIT, MEMORY, Screen
+from estimators.velocity.exact_update_few import ExactUpdateFew
+from estimators.velocity.screening import FEW, LIMIT, MEMORY, Screen, Screened
 
 HIGH_SLIP_GAIN = (0.22, 0.1)
 """L_x of P3's second mode, m/s and m/s^2."""
@@ -132,6 +133,7 @@ class SwitchedVelocityObserver(Memory):
         self.switch = SlipSwitch(self.batch_shape, limit, hysteresis)
         count = math.prod(self.batch_shape)
         self._updates = (ExactUpdate(normal), ExactUpdate(second))
+        self._few = (ExactUpdateFew(normal), ExactUpdateFew(second)) if count <= FEW else None
         self.screen = _SavedScreen(normal.parameter, normal.sample_time, count, False, stale_after)
         self._sample = 0
         self.state: FloatArray = np.zeros((2, count))
@@ -149,18 +151,12 @@ class SwitchedVelocityObserver(Memory):
         high = self.switch(entries(slip, self.batch_shape, "slip")).reshape(-1)
         seen = self.screen(u, y, p, self._sample, self.batch_shape)
         self._sample += 1
-        innovation: FloatArray = np.empty(p.size)
-        for update, chosen in zip(self._updates, (~high, high), strict=True):
-            if not chosen.any():
-                continue
-            part, told = self.state[:, chosen], np.empty(int(chosen.sum()))
-            coast = None if seen.coast is None else seen.coast[chosen]
-            update.advance(part, seen.held_input[chosen], seen.measurement[chosen], seen.parameter[chosen], coast, told)
-            self.state[:, chosen], innovation[chosen] = part, told
+        innovation = self._advance(seen, high)
         flags: FlagArray = np.zeros(p.size, dtype=np.int32) if seen.flags is None else seen.flags
-        gone = any_missing(~(np.absolute(self.state.T) <= LIMIT), (p.size,))
-        self.state[:, gone] = 0.0
-        raise_flag(flags, gone, Flag.RESET)
+        if not quiet(self.state):
+            gone = any_missing(~(np.absolute(self.state.T) <= LIMIT), (p.size,))
+            self.state[:, gone] = 0.0
+            raise_flag(flags, gone, Flag.RESET)
         if seen.missing is not None:
             innovation[seen.missing] = np.nan
         used = np.ones(p.size, dtype=np.bool_) if seen.coast is None else ~seen.coast
@@ -172,6 +168,25 @@ class SwitchedVelocityObserver(Memory):
             flags.reshape(shape),
             high.reshape(shape),
         )
+
+    def _advance(self, seen: Screened, high: BoolArray) -> FloatArray:
+        """Moves `state` by one sample, each entry with the gains of its mode; returns the innovations."""
+        innovation: FloatArray = np.empty(high.size)
+        if self._few is not None:
+            masks = [False] * high.size if seen.coast is None else seen.coast.tolist()
+            columns = (seen.held_input.tolist(), seen.measurement.tolist(), seen.parameter.tolist(), masks)
+            entries = zip(high.tolist(), *self.state.tolist(), *columns, strict=True)
+            moved = [self._few[mode].advance(x1, x2, u, y, p, mask) for mode, x1, x2, u, y, p, mask in entries]
+            self.state[0], self.state[1], innovation[:] = zip(*moved, strict=True)
+            return innovation
+        for update, chosen in zip(self._updates, (~high, high), strict=True):
+            if not chosen.any():
+                continue
+            part, told = self.state[:, chosen], np.empty(int(chosen.sum()))
+            coast = None if seen.coast is None else seen.coast[chosen]
+            update.advance(part, seen.held_input[chosen], seen.measurement[chosen], seen.parameter[chosen], coast, told)
+            self.state[:, chosen], innovation[chosen] = part, told
+        return innovation
 
     def reset(self, where: npt.ArrayLike | None = None, state: npt.ArrayLike = 0.0) -> None:
         """Sets the entries `where` (mask of the batch shape; None: all) to `state` (2,), in mode 1.

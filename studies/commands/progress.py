@@ -8,8 +8,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 
-def progress_bar() -> Progress:
-    """A transient bar with percentage and elapsed time."""
+def progress_bar(threaded: bool = True) -> Progress:
+    """A transient bar with percentage and elapsed time; without a thread it is drawn at every ``update(refresh=True)``."""
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -18,4 +18,5 @@ def progress_bar() -> Progress:
         console=Console(stderr=True),
         disable=not sys.stderr.isatty(),
         transient=True,
+        auto_refresh=threaded,
     )

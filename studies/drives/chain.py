@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -105,6 +106,7 @@ def _pipeline_of(
         "unknown-input": UnknownInputForceObserver,
         "pid": DifferentiatedPid,
         "unscented": WheelForceFilter,
+        "linear": partial(WheelForceFilter, method="linear"),
     }
     dynamic = chosen.vertical_load == "dynamic"
     method: Any = chosen.lateral_force

@@ -116,6 +116,6 @@ _PARAMETERS = {
     ("sideslip", "fixed-stiffness"): _STIFFNESS,
 }
 _SIGNALS = {
-    **{("longitudinal_force", name): TORQUES for name in ("unknown-input", "pid", "unscented")},
+    **{("longitudinal_force", name): TORQUES for name in ("unknown-input", "pid", "unscented", "linear")},
     ("attitude", "gyro"): ("roll_rate", "pitch_rate"),
 }

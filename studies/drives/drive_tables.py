@@ -114,13 +114,22 @@ def _one_of(*names: str) -> Callable[[str], str]:
 
 
 class Estimators(Table):
-    """Which estimators make up the pipeline; the first name of each is the default."""
+    """Which estimators make up the pipeline, and which run at the corners beside it; the first of each is the default.
 
-    longitudinal_force: Annotated[str, AfterValidator(_one_of("unknown-input", "pid", "unscented"))] = "unknown-input"
+    ``corner_velocity`` is what the result calls corner observers; those that cross-check the pipeline where a lateral
+    schedule is given are scheduled ones always.
+    """
+
+    longitudinal_force: Annotated[str, AfterValidator(_one_of("unknown-input", "pid", "unscented", "linear"))] = (
+        "unknown-input"
+    )
     vertical_load: Annotated[str, AfterValidator(_one_of("dynamic", "quasi-static"))] = "dynamic"
     lateral_force: Annotated[str, AfterValidator(_one_of("linear", "unscented"))] = "linear"
     attitude: Annotated[str, AfterValidator(_one_of("none", "gyro"))] = "none"
     velocity: Annotated[str, AfterValidator(_one_of("fusion"))] = "fusion"
+    corner_velocity: Annotated[
+        str, AfterValidator(_one_of("lpv", "gain-switched", "kalman-three-state", "kalman-two-state"))
+    ] = "lpv"
     sideslip: Annotated[
         str,
         AfterValidator(

@@ -35,6 +35,7 @@ class CornerInputs:
     steer: Array
     yaw_rate: Array
     ax: Array
+    ay: Array
     vy: Array
     x: Array
     y: Array
@@ -87,6 +88,7 @@ def corner_inputs_of(log: DriveLog, drive: DriveFile) -> CornerInputs:
         steer=steer,
         yaw_rate=yaw_rate,
         ax=ax,
+        ay=ay,
         vy=vy,
         x=x,
         y=y,

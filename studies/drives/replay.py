@@ -1,24 +1,20 @@
-"""The longitudinal observer at each corner, run over a drive, and the velocity at the centre of gravity."""
+"""The chosen longitudinal observer at each corner, run over a drive, and the velocity at the centre of gravity."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators import EstimatorError, GainSchedule, LpvVelocityObserver
-from estimators.schedule import SHIPPED, read_content
+from estimators.velocity import slip_ratio
 from studies.drives.baselines import held, mean_over
+from studies.drives.corner_observers import CornerObserver, CornerSample
 from studies.drives.prepare import CornerInputs
-from synthesis.errors import SpecError
 
 Array = npt.NDArray[np.float64]
 PROGRESS_STEPS = 50
-MODEL = "corner-velocity-{}"
 
 
 @dataclass(frozen=True)
@@ -36,57 +32,31 @@ class Replay:
     flags: npt.NDArray[np.int64]
 
 
-def load_schedule(
-    name: str, folder: Path, sample_time: float, direction: Literal["longitudinal", "lateral"] = "longitudinal"
-) -> GainSchedule:
-    """The schedule of a direction by shipped name, or by path relative to ``folder`` when the name ends in .json.
-
-    Raises SpecError, before anything runs: unreadable or edited, another model or direction, another sample time.
-    """
-    try:
-        if name.endswith(".json"):
-            path = folder / name
-        else:
-            GainSchedule.shipped(name)  # refuses an unknown name with a list of those there are
-            path = SHIPPED / f"{name}.json"
-        content = read_content(path)
-        schedule = GainSchedule.from_content(content, path.name)
-    except EstimatorError as error:
-        raise SpecError(f"schedules.{direction}: {error}") from error
-    model = content["model"]["id"]
-    wanted = MODEL.format(direction)
-    if model != wanted:
-        raise SpecError(f"schedules.{direction}: '{name}' is a schedule of {model}; this run needs one of {wanted}")
-    if abs(schedule.sample_time - sample_time) > 1e-9 * sample_time:
-        raise SpecError(
-            f"schedules.{direction}: '{name}' was proved at sample_time = {schedule.sample_time:g} s, the drive file "
-            f'asks for {sample_time:g} s; set sample_time = "{schedule.sample_time * 1e3:g} ms" or synthesise another'
-        )
-    return schedule
-
-
-def replay(inputs: CornerInputs, schedule: GainSchedule, progress: Callable[[float], None] | None = None) -> Replay:
+def replay(inputs: CornerInputs, observer: CornerObserver, progress: Callable[[float], None] | None = None) -> Replay:
     """Run the four observers; V_x of the last step enters the corner accelerations of the next, P1 section 6.
 
     They start at rest relative to the road (z = v_r = 0) with the first sample. Wheel accelerations are backward
     differences, so step k moves the estimate from sample k - 1 to k with what is known at k: nothing looks ahead.
     """
     n = inputs.time.size
-    observer = LpvVelocityObserver(schedule, batch_shape=(4,), outside="flag")
     relative, innovation = np.zeros((n, 4)), np.full((n, 4), np.nan)
     flags = np.zeros((n, 4), dtype=np.int64)
-    wheel_part = inputs.radius * inputs.wheel_acceleration - inputs.free
+    surface, dw = inputs.surface_speed, inputs.wheel_acceleration
+    wheel_part = inputs.radius * dw - inputs.free
     gain, shift = centre_map(inputs)
-    vx = float(held(mean_over(inputs.surface_speed))[0])
+    vx = float(held(mean_over(surface))[0])
     for k in range(1, n):
         u = wheel_part[k] - inputs.per_speed[k] * vx
-        step = observer.step(u, inputs.normalised_force[k], inputs.wheel_speed[k])
-        relative[k], innovation[k], flags[k] = step.estimate[:, 1], step.innovation, step.flags
-        seen = cg_velocity(gain[k] * (inputs.surface_speed[k] - relative[k]) + shift[k])
+        slip = slip_ratio(surface[k - 1], surface[k - 1] - relative[k - 1])
+        mu, ax, ay = inputs.normalised_force[k], float(inputs.ax[k]), float(inputs.ay[k])
+        relative[k], innovation[k], flags[k] = observer.step(
+            CornerSample(u, mu, inputs.wheel_speed[k], dw[k], slip, ax, ay)
+        )
+        seen = cg_velocity(gain[k] * (surface[k] - relative[k]) + shift[k])
         vx = float(seen) if np.isfinite(seen) else vx
         if progress is not None and k % max(1, n // PROGRESS_STEPS) == 0:
             progress(k / n)
-    corner = gain * (inputs.surface_speed - relative) + shift
+    corner = gain * (surface - relative) + shift
     return Replay(cg_velocity(corner), corner, relative, innovation, flags)
 
 

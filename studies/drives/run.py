@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 
 from studies.drives.chain import Chain, pipeline_of, run_chain
+from studies.drives.corner_observers import corner_observer
 from studies.drives.drive_file import read_drive
 from studies.drives.judge import DriveData, judge
 from studies.drives.log import read_log
 from studies.drives.output import ready_folder, whole_file, write_csv, write_json
 from studies.drives.prepare import corner_inputs_of
 from studies.drives.quantities import CORNERS
-from studies.drives.replay import load_schedule, replay
+from studies.drives.replay import replay
+from studies.drives.schedules import load_schedule
 
 Progress = Callable[[float], None]
 
@@ -56,11 +58,12 @@ def replay_drive(logs: Sequence[Path], drive: Path, *, progress: Progress | None
     names, time = description.schedules, description.sample_time
     schedule = load_schedule(names.longitudinal, drive.parent, time)
     lateral = load_schedule(names.lateral, drive.parent, time, "lateral") if names.lateral is not None else None
+    observer = corner_observer(description, drive.parent, schedule)
     pipeline, assumptions = pipeline_of(description, schedule, lateral)
     log = read_log(logs, description)
     told(0.2)
     inputs = corner_inputs_of(log, description)
-    replayed = replay(inputs, schedule, lambda done: told(0.2 + 0.1 * done))
+    replayed = replay(inputs, observer, lambda done: told(0.2 + 0.1 * done))
     chain = run_chain(log, inputs, pipeline, assumptions, lambda done: told(0.3 + 0.7 * done))
     return DriveData(description, schedule, log, inputs, replayed, chain)
 

@@ -22,6 +22,41 @@ MEASURED = np.array([0.1, 20.0, 0.1, 1.5])
 STEERING = 0.03
 
 
+LEVERS = np.array([CAR.front_lever, CAR.front_lever, -CAR.rear_lever, -CAR.rear_lever])
+SIDES = np.array([-1.0, 1.0, -1.0, 1.0]) * CAR.track / 2
+STIFFNESS = np.array([CAR.front_stiffness] * 2 + [CAR.rear_stiffness] * 2)
+RELAXATION = np.array([CAR.front_relaxation] * 2 + [CAR.rear_relaxation] * 2)
+KNEES = CAR.friction * np.asarray(CAR.static_loads) / (2 * STIFFNESS)
+ANGLES = np.array([STEERING, STEERING, 0.0, 0.0])
+
+
+def usual_transition(x: Any, dt: float) -> Any:
+    """The model of one car as one writes it for a loop: numpy over the wheels, P4 (1)-(11) as printed."""
+    r, v, b, drive = x[0], x[1], x[2], x[7]
+    forces = x[3:7]
+    tangents = np.tan(ANGLES - np.arctan2(v * b + LEVERS * r, v + SIDES * r))
+    ratio = np.minimum(KNEES / np.maximum(np.abs(tangents), 1e-9), 1.0)
+    front, rear = forces[0] + forces[1], forces[2] + forces[3]
+    lateral = front * np.cos(STEERING) + drive * np.sin(STEERING)
+    difference = (forces[0] - forces[1]) * np.sin(STEERING)
+    angle = b - STEERING
+    along = drive * np.cos(angle) + front * np.sin(angle) + rear * np.sin(b)
+    across = -drive * np.sin(angle) + front * np.cos(angle) + rear * np.cos(b)
+    rate = np.zeros(8)
+    rate[0] = (CAR.front_lever * lateral - CAR.rear_lever * rear + CAR.track / 2 * difference) / CAR.yaw_inertia
+    rate[1] = along / CAR.mass
+    rate[2] = across / (CAR.mass * v) - r
+    rate[3:7] = v / RELAXATION * (STIFFNESS * tangents * (2 - ratio) * ratio - forces)
+    return x + dt * rate
+
+
+def usual_measurement(x: Any) -> Any:
+    front, drive = x[3] + x[4], x[7]
+    along = drive * np.cos(STEERING) - front * np.sin(STEERING)
+    across = front * np.cos(STEERING) + x[5] + x[6] + drive * np.sin(STEERING)
+    return np.array([x[0], x[1], along / CAR.mass, across / CAR.mass])
+
+
 def plain_transition(x: Any, dt: float) -> Any:
     """The model in plain numbers, the fastest that a loop can be given."""
     r, v, b, f11, f12, f21, f22, fx = x.tolist()
@@ -62,15 +97,20 @@ def plain_measurement(x: Any) -> Any:
     return np.array([r, v, (fx * cd - front * sd) / CAR.mass, (front * cd + f21 + f22 + fx * sd) / CAR.mass])
 
 
-def reference(plain: bool = True) -> Any:
-    """filterpy's filter, with the model in plain numbers or with the very model object that the batch uses."""
+MODELS = ("usual numpy model", "model in plain numbers", "same model object")
+
+
+def reference(kind: str = MODELS[0]) -> Any:
+    """filterpy's filter with a model of one car: usual numpy, plain numbers, or the very object that the batch uses."""
     kalman = pytest.importorskip("filterpy.kalman", reason="filterpy is not installed: the `bench` extra brings it")
     points = kalman.MerweScaledSigmaPoints(8, math.sqrt(3 / 8), 2.0, 0.0)
     model = FourWheelModel.at(CAR, PERIOD, np.array(STEERING), np.array(CAR.static_loads), 1.0)
-    functions = (
-        (plain_measurement, plain_transition) if plain else (model.measurement, lambda x, dt: model.transition(x))
-    )
-    found = kalman.UnscentedKalmanFilter(8, 4, PERIOD, *functions, points)
+    functions = {
+        MODELS[0]: (usual_measurement, usual_transition),
+        MODELS[1]: (plain_measurement, plain_transition),
+        MODELS[2]: (model.measurement, lambda x, dt: model.transition(x)),
+    }
+    found = kalman.UnscentedKalmanFilter(8, 4, PERIOD, *functions[kind], points)
     found.x, found.P = START.copy(), SPREAD.copy()
     found.Q, found.R = np.diag(PROCESS * PERIOD), np.diag(SENSOR)
     return found
@@ -86,11 +126,16 @@ def inputs() -> tuple[Any, Any, Any]:
     return np.full(RUNS, STEERING), np.tile(CAR.static_loads, (RUNS, 1)), np.tile(MEASURED, (RUNS, 1))
 
 
-def test_plain_model_is_the_same() -> None:
+@pytest.mark.parametrize(
+    ("transition", "measurement"),
+    [(usual_transition, usual_measurement), (plain_transition, plain_measurement)],
+    ids=MODELS[:2],
+)
+def test_models_are_the_same(transition: Any, measurement: Any) -> None:
     model = FourWheelModel.at(CAR, PERIOD, np.array(STEERING), np.array(CAR.static_loads), 1.0)
     for x in START + np.random.default_rng(0).normal(size=(20, 8)) * np.sqrt(np.diag(SPREAD)):
-        np.testing.assert_allclose(plain_transition(x, PERIOD), model.transition(x), rtol=1e-11)
-        np.testing.assert_allclose(plain_measurement(x), model.measurement(x), rtol=1e-11, atol=1e-12)
+        np.testing.assert_allclose(transition(x, PERIOD), model.transition(x), rtol=1e-11)
+        np.testing.assert_allclose(measurement(x), model.measurement(x), rtol=1e-11, atol=1e-12)
 
 
 def test_prediction_equals_filterpy() -> None:
@@ -104,10 +149,10 @@ def test_prediction_equals_filterpy() -> None:
     np.testing.assert_allclose(ours.covariance, theirs.P, rtol=1e-8, atol=1e-9)
 
 
-@pytest.mark.parametrize("plain", [True, False], ids=["model in plain numbers", "same model object"])
-def test_batch_against_a_loop_over_filterpy(benchmark: Any, plain: bool) -> None:
+@pytest.mark.parametrize("kind", MODELS)
+def test_batch_against_a_loop_over_filterpy(benchmark: Any, kind: str) -> None:
     """Both in one process, in turns, in processor time; the ratio of the best rounds is what is reported."""
-    theirs, observer, given = reference(plain), batch(), inputs()
+    theirs, observer, given = reference(kind), batch(), inputs()
     observer.step(*given)
     slow, fast = math.inf, math.inf
     for _ in range(8):

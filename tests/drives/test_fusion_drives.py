@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from estimators.faults import Flag
 from estimators.interpolate import FloatArray
 from estimators.schedule import GainSchedule
 from estimators.vehicle import CORNERS, VehicleParameters
@@ -137,10 +138,10 @@ def normalised_forces(runs: Runs, car: VehicleParameters, slope: FloatArray) -> 
     return out
 
 
-def fused(runs: Runs, car: VehicleParameters, mu: FloatArray | None) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """V_x, V_y and the standard deviation of V_x."""
+def fused(runs: Runs, car: VehicleParameters, mu: FloatArray | None) -> tuple[FloatArray, ...]:
+    """V_x, V_y, the standard deviation of V_x, and where it started again."""
     fusion = VelocityFusion(car, STEP, runs.ax.shape[:-1])
-    vx, vy, spread = (np.empty_like(runs.ax) for _ in range(3))
+    vx, vy, spread, renewed = (np.empty_like(runs.ax) for _ in range(4))
     for k in range(runs.ax.shape[-1]):
         step = fusion.step(
             runs.wheel_speed[..., k, :],
@@ -151,7 +152,8 @@ def fused(runs: Runs, car: VehicleParameters, mu: FloatArray | None) -> tuple[Fl
             None if mu is None else mu[..., k, :],
         )
         vx[..., k], vy[..., k], spread[..., k] = step.vx, step.vy, step.vx_deviation
-    return vx, vy, spread
+        renewed[..., k] = step.flags & Flag.RESET
+    return vx, vy, spread, renewed
 
 
 def corner_observers(runs: Runs, car: VehicleParameters, mu: FloatArray, slope: FloatArray) -> FloatArray:
@@ -186,7 +188,7 @@ def compared() -> dict[str, FloatArray]:
     runs, car = simulated(), vehicle_of(SIMULATED["launch"])
     slope = lagged_slope(runs.wheel_speed, 0.01)
     mu = normalised_forces(runs, car, slope)
-    vx, vy, spread = fused(runs, car, mu)
+    vx, vy, spread, renewed = fused(runs, car, mu)
     wheels = (car.radius * runs.wheel_speed).mean(axis=-1)
     integrated = wheels[..., :1] + np.cumsum(runs.ax * STEP, axis=-1)
     corners = corner_observers(runs, car, mu, slope)
@@ -196,6 +198,7 @@ def compared() -> dict[str, FloatArray]:
     with np.errstate(invalid="ignore"):
         found["fusion_vy"] = nrms(vy, runs.vy)
         found["beyond_three_sigma"] = 100.0 * np.nanmean(np.abs(vx - runs.vx) > 3 * spread, axis=-1)
+    found["renewed"] = renewed.sum(axis=-1)
     return found
 
 
@@ -215,9 +218,13 @@ def test_it_knows_how_well_it_knows(table: dict[str, FloatArray]) -> None:
 
 
 def test_lateral_velocity_where_the_car_steers(table: dict[str, FloatArray]) -> None:
-    found = table["fusion_vy"][list(SIMULATED).index("steer")]
-    assert found.mean() < 6.0
-    assert np.mean(found < 6.0) >= 0.9  # scale errors that differ by 3 % between a_y and r drift by 0.2 m/s^2
+    """Every single run, though scale errors of a_y and r that differ by 4 % drift by 0.3 m/s^2."""
+    assert table["fusion_vy"][list(SIMULATED).index("steer")].max() < 6.0
+
+
+def test_no_estimate_is_taken_for_lost(table: dict[str, FloatArray]) -> None:
+    """Pulsed brakes and a patch of ice on all wheels are slip."""
+    assert not table["renewed"].any()
 
 
 @pytest.mark.parametrize("drive", SLIPPING)
@@ -242,7 +249,8 @@ def recorded() -> tuple[Runs, VehicleParameters]:
 
 def test_real_drive_from_launch_through_the_abs_stop() -> None:
     runs, car = recorded()
-    vx, vy, spread = fused(runs, car, None)
+    vx, vy, spread, renewed = fused(runs, car, None)
+    assert not renewed.any()
     error = np.sqrt(np.nanmean((vx - runs.vx) ** 2))
     wheels = np.sqrt(np.nanmean(((car.radius * runs.wheel_speed).mean(axis=-1) - runs.vx) ** 2))
     assert error < 0.3
@@ -275,7 +283,7 @@ def main() -> None:
     for name, values in found.items():
         print(f"{name:26}", *(f"{row(drive):>14}" for drive in values))
     runs, car = recorded()
-    vx, _, _ = fused(runs, car, None)
+    vx, *_ = fused(runs, car, None)
     wheels = (car.radius * runs.wheel_speed).mean(axis=-1)
     print("recorded drive, RMS m/s: fusion", round(float(np.sqrt(np.mean((vx - runs.vx) ** 2))), 3), end=", ")
     print("mean wheel speed", round(float(np.sqrt(np.mean((wheels - runs.vx) ** 2))), 3))

@@ -112,10 +112,7 @@ def test_longitudinal_velocity_in_every_run(found: Found, drive: str) -> None:
 
 
 def test_lateral_velocity_where_the_car_steers(found: Found) -> None:
-    """The mean over the runs; one run in ten draws a bias and scale that the side slip model cannot tell from sideslip."""
-    steer = found.velocity["vy"][list(SIMULATED).index("steer")]
-    assert steer.mean() < 6.0
-    assert np.mean(steer < 6.0) >= 0.9
+    assert found.velocity["vy"][list(SIMULATED).index("steer")].max() < 6.0  # every single run
 
 
 @pytest.mark.parametrize("signal", FORCES)

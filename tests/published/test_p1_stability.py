@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from studies.papers.corner_estimation.lyapunov import Certificate, Reading, certificate, convexity
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.models.catalogue.corner import Direction
@@ -158,25 +159,14 @@ def gain_box(direction: Direction) -> tuple[LpvModel, GainBox]:
 # ---- (29), (41): the printed matrices ---------------------------------------------------------------------------------
 
 
-def printed(direction: Direction, reading: str) -> tuple[LpvModel, list[list[str]], Printed, Form]:
+def printed(direction: Direction, reading: Reading) -> tuple[LpvModel, list[list[str]], Printed, Form]:
     """Model, gains and the printed matrix in one of four readings (P1 sheet section 11, item 2)."""
-    model, published = corner("corner-estimation", direction)
-    assert published.gains is not None
-    assert published.lyapunov is not None
-    matrix = [[list(row) for row in coefficient] for coefficient in published.lyapunov]
-    if reading in ("swapped", "adjugate"):
-        matrix = [[row[::-1] for row in coefficient[::-1]] for coefficient in matrix]
-    if reading == "adjugate":
-        matrix = [[[a, negated(b)], [negated(c), d]] for ((a, b), (c, d)) in matrix]
-    return model, [[str(gain)] for gain in published.gains], matrix, "dual" if reading == "dual" else "primal"
-
-
-def negated(decimal: str) -> str:
-    return decimal[1:] if decimal.startswith("-") else f"-{decimal}"
+    offered = certificate(direction, reading)
+    return offered.model, offered.gains, offered.matrix, offered.form
 
 
 WHOLE = (0.0, 180.0)
-JUDGED = {
+JUDGED: dict[tuple[Direction, Reading], tuple[tuple[float, float], ...]] = {
     # reading: intervals on [0, 180] for (29) and (41); sheet section 11 item 2, claims P1-29-*, P1-41-*
     ("longitudinal", "primal"): (),
     ("lateral", "primal"): ((52.8760, 52.9042),),
@@ -190,7 +180,7 @@ JUDGED = {
 
 
 @pytest.mark.parametrize(("direction", "reading"), list(JUDGED))
-def test_printed_matrices_hold_exactly_where_the_sheet_says(direction: Direction, reading: str) -> None:
+def test_printed_matrices_hold_exactly_where_the_sheet_says(direction: Direction, reading: Reading) -> None:
     model, gains, matrix, form = printed(direction, reading)
     found = judge(model, gains, matrix, form)
     expected = JUDGED[direction, reading]
@@ -230,7 +220,7 @@ def test_by_how_much_the_primal_reading_fails(direction: Direction, omega: float
 
 @settings(deadline=None, max_examples=30)
 @given(st.sampled_from(list(JUDGED)), st.floats(0.0, 180.0))
-def test_judgements_agree_with_dense_eigenvalues(case: tuple[Direction, str], omega: float) -> None:
+def test_judgements_agree_with_dense_eigenvalues(case: tuple[Direction, Reading], omega: float) -> None:
     """Second road: numpy eigenvalues at any wheel speed that is not right at an end of an interval."""
     model, gains, matrix, form = printed(*case)
     intervals = judge(model, gains, matrix, form).intervals
@@ -244,12 +234,7 @@ def test_judgements_agree_with_dense_eigenvalues(case: tuple[Direction, str], om
 
 def eigenvalues(model: LpvModel, gains: list[list[str]], matrix: Printed, form: Form, omega: FloatArray) -> FloatArray:
     """Eigenvalues of (28), (40) or their dual at both bounds of the rate, (g, 2 * nx)."""
-    constant, slope = (np.array(part, float) for part in matrix)
-    M = constant + omega[:, None, None] * slope
-    A_e = model.on(omega).error_dynamics(np.array(gains, float))[0]
-    product = M @ A_e if form == "primal" else A_e @ M
-    total = product + np.swapaxes(product, 1, 2)
-    return np.concatenate([np.linalg.eigvalsh(total + rate * slope) for rate in (-800.0, 800.0)], axis=1)
+    return Certificate(model, gains, matrix, form).eigenvalues(omega)
 
 
 def dense_worst(model: LpvModel, gain: FloatArray, lyapunov: FloatArray, form: Form, omega: FloatArray) -> float:
@@ -269,7 +254,7 @@ def dense_worst(model: LpvModel, gain: FloatArray, lyapunov: FloatArray, form: F
 
 @pytest.mark.parametrize("reading", ["primal", "swapped", "adjugate"])
 @pytest.mark.parametrize("direction", DIRECTIONS)
-def test_printed_matrices_are_not_multi_convex(direction: Direction, reading: str) -> None:
+def test_printed_matrices_are_not_multi_convex(direction: Direction, reading: Reading) -> None:
     """Claim P1-mc: A1'P1 + P1 A1 >= 0 is said to hold; its eigenvalues have both signs in every reading."""
     model, gains, matrix, _ = printed(direction, reading)
     spread = np.linalg.eigvalsh(convexity(model, np.array(gains, float), np.array(matrix[1], float)))
@@ -296,11 +281,3 @@ def test_multi_convexity_has_no_interior_and_is_met_as_an_equality(direction: Di
     assert found[1, 1] == 0.0
     assert abs(found[0, 1]) <= 1e-9 * scale
     assert found[0, 0] >= -1e-9 * scale
-
-
-def convexity(model: LpvModel, gain: FloatArray, slope: FloatArray) -> FloatArray:
-    """A1'P1 + P1 A1, with A1 the part of A_e that is linear in the wheel speed."""
-    A_e = model.on([0.0, 1.0]).error_dynamics(gain)[0]
-    A1 = A_e[1] - A_e[0]
-    A1[:, 1] = 0.0  # exactly, as (26) has it; the difference above leaves rounding
-    return np.asarray(A1.T @ slope + slope @ A1)

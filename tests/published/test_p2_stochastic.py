@@ -17,6 +17,7 @@ from scipy.linalg import solve_discrete_are
 from analysis.gramians import growing_observability, sampled_sequence, sliding_observability
 from analysis.observability_windows import uniform_detectability, uniform_stabilisability
 from analysis.stochastic_observability import stochastic_observability_along, wheel_speed_tests
+from studies.papers.longitudinal_speed.inputs import launch
 from synthesis.lmi.result import Verdict
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.catalogue.longitudinal_speed import longitudinal_speed_model
@@ -33,12 +34,8 @@ TYPICAL = (1e-3, 1.0, 0.1)  # sizes of z [m], V_r [m/s], z' [m/s]
 
 def drive(standing: float, duration: float) -> tuple[Array, Array, Array]:
     """Time, wheel speed, wheel acceleration: stand, launch to 60 rad/s in 4 s with wheel flutter, then cruise."""
-    t = STEP * np.arange(round(duration / STEP))
-    u = np.maximum(t - standing, 0.0)
-    ramp = np.minimum(u, 4.0) * np.pi / 4.0
-    speed = 30.0 * (1.0 - np.cos(ramp)) + 3.0 * np.sin(6.0 * u) ** 2
-    acceleration = np.where(u < 4.0, 30.0 * np.pi / 4.0 * np.sin(ramp), 0.0) + 18.0 * np.sin(12.0 * u)
-    return t, speed, acceleration
+    record = launch(standing, duration)
+    return record.time, record.speed, record.acceleration
 
 
 def constant(model: LpvModel, speed: float, samples: int) -> Any:

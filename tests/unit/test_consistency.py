@@ -21,18 +21,10 @@ from estimators.filters import (
     nis,
 )
 from estimators.sideslip import AdaptiveStiffnessObserver, FixedStiffnessObserver, FourWheelModel, FourWheelObserver
+from tests.unit.monte_carlo import RUNS, judged, normal
 from tests.unit.sideslip_truth import AXLES, CAR, PERIOD
 
-RUNS, STEPS = 1000, 150
-
-
-def normal(draw: np.random.Generator, variances: Any) -> np.ndarray:
-    return draw.normal(size=(RUNS, len(variances))) * np.sqrt(variances)
-
-
-def judged(errors: list[np.ndarray], innovations: list[np.ndarray], n: int, m: int) -> tuple[Consistency, Consistency]:
-    skip = len(errors) // 4  # the effect of the start
-    return consistency(np.array(errors)[skip:].T, n), consistency(np.array(innovations)[skip:].T, m)
+STEPS = 150
 
 
 def f(x: np.ndarray) -> np.ndarray:

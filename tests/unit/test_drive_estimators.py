@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from estimators import GainSchedule, LpvVelocityObserver
 from estimators.forces import VerticalLoads, WheelForceFilter
 from estimators.pipeline import DifferentiatedPid, FourWheelSideslip, StiffnessSideslip
 from estimators.schedule import write_content
+from estimators.velocity import BristleTire, LtvKalmanObserver, SwitchedVelocityObserver
 from studies.drives.chain import pipeline_of
+from studies.drives.corner_observers import CornerObserver, CornerSample, corner_observer
 from studies.drives.drive_file import DriveFile, read_drive
-from studies.drives.replay import load_schedule
+from studies.drives.judge import judge
 from studies.drives.run import replay_drive
+from studies.drives.schedules import load_schedule
 from synthesis.errors import SpecError
-from tests.drives.synthetic_drive import DRIVE, TORQUES, write_drive
-from tests.unit.schedule_content import schedule_content
+from tests.drives.synthetic_drive import DRIVE, TORQUES, columns, write_drive, write_log
+from tests.unit.schedule_content import EFFECTIVE_RADIUS, PUBLISHED, schedule_content
 
 TORQUE = DRIVE.replace("[reference]", TORQUES + "\n[reference]")
 TIRES = (
@@ -47,6 +52,8 @@ def read(folder: Path, text: str) -> DriveFile:
             chosen(TORQUE.replace("[schedules]", TIRES + "\n[schedules]"), sideslip="four-wheel-extended"),
             r"vehicle\.relaxation_length: missing",
         ),
+        (chosen(DRIVE, corner_velocity="gain-swiched"), "did you mean gain-switched"),
+        (chosen(DRIVE, corner_velocity="kalman"), r"estimators\.corner_velocity: unknown estimator 'kalman'"),
         (chosen(TORQUE, attitude="gyro"), r"signals\.roll_rate: missing, but estimators\.attitude = 'gyro'"),
     ],
 )
@@ -65,6 +72,9 @@ def test_what_is_chosen_is_built(tmp_path: Path) -> None:
     assert not pipeline.loads.dynamic
     assert isinstance(pipeline.sideslip, FourWheelSideslip)
     assert not assumptions
+    assert pipeline.longitudinal_force.method == "unscented"
+    pipeline, _ = pipeline_of(read(tmp_path, chosen(EQUIPPED, longitudinal_force="linear")), schedule)
+    assert pipeline.longitudinal_force.method == "linear"
     names = {"longitudinal_force": "pid", "sideslip": "adaptive-stiffness"}
     pipeline, _ = pipeline_of(read(tmp_path, chosen(EQUIPPED, **names)), schedule)
     assert isinstance(pipeline.longitudinal_force, DifferentiatedPid)
@@ -88,3 +98,62 @@ def test_a_car_that_cannot_be_is_refused_before_the_log_is_read(tmp_path: Path) 
     with pytest.raises(SpecError, match=r"cg_height = 55\.0 m is not in") as caught:
         replay_drive([tmp_path / "no-such-log.csv"], drive)
     assert "\n" not in str(caught.value)
+
+
+def corner_observer_of(folder: Path, name: str) -> CornerObserver:
+    drive = read(folder, chosen(DRIVE, corner_velocity=name))
+    return corner_observer(drive, folder, load_schedule("schedule.json", folder, 0.005))
+
+
+def sample(slip: float = 0.0) -> CornerSample:
+    return CornerSample(*(np.full(4, value) for value in (2.0, 0.3, 40.0, 6.0, slip)), 2.0, 0.0)
+
+
+def test_corner_observers_are_those_of_the_runtime(tmp_path: Path) -> None:
+    """Calm driving, then high slip: sample by sample what the estimators themselves make of it."""
+    schedule = GainSchedule.from_content(schedule_content())
+    sigma0, sigma1, sigma2, kappa = PUBLISHED["longitudinal"]["constants"]
+    tire = BristleTire(sigma0, sigma1, sigma2, kappa, EFFECTIVE_RADIUS)
+    lpv, switched = LpvVelocityObserver(schedule), SwitchedVelocityObserver(schedule)
+    kalman = {
+        f"kalman-{word}-state": LtvKalmanObserver(tire, 0.005, states=n) for word, n in (("three", 3), ("two", 2))
+    }  # type: ignore[arg-type]
+    chosen_ones = {name: corner_observer_of(tmp_path, name) for name in ("lpv", "gain-switched", *kalman)}
+    for k in range(40):
+        given = sample(0.3 if k >= 20 else 0.01)
+        u, mu, w, dw, slip = given[:5]
+        expected = {"lpv": lpv.step(u, mu, w).estimate, "gain-switched": switched.step(u, mu, w, slip).estimate}
+        expected |= {name: one.step(u, mu, w, dw, k >= 20).estimate for name, one in kalman.items()}
+        found = {name: one.step(given) for name, one in chosen_ones.items()}
+        for name, value in expected.items():
+            np.testing.assert_allclose(found[name].relative_velocity, value[:, 1], rtol=1e-12, atol=1e-15)
+            assert not found[name].flags[0] or k == 0
+    assert len({round(float(step.relative_velocity[0]), 6) for step in found.values()}) >= 3
+
+
+@pytest.mark.parametrize("name", ["gain-switched", "kalman-three-state", "kalman-two-state"])
+def test_every_corner_observer_finds_the_velocity_of_the_closed_form(tmp_path: Path, name: str) -> None:
+    log = write_log(tmp_path / "log.csv", columns(duration=1.5))
+    data = replay_drive([log], write_drive(tmp_path, chosen(TORQUE, corner_velocity=name)))
+    error = np.abs(data.replay.velocity - data.log.reference["vx"])[data.log.time > 0.5]
+    assert error.max() < 5e-3
+    assert not data.replay.flags.any()
+    assert judge(data)["pipeline"]["estimators"]["corner_velocity"] == name
+
+
+def test_a_schedule_without_a_tire_is_refused_before_the_log_is_read(tmp_path: Path) -> None:
+    drive = write_drive(tmp_path, chosen(DRIVE, corner_velocity="kalman-two-state"))
+    content = schedule_content()
+    del content["model"]["constants"]["sigma1"]
+    write_content(tmp_path / "schedule.json", content)
+    with pytest.raises(
+        SpecError, match=r"the model of 'schedule\.json' has no constant sigma1, which the Kalman"
+    ) as caught:
+        replay_drive([tmp_path / "no-such-log.csv"], drive)
+    assert "\n" not in str(caught.value)
+    content["model"]["constants"]["sigma1"] = {"value": -1.0, "unit": "s/m"}
+    write_content(tmp_path / "schedule.json", content)
+    with pytest.raises(
+        SpecError, match=r"'schedule\.json': tire constants must be finite and above zero: sigma1 = -1\.0"
+    ):
+        replay_drive([tmp_path / "no-such-log.csv"], drive)

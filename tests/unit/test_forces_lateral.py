@@ -10,7 +10,6 @@ import pytest
 
 from estimators.errors import EstimatorError
 from estimators.faults import Flag
-from estimators.filters import consistency, nees
 from estimators.forces import LateralForceEstimator, planar_outputs
 from estimators.forces.planar import planar_model
 from estimators.vehicle import VehicleParameters
@@ -106,33 +105,6 @@ def test_without_measurements_forces_fade_and_covariances_do_not_run_away() -> N
         axles = LOAD.reshape(2, 2).sum(-1)
         assert (found.deviation[:2] < 1.001 * axles).all()
     assert np.abs(found.axle_force).max() < 0.05 * 1000 * np.abs(before).max()
-
-
-def test_consistent_on_its_own_model_and_not_with_a_wrong_noise() -> None:
-    runs, n = 1000, 60
-    for wrong in (1.0, 0.3):
-        rng = np.random.default_rng(3)
-        sensors = np.array([0.3, 0.1, 0.3])
-        runner = LateralForceEstimator(
-            CAR,
-            TIME,
-            (runs,),
-            "linear",
-            130.0,
-            tuple(wrong * sensors),
-            split_deviation=1e6,  # type: ignore[arg-type]
-        )
-        states = rng.normal(size=(runs, 3)) * LOAD.reshape(2, 2).sum(-1)[[0, 1, 0]]
-        table = []
-        for k in range(n):
-            steer = np.full(runs, 0.25 * math.sin(0.2 * k))
-            states = states + rng.normal(0, 130.0, states.shape)
-            model = planar_model(CAR, steer, np.zeros((runs, 4)))
-            y = (model.C @ states[..., None])[..., 0] + rng.normal(size=states.shape) * sensors
-            runner.step(y[:, 0], y[:, 1], y[:, 2], steer, np.zeros((runs, 4)))
-            table.append(nees(runner.filter.state - states / 1000.0, runner.filter.covariance))
-        judged = consistency(np.stack(table, axis=-1), 3)
-        assert judged.consistent == (wrong == 1.0), str(judged)
 
 
 def test_batches_save_reset_and_refusals() -> None:

@@ -8,7 +8,6 @@ from scipy.linalg import expm
 
 from estimators.errors import EstimatorError
 from estimators.faults import Flag
-from estimators.filters import consistency, nees
 from estimators.velocity import KinematicKalman
 
 STEP = 0.005
@@ -77,27 +76,6 @@ def test_covariance_has_a_bound() -> None:
     assert step.flags == Flag.MISSING_INPUT | Flag.MISSING_MEASUREMENT
     step = filter_.step(0.0, 0.0, 0.0, [10.0, 0.0])
     np.testing.assert_allclose(step.velocity, [10.0, 0.0], atol=0.01)
-
-
-def test_consistent_on_its_own_model_and_not_with_a_wrong_noise() -> None:
-    runs, steps = 300, 150
-    rng = np.random.default_rng(1)
-    verdicts = []
-    for claimed in (2.0, 0.5):
-        filter_ = KinematicKalman(STEP, (runs,), acceleration_noise=claimed, bias_memory=10.0)
-        model = KinematicKalman(STEP, (runs,), acceleration_noise=2.0, bias_memory=10.0)
-        turn = np.full(runs, 0.3)
-        A, B, Q = model._model(turn, np.zeros(runs, dtype=np.bool_))
-        x = rng.normal(size=(runs, 4)) * [1.0, 1.0, 0.15, 0.15]
-        found = np.empty((runs, steps))
-        for k in range(steps):
-            noise = np.sqrt(np.einsum("bii->bi", Q)) * rng.normal(size=(runs, 4))
-            x = (A @ x[..., None])[..., 0] + B @ [1.0, 2.0] + noise
-            measured = x[:, :2] + 0.1 * rng.normal(size=(runs, 2))
-            step = filter_.step(1.0, 2.0, 0.3, measured)
-            found[:, k] = nees(x - np.concatenate([step.velocity, step.bias], axis=1), step.covariance)
-        verdicts.append(consistency(found, 4).consistent)
-    assert verdicts == [True, False]
 
 
 def test_missing_accelerations_are_held_and_flagged() -> None:

@@ -10,7 +10,6 @@ from scipy.linalg import expm
 
 from estimators.errors import EstimatorError
 from estimators.faults import Flag
-from estimators.filters import consistency, nees
 from estimators.velocity import BristleTire, LtvKalmanObserver
 from estimators.velocity.ltv_kalman import HIGH_SLIP, NORMAL
 from estimators.velocity.ltv_model import sampled
@@ -114,31 +113,6 @@ def test_at_constant_speed_two_states_are_observable_and_three_are_not() -> None
         rows = np.vstack([C @ np.linalg.matrix_power(A, k) for k in range(states)])
         rows = rows @ np.diag(1.0 / np.linalg.norm(rows, axis=0))
         assert np.linalg.matrix_rank(rows, tol=1e-9) == rank
-
-
-@pytest.mark.parametrize("states", [2, 3])
-def test_consistent_on_its_own_model_and_not_with_a_wrong_covariance(states: Literal[2, 3]) -> None:
-    q, r = 1e-4, 1e-3
-    runs, steps = 300, 40
-    rng = np.random.default_rng(4)
-    w = np.full(runs, 40.0)
-    A, B = sampled(TIRE, w, 0 * w, STEP, states)
-    C = TIRE.output(w, states)
-    verdicts = []
-    for claimed in (r, 0.2 * r):
-        observer = LtvKalmanObserver(TIRE, STEP, (runs,), states=states, normal=(q, claimed))
-        root = np.linalg.cholesky(observer.filter.covariance)
-        x = (root @ rng.normal(size=(runs, states, 1)))[..., 0]
-        found = np.empty((runs, steps))
-        for k in range(steps):
-            mu = (C @ x[..., None])[:, 0, 0] + np.sqrt(r) * rng.normal(size=runs)
-            u = np.full(runs, 2.0)
-            step = observer.step(u, mu, w)
-            x = (A @ x[..., None])[..., 0] + B * u[:, None] + np.sqrt(q) * rng.normal(size=(runs, 1)) * B3[:states]
-            error = (x - step.estimate)[:, 1:2]  # V_r: the covariance of all states becomes singular at constant speed
-            found[:, k] = nees(error, observer.filter.covariance[:, 1:2, 1:2])
-        verdicts.append(consistency(found, 1).consistent)
-    assert verdicts == [True, False]
 
 
 def test_high_slip_follows_the_kinematics() -> None:

@@ -1,0 +1,155 @@
+"""`speed_filter` for a single car: numbers where few are involved, matrices where a correction moves all of P.
+
+L is of the size of the channels, four at most: its inverse is found with plain numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.interpolate import FloatArray
+from estimators.velocity.speed_filter import Columns, SpeedFilter, Values
+
+_Row = list[float]
+
+
+class SpeedFilterFew(SpeedFilter):
+    """`mean` is a list of numbers, `spread` the covariance (n, n)."""
+
+    def _start(self) -> None:
+        self._means = self.prior_mean.tolist()
+        self.mean: _Row = self._means.copy()
+        self.spread: FloatArray = self.prior.copy()
+        self.waiting, self.waited = [0.0, 0.0], 0
+        self._couplings: dict[tuple[int, ...], tuple[FloatArray, npt.NDArray[np.int64]]] = {}
+        self._floor = self.prior.copy()
+        self._floor[0] = self._floor[:, 0] = 0.0
+        self._sensitivities: dict[Columns, tuple[FloatArray, npt.NDArray[np.int64]]] = {}
+
+    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+        super()._take(saved)
+        self.mean, self.waiting, self.waited = (saved[name].tolist() for name in ("mean", "waiting", "waited"))
+
+    @property
+    def state(self) -> FloatArray:
+        """A copy of the mean, (1, n)."""
+        return np.array([self.mean])
+
+    @property
+    def covariance(self) -> FloatArray:
+        """P as (1, n, n)."""
+        return self.spread[None].copy()
+
+    def variance(self, place: int, other: int | None = None) -> float:
+        """An entry of P."""
+        return self.spread.item(place, place if other is None else other)
+
+    def move(
+        self,
+        elapsed: float,
+        pace: float,
+        columns: tuple[int, ...],
+        coupling: tuple[float, ...],
+        shift: float,
+        noise: float,
+    ) -> None:
+        """One sample on, as `SpeedFilter.move`."""
+        x, P, known = self.mean, self.spread, self._couplings.get(columns)
+        if known is None:
+            known = self._couplings[columns] = np.zeros(self.size), np.array(columns, dtype=np.int64)
+        a, where = known
+        a.put(where, coupling)
+        speed = x[0] + shift
+        for place, value in zip(columns, coupling, strict=True):
+            speed += value * x[place]
+        first = P[0] + a.dot(P)
+        first[0] += a.dot(first) + noise
+        P[0] = P[:, 0] = first
+        self.mean = [speed, *x[1:]]
+        time, way = self.waiting
+        self.waiting = [time + elapsed, way + elapsed * pace]
+        self.waited += 1
+        if self.waited >= self.every:
+            self._forget()
+            self.waiting, self.waited = [0.0, 0.0], 0
+
+    def _forget(self) -> None:
+        time, way = self.waiting
+        memory = np.exp(-self.rates * time)
+        memory[self.place] = math.exp(-self.per_metre * way)
+        self.spread = np.multiply.outer(memory, memory) * (self.spread - self._floor) + self._floor
+        mean = self.prior_mean + memory * (self.mean - self.prior_mean)
+        self.mean[1:] = mean[1:].tolist()
+
+    def expect(self, columns: Columns, values: Values) -> _Row:
+        """h P h' of each channel, as `SpeedFilter.expect`."""
+        known = self._sensitivities.get(columns)
+        if known is None:
+            places = [k * self.size + row[j] for j in range(len(columns[0])) for k, row in enumerate(columns)]
+            known = self._sensitivities[columns] = np.zeros((len(columns), self.size)), np.array(places)
+        H, where = known
+        H.put(where, [value for over in values for value in over])
+        self._W = H.dot(self.spread)
+        self._S = self._W.dot(H.T).tolist()
+        return [self._S[k][k] for k in range(len(columns))]
+
+    def weigh(
+        self, innovation: Sequence[float], variance: Sequence[float], used: Sequence[bool], learning: bool = True
+    ) -> None:
+        """Corrects with the channels of `expect` that are `used`, as `SpeedFilter.weigh`."""
+        S, W, noise = self._S, self._W, variance
+        if not all(used):
+            rows = [k for k, counts in enumerate(used) if counts]
+            if not rows:
+                return
+            S, W = [[S[k][j] for j in rows] for k in rows], W[rows]
+            noise, innovation = [variance[k] for k in rows], [innovation[k] for k in rows]
+        inverse: list[_Row] = []  # L^-1, row by row
+        gaps: _Row = []  # L^-1 nu
+        for row, own, nu in zip(S, noise, innovation, strict=True):
+            rest, gap = row[len(inverse)] + own, nu
+            new = [0.0] * len(inverse)
+            for above, known in zip(inverse, gaps, strict=True):
+                entry = 0.0  # of L
+                for a, b in zip(above, row, strict=False):
+                    entry += a * b
+                rest -= entry * entry
+                gap -= entry * known
+                for k, a in enumerate(above):
+                    new[k] -= entry * a
+            scale = 1.0 / math.sqrt(rest)
+            inverse.append([a * scale for a in new] + [scale])
+            gaps.append(gap * scale)
+        L = np.array([row + [0.0] * (len(inverse) - len(row)) for row in inverse])
+        U = L.dot(W)
+        change, moved = U.T.dot(U), np.array(gaps).dot(U).tolist()
+        if not learning:
+            change[self.learned :, self.learned :] = 0.0
+            moved[self.learned :] = [0.0] * (self.size - self.learned)
+        self.spread -= change
+        self.mean = [a + b for a, b in zip(self.mean, moved, strict=True)]
+
+    def renew(self, where: bool, first: float, variance: float) -> None:
+        """Back to the priors, if `where`, with the speed `first` and its variance."""
+        if where:
+            self.mean, self.spread = [first, *self._means[1:]], self._floor.copy()
+            self.spread[0, 0] = variance
+
+
+def speed_filter(
+    mean: FloatArray,
+    spread: FloatArray,
+    rates: FloatArray,
+    spatial: tuple[int, float],
+    learned: int,
+    every: int,
+    count: int,
+) -> SpeedFilter:
+    """The filter that is faster for `count` cars."""
+    kind = SpeedFilterFew if count == 1 else SpeedFilter
+    return kind(mean, spread, rates, spatial, learned, every, count)

@@ -1,0 +1,163 @@
+"""A wheel speed that moves: the certified drop probability, and the energy that proves it on a sweep of the runtime observer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from analysis.dropout_modes import schedule_drop_modes
+from analysis.dropout_schedule import FrozenDropProbability, frozen_critical_probability
+from analysis.mean_square_schedule import MeanSquareSchedule, mean_square_schedule
+from estimators import GainSchedule
+from studies.beyond.drop_tolerance.observers import NAMES, Observer, observer
+from studies.beyond.drop_tolerance.population import START, evolve
+from studies.beyond.drop_tolerance.trial import MISS
+from studies.papers.resilient_velocity.ink import BLUE, GREY, RED, sheet
+from studies.study import Drawing, PartResult, Scope, Table
+from synthesis.lmi.result import Verdict
+from synthesis.polynomials.matrix import FloatArray
+
+SHARES = (0.95, 0.85, 0.7)  # of the smallest frozen value, tried in turn
+CHECKS = 8  # samples at which the simulated energy is compared
+RUNS, EVERY = 100, 2  # runs of a seed; samples between two resamplings
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Wheel speed (k+1,) in rad/s through the range and back, exact energy (k+1,), and what was seen at the samples `at` (m,)."""
+
+    speed: FloatArray
+    exact: FloatArray
+    at: NDArray[np.int64]
+    seen: FloatArray
+    half: FloatArray  # half width of the interval
+
+    @property
+    def holds(self) -> NDArray[np.bool_]:
+        """Which intervals hold the exact energy, (m,)."""
+        return np.asarray(np.abs(self.seen - self.exact[self.at]) <= self.half)
+
+
+def part(name: str) -> Callable[[Scope], PartResult]:
+    """The part of the study for one observer."""
+
+    def run(scope: Scope) -> PartResult:
+        tested = observer(name)
+        frozen = frozen_critical_probability(tested.schedule)
+        proof = certificate(tested.schedule, frozen, SHARES[1:] if scope.quick else SHARES)
+        if proof.verdict is not Verdict.CERTIFIED:
+            words = f"{tested.title}: nothing is proved while the wheel speed moves; {proof.message}."
+            none = {"certified_drop_probability": 0.0, "frozen_drop_probability": frozen.smallest}
+            return PartResult((), (), (), [words], none)
+        sweep = run_sweep(tested.schedule, proof, scope, NAMES.index(name))
+        hold = sweep.holds
+        falls = bool((np.diff(sweep.exact) < 0.0).all())
+        words = (
+            f"{tested.title}: a drop probability of {proof.drop_probability:.3f} is {proof.verdict!s} for every "
+            f"motion of the wheel speed within its rates (held at one speed: {frozen.smallest:.3f}). On the sweep "
+            f"the energy {'falls at every sample' if falls else 'DOES NOT FALL at every sample'}, and "
+            f"{int(hold.sum())} of {len(hold)} intervals of the runtime observer hold it ({1.0 - MISS:.1%} "
+            "simultaneous confidence)."
+        )
+        measures = {
+            "certified_drop_probability": proof.drop_probability,
+            "frozen_drop_probability": frozen.smallest,
+            "comparisons": float(len(hold) + 1),
+            "agreeing": float(int(hold.sum()) + falls),
+        }
+        return PartResult((), [_table(tested, sweep)], [_drawing(tested, proof, sweep, scope)], [words], measures)
+
+    return run
+
+
+def certificate(schedule: GainSchedule, frozen: FrozenDropProbability, shares: tuple[float, ...]) -> MeanSquareSchedule:
+    """The first share of the frozen value that is proved for a moving wheel speed; the last answer if none is."""
+    for share in shares:
+        found = mean_square_schedule(schedule, share * frozen.smallest, frozen)
+        if found.verdict is Verdict.CERTIFIED:
+            break
+    return found
+
+
+def path(schedule: GainSchedule) -> FloatArray:
+    """Wheel speed (k+1,) down and up through the range at the fastest certified rates."""
+    q = schedule.parameter
+    down = np.arange(q.max, q.min, q.rate_min * schedule.sample_time)
+    up = np.arange(q.min, q.max, q.rate_max * schedule.sample_time)
+    return np.concatenate([down, up, [q.max]])
+
+
+def energy_matrix(proof: MeanSquareSchedule, speed: FloatArray) -> FloatArray:
+    """P(speed) of the certificate, linear between its nodes, (k, n, n)."""
+    n = proof.lyapunov.shape[-1]
+    flat = proof.lyapunov.reshape(len(proof.nodes), -1)
+    return np.stack([np.interp(speed, proof.nodes, column) for column in flat.T], axis=-1).reshape(-1, n, n)
+
+
+def run_sweep(schedule: GainSchedule, proof: MeanSquareSchedule, scope: Scope, seed: int) -> Sweep:
+    """E e'P(w)e along the sweep: exact, and from populations of the runtime observer with intervals; 1 at the start."""
+    speed, p = path(schedule), proof.drop_probability
+    P = energy_matrix(proof, speed)
+    modes = schedule_drop_modes(schedule, speed)
+    moment, exact = np.outer(START, START), [float(START @ P[0] @ START)]
+    for k in range(len(speed) - 1):
+        moment = sum(q * A[k] @ moment @ A[k].T for q, A in ((p, modes.dropped), (1.0 - p, modes.received)))
+        exact.append(float(np.sum(P[k + 1] * moment)))
+    generator = np.random.default_rng(1000 + seed)
+    shape = (1, scope.seeds, RUNS)
+    logs = evolve(
+        schedule,
+        generator.random(shape) < p,
+        lambda k: np.full(shape, speed[k]),
+        lambda _: generator.random(shape) < p,
+        lambda k, error, _: np.einsum("csri,ij,csrj->csr", error, P[k], error),
+        len(speed) - 1,
+        EVERY,
+        generator,
+    )[:, 0]
+    at = EVERY * np.unique(np.linspace(0, len(logs), CHECKS + 1).round().astype(int)[1:])
+    seen = np.exp(logs[at // EVERY - 1] - np.log(exact[0]))
+    factor = float(student.ppf(1.0 - 0.5 * MISS / len(at), scope.seeds - 1))
+    half = factor * seen.std(axis=1, ddof=1) / np.sqrt(scope.seeds)
+    return Sweep(speed, np.array(exact) / exact[0], at, seen.mean(axis=1), half)
+
+
+def _table(tested: Observer, sweep: Sweep) -> Table:
+    at, step = sweep.at, 1e3 * tested.schedule.sample_time
+    columns = [at * step, sweep.speed[at], sweep.exact[at], sweep.seen, sweep.half]
+    return Table(
+        f"sweep-{tested.name}",
+        f"{tested.title}: energy of the certificate on a sweep of the wheel speed through the whole range and back "
+        "at the fastest certified rates, in parts of its start.",
+        ("time [ms]", "wheel speed [rad/s]", "predicted [1]", "simulated [1]", "half width of interval [1]"),
+        np.stack(columns, axis=1).tolist(),
+    )
+
+
+def _drawing(tested: Observer, proof: MeanSquareSchedule, sweep: Sweep, scope: Scope) -> Drawing:
+    figure = sheet(7.2, 4.4)
+    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+    time = 1e3 * tested.schedule.sample_time * np.arange(len(sweep.speed))
+    top.plot(time, sweep.exact, color=BLUE, lw=1.8, label="predicted")
+    lower = np.minimum(sweep.half, 0.99 * sweep.seen)  # a bar below zero has no place on a logarithmic axis
+    bars = {"fmt": "o", "ms": 4, "color": RED, "capsize": 3, "lw": 1.2, "label": "runtime observer"}
+    top.errorbar(time[sweep.at], sweep.seen, yerr=[lower, sweep.half], **bars)
+    top.set_yscale("log")
+    top.set_ylabel("mean energy over its start [1]")
+    top.legend(loc="upper right")
+    bottom.plot(time, sweep.speed, color=GREY, lw=1.5)
+    bottom.set_ylabel("|ω| [rad/s]")
+    bottom.set_xlabel("time [ms]")
+    return Drawing(
+        f"sweep-{tested.name}",
+        f"{tested.title}, wheel speed sweeping through its range and back at ±800 rad/s² while "
+        f"{proof.drop_probability:.0%} of the force samples are lost: mean of the energy e'P(ω)e whose decrease at "
+        f"every sample is {proof.verdict!s} for any such motion. Line: exact second moment; points: the runtime "
+        f"observer, {scope.seeds} seeds, bars at {1.0 - MISS:.1%} simultaneous confidence. Below: the wheel speed.",
+        "A falling line on a logarithmic scale with points on it, above a V-shaped course of the wheel speed.",
+        figure,
+    )

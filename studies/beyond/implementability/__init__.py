@@ -1,0 +1,1 @@
+"""At which sample rates do printed and shipped gains work, and under which discretisation?"""

@@ -1,0 +1,64 @@
+"""What gains really do: norms and poles at constant wheel speeds, whatever they were designed for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.error_norms import error_hinf_norm, selection
+from analysis.norms_h2 import h2_norm
+from studies.beyond.well_posed_design.cases import VELOCITY, Case
+from synthesis.polynomials.matrix import FloatArray
+
+
+@dataclass(frozen=True)
+class Achieved:
+    """Worst over the wheel speeds (held constant), arrays over the leading axes of the gains.
+
+    friction, noise: H-infinity gains to the velocity error, 1 and m/s per unit of normalised force; noise_density: its H2
+    norm, m/s for white force noise of unit two-sided density, 1 per sqrt(Hz); acceleration in s; slowest and fastest
+    pole as distances from the imaginary axis, 1/s.
+    """
+
+    friction: FloatArray
+    noise: FloatArray
+    noise_density: FloatArray
+    acceleration: FloatArray
+    slowest: FloatArray
+    fastest: FloatArray
+
+
+def achieved(case: Case, gains: FloatArray, wheel_speed: FloatArray) -> Achieved:
+    """For gains (..., g, 2) at wheel speeds (g,) rad/s, one gain vector for each of them; NaN gains give NaN."""
+    gains = np.asarray(gains, float)
+    lead, flat = gains.shape[:-2], gains.reshape(-1, 2, 1)
+    points = np.tile(wheel_speed, len(flat) // len(wheel_speed))
+    there = np.asarray(np.isfinite(flat).all(axis=(1, 2)))
+    flat, points = flat[there], points[there]
+    A_e, B_e = case.model.on(points).error_dynamics(flat)
+    poles = -np.linalg.eigvals(A_e).real
+
+    def worst(values: FloatArray) -> FloatArray:
+        full = np.full(len(there), np.nan)
+        full[there] = values
+        return np.asarray(full.reshape(*lead, len(wheel_speed)).max(axis=-1))
+
+    def norm(disturbance: str) -> FloatArray:
+        return worst(error_hinf_norm(case.model, flat, points, (disturbance,), VELOCITY, tolerance=1e-8).norm)
+
+    d, z = selection(case.model, ("force_noise",), VELOCITY)
+    return Achieved(
+        norm("friction"),
+        norm("force_noise"),
+        worst(h2_norm(A_e, B_e @ d, z)),
+        norm("acceleration_error"),
+        -worst(-poles.min(axis=-1)),
+        worst(poles.max(axis=-1)),
+    )
+
+
+def printed_achieved(case: Case, points: int = 57) -> Achieved:
+    """Of the printed gains, the same at every wheel speed."""
+    grid = case.grid(points)
+    return achieved(case, np.broadcast_to(case.printed, (len(grid), 2)), grid)

@@ -1,0 +1,57 @@
+"""The designs that are varied (those of the shipped specifications) and the printed gains that belong to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from studies.spec import load_spec
+from synthesis.errors import SpecError
+from synthesis.hinf_observer import ObserverDesign
+from synthesis.models.lpv import LpvModel
+
+PAPERS = {"corner-estimation": "P1", "resilient-velocity": "P3"}
+VELOCITY = ("relative_velocity",)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A model with its well-posed base design, and the gains and gain ranges that the paper prints for it."""
+
+    name: str
+    title: str
+    model: LpvModel
+    design: ObserverDesign
+    printed: tuple[float, float]
+    printed_range: tuple[tuple[float, float], tuple[float, float]]
+
+    def grid(self, points: int = 29) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+        """Wheel speeds over the range, rad/s."""
+        (parameter,) = self.model.parameters
+        return np.linspace(parameter.minimum, parameter.maximum, points)
+
+
+@cache
+def case(name: str) -> Case:
+    """By the name of a shipped specification. Raises SpecError if its parameter set prints no gains."""
+    spec, folder = load_spec(name)
+    parameters = spec.parameter_set(folder)
+    direction = spec.model.id.removeprefix("corner-velocity-")
+    published = parameters.tire[direction].published
+    if published is None or published.gains is None or published.gain_range is None:
+        raise SpecError(f"specification '{name}': its parameter set has no published gains to compare with")
+    (l1, l2), (first, second) = published.gains, published.gain_range
+    title = f"{PAPERS[parameters.id]} {direction}"
+    return Case(name, title, spec.build_model(parameters), spec.observer_design(), (l1, l2), (first, second))
+
+
+def p1_cases() -> tuple[Case, Case]:
+    """Longitudinal and lateral tires of P1."""
+    return case("corner-estimation-longitudinal"), case("corner-estimation-lateral")
+
+
+def all_cases() -> tuple[Case, ...]:
+    """P1 and P3, longitudinal and lateral."""
+    return (*p1_cases(), case("resilient-velocity-longitudinal"), case("resilient-velocity-lateral"))

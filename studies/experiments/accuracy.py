@@ -1,0 +1,76 @@
+"""Errors of many runs against one truth, and how well the mean over runs is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import t as student
+
+Array = npt.NDArray[np.float64]
+
+
+def nrms(estimate: Array, truth: Array, least: float = 0.0) -> Array:
+    """P1 (46) per run, %: RMS of ``estimate`` (S, n) minus ``truth`` (n,) over max |truth|, at samples with |truth| >= ``least``.
+
+    NaN where the truth never reaches ``least`` or stays 0.
+    """
+    counted = np.abs(truth) >= least
+    peak = float(np.max(np.abs(truth)))
+    if peak == 0.0 or not counted.any():
+        return np.full(estimate.shape[0], np.nan)
+    error: Array = np.sqrt(np.mean((estimate[:, counted] - truth[counted]) ** 2, axis=1))
+    return 100.0 * error / peak
+
+
+def sample_errors(estimate: Array, truth: Array) -> Array:
+    """P4 (13), P5 (8): 100 |estimate - truth|/max |truth| at every sample, %, shape of ``estimate`` (S, n)."""
+    out: Array = 100.0 * np.abs(estimate - truth) / float(np.max(np.abs(truth)))
+    return out
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Mean over runs with its 95 % confidence interval (Student's t), and the worst run."""
+
+    mean: float
+    low: float
+    high: float
+    worst: float
+    runs: int
+
+    def text(self, digits: int = 2) -> str:
+        """``mean [low, high]``."""
+        return f"{self.mean:.{digits}f} [{self.low:.{digits}f}, {self.high:.{digits}f}]"
+
+
+def spread(values: Array) -> Spread | None:
+    """Of one number a run (S,); None where it is not known in any run.
+
+    Raises ValueError when it is known in some runs only: a mean over the others would flatter.
+    """
+    known = np.isfinite(values)
+    if not known.any():
+        return None
+    if not known.all():
+        raise ValueError(f"{int(np.count_nonzero(~known))} of {values.size} runs have no value")
+    mean = float(values.mean())
+    if values.size == 1:
+        return Spread(mean, mean, mean, mean, 1)
+    half = float(student.ppf(0.975, values.size - 1) * values.std(ddof=1) / np.sqrt(values.size))
+    return Spread(mean, mean - half, mean + half, float(values.max()), values.size)
+
+
+def known_spread(values: Array) -> Spread:
+    """`spread` of values that are known in every run. Raises ValueError otherwise."""
+    found = spread(values)
+    if found is None:
+        raise ValueError(f"none of {values.size} runs has a value")
+    return found
+
+
+def sample_spreads(estimate: Array, truth: Array) -> tuple[Spread, Spread]:
+    """Mean and standard deviation over the samples of `sample_errors`, of (S, n) against (n,), each over the runs."""
+    error = sample_errors(estimate, truth)
+    return known_spread(error.mean(axis=1)), known_spread(error.std(axis=1))

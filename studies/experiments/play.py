@@ -1,0 +1,96 @@
+"""Several drives of one car, many sensor draws of each: one batch through the estimation pipeline."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.forces import AttitudeObserver
+from estimators.pipeline import EstimationPipeline
+from estimators.pipeline.result import PipelineStep
+from estimators.vehicle import VehicleParameters
+from studies.truth import Measured, Sensors, Truth, draw, drive, load_manoeuvre
+from synthesis.errors import SpecError
+
+Array = npt.NDArray[np.float64]
+Parts = Callable[[VehicleParameters, float, tuple[int, ...]], Mapping[str, Any]]
+"""(vehicle, sample time, batch shape) -> parts that replace those of the pipeline, by its argument names."""
+Reading = Callable[[PipelineStep], Array]
+"""Takes one signal out of a step."""
+
+VELOCITIES: dict[str, Reading] = {"vx": lambda step: step.vx, "vy": lambda step: step.vy}
+FORCES: dict[str, Reading] = {
+    "force_x": lambda step: step.force_x,
+    "force_z": lambda step: step.force_z,
+    "axle_force_y": lambda step: step.axle_force_y,
+}
+
+
+@cache
+def driven(names: tuple[str, ...], tire: str | None = None, seconds: float | None = None) -> Truth:
+    """The truth of shipped manoeuvres (``tire``: another one than their files name), integrated together, once a process.
+
+    ``seconds``: only so much of each, from its start.
+    """
+    loaded = [load_manoeuvre(name) for name in names]
+    if seconds is not None:
+        loaded = [m.model_copy(update={"duration": min(m.duration, seconds)}) for m in loaded]
+    return drive([m if tire is None else m.with_tire(tire) for m in loaded])
+
+
+def measured(truth: Truth, seeds: Sequence[int], sensors: Sensors) -> Measured:
+    """Sensor draws of every run of ``truth``, batch (S, B)."""
+    return draw(truth, sensors, seeds)
+
+
+def believed(drawn: Measured) -> VehicleParameters:
+    """The car of the truth. Raises SpecError when the runs have different ones: one pipeline believes in one car."""
+    cars = [vehicle.parameters for vehicle in drawn.truth.vehicles]
+    if any(car != cars[0] for car in cars[1:]):
+        raise SpecError(f"manoeuvres {', '.join(drawn.truth.names)} drive different cars; play them apart")
+    return cars[0]
+
+
+def play(
+    drawn: Measured,
+    readings: Mapping[str, Reading],
+    parts: Parts | None = None,
+    vehicle: VehicleParameters | None = None,
+) -> dict[str, Array]:
+    """Every reading at every sample: (S, B, n) or (S, B, n, k).
+
+    ``vehicle`` is what the estimators believe; None: the truth's own parameters. The inertial sensors are fixed to a body
+    that rolls and pitches: an `AttitudeObserver` levels them unless ``parts`` bring another attitude (None: without).
+    """
+    car = vehicle or believed(drawn)
+    time, shape = drawn.sample_time, drawn.batch_shape
+    chosen = {"attitude": AttitudeObserver(time, shape), **(parts(car, time, shape) if parts else {})}
+    pipeline = EstimationPipeline(car, time, shape, **chosen)
+    kept: dict[str, Array] = {}
+    for k, signals in enumerate(drawn):
+        step = pipeline.step(signals)
+        for name, reading in readings.items():
+            value = reading(step)
+            if name not in kept:
+                kept[name] = np.empty((*shape, drawn.time.size, *value.shape[2:]))
+            kept[name][:, :, k] = value
+    return kept
+
+
+def baselines(drawn: Measured) -> dict[str, Array]:
+    """V_x (S, B, n) without an observer, m/s: mean wheel speed, and a_x integrated from it."""
+    wheels = (believed(drawn).radius * drawn.signals["wheel_speed"]).mean(axis=-1)
+    moved = np.cumsum(drawn.signals["ax"] * drawn.sample_time, axis=-1)
+    return {"mean wheel speed": wheels, "integrated acceleration": wheels[..., :1] + moved - moved[..., :1]}
+
+
+def run_of(truth: Truth, name: str) -> tuple[int, slice]:
+    """Row of the named manoeuvre and the samples of its own duration. Raises SpecError for one that was not driven."""
+    if name not in truth.names:
+        raise SpecError(f"manoeuvre '{name}' was not driven; there are: {', '.join(truth.names)}")
+    row = truth.names.index(name)
+    return row, slice(0, int(np.count_nonzero(truth.valid[row])))

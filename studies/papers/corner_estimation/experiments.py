@@ -1,0 +1,72 @@
+"""The manoeuvres of Table III and of Figs. 6 to 8, driven on the truth vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+
+from estimators.pipeline import DifferentiatedPid
+from estimators.vehicle import VehicleParameters
+from studies.experiments.forces import Driven, force_part
+from studies.experiments.velocities import Printed, corner_observers, velocity_part
+from studies.study import Part
+
+OBSERVERS = corner_observers("corner-estimation")
+ALL_WHEEL = (
+    Printed("p1-launch-split", "launch, ice and dry", 2.64, 4.14, 0.2, 0.08),
+    Printed("p1-acceleration-in-turn-dry", "acceleration in a turn, dry", 4.61, 9.1, 6.3, 0.83),
+    Printed("p1-steering-accel-decel-snow", "steering, accelerating, braking, snow", 3.38, 9.98, 4.11, 4.04),
+    Printed("p1-lane-change-snow", "lane change, snow", 1.6, 11.86, 3.29, 2.02),
+)
+REAR_WHEEL = (
+    Printed("p1-acceleration-left-turn-wet-dry", "acceleration and left turn, wet to dry", 2.07, 9.06, 5.91, 0.95),
+    Printed("p1-full-turn-dry", "full turn, dry", 0.65, 9.01, 7.15, 0.52),
+    Printed("p1-full-turn-dry-wet", "full turn, dry to wet", 0.79, 7.51, 6.21, 0.74),
+)
+OVAL = (Printed("p1-oval-dry", "oval, dry", 3.15, 8.38, 7.6, 1.24),)
+"""Table III: NRMS in % and peaks in m/s of V_x and V_y."""
+FORCES = (
+    Driven("p1-lane-change-brake-wet", "lane change and braking, wet (Fig. 6a)"),
+    Driven("p1-brake-in-turn-snow", "brake in turn, packed snow (Fig. 6b)"),
+    Driven("p1-lane-change-dry", "lane change, dry (Fig. 7)"),
+    Driven("p1-steering-ice-snow", "steering, ice to snow (Fig. 8)"),
+)
+"""Table II is lost; the text gives 7.4 % for F_x, 7.1 % for F_y, 4 % for F_z at most."""
+
+
+def _pid(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) -> Mapping[str, DifferentiatedPid]:
+    return {"longitudinal_force": DifferentiatedPid(car, sample_time, (*shape, 4))}
+
+
+PARTS = (
+    Part(
+        "table-3-all-wheel-drive",
+        "Table III on the truth vehicle: all-wheel drive",
+        partial(velocity_part, "all-wheel-drive", ALL_WHEEL, OBSERVERS),
+        cost=90.0,
+    ),
+    Part(
+        "table-3-rear-wheel-drive",
+        "Table III on the truth vehicle: rear-wheel drive",
+        partial(velocity_part, "rear-wheel-drive", REAR_WHEEL, OBSERVERS),
+        cost=80.0,
+    ),
+    Part(
+        "table-3-oval",
+        "Table III on the truth vehicle: oval",
+        partial(velocity_part, "oval", OVAL, OBSERVERS),
+        cost=110.0,
+    ),
+    Part(
+        "table-3-other-tire",
+        "Table III on a tire that no estimator knows: Magic Formula with slip lag",
+        partial(velocity_part, "other-tire", ALL_WHEEL, OBSERVERS, tire="magic-formula"),
+        cost=90.0,
+    ),
+    Part(
+        "forces",
+        "Figs. 6 to 8 on the truth vehicle: forces",
+        partial(force_part, "forces", FORCES, {"PID": _pid}),
+        cost=80.0,
+    ),
+)

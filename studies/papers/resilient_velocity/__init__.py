@@ -1,0 +1,1 @@
+"""P3, resilient corner-based velocity estimation: its claims, tables and figures recomputed."""

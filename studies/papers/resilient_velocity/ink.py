@@ -1,0 +1,24 @@
+"""Colours and dashes of the figures: distinct in print and for the colour-blind, never told by colour alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from matplotlib.figure import Figure
+
+BLUE, RED, GREEN, ORANGE, PURPLE, GREY = "#0b62a4", "#c1272d", "#1b7f5c", "#e08214", "#7b3294", "0.45"
+SERIES: tuple[tuple[str, Any], ...] = (
+    (BLUE, "-"),
+    (RED, (0, (6, 2))),
+    (GREEN, (0, (6, 1.5, 1, 1.5))),
+    (ORANGE, (0, (2, 1.2))),
+    (PURPLE, (0, (8, 2, 2, 2, 2, 2))),
+)
+COLOUR: Mapping[str, str] = {"longitudinal": BLUE, "lateral": RED}
+SPEED_LABEL = "wheel speed |ω| [rad/s]"
+
+
+def sheet(width: float, height: float) -> Figure:
+    """An empty figure of this size in inches that arranges its own panels."""
+    return Figure(figsize=(width, height), layout="constrained")

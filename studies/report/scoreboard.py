@@ -1,0 +1,75 @@
+"""The scoreboard: how many claims of each paper came to which verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from studies.claim import JsonValue, Verdict
+from studies.running.record import PAPERS, paper_rank
+
+MARKS = {
+    Verdict.REPRODUCED: "✓",
+    Verdict.PARTLY: "½",
+    Verdict.NOT_REPRODUCED: "✗",
+    Verdict.ERRATUM: "!",
+    Verdict.UNDER_SPECIFIED: "?",
+    Verdict.DERIVED: "+",
+}
+"""A sign for each verdict, so that none is told by its colour alone."""
+
+MEANINGS = {
+    Verdict.REPRODUCED: "our value agrees with the printed one within half its last digit",
+    Verdict.PARTLY: "part of the claim holds, the reading says which",
+    Verdict.NOT_REPRODUCED: "under no reading that we found does our value agree",
+    Verdict.ERRATUM: "the paper prints a formula or number that contradicts itself; the reading corrects it",
+    Verdict.UNDER_SPECIFIED: "the paper leaves open what the number depends on; the reading says under which choice it holds",
+    Verdict.DERIVED: "not claimed by the paper, and computed here because other claims rest on it",
+}
+
+
+@dataclass(frozen=True)
+class PaperScore:
+    """One row: the claims of ``paper`` (P1..P5, or "other") in order, ``name`` the study that computes them."""
+
+    paper: str
+    name: str
+    claims: tuple[dict[str, JsonValue], ...]
+
+    def count(self, verdict: Verdict) -> int:
+        """Claims with ``verdict``."""
+        return sum(claim["verdict"] == verdict for claim in self.claims)
+
+
+@dataclass(frozen=True)
+class Scoreboard:
+    """All papers that have claims, P1 first."""
+
+    papers: tuple[PaperScore, ...]
+
+    @property
+    def total(self) -> int:
+        """Claims altogether."""
+        return sum(len(paper.claims) for paper in self.papers)
+
+    @property
+    def heading(self) -> str:
+        """What the board shows, as a title."""
+        if self.total == 0:
+            return "Studies beyond the papers"
+        return f"{self.total} published claim{'' if self.total == 1 else 's'}, recomputed"
+
+    def count(self, verdict: Verdict) -> int:
+        """Claims of all papers with ``verdict``."""
+        return sum(paper.count(verdict) for paper in self.papers)
+
+
+def scoreboard(claims: Sequence[dict[str, JsonValue]], names: Mapping[str, str]) -> Scoreboard:
+    """Sort ``claims`` (rows of ``claims.json``) by paper; ``names`` are study ids by paper."""
+    labels = (*PAPERS, "other")
+    grouped: dict[str, list[dict[str, JsonValue]]] = {label: [] for label in labels}
+    for claim in claims:
+        grouped[labels[paper_rank(str(claim["paper"]))]].append(claim)
+    return Scoreboard(
+        tuple(PaperScore(paper, names.get(paper, ""), tuple(rows)) for paper, rows in grouped.items() if rows)
+    )

@@ -1,0 +1,112 @@
+"""Studies as they lie on disk after a run: what the results and the report are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from studies.claim import JsonValue
+from studies.registry import Registry
+from studies.running.store import StoredPart, check_names, part_folder, read_part
+from studies.study import Scope, Study
+from synthesis.errors import SpecError
+
+PAPERS = ("P1", "P2", "P3", "P4", "P5")
+
+
+@dataclass(frozen=True)
+class PartRecord:
+    """A part: ``stored`` is what it found, or None and ``failure`` says why not."""
+
+    name: str
+    title: str
+    stored: StoredPart | None
+    failure: str = ""
+
+
+@dataclass(frozen=True)
+class StudyRecord:
+    """A study: its parts in their order and the ids of the published claims that no part delivered."""
+
+    id: str
+    title: str
+    paper: str
+    summary: str
+    scope: Scope
+    fingerprint: str
+    parts: tuple[PartRecord, ...]
+    missing_claims: tuple[str, ...] = field(default=())
+
+    @property
+    def stored(self) -> list[StoredPart]:
+        """The parts that there are."""
+        return [part.stored for part in self.parts if part.stored is not None]
+
+    @property
+    def incomplete(self) -> bool:
+        """Whether a part or a published claim is missing."""
+        return bool(self.missing_claims) or any(part.failure for part in self.parts)
+
+    @property
+    def claims(self) -> list[dict[str, JsonValue]]:
+        """All claims as rows of ``claims.json``."""
+        return [claim for part in self.stored for claim in part.claims]
+
+
+def record_study(
+    study: Study, registry: Registry, out: Path, scope: Scope, mark: str, failures: Mapping[str, str]
+) -> StudyRecord:
+    """Read the parts of ``study`` with fingerprint ``mark`` from ``out``; ``failures`` are messages by part name.
+
+    A part whose table, figure or claim has a name that an earlier part uses is a failure, as one would hide the other.
+    """
+    taken: set[tuple[str, str]] = set()
+    parts: list[PartRecord] = []
+    for part in study.parts:
+        stored = None if part.name in failures else read_part(part_folder(out, study.id, part.name), mark)
+        failure = failures.get(part.name, "" if stored else "it has no stored result")
+        if stored is not None:
+            names = _names(stored)
+            failure = ", ".join(f"{what} '{name}' is already there" for what, name in names if (what, name) in taken)
+            taken |= set(names)
+        parts.append(PartRecord(part.name, part.title, None if failure else stored, failure))
+    record = StudyRecord(study.id, study.title, study.paper, study.summary, scope, mark, tuple(parts))
+    found = {str(claim["id"]) for claim in record.claims}
+    missing = tuple(name for name in registry.claim_ids(study.id) if name not in found)
+    return StudyRecord(**{**record.__dict__, "missing_claims": missing})
+
+
+def _names(stored: StoredPart) -> list[tuple[str, str]]:
+    return [
+        *(("table", table["name"]) for table in stored.tables),
+        *(("figure", drawing["name"]) for drawing in stored.drawings),
+        *(("claim", str(claim["id"])) for claim in stored.claims),
+    ]
+
+
+def check_parts(study: Study) -> None:
+    """Raises SpecError when a part's name cannot be that of a folder, or when two parts have one name."""
+    try:
+        check_names("part", [part.name for part in study.parts])
+    except ValueError as error:
+        raise SpecError(f"study '{study.id}': {error}") from error
+
+
+def all_claims(records: Sequence[StudyRecord]) -> list[dict[str, JsonValue]]:
+    """Every claim of every study, P1 to P5, in the order of studies and parts within a paper.
+
+    Raises SpecError when two studies deliver one claim.
+    """
+    claims = [claim for record in records for claim in record.claims]
+    seen: set[str] = set()
+    for claim in claims:
+        if claim["id"] in seen:
+            raise SpecError(f"claim '{claim['id']}' is delivered by two studies; leave it to one")
+        seen.add(str(claim["id"]))
+    return sorted(claims, key=lambda claim: paper_rank(str(claim["paper"])))
+
+
+def paper_rank(paper: str) -> int:
+    """P1 before P5, ``P1/P2`` with P1, anything else last."""
+    return next((rank for rank, known in enumerate(PAPERS) if paper.startswith(known)), len(PAPERS))

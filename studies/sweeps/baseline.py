@@ -1,0 +1,156 @@
+"""The baseline: a small file in the repository, one line a figure, against which later sweeps are held."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field
+
+from studies.sweeps.figures import Figure, Summary
+from studies.sweeps.store import write_whole
+from studies.sweeps.strict import Strict, read_table
+from studies.sweeps.sweep import Sweep
+from studies.sweeps.versions import versions
+from synthesis.errors import SpecError
+
+SCHEMA = "gainsmith.sweep-baseline/1"
+DIGITS = 8
+HEAD = """\
+# The baseline of a sweep, one line a figure. Written by `gainsmith sweep --update-baseline`; review its diff like code.
+"""
+
+
+class _FigureLine(Strict):
+    value: float = Field(allow_inf_nan=True)
+    unit: str = "1"
+    kind: str = "value"
+    confidence: float | None = None
+    design: int | None = None
+    at: dict[str, float] = Field(default_factory=dict)
+
+
+class _Constant(Strict):
+    value: float
+    unit: str
+
+
+class _Nominal(Strict):
+    constants: dict[str, _Constant]
+    breakpoints: list[float]
+    gains: list[list[list[float]]]
+
+
+class _File(Strict):
+    schema_: str = Field(alias="schema")
+    sweep: str
+    form: str
+    sha256: str
+    made_with: dict[str, str]
+    nominal: dict[str, _Nominal]
+    figures: dict[str, dict[str, _FigureLine]]
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """What a sweep was once: its figures, the constants and gains it was run around, and the digest of what was asked."""
+
+    summary: Summary
+    sha256: str
+    nominal: Mapping[str, Mapping[str, Any]]
+    made_with: Mapping[str, str]
+
+
+def of_sweep(sweep: Sweep, summary: Summary) -> Baseline:
+    """The baseline that a finished sweep makes, its values rounded as they are written."""
+    figures = tuple(
+        replace(f, value=_rounded(f.value), at={k: _rounded(v) for k, v in f.at.items()}) for f in summary.figures
+    )
+    made = {name: versions()[name] for name in ("gainsmith", "numpy", "scipy")}
+    return Baseline(replace(summary, figures=figures), sweep.digest, sweep.nominal, made)
+
+
+def write_baseline(path: Path, baseline: Baseline) -> None:
+    """TOML, written beside and renamed."""
+    lines = [HEAD, f'schema = "{SCHEMA}"', f'sweep = "{baseline.summary.sweep}"', f'form = "{baseline.summary.form}"']
+    lines += [f'sha256 = "{baseline.sha256}"', f"made_with = {_inline(baseline.made_with)}"]
+    for subject, nominal in baseline.nominal.items():
+        lines += ["", f'[nominal."{subject}"]', f"breakpoints = {_list(nominal['breakpoints'])}", "gains = ["]
+        lines += [f"  {_list(row)}," for row in nominal["gains"]]
+        lines += ["]", f'[nominal."{subject}".constants]']
+        lines += [f"{_key(name)} = {_inline(entry)}" for name, entry in nominal["constants"].items()]
+    subject = ""
+    for figure in baseline.summary.figures:
+        if figure.subject != subject:
+            subject = figure.subject
+            lines += ["", f'[figures."{subject}"]']
+        lines.append(f'"{_name(figure)}" = {_figure(figure)}')
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, ("\n".join(lines) + "\n").encode())
+
+
+def read_baseline(path: Path) -> Baseline:
+    """Read and check. Raises SpecError, one line."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise SpecError(f"{path}: no such baseline; make it with --update-baseline") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise SpecError(f"{path}: {error}") from None
+    if data.get("schema") != SCHEMA:
+        raise SpecError(f"{path}: schema {data.get('schema')!r} is not '{SCHEMA}'")
+    found = read_table(_File, data, str(path))
+    figures = []
+    for subject, entries in found.figures.items():
+        for name, line in entries.items():
+            measure, _, rest = name.rpartition(" | ")
+            kind: Any = line.kind
+            figures.append(
+                Figure(subject, measure, rest, line.value, line.unit, kind, line.at, line.confidence, line.design)
+            )
+    nominal = {name: entry.model_dump() for name, entry in found.nominal.items()}
+    return Baseline(Summary(found.sweep, found.form, tuple(figures), ()), found.sha256, nominal, found.made_with)
+
+
+def _name(figure: Figure) -> str:
+    return f"{figure.measure} | {figure.name}" if figure.measure else figure.name
+
+
+def _figure(figure: Figure) -> str:
+    parts: dict[str, Any] = {"value": figure.value}
+    if figure.kind != "value":
+        parts["kind"] = figure.kind
+    if figure.unit != "1":
+        parts["unit"] = figure.unit
+    if figure.confidence is not None:
+        parts["confidence"] = _rounded(figure.confidence)
+    if figure.design is not None:
+        parts["design"] = figure.design
+    if figure.at:
+        parts["at"] = dict(figure.at)
+    return _inline(parts)
+
+
+def _inline(table: Mapping[str, Any]) -> str:
+    return "{ " + ", ".join(f"{_key(name)} = {_value(value)}" for name, value in table.items()) + " }"
+
+
+def _key(name: str) -> str:
+    return name if name.replace("_", "a").replace("-", "a").isalnum() else f'"{name}"'
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return _inline(value)
+    return f'"{value}"' if isinstance(value, str) else repr(value)  # repr of a float is TOML: 0.1, 1e-05, inf, nan
+
+
+def _list(values: Any) -> str:
+    return "[" + ", ".join(_list(v) if isinstance(v, list) else repr(v) for v in values) + "]"
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")

@@ -1,0 +1,90 @@
+"""Run a sweep into a folder, from the start or from where it was left."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from itertools import chain
+from os import cpu_count
+from pathlib import Path
+
+from studies.sweeps.executors import Executor, Processes, Serial
+from studies.sweeps.figures import Summary
+from studies.sweeps.reports import markdown
+from studies.sweeps.store import SUMMARY, SweepFolder, json_bytes, locked_folder, write_whole
+from studies.sweeps.summary import summarise
+from studies.sweeps.sweep import Chunk, Sweep
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """A complete sweep: its folder, its figures, the chunks computed by this run, and the seconds that their measures took."""
+
+    sweep: Sweep
+    folder: SweepFolder
+    summary: Summary
+    computed: int
+    seconds: float
+    first_reason: str
+
+    def count(self, name: str) -> int:
+        """Designs over all subjects: 'designs', 'invalid designs', 'designs without a number'."""
+        return int(sum(f.value for f in self.summary.figures if f.kind == "count" and f.name == name))
+
+
+def run_sweep(
+    sweep: Sweep,
+    out: Path,
+    executor: Executor | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> SweepResult:
+    """Compute what is missing, then the figures.
+
+    Raises SpecError for a folder in use or of another sweep, OSError if the disk is full.
+    """
+    with locked_folder(out, sweep) as folder:
+        folder.begin(resume)
+        computed, seconds, reason = _fill(folder, executor or default_executor(), progress)
+        summary_file = out / SUMMARY
+        if computed or not summary_file.exists():
+            summary = summarise(folder)
+            write_whole(out / "summary.md", markdown(summary).encode())
+            write_whole(summary_file, json_bytes(summary.content()))
+        summary = Summary.of_content(json.loads(summary_file.read_text(encoding="utf-8")))
+        return SweepResult(sweep, folder, summary, computed, seconds, reason)
+
+
+def default_executor(workers: int | None = None) -> Executor:
+    """As many processes as there are cores, or as asked; one computes in this process."""
+    count = workers or cpu_count() or 1
+    return Serial() if count == 1 else Processes(count)
+
+
+def _fill(folder: SweepFolder, executor: Executor, progress: Progress | None) -> tuple[int, float, str]:
+    """Chunks computed, seconds in their measures, and the first reason why a design has no value."""
+    total, there, done, seconds, reason = folder.sweep.chunk_count(), 0, 0, 0.0, ""
+
+    def missing() -> Iterator[Chunk]:
+        nonlocal there
+        for chunk in folder.sweep.chunks():
+            if folder.has(chunk):
+                there += 1
+            else:
+                yield chunk
+
+    left = missing()
+    first = next(left, None)
+    if first is None:
+        return 0, 0.0, ""
+    with closing(executor.run(folder.sweep, chain([first], left))) as results:
+        for result in results:
+            folder.keep(result)
+            done, seconds, reason = done + 1, seconds + result.seconds, reason or result.first_reason
+            if progress is not None:
+                progress(done + there, total)
+    return done, seconds, reason

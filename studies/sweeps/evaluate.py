@@ -1,0 +1,175 @@
+"""One chunk of a sweep: its designs, the values of every measure, and what became of each design."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.errors import AnalysisError
+from analysis.sensitivity_worst import worst_case
+from studies.sweeps.designs import WorstCase
+from studies.sweeps.measure import Measure
+from studies.sweeps.plant import Grid
+from studies.sweeps.subject import Batch, Subject
+from studies.sweeps.sweep import Chunk, Sweep
+from synthesis.errors import ModelError, ProblemError
+from synthesis.polynomials.matrix import FloatArray
+
+VALID, INVALID, NOT_A_NUMBER = "valid", "invalid", "not a number"
+POINTS = 8192  # designs x grid points treated at once: small enough to stay in a processor's cache
+TIE = 1e-9  # relative
+REFUSALS = (AnalysisError, ModelError, ProblemError, np.linalg.LinAlgError)
+
+Answer = TypeVar("Answer")
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """`columns` (m,) of the designs; for each measure the `worst` value over the grid (m,), its `place` (m,; -1: none) and
+    the envelope over the designs; `outcome` and `reason` (m,) of each design."""
+
+    columns: dict[str, FloatArray]
+    worst: dict[str, FloatArray]
+    place: dict[str, NDArray[np.int32]]
+    envelopes: dict[str, Envelope]
+    outcome: NDArray[np.str_]
+    reason: list[str]
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """At every grid point (g,) the worst and the best value of some designs, and the row that has the worst."""
+
+    worst: FloatArray
+    row: NDArray[np.int64]
+    best: FloatArray
+
+
+def evaluate_chunk(sweep: Sweep, chunk: Chunk) -> Evaluated:
+    """All measures at all designs of one chunk."""
+    subject, stage = sweep.subjects[chunk.subject], sweep.stages[chunk.stage]
+    varied = sweep.varied[subject.name]
+    grid = sweep.grid(subject)
+    indices = np.arange(chunk.start, chunk.stop)
+    if isinstance(stage, WorstCase):
+        values = np.stack([searched(sweep, subject, grid, stage, sweep.measures[int(i)]) for i in indices])
+    else:
+        values = stage.values(indices, varied)
+    return evaluate(subject, sweep.measures, grid, {v.name: values[:, i] for i, v in enumerate(varied)})
+
+
+def evaluate(subject: Subject, measures: Sequence[Measure], grid: Grid, columns: Mapping[str, FloatArray]) -> Evaluated:
+    """All measures at the given designs; a design that cannot be computed keeps the reason, the others are not touched."""
+    count = len(next(iter(columns.values())))
+    outcome = np.full(count, VALID, dtype="U12")
+    reason = [""] * count
+    found = {m.name: np.full((count, len(grid)), np.nan) for m in measures}
+    flat: set[str] = set()
+    step = max(1, POINTS // len(grid))
+    for start in range(0, count, step):
+        rows = np.arange(start, min(start + step, count))
+        batches = _separate(partial(_batch, subject, grid, columns), rows)
+        for part, batch in batches:
+            if isinstance(batch, str):
+                outcome[part], reason[part[0]] = INVALID, batch
+                continue
+            for measure in measures:
+                _fill(measure, subject, grid, columns, part, batch, found[measure.name], outcome, reason, flat)
+    worst, place, envelopes = {}, {}, {}
+    for measure in measures:
+        values = found[measure.name]
+        name = measure.name
+        worst[name], place[name] = _worst(measure, values)
+        if name in flat:
+            place[name][:] = -1
+        else:
+            envelopes[name] = _envelope(measure, values)
+    return Evaluated(dict(columns), worst, place, envelopes, outcome, reason)
+
+
+def _fill(
+    measure: Measure,
+    subject: Subject,
+    grid: Grid,
+    columns: Mapping[str, FloatArray],
+    rows: NDArray[np.int64],
+    batch: Batch,
+    out: FloatArray,
+    outcome: NDArray[np.str_],
+    reason: list[str],
+    flat: set[str],
+) -> None:
+    """Write one measure of some rows to `out`, NaN and the reason where it has no value."""
+
+    def of(part: NDArray[np.int64]) -> FloatArray:
+        return measure(batch if len(part) == len(rows) else _batch(subject, grid, columns, part))
+
+    for part, values in _separate(of, rows):
+        if isinstance(values, str):
+            bad, why = part, f"{measure.name}: {values}"
+        else:
+            if values.ndim == 1:
+                flat.add(measure.name)
+            out[part] = values.reshape(len(part), -1)
+            bad, why = part[np.isnan(out[part]).any(axis=1)], f"{measure.name} is not a number"
+        for row in bad:
+            outcome[row] = NOT_A_NUMBER
+            reason[row] = f"{reason[row]}; {why}" if reason[row] else why
+
+
+def _batch(subject: Subject, grid: Grid, columns: Mapping[str, FloatArray], rows: NDArray[np.int64]) -> Batch:
+    return subject.at({name: column[rows] for name, column in columns.items()}, grid)
+
+
+def _separate(
+    function: Callable[[NDArray[np.int64]], Answer], rows: NDArray[np.int64]
+) -> list[tuple[NDArray[np.int64], Answer | str]]:
+    """function(rows) if it can be had at once; else in halves, down to single rows whose refusal is returned as text."""
+    try:
+        return [(rows, function(rows))]
+    except REFUSALS as error:
+        if len(rows) == 1:
+            return [(rows, str(error))]
+    middle = len(rows) // 2
+    return _separate(function, rows[:middle]) + _separate(function, rows[middle:])
+
+
+def _worst(measure: Measure, values: FloatArray) -> tuple[FloatArray, NDArray[np.int32]]:
+    """The worst over the grid and where; NaN wins, so that it is never hidden behind a number."""
+    place = np.argmax(np.where(np.isnan(values), np.inf, measure.sign * values), axis=1)
+    chosen = np.take_along_axis(values, place[:, None], axis=1)[:, 0]
+    return np.where(np.isnan(values).any(axis=1), np.nan, chosen), place.astype(np.int32)
+
+
+def _envelope(measure: Measure, values: FloatArray) -> Envelope:
+    """Over the designs, those without a value left out; of designs that differ by rounding alone the first is taken."""
+    signed = np.where(np.isnan(values), -np.inf, measure.sign * values)
+    top = signed.max(axis=0)
+    with np.errstate(invalid="ignore"):
+        row = np.argmax((signed >= top - TIE * np.abs(top)) | (signed == top), axis=0)
+    worst = np.where(np.isnan(values).all(axis=0), np.nan, measure.sign * top)
+    best = np.where(np.isnan(values), np.inf, measure.sign * values).min(axis=0) * measure.sign
+    return Envelope(worst, row.astype(np.int64), best)
+
+
+def searched(sweep: Sweep, subject: Subject, grid: Grid, stage: WorstCase, measure: Measure) -> FloatArray:
+    """The parameters (d,) of the worst design that a search finds for one measure."""
+    varied = sweep.varied[subject.name]
+    nominal = {v.name: np.array([v.nominal]) for v in varied}
+    if np.isnan(evaluate(subject, [measure], grid, nominal).worst[measure.name]).any():
+        return np.array([v.nominal for v in varied])  # not a number already there: nothing to search
+
+    def scalar(columns: Mapping[str, FloatArray]) -> FloatArray:
+        worst = evaluate(subject, [measure], grid, columns).worst[measure.name]
+        return np.where(np.isnan(worst), -measure.sign * np.inf, worst)  # designs without a value are no answer
+
+    found = worst_case(
+        scalar, {v.name: (v.low, v.high) for v in varied}, measure.better == "smaller",
+        stage.samples, stage.generations, stage.seed,
+    )  # fmt: skip
+    return np.array([found.parameters[v.name] for v in varied])

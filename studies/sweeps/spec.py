@@ -1,0 +1,137 @@
+"""Sweeps as TOML files: shipped by name, or your own by path."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field
+
+from studies.sweeps.designs import STAGES, Stage
+from studies.sweeps.measure import Measure
+from studies.sweeps.measures import FAST, MeasureSpec
+from studies.sweeps.measures_costly import COSTLY
+from studies.sweeps.measures_drive import DRIVE
+from studies.sweeps.strict import Strict, read_kind, read_table
+from studies.sweeps.subject_spec import SubjectSpec
+from studies.sweeps.sweep import Sweep
+from studies.sweeps.vary import Vary
+from synthesis.errors import SpecError, unknown
+
+MEASURES: dict[str, type[MeasureSpec]] = {**FAST, **COSTLY, **DRIVE}
+
+
+class GridSpec(Strict):
+    """`points` of every scheduling parameter, over the whole range or over a narrower one by name."""
+
+    points: int = Field(default=141, ge=2)
+    range: dict[str, list[float]] = Field(default_factory=dict)
+
+
+class GateSpec(Strict):
+    """By how much of its distance to worthlessness a figure may fall behind the baseline; `measures` by measure name."""
+
+    tolerance: float = Field(default=0.01, ge=0)
+    measures: dict[str, float] = Field(default_factory=dict)
+
+
+class Quick(Strict):
+    """What `--quick` replaces: fewer grid points and smaller designs."""
+
+    points: int = Field(default=29, ge=2)
+    designs: list[Any] = Field(min_length=1)
+
+
+class SweepSpec(Strict):
+    """A whole file; [[subjects]], [[measures]] and [[designs]] are read one by one so that errors name them."""
+
+    name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$")
+    description: str
+    subjects: list[Any] = Field(min_length=1)
+    measures: list[Any] = Field(min_length=1)
+    designs: list[Any] = Field(min_length=1)
+    vary: dict[str, Any] = Field(default_factory=dict)
+    grid: GridSpec = GridSpec()
+    gate: GateSpec = GateSpec()
+    quick: Quick | None = None
+    chunk: int = Field(default=1000, ge=1)
+
+
+def shipped_sweeps() -> dict[str, Path]:
+    """The sweeps that come with the package, by name."""
+    folder = Path(str(resources.files("studies") / "sweeps" / "specs"))
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def load_sweep(name: str | Path, quick: bool = False) -> Sweep:
+    """A shipped sweep by name or one of your own by path. Raises SpecError, one line: file, place, what would be right."""
+    path = Path(name)
+    if path.suffix != ".toml":
+        known = shipped_sweeps()
+        if str(name) not in known:
+            raise SpecError(unknown("sweep", str(name), known) + "; a file of your own ends with .toml")
+        path = known[str(name)]
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise SpecError(f"{path}: no such sweep file") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise SpecError(f"{path}: {error}") from None
+    try:
+        return build_sweep(data, path.parent, quick)
+    except SpecError as error:
+        raise SpecError(f"{path.name}: {error}") from None
+
+
+def build_sweep(data: dict[str, Any], folder: Path, quick: bool = False) -> Sweep:
+    """A sweep from the content of a file; other files are looked for in `folder`."""
+    spec = read_table(SweepSpec, data, "sweep")
+    if quick and spec.quick is None:
+        raise SpecError("has no [quick] table; give it points and designs, or leave out --quick")
+    small = spec.quick if quick else None
+    tables = [read_table(SubjectSpec, _named(entry), f"subjects[{i}]") for i, entry in enumerate(spec.subjects)]
+    subjects = [table.build(folder) for table in tables]
+    common = _vary(spec.vary, "vary")
+    vary = {
+        subject.name: common if table.vary is None else table.vary
+        for subject, table in zip(subjects, tables, strict=True)
+    }
+    bounds: dict[str, tuple[float, float]] = {}
+    for name, edges in spec.grid.range.items():
+        if len(edges) != 2:
+            raise SpecError(f"grid.range.{name} = {edges}: give [minimum, maximum]")
+        bounds[name] = (edges[0], edges[1])
+    return Sweep(
+        name=spec.name,
+        subjects=subjects,
+        measures=[_measure(entry, i, folder) for i, entry in enumerate(spec.measures)],
+        stages=[_stage(entry, i) for i, entry in enumerate(small.designs if small else spec.designs)],
+        vary=vary,
+        points=small.points if small else spec.grid.points,
+        bounds=bounds,
+        chunk=spec.chunk,
+        tolerance=spec.gate.tolerance,
+        tolerances=spec.gate.measures,
+        form="quick" if small else "full",
+    )
+
+
+def _named(entry: Any) -> Any:
+    if isinstance(entry, dict) and isinstance(entry.get("vary"), dict):
+        return {**entry, "vary": _vary(entry["vary"], "subjects.vary")}
+    return entry
+
+
+def _vary(table: dict[str, Any], where: str) -> dict[str, Vary]:
+    return {name: read_table(Vary, entry, f"{where}.{name}") for name, entry in table.items()}
+
+
+def _measure(entry: Any, place: int, folder: Path) -> Measure:
+    table = read_kind(MEASURES, "id", entry, f"measures[{place}]")
+    return table.beside(folder).build()
+
+
+def _stage(entry: Any, place: int) -> Stage:
+    return read_kind(STAGES, "kind", entry, f"designs[{place}]")

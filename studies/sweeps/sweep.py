@@ -1,0 +1,168 @@
+"""A sweep, complete: subjects, what is varied, measures, designs and grid. Built in Python, or read from a file (`spec`)."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from studies.sweeps.designs import Nominal, Stage
+from studies.sweeps.measure import Measure
+from studies.sweeps.plant import Grid
+from studies.sweeps.subject import Subject
+from studies.sweeps.vary import Varied, Vary, resolve
+from synthesis.errors import SpecError
+
+SCHEMA = "gainsmith.sweep/1"
+RESERVED = {"design", "stage", "outcome", "reason"}
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Rows `start` .. `stop` of a stage of a subject; `number` counts chunks and `design` is the index of the first row."""
+
+    subject: int
+    number: int
+    stage: int
+    start: int
+    stop: int
+    design: int
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Everything a worker must know. Raises SpecError for names that do not exist, ranges that are empty, and repeated names.
+
+    `vary` is one table for all subjects, or a table for each by subject name. `points` of every scheduling parameter make the
+    grid, over the whole range or over `bounds`. `chunk` designs are computed and stored at once.
+    """
+
+    name: str
+    subjects: Sequence[Subject]
+    measures: Sequence[Measure]
+    stages: Sequence[Stage]
+    vary: Mapping[str, Mapping[str, Vary]] | Mapping[str, Vary]
+    points: int = 141
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    chunk: int = 1000
+    tolerance: float = 0.01
+    tolerances: Mapping[str, float] = field(default_factory=dict)
+    form: str = "full"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stages", (Nominal(), *(s for s in self.stages if not isinstance(s, Nominal))))
+        for what, names in (("subject", [s.name for s in self.subjects]), ("measure", [m.name for m in self.measures])):
+            repeated = sorted({name for name in names if names.count(name) > 1})
+            if not names or repeated:
+                raise SpecError(
+                    f"sweep '{self.name}': give at least one {what}, each with a name of its own; {repeated}"
+                )
+        if self.chunk < 1 or self.points < 2:
+            raise SpecError(
+                f"sweep '{self.name}': chunk = {self.chunk} and points = {self.points} must be at least 1 and 2"
+            )
+        for subject in self.subjects:
+            for measure in self.measures:
+                measure.check(subject)
+                if measure.name in subject.parameters or measure.name in RESERVED:
+                    raise SpecError(
+                        f"sweep '{self.name}': measure '{measure.name}' has the name of a column; rename it"
+                    )
+            for stage in self.stages:
+                stage.check(self.varied[subject.name])
+            self.grid(subject)
+        for name in self.tolerances:
+            if name not in {m.name for m in self.measures}:
+                raise SpecError(f"sweep '{self.name}': tolerance for '{name}', which is no measure of it")
+
+    @cached_property
+    def varied(self) -> dict[str, tuple[Varied, ...]]:
+        """What is varied of each subject."""
+        return {subject.name: resolve(subject, self._table(subject.name)) for subject in self.subjects}
+
+    def _table(self, subject: str) -> Mapping[str, Vary]:
+        plain = {name: entry for name, entry in self.vary.items() if isinstance(entry, Vary)}
+        own = self.vary.get(subject)
+        return own if own is not None and not isinstance(own, Vary) else plain
+
+    def grid(self, subject: Subject) -> Grid:
+        """The grid of one subject."""
+        return subject.grid(self.points, self.bounds)
+
+    def rows(self, subject: Subject, stage: Stage) -> int:
+        """Designs of one stage."""
+        return stage.rows(self.varied[subject.name], len(self.measures))
+
+    def designs(self, subject: Subject) -> int:
+        """Designs of a subject."""
+        return sum(self.rows(subject, stage) for stage in self.stages)
+
+    def chunks(self) -> Iterator[Chunk]:
+        """All chunks in order; none crosses a stage or cuts a block."""
+        for s, subject in enumerate(self.subjects):
+            number = design = 0
+            for k, stage in enumerate(self.stages):
+                rows, step = self.rows(subject, stage), stage.step(self.chunk, self.varied[subject.name])
+                for start in range(0, rows, step):
+                    stop = min(start + step, rows)
+                    yield Chunk(s, number, k, start, stop, design + start)
+                    number += 1
+                design += rows
+
+    def chunk_count(self) -> int:
+        """How many chunks there are."""
+        return sum(
+            -(-self.rows(subject, stage) // stage.step(self.chunk, self.varied[subject.name]))
+            for subject in self.subjects
+            for stage in self.stages
+        )
+
+    @cached_property
+    def definition(self) -> dict[str, Any]:
+        """What was asked, without today's values of constants and gains: these are what a baseline is to notice."""
+        return {
+            "schema": SCHEMA,
+            "name": self.name,
+            "form": self.form,
+            "subjects": {subject.name: self._asked(subject) for subject in self.subjects},
+            "measures": [{"name": m.name, "unit": m.unit, "better": m.better, **m.definition} for m in self.measures],
+            "designs": [stage.model_dump(mode="json") for stage in self.stages],
+            "chunk": self.chunk,
+        }
+
+    def _asked(self, subject: Subject) -> dict[str, Any]:
+        """Sample time, ranges (relative ones as such) and grid of one subject."""
+        ranges = {}
+        for v in self.varied[subject.name]:
+            share = round(0.5 * abs((v.high - v.low) / v.nominal), 12) if v.relative else None
+            ranges[v.name] = {"range": [v.low, v.high]} if share is None else {"relative": share}
+        edges = {p.name: self.bounds.get(p.name, (p.minimum, p.maximum)) for p in subject.plant.box}
+        grid = [[p.name, p.unit, *edges[p.name], self.points] for p in subject.plant.box]
+        return {"sample_time": subject.sample_time, "vary": ranges, "grid": grid}
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the definition."""
+        return hashlib.sha256(canonical(self.definition)).hexdigest()
+
+    @cached_property
+    def nominal(self) -> dict[str, Any]:
+        """Today's constants, gains and units of each subject: what the sweep was run around."""
+        return {subject.name: nominal_of(subject) for subject in self.subjects}
+
+
+def nominal_of(subject: Subject) -> dict[str, Any]:
+    """Constants with units, and the gain table, of one subject as plain data."""
+    return {
+        "constants": {p.name: {"value": p.nominal, "unit": p.unit} for p in subject.plant.parameters.values()},
+        "breakpoints": subject.gains.breakpoints.tolist(),
+        "gains": subject.gains.table.tolist(),
+    }
+
+
+def canonical(content: Any) -> bytes:
+    """One byte string for one content."""
+    return json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()

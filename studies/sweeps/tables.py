@@ -1,0 +1,121 @@
+"""Chunks as Parquet bytes: rows of designs, and the envelope over the grid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa  # type: ignore[import-untyped]
+import pyarrow.parquet as pq  # type: ignore[import-untyped]
+
+from studies.sweeps.evaluate import VALID, Evaluated, evaluate_chunk
+from studies.sweeps.sweep import Chunk, Sweep
+from studies.sweeps.versions import versions
+
+PLACE = " place"  # column of the grid point at which a measure is at its worst
+
+
+@dataclass(frozen=True)
+class Done:
+    """A finished chunk as it goes to the folder: bytes of its two files, what became of its designs, and who made it."""
+
+    chunk: Chunk
+    rows: bytes
+    envelope: bytes
+    invalid: int
+    not_a_number: int
+    first_reason: str
+    made_with: dict[str, str]
+    seconds: float
+
+
+def compute(sweep: Sweep, chunk: Chunk) -> Done:
+    """Evaluate a chunk and encode it: what a worker does."""
+    from time import perf_counter
+
+    start = perf_counter()
+    found = evaluate_chunk(sweep, chunk)
+    seconds = perf_counter() - start
+    names = [m.name for m in sweep.measures]
+    return Done(
+        chunk,
+        encoded(row_table(found, chunk, sweep.stages[chunk.stage].kind, names)),
+        encoded(envelope_table(found, chunk)),
+        int((found.outcome == "invalid").sum()),
+        int((found.outcome == "not a number").sum()),
+        next((reason for reason in found.reason if reason), ""),
+        versions(),
+        seconds,
+    )
+
+
+def row_table(found: Evaluated, chunk: Chunk, kind: str, measures: Sequence[str]) -> Any:
+    """One row a design: index, stage, parameters, for each measure its worst value and where, outcome and reason."""
+    count = chunk.stop - chunk.start
+    columns: dict[str, Any] = {
+        "design": pa.array(np.arange(chunk.design, chunk.design + count)),
+        "stage": pa.array([kind] * count).dictionary_encode(),
+    }
+    columns |= {name: pa.array(column) for name, column in found.columns.items()}
+    for name in measures:
+        columns[name] = pa.array(found.worst[name])
+        columns[name + PLACE] = pa.array(found.place[name])
+    columns["outcome"] = pa.array(found.outcome.tolist()).dictionary_encode()
+    columns["reason"] = pa.array([reason or None for reason in found.reason], pa.string())
+    return pa.table(columns)
+
+
+def envelope_table(found: Evaluated, chunk: Chunk) -> Any:
+    """One row a measure and grid point: worst and best value over the chunk's designs, and which design is worst."""
+    names = list(found.envelopes)
+    sizes = [len(e.worst) for e in found.envelopes.values()]
+    return pa.table(
+        {
+            "measure": pa.array([n for n, size in zip(names, sizes, strict=True) for _ in range(size)], pa.string()),
+            "place": pa.array([i for size in sizes for i in range(size)], pa.int32()),
+            "worst": pa.array(_joined([e.worst for e in found.envelopes.values()])),
+            "design": pa.array(_joined([e.row for e in found.envelopes.values()]).astype(np.int64) + chunk.design),
+            "best": pa.array(_joined([e.best for e in found.envelopes.values()])),
+        }
+    )
+
+
+def _joined(parts: list[Any]) -> Any:
+    return np.concatenate(parts) if parts else np.empty(0)
+
+
+def encoded(table: Any) -> bytes:
+    """Parquet, the same bytes for the same table."""
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd", write_statistics=False)
+    return bytes(sink.getvalue())
+
+
+def columns_of(path: Path, names: Sequence[str]) -> dict[str, Any]:
+    """Some columns of a chunk as arrays; words as lists."""
+    table = pq.read_table(path, columns=list(names), use_threads=False, memory_map=False)
+    return {name: _plain(table.column(name)) for name in names}
+
+
+def _plain(column: Any) -> Any:
+    kind = column.type
+    if pa.types.is_floating(kind) or pa.types.is_integer(kind):
+        return np.asarray(column)
+    return column.to_pylist()
+
+
+def row_count(path: Path) -> int:
+    """Rows of a chunk, from its footer."""
+    return int(pq.read_metadata(path).num_rows)
+
+
+def stream(paths: Iterator[Path] | Sequence[Path], names: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Some columns, chunk by chunk."""
+    for path in paths:
+        yield columns_of(path, names)
+
+
+__all__ = ["PLACE", "VALID", "Done", "columns_of", "compute", "encoded", "row_count", "stream"]

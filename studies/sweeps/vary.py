@@ -1,0 +1,75 @@
+"""Which parameters a sweep varies, and how far."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from analysis.errors import AnalysisError
+from analysis.sensitivity_designs import around, bounds
+from studies.sweeps.plant import Parameter
+from studies.sweeps.strict import Strict
+from studies.sweeps.subject import Subject
+from synthesis.errors import SpecError
+
+ALL = "constants"  # the name that stands for every parameter of the plant
+
+
+class Vary(Strict):
+    """`relative` to the nominal value, or a `range` in the parameter's own unit, which `unit` may state to be checked."""
+
+    relative: float | None = Field(default=None, gt=0)
+    range: tuple[float, float] | None = Field(default=None, strict=False)
+    unit: str | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if (self.relative is None) == (self.range is None):
+            raise ValueError("give either relative = 0.2 or range = [minimum, maximum]")
+        return self
+
+
+@dataclass(frozen=True)
+class Varied:
+    """A parameter with the range it is swept over; `relative` ranges follow the nominal value when it changes."""
+
+    name: str
+    unit: str
+    nominal: float
+    low: float
+    high: float
+    relative: bool
+
+
+def resolve(subject: Subject, table: Mapping[str, Vary]) -> tuple[Varied, ...]:
+    """The parameters of one subject, in the order of its own list. Raises SpecError for unknown names and bad ranges."""
+    if not table:
+        raise SpecError(f"subject '{subject.name}': nothing to vary; give [vary] at least one parameter")
+    chosen: dict[str, Vary] = {}
+    if ALL in table:
+        chosen = dict.fromkeys(subject.plant.parameters, table[ALL])
+    for name, vary in table.items():
+        if name != ALL:
+            subject.require(name)
+            chosen[name] = vary
+    return tuple(
+        _varied(subject, subject.parameters[name], chosen[name]) for name in subject.parameters if name in chosen
+    )
+
+
+def _varied(subject: Subject, parameter: Parameter, vary: Vary) -> Varied:
+    where = f"subject '{subject.name}': vary.{parameter.name}"
+    if vary.unit is not None and vary.unit != parameter.unit:
+        raise SpecError(f"{where}: unit '{vary.unit}' is not '{parameter.unit}', in which the parameter is given")
+    try:
+        if vary.relative is not None:
+            low, high = around({parameter.name: parameter.nominal}, vary.relative)[parameter.name]
+        else:
+            _, lows, highs = bounds({parameter.name: vary.range or (0.0, 0.0)})
+            low, high = float(lows[0]), float(highs[0])
+    except AnalysisError as error:
+        raise SpecError(f"{where}: {error}") from None
+    return Varied(parameter.name, parameter.unit, parameter.nominal, low, high, vary.relative is not None)

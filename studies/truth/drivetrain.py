@@ -1,0 +1,129 @@
+"""From what the driver asks to the torque of each wheel: AWD, RWD or FWD, brakes, and assists that are off or poor.
+
+The four wheels have motors of their own (the papers' car), or an open differential, which is the same: both wheels of an
+axle get the same torque. Torques are at the wheels, N m; brakes count as what they could hold (Coulomb).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+import numpy.typing as npt
+
+from synthesis.errors import SpecError, unknown
+
+Array = npt.NDArray[np.float64]
+FRONT_SHARES = {"AWD": 0.5, "FWD": 1.0, "RWD": 0.0}
+"""Share of the drive torque that goes to the front axle."""
+
+
+@dataclass(frozen=True)
+class Assist:
+    """Traction control or ABS, deliberately poor as in P2: no model, one threshold, slow hands.
+
+    Above `limit` of slip the torque of that wheel falls by `release` a second (as a share of what is asked), below it
+    comes back by `apply` a second; it never falls below `least`. `inactive_below` is in m/s.
+    """
+
+    limit: float = 0.25
+    release: float = 8.0
+    apply: float = 2.5
+    least: float = 0.1
+    inactive_below: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not (0 < self.limit < 1 and self.release > 0 and self.apply > 0 and 0 <= self.least < 1):
+            raise SpecError(f"assist: {self}: limit in (0, 1), release and apply above 0, least in [0, 1)")
+
+
+@dataclass(frozen=True)
+class Drivetrain:
+    """Raises SpecError for a share outside [0, 1] or a limit that is not above zero."""
+
+    layout: str = "AWD"
+    maximum_torque: float = 6400.0  # N m, sum over the driven wheels: 1600 at each wheel of the papers' car
+    maximum_power: float = 250e3  # W
+    maximum_brake_torque: float = 9000.0  # N m, sum over all wheels
+    front_brake_share: float = 0.65
+    traction_control: Assist | None = None
+    anti_lock: Assist | None = None
+
+    def __post_init__(self) -> None:
+        if self.layout not in FRONT_SHARES:
+            raise SpecError(f"drivetrain: {unknown('layout', self.layout, FRONT_SHARES)}")
+        for name in ("maximum_torque", "maximum_power", "maximum_brake_torque"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise SpecError(f"drivetrain.{name} = {getattr(self, name)!r}: must be finite and above 0")
+        if not 0 <= self.front_brake_share <= 1:
+            raise SpecError(f"drivetrain.front_brake_share = {self.front_brake_share!r}: must be in [0, 1]")
+
+
+class Drivetrains:
+    """The drivetrains of B vehicles; shares and limits as arrays."""
+
+    def __init__(self, drivetrains: Sequence[Drivetrain]) -> None:
+        front = np.array([FRONT_SHARES[d.layout] for d in drivetrains])
+        brake = np.array([d.front_brake_share for d in drivetrains])
+        self.share: Array = 0.5 * np.stack([front, front, 1 - front, 1 - front])
+        self.brake_share: Array = 0.5 * np.stack([brake, brake, 1 - brake, 1 - brake])
+        self.maximum = np.array([d.maximum_torque for d in drivetrains])
+        self.power = np.array([d.maximum_power for d in drivetrains])
+        self.maximum_brake = np.array([d.maximum_brake_torque for d in drivetrains])
+        self.traction = _Assists([d.traction_control for d in drivetrains], 1.0)
+        self.anti_lock = _Assists([d.anti_lock for d in drivetrains], -1.0)
+
+    def available(self, wheel_speed: Array) -> Array:
+        """Greatest drive torque (B,), N m, at the mean speed of the driven wheels (4, B), rad/s: flat, then hyperbola."""
+        mean = np.absolute((wheel_speed * self.share).sum(axis=0))
+        limit: Array = np.minimum(self.maximum, self.power / np.maximum(mean, 1e-3))
+        return limit
+
+    def torques(
+        self, drive: Array, brake: Array, slip: Array, speed: Array, wheel_speed: Array, h: float
+    ) -> tuple[Array, Array]:
+        """Drive and brake torque of each wheel (4, B), N m.
+
+        From the sums asked for (B,), slips (4, B), |v| (B,) m/s, wheel speeds (4, B) rad/s and the step, s. A spinning
+        wheel gets its share of the greatest power at most.
+        """
+        power = self.power * self.share / np.maximum(np.absolute(wheel_speed), 1.0)
+        driven = np.clip(drive, -self.maximum, self.maximum) * self.share
+        driven = np.clip(driven, -power, power)
+        braked = np.clip(brake, 0.0, self.maximum_brake) * self.brake_share
+        return driven * self.traction.step(slip, speed, h), braked * self.anti_lock.step(slip, speed, h)
+
+    def restart(self) -> None:
+        """All assists at rest."""
+        self.traction.restart()
+        self.anti_lock.restart()
+
+
+class _Assists:
+    def __init__(self, assists: Sequence[Assist | None], sign: float) -> None:
+        self.any, self.sign = any(a is not None for a in assists), sign
+        self.on = np.array([a is not None for a in assists])
+        for entry in fields(Assist):
+            values = [getattr(a or Assist(), entry.name) for a in assists]
+            setattr(self, entry.name, np.array(values))
+        self.restart()
+
+    limit: Array
+    release: Array
+    apply: Array
+    least: Array
+    inactive_below: Array
+
+    def restart(self) -> None:
+        self.share: Array = np.ones((4, self.on.size))
+
+    def step(self, slip: Array, speed: Array, h: float) -> Array | float:
+        """Share of the asked torque that each wheel gets (4, B)."""
+        if not self.any:
+            return 1.0
+        over = self.on & (self.sign * slip > self.limit) & (speed > self.inactive_below)
+        moved = self.share + h * np.where(over, -self.release, self.apply)
+        self.share = np.where(self.on, np.clip(moved, self.least, 1.0), 1.0)
+        return self.share

@@ -1,0 +1,167 @@
+"""The manoeuvre file (TOML, ``gainsmith.manoeuvre/1``): who drives what, where, and how. Every quantity has its unit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+
+from studies.drives import quantities
+from studies.drives.drive_tables import Table
+from studies.drives.quantities import Duration, to_si
+from studies.truth.course import Course
+from studies.truth.drivetrain import Assist
+from studies.truth.fleet import TIRES
+from studies.truth.path import PathPiece, curvature
+from studies.truth.profile import GRID, Array, Piece, check_units, sampled
+from studies.truth.road_table import Road
+from studies.truth.vehicle import TruthVehicle, load_vehicle
+from synthesis.errors import SpecError, unknown
+
+
+def _pieces(unit: str) -> AfterValidator:
+    def check(pieces: list[Piece]) -> list[Piece]:
+        check_units(pieces, unit)
+        return pieces
+
+    return AfterValidator(check)
+
+
+def _speed(text: str) -> str:
+    to_si(text, "m/s")
+    return text
+
+
+Angle = Annotated[list[Piece], _pieces("rad")]
+Torque = Annotated[list[Piece], _pieces("N*m")]
+Speed = Annotated[list[Piece], _pieces("m/s")]
+Share = Annotated[list[Piece], _pieces("share")]
+
+
+def _above_zero(unit: str) -> BeforeValidator:
+    def read(text: object) -> float:
+        value = quantities.to_si(text, unit)
+        if not value > 0:
+            raise ValueError(f"'{text}' is out of range; it must be above 0 {unit}")
+        return value
+
+    return BeforeValidator(read)
+
+
+Moment = Annotated[float, _above_zero("N*m")]
+Power = Annotated[float, _above_zero("W")]
+
+
+class Car(Table):
+    """Which vehicle, by the name of its parameter set or as a TOML file beside the manoeuvre, and what is fitted to it."""
+
+    parameters: str = Field(min_length=1)
+    drivetrain: Literal["AWD", "RWD", "FWD"] = "AWD"
+    tire: Literal["lugre", "magic-formula"] = "lugre"
+    steering_ratio: float | None = Field(default=None, gt=0.0)
+    traction_control: Literal["off", "poor"] = "off"
+    anti_lock: Literal["off", "poor"] = "off"
+    maximum_torque: Moment | None = None  # of all driven wheels; what full throttle gives at low speed
+    maximum_power: Power | None = None
+    maximum_brake_torque: Moment | None = None  # of all wheels
+
+
+class Manoeuvre(Table):
+    """A manoeuvre that was read and checked.
+
+    Steering: ``steer`` (at the road wheels) or ``hand_wheel`` (needs ``vehicle.steering_ratio``), or a ``path`` that the
+    driver follows. Pedals: ``torque`` (sum at the driven wheels) and ``throttle`` (share of what there is, negative for
+    reverse), ``brake_torque`` (sum) and ``brake`` (share of the greatest); or ``target_speed``, which the driver holds,
+    with the pedals added, and which he lets go of after ``free_after``.
+    """
+
+    schema_: Literal["gainsmith.manoeuvre/1"] = Field(alias="schema")
+    name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$")
+    title: str = Field(min_length=1)
+    paper: Literal["P1", "P2", "P3", "P4", "P5", ""] = ""
+    where: str = ""
+    given: list[str] = Field(default_factory=list)  # what the source says
+    chosen: list[str] = Field(default_factory=list)  # what it does not say, and what is taken instead
+    duration: Duration
+    speed: Annotated[str, AfterValidator(_speed)] = "0 m/s"
+    vehicle: Car
+    road: Road = Road()
+    steer: Angle = Field(default_factory=list)
+    hand_wheel: Angle = Field(default_factory=list)
+    torque: Torque = Field(default_factory=list)
+    throttle: Share = Field(default_factory=list)
+    brake_torque: Torque = Field(default_factory=list)
+    brake: Share = Field(default_factory=list)
+    target_speed: Speed = Field(default_factory=list)
+    free_after: Duration | None = None
+    path: list[PathPiece] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _parts_agree(self) -> Self:
+        steering = [name for name in ("steer", "hand_wheel", "path") if getattr(self, name)]
+        if len(steering) > 1:
+            raise ValueError(f"{' and '.join(steering)} both steer; keep one of steer, hand_wheel, path")
+        if self.hand_wheel and self.vehicle.steering_ratio is None:
+            raise ValueError("vehicle.steering_ratio: missing, but hand_wheel is given; add it, such as 16.7")
+        if self.free_after is not None and not self.target_speed:
+            raise ValueError("free_after: there is no target_speed to let go of; remove it or add target_speed")
+        return self
+
+    def with_tire(self, tire: str) -> Manoeuvre:
+        """The same manoeuvre on other tires. Raises SpecError for a tire that does not exist."""
+        if tire not in TIRES:
+            raise SpecError(unknown("tire", tire, TIRES))
+        return self.model_copy(update={"vehicle": self.vehicle.model_copy(update={"tire": tire})})
+
+    def truth_vehicle(self, folder: Path | None = None) -> TruthVehicle:
+        """The car. Raises SpecError when there is no such parameter set."""
+        own = self.vehicle
+        name = own.parameters
+        car = load_vehicle(folder / name if name.endswith(".toml") and folder else name)
+        limits = ("maximum_torque", "maximum_power", "maximum_brake_torque")
+        given = {name: value for name in limits if (value := getattr(own, name)) is not None}
+        fitted = replace(
+            car.drivetrain,
+            **given,
+            layout=own.drivetrain,
+            traction_control=Assist() if own.traction_control == "poor" else None,
+            anti_lock=Assist() if own.anti_lock == "poor" else None,
+        )
+        return car.changed(drivetrain=fitted)
+
+    def course(self) -> Course:
+        """As arrays."""
+
+        def table(pieces: Sequence[Piece], unit: str, start: float = 0.0) -> Array:
+            return sampled(pieces, unit, self.duration, start)
+
+        start = to_si(self.speed, "m/s")
+        steer = table(self.steer, "rad")
+        if self.hand_wheel and self.vehicle.steering_ratio:
+            steer = table(self.hand_wheel, "rad") / self.vehicle.steering_ratio
+        target = None
+        if self.target_speed:
+            target = table(self.target_speed, "m/s", start)
+            if self.free_after is not None:
+                target[int(np.ceil(self.free_after / GRID)) :] = np.nan
+        return Course(
+            name=self.name,
+            duration=self.duration,
+            initial_speed=start,
+            tire=self.vehicle.tire,
+            steer=steer,
+            drive_torque=table(self.torque, "N*m"),
+            drive_share=table(self.throttle, "share"),
+            brake_torque=table(self.brake_torque, "N*m"),
+            brake_share=table(self.brake, "share"),
+            grade=table(self.road.grade, "rad"),
+            bank=table(self.road.bank, "rad"),
+            friction=self.road.coefficient,
+            zones=self.road.zones(),
+            speed=target,
+            curvature=curvature(self.path) if self.path else None,
+        )

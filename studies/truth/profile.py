@@ -1,0 +1,139 @@
+"""Profiles over time: pieces in a row, each starting from the value at which the last one ended.
+
+A profile becomes a table on a uniform grid, linear between its points; the truth records what was applied.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field, model_validator
+
+from studies.drives import quantities
+from studies.drives.drive_tables import Table
+from studies.drives.quantities import Duration
+
+Array = npt.NDArray[np.float64]
+GRID = 0.005
+"""s, spacing of the tables."""
+_SHARE = re.compile(r"[-+]?[0-9]*\.?[0-9]+( ?%)?")
+_NEEDS: dict[str, tuple[set[str], set[str]]] = {
+    "hold": ({"time"}, {"to"}),
+    "ramp": ({"time", "to"}, set()),
+    "smooth": ({"time", "to"}, set()),
+    "sine": ({"time", "amplitude", "period"}, set()),
+    "half-sine": ({"time", "amplitude"}, set()),
+    "pulses": ({"time", "amplitude", "period"}, {"duty"}),
+    "table": ({"times", "values", "unit"}, set()),
+}
+"""Keys that each kind must have, and those that it may have."""
+
+
+class Piece(Table):
+    """One piece; values are quantities with a unit.
+
+    hold: stays, after a jump to ``to`` if given. ramp: linear to ``to``. smooth: half a cosine to ``to``. sine: starts at
+    zero phase around the present value. half-sine: up and back. pulses: the present value plus ``amplitude`` during the
+    first ``duty`` of each ``period``. table: linear between ``times`` (s, from the start of the piece) and ``values``.
+    """
+
+    kind: Literal["hold", "ramp", "smooth", "sine", "half-sine", "pulses", "table"]
+    time: Duration | None = None
+    to: str | None = None
+    amplitude: str | None = None
+    period: Duration | None = None
+    duty: float = Field(default=0.5, gt=0.0, lt=1.0)
+    times: list[float] | None = None
+    values: list[float] | None = None
+    unit: str | None = None
+
+    @model_validator(mode="after")
+    def _keys_fit_kind(self) -> Piece:
+        needs, may = _NEEDS[self.kind]
+        given = {name for name in self.model_fields_set if name != "kind"}
+        for name in sorted(needs - given):
+            raise ValueError(f"{self.kind} needs {name}; add it")
+        for name in sorted(given - needs - may):
+            raise ValueError(f"{self.kind} takes no {name}; it takes {', '.join(sorted(needs | may))}")
+        if self.kind == "table":
+            times, values = np.array(self.times), np.array(self.values)
+            if times.size < 2 or times.size != values.size or times[0] != 0.0 or (np.diff(times) <= 0).any():
+                raise ValueError("table: times must start at 0 and grow, with as many values")
+        return self
+
+    @property
+    def duration(self) -> float:
+        """s."""
+        return self.times[-1] if self.times is not None else float(self.time or 0.0)
+
+    def value(self, t: Array, start: float, unit: str) -> Array:
+        """At ``t`` seconds from the start of the piece, from the value ``start``, in ``unit``; clipped to the piece."""
+        T = self.duration
+        t = np.clip(t, 0.0, T)
+        if self.times is not None and self.values is not None:
+            scale = to_si(f"1 {self.unit}".strip(), unit)
+            return np.asarray(np.interp(t, self.times, np.array(self.values) * scale))
+        to = start if self.to is None else to_si(self.to, unit)
+        if self.kind == "hold":
+            return np.full_like(t, to)
+        if self.kind == "ramp":
+            return np.asarray(start + (to - start) * t / T)
+        if self.kind == "smooth":
+            return np.asarray(start + (to - start) * 0.5 * (1.0 - np.cos(np.pi * t / T)))
+        size = to_si(self.amplitude, unit)
+        if self.kind == "half-sine":
+            return np.asarray(start + size * np.sin(np.pi * t / T))
+        cycles = t / (self.period or T)
+        if self.kind == "sine":
+            return np.asarray(start + size * np.sin(2.0 * np.pi * cycles))
+        return np.asarray(start + size * (cycles % 1.0 < self.duty))
+
+    def end(self, start: float, unit: str) -> float:
+        """The value that the next piece starts from; pulses leave none."""
+        return start if self.kind == "pulses" else float(self.value(np.array([self.duration]), start, unit)[0])
+
+
+def to_si(text: object, unit: str) -> float:
+    """A quantity as in drive files; for ``share`` a number between -1 and 1 in quotes, or percent: "0.5", "50 %"."""
+    if unit != "share":
+        return quantities.to_si(text, unit)
+    if not isinstance(text, str) or not _SHARE.fullmatch(text):
+        raise ValueError(f'\'{text}\' is no share; write it like "0.5" or "50 %"')
+    value = float(text.rstrip(" %")) / (100.0 if text.endswith("%") else 1.0)
+    if not -1.0 <= value <= 1.0:
+        raise ValueError(f"'{text}' is out of range; a share is between -1 and 1")
+    return value
+
+
+def check_units(pieces: Sequence[Piece], unit: str) -> None:
+    """Raises ValueError naming the piece and the key that is no quantity in a unit of ``unit``."""
+    for k, piece in enumerate(pieces):
+        for name in ("to", "amplitude"):
+            if getattr(piece, name) is not None:
+                _named(f"piece[{k}].{name}", lambda p=piece, n=name: to_si(getattr(p, n), unit))  # type: ignore[misc]
+        if piece.unit is not None:
+            _named(f"piece[{k}].unit", lambda p=piece: to_si(f"1 {p.unit}".strip(), unit))  # type: ignore[misc]
+
+
+def _named(place: str, read: Callable[[], float]) -> None:
+    try:
+        read()
+    except ValueError as error:
+        raise ValueError(f"{place}: {error}") from None
+
+
+def sampled(pieces: Sequence[Piece], unit: str, duration: float, start: float = 0.0, grid: float = GRID) -> Array:
+    """The profile at 0, grid, 2 grid, ... beyond ``duration``, in ``unit``; after the last piece its value stays."""
+    t = grid * np.arange(int(np.ceil(duration / grid - 1e-9)) + 2)
+    out, begin = np.full(t.shape, start), 0.0
+    for piece in pieces:
+        inside = t >= begin - 1e-9
+        out[inside] = piece.value(np.asarray(t[inside] - begin, dtype=np.float64), start, unit)
+        begin += piece.duration
+        start = piece.end(start, unit)
+        out[t >= begin - 1e-9] = start
+    return out

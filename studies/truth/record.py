@@ -1,0 +1,92 @@
+"""What a simulation leaves behind: times, and every signal asked for, of B runs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from zlib import crc32
+
+import numpy as np
+import numpy.typing as npt
+
+from studies.truth.signals import UNITS
+from studies.truth.vehicle import TruthVehicle
+from synthesis.errors import SpecError, unknown
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """B runs over n samples. `signals`: name -> (B, n) of the car or (B, n, 4) of the corners fl, fr, rl, rr, SI.
+
+    `duration` (B,) s: a batch goes on to the end of its longest run, and what a shorter one does after its own end means
+    nothing; `valid` masks it. `vehicles` are the cars as they were driven.
+    """
+
+    time: Array  # (n,) s
+    signals: dict[str, Array]
+    names: tuple[str, ...]  # (B,) of the manoeuvres
+    duration: Array  # (B,) s
+    vehicles: tuple[TruthVehicle, ...]
+    tires: tuple[str, ...]  # (B,)
+    keys: tuple[tuple[int, int], ...] = ()  # (B,) of the random numbers: manoeuvre, and which of its runs
+
+    def __post_init__(self) -> None:
+        if not self.keys:
+            seen: Counter[str] = Counter()
+            keys = []
+            for name in self.names:
+                keys.append((crc32(name.encode()), seen[name]))
+                seen[name] += 1
+            object.__setattr__(self, "keys", tuple(keys))
+
+    @property
+    def sample_time(self) -> float:
+        """s."""
+        return float(self.time[1] - self.time[0])
+
+    @property
+    def size(self) -> int:
+        """B."""
+        return len(self.names)
+
+    @property
+    def valid(self) -> npt.NDArray[np.bool_]:
+        """(B, n): samples within the run's own duration."""
+        return np.asarray(self.time <= self.duration[:, None] + 1e-9)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every signal kept."""
+        return {name: UNITS[name] for name in self.signals}
+
+    def __getitem__(self, name: str) -> Array:
+        """A signal by name. Raises SpecError with the nearest names."""
+        if name not in self.signals:
+            raise SpecError(f"truth: {unknown('signal', name, self.signals)}")
+        return self.signals[name]
+
+    def only(self, runs: Sequence[int] | str) -> Truth:
+        """The runs with the given numbers, or those of one manoeuvre, cut to the longest of them."""
+        rows = [k for k, name in enumerate(self.names) if name == runs] if isinstance(runs, str) else list(runs)
+        if not rows:
+            raise SpecError(f"truth: {unknown('manoeuvre', str(runs), self.names)}")
+        duration = self.duration[rows]
+        keep = self.time <= duration.max() + 1e-9
+        return Truth(
+            self.time[keep],
+            {name: value[rows][:, keep] for name, value in self.signals.items()},
+            tuple(self.names[k] for k in rows),
+            duration,
+            tuple(self.vehicles[k] for k in rows),
+            tuple(self.tires[k] for k in rows),
+            tuple(self.keys[k] for k in rows),
+        )
+
+    def every(self, n: int) -> Truth:
+        """Every n-th sample."""
+        if n == 1:
+            return self
+        return replace(self, time=self.time[::n], signals={name: v[:, ::n] for name, v in self.signals.items()})

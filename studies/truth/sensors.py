@@ -1,0 +1,154 @@
+"""What sensors make of the truth: noise, bias, scale, resolution, rate, delay and drops, channel by channel."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+import numpy.typing as npt
+
+from synthesis.errors import SpecError
+
+Array = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Drops:
+    """Lost samples. With `burst` 1 they are independent, with probability `share`.
+
+    Else Gilbert's chain: lost in the bad state only, `burst` samples long on average and `share` of all in the long run:
+    bad -> good with 1/burst, good -> bad with share/((1 - share) burst). `kept_in_bad` lets some through (Elliott).
+    """
+
+    share: float = 0.0
+    burst: float = 1.0
+    kept_in_bad: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.share < 1.0 and self.burst >= 1.0 and 0.0 <= self.kept_in_bad < 1.0):
+            raise SpecError(f"drops: {self}: share in [0, 1), burst at least 1 sample, kept_in_bad in [0, 1)")
+        if self.burst > 1.0 and self._bad / (1.0 - self._bad) / self.burst > 1.0:
+            raise SpecError(
+                f"drops: bursts of {self.burst:g} samples cannot be so frequent; lower share or lengthen burst"
+            )
+
+    @property
+    def _bad(self) -> float:
+        """Long-run share of the bad state."""
+        bad = self.share / (1.0 - self.kept_in_bad)
+        if bad >= 1.0:
+            raise SpecError(f"drops: {self}: share must be below 1 - kept_in_bad")
+        return bad
+
+    def lost(self, rng: np.random.Generator, samples: int, shape: tuple[int, ...]) -> BoolArray:
+        """(samples, *shape): which samples are lost; starts in the long-run distribution."""
+        if self.share == 0.0:
+            return np.zeros((samples, *shape), dtype=np.bool_)
+        draw = rng.random((samples, *shape))
+        if self.burst == 1.0:
+            return np.asarray(draw < self.share)
+        bad = self._bad
+        stay, enter = 1.0 - 1.0 / self.burst, bad / ((1.0 - bad) * self.burst)
+        # one draw u decides both ways: bad -> bad if u < stay, good -> bad if u < enter. Below both bounds the new state
+        # is bad whatever the old one, above both good; in between it is kept (enter < stay) or turned: so the state is
+        # that of the last sure sample, turned as often as samples since then say.
+        sure = (draw < min(stay, enter)) | (draw >= max(stay, enter))
+        value = draw < min(stay, enter)
+        sure[0], value[0] = True, draw[0] < bad
+        row = np.arange(samples).reshape(-1, *[1] * len(shape))
+        last = np.maximum.accumulate(np.where(sure, row, 0), axis=0)
+        state = np.take_along_axis(value, last, axis=0)
+        if enter > stay:
+            state ^= (row - last) % 2 == 1
+        if self.kept_in_bad:
+            state &= rng.random(state.shape) >= self.kept_in_bad
+        return np.asarray(state, dtype=np.bool_)
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Errors of one sensor; the unit is that of its signal. Bias and scale are drawn once a run, noise at every sample.
+
+    `period`: s between new values, held in between (0: every sample). `delay`: s by which they come late.
+    """
+
+    noise: float = 0.0  # standard deviation
+    bias: float = 0.0  # standard deviation over runs
+    scale: float = 0.0  # standard deviation over runs of the relative gain error
+    resolution: float = 0.0  # least step of the reading
+    period: float = 0.0
+    delay: float = 0.0
+    drops: Drops = Drops()
+    dropped: str = "missing"  # "missing": NaN; "hold": the last value again
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if isinstance(value, int | float) and not (math.isfinite(value) and value >= 0):
+                raise SpecError(f"sensor.{entry.name} = {value!r}: must be finite and at least 0")
+        if self.dropped not in {"missing", "hold"}:
+            raise SpecError(f"sensor.dropped = '{self.dropped}': write missing or hold")
+
+    def read(self, true: Array, rng: np.random.Generator, time_step: float) -> Array:
+        """What the sensor says of ``true`` (n, ...), sampled every ``time_step``, s."""
+        samples, shape = true.shape[0], true.shape[1:]
+        gain = 1.0 + self.scale * rng.standard_normal(shape)
+        value = true * gain + self.bias * rng.standard_normal(shape)
+        if self.noise:
+            value = value + self.noise * rng.standard_normal(true.shape)
+        if self.resolution:
+            value = self.resolution * np.round(value / self.resolution)
+        late = round(self.delay / time_step)
+        every = max(1, round(self.period / time_step))
+        if late or every > 1:
+            k = np.arange(samples)
+            value = value[np.maximum(k - k % every - late, 0)]
+        lost = self.drops.lost(rng, samples, shape)
+        if self.drops.share == 0.0:
+            return value
+        if self.dropped == "missing":
+            return np.where(lost, np.nan, value)
+        row = np.arange(samples).reshape(-1, *[1] * len(shape))
+        last = np.maximum.accumulate(
+            np.where(lost, 0, row), axis=0
+        )  # a run that starts with a loss holds its first value
+        return np.take_along_axis(value, np.broadcast_to(last, value.shape), axis=0)
+
+
+@dataclass(frozen=True)
+class Ticks:
+    """A wheel encoder: `teeth` edges a revolution, counted; speed by `estimators.signals.TickSpeed`."""
+
+    teeth: int = 96
+    least_ticks: int = 8
+    longest_window: int = 20
+
+    def __post_init__(self) -> None:
+        if self.teeth < 1:
+            raise SpecError(f"ticks.teeth = {self.teeth}: at least 1")
+
+
+def _imu() -> Channel:
+    return Channel(noise=0.05, bias=0.05, scale=0.002)
+
+
+def _gyro() -> Channel:
+    return Channel(noise=0.002, bias=0.002, scale=0.002)
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """The sensors of a car; the defaults are those of a good production car at 200 Hz."""
+
+    wheel_speed: Channel = field(default_factory=lambda: Channel(noise=0.05))  # rad/s
+    acceleration: Channel = field(default_factory=_imu)  # m/s^2: ax, ay, az
+    rate: Channel = field(default_factory=_gyro)  # rad/s: yaw, roll, pitch
+    steer: Channel = field(default_factory=lambda: Channel(noise=0.0005, bias=0.001))  # rad at the road wheels
+    torque: Channel = field(default_factory=lambda: Channel(noise=5.0, scale=0.02))  # N m at each wheel
+    ticks: Ticks | None = None  # wheel speed from an encoder instead of a noisy speed
+
+
+PERFECT = Sensors(Channel(), Channel(), Channel(), Channel(), Channel())
+"""Sensors without any error."""

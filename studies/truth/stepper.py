@@ -1,0 +1,85 @@
+"""One step in time: midpoint rule for the body, exact bristles, and wheels that brakes can stop.
+
+1. Tire forces averaged over the step with the velocities at its start (`bristle.held`): a first guess of its end.
+2. The same with the mean of the velocities at start and guessed end, and the body by the rates of change at their middle.
+
+Bristles, with rates up to 2e4 1/s, are stepped exactly; the rest is slow against a millisecond. Brake and rolling
+resistance act on a wheel as dry friction, w = sign(w*) max(|w*| - h T_c/I_w, 0) with w* the wheel without them (Moreau):
+a braked wheel stops and stays stopped, exactly, and I_w dw/dt = T - R_e F_x holds over every step with the torque that
+acted. Second order away from such stops.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from studies.truth.bristle import held
+from studies.truth.layout import DEFLECTION, W
+from studies.truth.plant import Controls, Forces, Plant, Slide, Turned
+
+Array = npt.NDArray[np.float64]
+
+
+class Step(NamedTuple):
+    """State at the end of a step, and means over it."""
+
+    state: Array  # (STATES, B)
+    rates: Array  # (STATES, B) of the body; zero for wheel speeds and deflections
+    forces: Forces
+    torque: Array  # (4, B) N m, drive minus brake, as it acted: what a torque sensor in the half shaft shows
+    rolling: Array  # (4, B) N m, rolling resistance, positive against forward rolling
+    slide: Slide
+
+
+class _Spin(NamedTuple):
+    w: Array
+    torque: Array
+    rolling: Array
+
+
+def advance(plant: Plant, state: Array, controls: Controls, h: float) -> Step:
+    """One step of ``h`` seconds under controls that are held over it (best: those at its middle)."""
+    turned = Turned(np.sin(controls.steer), np.cos(controls.steer))
+    start, load = plant.slide(state, turned), plant.loads(state)
+    z = state[DEFLECTION].reshape(2, 4, -1)
+    end_z, forces = _contact(plant, z, z, start, load, controls, turned, h)
+    spin = _wheels(plant, state, forces, controls, h)
+    guess = state + h * plant.body_rates(state, forces, spin.torque, controls)
+    guess[W["wheel_speed"]] = spin.w
+    end = plant.slide(guess, turned)
+    middle = Slide(*(0.5 * (a + b) for a, b in zip(start, end, strict=True)))
+    load = 0.5 * (load + plant.loads(guess))
+    end_z, forces = _contact(plant, z, 0.5 * (z + end_z), middle, load, controls, turned, h)
+    spin = _wheels(plant, state, forces, controls, h)
+    rates = plant.body_rates(0.5 * (state + guess), forces, spin.torque, controls)
+    out = state + h * rates
+    out[W["wheel_angle"]] += 0.5 * h * (state[W["wheel_speed"]] + spin.w)
+    out[W["wheel_speed"]] = spin.w
+    out[DEFLECTION] = end_z.reshape(8, -1)
+    return Step(out, rates, forces, spin.torque, spin.rolling, middle)
+
+
+def _contact(
+    plant: Plant, z: Array, at: Array, moving: Slide, load: Array, controls: Controls, turned: Turned, h: float
+) -> tuple[Array, Forces]:
+    """Deflections (2, 4, B) at the end of the step and mean forces over it; rates are taken at the deflections `at`."""
+    transport, tire = plant.transport(moving), plant.tire
+    a, push = tire.rates(at, moving.slip, np.absolute(moving.surface), transport, controls.friction)
+    after, mean, rate = held(z, push, a, h)
+    force = tire.forces(mean, rate, moving.slip, transport, load, controls.friction)
+    return after, plant.in_body_axes(force, load, turned)
+
+
+def _wheels(plant: Plant, state: Array, forces: Forces, controls: Controls, h: float) -> _Spin:
+    """Wheel speeds at the end of the step, and the torques that acted."""
+    car, before = plant.fleet, state[W["wheel_speed"]]
+    rolling = car.radius * car.rolling_resistance * forces.load
+    most = controls.brake + rolling
+    free = before + h * (controls.drive - car.radius * forces.tire[0]) / car.wheel_inertia
+    after = np.sign(free) * np.maximum(np.absolute(free) - h * most / car.wheel_inertia, 0.0)
+    hold = (free - after) * car.wheel_inertia / h
+    share = controls.brake / np.where(most > 0.0, most, 1.0)
+    return _Spin(after, controls.drive - hold * share, hold * (1.0 - share))

@@ -1,0 +1,114 @@
+"""What a sweep costs: the whole, two workers against one, the growth with designs, the folder, and going on.
+
+Ratios come from one run and are recorded, not asserted: a machine has other things to do. `--benchmark-only` takes the sizes of
+the shipped sweep; otherwise everything runs once on small ones.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import pytest
+
+from studies.sweeps.engine import run_sweep
+from studies.sweeps.evaluate import evaluate_chunk
+from studies.sweeps.executors import Processes, Serial
+from studies.sweeps.summary import summarise
+from studies.sweeps.sweep import Sweep
+from studies.sweeps.tables import compute
+from tests.unit.sweep_cases import NOISE, sweep
+
+MEASURES = [{"id": "stability_margin"}, NOISE, {"id": "sampled_radius"}, {"id": "critical_drop_probability"}]
+
+
+def shipped_size(benchmark: Any, samples: int) -> Sweep:
+    """The four measures at 141 speeds, in chunks of 1000 designs."""
+    large = benchmark.enabled
+    return sweep(
+        measures=MEASURES, grid={"points": 141 if large else 5}, chunk=1000 if large else 20,
+        designs=[{"kind": "latin hypercube", "samples": (samples if large else 60) - 1}],
+    )  # fmt: skip
+
+
+def timed(function: Any, *arguments: Any, **named: Any) -> tuple[float, Any]:
+    start = perf_counter()
+    answer = function(*arguments, **named)
+    return perf_counter() - start, answer
+
+
+def test_two_workers_against_one(benchmark: Any, tmp_path: Path) -> None:
+    """20,000 designs x 141 speeds x 4 measures on two processes, beside the same on one."""
+    whole = shipped_size(benchmark, 20_000)
+    compute(whole, next(whole.chunks()))  # symbols are compiled before the clock starts, and before workers are forked
+    one, alone = timed(run_sweep, whole, tmp_path / "one", Serial())
+    folders = iter(range(100))
+    result = benchmark.pedantic(lambda: run_sweep(whole, tmp_path / f"two{next(folders)}", Processes(2)), rounds=1)
+    assert result.summary == alone.summary
+    if benchmark.stats is not None:
+        two = benchmark.stats.stats.median
+        benchmark.extra_info.update(
+            designs=result.count("designs"), one_worker_s=one, two_workers_s=two, ratio=one / two
+        )
+
+
+def test_growth_with_designs(benchmark: Any) -> None:
+    """Four times the designs must cost four times as much: bare evaluation, no folder."""
+    whole = shipped_size(benchmark, 8000)
+    chunks = list(whole.chunks())[1:]  # without the nominal design
+    few = chunks[: max(1, len(chunks) // 4)]
+    evaluate_chunk(whole, chunks[0])
+    quarter, _ = timed(lambda: [evaluate_chunk(whole, c) for c in few])
+    done = benchmark.pedantic(lambda: [evaluate_chunk(whole, c) for c in chunks], rounds=1)
+    assert sum(len(found.outcome) for found in done) == chunks[-1].stop
+    if benchmark.stats is not None:
+        share = chunks[-1].stop / few[-1].stop
+        all_s = benchmark.stats.stats.median
+        benchmark.extra_info.update(
+            times_the_designs=share, times_the_cost=all_s / quarter, microseconds_a_point=1e6 * all_s / (8000 * 141)
+        )
+
+
+def test_folder_manifest_and_progress_against_bare_evaluation(benchmark: Any, tmp_path: Path) -> None:
+    """The same chunks, evaluated only, and run into a folder with progress; figures are counted apart."""
+    whole = shipped_size(benchmark, 8000)
+    chunks = list(whole.chunks())
+    for chunk in chunks[:2]:
+        compute(whole, chunk)
+    bare, _ = timed(lambda: [evaluate_chunk(whole, c) for c in chunks])
+    folders = iter(range(100))
+    seen: list[int] = []
+    result = benchmark.pedantic(
+        lambda: run_sweep(
+            whole, tmp_path / f"out{next(folders)}", Serial(), progress=lambda done, _: seen.append(done)
+        ),
+        rounds=1,
+    )
+    figures, summary = timed(summarise, result.folder)
+    assert seen[-1] == len(chunks) and summary == result.summary
+    if benchmark.stats is not None:
+        whole_s = benchmark.stats.stats.median
+        benchmark.extra_info.update(
+            bare_s=bare, folder_s=whole_s, figures_s=figures, inside_measures_s=result.seconds,
+            overhead_percent=100.0 * (whole_s - figures - result.seconds) / result.seconds,
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize("missing", [0, 1])
+def test_resume(benchmark: Any, tmp_path: Path, missing: int) -> None:
+    """Going on with a finished sweep, and with one that misses a chunk (recorded beside the cost of that chunk)."""
+    whole = shipped_size(benchmark, 20_000)
+    run_sweep(whole, tmp_path, Serial())
+    files = sorted(tmp_path.glob("rows/*/*/*.parquet"))
+    before = files[-1].read_bytes()
+
+    def remove() -> None:
+        for file in files[len(files) - missing :]:
+            file.unlink()
+
+    benchmark.pedantic(lambda: run_sweep(whole, tmp_path, Serial(), resume=True), setup=remove, rounds=3)
+    assert files[-1].read_bytes() == before
+    if benchmark.stats is not None and missing:
+        cost, _ = timed(compute, whole, list(whole.chunks())[-1])
+        benchmark.extra_info.update(chunk_s=cost, beyond_the_chunk_s=benchmark.stats.stats.median - cost)

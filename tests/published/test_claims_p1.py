@@ -1,0 +1,108 @@
+"""The claims of P1 as the study recomputes them: complete, fit for the report, and in line with the reference list."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from studies.papers.claims_file import published_claims
+from studies.papers.corner_estimation.inputs import PACKAGE
+from studies.papers.corner_estimation.study import CLAIMS, STUDY
+from studies.running.drawing import drawing_style
+from studies.study import QUICK, PartResult
+from tests.unit.p1_findings import PRINT, finding
+from tests.unit.study_checks import check_result, check_study, desk_parts
+from tests.unit.study_reference import numbers, reference_claims
+
+
+@cache
+def part(name: str) -> PartResult:
+    (found,) = (p for p in desk_parts(STUDY) if p.name == name)
+    with drawing_style():
+        return found.run(QUICK)
+
+
+def close(value: float, printed: str) -> bool:
+    """Within half of the last digit of a number as it is written."""
+    mantissa, _, exponent = printed.lower().partition("e")
+    digits = len(mantissa.partition(".")[2])
+    return abs(value - float(printed)) <= 0.5 * 10.0 ** (int(exponent or 0) - digits) * (1 + 1e-9)
+
+
+def test_every_published_claim_is_computed_in_one_part() -> None:
+    published = published_claims(PACKAGE)
+    assert set(CLAIMS) == set(published)
+    assert {entry.paper for entry in published.values()} == {"P1", "P1/P2"}
+    check_study(STUDY)
+    homes = [claim.published.id for p in desk_parts(STUDY) for claim in part(p.name).claims]
+    assert sorted(homes) == sorted(CLAIMS)
+
+
+@pytest.mark.parametrize("name", [p.name for p in desk_parts(STUDY)])
+def test_every_part_hands_over_what_the_report_needs(name: str) -> None:
+    check_result(part(name))
+
+
+@pytest.mark.shared
+def test_claims_and_verdicts_are_those_of_the_reference() -> None:
+    reference = reference_claims("P1") | reference_claims("P1/P2")
+    assert set(CLAIMS) == set(reference)
+    for name, entry in reference.items():
+        if entry["verdict"] != "yours to find":
+            assert str(finding(name).verdict) == entry["verdict"], name
+
+
+@pytest.mark.shared
+def test_numbers_agree_with_the_reference() -> None:
+    """Read from the text of each entry, in the order in which it names them."""
+    text = {name: entry["computed"] for name, entry in (reference_claims("P1") | reference_claims("P1/P2")).items()}
+    terms = {term.strip() for term in finding("P1-26").computed["entry"].replace("-", "+-").split("+")} - {""}
+    assert terms == {term.strip() for term in text["P1-26"].replace("-", "+-").split("+")}
+    primal = finding("P1-29-primal").computed
+    assert close(primal["largest_eigenvalue_at_0_rad_s"], "9.278e9") and numbers(text["P1-29-primal"])[0] == 9.278e9
+    ((low, high),) = primal["holds_on_up_to_400_rad_s"]
+    np.testing.assert_allclose([low, high], numbers(text["P1-29-primal"].split("(")[1]), atol=5e-5)
+    lateral = finding("P1-41-primal").computed
+    at_rest, _, at_180, _ = numbers(text["P1-41-primal"])
+    assert lateral["largest_eigenvalue_at_0_rad_s"] == pytest.approx(at_rest, rel=5e-4)
+    assert lateral["largest_eigenvalue_at_180_rad_s"] == pytest.approx(at_180, rel=5e-4)
+    shown = numbers(reference_claims("P1")["P1-41-primal"]["reading"].split("(")[1])
+    np.testing.assert_allclose(lateral["holds_on_rad_s"][0], shown, atol=5e-5)
+    weights = [numbers(entry)[0] for entry in text["P1-aqs-feas"].split("diag(")[1:]]
+    for weight, entry in zip(weights, finding("P1-aqs-feas").computed.values(), strict=True):
+        assert entry["weights_of_diag_w_1"][0] < weight < entry["weights_of_diag_w_1"][1]
+    scale = numbers(text["P1-aqs-scale"].split("natural")[1].split("constant")[0])
+    found = list(finding("P1-aqs-scale").computed.values())
+    # 2 g^2 of the reference are "~", two digits
+    np.testing.assert_allclose([e["natural_condition_number"] for e in found], [v for v in scale if v > 1e4], rtol=0.03)
+    capped = numbers(
+        text["P1-aqs-scale"].split("certificate) for")[1].split(", cap")[0].replace("xP1", "").replace("xP3", "")
+    )
+    np.testing.assert_allclose(
+        [found[0]["margin_unscaled"]["10000"], found[2]["margin_unscaled"]["10000"]], capped, rtol=2e-3
+    )
+    scales = numbers(text["P1-aqs-scale"].split("|c/b| (")[1].split(")")[0])
+    np.testing.assert_allclose([e["scale_of_z"] for e in found], scales, atol=0.5)
+    gamma = finding("P1-30-sign").computed["gamma"]
+    wrong, right = numbers(text["P1-30-sign"].split("gamma=")[1])
+    assert abs(gamma["printed"]["lateral"] - wrong) <= 1e-3 and abs(gamma["corrected"]["lateral"] - right) <= 1e-3
+    kalman = numbers(text["P1-hinf-figs"].split("q/r=")[1].replace("->", " ").replace("L1x", "").replace("L2x", ""))
+    x, y = (finding("P1-hinf-figs").computed[d] for d in PRINT)
+    ours = [*x["intensities_of_friction_and_acceleration"], *x["Kalman filter"]["L1"], x["Kalman filter"]["L2"][0],
+            *y["intensities_of_friction_and_acceleration"], *y["Kalman filter"]["L1"], y["Kalman filter"]["L2"][0]]  # fmt: skip
+    np.testing.assert_allclose(ours, kalman, rtol=1e-3)
+    bound, ramp, _ = numbers(text["P1-prop1"])
+    force = finding("P1-prop1").computed
+    assert abs(force["bound_N"] - bound) < 5e-9
+    assert force["largest_late_error_N"]["ramp"] == pytest.approx(ramp, rel=1e-3)
+    sums = finding("P1-ukf").computed
+    assert {"9", "11/3", "1/6"} <= set(text["P1-ukf"].replace("=", " ").replace("(", " ").replace(":", " ").split())
+    assert (sums["N=3"]["sum_of_mean_weights"], sums["N=3"]["centre_weights"]) == (
+        {"printed": 9, "corrected": 1},
+        [0, 2],
+    )
+    assert sums["N=1"]["sum_of_mean_weights"]["printed"] == pytest.approx(11 / 3, rel=1e-15)
+    assert [row[3] for row in finding("P1-tab3").computed["above_the_limit"]] == numbers(text["P1-tab3"])[:2]
+    assert finding("P1-34").computed["needed_for_both_axles"]["W_s"] == "1/2" and text["P1-34"].endswith("1/2")

@@ -1,0 +1,101 @@
+"""Second roads to what the study of P1 says of the H-infinity design, the Kalman gains, forces and loads."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.norms import hinf_norm
+from studies.papers.corner_estimation.hinf import optima, signed_model, velocity_floor
+from studies.papers.corner_estimation.inputs import corner_model, printed_gains, printed_numbers
+from studies.papers.corner_estimation.kalman import fitted, schedule
+from studies.papers.corner_estimation.tables_forces import filter_lag
+from tests.unit.p1_findings import PRINT, RADIUS, finding
+
+Direction = Any
+
+
+# ---- (30): H-infinity -----------------------------------------------------------------------------------------------------
+
+
+def test_gamma_lies_between_the_floor_and_the_frozen_norms() -> None:
+    """Every gamma is at least the static gain, and the frozen loops with the returned gains reach no more than gamma."""
+    for direction in PRINT:
+        for found in optima(direction):
+            model = corner_model(direction, 140.0)
+            A_e, B_e = model.on(found.omega).error_dynamics(found.gains[..., None])
+            norm = hinf_norm(A_e, B_e[..., :2], np.eye(2)).norm
+            floor = velocity_floor(direction, "corrected", found.omega)
+            assert (norm >= floor * (1 - 1e-9)).all()
+            assert norm.max() <= found.gamma * (1 + 1e-7)
+            assert floor.max() == 1.0
+
+
+def test_static_gain_for_both_signs_by_solving_the_error_at_rest() -> None:
+    """-A_e^-1 B_e with arbitrary gains, for the printed and the corrected sign."""
+    omega = np.array([0.0, 40.0, 140.0])
+    for direction, sign in product(PRINT, ("printed", "corrected")):
+        numeric = signed_model(direction, sign).on(omega)  # type: ignore[arg-type]
+        A_e, B_e = numeric.error_dynamics(np.array([[0.9], [33.0]]))
+        gain = np.abs(-np.linalg.solve(A_e, B_e)[:, 1, 0])
+        np.testing.assert_allclose(gain, velocity_floor(direction, sign, omega), rtol=1e-9)  # type: ignore[arg-type]
+    a = 12.84 * 0.33 * 140.0
+    assert abs(1.621 * a / (181.5 + 0.001 * a) - 1.0 - 4.2808) < 5e-5
+
+
+@pytest.mark.parametrize("direction", PRINT)
+def test_kalman_gains_by_spectral_factorisation(direction: Direction) -> None:
+    """L2 is constant and L1 has the closed form of the module; the Riccati road must agree, also near sigma0 = sigma1 a."""
+    s0, s1, s2, kappa, *_ = (float(value) for value in PRINT[direction])
+    noise = fitted(direction, printed_gains(direction), 70.0)
+    omega = np.array([0.0, 20.0, 50.0, 52.8, 60.0, 140.0])
+    a = kappa * float(RADIUS) * omega
+    sensor = 1.0 + s1 * s1 * noise.friction
+    L2 = np.sqrt(noise.acceleration / sensor)
+    p0 = L2 * (s0 + s2 * a)
+    p1 = np.sqrt(2 * p0 + (noise.friction * s0**2 + noise.acceleration * (s1 + s2) ** 2 + a * a) / sensor)
+    L1 = (p1 - a - L2 * (s1 + s2)) / (s0 - s1 * a)
+    np.testing.assert_allclose(schedule(direction, noise, omega), np.stack([L1, np.full(6, L2)], axis=1), rtol=1e-7)
+
+
+# ---- forces -----------------------------------------------------------------------------------------------------------------
+
+
+def test_poles_of_the_wheel_error_in_closed_form() -> None:
+    inertia, radius, eta1, eta2 = (Fraction(x) for x in ("1.68", RADIUS, "1.8", "11.4"))
+    half = radius * eta1 / (2 * inertia)
+    square = eta2 / inertia - half * half
+    computed = finding("P1-pid-K").computed
+    (real, imaginary), (_, mirrored) = computed["poles_1_s"]
+    assert half > 0 and square > 0  # complex and stable
+    assert (
+        abs(real + float(half)) <= 1e-8 and abs(imaginary - np.sqrt(float(square))) <= 1e-8 and mirrored == -imaginary
+    )
+    assert computed["damping_ratio"] == pytest.approx(0.068, abs=5e-4)
+
+
+def test_loads_in_fractions() -> None:
+    mass, gravity, height, front, rear = (Fraction(x) for x in ("2270", "9.81", "0.65", "1.42", "1.43"))
+    base, computed = front + rear, finding("P1-loads").computed
+    static = {"front": mass * gravity * rear / base, "rear": mass * gravity * front / base}
+    for axle, track in (("front", Fraction("1.62")), ("rear", Fraction("1.56"))):
+        assert abs(computed["static_N"][axle] - float(static[axle])) <= 1e-4
+        assert abs(computed["static_N"][f"{axle}_left"] - float(static[axle] / 2)) <= 1e-4
+        shift = float(static[axle] / gravity * height / track)
+        assert abs(computed["per_unit_a_y_N"][f"{axle}_right"] - shift) <= 1e-4
+        assert abs(computed["per_unit_a_y_N"][f"{axle}_left"] + shift) <= 1e-4
+    assert abs(computed["per_unit_a_x_N"]["rear"] - float(mass * height / base)) <= 1e-4
+    assert computed["at_rest_on_3_deg_bank"]["printed"] == pytest.approx(9.81 * np.sin(np.deg2rad(6.0)), rel=1e-12)
+
+
+def test_force_filter_lags_by_its_own_covariances() -> None:
+    """Sheet section 11 item 8: 1 s and 3.5 s in newtons, 1.5 ms and up to 3.8 ms in kilonewtons."""
+    for entry, newtons, kilo in zip(
+        printed_numbers()["force_filter"]["readings"], (3.5, 1.06), (3.8e-3, 1.57e-3), strict=True
+    ):
+        assert filter_lag(entry["process"], entry["measurement"], 1.0) == pytest.approx(newtons, rel=0.01)
+        assert filter_lag(entry["process"], entry["measurement"], 1e3) == pytest.approx(kilo, rel=0.01)

@@ -1,0 +1,77 @@
+"""The claims of P2 as the study recomputes them: complete, fit for the report, and in line with the reference list."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from studies.papers.claims_file import published_claims
+from studies.papers.longitudinal_speed.inputs import PACKAGE, accelerating
+from studies.papers.longitudinal_speed.study import CLAIMS, STUDY
+from studies.papers.longitudinal_speed.unknown_start import both_tests
+from studies.running.drawing import drawing_style
+from studies.study import QUICK, PartResult
+from tests.unit.p2_findings import finding
+from tests.unit.study_checks import check_result, check_study, desk_parts
+from tests.unit.study_reference import numbers, reference_claims
+
+
+@cache
+def part(name: str) -> PartResult:
+    (found,) = (p for p in desk_parts(STUDY) if p.name == name)
+    with drawing_style():
+        return found.run(QUICK)
+
+
+def test_every_published_claim_is_computed_in_one_part() -> None:
+    published = published_claims(PACKAGE)
+    assert set(CLAIMS) == set(published)
+    assert {entry.paper for entry in published.values()} == {"P2"}
+    check_study(STUDY)
+    homes = [claim.published.id for p in desk_parts(STUDY) for claim in part(p.name).claims]
+    assert sorted(homes) == sorted(CLAIMS)
+
+
+@pytest.mark.parametrize("name", [p.name for p in desk_parts(STUDY)])
+def test_every_part_hands_over_what_the_report_needs(name: str) -> None:
+    check_result(part(name))
+
+
+@pytest.mark.shared
+def test_claims_and_verdicts_are_those_of_the_reference() -> None:
+    reference = reference_claims("P2")
+    assert set(CLAIMS) == set(reference)
+    for name, entry in reference.items():
+        if entry["verdict"] != "yours to find":
+            assert str(finding(name).verdict) == entry["verdict"], name
+
+
+@pytest.mark.shared
+def test_numbers_agree_with_the_reference() -> None:
+    text = {name: entry["computed"] for name, entry in reference_claims("P2").items()}
+    first = finding("P2-test1").computed
+    samples, seconds, _, w40, left40, six, w100, left100, _, fewer = numbers(
+        text["P2-test1"].replace("=", " ").replace("2kRw", "")
+    )
+    assert (samples * 0.005, fewer * 0.005, six, w40, w100) == (0.015, 0.01, 6, 40, 100)
+    assert first["seconds_to_zero"] == {
+        "three states, accelerating": seconds, "three states, constant speed": "never", "two states": fewer * 0.005,
+    }  # fmt: skip
+    assert first["left_after_6_samples"]["40 rad/s"] == pytest.approx(left40, rel=5e-3)
+    assert first["left_after_6_samples"]["100 rad/s"] == pytest.approx(left100, rel=1e-2)
+    peaks = numbers(reference_claims("P2")["P2-test1"]["reading"].split("psi=1e18")[1])
+    moving = both_tests(accelerating(40.0, 100.0, 13, 13)).largest_known
+    np.testing.assert_allclose(moving[3:6], peaks, rtol=2e-3)
+    lowest = numbers(text["P2-29"].split("(=")[1])[0]
+    assert finding("P2-29").computed["printed"][0] == pytest.approx(lowest, abs=5e-5)
+    assert finding("P2-kappa").computed["patch_length_m"]["7/(6 L)"] == pytest.approx(
+        numbers(text["P2-kappa"].split("L=")[1])[0], abs=5e-5
+    )
+    table = finding("P2-tab2").computed
+    largest, load, worse, cells, *pairs = numbers(text["P2-tab2"].replace("/", " "))
+    assert (table["largest_ukf_percent"], table["largest_load_percent"]) == (largest, load)
+    assert (len(table["uio_better"]), table["cells"]) == (worse, cells)
+    assert sorted(value for row in table["uio_better"] for value in row[2:]) == sorted(pairs)
+    assert finding("P2-19M").computed["B"] == numbers(text["P2-19M"].split("B=")[1])[:3]

@@ -1,0 +1,53 @@
+"""What every part of a study must hand over: figures and tables that stand on their own, claims that can be stored."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+from studies.claim import Verdict
+from studies.study import Part, PartResult, Study
+
+
+def check_study(study: Study) -> None:
+    """Names are unique and fit for files, costs are positive."""
+    names = [part.name for part in study.parts]
+    assert len(names) == len(set(names)) and names
+    assert all(re.fullmatch(r"[a-z0-9][a-z0-9-]*", name) for name in (study.id, *names))
+    assert all(0.0 < part.cost <= 300.0 and part.title for part in study.parts)
+
+
+def desk_parts(study: Study) -> list[Part]:
+    """The parts that compute from models alone; drives of truth vehicles cost more and have tests of their own."""
+    return [part for part in study.parts if part.cost <= 30.0]
+
+
+def check_result(result: PartResult) -> None:
+    """Axes carry names and units, captions say something, rows fit their columns, claims are JSON."""
+    for drawing in result.drawings:
+        assert len(drawing.caption) > 120 and len(drawing.alternative) > 60, drawing.name
+        drawing.figure.draw_without_rendering()
+        for axis in drawing.figure.axes:
+            for label, wanted in ((axis.get_xlabel(), _bottom(axis)), (axis.get_ylabel(), _leftmost(axis))):
+                if wanted or label:
+                    assert label, f"{drawing.name}: an axis has no name"
+                    assert re.search(r"\[.+\]", label), f"{drawing.name}: no unit in '{label}'"
+    for table in result.tables:
+        assert len(table.caption) > 60 and table.rows, table.name
+        assert all(len(row) == len(table.columns) for row in table.rows), table.name
+        json.dumps([list(row) for row in table.rows])
+    for claim in result.claims:
+        row = json.loads(json.dumps(claim.row()))
+        assert row["reading"] and row["computed"] and row["verdict"] in set(Verdict)
+
+
+def _bottom(axis: Any) -> bool:
+    place = axis.get_subplotspec()
+    words = any(re.search("[A-Za-z]{3}", label.get_text()) for label in axis.get_xticklabels())
+    return place is not None and place.is_last_row() and not words  # categories name themselves
+
+
+def _leftmost(axis: Any) -> bool:
+    place = axis.get_subplotspec()
+    return place is not None and place.is_first_col()

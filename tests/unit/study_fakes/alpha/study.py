@@ -1,0 +1,60 @@
+"""Every kind of value, verdict, table and figure that a study may deliver."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from studies.claim import Claim, Finding, Verdict
+from studies.papers.claims_file import published_claims
+from studies.study import Drawing, Part, PartResult, Scope, Study, Table
+from tests.unit.study_fakes.trace import computed
+
+VALUES = {
+    "P1-root": (math.sqrt(2.0), Verdict.REPRODUCED, "positive root"),
+    "P1-pair": ({"omega=0": np.float64(0.5), "omega=40": [1, 2.5]}, Verdict.PARTLY, "only at `omega=0`"),
+    "P1-wrong": (float("nan"), Verdict.NOT_REPRODUCED, 'tags <b>& quotes" stay text'),
+    "P1-sign": ("L1*p1 - 1", Verdict.ERRATUM, "the sign must be minus"),
+    "P1-open": (float("inf"), Verdict.UNDER_SPECIFIED, ""),
+    "P1-extra": (True, Verdict.DERIVED, "needed for `P1-root`"),
+}
+
+
+def numbers(scope: Scope) -> PartResult:
+    computed("alpha-numbers")
+    published = published_claims(__package__ or "")
+    claims = [Claim(published[name], Finding(*found)) for name, found in VALUES.items()]
+    wide = Table("wide", "Many columns.", [f"speed {i} [m/s]" for i in range(14)], [[i / 7 for i in range(14)]] * 3)
+    mixed = Table("mixed", "Words, gaps and numbers.", ("name", "value [1]", "good"),
+                  (("a, b", 1 / 3, True), ("c", None, False), ("d", float("nan"), True)))  # fmt: skip
+    return PartResult(
+        claims,
+        (wide, mixed),
+        notes=[f"{scope.seeds} seeds & <more>."],
+        measures={"seeds": scope.seeds, "gap": math.nan},
+    )
+
+
+def curve(_scope: Scope) -> PartResult:
+    computed("alpha-curve")
+    figure = Figure(figsize=(7.2, 3.6), layout="constrained")
+    axis = figure.subplots()
+    time = np.linspace(0.0, 10.0, 200)
+    axis.plot(time, np.sin(time), label="sine")
+    axis.set_xlabel("time [s]")
+    axis.set_ylabel("velocity [m/s]")
+    axis.legend()
+    dense = Figure(figsize=(4.0, 3.0), layout="constrained")
+    dense.subplots().plot(*np.random.default_rng(1).standard_normal((2, 6_000)), ".", ms=1)
+    return PartResult(
+        drawings=(
+            Drawing("sine", "A sine over time.", "A line that swings between -1 and 1 m/s.", figure),
+            Drawing("cloud", "Many points.", "A round cloud of points.", dense),
+        )
+    )
+
+
+STUDY = Study("alpha", "Alpha: all kinds of results", "P1", "Values, tables and figures of every kind.",
+              (Part("numbers", "Numbers", numbers, 2.0), Part("curve", "Curves", curve, 5.0)))  # fmt: skip

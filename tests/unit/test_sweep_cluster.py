@@ -1,0 +1,125 @@
+"""A real scheduler with two real workers on the loopback address; one of them is killed in the middle."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from studies.sweeps import cluster as cluster_module
+from studies.sweeps.cluster import Cluster
+from studies.sweeps.engine import run_sweep
+from studies.sweeps.executors import Serial
+from studies.sweeps.sweep import Sweep
+from synthesis.errors import SpecError
+from tests.unit.sweep_cases import contents, many_chunks
+
+pytest.importorskip("distributed", reason="Dask is not installed: pip install 'gainsmith[cluster]'")
+ROOT = Path(__file__).parents[2]
+
+
+def start(*arguments: str) -> subprocess.Popen[bytes]:
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(
+        [sys.executable, "-m", *arguments], cwd=ROOT, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def whole() -> Sweep:
+    return many_chunks()
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """Address of a scheduler and its two workers, one thread each."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    address = f"tcp://127.0.0.1:{port}"
+    scheduler = start(
+        "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard", "--no-show"
+    )
+    options = (
+        "--nthreads",
+        "1",
+        "--no-nanny",
+        "--no-dashboard",
+        "--host",
+        "127.0.0.1",
+        "--local-directory",
+        str(tmp_path),
+    )
+    workers = [start("distributed.cli.dask_worker", address, *options) for _ in range(2)]
+    try:
+        yield address, workers
+    finally:
+        for process in (*workers, scheduler):
+            process.kill()
+            process.wait()
+
+
+def wait_for_workers(address: str, count: int) -> None:
+    from distributed import Client
+
+    for _ in range(120):
+        try:
+            with Client(address, timeout=5, set_as_default=False) as client:
+                client.wait_for_workers(count, timeout=60)
+                return
+        except (OSError, TimeoutError):
+            time.sleep(0.5)
+    pytest.fail(f"no {count} workers at {address}")
+
+
+@pytest.mark.filterwarnings("ignore")  # lost connections are what this is about
+def test_a_worker_killed_in_the_middle_loses_nothing_and_counts_nothing_twice(
+    cluster: tuple[str, list[subprocess.Popen[bytes]]], whole: Sweep, tmp_path: Path
+) -> None:
+    address, workers = cluster
+    wait_for_workers(address, 2)
+    killed: list[int] = []
+
+    def told(done: int, total: int) -> None:
+        if done == 10:
+            workers[0].send_signal(signal.SIGKILL)
+            killed.append(workers[0].wait())
+
+    result = run_sweep(whole, tmp_path / "cluster", Cluster(address), progress=told)
+    assert killed == [-signal.SIGKILL] and workers[1].poll() is None
+    assert result.computed == whole.chunk_count()
+    files = sorted((tmp_path / "cluster").glob("rows/*/*/*.parquet"))
+    designs = [d for file in files for d in pq.read_table(file).column("design").to_pylist()]
+    assert designs == list(range(whole.designs(whole.subjects[0])))
+    run_sweep(whole, tmp_path / "here", Serial())
+    assert contents(tmp_path / "cluster") == contents(tmp_path / "here")
+
+
+@pytest.mark.parametrize(("listens", "patience"), [(False, 0.5), (True, None)])
+def test_a_scheduler_that_does_not_answer_is_one_line_within_ten_seconds(
+    whole: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, listens: bool, patience: float | None
+) -> None:
+    """A port that nobody listens to, and one where somebody accepts and says nothing."""
+    if patience is not None:
+        monkeypatch.setattr(cluster_module, "ANSWER", patience)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        port = silent.getsockname()[1]
+        if not listens:
+            silent.close()
+        start_at = time.perf_counter()
+        with pytest.raises(SpecError, match="no answer within") as refused:
+            run_sweep(whole, tmp_path / "out", Cluster(f"tcp://127.0.0.1:{port}"))
+        assert time.perf_counter() - start_at < 10.0
+    assert "\n" not in str(refused.value)
+
+
+def test_an_address_that_is_none(whole: Sweep, tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="unknown address scheme"):
+        run_sweep(whole, tmp_path / "out", Cluster("nowhere://x"))

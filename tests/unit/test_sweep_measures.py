@@ -1,0 +1,262 @@
+"""Every measure against a second road, and what becomes of designs that cannot be computed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from analysis.dropout_schedule import frozen_critical_probability
+from analysis.error_norms import error_hinf_norm
+from analysis.mean_square_schedule import drop_radius
+from analysis.rank_loss_speeds import RankLossSpeeds
+from estimators import GainSchedule, LpvVelocityObserver
+from studies.sweeps.designs import STAGES
+from studies.sweeps.evaluate import INVALID, NOT_A_NUMBER, VALID, evaluate
+from studies.sweeps.measure import Measure
+from studies.sweeps.spec import MEASURES
+from studies.sweeps.subject import Batch, Subject, model_subject
+from studies.sweeps.subject_spec import SubjectSpec
+from studies.sweeps.sweep import Sweep
+from studies.sweeps.vary import Vary
+from synthesis.errors import SpecError
+from synthesis.models.catalogue.corner import corner_velocity_model
+from synthesis.models.lpv import LpvModel
+from synthesis.models.param import Constant, SchedulingParameter, Signal
+from synthesis.models.parameter_set import load_parameter_set
+from tests.drives.synthetic_drive import columns, write_drive, write_log
+
+NAME = "corner-estimation-longitudinal"
+SCHEDULE = GainSchedule.shipped(NAME)
+MODEL = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal")
+DESIGNS = {"sigma1": np.array([0.76, 0.65, 0.9]), "kappa": np.array([8.32, 9.5, 7.0])}
+
+
+@pytest.fixture(scope="module")
+def subject() -> Subject:
+    return SubjectSpec(schedule=NAME, parameters="corner-estimation").build(Path())
+
+
+def measure(kind: str, **options: object) -> Measure:
+    return MEASURES[kind].model_validate({"id": kind, **options}).build()
+
+
+def perturbed(row: int) -> LpvModel:
+    """The symbolic model with the constants of one design: what one would write without any batch."""
+    changed = {
+        name: replace(c, value=float(DESIGNS[name][row])) if name in DESIGNS else c
+        for name, c in MODEL.constants.items()
+    }
+    return replace(MODEL, constants=changed)
+
+
+def test_margin_norm_and_radius_are_those_of_single_models(subject: Subject) -> None:
+    grid = subject.grid(6)
+    speeds = grid.points[:, 0]
+    kinds = [
+        measure("stability_margin"),
+        measure("sampled_radius"),
+        measure("hinf_norm", disturbances=["force_noise"], errors=["relative_velocity"]),
+        measure(
+            "hinf_norm", name="all", disturbances=["friction", "acceleration_error"],
+            errors=["bristle_deflection", "relative_velocity"],
+        ),
+    ]  # fmt: skip
+    batch = subject.at(DESIGNS, grid)
+    margin, radius, noise, everything = (m(batch) for m in kinds)
+    for row in range(3):
+        model, gain = perturbed(row), SCHEDULE.gain(speeds)
+        A_e, _ = model.on(speeds).error_dynamics(gain)
+        np.testing.assert_allclose(margin[row], np.linalg.eigvals(A_e).real.max(axis=-1), rtol=1e-9)
+        updates = [np.abs(np.linalg.eigvals(batch.coast.received[row, g])).max() for g in range(6)]
+        np.testing.assert_allclose(radius[row], updates, rtol=1e-9)
+        found = error_hinf_norm(model, gain, speeds, ["force_noise"], ["relative_velocity"])
+        np.testing.assert_allclose(noise[row], found.norm, rtol=1e-7)
+        found = error_hinf_norm(model, gain, speeds, ["friction", "acceleration_error"])
+        np.testing.assert_allclose(everything[row], found.norm, rtol=1e-5)
+
+
+def test_received_update_is_the_one_that_the_runtime_performs(subject: Subject) -> None:
+    """One step of the real observer from unit errors, the plant at rest."""
+    grid = subject.grid(5)
+    received = subject.at({"sigma1": np.array([0.76])}, grid).coast.received[0]
+    for g, speed in enumerate(grid.points[:, 0]):
+        for state in range(2):
+            observer = LpvVelocityObserver(SCHEDULE, batch_shape=(1,))
+            observer.reset(state=np.eye(2)[state])
+            step = observer.step([0.0], [0.0], [speed])
+            np.testing.assert_allclose(step.estimate[0], received[g, :, state], rtol=1e-9, atol=1e-12)
+
+
+def test_drop_measures_are_those_of_the_schedule(subject: Subject) -> None:
+    frozen = frozen_critical_probability(SCHEDULE, points=29)
+    grid = subject.grid(29)
+    batch = subject.at({"sigma1": np.array([0.76])}, grid)
+    shared = np.isin(frozen.points, grid.points[:, 0])
+    np.testing.assert_allclose(
+        measure("critical_drop_probability")(batch)[0], frozen.values[shared], rtol=1e-8, atol=1e-10
+    )
+    radius = measure("second_moment_radius", drop_probability=float(frozen.values[0]))(batch)
+    assert radius[0, 0] == pytest.approx(1.0, abs=1e-6)  # at the critical probability, by its definition
+    wanted = drop_radius(batch.coast.dropped, batch.coast.received, 0.3)
+    np.testing.assert_allclose(measure("second_moment_radius", drop_probability=0.3)(batch), wanted)
+
+
+def test_switching_bound_of_one_speed_is_its_radius(subject: Subject) -> None:
+    batch = subject.at(DESIGNS, subject.grid(3))
+    bound = measure("joint_spectral_radius", speeds=1, tolerance=1e-3)(batch)
+    radius = measure("sampled_radius")(batch)[:, 0]
+    assert bound.shape == (3,)
+    assert (bound >= radius * (1.0 - 1e-9)).all() and (bound <= radius * 1.002).all()
+    many = measure("joint_spectral_radius", speeds=3)(batch)
+    assert (many >= measure("sampled_radius")(batch).max(axis=1) * (1.0 - 1e-9)).all()
+
+
+def test_designing_again_gives_the_design_bound_of_the_schedule(subject: Subject) -> None:
+    constants = {"sigma1": np.array([0.76, 0.68])}
+    gamma = measure("certified_gamma")(subject.at(constants, subject.grid(2)))
+    assert gamma[0] == pytest.approx(SCHEDULE.guarantee["design"]["gamma"], rel=1e-6)
+    assert gamma[1] != pytest.approx(gamma[0], rel=1e-4)
+    with pytest.raises(SpecError, match="is not one of"):
+        measure("certified_gamma", channel="friction").check(subject)
+
+
+def test_rank_loss_speed_of_a_subject(subject: Subject) -> None:
+    found = measure("rank_loss_speed")(subject.at(DESIGNS, subject.grid(2)))
+    np.testing.assert_array_equal(found, RankLossSpeeds(MODEL).lowest(DESIGNS))
+
+
+def test_nrms_is_that_of_the_replayed_observers(subject: Subject, tmp_path: Path) -> None:
+    from studies.drives.corner_observers import ScheduledObserver
+    from studies.drives.drive_file import read_drive
+    from studies.drives.log import read_log
+    from studies.drives.metrics import deviation
+    from studies.drives.prepare import corner_inputs_of
+    from studies.drives.replay import replay
+
+    table = columns(duration=2.0)
+    wobble = 0.05 * np.sin(9.0 * table["t"])
+    for corner, sign in (("fl", 1.0), ("rr", -1.0)):
+        table[f"w_{corner}"] = table[f"w_{corner}"] * (1.0 + sign * wobble)
+    path, drive = write_log(tmp_path / "log.csv", table), write_drive(tmp_path)
+    spec = MEASURES["estimator_nrms"].model_validate(
+        {"id": "estimator_nrms", "drive": "drive.toml", "logs": ["log.csv"]}
+    )
+    found = spec.beside(tmp_path).build()
+    found.check(subject)
+    values = found(subject.at({"sigma1": np.array([0.76, 0.5])}, subject.grid(2)))
+    description = read_drive(drive)
+    log = read_log([path], description)
+    velocity = replay(corner_inputs_of(log, description), ScheduledObserver(SCHEDULE)).velocity
+    wanted = deviation(velocity, log.reference["vx"], "m/s").nrms_percent
+    assert wanted is not None and wanted > 0.01
+    assert values[0] == pytest.approx(wanted, rel=1e-9)
+    assert values[1] != pytest.approx(wanted, rel=1e-3)
+    path.write_bytes(path.read_bytes() + b"\n")
+    assert spec.beside(tmp_path).build().definition != found.definition  # another log is another measure
+
+
+def test_schedule_of_an_unknown_model_is_swept_by_its_polynomials() -> None:
+    """Without a catalogue model the entries of the plant are what can be varied; the nominal design is the same."""
+    from studies.sweeps.subject import Gains
+    from studies.sweeps.subject_spec import polynomial_plant
+
+    plain = Subject("x", polynomial_plant(SCHEDULE), Gains(SCHEDULE.table, SCHEDULE.breakpoints), SCHEDULE.sample_time)
+    grid = plain.grid(4)
+    A_e = plain.at({"A_1_1": np.array([1.0, 1.2])}, grid).error[0]
+    model = replace(MODEL, constants=MODEL.constants).on(grid.points[:, 0])
+    np.testing.assert_allclose(A_e[0], model.error_dynamics(SCHEDULE.gain(grid.points[:, 0]))[0], rtol=1e-12)
+    np.testing.assert_allclose((A_e[1] - A_e[0])[:, 0, 0], 0.2 * model.A[:, 0, 0], rtol=1e-9, atol=1e-12)
+    assert set(plain.plant.parameters) >= {"A_1_1", "C_1_1", "C_1_2"} and "A_2_2" not in plain.plant.parameters
+
+
+MASS = LpvModel(
+    name="mass-spring",
+    source="Newton",
+    states=(Signal("position", "m"), Signal("velocity", "m/s"), Signal("bias", "m")),
+    outputs=(Signal("measured", "m"), Signal("rate", "m/s")),
+    disturbances=(Signal("force", "N"),),
+    parameters=(
+        SchedulingParameter("stiffness", "N/m", 10.0, 40.0, -50.0, 50.0),
+        SchedulingParameter("drag", "N*s/m", 0.5, 2.0, -1.0, 1.0),
+    ),
+    constants={"mass": Constant(2.0, "kg", "scale"), "offset": Constant(1.0, "kg", "scale")},
+    A=sp.Matrix([[0, 1, 0], [sp.sympify(0), 0, 0], [0, 0, 0]])
+    + sp.Matrix([[0, 0, 0], [-sp.Symbol("stiffness"), -sp.Symbol("drag"), 0], [0, 0, 0]])
+    / (sp.Symbol("mass") - sp.Symbol("offset")),
+    C=sp.Matrix([[1, 0, 1], [0, 1, 0]]),
+    E=sp.Matrix([0, 1 / (sp.Symbol("mass") - sp.Symbol("offset")), 0]),
+)
+GAIN = np.array([[4.0, 0.1], [2.0, 5.0], [3.0, -0.2]])
+
+
+def test_a_models_own_sweep_over_two_scheduling_parameters(tmp_path: Path) -> None:
+    """Three states, two outputs, two parameters: nothing is made for the corner models alone."""
+    from studies.sweeps.engine import run_sweep
+    from studies.sweeps.executors import Serial
+
+    own = model_subject("mass", MASS, GAIN, 0.01)
+    channel = {"disturbances": ["force"], "errors": ["position"]}
+    sweep = Sweep(
+        "own", [own], [measure("stability_margin"), measure("hinf_norm", name="norm", **channel)],
+        [STAGES["sobol"].model_validate({"kind": "sobol", "samples": 16})],
+        {"mass": Vary(range=(1.5, 3.0)), "gain_velocity_rate": Vary(relative=0.3)}, points=4,
+    )  # fmt: skip
+    result = run_sweep(sweep, tmp_path / "out", Serial())
+    worst = result.summary.of("mass", "norm", "worst")
+    assert worst is not None and set(worst.at) == {"mass", "gain_velocity_rate", "stiffness", "drag"}
+    model = replace(MASS, constants={**MASS.constants, "mass": replace(MASS.constants["mass"], value=worst.at["mass"])})
+    gain = GAIN.copy()
+    gain[1, 1] = worst.at["gain_velocity_rate"]
+    single = error_hinf_norm(model, gain, [[worst.at["stiffness"], worst.at["drag"]]], ["force"], ["position"])
+    assert worst.value == pytest.approx(single.norm[0], rel=1e-5)
+
+
+def test_invalid_designs_keep_their_reason_and_touch_no_other() -> None:
+    own = model_subject("mass", MASS, GAIN, 0.01)
+    grid = own.grid(2)
+    given = np.array([2.0, 1.0, 1.8, -1.0, 2.2])  # 1.0 divides by zero, -1.0 has another sign than the nominal mass
+    found = evaluate(own, [measure("stability_margin")], grid, {"mass": given})
+    assert found.outcome.tolist() == [VALID, INVALID, VALID, INVALID, VALID]
+    assert "denominator" in found.reason[1] and "sign" in found.reason[3] and not found.reason[0]
+    alone = evaluate(own, [measure("stability_margin")], grid, {"mass": given[[0, 2, 4]]})
+    np.testing.assert_array_equal(found.worst["stability_margin"][[0, 2, 4]], alone.worst["stability_margin"])
+    assert np.isnan(found.worst["stability_margin"][[1, 3]]).all()
+
+
+def _holes(where: float, batch: Batch) -> np.ndarray:
+    values = np.tile(batch.columns["sigma1"][:, None], (1, len(batch.grid)))
+    values[batch.columns["sigma1"] > where, 0] = np.nan
+    return values
+
+
+def _wrong_shape(batch: Batch) -> np.ndarray:
+    return np.zeros(7)
+
+
+def test_nan_is_an_outcome_and_a_wrong_shape_is_refused(subject: Subject) -> None:
+    holes = Measure("holes", "s/m", "larger", partial(_holes, 0.8))
+    found = evaluate(subject, [holes, measure("stability_margin")], subject.grid(3), DESIGNS)
+    assert found.outcome.tolist() == [VALID, VALID, NOT_A_NUMBER]
+    assert found.reason[2] == "holes is not a number" and np.isnan(found.worst["holes"][2])
+    assert np.isfinite(found.worst["stability_margin"]).all()
+    with pytest.raises(SpecError, match="returned the shape"):
+        evaluate(subject, [Measure("bad", "1", "larger", _wrong_shape)], subject.grid(2), DESIGNS)
+
+
+def test_loss_is_relative_to_the_distance_from_worthlessness() -> None:
+    radius, margin, critical = (
+        measure("sampled_radius"),
+        measure("stability_margin"),
+        measure("critical_drop_probability"),
+    )
+    assert radius.loss(0.96, 0.97) == pytest.approx(0.25)
+    assert margin.loss(-80.0, -60.0) == pytest.approx(0.25) and margin.loss(-60.0, -80.0) == pytest.approx(-1 / 3)
+    assert critical.loss(0.5, 0.4) == pytest.approx(0.2)
+    norm = measure("hinf_norm", disturbances=["a"], errors=["b"])
+    assert norm.loss(2.0, np.inf) == np.inf and norm.loss(np.inf, 2.0) == -np.inf and norm.loss(np.inf, np.inf) == 0.0
+    assert norm.loss(2.0, np.nan) == np.inf
