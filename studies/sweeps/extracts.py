@@ -60,11 +60,12 @@ def tornado(rows: Rows, measure: Measure) -> list[Bar]:
     """One bar a parameter, the longest first; empty without a one-at-a-time stage."""
     nominal: float | None = None
     values, at = [], []
+    alone = next((stage for stage in rows.stages if isinstance(stage, OneAtATime)), None)
     for stage, _, columns in rows.columns([*rows.varied, measure.name]):
         if nominal is None:
             nominal = float(columns[measure.name][0])
             centre = np.array([float(columns[name][0]) for name in rows.varied])
-        if isinstance(stage, OneAtATime):
+        if stage is alone:
             values.append(columns[measure.name])
             at.append(np.stack([columns[name] for name in rows.varied], axis=1))
     if nominal is None or not values:

@@ -8,6 +8,7 @@ from functools import partial
 from estimators.forces import UnknownInputForceObserver, WheelForceFilter
 from estimators.vehicle import CORNERS, VehicleParameters
 from studies.experiments.forces import Driven, force_part
+from studies.experiments.speed import Drive, speed_part
 from studies.study import Part
 
 
@@ -38,6 +39,21 @@ ROWS = (
 )
 """Table II."""
 
+FIG_6 = (Driven("p2-throttle-brake-low", "alternating throttle and brake, friction 0.3 (Fig. 6a)"),)
+FIG_9 = (
+    Drive("p2-step-steer-dry", "step steer, dry"),
+    Drive("p2-turn-throttle-dry", "full throttle in a turn, dry"),
+    Drive("p2-turn-throttle-low", "full throttle in a turn, friction 0.3"),
+)
+FIG_10 = (
+    Drive("p2-launch-wet-dry", "launch, wet to dry, braking"),
+    Drive("p2-acceleration-in-turn-wet-dry", "acceleration in a turn, wet to dry, braking"),
+)
+FIG_12 = (
+    Drive("p2-brake-in-turn-snow", "braking in a turn and accelerating, snow"),
+    Drive("p2-harsh-steering-ice", "harsh steering, snow and ice"),
+)
+
 
 def _unscented(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) -> Mapping[str, WheelForceFilter]:
     """The same filter in its linear form: the model is linear, so both are equal to round-off, and this one is faster."""
@@ -56,5 +72,29 @@ PARTS = (
         "Table II on the truth vehicle",
         partial(force_part, "table-2", ROWS, {"UKF": _unscented, "UIO": _unknown_input}),
         cost=120.0,
+    ),
+    Part(
+        "forces-fig-6",
+        "Fig. 6 on the truth vehicle: forces under alternating throttle and brake",
+        partial(force_part, "fig-6", FIG_6, {"UKF": _unscented, "UIO": _unknown_input}),
+        cost=40.0,
+    ),
+    Part(
+        "speed-fig-9",
+        "Fig. 9 on the truth vehicle: step steer, throttle in a turn",
+        partial(speed_part, "fig-9", FIG_9),
+        cost=60.0,
+    ),
+    Part(
+        "speed-fig-10",
+        "Figs. 10 and 11 on the truth vehicle: wet, then dry",
+        partial(speed_part, "fig-10", FIG_10),
+        cost=45.0,
+    ),
+    Part(
+        "speed-fig-12",
+        "Figs. 12 and 13 on the truth vehicle: snow and ice",
+        partial(speed_part, "fig-12", FIG_12),
+        cost=55.0,
     ),
 )
