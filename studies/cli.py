@@ -79,7 +79,11 @@ def parser() -> argparse.ArgumentParser:
     sweep.add_argument("--junit", type=Path, metavar="FILE", help="the gate as JUnit XML")
     sweep.add_argument("--summary", type=Path, metavar="FILE", help="the gate as Markdown")
 
-    command("list", "shipped specifications, parameter sets, models and schedules", "listing.run_list")
+    command(
+        "list",
+        "what is shipped: specifications, parameter sets, models, schedules, studies, sweeps",
+        "listing.run_list",
+    )
     return top
 
 

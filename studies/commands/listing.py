@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from importlib import resources
 
+from studies.registry import MODULES
 from studies.spec import load_spec, shipped_specs
 from synthesis.models.catalogue import CATALOGUE
 
@@ -21,6 +22,9 @@ def run_list(as_json: bool) -> int:
         "parameter sets": stems("synthesis.models", "parameters", ".toml"),
         "models": sorted(CATALOGUE),
         "schedules": stems("estimators", "schedules", ".json"),
+        "studies": list(MODULES),
+        "sweeps": stems("studies", "sweeps/specs", ".toml"),
+        "manoeuvres": stems("studies", "manoeuvres", ".toml"),
     }
     if as_json:
         print(json.dumps(found, indent=1))
