@@ -56,23 +56,26 @@ def right_divide(rows: FloatArray, lower: FloatArray, triangular: bool = False) 
 
     With `triangular` the first n rows are a lower triangle, whose zeros are passed over.
     """
+    inverse = 1.0 / np.einsum("kkb->kb", lower)
     for k in reversed(range(lower.shape[0])):
         part = rows[k if triangular else 0 :]
+        column = part[:, k]
         if k + 1 < lower.shape[0]:
-            part[:, k] -= np.einsum("rjb,jb->rb", part[:, k + 1 :], lower[k + 1 :, k])
-        part[:, k] *= 1.0 / lower[k, k]
+            column -= np.einsum("rjb,jb->rb", part[:, k + 1 :], lower[k + 1 :, k])
+        column *= inverse[k]
     return rows
 
 
 def left_divide(lower: FloatArray, rows: FloatArray, out: FloatArray | None = None) -> FloatArray:
     """X (n, k, b) with L X = rows, by forward substitution; `out` may hold the memory for it."""
     out = np.empty(rows.shape) if out is None else out
-    out[:] = rows
-    for k in range(lower.shape[0]):
-        if k:
-            out[k] -= np.einsum("jb,jkb->kb", lower[k, :k], out[:k])
-        out[k] /= lower[k, k]
-    return np.asarray(out, dtype=np.float64)
+    inverse = 1.0 / np.einsum("kkb->kb", lower)
+    np.multiply(rows[0], inverse[0], out[0])
+    for k in range(1, lower.shape[0]):
+        row = np.einsum("jb,jkb->kb", lower[k, :k], out[:k])
+        np.subtract(rows[k], row, row)
+        np.multiply(row, inverse[k], out[k])
+    return out
 
 
 def summed_factor(
@@ -105,27 +108,25 @@ def _cholesky(
     matrix: FloatArray, columns: FloatArray | None, least: float, out: FloatArray | None = None
 ) -> tuple[FloatArray, float]:
     """L L' = matrix + columns columns', and the smallest pivot relative to its diagonal entry, -1 where that is not
-    above `least`."""
+    above `least`: L means nothing then."""
     n = matrix.shape[0]
-    lower = np.zeros((n, n, matrix.shape[2] if columns is None else columns.shape[2])) if out is None else out
-    safest = np.inf
-    for k in range(n):
-        column = lower[k:, k]
-        if columns is None:
-            column[:] = matrix[k:, k]
-        else:
-            np.add(np.einsum("rjb,jb->rb", columns[k:], columns[k]), matrix[k:, k], column)
-        if k:
-            diagonal = column[0].copy()
-            column -= np.einsum("rjb,jb->rb", lower[k:, :k], lower[k, :k])
-            np.divide(column[0], diagonal, diagonal)
-            safest = min(safest, float(np.minimum.reduce(diagonal)))
-        elif not np.minimum.reduce(column[0]) > 0:
-            return lower, -1.0
-        if not safest > least:  # NaN stops as well
-            return lower, -1.0
-        column *= 1.0 / np.sqrt(column[0])
-    return lower, safest
+    diagonal = np.einsum("kkb->kb", matrix)
+    if columns is not None:
+        diagonal = diagonal + np.einsum("kjb,kjb->kb", columns, columns)
+    lower = np.zeros((n, n, diagonal.shape[1])) if out is None else out
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        for k in range(n):
+            column = lower[k:, k]
+            if columns is None:
+                column[:] = matrix[k:, k]
+            else:
+                np.add(np.einsum("rjb,jb->rb", columns[k:], columns[k]), matrix[k:, k], column)
+            if k:
+                column -= np.einsum("rjb,jb->rb", lower[k:, :k], lower[k, :k])
+            column *= 1.0 / np.sqrt(column[0])
+        share = np.square(np.einsum("kkb->kb", lower)) / diagonal
+    safest = float(np.minimum.reduce(share, None))  # NaN where a pivot was not positive
+    return lower, safest if safest > least else -1.0
 
 
 def semidefinite_factor(matrix: FloatArray, what: str, definite: bool = False) -> FloatArray:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.filters import ExtendedKalmanFilter, FilterStep, UnscentedKalmanFilter
-from estimators.filters.step import broadcast, diagonal
+from estimators.filters.step import all_bounded, broadcast, diagonal
 from estimators.filters.workspace import Workspace
 from estimators.interpolate import FloatArray
 from estimators.sideslip.dugoff import used_friction
@@ -159,9 +159,11 @@ class FourWheelObserver:
                 result = result._replace(state=each.state, covariance=each.covariance)
             found.append(result)
         joined = found[0] if len(found) == 1 else _joined(found)
-        raise_flag(flags, np.asarray(np.isnan(joined.innovation).any(axis=-1)), Flag.MISSING_MEASUREMENT)
-        raise_flag(flags, self._renewed, Flag.RESET)
-        self._renewed[:] = False
+        if not all_bounded(joined.innovation):
+            raise_flag(flags, np.asarray(np.isnan(joined.innovation).any(axis=-1)), Flag.MISSING_MEASUREMENT)
+        if self._renewed.any():
+            raise_flag(flags, self._renewed, Flag.RESET)
+            self._renewed[:] = False
         forces = joined.state[:, 3:7]
         friction = used_friction(forces, load)
         shaped = _reshaped(joined, shape)

@@ -63,8 +63,9 @@ class FourWheelModel(NamedTuple):
         memory: Workspace | None = None,
     ) -> FourWheelModel:
         """From the steering angle (b) in rad and the loads (b, 4) in N; `memory` None: fresh."""
-        limits = np.moveaxis(loads, -1, 0) * (0.5 * vehicle.friction)
-        knees = np.maximum(limits / _stiffness(vehicle, steering.ndim), LEAST_KNEE)
+        last = loads.ndim - 1
+        knees = loads.transpose(last, *range(last)) * (0.5 * vehicle.friction / _stiffness(vehicle, steering.ndim))
+        np.maximum(knees, LEAST_KNEE, out=knees)
         return cls(
             vehicle, sample_time, np.sin(steering), np.cos(steering), knees, slow, at_rest, memory or Workspace()
         )

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -120,7 +121,7 @@ class OneCar(Arithmetic):
 
     def table(self, groups: Sequence[Signals], shape: tuple[int, ...]) -> npt.NDArray[Any]:
         """An array of the entries, behind axes of length one if `shape` has any."""
-        array = np.array([value for group in groups for value in group])
+        array = np.array(list(chain.from_iterable(groups)))
         return array.reshape(*shape, -1) if shape else array
 
 

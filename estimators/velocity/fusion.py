@@ -216,12 +216,16 @@ class VelocityFusion(Memory):
         if normalised_force is None:
             return kit.stacked((share,) * 4)
 
-        def limited(given: Number) -> tuple[Number, ...]:
-            large = abs(given) > _LARGEST_FRICTION
-            bound = kit.where(large, kit.where(given > 0.0, _LARGEST_FRICTION, -_LARGEST_FRICTION), given)
-            return (kit.where(abs(given) < math.inf, bound, share),)
+        mu = self._four(normalised_force, "normalised_force")
+        (usual,) = kit.each(lambda given: (abs(given) <= _LARGEST_FRICTION,), mu)
+        if not kit.some(kit.no(usual[0] & usual[1] & usual[2] & usual[3])):
+            return mu
 
-        return kit.each(limited, self._four(normalised_force, "normalised_force"))[0]
+        def limited(given: Number) -> tuple[Number, ...]:
+            known = kit.maximum(kit.minimum(given, _LARGEST_FRICTION), -_LARGEST_FRICTION)
+            return (kit.where(abs(given) < math.inf, known, share),)
+
+        return kit.each(limited, mu)[0]
 
     def _forget(self, where: Number) -> None:
         self.screen.forget(where)

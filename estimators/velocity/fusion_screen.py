@@ -100,10 +100,12 @@ class FusionScreen(Memory):
             blind = gone[1] | gone[2]  # a_y without r, or r without a_y, misleads V_y
             lost = zip((gone[0], blind, blind), value, strict=True)
             value = kit.stacked([choose(nothing, 0.0, v) for nothing, v in lost])
-        self.steer, turned = kit.each(self._held, steer, self.steer)
+        (turned,) = kit.each(lambda angle: (abs(angle) <= _LARGEST_STEER,), steer)
         steered = turned[0] & turned[1] & turned[2] & turned[3]
         if some(no(steered)):
             flags = flags | choose(steered, 0, _MISSING_INPUT)
+            (steer,) = kit.each(lambda good, angle, old: (choose(good, angle, old),), turned, steer, self.steer)
+        self.steer = steer
         yaw_step = choose(knew & good[2], value[2] - last, 0.0) / elapsed
         self.swing = self._smooth(self.swing, yaw_step, elapsed)
         self.inertial, self.run = value, run
@@ -157,10 +159,6 @@ class FusionScreen(Memory):
         run = choose(good & self.kit.no(same), 1.0, self.kit.minimum(run + 1.0, _LONGEST_RUN))
         noise = choose(good, quiet, loud) * self.kit.sqrt(2.0 * run - 1.0)
         return choose(good, given, last), run, noise, good, same & (run >= _LONGEST_RUN)
-
-    def _held(self, given: Number, last: Number) -> tuple[Number, ...]:
-        good = abs(given) <= _LARGEST_STEER
-        return self.kit.where(good, given, last), good
 
     def _missing(self, inertial: Signals, good: Signals) -> Number:
         """Flags of inertial signals that are not usable."""

@@ -29,7 +29,7 @@ class SpeedFilterFew(SpeedFilter):
         self._couplings: dict[tuple[int, ...], tuple[FloatArray, npt.NDArray[np.int64]]] = {}
         self._floor = self.prior.copy()
         self._floor[0] = self._floor[:, 0] = 0.0
-        self._sensitivities: dict[Columns, tuple[FloatArray, npt.NDArray[np.int64]]] = {}
+        self._sensitivities: dict[int, tuple[FloatArray, npt.NDArray[np.int64], Columns]] = {}
 
     def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
         super()._take(saved)
@@ -88,11 +88,12 @@ class SpeedFilterFew(SpeedFilter):
 
     def expect(self, columns: Columns, values: Values) -> _Row:
         """h P h' of each channel, as `SpeedFilter.expect`."""
-        known = self._sensitivities.get(columns)
+        known = self._sensitivities.get(id(columns))  # kept below, so no other object gets its number
         if known is None:
             places = [k * self.size + row[j] for j in range(len(columns[0])) for k, row in enumerate(columns)]
-            known = self._sensitivities[columns] = np.zeros((len(columns), self.size)), np.array(places)
-        H, where = known
+            known = np.zeros((len(columns), self.size)), np.array(places), columns
+            self._sensitivities[id(columns)] = known
+        H, where, _ = known
         H.put(where, [value for over in values for value in over])
         self._W = H.dot(self.spread)
         self._S = self._W.dot(H.T).tolist()
@@ -109,25 +110,9 @@ class SpeedFilterFew(SpeedFilter):
                 return
             S, W = [[S[k][j] for j in rows] for k in rows], W[rows]
             noise, innovation = [variance[k] for k in rows], [innovation[k] for k in rows]
-        inverse: list[_Row] = []  # L^-1, row by row
-        gaps: _Row = []  # L^-1 nu
-        for row, own, nu in zip(S, noise, innovation, strict=True):
-            rest, gap = row[len(inverse)] + own, nu
-            new = [0.0] * len(inverse)
-            for above, known in zip(inverse, gaps, strict=True):
-                entry = 0.0  # of L
-                for a, b in zip(above, row, strict=False):
-                    entry += a * b
-                rest -= entry * entry
-                gap -= entry * known
-                for k, a in enumerate(above):
-                    new[k] -= entry * a
-            scale = 1.0 / math.sqrt(rest)
-            inverse.append([a * scale for a in new] + [scale])
-            gaps.append(gap * scale)
-        L = np.array([row + [0.0] * (len(inverse) - len(row)) for row in inverse])
-        U = L.dot(W)
-        change, moved = U.T.dot(U), np.array(gaps).dot(U).tolist()
+        inverse = np.array(_inverse_factor(S, noise))
+        U = inverse.dot(W)
+        change, moved = U.T.dot(U), inverse.dot(innovation).dot(U).tolist()
         if not learning:
             change[self.learned :, self.learned :] = 0.0
             moved[self.learned :] = [0.0] * (self.size - self.learned)
@@ -139,6 +124,30 @@ class SpeedFilterFew(SpeedFilter):
         if where:
             self.mean, self.spread = [first, *self._means[1:]], self._floor.copy()
             self.spread[0, 0] = variance
+
+
+def _inverse_factor(S: list[_Row], noise: Sequence[float]) -> list[_Row]:
+    """L^-1 with L L' = S + diag(noise), for up to four channels: each row from those above."""
+    count, root = len(S), math.sqrt
+    a = 1.0 / root(S[0][0] + noise[0])
+    if count == 1:
+        return [[a]]
+    p = S[1][0] * a
+    b = 1.0 / root(S[1][1] + noise[1] - p * p)
+    ba = -p * a * b
+    if count == 2:
+        return [[a, 0.0], [ba, b]]
+    s, t, own, *_ = S[2]
+    p, q = s * a, s * ba + t * b
+    c = 1.0 / root(own + noise[2] - p * p - q * q)
+    ca, cb = -(p * a + q * ba) * c, -q * b * c
+    if count == 3:
+        return [[a, 0.0, 0.0], [ba, b, 0.0], [ca, cb, c]]
+    s, t, u, own = S[3]
+    p, q, r = s * a, s * ba + t * b, s * ca + t * cb + u * c
+    d = 1.0 / root(own + noise[3] - p * p - q * q - r * r)
+    last = [-(p * a + q * ba + r * ca) * d, -(q * b + r * cb) * d, -r * c * d, d]
+    return [[a, 0.0, 0.0, 0.0], [ba, b, 0.0, 0.0], [ca, cb, c, 0.0], last]
 
 
 def speed_filter(

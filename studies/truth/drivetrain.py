@@ -90,9 +90,9 @@ class Drivetrains:
         wheel gets its share of the greatest power at most.
         """
         power = self.power * self.share / np.maximum(np.absolute(wheel_speed), 1.0)
-        driven = np.clip(drive, -self.maximum, self.maximum) * self.share
-        driven = np.clip(driven, -power, power)
-        braked = np.clip(brake, 0.0, self.maximum_brake) * self.brake_share
+        power = np.minimum(power, self.maximum * self.share)
+        driven = np.minimum(np.maximum(drive * self.share, -power), power)
+        braked = np.minimum(np.maximum(brake, 0.0), self.maximum_brake) * self.brake_share
         return driven * self.traction.step(slip, speed, h), braked * self.anti_lock.step(slip, speed, h)
 
     def restart(self) -> None:

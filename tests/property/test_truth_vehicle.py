@@ -115,9 +115,9 @@ def test_left_and_right_are_alike(draw: list[float], tire: str) -> None:
 
 
 def test_a_run_is_the_same_alone_and_in_any_batch() -> None:
-    wet = Zone(0.4, from_place=2.0, to_place=6.0)
+    wet = Zone(0.4, from_place=1.0, to_place=2.5)
     courses = [
-        course(tire=tire, speed=v, duration=0.4, zones=zones, steer=lambda t, v=v: 0.01 * v * t, name=f"{tire} {v:g}")
+        course(tire=tire, speed=v, duration=0.2, zones=zones, steer=lambda t, v=v: 0.01 * v * t, name=f"{tire} {v:g}")
         for tire in TIRES
         for v, zones in ((4.0, ()), (11.0, (wet,)), (20.0, ()))
     ]

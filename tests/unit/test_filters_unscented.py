@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimators.filters import SigmaWeights, UnscentedKalmanFilter
+from estimators.errors import EstimatorError
+from estimators.filters import KalmanFilter, SigmaWeights, UnscentedKalmanFilter
 from estimators.filters.triangular import FEW, left_divide, lower_factor, right_divide, summed_factor
 
 
@@ -105,6 +106,54 @@ def test_negative_centre_weight_never_breaks_positive_definiteness(count: int) -
         assert (np.linalg.eigvalsh(P / scale[:, None] / scale[..., None])[:, 0] > 0).all()
         unscented.correct(np.zeros((count, 2)), lambda x: x[..., :2] ** 2, 1e-9 * np.eye(2))
         assert (np.linalg.eigvalsh(unscented.covariance)[:, 0] > -1e-18).all()
+
+
+@pytest.mark.parametrize("count", [3, FEW + 2])
+@pytest.mark.parametrize(("n", "k"), [(3, 0), (3, 1), (8, 3), (14, 5), (8, 8)])
+def test_affine_states_need_one_point_a_column(n: int, k: int, count: int) -> None:
+    """Functions that are affine from state k on, with slopes that depend on the states before: the same to round-off."""
+    draw = np.random.default_rng(n + k)
+    root, mix = 0.2 * draw.normal(size=(count, n, n)), draw.normal(size=(n, n))
+    P, x = root @ root.swapaxes(1, 2) + 0.05 * np.eye(n), draw.normal(size=(count, n))
+
+    def bent(x: np.ndarray) -> np.ndarray:
+        slope = np.cos(x[..., :k]).sum(axis=-1, keepdims=True)
+        return 0.3 * x @ mix + np.concatenate((np.sin(x[..., :k]), 0.1 * slope * x[..., k:] + 1.0), axis=-1)
+
+    full, short = UnscentedKalmanFilter(x, P), UnscentedKalmanFilter(x, P)
+    for _ in range(3):
+        y = draw.normal(size=(count, 2))
+        y[0, 1] = np.nan
+        full.predict(bent, 0.1 * np.eye(n))
+        short.predict(bent, 0.1 * np.eye(n), affine_from=k)
+        a = full.correct(y, lambda x: bent(x)[..., -2:], 0.2 * np.eye(2), 0.999)
+        b = short.correct(y, lambda x: bent(x)[..., -2:], 0.2 * np.eye(2), 0.999, affine_from=k)
+        for name in a._fields:
+            np.testing.assert_allclose(getattr(b, name), getattr(a, name), rtol=1e-8, atol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize("count", [3, FEW + 2])
+@pytest.mark.parametrize("affine", [None, 0])
+def test_functions_may_return_what_they_are_given(count: int, affine: int | None) -> None:
+    """The points themselves, or some of their columns, as views: nothing is overwritten while it is read."""
+    draw = np.random.default_rng(6)
+    P, x = np.eye(4) + 0.3, draw.normal(size=(count, 4))
+    unscented, kalman = UnscentedKalmanFilter(x, P), KalmanFilter(x, P)
+    for _ in range(3):
+        y = draw.normal(size=(count, 2))
+        unscented.predict(lambda x: x, 0.1 * np.eye(4), affine)
+        kalman.predict(np.eye(4), 0.1 * np.eye(4))
+        a = unscented.correct(y, lambda x: x[..., 1:3], np.eye(2), affine_from=affine)
+        b = kalman.correct(y, np.eye(4)[1:3], np.eye(2))
+        for name in a._fields:
+            np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=1e-9, atol=1e-12, err_msg=name)
+
+
+def test_a_state_that_is_not_there_is_refused() -> None:
+    unscented = UnscentedKalmanFilter(np.zeros((2, 3)), np.eye(3))
+    for bad in (-1, 4):
+        with pytest.raises(EstimatorError, match=f"affine_from = {bad} must be the index of a state, 0 to 2, or None"):
+            unscented.predict(lambda x: x, np.eye(3), bad)
 
 
 def test_factors() -> None:

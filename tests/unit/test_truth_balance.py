@@ -16,11 +16,11 @@ STEP = 0.001
 @pytest.fixture(scope="module", params=TIRES)
 def drive(request: pytest.FixtureRequest) -> Truth:
     """Steering, torque, then brakes, over an icy patch on the left, uphill and on a bank."""
-    patch = Zone(0.25, (True, False, True, False), from_place=13.0, to_place=26.0)
+    patch = Zone(0.25, (True, False, True, False), from_place=12.0, to_place=24.0)
     one = course(
         tire=request.param,
         speed=14.0,
-        duration=2.0,
+        duration=1.6,
         zones=(patch,),
         steer=lambda t: 0.05 * np.sin(4.0 * t),
         drive_torque=lambda t: np.where(t < 0.8, 3500.0 * np.minimum(t / 0.2, 1.0), 0.0),

@@ -17,8 +17,8 @@ from studies.truth.simulate import STEP
 from tests.unit.truth_cases import TIRES, course, plant_of, ramp, run, suv
 
 Array = npt.NDArray[np.float64]
-AT = 0.05 * np.arange(1, 12)
-PATCH = Zone(0.3, (True, False, True, False), from_place=4.0, to_place=9.0)
+AT = 0.05 * np.arange(1, 10)
+PATCH = Zone(0.3, (True, False, True, False), from_place=3.0, to_place=7.0)
 CASES = {
     "turn and drive": {"speed": 15.0, "steer": ramp(0.1, 0.3, 0.06), "drive_torque": ramp(0.1, 0.4, 3000.0)},
     "brake on split": {"speed": 20.0, "brake_torque": ramp(0.05, 0.3, 1700.0), "zones": (PATCH,)},
@@ -29,7 +29,7 @@ BOUNDS = {"vx": 2e-4, "vy": 1e-4, "yaw_rate": 5e-5, "roll": 1e-5, "pitch": 1e-5,
 
 
 def case(tire: str, name: str) -> Course:
-    return course(tire=tire, duration=0.6, **CASES[name])  # type: ignore[arg-type]
+    return course(tire=tire, duration=0.5, **CASES[name])  # type: ignore[arg-type]
 
 
 @cache
@@ -61,7 +61,7 @@ def errors(tire: str, name: str, step: float) -> dict[str, float]:
 def test_default_step_is_fine_enough(tire: str, name: str) -> None:
     found = errors(tire, name, STEP)
     assert all(found[q] < bound for q, bound in BOUNDS.items()), found
-    assert np.ptp(reference(tire, name)[B["vx"]]) > 0.4  # something happened
+    assert np.ptp(reference(tire, name)[B["vx"]]) > 0.25  # something happened
 
 
 @pytest.mark.parametrize("tire", TIRES)

@@ -113,7 +113,7 @@ def followed(pieces: list[dict[str, object]], speed: float, duration: float) -> 
     zero = np.zeros(n)
     path = curvature([PathPiece.model_validate(p) for p in pieces])
     one = Course("path", duration, speed, "lugre", *[zero] * 7, friction=1.0, speed=np.full(n, speed), curvature=path)
-    return simulate([one], [load_vehicle("corner-estimation")], record_time=0.01)
+    return simulate([one], [load_vehicle("corner-estimation")], step=0.002, record_time=0.01)
 
 
 def test_the_driver_holds_path_and_speed() -> None:

@@ -13,7 +13,7 @@ GRADE, BANK = float(np.arctan(0.15)), float(np.arctan(0.05))
 FREE = {"rolling_resistance": 0.0, "drag_area": 0.0}
 CASES = {
     "standing": ({}, {}),
-    "parked": ({"brake_torque": lambda t: 6000.0 + 0.0 * t, "grade": ramp(0.0, 0.7, GRADE), "bank": ramp(0.0, 0.7, BANK)}, {}),
+    "parked": ({"brake_torque": lambda t: 6000.0 + 0.0 * t, "grade": ramp(0.0, 0.5, GRADE), "bank": ramp(0.0, 0.5, BANK)}, {}),
     "released": ({"grade": ramp(0.0, 0.01, 0.1)}, FREE),
     "stop": ({"speed": 8.0, "brake_torque": ramp(0.1, 0.3, 5000.0)}, {}),
     "back": ({"speed": -5.0, "steer": ramp(0.1, 0.4, 0.05), "drive_torque": ramp(0.7, 0.9, -800.0)}, {}),
@@ -23,7 +23,7 @@ CASES = {
 
 @pytest.fixture(scope="module", params=TIRES)
 def drives(request: pytest.FixtureRequest) -> Truth:
-    courses = [course(tire=request.param, duration=4.0, name=name, **keys) for name, (keys, _) in CASES.items()]  # type: ignore[arg-type]
+    courses = [course(tire=request.param, duration=3.0, name=name, **keys) for name, (keys, _) in CASES.items()]  # type: ignore[arg-type]
     cars = [suv(**changes) for _, changes in CASES.values()]
     return simulate(courses, cars, record_time=0.01)
 
@@ -43,7 +43,7 @@ def test_a_standing_car_stands(drives: Truth) -> None:
 def test_brakes_hold_a_car_on_a_slope(drives: Truth) -> None:
     """On 15 % uphill and 5 % bank, once the body has settled: no creeping, and the tires carry m g sin(grade)."""
     truth = drives.only("parked")
-    late = truth.time > 3.5
+    late = truth.time > 2.5
     weight = suv().parameters.mass * GRAVITY
     along, across = (truth[name][0, late].sum(axis=1).mean() for name in ("force_x", "force_y"))
     assert along == pytest.approx(weight * np.sin(GRADE), rel=3e-3)
@@ -63,16 +63,16 @@ def test_without_brakes_it_rolls_back(drives: Truth) -> None:
     truth, own = drives.only("released"), suv().parameters
     rolling_mass = own.mass + 4.0 * own.wheel_inertia / own.radius[0] ** 2
     expected = -own.mass * GRAVITY * np.sin(0.1) / rolling_mass
-    assert np.polyfit(truth.time[100:], truth["vx"][0, 100:], 1)[0] == pytest.approx(expected, rel=2e-3)
+    assert np.polyfit(truth.time[50:], truth["vx"][0, 50:], 1)[0] == pytest.approx(expected, rel=2e-3)
     assert (truth["wheel_speed"][0, -1] < -5.0).all()
-    assert truth["distance"][0, -1] < -3.0
+    assert truth["distance"][0, -1] < -2.0
 
 
 def test_braking_to_a_stop_stays_there(drives: Truth) -> None:
     truth = drives.only("stop")
     stopped = truth.time > 2.0
     assert np.abs(truth["vx"][0, stopped]).max() < 0.1
-    assert np.abs(truth["vx"][0, -50:]).max() < 1e-2
+    assert np.abs(truth["vx"][0, -50:]).max() < 3e-2
     assert (truth["wheel_speed"][0, stopped] == 0.0).all()
     assert np.abs(truth["torque"][0, stopped]).max() < 2000.0  # what it takes to hold, not what the brake could do
     assert truth["vx"][0].min() > -0.5  # springs give back a nod, no more
@@ -89,5 +89,5 @@ def test_backwards_is_forwards_turned_round(drives: Truth) -> None:
 
 def test_from_forwards_through_rest_to_backwards(drives: Truth) -> None:
     vx = drives.only("turn round")["vx"][0]
-    assert vx[0] > 1.9 and vx[-1] < -3.0
+    assert vx[0] > 1.9 and vx[-1] < -2.0
     assert np.abs(np.diff(vx)).max() < 0.05  # no jump anywhere on the way

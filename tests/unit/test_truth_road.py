@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from studies.truth.course import PATH_GRID
+from studies.truth.course import PATH_GRID, Courses
+from studies.truth.driver import Driver
+from studies.truth.fleet import Fleet, tires_of
+from studies.truth.layout import B, rolling
 from studies.truth.path import PathPiece, curvature
+from studies.truth.plant import Plant, Turned
 from studies.truth.profile import GRID, Piece, sampled, to_si
 from studies.truth.road import Roads, Zone
-from tests.unit.truth_cases import course, ramp, run
+from tests.unit.truth_cases import course, ramp, run, suv
 
 
 def piece(**keys: object) -> Piece:
@@ -111,3 +115,15 @@ def test_friction_limits_the_force_and_nothing_else_does() -> None:
         )
         use = -truth["force_x"][0].sum(axis=1) / truth["force_z"][0].sum(axis=1)
         assert use.max() == pytest.approx(friction, rel=0.15)
+
+
+def test_a_step_takes_the_road_at_its_middle() -> None:
+    """Second order in place as well: half of the edge is passed when the middle of the step is on it."""
+    edge = Zone(0.2, from_place=5.0, blend=0.2)
+    fleet = Fleet([suv()])
+    driver = Driver(Courses([course(speed=10.0, duration=1.0, zones=(edge,))]), fleet)
+    state = rolling([10.0], fleet.radius)
+    state[B["distance"]] = 5.0 - fleet.x[0] - 0.05
+    still = Turned(np.zeros((4, 1)), np.ones((4, 1)))
+    moving = Plant(fleet, tires_of("lugre", [suv()])).slide(state, still)
+    assert driver.act(state, moving, 0.4, 0.01).friction[:, 0] == pytest.approx([0.6, 0.6, 1.0, 1.0])
