@@ -17,19 +17,6 @@ from estimators.velocity.longitudinal_fusion import BIAS, GRADE
 from estimators.velocity.slip import LEAST_SPEED
 
 _HIGH_SLIP, _GATED, _STOPPED = int(Flag.HIGH_SLIP), int(Flag.GATED), int(Flag.WHEEL_STOPPED)
-_PLACES = (
-    (0, 1, 2, 3, 4, 14, 4),
-    tuple(
-        slice(*ends)
-        for ends in (
-            *((5, 8), (8, 10), (10, 14), (14, 18), (18, 22), (22, 26), (26, 28)),  # real numbers
-            *((0, 4), (4, 8), (8, 12), (12, 14)),  # decisions
-            (0, 4),  # flags
-        )
-    ),
-)
-"""Where the fields of `FusionStep` are in the three tables, numbers and groups."""
-_BATCH_PLACES = tuple(tuple((Ellipsis, place) for place in places) for places in _PLACES)
 _STANDING, _NOT_EXCITED = int(Flag.STANDING), int(Flag.NOT_EXCITED)
 
 
@@ -89,8 +76,24 @@ def reported(
     real = kit.table((speeds, errors, radius, slip, angle, innovation, axle.innovation), shape)
     true = kit.table((wheel.used, wheel.gated, slipping, axle.used, (standing,)), shape)
     sums = kit.table((wheel_flags, (flags,)), shape).astype(np.int32)
-    single, several = _PLACES if not shape else _BATCH_PLACES
-    speeds, signals = [real[k] for k in single[:5]], [real[part] for part in several[:7]]
-    used, gated, high, axle_used = (true[part] for part in several[7:11])
-    wheels = used, gated, high, signals.pop(), axle_used
-    return FusionStep(*speeds, *signals, *wheels, true[single[5]], sums[single[6]], sums[several[11]])
+    return FusionStep(
+        vx=real[..., 0],
+        vy=real[..., 1],
+        vx_deviation=real[..., 2],
+        vy_deviation=real[..., 3],
+        yaw_rate=real[..., 4],
+        sensor_bias=real[..., 5:8],
+        gravity=real[..., 8:10],
+        radius=real[..., 10:14],
+        slip=real[..., 14:18],
+        slip_angle=real[..., 18:22],
+        innovation=real[..., 22:26],
+        used=true[..., :4],
+        gated=true[..., 4:8],
+        high_slip=true[..., 8:12],
+        axle_innovation=real[..., 26:],
+        axle_used=true[..., 12:14],
+        standing=true[..., 14],
+        flags=sums[..., 4],
+        wheel_flags=sums[..., :4],
+    )
