@@ -72,7 +72,7 @@ def parser() -> argparse.ArgumentParser:
     sweep.add_argument("--quick", action="store_true", help="the quick form of the specification")
     sweep.add_argument("--resume", action="store_true", help="go on with an interrupted sweep in DIR")
     sweep.add_argument(
-        "--out", type=Path, metavar="DIR", help="where chunks, summary and pictures go (default: out/sweep)"
+        "--out", type=Path, metavar="DIR", help="chunks, summary and pictures (default: out/sweep/NAME[-quick])"
     )
     sweep.add_argument("--baseline", type=Path, metavar="FILE", help="fail when a figure shrank beyond its tolerance")
     sweep.add_argument("--update-baseline", action="store_true", help="write the baseline instead of comparing")

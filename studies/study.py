@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.claim import Claim
@@ -16,10 +17,14 @@ Cell = str | int | float | bool | None
 
 @dataclass(frozen=True)
 class Scope:
-    """How much is computed: ``seeds`` Monte Carlo runs, coarse grids when ``quick``."""
+    """How much is computed: ``seeds`` Monte Carlo runs, coarse grids when ``quick``.
+
+    ``prepared``: the folder with what the preparations of a run left; None outside of a run.
+    """
 
     quick: bool = False
     seeds: int = 200
+    prepared: Path | None = field(default=None, compare=False, repr=False)  # where it lies changes no result
 
 
 QUICK = Scope(quick=True, seeds=12)
@@ -63,13 +68,30 @@ PartFunction = Callable[[Scope], PartResult]
 
 
 @dataclass(frozen=True)
+class Preparation:
+    """What several parts read, computed once before them: ``run`` fills the folder ``scope.prepared / name`` that it is given.
+
+    Parts of all studies share a preparation by its name, which belongs to it alone.
+    """
+
+    name: str
+    run: Callable[[Scope, Path], None]
+    cost: float = 1.0
+
+
+@dataclass(frozen=True)
 class Part:
-    """A named piece of a study; ``cost`` in rough seconds of one core lets the runner start the longest first."""
+    """A named piece of a study; ``cost`` in rough seconds of one core lets the runner start the longest first.
+
+    ``quick`` is False for a part that a quick run leaves out, because another one shows the same on fewer drives.
+    """
 
     name: str
     title: str
     run: PartFunction
     cost: float = 1.0
+    needs: tuple[Preparation, ...] = ()
+    quick: bool = True
 
 
 @dataclass(frozen=True)
@@ -81,3 +103,7 @@ class Study:
     paper: str
     summary: str
     parts: tuple[Part, ...]
+
+    def chosen(self, scope: Scope) -> tuple[Part, ...]:
+        """The parts that a run with ``scope`` computes."""
+        return tuple(part for part in self.parts if part.quick or not scope.quick)

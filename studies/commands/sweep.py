@@ -43,12 +43,12 @@ def run_sweep(
     """Run a sweep, hold it against a baseline; 0 good, 1 something shrank, 2 bad input or a measure that is not a number."""
     if update_baseline and baseline is None:
         raise SpecError("--update-baseline: say which file with --baseline FILE")
+    executor = _executor(workers, scheduler)
     sweep = load_sweep(spec, quick)
     before = read_baseline(baseline) if baseline is not None and not update_baseline else None
     if before is not None:
         comparable(sweep, before)
     folder = out or Path("out") / "sweep" / (sweep.name if sweep.form == "full" else f"{sweep.name}-{sweep.form}")
-    executor = _executor(workers, scheduler)
     with progress_bar(threaded=False) as bar:  # its thread must not be there when workers are forked
         task = bar.add_task(f"sweeping {sweep.name}", total=None)
 
@@ -89,7 +89,9 @@ def _executor(workers: int | None, scheduler: str | None) -> Executor:
     if scheduler is not None:
         if workers is not None:
             raise SpecError("--workers and --scheduler exclude each other: a cluster has the workers that it has")
-        return Cluster(scheduler)
+        cluster = Cluster(scheduler)
+        cluster.require()  # before anything is read or written
+        return cluster
     if workers is not None and workers < 1:
         raise SpecError(f"--workers {workers}: give at least 1")
     return default_executor(workers)

@@ -7,9 +7,9 @@ from matplotlib.figure import Figure
 
 from studies.experiments.axle_forces import FORCES, RIGHT, AxleRun
 from studies.experiments.panels import estimate_line, finished, true_line
+from studies.report.colours import SETTINGS
 from studies.study import Drawing
 
-COLOURS = ("#c2571a", "#1f6f8b", "#3a9e6f")
 _LABELS = {"F_y1": "$F_{y1}$ [kN]", "F_y2": "$F_{y2}$ [kN]", "F_x1": "$F_{x1}$ [kN]", "yaw_rate": "yaw rate [deg/s]"}
 _BANDS = "Lines: first sensor draw; bands: 95 % of all draws."
 
@@ -21,7 +21,7 @@ def force_history(name: str, title: str, run: AxleRun) -> Drawing:
     for k, axes in enumerate(figure.subplots(4, 1, sharex=True)):
         scale = float(np.degrees(1.0)) if FORCES[k] == "yaw_rate" else 1e-3
         true_line(axes, time, scale * run.true_forces[:, k])
-        estimate_line(axes, time, scale * run.forces[RIGHT[0]][:, :, k], "sliding mode", color=COLOURS[1])
+        estimate_line(axes, time, scale * run.forces[RIGHT[0]][:, :, k], "sliding mode", color=SETTINGS[1])
         finished(axes, _LABELS[FORCES[k]], last=k == 3)
     figure.axes[0].legend(ncols=2, fontsize="small", frameon=False, loc="upper left")
     return Drawing(
@@ -43,14 +43,14 @@ def stiffness_history(name: str, title: str, run: AxleRun) -> Drawing:
     shown = np.where(run.counted, np.degrees(run.true_sideslip), np.nan)
     for axes, found, what in ((panels[0, 0], run.fixed, "fixed (ORL)"), (panels[0, 1], run.adaptive, "adapted (EKF)")):
         true_line(axes, time, shown)
-        for setting, colour in zip(settings, COLOURS, strict=False):
+        for setting, colour in zip(settings, SETTINGS, strict=False):
             estimate_line(axes, time, np.degrees(found[setting]), f"× {setting[1]:g}", color=colour)
         axes.set_ylim(-limit, limit)
         axes.set_title(f"rear sideslip, stiffness {what}", loc="left", fontsize="medium")
     panels[0, 0].legend(ncols=4, fontsize="small", frameon=False, loc="upper left")
     for k, axle in enumerate(("front", "rear")):
         axes = panels[1, k]
-        for setting, colour in zip(settings, COLOURS, strict=False):
+        for setting, colour in zip(settings, SETTINGS, strict=False):
             estimate_line(axes, time, 1e-3 * run.stiffness[setting][:, :, k], f"× {setting[1]:g}", color=colour)
         axes.set_title(f"{axle} axle", loc="left", fontsize="medium")
         axes.set_ylim(bottom=0.0)
@@ -75,7 +75,7 @@ def mass_history(name: str, title: str, run: AxleRun) -> Drawing:
     time = run.drawn.truth.time
     true_line(force, time, 1e-3 * run.true_forces[:, 0])
     true_line(slip, time, np.where(run.counted, np.degrees(run.true_sideslip), np.nan))
-    for mass, colour in zip(sorted(run.forces), COLOURS, strict=False):
+    for mass, colour in zip(sorted(run.forces), SETTINGS, strict=False):
         label = f"m {mass:+g} kg" if mass else "m"
         estimate_line(force, time, 1e-3 * run.forces[mass][:, :, 0], label, color=colour)
         estimate_line(slip, time, np.degrees(run.adaptive[mass, 1.0]), label, color=colour)

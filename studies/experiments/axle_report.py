@@ -12,15 +12,14 @@ import numpy.typing as npt
 from studies.experiments.accuracy import Spread, sample_spreads
 from studies.experiments.axle_figures import force_history, mass_history, stiffness_history
 from studies.experiments.axle_forces import FORCES, RIGHT, AxleRun, Setting, run_axles
+from studies.experiments.driven import LUGRE, driven
 from studies.experiments.first_block import LEAST_SPEED, SAMPLE_TIME, START
-from studies.experiments.play import driven
 from studies.experiments.sensors import TEST_CAR
 from studies.experiments.tire_curve import USE
 from studies.study import Cell, PartResult, Scope, Table
 from studies.truth import draw
 
 Array = npt.NDArray[np.float64]
-QUICK_SECONDS = 16.0
 BETA = "beta_2"
 
 
@@ -36,9 +35,9 @@ class AxleTest:
     masses: tuple[float, ...] = ()
 
 
-def axle_part(name: str, test: AxleTest, scope: Scope, tire: str | None = None) -> PartResult:
+def axle_part(name: str, test: AxleTest, scope: Scope, tire: str = LUGRE) -> PartResult:
     """Drive, observe with every setting, judge."""
-    truth = driven((test.manoeuvre,), tire, QUICK_SECONDS if scope.quick else None)
+    truth = driven((test.manoeuvre,), tire, scope)
     settings: list[Setting] = [(0.0, factor) for factor in test.factors]
     settings += [(mass, 1.0) for mass in test.masses if mass != 0.0]
     run = run_axles(draw(truth, TEST_CAR, range(scope.seeds), SAMPLE_TIME), settings)

@@ -11,8 +11,10 @@ from matplotlib.figure import Figure
 
 from estimators.vehicle import CORNERS
 from studies.experiments.accuracy import Spread, nrms, spread
-from studies.experiments.play import Parts, Reading, driven, measured, play, run_of
+from studies.experiments.driven import LUGRE, driven
+from studies.experiments.play import QUICK_SECONDS, Parts, Reading, measured, play, run_of
 from studies.experiments.sensors import TEST_CAR
+from studies.report import colours
 from studies.study import Cell, Drawing, PartResult, Scope, Table
 from studies.truth import Truth
 
@@ -39,10 +41,10 @@ class Driven:
 
 
 def force_part(
-    name: str, rows: Sequence[Driven], methods: Mapping[str, Parts], scope: Scope, tire: str | None = None
+    name: str, rows: Sequence[Driven], methods: Mapping[str, Parts], scope: Scope, tire: str = LUGRE
 ) -> PartResult:
     """Play every manoeuvre with each of the paper's wheel force observers in the pipeline; F_y and F_z from the first one."""
-    truth = driven(tuple(row.manoeuvre for row in rows), tire)
+    truth = driven(tuple(row.manoeuvre for row in rows), tire, scope, QUICK_SECONDS)
     drawn = measured(truth, range(scope.seeds), TEST_CAR)
     played = {method: play(drawn, READINGS, parts) for method, parts in methods.items()}
     first = next(iter(played.values()))
@@ -104,8 +106,7 @@ def _history(name: str, truth: Truth, row: Driven, estimates: Mapping[str, Array
     panels = figure.subplots(3, 1, sharex=True)
     shown = (("F_x", "force_x", CORNERS), ("F_y", "axle_force_y", AXLES), ("F_z", "force_z", CORNERS))
     for axes, (signal, key, places) in zip(panels, shown, strict=True):
-        for k, where in enumerate(places):
-            colour = ("#1f6f8b", "#c2571a", "#3a9e6f", "#7a3b8f")[k]
+        for k, (where, colour) in enumerate(zip(places, colours.CORNERS, strict=False)):
             axes.plot(time, 1e-3 * _true(truth, signal, place, k)[samples], color=colour, linewidth=2.2, alpha=0.35)
             axes.plot(time, 1e-3 * estimates[key][0, place, samples, k], color=colour, linewidth=0.8, label=where)
         axes.set_ylabel(f"${signal[0]}_{signal[2]}$ [kN]")

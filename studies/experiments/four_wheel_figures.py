@@ -13,17 +13,18 @@ from estimators.vehicle import CORNERS
 from studies.experiments.accuracy import Spread
 from studies.experiments.four_wheel import EKF, PIPELINE, SHARE, STEADY, UKF, FourWheelRun
 from studies.experiments.panels import estimate_line, finished, true_line
+from studies.report import colours
 from studies.study import Drawing
 
 if TYPE_CHECKING:
     from studies.experiments.four_wheel_report import PrintedRow
 
 STYLE: dict[str, dict[str, Any]] = {
-    EKF: {"color": "#c2571a", "linewidth": 1.9},
-    UKF: {"color": "#1f6f8b", "linestyle": (0, (4, 2))},
-    PIPELINE: {"color": "#3a9e6f"},
-    SHARE: {"color": "#8a8a8a"},
-    STEADY: {"color": "#8a8a8a"},
+    EKF: {"color": colours.EXTENDED, "linewidth": 1.9},
+    UKF: {"color": colours.UNSCENTED, "linestyle": (0, (4, 2))},
+    PIPELINE: {"color": colours.PIPELINE},
+    SHARE: {"color": colours.STEADY},
+    STEADY: {"color": colours.STEADY},
 }
 MARKERS = {EKF: "s", UKF: "o", PIPELINE: "D", SHARE: "^", STEADY: "^"}
 _TITLES = {SHARE: "m a_y by load", STEADY: "steady linear car"}
@@ -121,7 +122,7 @@ def used_friction_history(name: str, run: FourWheelRun) -> Drawing:
         estimate_line(axes, time, used_friction(run.forces[UKF][:, :, k], run.loads[:, :, k]), UKF, **STYLE[UKF])
         for side in (-1, 1):
             limit = side * float(np.mean(run.tire.peak))
-            axes.axhline(limit, color="#c23b3b", linewidth=0.8, linestyle=":", label="limit" if side > 0 else None)
+            axes.axhline(limit, color=colours.LIMIT, linewidth=0.8, linestyle=":", label="limit" if side > 0 else None)
         axes.set_title(CORNERS[k], loc="left", fontsize="medium")
         finished(axes, "$F_y/F_z$" if k % 2 == 0 else "", last=k > 1)
     figure.axes[0].legend(fontsize="small", frameon=False, ncols=3)

@@ -9,17 +9,17 @@ import numpy as np
 import numpy.typing as npt
 
 from studies.experiments.accuracy import Spread, known_spread, sample_errors, sample_spreads
+from studies.experiments.driven import LUGRE, driven
 from studies.experiments.first_block import LEAST_SPEED, SAMPLE_TIME, START
 from studies.experiments.four_wheel import AT_REST, EKF, UKF, FourWheelRun, run_four_wheel
 from studies.experiments.four_wheel_figures import error_dots, force_history, sideslip_history, used_friction_history
-from studies.experiments.play import driven
 from studies.experiments.sensors import TEST_CAR
 from studies.experiments.tire_curve import USE
 from studies.study import Cell, PartResult, Scope, Table
 from studies.truth import draw
 
 Array = npt.NDArray[np.float64]
-QUICK_SECONDS = 11.0
+QUICK_SECONDS = 6.5
 
 
 class PrintedRow(Protocol):
@@ -38,10 +38,10 @@ class PrintedRow(Protocol):
 
 
 def four_wheel_part(
-    name: str, manoeuvre: str, printed: Sequence[PrintedRow], scope: Scope, tire: str | None = None
+    name: str, manoeuvre: str, printed: Sequence[PrintedRow], scope: Scope, tire: str = LUGRE
 ) -> PartResult:
     """Drive, observe with both filters, judge; ``printed`` are four force rows in the order of the corners, then sideslip."""
-    truth = driven((manoeuvre,), tire, QUICK_SECONDS if scope.quick else None)
+    truth = driven((manoeuvre,), tire, scope, QUICK_SECONDS)
     run = run_four_wheel(draw(truth, TEST_CAR, range(scope.seeds), SAMPLE_TIME))
     found = [quantity_errors(run, k) for k in range(len(printed))]
     rows: list[list[Cell]] = []

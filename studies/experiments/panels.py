@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from studies.report.colours import TRUTH
+
 Array = npt.NDArray[np.float64]
 BAND = (2.5, 97.5)
 """Percentiles over the sensor draws."""
 
 
 def true_line(axes: Any, time: Array, truth: Array) -> None:
-    """The truth (n,), wide and black, below the estimates."""
-    axes.plot(time, truth, color="black", linewidth=2.0, alpha=0.8, label="truth", zorder=1)
+    """The truth (n,), wide, below the estimates."""
+    axes.plot(time, truth, color=TRUTH, linewidth=2.0, alpha=0.8, label="truth", zorder=1)
 
 
 def estimate_line(axes: Any, time: Array, estimate: Array, label: str, **style: Any) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,12 @@ from estimators.forces import AttitudeObserver
 from estimators.pipeline import EstimationPipeline
 from estimators.pipeline.result import PipelineStep
 from estimators.vehicle import VehicleParameters
-from studies.truth import Measured, Sensors, Truth, draw, drive, load_manoeuvre
+from studies.truth import Measured, Sensors, Truth, draw
 from synthesis.errors import SpecError
 
 Array = npt.NDArray[np.float64]
+QUICK_SECONDS = 4.0
+"""So much of each manoeuvre the pipeline plays when quick."""
 Parts = Callable[[VehicleParameters, float, tuple[int, ...]], Mapping[str, Any]]
 """(vehicle, sample time, batch shape) -> parts that replace those of the pipeline, by its argument names."""
 Reading = Callable[[PipelineStep], Array]
@@ -28,18 +29,6 @@ FORCES: dict[str, Reading] = {
     "force_z": lambda step: step.force_z,
     "axle_force_y": lambda step: step.axle_force_y,
 }
-
-
-@cache
-def driven(names: tuple[str, ...], tire: str | None = None, seconds: float | None = None) -> Truth:
-    """The truth of shipped manoeuvres (``tire``: another one than their files name), integrated together, once a process.
-
-    ``seconds``: only so much of each, from its start.
-    """
-    loaded = [load_manoeuvre(name) for name in names]
-    if seconds is not None:
-        loaded = [m.model_copy(update={"duration": min(m.duration, seconds)}) for m in loaded]
-    return drive([m if tire is None else m.with_tire(tire) for m in loaded])
 
 
 def measured(truth: Truth, seeds: Sequence[int], sensors: Sensors) -> Measured:

@@ -14,8 +14,9 @@ from estimators.schedule import GainSchedule
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import FusionSettings, VelocityFusion
 from studies.experiments.accuracy import Spread, known_spread, nrms
+from studies.experiments.driven import LUGRE, driven
 from studies.experiments.ltv_corners import LtvCornerObservers, SideBySide, bristle_tire
-from studies.experiments.play import Reading, baselines, driven, measured, play, run_of
+from studies.experiments.play import QUICK_SECONDS, Reading, baselines, measured, play, run_of
 from studies.experiments.sensors import TEST_CAR
 from studies.experiments.speed_figures import error_dots, speed_history
 from studies.experiments.velocities import FUSION, TOLD
@@ -37,7 +38,6 @@ READINGS: dict[str, Reading] = {
     "high": lambda step: step.corners.steps[THREE].high_slip[..., CORNER],
 }
 ESTIMATES = (THREE, TWO, LPV, FUSION, "mean wheel speed", "integrated acceleration")
-QUICK_SECONDS = 6.5
 
 
 @dataclass(frozen=True)
@@ -65,9 +65,9 @@ def parts(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) ->
     }
 
 
-def speed_part(name: str, rows: Sequence[Drive], scope: Scope) -> PartResult:
+def speed_part(name: str, rows: Sequence[Drive], scope: Scope, tire: str = LUGRE) -> PartResult:
     """Play every manoeuvre with all of them and judge V_x."""
-    truth = driven(tuple(row.manoeuvre for row in rows), None, QUICK_SECONDS if scope.quick else None)
+    truth = driven(tuple(row.manoeuvre for row in rows), tire, scope, QUICK_SECONDS)
     drawn = measured(truth, range(scope.seeds), TEST_CAR)
     estimates = play(drawn, READINGS, parts) | baselines(drawn)
     table: list[list[Cell]] = []
@@ -89,7 +89,7 @@ def speed_part(name: str, rows: Sequence[Drive], scope: Scope) -> PartResult:
             )  # fmt: skip
             measures[f"{row.manoeuvre}, {who}"] = value.mean
     caption = (
-        "Longitudinal speed at the centre of gravity on the truth vehicle (LuGre tires), NRMS in % of the "
+        f"Longitudinal speed at the centre of gravity on the truth vehicle ({tire} tires), NRMS in % of the "
         "peak as P1 (46): mean over "
         f"{scope.seeds} sensor draws with its 95 % confidence interval, the worst draw, and the greatest "
         "error in m/s. Kalman filters: P2 "

@@ -12,6 +12,15 @@ from matplotlib.figure import Figure
 from studies.experiments.accuracy import Spread
 from studies.experiments.panels import estimate_line, finished, true_line
 from studies.experiments.play import believed, run_of
+from studies.report.colours import (
+    FUSION,
+    HIGH_SLIP,
+    INTEGRATED_ACCELERATION,
+    KALMAN,
+    MEAN_WHEEL_SPEED,
+    SCHEDULE,
+    SECOND_FILTER,
+)
 from studies.study import Drawing
 from studies.truth import Measured
 
@@ -20,12 +29,12 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 STYLE = {
-    "Kalman, 3 states": ("s", "#c2571a"),
-    "Kalman, 2 states": ("D", "#d9a441"),
-    "schedule": ("P", "#7a3b8f"),
-    "fusion": ("o", "#1f6f8b"),
-    "mean wheel speed": ("^", "#8a8a8a"),
-    "integrated acceleration": ("v", "#b9b9b9"),
+    "Kalman, 3 states": ("s", KALMAN),
+    "Kalman, 2 states": ("D", SECOND_FILTER),
+    "schedule": ("P", SCHEDULE),
+    "fusion": ("o", FUSION),
+    "mean wheel speed": ("^", MEAN_WHEEL_SPEED),
+    "integrated acceleration": ("v", INTEGRATED_ACCELERATION),
 }
 
 
@@ -79,7 +88,7 @@ def speed_history(name: str, drawn: Measured, row: Drive, estimates: Mapping[str
     centre = surface - estimates["relative"][0, place, samples]
     bottom.plot(time, centre, color=STYLE["Kalman, 3 states"][1], linewidth=0.9, label="Kalman, 3 states", zorder=3)
     high = estimates["high"][0, place, samples] > 0.5
-    bottom.fill_between(time, 0, 1, where=high, transform=bottom.get_xaxis_transform(), color="#f3d9c8", linewidth=0, zorder=0,
+    bottom.fill_between(time, 0, 1, where=high, transform=bottom.get_xaxis_transform(), color=HIGH_SLIP, linewidth=0, zorder=0,
                         label="high slip detected")  # fmt: skip
     finished(top, "$V_x$ [m/s]")
     finished(middle, "error of $V_x$ [m/s]")

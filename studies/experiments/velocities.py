@@ -15,8 +15,10 @@ from estimators.schedule import GainSchedule
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import FusionSettings, SlipWeights, VelocityFusion
 from studies.experiments.accuracy import Spread, nrms, spread
-from studies.experiments.play import Parts, Reading, baselines, driven, measured, play, run_of
+from studies.experiments.driven import LUGRE, driven
+from studies.experiments.play import QUICK_SECONDS, Parts, Reading, baselines, measured, play, run_of
 from studies.experiments.sensors import TEST_CAR
+from studies.report import colours
 from studies.study import Cell, Drawing, PartResult, Scope, Table
 from studies.truth import Measured
 from synthesis.models.parameter_set import load_parameter_set
@@ -75,11 +77,9 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def velocity_part(
-    name: str, rows: Sequence[Printed], parts: Parts, scope: Scope, tire: str | None = None
-) -> PartResult:
+def velocity_part(name: str, rows: Sequence[Printed], parts: Parts, scope: Scope, tire: str = LUGRE) -> PartResult:
     """Play every manoeuvre of ``rows`` for the seeds of ``scope`` and put the errors beside the printed ones."""
-    truth = driven(tuple(row.manoeuvre for row in rows), tire)
+    truth = driven(tuple(row.manoeuvre for row in rows), tire, scope, QUICK_SECONDS)
     drawn = measured(truth, range(scope.seeds), TEST_CAR)
     estimates = play(drawn, READINGS, parts)
     others = baselines(drawn)
@@ -118,7 +118,12 @@ def velocity_part(
     return PartResult(tables=[Table(f"{name}-errors", caption, COLUMNS, table)], drawings=drawings, measures=measures)
 
 
-STYLE = {OWN: ("s", "#c2571a"), FUSION: ("o", "#1f6f8b"), WHEELS: ("^", "#8a8a8a"), INTEGRATED: ("v", "#b9b9b9")}
+STYLE = {
+    OWN: ("s", colours.OWN_OBSERVERS),
+    FUSION: ("o", colours.FUSION),
+    WHEELS: ("^", colours.MEAN_WHEEL_SPEED),
+    INTEGRATED: ("v", colours.INTEGRATED_ACCELERATION),
+}
 
 
 def _dots(name: str, rows: Sequence[Printed], means: Mapping[str, Mapping[str, Spread]]) -> Drawing:

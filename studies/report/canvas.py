@@ -1,4 +1,4 @@
-"""A blank figure in the look of the reports, and the colours of lines that the figures share."""
+"""A blank figure in the look of the reports, and the dashes of lines that the figures share."""
 
 from __future__ import annotations
 
@@ -11,9 +11,6 @@ from matplotlib.figure import Figure
 
 from studies.running.drawing import drawing_style
 
-# Distinct in print and for the colour-blind; every figure also differs by dashes or markers.
-BLUE, ORANGE, GREEN, RED, PURPLE, GREY = "#0b62a4", "#e08214", "#1b7f5c", "#c1272d", "#7b3294", "0.45"
-COLOURS = (BLUE, RED, GREEN, ORANGE, PURPLE, GREY)
 DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (6, 1.5, 1, 1.5)))
 
 

@@ -16,13 +16,14 @@ from matplotlib.figure import Figure
 
 from studies.drives.judge import LEAST_SPEED, DriveData
 from studies.drives.quantities import CORNERS
+from studies.report.colours import BLUE, RED
 
 Array = npt.NDArray[np.float64]
 Save = Callable[[Path], None]
 
 REFERENCE = {"color": "0.1", "linewidth": 1.8, "label": "reference"}
-ESTIMATE = {"color": "#0b62a4", "linewidth": 1.1, "label": "corner observers"}
-PIPELINE = {"color": "#c1272d", "linewidth": 1.2, "label": "pipeline"}
+ESTIMATE = {"color": BLUE, "linewidth": 1.1, "label": "corner observers"}
+PIPELINE = {"color": RED, "linewidth": 1.2, "label": "pipeline"}
 BASELINES = {
     "mean_wheel_speed": {"color": "#f4a261", "linewidth": 2.4, "label": "mean wheel speed"},
     "integrated_acceleration": {

@@ -12,6 +12,8 @@ import numpy as np
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
+from studies.report.colours import PRINTED_BAND
+
 if TYPE_CHECKING:
     from studies.schedules import ScheduleRun
 
@@ -33,7 +35,7 @@ def plot_schedule(run: ScheduleRun, folder: Path) -> list[Path]:
     for i, axis in enumerate(axes[0]):
         if run.published is not None:
             low, high = run.published[i]
-            axis.axhspan(low, high, color="#4477aa", alpha=0.15, lw=0, label=f"published range {low:g} to {high:g}")
+            axis.axhspan(low, high, color=PRINTED_BAND, alpha=0.15, lw=0, label=f"published range {low:g} to {high:g}")
         axis.plot(breakpoints, table[:, i], "o-", color="#aa3377", ms=4, lw=1.5, label="deployed, proved")
         axis.set_xlabel(f"{parameter['name'].replace('_', ' ')} [{parameter['unit']}]")
         axis.set_ylabel(

@@ -15,11 +15,12 @@ from matplotlib.figure import Figure
 
 from studies.identify.identify import Identification
 from studies.identify.slip_limit import LimitedFit
+from studies.report.colours import BLUE
 from studies.report.drive_plots import STYLE
 
 Array = npt.NDArray[np.float64]
 Save = Callable[[Path], None]
-USED, LEFT_OUT, LINE = "#0b62a4", "0.8", "#d1495b"
+USED, LEFT_OUT, LINE = BLUE, "0.8", "#d1495b"
 NAMES = {
     "longitudinal": ("front left", "front right", "rear left", "rear right", "mean of the corners"),
     "lateral": ("front axle", "rear axle"),

@@ -9,9 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from studies.report.colours import BLUE, RED
 from studies.sweeps.measure import Measure
 
-LOW, HIGH, NOMINAL, WORST, BEST = "#0b62a4", "#d1495b", "0.1", "#c1272d", "#4d9a2a"
+LOW, HIGH, NOMINAL, WORST, BEST = BLUE, "#d1495b", "0.1", RED, "#4d9a2a"
 
 
 def panels(count: int, width: float, height: float) -> tuple[Figure, list[Axes]]:

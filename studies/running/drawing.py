@@ -40,6 +40,10 @@ def drawing_style() -> Iterator[None]:
 def save_drawing(drawing: Drawing, folder: Path) -> None:
     """Write ``<name>.svg`` and ``<name>.png`` to ``folder`` and close the figure."""
     figure = drawing.figure
+    layout = figure.get_layout_engine()
+    if layout is not None:  # once for both files: it takes as long as drawing
+        layout.execute(figure)
+        figure.set_layout_engine("none")
     figure.savefig(folder / f"{drawing.name}.svg", metadata={"Date": None})
     figure.savefig(folder / f"{drawing.name}.png", dpi=PNG_DPI)
     figure.clear()

@@ -25,11 +25,20 @@ TICK = 0.2  # s between two looks at the progress bar
 class Outcome:
     """What became of a part: stored (was there already), computed, or failed with a ``message``."""
 
-    study: str
-    part: str
+    job: Job
     state: str
     seconds: float = 0.0
     message: str = ""
+
+    @property
+    def study(self) -> str:
+        """Id of the study."""
+        return self.job.study
+
+    @property
+    def part(self) -> str:
+        """Name of the part."""
+        return self.job.part
 
 
 @dataclass
@@ -57,12 +66,19 @@ def run_jobs(
     Raises OSError when a result cannot be written: then no other could be either. Leaving early ends the workers.
     """
     context = get_context(start_method())
-    pending = sorted(jobs, key=lambda job: job.cost)  # the last one is taken first
+    pending = sorted(jobs, key=lambda job: (bool(job.preparation), job.cost))  # the last one that can is taken first
+    ended: dict[str, str] = {}  # preparations, and what went wrong with them
     running: dict[Connection, _Running] = {}
     try:
         while pending or running:
-            while pending and len(running) < workers:
-                job = pending.pop()
+            for job in [job for job in pending if any(ended.get(name) for name in job.waits_for)]:
+                pending.remove(job)
+                name = next(name for name in job.waits_for if ended.get(name))
+                yield Outcome(job, "failed", message=f"{name}: {ended[name]}")
+            for job in [job for job in reversed(pending) if ended.keys() >= set(job.waits_for)][
+                : workers - len(running)
+            ]:
+                pending.remove(job)
                 mine, theirs = context.Pipe(duplex=False)
                 process = context.Process(target=work, args=(job, registry, theirs))  # type: ignore[attr-defined]
                 with catch_warnings():  # libraries keep idle threads of their own, which a fork does not disturb
@@ -73,7 +89,10 @@ def run_jobs(
             tick([entry.job for entry in running.values()])
             ready = wait(list(running), timeout=TICK)
             for connection in [one for one in running if one in ready]:
-                yield _outcome(running.pop(connection), connection)
+                outcome = _outcome(running.pop(connection), connection)
+                if outcome.job.preparation:
+                    ended[outcome.job.preparation] = outcome.message
+                yield outcome
     finally:
         for entry in running.values():
             entry.process.kill()
@@ -88,10 +107,10 @@ def _outcome(entry: _Running, connection: Connection) -> Outcome:
     entry.process.join()
     seconds = perf_counter() - entry.start
     if told is None:
-        return Outcome(job.study, job.part, "failed", seconds, _death(entry.process.exitcode))
+        return Outcome(job, "failed", seconds, _death(entry.process.exitcode))
     if told.errno is not None:
         raise OSError(told.errno, told.error, told.path)
-    return Outcome(job.study, job.part, "failed" if told.error else "computed", seconds, told.error)
+    return Outcome(job, "failed" if told.error else "computed", seconds, told.error)
 
 
 def _death(code: int | None) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from studies.claim import JsonValue
@@ -27,7 +27,7 @@ class PartRecord:
 
 @dataclass(frozen=True)
 class StudyRecord:
-    """A study: its parts in their order and the ids of the published claims that no part delivered."""
+    """A study: its parts in their order, the ids of the published claims that no part delivered, the titles of parts left out."""
 
     id: str
     title: str
@@ -37,6 +37,7 @@ class StudyRecord:
     fingerprint: str
     parts: tuple[PartRecord, ...]
     missing_claims: tuple[str, ...] = field(default=())
+    left_out: tuple[str, ...] = field(default=())
 
     @property
     def stored(self) -> list[StoredPart]:
@@ -63,7 +64,8 @@ def record_study(
     """
     taken: set[tuple[str, str]] = set()
     parts: list[PartRecord] = []
-    for part in study.parts:
+    chosen = study.chosen(scope)
+    for part in chosen:
         stored = None if part.name in failures else read_part(part_folder(out, study.id, part.name), mark)
         failure = failures.get(part.name, "" if stored else "it has no stored result")
         if stored is not None:
@@ -74,7 +76,8 @@ def record_study(
     record = StudyRecord(study.id, study.title, study.paper, study.summary, scope, mark, tuple(parts))
     found = {str(claim["id"]) for claim in record.claims}
     missing = tuple(name for name in registry.claim_ids(study.id) if name not in found)
-    return StudyRecord(**{**record.__dict__, "missing_claims": missing})
+    left_out = tuple(part.title for part in study.parts if part not in chosen)
+    return replace(record, missing_claims=missing, left_out=left_out)
 
 
 def _names(stored: StoredPart) -> list[tuple[str, str]]:

@@ -67,6 +67,7 @@ def result_content(record: StudyRecord) -> dict[str, Any]:
             for part in record.parts if part.stored is not None
         ],
         "failed": [{"part": part.name, "message": part.failure} for part in record.parts if part.stored is None],
+        "left_out": list(record.left_out),
         "claims": record.claims,
         "missing_claims": list(record.missing_claims),
     }  # fmt: skip
@@ -94,11 +95,11 @@ def write_claims(path: Path, claims: Sequence[dict[str, JsonValue]]) -> None:
 
 
 def write_table(path: Path, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
-    """Comma-separated, full precision, what is missing an empty cell."""
+    """Comma-separated, full precision, what is missing an empty cell, truth values ``true`` and ``false`` as in JSON."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
-        writer.writerows(rows)
+        writer.writerows([json.dumps(value) if isinstance(value, bool) else value for value in row] for row in rows)
 
 
 def dump(path: Path, content: Any) -> None:

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from studies.drives.output import ready_folder, whole_file
 from studies.registry import Registry
+from studies.running.compute import Pool, Progress, compute_parts
 from studies.running.fingerprint import fingerprint
 from studies.running.lock import only_run
-from studies.running.pool import Outcome, run_jobs
+from studies.running.pool import Outcome
+from studies.running.prepared import discard_prepared, sweep_prepared
 from studies.running.record import StudyRecord, all_claims, check_parts, record_study
 from studies.running.results import check_replaceable, read_result, write_claims, write_study
-from studies.running.store import part_folder, read_part, sweep_parts
+from studies.running.store import sweep_parts
 from studies.running.whole_folder import sweep
-from studies.running.worker import Job
 from studies.study import Scope, Study
-
-Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
@@ -70,11 +69,14 @@ def run_studies(
         for name in studies:
             check_replaceable(out / name)
             sweep_parts(out, name)
+        sweep_prepared(out)
         sweep(out)
-        outcomes = _compute(list(studies.values()), out, scope, workers, registry, mark, progress)
+        outcomes = compute_parts(list(studies.values()), out, scope, mark, Pool(registry, workers, progress))
         progress(1.0, "writing the report")
         shown = _with_earlier(studies, registry, out, mark)
         failed = {(o.study, o.part): o.message for o in outcomes if o.state == "failed"}
+        if not failed:
+            discard_prepared(out)
         records = [
             record_study(
                 study, registry, out, scope, mark, {part: text for (name, part), text in failed.items() if name == key}
@@ -91,35 +93,6 @@ def _naming(out: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise OSError(error.errno, error.strerror, error.filename or str(out)) from error
-
-
-def _compute(
-    studies: Sequence[Study],
-    out: Path,
-    scope: Scope,
-    workers: int,
-    registry: Registry,
-    mark: str,
-    progress: Progress,
-) -> list[Outcome]:
-    outcomes, jobs = [], []
-    for study in studies:
-        for part in study.parts:
-            if read_part(part_folder(out, study.id, part.name), mark) is not None:
-                outcomes.append(Outcome(study.id, part.name, "stored"))
-            else:
-                jobs.append(Job(study.id, part.name, part.cost, scope, mark, out))
-    cost = {(job.study, job.part): job.cost for job in jobs}
-    total, done = sum(cost.values()) or 1.0, 0.0
-
-    def tick(running: list[Job]) -> None:
-        progress(done / total, ", ".join(f"{job.study}/{job.part}" for job in running))
-
-    with closing(run_jobs(jobs, registry, workers, tick)) as finished:
-        for outcome in finished:
-            outcomes.append(outcome)
-            done += cost[outcome.study, outcome.part]
-    return outcomes
 
 
 def _with_earlier(studies: dict[str, Study], registry: Registry, out: Path, mark: str) -> dict[str, Study]:

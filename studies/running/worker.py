@@ -1,4 +1,4 @@
-"""One part in a process of its own: computed, stored, and what became of it told to the parent."""
+"""One part, or what parts need, in a process of its own: computed, stored, and what became of it told to the parent."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import signal
 import sys
 import traceback
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import parent_process
 from pathlib import Path
@@ -16,13 +16,17 @@ from threading import Thread
 from studies.registry import Registry
 from studies.running.drawing import drawing_style
 from studies.running.fingerprint import SOURCE_ROOT
+from studies.running.prepared import prepare, prepared_root
 from studies.running.store import part_folder, write_part
 from studies.study import Part, Scope
 
 
 @dataclass(frozen=True)
 class Job:
-    """A part to compute: ``study`` and ``part`` are names, so that a fresh interpreter can find it, too."""
+    """A part to compute: ``study`` and ``part`` are names, so that a fresh interpreter can find it, too.
+
+    With ``preparation``, that one of the part's needs is computed instead; ``waits_for`` are preparations of this run.
+    """
 
     study: str
     part: str
@@ -30,6 +34,13 @@ class Job:
     scope: Scope
     fingerprint: str
     out: Path
+    preparation: str = ""
+    waits_for: tuple[str, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """For the progress line."""
+        return self.preparation or f"{self.study}/{self.part}"
 
 
 @dataclass(frozen=True)
@@ -45,14 +56,17 @@ def work(job: Job, registry: Registry, parent: Connection) -> None:
     """Compute and store the part of ``job``; whatever it raises ends this process alone, with one line to the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt means
     Thread(target=_end_with_parent, daemon=True).start()
-    folder = part_folder(job.out, job.study, job.part)
-    computed = False
+    computed = bool(job.preparation)  # a preparation writes while it computes
     try:
         part = find_part(registry.load(job.study).parts, job.part)
-        with drawing_style():
-            result = part.run(job.scope)
-            computed = True
-            write_part(folder, result, job.fingerprint)
+        if job.preparation:
+            need = next(need for need in part.needs if need.name == job.preparation)
+            prepare(need, job.out, job.scope, job.fingerprint)
+        else:
+            with drawing_style():
+                result = part.run(replace(job.scope, prepared=prepared_root(job.out)))
+                computed = True
+                write_part(part_folder(job.out, job.study, job.part), result, job.fingerprint)
     except BaseException as error:
         if computed and isinstance(error, OSError):
             parent.send(Told(error.strerror or str(error), error.errno, str(error.filename or job.out)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import struct
 from collections.abc import Generator, Iterable
 from itertools import islice
 from typing import Any
@@ -12,7 +13,8 @@ from studies.sweeps.sweep import Chunk, Sweep
 from studies.sweeps.tables import Done, compute
 from synthesis.errors import SpecError
 
-ANSWER = 5.0  # s that a scheduler has to answer
+ANSWER = 4.0  # s that a scheduler has to answer
+OTHERS = (TypeError, LookupError, EOFError, MemoryError, struct.error)  # what comes of reading what a stranger says
 RETRIES = 3  # times that a chunk is given to another worker after one was lost with it
 
 
@@ -25,11 +27,10 @@ class Cluster:
     def __init__(self, address: str) -> None:
         self.address = address
 
-    def run(self, sweep: Sweep, chunks: Iterable[Chunk]) -> Generator[Done, None, None]:
-        """In the order in which they are finished."""
+    def require(self) -> None:
+        """Raises SpecError unless a scheduler answers."""
         try:
-            from distributed import Client, as_completed
-            from distributed.scheduler import KilledWorker
+            import distributed  # noqa: F401
         except ImportError:
             raise SpecError("--scheduler needs Dask: pip install 'gainsmith[cluster]'") from None
         try:
@@ -38,6 +39,15 @@ class Cluster:
         except (OSError, TimeoutError, ValueError) as error:
             reason = f"; {str(error).splitlines()[0]}" if str(error) else ""
             raise SpecError(f"--scheduler {self.address}: no answer within {ANSWER:g} s{reason}") from None
+        except OTHERS:
+            raise SpecError(f"--scheduler {self.address}: something answers there that is no Dask scheduler") from None
+
+    def run(self, sweep: Sweep, chunks: Iterable[Chunk]) -> Generator[Done, None, None]:
+        """In the order in which they are finished."""
+        self.require()
+        from distributed import Client, as_completed
+        from distributed.scheduler import KilledWorker
+
         with _quiet():
             client = _client(Client, self.address)
             try:

@@ -81,6 +81,8 @@ def _fill(folder: SweepFolder, executor: Executor, progress: Progress | None) ->
     first = next(left, None)
     if first is None:
         return 0, 0.0, ""
+    for measure in folder.sweep.measures:
+        measure.prepare()
     with closing(executor.run(folder.sweep, chain([first], left))) as results:
         for result in results:
             folder.keep(result)

@@ -19,6 +19,10 @@ def _anything_goes(_subject: Subject) -> None:
     pass
 
 
+def _nothing_to_make() -> None:
+    pass
+
+
 @dataclass(frozen=True)
 class Measure:
     """`function(batch)` returns (designs, grid), or (designs,) for a number that belongs to no place of the grid.
@@ -27,7 +31,8 @@ class Measure:
     Infinite values are answers (an unstable design), NaN is an outcome of its own. A loss is measured relative to the distance
     from `limit`, at which the measure becomes worthless (a margin of 0, a radius of 1). `variance` says what Sobol indices
     speak of: the value, or its reciprocal for a measure that may be infinite. `definition` is what makes two measures the
-    same; `check` refuses a subject that the measure does not fit (SpecError). `heavy`: costs a second, not a microsecond.
+    same; `check` refuses a subject that the measure does not fit (SpecError). `prepare` makes what all chunks share, once, before
+    workers are started.
     A function that must travel to other processes is one that a module defines, or a `functools.partial` of one.
     """
 
@@ -39,7 +44,7 @@ class Measure:
     variance: Literal["value", "reciprocal"] = "value"
     definition: Mapping[str, Any] = field(default_factory=dict)
     check: Callable[[Subject], None] = _anything_goes
-    heavy: bool = False
+    prepare: Callable[[], None] = _nothing_to_make
 
     def __call__(self, batch: Batch) -> FloatArray:
         """The values (n, g) or (n,). Raises SpecError for any other shape."""

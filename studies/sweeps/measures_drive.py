@@ -1,17 +1,18 @@
-"""The error of the velocity estimate on a recorded drive, for all designs of a batch at once."""
+"""The error of the velocity estimate on a drive, for all designs of a batch at once."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from studies.sweeps.drive_sources import DriveSource, LoggedDrive, TruthDrive
 from studies.sweeps.measure import Measure
 from studies.sweeps.measures import MeasureSpec
+from studies.sweeps.plant import ModelPlant
 from studies.sweeps.subject import Batch, Subject
 from synthesis.errors import SpecError
 from synthesis.polynomials.matrix import FloatArray
@@ -20,55 +21,83 @@ MODEL_STATES = ("bristle_deflection", "relative_velocity")
 
 
 class EstimatorNrms(MeasureSpec):
-    """NRMS in % of V_x from four longitudinal corner observers on a drive (P1 (46)), whose log has a reference `vx`.
+    """NRMS in % of V_x from four longitudinal corner observers on a drive (P1 (46)).
 
-    The observers know the perturbed constants, the drive is what was recorded: the question is what a wrong tire or radius
-    costs. A perturbed `effective_radius` also scales the wheel signals; forces stay as they were measured. Samples without force
-    or outside the range of the schedule coast, as at run time; the runtime's other fault checks are left out.
+    The drive is a `manoeuvre` of the truth vehicles (shipped, by name, or a file), with the sensor errors of `seed` and cut
+    after `seconds`; or a `drive` file and `logs` as `gainsmith run` takes them, with a reference `vx`.
+
+    The observers believe the constants of the design, the drive stays as it was measured: the question is what a wrong tire or
+    radius costs. A perturbed `effective_radius` also scales the wheel signals; forces stay. Missing samples are treated as by
+    the runtime observer; an estimate that grows beyond all bounds counts as infinite.
     """
 
     id: Literal["estimator_nrms"]
-    drive: str
-    logs: Annotated[list[str], Field(min_length=1)]
+    manoeuvre: str | None = None
+    seed: int = Field(default=0, ge=0)
+    seconds: float | None = Field(default=None, ge=0.1)
+    drive: str | None = None
+    logs: Annotated[list[str], Field(min_length=1)] | None = None
+
+    @model_validator(mode="after")
+    def _one_drive(self) -> Self:
+        if (self.manoeuvre is None) == (self.drive is None) or (self.drive is None) != (self.logs is None):
+            raise ValueError("give either manoeuvre, or drive with logs")
+        if self.drive is not None and {"seed", "seconds"} & self.model_fields_set:
+            raise ValueError("seed and seconds belong to a manoeuvre; a drive is taken as it was logged")
+        return self
 
     def beside(self, folder: Path) -> EstimatorNrms:
         """File names relative to the sweep file."""
-        return self.model_copy(
-            update={"drive": str(folder / self.drive), "logs": [str(folder / name) for name in self.logs]}
-        )
+        if self.drive is not None and self.logs is not None:
+            return self.model_copy(
+                update={"drive": str(folder / self.drive), "logs": [str(folder / name) for name in self.logs]}
+            )
+        own = str(self.manoeuvre).endswith(".toml")
+        return self.model_copy(update={"manoeuvre": str(folder / str(self.manoeuvre))}) if own else self
 
     def build(self) -> Measure:
-        """The measure. Raises SpecError for files that cannot be read, or without reference."""
-        files = (self.drive, *self.logs)
-        _recorded_sample_time(files)
-        digest = hashlib.sha256(b"".join(Path(name).read_bytes() for name in files)).hexdigest()
-        key = {"id": self.id, "drive": Path(self.drive).name, "sha256": digest}
-        name = self.name or f"estimator_nrms {Path(self.drive).stem}"
+        """The measure. Raises SpecError or LogError for what cannot be read, or has no reference."""
+        source = self._source()
+        name = self.name or f"estimator_nrms {Path(self.drive or str(self.manoeuvre)).stem}"
         return Measure(
-            name, "%", "smaller", partial(_nrms, files), definition=key, check=partial(_fits, files), heavy=True
-        )
+            name, "%", "smaller", partial(_nrms, source), definition={"id": self.id, **source.definition},
+            check=partial(_fits, source), prepare=partial(_ready, source),
+        )  # fmt: skip
+
+    def _source(self) -> DriveSource:
+        if self.drive is not None and self.logs is not None:
+            logged = LoggedDrive(Path(self.drive), tuple(Path(name) for name in self.logs))
+            _ready(logged)  # what is wrong with the files is said at once
+            return logged
+        from studies.truth import load_manoeuvre
+
+        found = load_manoeuvre(str(self.manoeuvre))
+        if self.seconds is not None:
+            found = found.model_copy(update={"duration": min(found.duration, self.seconds)})
+        return TruthDrive(found, self.seed, Path(str(self.manoeuvre)).parent)
 
 
-def _fits(files: tuple[str, ...], subject: Subject) -> None:
-    states = tuple(s.name for s in subject.plant.states)
-    if states != MODEL_STATES or len(subject.plant.box) != 1 or "lateral" in subject.name:
+def _fits(source: DriveSource, subject: Subject) -> None:
+    plant = subject.plant
+    model, inputs = (plant.model.name, len(plant.model.inputs)) if isinstance(plant, ModelPlant) else (subject.name, 1)
+    sizes = (inputs, len(plant.outputs), len(plant.box))
+    if tuple(s.name for s in plant.states) != MODEL_STATES or sizes != (1, 1, 1) or "lateral" in model:
         raise SpecError(f"subject '{subject.name}': estimator_nrms is for longitudinal corner observers")
-    if abs(_recorded_sample_time(files) - subject.sample_time) > 1e-9:
+    if abs(source.sample_time - subject.sample_time) > 1e-9:
         raise SpecError(
-            f"subject '{subject.name}': its sample time is {subject.sample_time:g} s, that of {files[0]} is not"
+            f"subject '{subject.name}': its sample time is {subject.sample_time:g} s, that of the drive of estimator_nrms is "
+            f"{source.sample_time:g} s; they must be the same"
         )
 
 
-def _recorded_sample_time(files: tuple[str, ...]) -> float:
-    from studies.sweeps.drive_replay import recorded  # reading logs takes imports that other sweeps need not wait for
-
-    return recorded(*files).sample_time
+def _ready(source: DriveSource) -> None:
+    source.recorded  # noqa: B018  made once and kept
 
 
-def _nrms(files: tuple[str, ...], batch: Batch) -> FloatArray:
+def _nrms(source: DriveSource, batch: Batch) -> FloatArray:
     from studies.sweeps.drive_replay import nrms
 
-    return nrms(files, batch)
+    return nrms(source.recorded, batch)
 
 
 DRIVE: Mapping[str, type[MeasureSpec]] = {"estimator_nrms": EstimatorNrms}

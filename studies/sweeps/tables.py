@@ -15,6 +15,7 @@ from studies.sweeps.evaluate import VALID, Evaluated, evaluate_chunk
 from studies.sweeps.sweep import Chunk, Sweep
 from studies.sweeps.versions import versions
 
+WORDS = ("stage", "outcome", "reason", "measure")  # a dictionary of columns of numbers costs more than it saves
 PLACE = " place"  # column of the grid point at which a measure is at its worst
 
 
@@ -90,7 +91,8 @@ def _joined(parts: list[Any]) -> Any:
 def encoded(table: Any) -> bytes:
     """Parquet, the same bytes for the same table."""
     sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd", write_statistics=False)
+    repeated = [name for name in WORDS if name in table.column_names]
+    pq.write_table(table, sink, compression="zstd", write_statistics=False, use_dictionary=repeated)
     return bytes(sink.getvalue())
 
 

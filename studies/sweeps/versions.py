@@ -9,7 +9,15 @@ from importlib import resources
 from importlib.metadata import version
 from pathlib import Path
 
-PACKAGES = ("analysis", "estimators", "studies.drives", "studies.sweeps", "synthesis")
+PACKAGES = (
+    "analysis",
+    "estimators",
+    "studies.drives",
+    "studies.experiments",
+    "studies.sweeps",
+    "studies.truth",
+    "synthesis",
+)
 OTHERS = ("gainsmith", "numpy", "scipy", "sympy", "pyarrow")
 
 

@@ -85,6 +85,12 @@ class Truth:
             tuple(self.keys[k] for k in rows),
         )
 
+    def until(self, end: float) -> Truth:
+        """The samples up to ``end``, s; runs that take longer end there."""
+        keep = self.time <= end + 1e-9
+        signals = {name: value[:, keep] for name, value in self.signals.items()}
+        return replace(self, time=self.time[keep], signals=signals, duration=np.minimum(self.duration, end))
+
     def every(self, n: int) -> Truth:
         """Every n-th sample."""
         if n == 1:

@@ -20,7 +20,7 @@ def check_study(study: Study) -> None:
 
 def desk_parts(study: Study) -> list[Part]:
     """The parts that compute from models alone; drives of truth vehicles cost more and have tests of their own."""
-    return [part for part in study.parts if part.cost <= 30.0]
+    return [part for part in study.parts if part.cost <= 30.0 and not part.needs]
 
 
 def check_result(result: PartResult) -> None:

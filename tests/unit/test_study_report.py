@@ -78,6 +78,12 @@ def test_every_claim_figure_table_and_failure_is_shown(page: Elements, out: Path
     assert "without a computed value: P2-lost" in page.text
 
 
+def test_truth_values_are_words(page: Elements, out: Path) -> None:
+    assert not re.search("true|false", page.text, re.IGNORECASE)
+    document = (out / "report.html").read_text()
+    assert document.count(">yes</td>") == 3 and document.count(">no</td>") == 1  # a claim, and a column of a table
+
+
 def test_the_page_needs_nothing_else(page: Elements) -> None:
     assert not page.named("script")
     for tag, attributes in page.tags:

@@ -77,7 +77,7 @@ def test_results_are_stored_as_the_study_gave_them(run: Run, tmp_path: Path) -> 
     assert claims["P1-extra"]["computed"] is True and claims["P1-extra"]["verdict"] == "derived (not claimed)"
     with (out / "alpha" / "tables" / "mixed.csv").open(newline="") as file:
         rows = list(csv.reader(file))
-    assert rows == [["name", "value [1]", "good"], ["a, b", str(1 / 3), "True"], ["c", "", "False"], ["d", "", "True"]]
+    assert rows == [["name", "value [1]", "good"], ["a, b", str(1 / 3), "true"], ["c", "", "false"], ["d", "", "true"]]
     result = json.loads((out / "alpha" / "result.json").read_text())
     assert result["scope"] == {"quick": True, "seeds": 12}
     assert result["claims"] == list(claims.values()) and result["failed"] == []
@@ -147,6 +147,27 @@ def test_a_part_that_raises_is_named_and_the_others_go_on(run: Run, trace: Path,
     (trace / "mended").touch()
     assert run("beta").good
     assert counts(trace) == {"beta-P2-lost": 2, "beta-P2-sum": 1}
+
+
+def test_what_parts_share_is_computed_once_and_before_them(run: Run, trace: Path, tmp_path: Path) -> None:
+    summary = run("sharing")
+    assert counts(trace) == {"number": 1, "broken": 1, "read": 2, "alone": 1}
+    assert summary.failures == [("sharing", "three", "broken: ZeroDivisionError: nothing to share "
+                                 "(tests/unit/study_fakes/sharing/study.py:20)")]  # fmt: skip
+    shared = tmp_path / "out" / ".parts" / ".prepared"
+    assert sorted(p.name for p in shared.iterdir()) == ["number"]  # kept for what is missing; nothing half-written
+    (trace / "mended").touch()
+    assert run("sharing").good
+    assert counts(trace) == {"number": 1, "broken": 2, "read": 2, "alone": 2}
+    assert not shared.exists()  # nobody reads it any more
+
+
+def test_what_parts_share_belongs_to_the_scope(run: Run, trace: Path, tmp_path: Path) -> None:
+    run("sharing")
+    run("sharing", scope=Scope(seeds=12))
+    assert counts(trace)["number"] == 2
+    result = json.loads((tmp_path / "out" / "sharing" / "result.json").read_text())
+    assert [part["measures"] for part in result["parts"] if part["name"] == "one"] == [{"number": 70.0}]
 
 
 def test_crashes_and_unfit_results_stay_with_their_part(run: Run, tmp_path: Path) -> None:

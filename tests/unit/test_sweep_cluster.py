@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +15,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
+from studies.cli import main
 from studies.sweeps import cluster as cluster_module
 from studies.sweeps.cluster import Cluster
 from studies.sweeps.engine import run_sweep
@@ -118,6 +120,26 @@ def test_a_scheduler_that_does_not_answer_is_one_line_within_ten_seconds(
             run_sweep(whole, tmp_path / "out", Cluster(f"tcp://127.0.0.1:{port}"))
         assert time.perf_counter() - start_at < 10.0
     assert "\n" not in str(refused.value)
+
+
+def test_a_stranger_that_answers_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A web server, say; and nothing is written."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer() -> None:
+            caller, _ = server.accept()
+            with caller:
+                caller.sendall(b"HTTP/1.1 400 Bad Request\r\nConnection: close\r\n\r\n")
+                caller.recv(1 << 16)
+
+        thread = threading.Thread(target=answer)
+        thread.start()
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        assert main(["sweep", "gain-box", "--scheduler", address, "--out", str(tmp_path / "out")]) == 2
+        thread.join()
+    told = capsys.readouterr().err
+    assert "no Dask scheduler" in told and len(told.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
 
 
 def test_an_address_that_is_none(whole: Sweep, tmp_path: Path) -> None:

@@ -28,7 +28,6 @@ from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Constant, SchedulingParameter, Signal
 from synthesis.models.parameter_set import load_parameter_set
-from tests.drives.synthetic_drive import columns, write_drive, write_log
 
 NAME = "corner-estimation-longitudinal"
 SCHEDULE = GainSchedule.shipped(NAME)
@@ -128,36 +127,6 @@ def test_designing_again_gives_the_design_bound_of_the_schedule(subject: Subject
 def test_rank_loss_speed_of_a_subject(subject: Subject) -> None:
     found = measure("rank_loss_speed")(subject.at(DESIGNS, subject.grid(2)))
     np.testing.assert_array_equal(found, RankLossSpeeds(MODEL).lowest(DESIGNS))
-
-
-def test_nrms_is_that_of_the_replayed_observers(subject: Subject, tmp_path: Path) -> None:
-    from studies.drives.corner_observers import ScheduledObserver
-    from studies.drives.drive_file import read_drive
-    from studies.drives.log import read_log
-    from studies.drives.metrics import deviation
-    from studies.drives.prepare import corner_inputs_of
-    from studies.drives.replay import replay
-
-    table = columns(duration=2.0)
-    wobble = 0.05 * np.sin(9.0 * table["t"])
-    for corner, sign in (("fl", 1.0), ("rr", -1.0)):
-        table[f"w_{corner}"] = table[f"w_{corner}"] * (1.0 + sign * wobble)
-    path, drive = write_log(tmp_path / "log.csv", table), write_drive(tmp_path)
-    spec = MEASURES["estimator_nrms"].model_validate(
-        {"id": "estimator_nrms", "drive": "drive.toml", "logs": ["log.csv"]}
-    )
-    found = spec.beside(tmp_path).build()
-    found.check(subject)
-    values = found(subject.at({"sigma1": np.array([0.76, 0.5])}, subject.grid(2)))
-    description = read_drive(drive)
-    log = read_log([path], description)
-    velocity = replay(corner_inputs_of(log, description), ScheduledObserver(SCHEDULE)).velocity
-    wanted = deviation(velocity, log.reference["vx"], "m/s").nrms_percent
-    assert wanted is not None and wanted > 0.01
-    assert values[0] == pytest.approx(wanted, rel=1e-9)
-    assert values[1] != pytest.approx(wanted, rel=1e-3)
-    path.write_bytes(path.read_bytes() + b"\n")
-    assert spec.beside(tmp_path).build().definition != found.definition  # another log is another measure
 
 
 def test_schedule_of_an_unknown_model_is_swept_by_its_polynomials() -> None:

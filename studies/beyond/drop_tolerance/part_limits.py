@@ -10,7 +10,8 @@ from estimators import GainSchedule, LpvVelocityObserver
 from studies.beyond.drop_tolerance.observers import SHIPPED, observer
 from studies.beyond.drop_tolerance.population import START
 from studies.beyond.drop_tolerance.prediction import critical, independent_drops, radius, system
-from studies.papers.resilient_velocity.ink import BLUE, GREEN, GREY, ORANGE, RED, sheet
+from studies.papers.resilient_velocity.ink import sheet
+from studies.report.colours import BLUE, GREEN, GREY, ORANGE, RED
 from studies.study import Cell, Drawing, PartResult, Scope, Table
 from synthesis.lmi.result import Verdict
 

@@ -16,7 +16,8 @@ from estimators import GainSchedule
 from studies.beyond.drop_tolerance.observers import NAMES, Observer, observer
 from studies.beyond.drop_tolerance.population import START, evolve
 from studies.beyond.drop_tolerance.trial import MISS
-from studies.papers.resilient_velocity.ink import BLUE, GREY, RED, sheet
+from studies.papers.resilient_velocity.ink import sheet
+from studies.report.colours import BLUE, GREY, RED
 from studies.study import Drawing, PartResult, Scope, Table
 from synthesis.lmi.result import Verdict
 from synthesis.polynomials.matrix import FloatArray

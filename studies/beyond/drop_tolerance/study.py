@@ -10,6 +10,9 @@ from studies.study import Part, Study
 
 WORDS = {name: name.replace("-", " ") for name in NAMES}
 
+QUICK = ("corner-estimation-longitudinal",)
+"""Observers of a quick run; the overview has all of them."""
+
 STUDY = Study(
     id="drop-tolerance",
     title="How many lost force measurements the observers survive",
@@ -23,7 +26,13 @@ STUDY = Study(
     parts=(
         Part("overview", "What each observer survives, predicted", overview, cost=3.0),
         *(
-            Part(f"observer-{name}", f"Prediction against runtime: {WORDS[name]}", part_observer.part(name), cost=5.5)
+            Part(
+                f"observer-{name}",
+                f"Prediction against runtime: {WORDS[name]}",
+                part_observer.part(name),
+                cost=5.5,
+                quick=name in QUICK,
+            )
             for name in NAMES
         ),
         *(
@@ -32,6 +41,7 @@ STUDY = Study(
                 f"Wheel speed in motion: {WORDS[name]}",
                 part_moving.part(name),
                 cost=6.0 if name.endswith("lateral") else 1.0,
+                quick=name in QUICK,
             )
             for name in NAMES
         ),

@@ -10,15 +10,15 @@ from matplotlib.figure import Figure
 from studies.beyond.friction_floor.launches import Launch
 from studies.beyond.friction_floor.runtime import WHEEL_SPEEDS, Missed
 from studies.beyond.friction_floor.theory import missed_share
+from studies.report.colours import FUSION, INTEGRATED_ACCELERATION, MEAN_WHEEL_SPEED, OWN_OBSERVERS, ROADS
 from studies.study import Drawing
 from synthesis.models.parameter_set import load_parameter_set
 
-COLOURS = ("#1f6f8b", "#3a9e6f", "#c9a227", "#c2571a", "#7a3b8f")
 NAMES = {
-    "corner observers": "#c2571a",
-    "fusion": "#1f6f8b",
-    "mean wheel speed": "#8a8a8a",
-    "integrated acceleration": "#b9b9b9",
+    "corner observers": OWN_OBSERVERS,
+    "fusion": FUSION,
+    "mean wheel speed": MEAN_WHEEL_SPEED,
+    "integrated acceleration": INTEGRATED_ACCELERATION,
 }
 
 
@@ -28,7 +28,7 @@ def shares(missed: Missed, friction: Sequence[float], slip: Sequence[float]) -> 
     fine = np.geomspace(slip[0], slip[-1], 200)
     figure = Figure(figsize=(6.4, 4.0), layout="constrained")
     axes = figure.subplots()
-    for i, (theta, colour) in enumerate(zip(friction, COLOURS, strict=False)):
+    for i, (theta, colour) in enumerate(zip(friction, ROADS, strict=False)):
         radius = values.vehicle["effective_radius"].value
         line = missed_share(values.tire["longitudinal"], radius, WHEEL_SPEEDS[1], fine, theta)
         axes.plot(100 * fine, 100 * line, color=colour, linewidth=1.4, label=f"friction {theta:g}")
@@ -53,7 +53,7 @@ def over_time(found: Sequence[Launch]) -> Drawing:
     """Slip and shares of every launch."""
     figure = Figure(figsize=(8.0, 5.2), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True)
-    for launch, colour in zip(found, COLOURS, strict=False):
+    for launch, colour in zip(found, ROADS, strict=False):
         top.plot(launch.time, 100 * launch.slip, color=colour, label=f"friction {launch.friction:g}")
         bottom.plot(launch.time, 100 * launch.predicted, color=colour, linewidth=2.4, alpha=0.35)
         bottom.plot(launch.time, 100 * launch.missed, color=colour, linewidth=1.0)

@@ -37,17 +37,24 @@ def name_of(friction: float) -> str:
     return f"floor-launch-{round(100 * friction)}"
 
 
+QUICK_PACE = 0.5
+"""Durations of a quick run, over those of the manoeuvre: the torque still changes slowly against the bristles."""
+
+
 @cache
-def launched() -> Truth:
+def launched(quick: bool = False) -> Truth:
     """One run for each friction, integrated together."""
+    pace = QUICK_PACE if quick else 1.0
     base = load_manoeuvre("floor-launch")
     car = base.truth_vehicle()
     grip = car.lugre.sliding * car.parameters.mass * GRAVITY * float(np.mean(car.parameters.radius))
     runs = []
     for friction in FRICTIONS:
-        held, rise, fall = base.torque
+        held, rise, fall = (piece.model_copy(update={"time": pace * (piece.time or 0.0)}) for piece in base.torque)
         pieces = [held, rise.model_copy(update={"to": f"{BEYOND * friction * grip:.6g} N*m"}), fall]
-        changes = {"name": name_of(friction), "road": Road(friction=friction), "torque": pieces}
+        changes = {
+            "name": name_of(friction), "road": Road(friction=friction), "torque": pieces, "duration": pace * base.duration,
+        }  # fmt: skip
         runs.append(base.model_copy(update=changes))
     return drive(runs)
 
@@ -66,7 +73,7 @@ class Launch:
 
 def launches(scope: Scope) -> list[Launch]:
     """Play all roads in one batch."""
-    truth = launched()
+    truth = launched(scope.quick)
     drawn = measured(truth, range(scope.seeds), TEST_CAR)
     estimates = play(drawn, READINGS, corner_observers("corner-estimation"))
     velocities = {name: estimates[name] for name in ("fusion", "corner observers")} | baselines(drawn)

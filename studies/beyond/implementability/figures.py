@@ -12,10 +12,11 @@ from studies.beyond.implementability.break_rates import BreakCurve, break_curve
 from studies.beyond.implementability.designs import WHEEL_SPEED, Design, printed_designs, shipped_designs
 from studies.beyond.implementability.simulate import RUNTIME, STEPS, launch, run
 from studies.beyond.implementability.updates import BREAKABLE, LASTING, UPDATES, exact_closed_loop, spectral_radius
+from studies.report.colours import BLUE, GREEN, ORANGE, PURPLE, RED
 from studies.study import Drawing
 
 PAPER_RATE = 200.0  # Hz, P1 and P3
-COLOURS = ("tab:blue", "tab:red", "tab:orange", "tab:green", "tab:purple")
+COLOURS = (BLUE, RED, ORANGE, GREEN, PURPLE)
 RATE_TICKS = (20, 50, 100, 200, 500, 1000, 2000)
 
 

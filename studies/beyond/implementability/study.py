@@ -78,9 +78,9 @@ STUDY = Study(
     parts=(
         Part("break-rates", "Sample rates at which each discretisation breaks", rates, cost=6.0),
         Part("printed", "Spectral radius of the printed gains", printed, cost=1.5),
-        Part("shipped", "Spectral radius of the shipped schedules", shipped, cost=1.5),
+        Part("shipped", "Spectral radius of the shipped schedules", shipped, cost=1.5, quick=False),
         Part("lasting-schemes", "What the schemes that never break cost", lasting, cost=0.3),
-        Part("confirmation", "Observers run on both sides of every break", confirmation, cost=9.0),
-        Part("launch", "Accelerating through the whole range at 200 Hz", acceleration, cost=1.5),
+        Part("confirmation", "Observers run on both sides of every break", confirmation, cost=9.0, quick=False),
+        Part("launch", "Accelerating through the whole range at 200 Hz", acceleration, cost=1.5, quick=False),
     ),
 )

@@ -16,9 +16,10 @@ from studies.beyond.well_posed_design.cases import Case
 from studies.beyond.well_posed_design.gain_plane import gain_plane
 from studies.beyond.well_posed_design.literal import Approach, explicit_family
 from studies.beyond.well_posed_design.sweeps import Sweep
+from studies.report.colours import BLUE, GREEN, ORANGE, PURPLE, RED
 from studies.study import Drawing
 
-COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:purple")
+COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
 MOST_TICKS = 7
 NICE = (0.001, 0.01, 0.1, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 300.0, 600.0, 1000.0, 2000.0)  # ticks
 GAIN_LABELS = ("$L_1$ [m/s]", "$L_2$ [m/s²]")
@@ -39,8 +40,8 @@ def ill_posed(
             )
         well = posed[case.name]
         axis.loglog(well.backoffs, well.gains[:, 1], "s--", color="black", ms=3.5, lw=1.3, label="well-posed, degree 1")
-        axis.axhline(case.printed[1], color="tab:red", lw=1.0, ls=":")
-        axis.text(0.11, case.printed[1] * 1.06, "printed", color="tab:red", fontsize=8, ha="left")
+        axis.axhline(case.printed[1], color=RED, lw=1.0, ls=":")
+        axis.text(0.11, case.printed[1] * 1.06, "printed", color=RED, fontsize=8, ha="left")
         axis.set_xlim(0.13, 8e-4)
         axis.set_title(case.title, loc="left")
         axis.set_xlabel("distance from the infimum, γ/γ* − 1 [1]")
@@ -49,7 +50,7 @@ def ill_posed(
         axis.set_ylim(low, high * 12.0)
         axis.legend(loc="upper left", fontsize=7.5)
     second = np.geomspace(1.0, 1e7, 43)
-    for case, color in zip(cases, ("tab:blue", "tab:red"), strict=False):
+    for case, color in zip(cases, (BLUE, RED), strict=False):
         axes[2].loglog(second, explicit_family(case, second) - 1.0, color=color, lw=1.5, label=case.title)
         ratio = case.model.constants["sigma2"].value / case.model.constants["sigma0"].value
         axes[2].axhline(0.5 * ratio**2, color=color, lw=0.9, ls=":")
@@ -96,23 +97,21 @@ def demand_figure(name: str, demand: str, sweeps: Sequence[Sweep], what: str, of
 def _demand_row(row: Sequence[Axes], sweep: Sweep, offset: float) -> None:
     case, good, demand = sweep.case, sweep.feasible, sweep.demand - offset
     reference, x = printed_achieved(case), demand[good]
-    printed: Any = {"color": "tab:red", "lw": 1.1, "ls": "--", "label": "printed gains"}
+    printed: Any = {"color": RED, "lw": 1.1, "ls": "--", "label": "printed gains"}
     for i, axis in enumerate(row[:2]):
         low, high = sweep.gains[good, :, i].min(axis=1), sweep.gains[good, :, i].max(axis=1)
-        axis.fill_between(x, low, high, color="tab:blue", alpha=0.35, lw=0)
-        axis.plot(x, low, color="tab:blue", lw=1.2)
-        axis.plot(x, high, color="tab:blue", lw=1.2, label="design, least and largest over the wheel speeds")
-        axis.axhspan(*case.printed_range[i], color="tab:red", alpha=0.10, lw=0, label="printed range")
+        axis.fill_between(x, low, high, color=BLUE, alpha=0.35, lw=0)
+        axis.plot(x, low, color=BLUE, lw=1.2)
+        axis.plot(x, high, color=BLUE, lw=1.2, label="design, least and largest over the wheel speeds")
+        axis.axhspan(*case.printed_range[i], color=RED, alpha=0.10, lw=0, label="printed range")
         axis.axhline(case.printed[i], **printed)
         axis.set_ylabel(f"{case.title}\n{GAIN_LABELS[i]}" if i == 0 else GAIN_LABELS[i])
-    row[2].fill_between(x, sweep.gamma_lower[good], sweep.gamma[good], color="tab:green", alpha=0.35, lw=0)
-    row[2].plot(x, sweep.gamma[good], "o-", color="tab:green", ms=3, lw=1.2, label="proved bound, any motion")
+    row[2].fill_between(x, sweep.gamma_lower[good], sweep.gamma[good], color=GREEN, alpha=0.35, lw=0)
+    row[2].plot(x, sweep.gamma[good], "o-", color=GREEN, ms=3, lw=1.2, label="proved bound, any motion")
     row[2].plot(x, sweep.achieved.noise[good], color="black", lw=1.6, label="the same gains, constant wheel speed")
     row[2].axhline(float(reference.noise), **printed)
     row[2].set_ylabel("gain to the velocity error [m/s]")
-    row[3].plot(
-        x, sweep.achieved.noise_density[good], "o-", color="tab:purple", ms=3, lw=1.2, label="H₂ gain of the design"
-    )
+    row[3].plot(x, sweep.achieved.noise_density[good], "o-", color=PURPLE, ms=3, lw=1.2, label="H₂ gain of the design")
     row[3].axhline(float(reference.noise_density), **printed)
     row[3].set_ylabel("H₂ gain, force noise [m/s·√Hz]")
     low, high = float(demand.min()), float(demand.max())
@@ -143,15 +142,15 @@ def plane(cases: Sequence[Case], points: int = 61) -> Drawing:
         fastest = float(case.design.fastest_pole or 0.0)
         decay = case.design.decay_rate
         for field, levels, color, dashes in (
-            (found.fields.slowest, [decay * f for f in (0.25, 0.5, 1.0, 2.0, 4.0)], "tab:blue", "solid"),
-            (found.fields.fastest, [fastest * f for f in (0.5, 1.0, 2.0)], "tab:orange", "dashed"),
-            (found.fields.friction, [1.001, 1.1], "tab:green", "dotted"),
+            (found.fields.slowest, [decay * f for f in (0.25, 0.5, 1.0, 2.0, 4.0)], BLUE, "solid"),
+            (found.fields.fastest, [fastest * f for f in (0.5, 1.0, 2.0)], ORANGE, "dashed"),
+            (found.fields.friction, [1.001, 1.1], GREEN, "dotted"),
         ):
             lines = axis.contour(x, y, field.T, levels=levels, colors=color, linestyles=dashes, linewidths=1.2)
             axis.clabel(lines, fmt="%g", fontsize=6.5)
         (a, b), (c, d) = case.printed_range
-        axis.add_patch(Rectangle((a, c), b - a, d - c, fill=False, ec="tab:red", lw=1.2, label="printed range"))
-        axis.plot(*case.printed, "*", color="tab:red", ms=12, mec="white", label="printed gains")
+        axis.add_patch(Rectangle((a, c), b - a, d - c, fill=False, ec=RED, lw=1.2, label="printed range"))
+        axis.plot(*case.printed, "*", color=RED, ms=12, mec="white", label="printed gains")
         table = GainSchedule.shipped(case.name).table[:, :, 0]
         axis.plot(table[:, 0], table[:, 1], "o-", color="black", ms=3, lw=1.3, label="shipped schedule")
         axis.plot(table[0, 0], table[0, 1], "o", color="white", mec="black", ms=6, label="shipped, at standstill")

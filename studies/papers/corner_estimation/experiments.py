@@ -7,9 +7,10 @@ from functools import partial
 
 from estimators.pipeline import DifferentiatedPid
 from estimators.vehicle import VehicleParameters
+from studies.experiments.driven import MAGIC_FORMULA, driven_part
 from studies.experiments.forces import Driven, force_part
+from studies.experiments.motion import Moved, motion_part
 from studies.experiments.velocities import Printed, corner_observers, velocity_part
-from studies.study import Part
 
 OBSERVERS = corner_observers("corner-estimation")
 ALL_WHEEL = (
@@ -38,35 +39,52 @@ def _pid(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) -> 
     return {"longitudinal_force": DifferentiatedPid(car, sample_time, (*shape, 4))}
 
 
+MOTION = (
+    Moved("p1-lane-change-dry", "Lane change, dry (Fig. 7)"),
+    Moved("p1-launch-split", "Launch, ice and dry (Fig. 9)"),
+    Moved("p1-lane-change-snow", "Lane change, snow and ice (Fig. 10)"),
+    Moved("p1-oval-dry", "Oval, dry (Fig. 11)"),
+    Moved("p1-acceleration-in-turn-dry", "Acceleration in a turn, dry (Fig. 12)"),
+    Moved("p1-acceleration-left-turn-wet-dry", "Acceleration and left turn, wet to dry (Fig. 13)"),
+)
+
 PARTS = (
-    Part(
+    driven_part(
         "table-3-all-wheel-drive",
         "Table III on the truth vehicle: all-wheel drive",
         partial(velocity_part, "all-wheel-drive", ALL_WHEEL, OBSERVERS),
         cost=90.0,
+        quick=True,
     ),
-    Part(
+    driven_part(
         "table-3-rear-wheel-drive",
         "Table III on the truth vehicle: rear-wheel drive",
         partial(velocity_part, "rear-wheel-drive", REAR_WHEEL, OBSERVERS),
         cost=80.0,
     ),
-    Part(
+    driven_part(
         "table-3-oval",
         "Table III on the truth vehicle: oval",
         partial(velocity_part, "oval", OVAL, OBSERVERS),
         cost=110.0,
     ),
-    Part(
+    driven_part(
         "table-3-other-tire",
         "Table III on a tire that no estimator knows: Magic Formula with slip lag",
-        partial(velocity_part, "other-tire", ALL_WHEEL, OBSERVERS, tire="magic-formula"),
+        partial(velocity_part, "other-tire", ALL_WHEEL, OBSERVERS),
         cost=90.0,
+        tire=MAGIC_FORMULA,
     ),
-    Part(
+    driven_part(
         "forces",
         "Figs. 6 to 8 on the truth vehicle: forces",
         partial(force_part, "forces", FORCES, {"PID": _pid}),
         cost=80.0,
+    ),
+    driven_part(
+        "motion",
+        "Figs. 7 and 9 to 13 on the truth vehicle: accelerations and yaw rate",
+        partial(motion_part, "motion", MOTION),
+        cost=5.0,
     ),
 )

@@ -18,19 +18,8 @@ from studies.papers.corner_estimation.inputs import (
     printed_gains,
 )
 from studies.papers.corner_estimation.kalman import fitted, schedule
-from studies.report.canvas import (
-    BLUE,
-    COLOURS,
-    DASHES,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    canvas,
-    grid,
-    label,
-    legend,
-)
+from studies.report.canvas import DASHES, canvas, grid, label, legend
+from studies.report.colours import BLUE, CURVES, GREEN, GREY, ORANGE, PRINTED_BAND, RED
 from studies.study import Drawing
 from synthesis.well_posedness import well_posedness
 
@@ -40,7 +29,7 @@ def conditioning_figure(caps: int = 13) -> Drawing:
     figure, axes = canvas(7.2, 3.6, 1, 2)
     left, right = axes[0]
     conditions = np.geomspace(1.0, 1e6, caps)
-    for (name, direction), colour in zip(DESIGNS, COLOURS, strict=False):
+    for (name, direction), colour in zip(DESIGNS, CURVES, strict=False):
         scale = natural_scale(name, direction)
         for g, dash in ((1.0, DASHES[1]), (scale, "-")):
             # Relative to the trivial growth of the margin with P itself, so that the sign is what one sees.
@@ -103,7 +92,7 @@ def gain_figure() -> Drawing:
         filtered = schedule(direction, fitted(direction, gains, FIT_SPEED), omega)
         shipped = GainSchedule.shipped(f"corner-estimation-{direction}").gain(omega)[..., 0]
         for i, (ax, (low, high)) in enumerate(zip(row, axes_of_the_figures(direction), strict=True)):
-            ax.axhspan(low, high, color="#4477aa", alpha=0.13, linewidth=0, label="axis of the printed figure")
+            ax.axhspan(low, high, color=PRINTED_BAND, alpha=0.13, linewidth=0, label="axis of the printed figure")
             ax.axhline(gains[i], color=GREY, linewidth=1.2, linestyle=DASHES[2], label="printed constant gain")
             ax.plot(
                 omega, filtered[:, i], color=ORANGE, linestyle=DASHES[1], label="Kalman filter through the printed gain"

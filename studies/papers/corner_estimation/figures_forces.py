@@ -11,7 +11,8 @@ from studies.papers.corner_estimation.claims_filter import SIZES, STEER, determi
 from studies.papers.corner_estimation.claims_forces import DISTURBANCE_RATE, STEP, force_errors
 from studies.papers.corner_estimation.inputs import FORCE_GAINS, parameters
 from studies.papers.corner_estimation.sigma_points import weights
-from studies.report.canvas import BLUE, COLOURS, DASHES, GREY, RED, canvas, grid, label, legend
+from studies.report.canvas import DASHES, canvas, grid, label, legend
+from studies.report.colours import BLUE, CURVES, GREY, RED
 from studies.study import Drawing
 
 
@@ -22,7 +23,7 @@ def observer_error_figure() -> Drawing:
     figure, axes = canvas(7.2, 3.6, 1, 2)
     left, right = axes[0]
     for k, name in enumerate(errors.names):
-        left.plot(errors.time, errors.force[:, k], color=COLOURS[k], linewidth=1.4, linestyle=DASHES[k], label=name)
+        left.plot(errors.time, errors.force[:, k], color=CURVES[k], linewidth=1.4, linestyle=DASHES[k], label=name)
     left.axhspan(-bound, bound, color=GREY, alpha=0.18, linewidth=0, label=f"±{bound:.3f} N, the bound")
     left.set_xlim(0.0, 6.0)
     left.set_ylim(-4.0, 6.0)
@@ -128,7 +129,7 @@ def load_figure() -> Drawing:
     names = ("front left", "front right", "rear left", "rear right")
     for ax, motion, axis in zip(axes[0], ((acceleration, zero), (zero, acceleration)), "xy", strict=True):
         found = vertical_loads(parameters(), *motion)
-        for name, colour, dash in zip(names, COLOURS, DASHES, strict=False):
+        for name, colour, dash in zip(names, CURVES, DASHES, strict=False):
             ax.plot(
                 acceleration, getattr(found, name.replace(" ", "_")) / 1e3, color=colour, linestyle=dash, label=name
             )

@@ -18,7 +18,8 @@ from studies.papers.corner_estimation.inputs import (
     printed_gains,
 )
 from studies.papers.corner_estimation.lyapunov import Reading, certificate
-from studies.report.canvas import BLUE, DASHES, GREEN, GREY, ORANGE, RED, canvas, grid, label, legend
+from studies.report.canvas import DASHES, canvas, grid, label, legend
+from studies.report.colours import BLUE, FORBIDDEN, GREEN, GREY, ORANGE, RED
 from studies.study import Drawing
 from synthesis.models.catalogue.corner import Direction
 from synthesis.polynomials.matrix import FloatArray
@@ -112,7 +113,7 @@ def box_figure(points: int = 81) -> Drawing:
         first, second = gain_grid(wide, points)
         slowest = slowest_poles(direction, first, second, speeds=46)
         steps = [-200.0, -100.0, -50.0, -25.0, 0.0] if direction == "longitudinal" else [-10.0, -5.0, -2.5, -1.0, 0.0]
-        ax.contourf(first, second, slowest, levels=[0.0, max(1.0, slowest.max())], colors=["#f2c4c4"])
+        ax.contourf(first, second, slowest, levels=[0.0, max(1.0, slowest.max())], colors=[FORBIDDEN])
         lines = ax.contour(first, second, slowest, levels=steps, colors=["0.25"], linewidths=0.9, linestyles="solid")
         ax.clabel(lines, fmt="%g", fontsize=7)
         (left, right), (low, high) = box

@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from studies.papers.ekf_ukf_lateral.observability import sight, substitute_car
 from studies.papers.ekf_ukf_lateral.twins import twins
+from studies.report.colours import BLUE, GREEN, PURPLE, RED
 from studies.study import Drawing
 
 FLOOR = 1e-17  # singular values below rounding are drawn here
@@ -21,9 +22,9 @@ def rank_map(points: int = 161) -> Drawing:
     angle = np.radians(degrees)
     right_y, printed = sight(angle, np.array(20.0)).relative, sight(angle, np.array(20.0), printed=True).relative
     for values, label, style in (
-        (right_y[:, 6], "7th, y₄ corrected", {"color": "tab:blue", "lw": 1.8}),
-        (right_y[:, 7], "8th, y₄ corrected", {"color": "tab:blue", "lw": 1.4, "ls": ":"}),
-        (printed[:, 7], "8th, y₄ as printed", {"color": "tab:red", "lw": 1.4, "ls": "--"}),
+        (right_y[:, 6], "7th, y₄ corrected", {"color": BLUE, "lw": 1.8}),
+        (right_y[:, 7], "8th, y₄ corrected", {"color": BLUE, "lw": 1.4, "ls": ":"}),
+        (printed[:, 7], "8th, y₄ as printed", {"color": RED, "lw": 1.4, "ls": "--"}),
     ):
         left.semilogy(degrees, np.maximum(values, FLOOR), label=label, **style)
     left.axhspan(FLOOR / 3, 1e-14, color="0.5", alpha=0.15, lw=0)
@@ -39,7 +40,7 @@ def rank_map(points: int = 161) -> Drawing:
         degrees, speed, np.log10(np.maximum(field, 1e-9)), shading="gouraud", cmap="viridis", vmin=-7
     )
     mesh.set_rasterized(True)
-    right.axvline(0.0, color="tab:red", lw=1.6)
+    right.axvline(0.0, color=RED, lw=1.6)
     right.annotate(
         "rank 6", (0.0, 3.0), (2.2, 2.0), color="white", fontsize=9, arrowprops={"arrowstyle": "->", "color": "white"}
     )
@@ -72,10 +73,10 @@ def twin_motions() -> Drawing:
     axes = figure.subplots(1, 3)
     styles = (("first", "-", 2.6), ("second", "--", 1.4))
     for k, (name, dashes, width) in enumerate(styles):
-        for wheel, color in ((5, "tab:blue"), (6, "tab:red")):
+        for wheel, color in ((5, BLUE), (6, RED)):
             label = f"rear {'left' if wheel == 5 else 'right'}, {name} motion"
             axes[0].plot(run.time, run.states[:, k, wheel] / 1e3, color=color, ls=dashes, lw=width, label=label)
-        for (what, column, factor), color in zip(OUTPUTS, ("tab:green", "tab:purple"), strict=True):
+        for (what, column, factor), color in zip(OUTPUTS, (GREEN, PURPLE), strict=True):
             values = factor * run.outputs[:, k, column]
             axes[1].plot(run.time, values, color=color, ls=dashes, lw=width, label=f"{what}, {name}")
     axes[0].set_ylabel("lateral force [kN]")
@@ -87,13 +88,9 @@ def twin_motions() -> Drawing:
     split = np.abs(np.diff(run.states[:, :, 5], axis=1)[:, 0])
     seen = np.abs(np.diff(run.outputs, axis=1)[:, 0]).max(axis=1)
     lag = np.exp(-run.time * 20.0 / car.rear_relaxation)
-    axes[2].semilogy(
-        run.time, np.maximum(split / split[0], FLOOR), color="tab:blue", lw=2.6, label="rear left force / 800 N"
-    )
+    axes[2].semilogy(run.time, np.maximum(split / split[0], FLOOR), color=BLUE, lw=2.6, label="rear left force / 800 N")
     axes[2].semilogy(run.time, lag, color="black", lw=1.0, ls="--", label="exp(−t V / σ₂)")
-    axes[2].semilogy(
-        run.time, np.maximum(seen, FLOOR), ".", color="tab:green", ms=2, label="outputs, largest [SI units]"
-    )
+    axes[2].semilogy(run.time, np.maximum(seen, FLOOR), ".", color=GREEN, ms=2, label="outputs, largest [SI units]")
     axes[2].set_ylim(FLOOR / 3, 1e4)
     axes[2].set_ylabel("difference of the motions [see legend]")
     axes[2].set_title("their difference", loc="left")

@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from studies.papers.ekf_ukf_lateral.claims_table import LIMIT
 from studies.papers.ekf_ukf_lateral.published_table import table_1
+from studies.report.colours import EXTENDED, RED, UNSCENTED
 from studies.study import Drawing
 
 
@@ -17,7 +18,7 @@ def printed_errors() -> Drawing:
     axes = figure.subplots(1, 2, sharey=True)
     place = np.arange(len(rows))
     for axis, title in zip(axes, ("mean", "deviation"), strict=True):
-        for k, (kind, color, label) in enumerate((("ekf", "tab:orange", "extended"), ("ukf", "tab:blue", "unscented"))):
+        for k, (kind, color, label) in enumerate((("ekf", EXTENDED, "extended"), ("ukf", UNSCENTED, "unscented"))):
             values = [getattr(row, title)[kind] for row in rows]
             bars = axis.bar(place + (k - 0.5) * 0.4, values, 0.38, color=color, label=f"{label} Kalman filter")
             labels = axis.bar_label(bars, fmt="%.4g", fontsize=7, padding=2)
@@ -27,12 +28,10 @@ def printed_errors() -> Drawing:
         axis.grid(visible=False, axis="x")
         axis.set_title("mean" if title == "mean" else "standard deviation", loc="left")
     average = np.mean([row.mean["ukf"] for row in rows])
-    axes[0].axhline(LIMIT, color="tab:red", lw=1.2)
-    axes[0].text(-0.5, LIMIT + 0.15, f"{LIMIT:g} % of the text", color="tab:red", fontsize=8)
-    axes[0].axhline(average, color="tab:blue", lw=1.0, ls=":")
-    axes[0].text(
-        -0.5, average - 0.75, f"unscented,\naverage {average:.2f} %", color="tab:blue", fontsize=8, va="center"
-    )
+    axes[0].axhline(LIMIT, color=RED, lw=1.2)
+    axes[0].text(-0.5, LIMIT + 0.15, f"{LIMIT:g} % of the text", color=RED, fontsize=8)
+    axes[0].axhline(average, color=UNSCENTED, lw=1.0, ls=":")
+    axes[0].text(-0.5, average - 0.75, f"unscented,\naverage {average:.2f} %", color=UNSCENTED, fontsize=8, va="center")
     axes[0].set_ylabel("error, share of the largest value [%]")
     axes[0].set_ylim(0, 16.5)
     axes[1].legend(loc="upper left")

@@ -7,11 +7,12 @@ from matplotlib.figure import Figure
 
 from estimators.sideslip import dugoff_force
 from studies.papers.ekf_ukf_lateral.equations import SPEED, single_track_poles, step_response
+from studies.report.colours import BLUE, GREEN, ORANGE, RED
 from studies.study import Drawing
 from synthesis.models.catalogue.four_wheel import SUBSTITUTES
 from synthesis.polynomials.matrix import FloatArray
 
-COLOURS = ("tab:blue", "tab:orange", "tab:green")
+COLOURS = (BLUE, ORANGE, GREEN)
 STIFFNESS = SUBSTITUTES["front_stiffness"].value  # N/rad, one tire
 
 
@@ -60,7 +61,7 @@ def sign_of_the_force() -> Drawing:
     figure = Figure(figsize=(9.2, 3.5), layout="constrained")
     left, right = figure.subplots(1, 2)
     speed = np.linspace(5.0, 40.0, 141)
-    for sign, color, label in ((1, "tab:blue", "plus (corrected)"), (-1, "tab:red", "minus (as printed)")):
+    for sign, color, label in ((1, BLUE, "plus (corrected)"), (-1, RED, "minus (as printed)")):
         poles = single_track_poles(sign, speed)
         left.plot(speed, poles[:, 0], color=color, lw=1.6, label=label)
         left.plot(speed, poles[:, 1], color=color, lw=1.6)

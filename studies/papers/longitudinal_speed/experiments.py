@@ -7,9 +7,11 @@ from functools import partial
 
 from estimators.forces import UnknownInputForceObserver, WheelForceFilter
 from estimators.vehicle import CORNERS, VehicleParameters
+from studies.experiments.driven import driven_part
 from studies.experiments.forces import Driven, force_part
+from studies.experiments.motion import Moved, motion_part
 from studies.experiments.speed import Drive, speed_part
-from studies.study import Part
+from studies.papers.longitudinal_speed.driven_tests import driven_tests_part
 
 
 def _printed(
@@ -39,7 +41,11 @@ ROWS = (
 )
 """Table II."""
 
-FIG_6 = (Driven("p2-throttle-brake-low", "alternating throttle and brake, friction 0.3 (Fig. 6a)"),)
+FIG_6 = (
+    Driven("p2-throttle-brake-low", "alternating throttle and brake, friction 0.3 (Fig. 6a)"),
+    Driven("p2-acceleration-in-turn-dry", "acceleration in a turn, dry (Fig. 6b)"),
+    Driven("p2-acceleration-in-turn-low", "acceleration in a turn, friction 0.25 (Fig. 6c)"),
+)
 FIG_9 = (
     Drive("p2-step-steer-dry", "step steer, dry"),
     Drive("p2-turn-throttle-dry", "full throttle in a turn, dry"),
@@ -66,35 +72,57 @@ def _unknown_input(
     return {"longitudinal_force": UnknownInputForceObserver(car, sample_time, (*shape, 4))}
 
 
+MOTION = (
+    Moved("p2-steer-wet-dry", "Harsh steering, wet and dry (Fig. 7)", rear=True),
+    Moved("p2-double-lane-change-snow", "Double lane change, snow (Fig. 8)", rear=True),
+    Moved("p2-launch-wet-dry", "Launch, wet to dry, braking (Fig. 10)"),
+    Moved("p2-acceleration-in-turn-wet-dry", "Acceleration in a turn, wet to dry, braking (Fig. 10)"),
+    Moved("p2-brake-in-turn-snow", "Braking in a turn and accelerating, snow (Fig. 12)"),
+    Moved("p2-harsh-steering-ice", "Harsh steering, snow and ice (Fig. 12)"),
+)
+
 PARTS = (
-    Part(
+    driven_part(
         "table-2-driven",
         "Table II on the truth vehicle",
         partial(force_part, "table-2", ROWS, {"UKF": _unscented, "UIO": _unknown_input}),
         cost=120.0,
     ),
-    Part(
+    driven_part(
         "forces-fig-6",
-        "Fig. 6 on the truth vehicle: forces under alternating throttle and brake",
+        "Fig. 6 on the truth vehicle: forces under throttle and brake, and accelerating in a turn",
         partial(force_part, "fig-6", FIG_6, {"UKF": _unscented, "UIO": _unknown_input}),
         cost=40.0,
     ),
-    Part(
+    driven_part(
         "speed-fig-9",
         "Fig. 9 on the truth vehicle: step steer, throttle in a turn",
         partial(speed_part, "fig-9", FIG_9),
         cost=60.0,
     ),
-    Part(
+    driven_part(
         "speed-fig-10",
         "Figs. 10 and 11 on the truth vehicle: wet, then dry",
         partial(speed_part, "fig-10", FIG_10),
         cost=45.0,
+        quick=True,
     ),
-    Part(
+    driven_part(
         "speed-fig-12",
         "Figs. 12 and 13 on the truth vehicle: snow and ice",
         partial(speed_part, "fig-12", FIG_12),
         cost=55.0,
+    ),
+    driven_part(
+        "tests-driven",
+        "Figs. 1 to 3 on the truth vehicle: gramian and unknown start",
+        driven_tests_part,
+        cost=8.0,
+    ),
+    driven_part(
+        "motion",
+        "Figs. 7, 8, 10 and 12 on the truth vehicle: accelerations, yaw rate, rear wheels",
+        partial(motion_part, "motion", MOTION),
+        cost=5.0,
     ),
 )

@@ -12,7 +12,8 @@ from studies.papers.longitudinal_speed.claims_slip import LOWER, RATE, UPPER, VA
 from studies.papers.longitudinal_speed.covariance import MODES, steady_filter
 from studies.papers.longitudinal_speed.inputs import printed_numbers, printed_value, sample_time
 from studies.papers.longitudinal_speed.unknown_start import STRUCTURES
-from studies.report.canvas import BLUE, COLOURS, DASHES, GREY, ORANGE, RED, canvas, label, legend
+from studies.report.canvas import DASHES, canvas, label, legend
+from studies.report.colours import BLUE, CURVES, GREY, ORANGE, RED
 from studies.study import Drawing
 
 
@@ -20,7 +21,7 @@ def covariance_figure(points: int = 28) -> Drawing:
     """Velocity gain and slowest time constant over wheel speed for each reading of Q, both modes."""
     figure, axes = canvas(7.2, 3.8, 1, 2, sharex=True)
     speeds = np.linspace(5.0, 140.0, points)
-    for structure, colour in zip(STRUCTURES, COLOURS, strict=False):
+    for structure, colour in zip(STRUCTURES, CURVES, strict=False):
         for mode, dash in zip(MODES, DASHES, strict=False):
             found = [steady_filter(float(w), structure, mode) for w in speeds]
             name = f"S = {structure}, {mode.replace('_', ' ')}"

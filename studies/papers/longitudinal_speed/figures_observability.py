@@ -19,19 +19,8 @@ from studies.papers.longitudinal_speed.inputs import (
     slalom,
 )
 from studies.papers.longitudinal_speed.unknown_start import RAMP, SPEEDS, both_tests, two_states
-from studies.report.canvas import (
-    BLUE,
-    COLOURS,
-    DASHES,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    RED,
-    canvas,
-    label,
-    legend,
-)
+from studies.report.canvas import DASHES, canvas, label, legend
+from studies.report.colours import BLUE, CURVES, GREEN, GREY, ORANGE, PURPLE, RED
 from studies.study import Drawing
 from synthesis.polynomials.matrix import FloatArray
 
@@ -53,7 +42,7 @@ def rank_figure() -> Drawing:
     figure, axes = canvas(7.2, 4.4, 2, 1, sharex=True)
     top, bottom = axes[:, 0]
     for k, record in enumerate(drives()):
-        style = {"color": COLOURS[k], "linestyle": DASHES[k], "label": record.name}
+        style = {"color": CURVES[k], "linestyle": DASHES[k], "label": record.name}
         top.plot(record.time, record.speed, **style)
         bottom.step(record.time, gramian_rank(record) + 0.05 * (k - 1.5), where="post", **style)
     label(top, "", "wheel speed [rad/s]")

@@ -7,9 +7,11 @@ from functools import partial
 
 from estimators.pipeline import DifferentiatedPid
 from estimators.vehicle import VehicleParameters
+from studies.experiments.driven import MAGIC_FORMULA, driven_part
 from studies.experiments.forces import Driven, force_part
+from studies.experiments.motion import Moved, motion_part
 from studies.experiments.velocities import Printed, corner_observers, velocity_part
-from studies.study import Part
+from studies.papers.resilient_velocity.compliance_report import TESTS, compliance_part
 
 OBSERVERS = corner_observers("resilient-velocity")
 ROWS = (
@@ -25,23 +27,41 @@ def _pid(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) -> 
     return {"longitudinal_force": DifferentiatedPid(car, sample_time, (*shape, 4))}
 
 
+MOTION = (
+    Moved("p3-acceleration-in-turn-dry", "Acceleration in a turn, dry (Fig. 11)"),
+    Moved("p3-lane-change-snow", "Lane change, accelerating and braking, snow (Fig. 13)"),
+)
+
 PARTS = (
-    Part(
+    driven_part(
         "velocities",
         "Figs. 9, 11, 13 on the truth vehicle",
         partial(velocity_part, "velocities", ROWS, OBSERVERS),
         cost=80.0,
     ),
-    Part(
+    driven_part(
         "velocities-other-tire",
         "Figs. 9, 11, 13 on a tire that no estimator knows: Magic Formula with slip lag",
-        partial(velocity_part, "velocities-other-tire", ROWS, OBSERVERS, tire="magic-formula"),
+        partial(velocity_part, "velocities-other-tire", ROWS, OBSERVERS),
         cost=80.0,
+        tire=MAGIC_FORMULA,
     ),
-    Part(
+    driven_part(
         "normal-forces",
         "Fig. 14 on the truth vehicle: forces",
         partial(force_part, "forces", FORCES, {"PID": _pid}),
         cost=40.0,
+    ),
+    driven_part(
+        "compliance",
+        "Figs. 9, 10 and 12 on the truth vehicle: wheels, with and without the suspension compliance",
+        partial(compliance_part, "compliance", TESTS),
+        cost=60.0,
+    ),
+    driven_part(
+        "motion",
+        "Figs. 11 and 13 on the truth vehicle: accelerations and yaw rate",
+        partial(motion_part, "motion", MOTION),
+        cost=5.0,
     ),
 )

@@ -7,8 +7,9 @@ import numpy as np
 from analysis.dropout import drop_radius
 from studies.papers.resilient_velocity.claims_example3 import PRINTED_RADIUS, tustin, twenty_percent
 from studies.papers.resilient_velocity.drops import critical, harmless_from, radius
-from studies.papers.resilient_velocity.ink import COLOUR, GREY, SERIES, SPEED_LABEL, sheet
+from studies.papers.resilient_velocity.ink import COLOUR, SERIES, SPEED_LABEL, sheet
 from studies.papers.resilient_velocity.setting import DIRECTIONS, HIGHEST_SPEED, PRINTED, Setting
+from studies.report.colours import GREY, ORANGE
 from studies.study import Drawing
 
 SPEEDS = np.linspace(0.0, HIGHEST_SPEED, 561)
@@ -113,7 +114,7 @@ def map_figure(setting: Setting = PRINTED) -> Drawing:
         )
         axis.clabel(lines, fontsize=7)
         border = critical(setting, direction, SPEEDS)
-        axis.plot(SPEEDS, np.where(border < 1.0, border, np.nan), color="#e6550d", lw=2.0)
+        axis.plot(SPEEDS, np.where(border < 1.0, border, np.nan), color=ORANGE, lw=2.0)
         axis.set_xlabel(SPEED_LABEL)
         axis.set_title(direction, loc="left")
         axis.grid(visible=False)

@@ -8,8 +8,9 @@ from estimators.velocity import SuspensionCompliance
 from studies.papers.resilient_velocity.claims_friction import ROADS
 from studies.papers.resilient_velocity.claims_suspension import oscillator, table_of_estimator
 from studies.papers.resilient_velocity.friction import SPEED, peak, steady
-from studies.papers.resilient_velocity.ink import COLOUR, GREY, SERIES, sheet
+from studies.papers.resilient_velocity.ink import COLOUR, SERIES, sheet
 from studies.papers.resilient_velocity.setting import DIRECTIONS, PRINTED, Setting
+from studies.report.colours import GREY
 from studies.study import Drawing
 from synthesis.polynomials.matrix import FloatArray
 

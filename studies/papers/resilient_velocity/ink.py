@@ -1,4 +1,4 @@
-"""Colours and dashes of the figures: distinct in print and for the colour-blind, never told by colour alone."""
+"""Dashes of the figures: distinct in print and for the colour-blind, never told by colour alone."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-BLUE, RED, GREEN, ORANGE, PURPLE, GREY = "#0b62a4", "#c1272d", "#1b7f5c", "#e08214", "#7b3294", "0.45"
+from studies.report.colours import BLUE, GREEN, ORANGE, PURPLE, RED
+
 SERIES: tuple[tuple[str, Any], ...] = (
     (BLUE, "-"),
     (RED, (0, (6, 2))),

@@ -2,37 +2,56 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from studies.experiments.axle_report import AxleTest, axle_part
+from studies.experiments.driven import MAGIC_FORMULA, driven_part
+from studies.experiments.motion import Moved, motion_part
 from studies.papers.smo_ekf_sideslip.published_tables import MASS_SETTINGS, STIFFNESS_SETTINGS, printed
-from studies.study import Part, PartResult, Scope
+from studies.study import PartResult, Scope
 
 
-def slalom(scope: Scope) -> PartResult:
+def slalom(name: str, title: str, scope: Scope, tire: str) -> PartResult:
     """Tables 1, 3 and 5."""
-    test = AxleTest("p5-slalom", "Slalom", printed()["slalom"], 5.7, STIFFNESS_SETTINGS, MASS_SETTINGS)
-    return axle_part("slalom", test, scope)
+    test = AxleTest("p5-slalom", title, printed()["slalom"], 5.7, STIFFNESS_SETTINGS, MASS_SETTINGS)
+    return axle_part(name, test, scope, tire)
 
 
-def slalom_other_tire(scope: Scope) -> PartResult:
-    """Tables 1, 3 and 5 on the Magic Formula."""
-    test = AxleTest("p5-slalom", "Slalom, other tire", printed()["slalom"], 5.7, STIFFNESS_SETTINGS, MASS_SETTINGS)
-    return axle_part("slalom-other-tire", test, scope, "magic-formula")
-
-
-def roundabout(scope: Scope) -> PartResult:
+def roundabout(scope: Scope, tire: str) -> PartResult:
     """Tables 2 and 4."""
     return axle_part(
-        "roundabout", AxleTest("p5-roundabout", "Roundabout", printed()["roundabout"], 5.4, STIFFNESS_SETTINGS), scope
+        "roundabout",
+        AxleTest("p5-roundabout", "Roundabout", printed()["roundabout"], 5.4, STIFFNESS_SETTINGS),
+        scope,
+        tire,
     )
 
 
+MOTION = (
+    Moved("p5-slalom", "Slalom, dry (Fig. 5)", course=True),
+    Moved("p5-roundabout", "Roundabout, dry (Fig. 6)", course=True),
+)
+
 PARTS = (
-    Part("slalom-driven", "Tables 1, 3 and 5 on the truth vehicle: slalom", slalom, cost=60.0),
-    Part(
+    driven_part(
+        "slalom-driven",
+        "Tables 1, 3 and 5 on the truth vehicle: slalom",
+        partial(slalom, "slalom", "Slalom"),
+        cost=60.0,
+        quick=True,
+    ),
+    driven_part(
         "slalom-other-tire",
         "Tables 1, 3 and 5 on a tire with another shape: Magic Formula with slip lag",
-        slalom_other_tire,
+        partial(slalom, "slalom-other-tire", "Slalom, other tire"),
         cost=65.0,
+        tire=MAGIC_FORMULA,
     ),
-    Part("roundabout-driven", "Tables 2 and 4 on the truth vehicle: roundabout", roundabout, cost=70.0),
+    driven_part("roundabout-driven", "Tables 2 and 4 on the truth vehicle: roundabout", roundabout, cost=70.0),
+    driven_part(
+        "motion",
+        "Figs. 5 and 6 on the truth vehicle: path and accelerations",
+        partial(motion_part, "motion", MOTION),
+        cost=5.0,
+    ),
 )

@@ -10,6 +10,7 @@ from analysis.bounds_sliding_mode import OUTPUTS, PUBLISHED, smallest_zone_width
 from studies.papers.smo_ekf_sideslip.claims_gains import FINE
 from studies.papers.smo_ekf_sideslip.claims_sampling import NARROW, SAMPLE_TIME, WIDE, radius
 from studies.papers.smo_ekf_sideslip.error_motion import CAR, LARGEST, error_motion, split, split_tracking
+from studies.report.colours import BLUE, GREEN, ORANGE, RED
 from studies.study import Drawing
 
 RATE = 3.44  # 1/s, (A.12)
@@ -24,20 +25,20 @@ def convergence() -> Drawing:
     left, right = figure.subplots(1, 2)
     thin = slice(None, None, 20)
     for values, label, color in (
-        (path[:, 1], "front lateral", "tab:blue"),
-        (path[:, 2], "rear lateral", "tab:red"),
+        (path[:, 1], "front lateral", BLUE),
+        (path[:, 2], "rear lateral", RED),
         (path[:, 1] + path[:, 2], "their sum", "black"),
-        (path[:, 3], "longitudinal", "tab:green"),
+        (path[:, 3], "longitudinal", GREEN),
     ):
         left.plot(time[thin], values[thin] / 1e3, color=color, lw=1.5, label=label)
     left.set_ylabel("force error [kN]")
     left.set_xlabel("time [s]")
     left.legend()
-    right.semilogy(time[thin], moment[thin], color="tab:blue", lw=1.6, label="|L₁x₂ − L₂x₃| simulated")
+    right.semilogy(time[thin], moment[thin], color=BLUE, lw=1.6, label="|L₁x₂ − L₂x₃| simulated")
     start = moment[np.searchsorted(time, 0.2)]
     right.semilogy(time[thin], start * np.exp(-RATE * (time[thin] - 0.2)), color="black", ls="--", lw=1.0,
                    label=f"exp(−{RATE:g} t), (A.12)")  # fmt: skip
-    right.axhline(30.0, color="tab:red", lw=1.0, ls=":", label="limit of (A.4), 30 kN m")
+    right.axhline(30.0, color=RED, lw=1.0, ls=":", label="limit of (A.4), 30 kN m")
     right.set_ylabel("yaw moment error of the split [kN m]")
     right.set_xlabel("time [s]")
     right.set_ylim(0.1, 60.0)
@@ -64,8 +65,8 @@ def chatter() -> Drawing:
     for column, (widths, title) in enumerate(cases):
         path = error_motion(start, 2.0, SAMPLE_TIME, widths)
         time = SAMPLE_TIME * np.arange(1, len(path) + 1)
-        axes[0, column].plot(time, path[:, 0], color="tab:blue", lw=1.0)
-        axes[1, column].plot(time, path[:, 1] / 1e3, color="tab:red", lw=1.0)
+        axes[0, column].plot(time, path[:, 0], color=BLUE, lw=1.0)
+        axes[1, column].plot(time, path[:, 1] / 1e3, color=RED, lw=1.0)
         axes[0, column].set_title(title, loc="left")
         axes[1, column].set_xlabel("time [s]")
         if widths is not None:
@@ -110,17 +111,15 @@ def zone_widths(points: int = 121) -> Drawing:
     axes[0].set_ylabel("width of the lateral acceleration zone [m/s²]")
     figure.colorbar(mesh, ax=axes[0], label="log₁₀ of the spectral radius [1]", pad=0.02)
     slow = np.array([radius((w, 1.0, 1.0)) for w in yaw])
-    axes[1].semilogx(yaw, slow, color="tab:blue", lw=1.6, label="spectral radius at 1 m/s²")
+    axes[1].semilogx(yaw, slow, color=BLUE, lw=1.6, label="spectral radius at 1 m/s²")
     axes[1].axhline(1.0, color="black", lw=0.8)
     axes[1].axhline(
-        np.exp(-RATE * SAMPLE_TIME), color="tab:green", ls="--", lw=1.0, label="sliding motion, exp(−3.44 · 0.01)"
+        np.exp(-RATE * SAMPLE_TIME), color=GREEN, ls="--", lw=1.0, label="sliding motion, exp(−3.44 · 0.01)"
     )
     axes[1].axvline(limits[OUTPUTS[0]], color="0.5", ls=":", lw=1.0)
     critical = PUBLISHED[1] / (4.0 * RATE)
-    axes[1].axvline(critical, color="tab:red", ls=":", lw=1.0)
-    axes[1].text(
-        critical * 0.94, 1.045, f"critical damping\n{critical:.2f} rad/s", color="tab:red", fontsize=8, ha="right"
-    )
+    axes[1].axvline(critical, color=RED, ls=":", lw=1.0)
+    axes[1].text(critical * 0.94, 1.045, f"critical damping\n{critical:.2f} rad/s", color=RED, fontsize=8, ha="right")
     axes[1].set_xlim(yaw[0], yaw[-1])
     axes[1].set_ylim(0.9, 1.1)
     axes[1].set_xlabel("width of the yaw rate zone [rad/s]")
@@ -145,7 +144,7 @@ def tracking() -> Drawing:
     left, right = figure.subplots(1, 2, sharex=True)
     frequency = np.geomspace(0.02, 5.0, 200)
     span = CAR.front_axle_distance + CAR.rear_axle_distance
-    for width, color in ((0.05, "tab:orange"), (WIDE[0], "tab:blue"), (0.7, "tab:green")):
+    for width, color in ((0.05, ORANGE), (WIDE[0], BLUE), (0.7, GREEN)):
         share = split_tracking(frequency, width)
         left.loglog(frequency, share, color=color, lw=1.5, label=f"yaw rate zone {width:g} rad/s")
         force = CAR.yaw_inertia * 2.0 * np.pi * frequency * LARGEST[0] * share / span
@@ -165,8 +164,8 @@ def tracking() -> Drawing:
     left.legend(loc="lower right")
     for value, name in ((0.041 * LARGEST[1], "4.1 % of F_y1"), (0.022 * LARGEST[2], "2.2 % of F_y2")):
         amplitude = 0.5 * np.pi * value  # of a sine with this mean size
-        right.axhline(amplitude, color="tab:red", ls=":", lw=1.1)
-        right.text(5.0, amplitude * 0.9, f"mean {name} (Table 1)", color="tab:red", fontsize=8, ha="right", va="top")
+        right.axhline(amplitude, color=RED, ls=":", lw=1.1)
+        right.text(5.0, amplitude * 0.9, f"mean {name} (Table 1)", color=RED, fontsize=8, ha="right", va="top")
     return Drawing(
         "tracking",
         "What the proof of Appendix A leaves out: true forces that move. Left: share of the front-rear split that "

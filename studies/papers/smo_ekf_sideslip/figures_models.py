@@ -9,11 +9,12 @@ from matplotlib.figure import Figure
 
 from studies.papers.smo_ekf_sideslip.axle_drive import GRAVITY, SAMPLE_TIME, AxleDrive, published_car
 from studies.papers.smo_ekf_sideslip.observer_chain import ChainRun
+from studies.report.colours import BLUE, GREEN, ORANGE, PURPLE, RED
 from studies.study import Drawing
 from synthesis.polynomials.matrix import FloatArray
 
 THRESHOLD = 1000.0  # N, lambda_1; not printed
-ZONES = (("zones 1, 2: β₁F < 0", "tab:red"), ("zones 3, 4: |F| < λ₁", "tab:orange"), ("zones 5, 6", "tab:blue"))
+ZONES = (("zones 1, 2: β₁F < 0", RED), ("zones 3, 4: |F| < λ₁", ORANGE), ("zones 5, 6", BLUE))
 # Burckhardt's c1, c2, c3 as commonly tabulated (Burckhardt 1993; Kiencke and Nielsen 2005); P5 names the model, not the values.
 BURCKHARDT = {
     "dry asphalt": (1.2801, 23.99, 0.52),
@@ -43,7 +44,7 @@ def lateral_models() -> Drawing:
     slip = np.radians(np.linspace(0.0, 12.0, 241))
     figure = Figure(figsize=(7.2, 4.0), layout="constrained")
     axis = figure.subplots()
-    for road, color in zip(BURCKHARDT, ("tab:blue", "tab:orange", "tab:green", "tab:purple"), strict=True):
+    for road, color in zip(BURCKHARDT, (BLUE, ORANGE, GREEN, PURPLE), strict=True):
         axis.plot(
             np.degrees(slip), burckhardt_force(slip, road, load) / 1e3, color=color, lw=1.6, label=f"Burckhardt, {road}"
         )
@@ -62,11 +63,11 @@ def lateral_models() -> Drawing:
     axis.plot(
         np.degrees(slip),
         np.where(secant * slip / 1e3 < shown, secant * slip / 1e3, np.nan),
-        color="tab:red",
+        color=RED,
         lw=1.2,
         label="linear adaptive, through dry asphalt at 6°",
     )
-    axis.plot(6.0, secant * point / 1e3, "o", color="tab:red", ms=5)
+    axis.plot(6.0, secant * point / 1e3, "o", color=RED, ms=5)
     axis.set_xlim(0, 12)
     axis.set_ylim(0, 13)
     axis.set_xlabel("front slip angle β₁ [deg]")
@@ -100,7 +101,7 @@ def zones(drive: AxleDrive, run: ChainRun) -> Drawing:
     line = np.array([-5.5, 5.5])
     for value, style, name in (
         (stiffness[0], {"color": "black", "ls": "--"}, "at the start"),
-        (stiffness[-1], {"color": "tab:green"}, "at the end"),
+        (stiffness[-1], {"color": GREEN}, "at the end"),
     ):
         left.plot(line, value * np.radians(line), lw=1.2, label=f"(C₁ + ΔC₁) β₁ {name}", **style)
     for sign in (-1, 1):

@@ -9,9 +9,10 @@ from studies.papers.smo_ekf_sideslip.axle_drive import LINEAR, SAMPLE_TIME, Axle
 from studies.papers.smo_ekf_sideslip.observer_chain import ChainRun
 from studies.papers.smo_ekf_sideslip.published_tables import MASS_SETTINGS, STIFFNESS_SETTINGS
 from studies.papers.smo_ekf_sideslip.stiffness_rank import third_singular_value
+from studies.report.colours import BLUE, GREEN, ORANGE, RED
 from studies.study import Drawing
 
-COLOURS = ("tab:orange", "tab:blue", "tab:green")
+COLOURS = (ORANGE, BLUE, GREEN)
 TRUTH = {"color": "black", "lw": 2.2, "label": "true"}
 
 
@@ -104,7 +105,7 @@ def stiffness_observability() -> Drawing:
     """Third singular value in a slalom and in a steady turn."""
     figure = Figure(figsize=(9.2, 3.7), layout="constrained")
     left, right = figure.subplots(1, 2, sharex=True)
-    for steering, name, color in ((slalom, "slalom", "tab:blue"), (steady_turn, "steady turn", "tab:red")):
+    for steering, name, color in ((slalom, "slalom", BLUE), (steady_turn, "steady turn", RED)):
         drive = axle_drive(steering, seconds=14.0, friction=LINEAR)
         signals = {"sideslip": drive.sideslip, "steering_angle": drive.steering, "yaw_rate": drive.yaw_rate,
                    "speed": drive.speed, "front_force_x": drive.drive}  # fmt: skip

@@ -101,9 +101,9 @@ STUDY = Study(
         Part("observability", "Observability of both models", observability, cost=2.0),
         Part("tables", "Tables 1 to 5 against the text", printed, cost=0.2),
         Part("fixed-stiffness", "In which direction a fixed stiffness errs", fixed_stiffness, cost=2.0),
-        Part("stiffness-settings", "Fixed and adaptive stiffness in a slalom", stiffness, cost=9.0),
+        Part("stiffness-settings", "Fixed and adaptive stiffness in a slalom", stiffness, cost=9.0, quick=False),
         Part("zones", "Zones of the sideslip filter", zone_plane, cost=2.0),
-        Part("mass-settings", "A wrong mass in a slalom", mass, cost=5.0),
+        Part("mass-settings", "A wrong mass in a slalom", mass, cost=5.0, quick=False),
         *experiments.PARTS,
     ),
 )
