@@ -102,9 +102,8 @@ class BodyResponse(Memory):
         return self._advance(before)
 
     def _advance(self, before: list[float]) -> list[float]:
-        columns = (before, self.deflection.reshape(-1).tolist(), self.speed.reshape(-1).tolist())
-        moved = [_moved(mode, x, v, force) for mode, force, x, v in zip(self._modes, *columns, strict=True)]
-        x, v, out = zip(*moved, strict=True)
+        columns = (self._modes, self.deflection.reshape(-1).tolist(), self.speed.reshape(-1).tolist(), before)
+        x, v, out = zip(*map(_moved, *columns), strict=True)
         self.deflection, self.speed = np.array(x).reshape(self.input.shape), np.array(v).reshape(self.input.shape)
         return list(out)
 

@@ -91,13 +91,16 @@ class _Transfer:
         tracks = np.array([vehicle.front_track, vehicle.front_track, vehicle.rear_track, vehicle.rear_track])
         self.across = np.array([-1.0, 1.0, -1.0, 1.0]) / tracks
 
-    def __call__(self, ax: FloatArray, lean: FloatArray, az: FloatArray) -> FloatArray:
-        return self.of(ax[..., None], lean[..., None], az[..., None])
+        self._wheels = list(zip(self.up.tolist(), self.along.tolist(), self.across.tolist(), strict=True))
 
-    def of(self, ax: FloatArray | float, lean: FloatArray | float, az: FloatArray | float) -> FloatArray:
-        """The same of one car's numbers."""
-        load: FloatArray = (self.up * az + self.along * ax) * (0.5 + self.across * lean)
+    def __call__(self, ax: FloatArray, lean: FloatArray, az: FloatArray) -> FloatArray:
+        load: FloatArray = self.up * az[..., None] + self.along * ax[..., None]
+        load *= 0.5 + self.across * lean[..., None]
         return load
+
+    def of(self, ax: float, lean: float, az: float) -> list[float]:
+        """The same of one car's numbers."""
+        return [(up * az + along * ax) * (0.5 + across * lean) for up, along, across in self._wheels]
 
 
 def without_negative(load: FloatArray) -> FloatArray:
@@ -168,7 +171,8 @@ class VerticalLoads(Renewable):
         if self._single and not self._any_renewed:
             calm = self._calm(ax, ay, az, pitch, roll)
             if calm is not None:
-                return self._limited(calm, flags)
+                load = np.array(calm).reshape(*shape, 4)
+                return LoadStep(load, self._nowhere.copy(), flags) if min(calm) >= 0.0 else self._limited(load, flags)
         both, missing = self.along(pair(ax, ay, shape, "ax", "ay"))
         if missing is not None:
             raise_flag(flags, any_missing(missing, shape), Flag.MISSING_MEASUREMENT)
@@ -199,8 +203,8 @@ class VerticalLoads(Renewable):
         az: npt.ArrayLike | None,
         pitch: npt.ArrayLike | None,
         roll: npt.ArrayLike | None,
-    ) -> FloatArray | None:
-        """The loads of one car, in plain numbers; None where something is missing."""
+    ) -> list[float] | None:
+        """The loads of one car, in plain numbers and not limited; None where something is missing."""
         shape = self.batch_shape
         along, across = number(ax, shape, "ax"), number(ay, shape, "ay")
         up = GRAVITY if az is None else number(az, shape, "az")
@@ -217,7 +221,7 @@ class VerticalLoads(Renewable):
         if self.dynamic:
             along, across = self.response.one([along, across])
         shift = self.vehicle.cg_height * across / max(up, LEAST_GRAVITY) + self.vehicle.roll_center_height * sine
-        return self._transfer.of(along, shift, up).reshape(*shape, 4)
+        return self._transfer.of(along, shift, up)
 
     def _limited(self, load: FloatArray, flags: FlagArray) -> LoadStep:
         if np.minimum.reduce(load, None) >= 0.0:

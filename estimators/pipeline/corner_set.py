@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,13 +14,14 @@ from estimators.faults import FlagArray
 from estimators.interpolate import FloatArray
 from estimators.schedule import GainSchedule
 from estimators.signals import FilteredDerivative
-from estimators.signals.checks import batch, bounded, entries, mask
+from estimators.signals.checks import LIMIT, batch, entries, mask
 from estimators.signals.memory import Memory
 from estimators.vehicle import VehicleParameters
-from estimators.velocity.corners import CornerVectors, corner_acceleration, corner_velocity, tire_frame, vehicle_frame
+from estimators.velocity.arithmetic import Number, Signals, arithmetic, kept_signals
+from estimators.velocity.corners import rotated, tire_motion
 from estimators.velocity.lpv import LpvVelocityObserver
-from estimators.velocity.mapping import SlipWeights, to_centre
-from estimators.velocity.slip import side_slip_angle, slip_ratio
+from estimators.velocity.mapping import SlipWeights, weighed
+from estimators.velocity.slip import slips
 
 
 class CornerSetStep(NamedTuple):
@@ -38,7 +41,8 @@ class CornerObservers(Memory):
     """A longitudinal observer at every corner, a lateral one where a schedule is given, and their mapping to the car.
 
     u_x = R_e w' - v_xt', u_y = -v_yt' with the velocities of the last step in the accelerations, P1 section 6. Without a
-    lateral schedule V_y is what `step` is told. Axles are weighed by slip (`SlipWeights`), or equally.
+    lateral schedule V_y is what `step` is told. Axles are weighed by slip (`SlipWeights`), or equally. One car runs on
+    plain numbers, several on arrays, by the same formulas (`arithmetic`).
 
     Args:
         vehicle: radii and lever arms.
@@ -75,10 +79,15 @@ class CornerObservers(Memory):
         self.across = LpvVelocityObserver(lateral, four) if lateral is not None else None
         self.slope = FilteredDerivative(self.sample_time, lag, (*self.batch_shape, 9))
         self.parts: tuple[str, ...] = ("along", "slope") if lateral is None else ("along", "across", "slope")
-        self.vx: FloatArray = np.full(self.batch_shape, np.nan)
-        self.vy: FloatArray = np.zeros(self.batch_shape)
-        self.slip: FloatArray = np.zeros(four)
-        self.angle: FloatArray = np.zeros(four)
+        self._count = math.prod(self.batch_shape)
+        self._kit = kit = arithmetic((self._count,))
+        lever_x, lever_y = vehicle.corner_x.tolist(), vehicle.corner_y.tolist()
+        self._wheels = kit.signals(vehicle.radii), kit.signals(lever_x), kit.signals(lever_y)
+        self.vx: Number = kit.full(math.nan)
+        self.vy: Number = kit.full(0.0)
+        nothing = kit.stacked([kit.full(0.0)] * 4)
+        self.slip: Signals = nothing  # slips and angles of the last sample, where weights ask for them
+        self.angle: Signals = nothing
 
     def step(
         self,
@@ -98,41 +107,65 @@ class CornerObservers(Memory):
         Raises:
             EstimatorError: another shape, or not numbers.
         """
-        shape, four = self.batch_shape, (*self.batch_shape, 4)
-        w, turned = entries(wheel_speed, four, "wheel_speed"), entries(steer, four, "steer")
-        raw = np.concatenate([w, turned, entries(yaw_rate, shape, "yaw_rate")[..., None]], axis=-1)
-        rate = self.slope.step(raw)
-        angle, turn = rate.value[..., 4:8], rate.value[..., 8]
-        surface = self.vehicle.radius * rate.value[..., :4]
-        start = np.isnan(self.vx)
-        vx = np.where(start, surface.mean(axis=-1), self.vx) if start.any() else self.vx
-        left = self.vy if self.across is not None else entries(vy, shape, "vy")
-        a, b = (np.where(bounded(v), v, 0.0) for v in (entries(ax, shape, "ax"), entries(ay, shape, "ay")))
-        pull = corner_acceleration(
-            self.vehicle, a, b, turn, rate.derivative[..., 8], vx, left, angle, rate.derivative[..., 4:8]
+        kit, shape, choose = self._kit, self.batch_shape, self._kit.where
+        four, radius, *levers = (*shape, 4), *self._wheels
+        w = entries(wheel_speed, four, "wheel_speed")
+        speed, angles = kit.rows(w, 4), kit.wheels(steer, shape, "steer")
+        rate = self.slope.step(kit.table((speed, angles, (kit.car(yaw_rate, shape, "yaw_rate"),)), shape))
+        held, slope = kit.rows(rate.value, 9), kit.rows(rate.derivative, 9)
+        turn, swing = held[8], slope[8]
+        left = self.vy if self.across is not None else kit.car(vy, shape, "vy")
+        vx = self._started(held)
+        given = kit.car(ax, shape, "ax"), kit.car(ay, shape, "ay")
+        own_x, own_y = (choose(abs(value) <= LIMIT, value, 0.0) for value in given)
+        forward, leftward = own_x + turn * left, own_y - turn * vx
+
+        def driven(
+            w: Number, angle: Number, w_slope: Number, swivel: Number, R: float, x: float, y: float
+        ) -> tuple[Number, ...]:
+            """Sine and cosine of the steering, v_yt, and the inputs of both observers (`corner_acceleration`)."""
+            sine, cosine = kit.sin(angle), kit.cos(angle)
+            velocity = vx - turn * y, left + turn * x
+            acceleration = forward - swing * y, leftward + swing * x
+            _, beside, pull_x, pull_y = tire_motion(velocity, acceleration, sine, cosine, swivel)
+            return sine, cosine, beside, R * w_slope - pull_x, -pull_y
+
+        sine, cosine, beside, push_x, push_y = kit.each(
+            driven, held[:4], held[4:8], slope[:4], slope[4:8], radius, *levers
         )
-        mu_x, mu_y = entries(longitudinal_use, four, "longitudinal_use"), entries(lateral_use, four, "lateral_use")
-        found = self.along.step(self.vehicle.radius * rate.derivative[..., :4] - pull.x, mu_x, w)
-        missing = ~bounded(w)
-        relative, flags = found.estimate[..., 1], found.flags
-        forward = np.where(missing, np.nan, surface - relative)
+        along = self.along.step(kit.table((push_x,), shape), entries(longitudinal_use, four, "longitudinal_use"), w)
+        relative, flags = along.estimate[..., 1], along.flags
         if self.across is not None:
-            side = self.across.step(-pull.y, mu_y, w)
-            beside = -side.estimate[..., 1]
-            flags = flags | side.flags
-        else:
-            beside = tire_frame(corner_velocity(self.vehicle, vx, left, turn), angle).y
-        corner = vehicle_frame(CornerVectors(forward, beside), angle)
-        share = self._weights()
-        centre = to_centre(self.vehicle, corner, turn, *share)
-        self.vx = np.where(np.isfinite(centre.vx), centre.vx, vx)
-        self.vy = np.where(np.isfinite(centre.vy), centre.vy, left)
-        self.slip = np.where(missing, 0.0, slip_ratio(surface, np.where(missing, 0.0, forward)))
-        self.angle = side_slip_angle(np.where(missing, 0.0, forward), beside)
-        spin = turn[..., None]
-        own_x, own_y = corner.x + spin * self.vehicle.corner_y, corner.y - spin * self.vehicle.corner_x
+            side = self.across.step(kit.table((push_y,), shape), entries(lateral_use, four, "lateral_use"), w)
+            beside, flags = kit.rows(-side.estimate[..., 1], 4), flags | side.flags
+
+        def placed(
+            given: Number,
+            w: Number,
+            slip_speed: Number,
+            beside: Number,
+            sine: Number,
+            cosine: Number,
+            R: float,
+            x: float,
+            y: float,
+        ) -> tuple[Number, ...]:
+            """V_x, V_y of the centre of gravity as the corner sees them, and v_xt, NaN without a wheel speed."""
+            ahead = choose(abs(given) <= LIMIT, R * w - slip_speed, math.nan)
+            corner_x, corner_y = rotated(ahead, beside, -sine, cosine)
+            return corner_x + turn * y, corner_y - turn * x, ahead
+
+        seen_x, seen_y, ahead = kit.each(
+            placed, speed, held[:4], kit.rows(relative, 4), beside, sine, cosine, radius, *levers
+        )
+        share_x, share_y = self._shares()
+        found_x, found_y = weighed(kit, seen_x, share_x)[0], weighed(kit, seen_y, share_y)[0]
+        self.vx, self.vy = choose(kit.known(found_x), found_x, vx), choose(kit.known(found_y), found_y, left)
+        if self.weights is not None:
+            self.slip, self.angle = kit.each(self._slips, held[:4], ahead, beside, radius)
+        told = kit.table(((self.vx, self.vy), seen_x, seen_y), shape)
         return CornerSetStep(
-            self.vx.copy(), self.vy.copy(), own_x, own_y, relative, found.innovation, found.used, flags
+            told[..., 0], told[..., 1], told[..., 2:6], told[..., 6:], relative, along.innovation, along.used, flags
         )
 
     def reset(self, where: npt.ArrayLike | None = None) -> None:
@@ -143,10 +176,36 @@ class CornerObservers(Memory):
             if observer is not None:
                 observer.reset(corners)
         self.slope.reset(np.repeat(chosen[..., None], 9, axis=-1))
-        self.vx, self.vy = np.where(chosen, np.nan, self.vx), np.where(chosen, 0.0, self.vy)
-        self.slip, self.angle = np.where(corners, 0.0, self.slip), np.where(corners, 0.0, self.angle)
+        kit, here = self._kit, self._kit.rows(chosen, 1)[0]
+        self.vx, self.vy = kit.where(here, math.nan, self.vx), kit.where(here, 0.0, self.vy)
+        self.slip, self.angle = kit.each(
+            lambda slip, angle: (kit.where(here, 0.0, slip), kit.where(here, 0.0, angle)), self.slip, self.angle
+        )
 
-    def _weights(self) -> tuple[Any, Any]:
+    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+        super()._take(saved)
+        self.vx, self.vy = (self._kit.own(saved[name].copy()) for name in ("vx", "vy"))
+        self.slip, self.angle = (kept_signals(saved[name], self._count == 1) for name in ("slip", "angle"))
+
+    def _started(self, wheel_speed: Signals) -> Number:
+        """V_x of the last sample, m/s; the mean of the wheels' surface speeds at the first one."""
+        known = self._kit.known(self.vx)
+        if not self._kit.some(self._kit.no(known)):
+            return self.vx
+        (surface,) = self._kit.each(lambda w, R: (R * w,), wheel_speed[:4], self._wheels[0])
+        return self._kit.where(known, self.vx, sum(surface) / 4.0)
+
+    def _shares(self) -> tuple[Number, Number]:
+        """W_f along and across, by the slips and slip angles of the last sample."""
         if self.weights is None:
             return 0.5, 0.5
-        return self.weights.front(self.slip), self.weights.front(self.angle)
+        sums = ((abs(v[0]) + abs(v[1]), abs(v[2]) + abs(v[3])) for v in (self.slip, self.angle))
+        along, across = (self.weights.of_axles(self._kit, *axles) for axles in sums)
+        return along, across
+
+    def _slips(self, w: Number, ahead: Number, beside: Number, radius: float) -> tuple[Number, Number]:
+        """Slip ratio and slip angle of a corner; no slip, and the car not moving, without a wheel speed."""
+        known = self._kit.known(ahead)
+        ahead = self._kit.where(known, ahead, 0.0)
+        slip, angle = slips(self._kit, radius * w, ahead, beside)
+        return self._kit.where(known, slip, 0.0), angle

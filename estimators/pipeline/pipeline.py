@@ -161,7 +161,8 @@ class EstimationPipeline(Memory):
         if self.sideslip is not None:
             bare = np.asarray(angle), np.asarray(turn), moved.vx, np.asarray(own_x), np.asarray(own_y)
             beside = self.sideslip.step(*bare, agreed.force, loads.load, lateral.axle_force)
-        lost = kit.own(np.logical_or.reduce(unknown, -1))
+        open_ = kit.rows(unknown, 4)
+        lost = open_[0] | open_[1] | open_[2] | open_[3]
         consistency = self.checks(agreed, lateral, loads, moved, corners, signals.az, lost, late)
         self.bias = kit.rows(moved.sensor_bias, 3)[:2]
         self.front = kit.own(lateral.axle_force[..., 0])

@@ -12,7 +12,7 @@ from estimators.faults import BoolArray
 from estimators.interpolate import FloatArray
 
 LIMIT = 1e100  # a magnitude beyond it is treated as not finite: no physical quantity, and products would overflow
-_SMALL = 4096  # entries
+_FEW, _SMALL = 6, 4096  # entries
 
 
 def entries(value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> FloatArray:
@@ -72,8 +72,13 @@ def bounded(value: FloatArray) -> BoolArray:
 def quiet(value: FloatArray) -> bool:
     """Whether all entries are `bounded`: what every step asks first. False for NaN.
 
-    One dot product for small arrays; for large ones BLAS would start threads, and extrema are as fast.
+    Plain numbers for a handful; one dot product for small arrays; for large ones BLAS would start threads, and extrema are
+    as fast.
     """
+    if value.ndim == 0:
+        return bool(abs(value.item()) <= LIMIT)
+    if value.ndim == 1 and value.size <= _FEW:
+        return bool(sum(map(abs, value.tolist())) <= LIMIT)
     if value.size <= _SMALL:
         return bool(np.vdot(value, value) <= LIMIT * LIMIT)
     return bool(np.minimum.reduce(value, None) >= -LIMIT and np.maximum.reduce(value, None) <= LIMIT)

@@ -18,7 +18,10 @@ from estimators.signals.memory import Memory
 
 
 class DerivativeStep(NamedTuple):
-    """Leading axes are those of the batch."""
+    """Leading axes are those of the batch.
+
+    Where nothing is wrong, `fresh`, `used` and `flags` are read-only arrays that steps share.
+    """
 
     value: FloatArray  # the signal, held at its last finite value
     derivative: FloatArray  # per second; always finite
@@ -80,6 +83,8 @@ class FilteredDerivative(Memory):
         self._simple = hold == 1 and stale_after is None  # every finite sample is new
         self._flowing = False  # the last sample was new everywhere, and has a slope
         self._all: BoolArray = np.ones(self.batch_shape, dtype=np.bool_)
+        self._no_flags: FlagArray = np.zeros(self.batch_shape, dtype=np.int32)
+        self._all.flags.writeable = self._no_flags.flags.writeable = False
 
     def step(self, value: npt.ArrayLike) -> DerivativeStep:
         """Takes one sample of the batch shape.
@@ -92,8 +97,7 @@ class FilteredDerivative(Memory):
             slope = (array - self.reading) * ((1.0 - self._keep) / self.sample_time)
             self.slope = self._keep * self.slope + slope
             self.reading = self.value = array.copy()
-            flags: FlagArray = np.zeros(self.batch_shape, dtype=np.int32)
-            return DerivativeStep(array.copy(), self.slope.copy(), self._all.copy(), self._all.copy(), flags)
+            return DerivativeStep(array.copy(), self.slope.copy(), self._all, self._all, self._no_flags)
         seen = self.freshness.step(array)
         return self._careful(array, seen.fresh, seen.flags)
 

@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from estimators.signals.checks import entries, number
+
 Number = Any
 """A float, int or bool of one car, or an array of the batch shape."""
 Signals = Any
@@ -36,6 +38,7 @@ class Arithmetic:
     minimum: Any
     sign: Any
     no: Any  # negation of a condition
+    known: Any  # whether a number is finite
     some: Any  # whether a condition holds for any car
 
     def full(self, value: float | bool) -> Number:
@@ -45,6 +48,22 @@ class Arithmetic:
     def own(self, value: npt.ArrayLike) -> Number:
         """A signal of the batch shape as a `Number`."""
         raise NotImplementedError
+
+    def car(self, value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> Number:
+        """An argument of the batch shape `shape`, or one number for all cars.
+
+        Raises:
+            EstimatorError: another shape, or not numbers.
+        """
+        raise NotImplementedError
+
+    def wheels(self, value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> Signals:
+        """An argument (*shape, 4), or one number for all wheels.
+
+        Raises:
+            EstimatorError: another shape, or not numbers.
+        """
+        return self.rows(entries(value, (*shape, 4), what), 4)
 
     def each(self, formula: Callable[..., tuple[Number, ...]], *signals: Signals) -> tuple[Signals, ...]:
         """The results of a formula for each entry of the signals, which are as long as each other."""
@@ -92,7 +111,7 @@ class OneCar(Arithmetic):
 
     exp, sqrt, sin, cos, tan, atan = map(staticmethod, (math.exp, math.sqrt, math.sin, math.cos, math.tan, math.atan))
     where, maximum, minimum = staticmethod(_choose), staticmethod(_larger), staticmethod(_smaller)
-    sign, no, some = staticmethod(_sign), staticmethod(_not), staticmethod(bool)
+    sign, no, known, some = map(staticmethod, (_sign, _not, math.isfinite, bool))
 
     def full(self, value: float | bool) -> Number:
         """`value` itself."""
@@ -101,6 +120,10 @@ class OneCar(Arithmetic):
     def own(self, value: npt.ArrayLike) -> Number:
         """The only entry."""
         return value if isinstance(value, float) else np.asarray(value).item()
+
+    def car(self, value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> Number:
+        """A float."""
+        return number(value, shape, what)
 
     def each(self, formula: Callable[..., tuple[Number, ...]], *signals: Signals) -> tuple[Signals, ...]:
         """One after the other."""
@@ -130,6 +153,7 @@ class ManyCars(Arithmetic):
 
     exp, sqrt, sin, cos, tan, atan = np.exp, np.sqrt, np.sin, np.cos, np.tan, np.arctan
     where, maximum, minimum, sign, no = staticmethod(np.where), np.maximum, np.minimum, np.sign, np.logical_not
+    known = np.isfinite
 
     def __init__(self, shape: tuple[int, ...]) -> None:
         self.shape = shape
@@ -146,6 +170,10 @@ class ManyCars(Arithmetic):
     def own(self, value: npt.ArrayLike) -> Number:
         """The array."""
         return np.asarray(value)
+
+    def car(self, value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> Number:
+        """An array of the kit's own shape."""
+        return entries(value, shape, what).reshape(self.shape)
 
     def each(self, formula: Callable[..., tuple[Number, ...]], *signals: Signals) -> tuple[Signals, ...]:
         """All at once."""

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from estimators.interpolate import FloatArray
 from estimators.vehicle import VehicleParameters
+from estimators.velocity.arithmetic import Number
 
 
 class CornerVectors(NamedTuple):
@@ -21,6 +22,24 @@ class CornerVectors(NamedTuple):
 
     x: FloatArray
     y: FloatArray
+
+
+def rotated(x: Number, y: Number, sine: Number, cosine: Number) -> tuple[Number, Number]:
+    """A vector of the vehicle frame in that of a tire; of numbers or of arrays. The inverse takes -sine."""
+    return x * cosine + y * sine, y * cosine - x * sine
+
+
+def tire_motion(
+    velocity: tuple[Number, Number],
+    acceleration: tuple[Number, Number],
+    sine: Number,
+    cosine: Number,
+    steer_rate: Number,
+) -> tuple[Number, Number, Number, Number]:
+    """v_xt, v_yt and their time derivatives from V_xc, V_yc and theirs; of numbers or of arrays."""
+    along, across = rotated(*velocity, sine, cosine)
+    pull_x, pull_y = rotated(*acceleration, sine, cosine)
+    return along, across, pull_x + steer_rate * across, pull_y - steer_rate * along
 
 
 def corner_velocity(
@@ -34,8 +53,7 @@ def corner_velocity(
 def tire_frame(vector: CornerVectors, steer: npt.ArrayLike) -> CornerVectors:
     """Turns vectors of the vehicle frame into those of the tires, steered by `steer` (..., 4) rad."""
     angle = np.asarray(steer, dtype=np.float64)
-    sine, cosine = np.sin(angle), np.cos(angle)
-    return CornerVectors(vector.x * cosine + vector.y * sine, vector.y * cosine - vector.x * sine)
+    return CornerVectors(*rotated(vector.x, vector.y, np.sin(angle), np.cos(angle)))
 
 
 def vehicle_frame(vector: CornerVectors, steer: npt.ArrayLike) -> CornerVectors:
@@ -72,14 +90,10 @@ def corner_acceleration(
     """
     a, b, turn, swing = (_cornered(value) for value in (ax, ay, yaw_rate, yaw_acceleration))
     forward, left = _cornered(vx), _cornered(vy)
-    body = CornerVectors(
-        a + turn * left - swing * vehicle.corner_y,
-        b - turn * forward + swing * vehicle.corner_x,
-    )
-    rotated = tire_frame(body, steer)
-    centre = tire_frame(corner_velocity(vehicle, vx, vy, yaw_rate), steer)
-    rate = np.asarray(steer_rate, dtype=np.float64)
-    return CornerVectors(rotated.x + rate * centre.y, rotated.y - rate * centre.x)
+    body = a + turn * left - swing * vehicle.corner_y, b - turn * forward + swing * vehicle.corner_x
+    angle, rate = np.asarray(steer, dtype=np.float64), np.asarray(steer_rate, dtype=np.float64)
+    velocity = corner_velocity(vehicle, vx, vy, yaw_rate)
+    return CornerVectors(*tire_motion(velocity, body, np.sin(angle), np.cos(angle), rate)[2:])
 
 
 def _cornered(value: npt.ArrayLike) -> FloatArray:

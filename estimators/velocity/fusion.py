@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from estimators.errors import EstimatorError
 from estimators.faults import Flag
-from estimators.signals.checks import batch, entries, mask, number, setting
+from estimators.signals.checks import batch, mask, setting
 from estimators.signals.memory import Memory
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity import lateral_fusion as lateral
@@ -110,9 +110,10 @@ class VelocityFusion(Memory):
             EstimatorError: another shape, or not numbers.
         """
         kit, along, across = self._kit, self._along, self._across
-        wheels, turned = self._four(wheel_speed, "wheel_speed"), self._four(steer, "steer")
+        shape = self.batch_shape
+        wheels, turned = kit.wheels(wheel_speed, shape, "wheel_speed"), kit.wheels(steer, shape, "steer")
         named = ((ax, "ax"), (ay, "ay"), (yaw_rate, "yaw_rate"))
-        inertial = kit.stacked([self._one(value, name) for value, name in named])
+        inertial = kit.stacked([kit.car(value, shape, name) for value, name in named])
         dt, odd = self._elapsed(elapsed)
         seen = self.screen(inertial, wheels, turned, dt)
         self._begin(seen)
@@ -146,7 +147,7 @@ class VelocityFusion(Memory):
         self._guard(seen, lost)
         judged = Judged(slipping, wheel, axle, standing, self.standing.stopped(seen.silent))
         geometry = (sine, course[0], *self._places)
-        return reported(kit, self.batch_shape, along, across, seen, geometry, judged, flags)
+        return reported(kit, shape, along, across, seen, geometry, judged, flags)
 
     def reset(self, where: npt.ArrayLike | None = None, vx: npt.ArrayLike = np.nan, vy: npt.ArrayLike = 0.0) -> None:
         """Forgets the entries `where` (mask of the batch shape; None: all) and starts them at `vx`, `vy`, m/s.
@@ -156,8 +157,9 @@ class VelocityFusion(Memory):
         Raises:
             EstimatorError: a mask or speeds of another shape.
         """
-        chosen = self._kit.rows(mask(where, self.batch_shape, "where"), 1)[0]
-        asked = self._one(vx, "vx"), self._one(vy, "vy")
+        shape = self.batch_shape
+        chosen = self._kit.rows(mask(where, shape, "where"), 1)[0]
+        asked = self._kit.car(vx, shape, "vx"), self._kit.car(vy, shape, "vy")
         start = [self._kit.where(chosen, new, old) for new, old in zip(asked, self.start, strict=True)]
         self.start = self._kit.stacked(start)
         self._forget(chosen)
@@ -167,21 +169,11 @@ class VelocityFusion(Memory):
         self.start = kept_signals(saved["start"], self._count == 1)
         self.new, self.renewed = (self._kit.own(saved[name].copy()) for name in ("new", "renewed"))
 
-    def _four(self, value: npt.ArrayLike, what: str) -> Signals:
-        """The four wheels of a signal."""
-        return self._kit.rows(entries(value, (*self.batch_shape, 4), what), 4)
-
-    def _one(self, value: npt.ArrayLike, what: str) -> Number:
-        """A signal of the car."""
-        if self._count == 1:
-            return number(value, self.batch_shape, what)
-        return entries(value, self.batch_shape, what).reshape(-1)
-
     def _elapsed(self, elapsed: npt.ArrayLike | None) -> tuple[Number, Number]:
         """Seconds, and where they were unusable and replaced by the sample time."""
         if elapsed is None:
             return self._usual, self._never
-        given = self._one(elapsed, "elapsed")
+        given = self._kit.car(elapsed, self.batch_shape, "elapsed")
         odd = self._kit.no((given > 0.0) & (given < 1e6))
         return self._kit.where(odd, self._usual, given), odd
 
@@ -216,7 +208,7 @@ class VelocityFusion(Memory):
         if normalised_force is None:
             return kit.stacked((share,) * 4)
 
-        mu = self._four(normalised_force, "normalised_force")
+        mu = kit.wheels(normalised_force, self.batch_shape, "normalised_force")
         (usual,) = kit.each(lambda given: (abs(given) <= _LARGEST_FRICTION,), mu)
         if not kit.some(kit.no(usual[0] & usual[1] & usual[2] & usual[3])):
             return mu

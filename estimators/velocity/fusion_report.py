@@ -14,7 +14,7 @@ from estimators.velocity.arithmetic import Arithmetic, Number, Signals
 from estimators.velocity.fusion_screen import Screened
 from estimators.velocity.fusion_step import FusionStep
 from estimators.velocity.longitudinal_fusion import BIAS, GRADE
-from estimators.velocity.slip import LEAST_SPEED
+from estimators.velocity.slip import slips
 
 _HIGH_SLIP, _GATED, _STOPPED = int(Flag.HIGH_SLIP), int(Flag.GATED), int(Flag.WHEEL_STOPPED)
 _STANDING, _NOT_EXCITED = int(Flag.STANDING), int(Flag.NOT_EXCITED)
@@ -41,7 +41,7 @@ def reported(
     flags: Number,
 ) -> FusionStep:
     """The step in the batch shape; `course` sine and cosine of the steering and x, y of the wheels."""
-    choose, largest, x, y = kit.where, kit.maximum, along.filter.mean, across.filter.mean
+    choose, x, y = kit.where, along.filter.mean, across.filter.mean
     slipping, wheel, axle, standing, stopped = judged
     turn, ahead_speed, left_speed = across.yaw_rate(seen.inertial[2]), x[0], y[0]
 
@@ -59,9 +59,7 @@ def reported(
         forward, left = ahead_speed - turn * side_arm, left_speed + turn * forward_arm
         ahead, beside = forward * cosine + left * sine, left * cosine - forward * sine
         radius = catalogue * (1.0 + error)
-        surface, pace = radius * w, largest(abs(ahead), LEAST_SPEED)
-        slip, angle = (surface - ahead) / largest(pace, abs(surface)), kit.atan(beside / pace)
-        return radius, slip, angle, choose(fresh, off, math.nan)
+        return radius, *slips(kit, radius * w, ahead, beside), choose(fresh, off, math.nan)
 
     radius, slip, angle, innovation = kit.each(
         mapped, seen.wheel_speed, seen.fresh, wheel.innovation, along.radius, x[longitudinal.RADIUS :], *course

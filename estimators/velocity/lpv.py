@@ -13,6 +13,7 @@ from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.interpolate import FloatArray
 from estimators.schedule import GainSchedule
+from estimators.signals.checks import quiet
 from estimators.velocity.exact_update import ExactUpdate, refuse_explosive
 from estimators.velocity.exact_update_few import ExactUpdateFew
 from estimators.velocity.screening import FEW, LIMIT, MEMORY, Screen
@@ -81,7 +82,6 @@ class LpvVelocityObserver:
         self._few = ExactUpdateFew(schedule) if count <= FEW else None
         self._screen = Screen(schedule.parameter, schedule.sample_time, count, outside == "refuse", stale_after)
         self._state: FloatArray = np.zeros((2, count))
-        self._size: FloatArray = np.empty((2, count))
         self._renewed: BoolArray = np.zeros(count, dtype=np.bool_)  # to be flagged RESET at the next step
         self._any_renewed = False
         self._samples = 0
@@ -104,6 +104,10 @@ class LpvVelocityObserver:
         u = self._entries(held_input, "input")
         y = self._entries(measurement, "measurement")
         p = self._entries(parameter, "parameter")
+        if self._few is not None and self._screen.stale_after is None and not self._any_renewed:
+            quick = self._quick(self._few, u, y, p)
+            if quick is not None:
+                return quick
         seen = self._screen(u, y, p, self._samples, self.batch_shape)
         innovation: FloatArray = np.empty(p.size)
         self._advance(seen.held_input, seen.measurement, seen.parameter, seen.coast, innovation)
@@ -186,6 +190,30 @@ class LpvVelocityObserver:
             raise EstimatorError(f"{what} has shape {array.shape}, expected the batch shape {self.batch_shape}")
         return array.reshape(-1)
 
+    def _quick(self, few: ExactUpdateFew, u: FloatArray, y: FloatArray, p: FloatArray) -> LpvStep | None:
+        """`step` in plain numbers; None, and nothing done, where more is wrong than missing measurements."""
+        plain = self._screen.plain(u, y, p)
+        if plain is None:
+            return None
+        missing, measured = plain.missing, plain.measurement
+        coast = [False] * p.size
+        for place in missing:
+            coast[place], measured[place] = True, 0.0
+        columns = (*self._state.tolist(), plain.held_input, measured, plain.parameter, coast)
+        first, second, told = zip(*map(few.advance, *columns), strict=True)
+        state = np.array(first + second)
+        if not quiet(state):
+            return None
+        self._state, innovation, shape = state.reshape(2, -1), np.array(told), self.batch_shape
+        self._screen.remember(u, p)
+        self._samples += 1
+        used, flags = self._all_used, self._no_flags
+        if missing:
+            innovation[missing] = np.nan
+            used = np.logical_not(coast).reshape(shape)
+            flags = np.where(used, 0, np.int32(Flag.MISSING_MEASUREMENT))
+        return LpvStep(self.state, innovation.reshape(shape), used, flags, np.array(plain.parameter).reshape(shape))
+
     def _advance(
         self, u: FloatArray, y: FloatArray, p: FloatArray, coast: BoolArray | None, innovation: FloatArray
     ) -> None:
@@ -202,7 +230,7 @@ class LpvVelocityObserver:
 
     def _guarded(self, flags: FlagArray | None) -> FlagArray | None:
         """Flags resets; a state beyond all bounds (an unstable model coasting for long) starts again from zero."""
-        lost = not self._bounded()
+        lost = not quiet(self._state)
         if not lost and not self._any_renewed:
             return flags
         if lost:
@@ -213,10 +241,3 @@ class LpvVelocityObserver:
         raise_flag(marked, self._renewed, Flag.RESET)
         self._renewed[:] = self._any_renewed = False
         return marked
-
-    def _bounded(self) -> bool:
-        """Whether every state is finite; comparisons with NaN are false."""
-        if self._few is not None:
-            return all(-LIMIT <= value <= LIMIT for row in self._state.tolist() for value in row)
-        np.absolute(self._state, self._size)
-        return bool(np.maximum.reduce(self._size, None) <= LIMIT)

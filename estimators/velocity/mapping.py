@@ -9,7 +9,6 @@ so the argument is the difference of their slips (P1 sheet, section 11 item 13).
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,6 +18,7 @@ import numpy.typing as npt
 from estimators.errors import EstimatorError
 from estimators.interpolate import FloatArray
 from estimators.vehicle import VehicleParameters
+from estimators.velocity.arithmetic import Arithmetic, ManyCars, Number, Signals
 from estimators.velocity.corners import CornerVectors, corner_velocity, tire_frame
 from estimators.velocity.slip import side_slip_angle, slip_ratio
 
@@ -53,8 +53,11 @@ class SlipWeights:
         """W_f (...) from the slip ratios or slip angles (..., 4); unknown slips (NaN) count as zero."""
         size = np.nan_to_num(np.absolute(np.asarray(slip, dtype=np.float64)))
         front, rear = size[..., :2].sum(axis=-1), size[..., 2:].sum(axis=-1)
-        out: FloatArray = 0.5 + (self.upper - self.lower) / math.pi * np.arctan(self.sharpness * (rear - front))
-        return out
+        return np.asarray(self.of_axles(ManyCars(front.shape), front, rear))
+
+    def of_axles(self, kit: Arithmetic, front: Number, rear: Number) -> Number:
+        """W_f from Sigma_f and Sigma_r."""
+        return 0.5 + (self.upper - self.lower) / math.pi * kit.atan(self.sharpness * (rear - front))
 
 
 class CentreVelocity(NamedTuple):
@@ -86,13 +89,14 @@ def to_centre(
     """
     turn = np.asarray(yaw_rate, dtype=np.float64)[..., None]
     along, across = corner.x + turn * vehicle.corner_y, corner.y - turn * vehicle.corner_x
-    values = []
+    kit, values = ManyCars(turn.shape[:-1]), []
     for value, weight, name in ((along, front_weight_x, "x"), (across, front_weight_y, "y")):
         share = np.asarray(weight, dtype=np.float64)
         if not ((share >= 0.0) & (share <= 1.0)).all():
             raise EstimatorError(f"front_weight_{name} is not in [0, 1]; it is the share of the front axle")
-        values.append(_weighed(value, share))
-    (vx, axle_x), (vy, axle_y) = values
+        mean, *axles = weighed(kit, np.moveaxis(value, -1, 0), share)
+        values += [mean, np.stack(axles, axis=-1)]
+    vx, axle_x, vy, axle_y = values
     return CentreVelocity(vx, vy, axle_x, axle_y)
 
 
@@ -121,16 +125,17 @@ def to_corners(
     return CornerSlip(slip_ratio(surface, tire.x), side_slip_angle(tire.x, tire.y), tire.x, tire.y)
 
 
-def _weighed(value: FloatArray, front: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Weighted mean of the axle means (...), and these (..., 2)."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Mean of empty slice", category=RuntimeWarning)
-        axles = np.nanmean(value.reshape(*value.shape[:-1], 2, 2), axis=-1)
-    weight = np.stack(np.broadcast_arrays(front, 1.0 - front), axis=-1)
-    known = np.isfinite(axles)
-    weight = np.where(known, np.where(known.all(axis=-1, keepdims=True), weight, 1.0), 0.0)
-    total = weight.sum(axis=-1)
-    sums = (np.where(known, axles, 0.0) * weight).sum(axis=-1)
-    out = np.full(sums.shape, np.nan)
-    np.divide(sums, total, out=out, where=total > 0)
-    return out, axles
+def weighed(kit: Arithmetic, value: Signals, front: Number) -> tuple[Number, Number, Number]:
+    """Weighted mean of the axle means, and these; of the velocities at the four wheels, NaN where unknown.
+
+    An axle that is unknown leaves all the weight to the other.
+    """
+    fl, fr, rl, rr = value
+    ahead, behind = _mean(kit, fl, fr), _mean(kit, rl, rr)
+    both = front * ahead + (1.0 - front) * behind
+    return kit.where(kit.known(ahead), kit.where(kit.known(behind), both, ahead), behind), ahead, behind
+
+
+def _mean(kit: Arithmetic, left: Number, right: Number) -> Number:
+    """Of those that are known."""
+    return kit.where(kit.known(left), kit.where(kit.known(right), 0.5 * (left + right), left), right)

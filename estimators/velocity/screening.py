@@ -28,6 +28,15 @@ class Screened(NamedTuple):
     flags: FlagArray | None
 
 
+class Plain(NamedTuple):
+    """A sample in which nothing is wrong but the measurements `missing`."""
+
+    held_input: list[float]
+    measurement: list[float]
+    parameter: list[float]
+    missing: list[int]
+
+
 class Screen:
     """Remembers the last good values of `count` entries."""
 
@@ -60,12 +69,12 @@ class Screen:
         """
         value = np.absolute(p) if self.box.absolute else p.copy()
         if p.size <= FEW:
-            missing = self._missing_few(u, y, p)
-            if missing is None or (missing and self.stale_after is not None):
+            plain = self.plain(u, y, p)
+            if plain is None or (plain.missing and self.stale_after is not None):
                 return self._repaired(u, y, p, sample, shape)
-            if missing:
-                self.input[:], self.raw[:] = u, p
-                return _without(missing, u, y, value)
+            if plain.missing:
+                self.remember(u, p)
+                return _without(plain.missing, u, y, value)
         elif not self._calm(u, y, p, value):
             return self._repaired(u, y, p, sample, shape)
         if self.stale_after is not None:
@@ -74,9 +83,13 @@ class Screen:
                 return self._repaired(u, y, p, sample, shape)
             self.run[:] = 1
             self.measurement[:] = y
+        self.remember(u, p)
+        return Screened(u, y, value, None, None, None)
+
+    def remember(self, u: FloatArray, p: FloatArray) -> None:
+        """Input and parameter of a sample in which both were good."""
         self.input[:] = u
         self.raw[:] = p
-        return Screened(u, y, value, None, None, None)
 
     def _calm(self, u: FloatArray, y: FloatArray, p: FloatArray, value: FloatArray) -> bool:
         """Whether nothing at all is wrong; comparisons with NaN are false, so NaN never passes."""
@@ -91,22 +104,23 @@ class Screen:
             and largest(np.absolute(np.subtract(p, self.raw, scratch), scratch)) <= self.calm
         )
 
-    def _missing_few(self, u: FloatArray, y: FloatArray, p: FloatArray) -> list[int] | None:
-        """Which measurements are missing where nothing else is wrong (None: something is), on plain numbers.
+    def plain(self, u: FloatArray, y: FloatArray, p: FloatArray) -> Plain | None:
+        """The sample of a handful of entries in plain numbers; None where more is wrong than a missing measurement.
 
-        For a handful of entries this is faster than `_calm`; a lost measurement is too common for the careful road.
+        Remembers nothing. For so few this is faster than `_calm`; a lost measurement is too common for the careful road.
         """
         if self.gaps:
             return None
         low, high, calm, absolute = self.box.min, self.box.max, self.calm, self.box.absolute
-        missing = []
-        entries = zip(u.tolist(), y.tolist(), p.tolist(), self.raw.tolist(), strict=True)
-        for place, (a, b, c, before) in enumerate(entries):
-            if not (low <= (abs(c) if absolute else c) <= high and -LIMIT <= a <= LIMIT and abs(c - before) <= calm):
+        given = Plain(u.tolist(), y.tolist(), p.tolist(), [])
+        for place, (a, b, c, before) in enumerate(zip(*given[:3], self.raw.tolist(), strict=True)):
+            value = abs(c) if absolute else c
+            if not (low <= value <= high and -LIMIT <= a <= LIMIT and abs(c - before) <= calm):
                 return None
+            given.parameter[place] = value
             if not -LIMIT <= b <= LIMIT:
-                missing.append(place)
-        return missing
+                given.missing.append(place)
+        return given
 
     def _repaired(self, u: FloatArray, y: FloatArray, p: FloatArray, sample: int, shape: tuple[int, ...]) -> Screened:
         """The careful road; nothing is remembered before every refusal has been considered."""

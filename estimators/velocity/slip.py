@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from estimators.interpolate import FloatArray
+from estimators.velocity.arithmetic import Arithmetic, Number
 
 LEAST_SPEED = 0.5
 """m/s by which slips are divided at least: below, a velocity error of sensor size would read as full slip."""
@@ -35,3 +36,9 @@ def side_slip_angle(along: npt.ArrayLike, across: npt.ArrayLike, least: float = 
     forward, left = np.asarray(along, dtype=np.float64), np.asarray(across, dtype=np.float64)
     out: FloatArray = np.arctan(left / np.maximum(np.absolute(forward), least))
     return out
+
+
+def slips(kit: Arithmetic, surface: Number, along: Number, across: Number) -> tuple[Number, Number]:
+    """`slip_ratio` and `side_slip_angle` of one wheel, of numbers or of arrays."""
+    pace = kit.maximum(abs(along), LEAST_SPEED)
+    return (surface - along) / kit.maximum(pace, abs(surface)), kit.atan(across / pace)

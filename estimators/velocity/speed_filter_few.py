@@ -26,7 +26,7 @@ class SpeedFilterFew(SpeedFilter):
         self.mean: _Row = self._means.copy()
         self.spread: FloatArray = self.prior.copy()
         self.waiting, self.waited = [0.0, 0.0], 0
-        self._couplings: dict[tuple[int, ...], tuple[FloatArray, npt.NDArray[np.int64]]] = {}
+        self._rows: dict[tuple[int, ...], FloatArray] = {}  # of the transition matrix, the first: 1 and the coupling
         self._floor = self.prior.copy()
         self._floor[0] = self._floor[:, 0] = 0.0
         self._sensitivities: dict[int, tuple[FloatArray, npt.NDArray[np.int64], Columns]] = {}
@@ -59,16 +59,16 @@ class SpeedFilterFew(SpeedFilter):
         noise: float,
     ) -> None:
         """One sample on, as `SpeedFilter.move`."""
-        x, P, known = self.mean, self.spread, self._couplings.get(columns)
-        if known is None:
-            known = self._couplings[columns] = np.zeros(self.size), np.array(columns, dtype=np.int64)
-        a, where = known
-        a.put(where, coupling)
+        x, P, row = self.mean, self.spread, self._rows.get(columns)
+        if row is None:
+            row = self._rows[columns] = np.zeros(self.size)
+            row[0] = 1.0
         speed = x[0] + shift
         for place, value in zip(columns, coupling, strict=True):
+            row[place] = value
             speed += value * x[place]
-        first = P[0] + a.dot(P)
-        first[0] += a.dot(first) + noise
+        first = row.dot(P)
+        first[0] = row.dot(first) + noise
         P[0] = P[:, 0] = first
         self.mean = [speed, *x[1:]]
         time, way = self.waiting

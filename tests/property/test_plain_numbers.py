@@ -17,6 +17,7 @@ from estimators.filters.scalar import ScalarKalmanFilter
 from estimators.filters.three_states import informed
 from estimators.forces import AttitudeObserver, BodyResponse, LateralForceEstimator, VerticalLoads, WheelForceFilter
 from estimators.forces.lateral_few import FEW, LateralFew
+from estimators.signals.checks import quiet
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import BristleTire, LtvKalmanObserver, SwitchedVelocityObserver
 from tests.unit.schedule_content import schedule_content
@@ -53,6 +54,15 @@ def test_information_added_to_three_states(root: Array, C: Array) -> None:
     scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     np.testing.assert_allclose(found / scale, expected / scale, atol=1e-7)
     assert np.linalg.eigvalsh(found)[0] > 0
+
+
+@pytest.mark.parametrize("shape", [(), (4,), (6,), (7,), (2, 3), (5000,)])
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e150])
+def test_one_bad_entry_is_found_whatever_the_size(shape: tuple[int, ...], bad: float) -> None:
+    value = np.full(shape, -30.0)
+    assert quiet(value)
+    value.flat[-1] = bad
+    assert not quiet(value)
 
 
 @pytest.mark.parametrize("gate", [None, 0.99])

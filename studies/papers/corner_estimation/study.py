@@ -27,6 +27,7 @@ from studies.papers.corner_estimation import (
     tables_stability,
 )
 from studies.papers.corner_estimation.inputs import PACKAGE
+from studies.papers.parameter_table import parameter_part
 from studies.study import Part, PartResult, Scope, Study
 
 CLAIMS: dict[str, ClaimFunction] = {
@@ -130,6 +131,8 @@ def accuracy(scope: Scope) -> PartResult:
     return PartResult(_computed("P1-tab3", "P1-34"), [tables_forces.velocity_table_3()], drawings)
 
 
+PARAMETERS = "Vehicle and tire constants of P1, as every result of this study uses them."
+
 STUDY = Study(
     "corner-estimation",
     "Corner-based estimation of tire forces and vehicle velocities",
@@ -139,6 +142,7 @@ STUDY = Study(
     "the H-infinity design and its gains, the force observers, loads, observability and the accuracy that the text "
     "claims.",
     (
+        Part("parameters", "Table I: vehicle and tire", partial(parameter_part, "corner-estimation", PARAMETERS), 0.1),
         Part("error-matrix", "Error dynamics of the velocity observer", error_matrix, 2.0),
         Part("printed-lyapunov", "What the printed Lyapunov matrices prove", printed_lyapunov, 2.0),
         Part("quadratic-stability", "Stability of the printed gains and gain boxes", quadratic_stability, 3.0),

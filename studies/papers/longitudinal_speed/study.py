@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from studies.claim import Claim, ClaimFunction
 from studies.papers.claims_file import computed_claims
 from studies.papers.longitudinal_speed import (
@@ -18,6 +20,7 @@ from studies.papers.longitudinal_speed import (
     tables,
 )
 from studies.papers.longitudinal_speed.inputs import PACKAGE
+from studies.papers.parameter_table import parameter_part
 from studies.study import Part, PartResult, Scope, Study
 
 CLAIMS: dict[str, ClaimFunction] = {
@@ -84,6 +87,11 @@ def accuracy(scope: Scope) -> PartResult:
     )
 
 
+PARAMETERS = (
+    "Vehicle and tire constants of P2, as every result of this study uses them; of the two radii that it prints, 0.35 m in "
+    "the text and 0.33 m in Table I, that of the text."
+)
+
 STUDY = Study(
     "longitudinal-speed",
     "Longitudinal speed estimation robust to road conditions",
@@ -93,6 +101,7 @@ STUDY = Study(
     "the filter, the recursions of the appendix, the bound of the force observer, the slip threshold and the "
     "accuracy that the text claims.",
     (
+        Part("parameters", "Table I: vehicle and tire", partial(parameter_part, "longitudinal-speed", PARAMETERS), 0.1),
         Part("model", "Model, patch constant and radius", model, 1.0),
         Part("observability", "Observability of the three-state model (Fig. 1)", observability, 4.0),
         Part("first-test", "Forgetting an unknown start (Figs 2 and 3)", first_test, 2.0),
