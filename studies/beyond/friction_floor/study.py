@@ -101,6 +101,6 @@ STUDY = Study(
     ),
     parts=(
         Part("theory", "The floor in closed form, and the runtime observers at rest", theory, cost=15.0),
-        Part("launches", "Launches on five roads", simulation, cost=60.0),
+        Part("launches", "Launches on five roads", simulation, cost=41.0),
     ),
 )

@@ -20,12 +20,12 @@ def _table_1(name: str, scope: Scope, tire: str) -> PartResult:
 MOTION = (Moved(MANOEUVRE, "Right, left and right bend, dry (Fig. 5)", course=True),)
 
 PARTS = (
-    driven_part("table-1-driven", "Table I on the truth vehicle", partial(_table_1, "bends"), cost=60.0, quick=True),
+    driven_part("table-1-driven", "Table I on the truth vehicle", partial(_table_1, "bends"), cost=53.0, quick=True),
     driven_part(
         "table-1-other-tire",
         "Table I on a tire with another shape: Magic Formula with slip lag",
         partial(_table_1, "bends-other-tire"),
-        cost=65.0,
+        cost=53.0,
         tire=MAGIC_FORMULA,
     ),
     driven_part(
