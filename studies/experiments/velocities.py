@@ -153,7 +153,7 @@ def _dots(name: str, rows: Sequence[Printed], means: Mapping[str, Mapping[str, S
         axes.grid(axis="x", which="both", alpha=0.25)
     first = figure.axes[0]
     first.set_yticks(range(len(rows)), [row.title for row in rows])
-    first.invert_yaxis()
+    first.set_ylim(len(rows) - 0.5, -0.5)
     figure.legend(*first.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
     return Drawing(
         name,

@@ -17,9 +17,9 @@ from estimators.forces import (
     WheelForceFilter,
     reconcile,
 )
-from estimators.pipeline import DifferentiatedPid
+from estimators.pipeline import CornerObservers, DifferentiatedPid
 from estimators.vehicle import VehicleParameters
-from estimators.velocity import BristleTire, LtvKalmanObserver, SwitchedVelocityObserver
+from estimators.velocity import BristleTire, LtvKalmanObserver, SlipWeights, SwitchedVelocityObserver
 from tests.unit.schedule_content import schedule_content
 
 CAR, TIME, COUNT = VehicleParameters.published_suv(), 0.005, 64
@@ -75,6 +75,26 @@ def chain(kind: str) -> Step:
     return step
 
 
+def first_paper(kind: str) -> Step:
+    """Every estimator of P1 for one sample: forces of three directions, corner observers, the centre of gravity."""
+    method: Any = kind
+    loads, wheels, lateral = (
+        VerticalLoads(CAR, TIME),
+        wheel_forces("pid"),
+        LateralForceEstimator(CAR, TIME, method=method),
+    )
+    corners = CornerObservers(CAR, schedule(), schedule("lateral"), weights=SlipWeights())
+
+    def step(k: int) -> Any:
+        ax, ay, turn, swing = BODY[k]
+        up = loads.step(ax, ay).load
+        force = wheels.step(SPEED[k], TORQUE[k], up).force
+        side = lateral.step(ax, ay, swing, STEER[k], force, up).corner_force
+        return corners.step(SPEED[k], (STEER[k], STEER[k], 0.0, 0.0), ax, ay, turn, force / up, side / up)
+
+    return step
+
+
 def corner(name: str) -> Step:
     use, push = FORCE / LOAD, 1e-3 * FORCE
     if name.startswith("scheduled"):
@@ -109,6 +129,12 @@ def test_part(benchmark: Any, name: str) -> None:
 @pytest.mark.parametrize("kind", ["unknown input", "pid", "linear"])
 def test_chain(benchmark: Any, kind: str) -> None:
     assert np.isfinite(measured(benchmark, chain(kind)).axle_force).all()
+
+
+@pytest.mark.parametrize("kind", ["linear", "unscented"])
+def test_estimators_of_the_first_paper(benchmark: Any, kind: str) -> None:
+    found = measured(benchmark, first_paper(kind))
+    assert np.isfinite(found.vx) and np.isfinite(found.vy) and found.used.all()
 
 
 @pytest.mark.parametrize(

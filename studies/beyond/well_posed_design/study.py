@@ -94,12 +94,12 @@ STUDY = Study(
         Part("pole-limit", "Pole limit", demand(
             "pole-limit", "limit of the fastest pole [1/s]",
             "Gains over the limit of the fastest pole (tied to the sample time): it sets L1.",
-            pole_limit, _by_direction(*POLES)), cost=4.0),
+            pole_limit, _by_direction(*POLES)), cost=4.0, quick=False),
         Part("noise-weight", "Noise weight", demand(
             "noise-weight", "acceleration weight [m/s²]",
             "Gains over the size of acceleration errors that counts as much as one unit of normalised force noise; "
             "both share the minimised channel, whose bound is shown. A worse accelerometer asks for more L2.",
-            noise_weight, _by_direction(WEIGHTS, WEIGHTS)), cost=4.0),
+            noise_weight, _by_direction(WEIGHTS, WEIGHTS)), cost=4.0, quick=False),
         Part("gain-plane", "Printed and shipped gains on the map", planes, cost=6.0),
     ),
 )  # fmt: skip

@@ -60,7 +60,7 @@ STUDY = Study(
     ),
     parts=(
         Part("observability", "Is the eight-state model observable?", observability, cost=2.0),
-        Part("hidden-split", "What no sensor tells apart", hidden_split, cost=1.0),
+        Part("hidden-split", "What no sensor tells apart", hidden_split, cost=1.0, quick=False),
         Part("tire", "The Dugoff tire and the sign of its force", tire, cost=1.0),
         Part("output-equation", "The measured lateral acceleration", output_equation, cost=1.5),
         Part("table-1", "Table I against the text", errors, cost=0.2),
