@@ -9,7 +9,7 @@ from pathlib import Path
 from studies.claim import JsonValue
 from studies.registry import Registry
 from studies.running.store import StoredPart, check_names, part_folder, read_part
-from studies.study import Scope, Study
+from studies.study import Preparation, Scope, Study
 from synthesis.errors import SpecError
 
 PAPERS = ("P1", "P2", "P3", "P4", "P5")
@@ -88,12 +88,19 @@ def _names(stored: StoredPart) -> list[tuple[str, str]]:
     ]
 
 
-def check_parts(study: Study) -> None:
-    """Raises SpecError when a part's name cannot be that of a folder, or when two parts have one name."""
-    try:
-        check_names("part", [part.name for part in study.parts])
-    except ValueError as error:
-        raise SpecError(f"study '{study.id}': {error}") from error
+def check_parts(studies: Sequence[Study]) -> None:
+    """Raises SpecError when a name cannot be that of a folder, when two parts have one name, or two preparations."""
+    known: dict[str, Preparation] = {}
+    for study in studies:
+        needs = [need for part in study.parts for need in part.needs]
+        try:
+            check_names("part", [part.name for part in study.parts])
+            check_names("preparation", list(dict.fromkeys(need.name for need in needs)))
+        except ValueError as error:
+            raise SpecError(f"study '{study.id}': {error}") from error
+        for need in needs:
+            if known.setdefault(need.name, need) != need:
+                raise SpecError(f"study '{study.id}': another preparation is called '{need.name}', too")
 
 
 def all_claims(records: Sequence[StudyRecord]) -> list[dict[str, JsonValue]]:

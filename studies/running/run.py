@@ -61,8 +61,7 @@ def run_studies(
     studies and for a folder in use, LogError or OSError when ``out`` cannot be written.
     """
     studies = {name: registry.load(name) for name in ids}
-    for study in studies.values():
-        check_parts(study)
+    check_parts(list(studies.values()))
     mark = fingerprint(scope, sources)
     ready_folder(out)
     with _naming(out), only_run(out):

@@ -16,8 +16,9 @@ import pytest
 
 from studies.registry import Registry
 from studies.running.fingerprint import PACKAGES, SOURCE_ROOT, fingerprint
+from studies.running.record import check_parts
 from studies.running.run import RunSummary, run_studies
-from studies.study import QUICK, Scope
+from studies.study import QUICK, Part, PartResult, Preparation, Scope, Study
 from synthesis.errors import SpecError
 from tests.unit.study_fakes.registry import REGISTRY
 from tests.unit.study_fakes.trace import VARIABLE
@@ -160,6 +161,24 @@ def test_what_parts_share_is_computed_once_and_before_them(run: Run, trace: Path
     assert run("sharing").good
     assert counts(trace) == {"number": 1, "broken": 2, "read": 2, "alone": 2}
     assert not shared.exists()  # nobody reads it any more
+
+
+def test_two_preparations_of_one_name_are_refused() -> None:
+    def nothing(_scope: Scope, _folder: Path) -> None:
+        """Prepare nothing."""
+
+    def other(_scope: Scope, _folder: Path) -> None:
+        """Prepare nothing else."""
+
+    def study(name: str, *needs: Preparation) -> Study:
+        return Study(name, name, "", "", (Part("one", "One", lambda _: PartResult(), 1.0, needs),))
+
+    same = Preparation("numbers", nothing)
+    check_parts([study("a", same), study("b", Preparation("numbers", nothing))])
+    with pytest.raises(SpecError, match="study 'b': another preparation is called 'numbers', too"):
+        check_parts([study("a", same), study("b", Preparation("numbers", other))])
+    with pytest.raises(SpecError, match=r"study 'a': preparation '\.\./up'"):
+        check_parts([study("a", Preparation("../up", nothing))])
 
 
 def test_what_parts_share_belongs_to_the_scope(run: Run, trace: Path, tmp_path: Path) -> None:
