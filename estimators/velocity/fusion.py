@@ -17,6 +17,7 @@ from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity import lateral_fusion as lateral
 from estimators.velocity import longitudinal_fusion as longitudinal
 from estimators.velocity.arithmetic import Number, Signals, arithmetic, kept_signals
+from estimators.velocity.fusion_adrift import FusionAdrift
 from estimators.velocity.fusion_lost import FusionLost
 from estimators.velocity.fusion_report import Judged, reported
 from estimators.velocity.fusion_screen import FusionScreen, Screened
@@ -52,7 +53,7 @@ class VelocityFusion(Memory):
     """
 
     memory = ("new", "renewed", "start")
-    parts = ("screen", "longitudinal_filter", "lateral_filter", "lost", "standing")
+    parts = ("screen", "longitudinal_filter", "lateral_filter", "lost", "adrift", "standing")
     unknowns = ("start",)
 
     def __init__(
@@ -77,6 +78,7 @@ class VelocityFusion(Memory):
         self.longitudinal_filter, self.lateral_filter = self._along.filter, self._across.filter
         self.screen = FusionScreen(self._radius, self.settings, count)
         self.lost = FusionLost(self.settings, count)
+        self.adrift = FusionAdrift(self.settings, self._across, count)
         self.standing = FusionStanding(self.settings, self._along, self._across, count)
         self.new: Number = kit.full(True)  # waits for a first wheel speed
         self.renewed: Number = kit.full(False)
@@ -140,9 +142,10 @@ class VelocityFusion(Memory):
         fl, fr, rl, rr = seen.steer
         angles = kit.stacked((0.5 * (fl + fr), 0.5 * (rl + rr)))
         axle = across.correct(dt, b, r, swing, angles, along.speed, a, usable)
+        adrift = self.adrift(dt, along.speed, axle, usable)
         across.blind(dt, seen.blind)
         across.stand(standing, r)
-        flags = seen.flags | kit.where(odd, _MISSING_INPUT, 0) | kit.where(self.renewed, _RESET, 0)
+        flags = seen.flags | kit.where(odd, _MISSING_INPUT, 0) | kit.where(self.renewed | adrift, _RESET, 0)
         self.renewed = self._never
         self._guard(seen, lost)
         judged = Judged(slipping, wheel, axle, standing, self.standing.stopped(seen.silent))
@@ -222,6 +225,7 @@ class VelocityFusion(Memory):
     def _forget(self, where: Number) -> None:
         self.screen.forget(where)
         self.lost.forget(where)
+        self.adrift.forget(where)
         self.standing.forget(where)
         self.new, self.renewed = self.new | where, self.renewed | where
 

@@ -37,6 +37,7 @@ class AxleVerdict(NamedTuple):
 
     innovation: Signals  # m/s
     used: Signals
+    friction: Signals  # mu: F_y/F_z that the axles need
     excited: Number  # whether an axle slips enough for its stiffness to show above the error of its condition
 
 
@@ -130,9 +131,9 @@ class LateralFusion:
             blur = pace * (s.side_floor + s.side_linear * abs(side)) + s.slip_speed
             white = turn_noise + speed * speed * steering_noise
             values = (one, steep, -arm * one, steep * measured, -arm * sensed, linear, linear * square)
-            return innovation, blur * blur, white, *values
+            return innovation, mu, blur * blur, white, *values
 
-        innovation, model, white, *values = kit.each(predicted, steer, x[TIRES::2], x[TIRES + 1 :: 2], *self._axles)
+        innovation, mu, model, white, *values = kit.each(predicted, steer, x[TIRES::2], x[TIRES + 1 :: 2], *self._axles)
 
         def judged(
             explained: Number, off: Number, model: Number, white: Number, linear: Number, usable: Number
@@ -143,7 +144,7 @@ class LateralFusion:
         explained = self.filter.expect(_SEEN, values)
         used, variance, excited = kit.each(judged, explained, innovation, model, white, values[5], usable)
         self.filter.weigh(innovation, variance, used)
-        return AxleVerdict(innovation, used, excited[0] | excited[1])
+        return AxleVerdict(innovation, used, mu, excited[0] | excited[1])
 
     def blind(self, elapsed: Number, where: Number) -> None:
         """V_y near zero for the cars `where` that have no lateral motion sensor: nothing else is known."""

@@ -179,6 +179,10 @@ class SpeedFilter(Memory):
         """Back to the priors where the condition `where` holds, with the speed `first` and its variance."""
         self.mean = np.where(where, self.prior_mean[:, None], self.mean)
         self.spread = np.where(where, self._packed, self.spread)
+        self.restart(where, first, variance)
+
+    def restart(self, where: Number, first: Number, variance: Number) -> None:
+        """The speed `first` with its variance where the condition `where` holds; parameters stay as they are known."""
         self.spread[1 : self.size, where] = 0.0
         self.mean[0] = np.where(where, first, self.mean[0])
         self.spread[0] = np.where(where, variance, self.spread[0])

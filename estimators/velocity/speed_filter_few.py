@@ -125,6 +125,13 @@ class SpeedFilterFew(SpeedFilter):
             self.mean, self.spread = [first, *self._means[1:]], self._floor.copy()
             self.spread[0, 0] = variance
 
+    def restart(self, where: bool, first: float, variance: float) -> None:
+        """The speed `first` with its variance, if `where`; parameters stay as they are known."""
+        if where:
+            self.mean = [first, *self.mean[1:]]
+            self.spread[0] = self.spread[:, 0] = 0.0
+            self.spread[0, 0] = variance
+
 
 def _inverse_factor(S: list[_Row], noise: Sequence[float]) -> list[_Row]:
     """L^-1 with L L' = S + diag(noise), for up to four channels: each row from those above."""

@@ -44,15 +44,32 @@ TOLD = 0.2
 """Relative spread of the slip compliances that the fusion is told: as well as a fit to a drive knows them."""
 
 
+USED = 0.6
+"""Largest F_y/F_z of the fit of the side slip curve: what a car shows on a dry road before it slides."""
+
+
+def side_slip_curve(compliance: float) -> tuple[float, float]:
+    """c_1, c_3 in rad of alpha = c_1 mu + c_3 mu^3, least squares up to `USED`, of a bristle tire on a dry road.
+
+    Steady bristles on a road of friction 1 without Stribeck effect carry mu = alpha/(c + alpha): alpha = c mu/(1 - mu).
+    """
+    mu = np.linspace(0.0, USED, 61)
+    c1, c3 = np.linalg.lstsq(np.stack([mu, mu**3], axis=1), compliance * mu / (1.0 - mu), rcond=None)[0]
+    return float(c1), float(c3)
+
+
 def corner_observers(parameters: str) -> Parts:
     """Parts that know the tires of a shipped parameter set: the corner observers of its two schedules, and the fusion."""
     tires = load_parameter_set(parameters).tire
     along, across = (tires[d].kappa.value / tires[d].sigma0.value for d in ("longitudinal", "lateral"))
+    linear, cubic = side_slip_curve(across)
     settings = FusionSettings(
         slip_compliance=along,
         slip_compliance_spread=TOLD * along,
-        side_compliance=across,
-        side_compliance_spread=TOLD * across,
+        side_compliance=linear,
+        side_compliance_spread=TOLD * linear,
+        side_cubic=cubic,
+        side_cubic_spread=cubic,  # friction of the road is not told
     )
 
     def parts(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) -> Mapping[str, Any]:

@@ -11,6 +11,7 @@ import pytest
 from studies.experiments.accuracy import known_spread, nrms, spread
 from studies.experiments.driven import DRIVEN, LUGRE, MAGIC_FORMULA, driven, driven_part
 from studies.experiments.play import baselines, believed, measured, play, run_of
+from studies.experiments.velocities import USED, side_slip_curve
 from studies.registry import MODULES, load_study
 from studies.study import PartResult, Scope
 from studies.truth import PERFECT, Truth, drive, load_manoeuvre
@@ -142,3 +143,13 @@ def test_nrms_counts_where_the_truth_is_large() -> None:
     estimate = np.array([[9.0, 2.4, -4.3]])
     assert nrms(estimate, truth, 1.0)[0] == pytest.approx(100.0 * np.sqrt((0.16 + 0.09) / 2.0) / 4.0)
     assert np.isnan(nrms(estimate, truth, 5.0)).all() and np.isnan(nrms(estimate, np.zeros(3))).all()
+
+
+def test_side_slip_curve_is_that_of_a_bristle_tire() -> None:
+    """mu = alpha/(c + alpha) turned round, to a few per cent of the slip angle at most; a line is far off."""
+    c = 0.07
+    c1, c3 = side_slip_curve(c)
+    mu = np.linspace(0.1, USED, 20)
+    exact = c * mu / (1.0 - mu)
+    assert np.abs(c1 * mu + c3 * mu**3 - exact).max() < 0.06 * exact[-1]
+    assert np.abs(c * mu - exact).max() > 0.5 * exact[-1]

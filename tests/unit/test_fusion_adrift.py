@@ -1,0 +1,85 @@
+"""V_y that a slide has left wrong: found again from unloaded axles, and from nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimators.faults import Flag
+from estimators.velocity import FusionSettings, VelocityFusion
+from estimators.velocity.fusion_adrift import FusionAdrift
+from estimators.velocity.lateral_fusion import AxleVerdict
+from tests.unit.fusion_course import CAR, STEP, Signals, course, driven, phases, sensed
+
+SETTINGS = FusionSettings()
+BEFORE, AFTER = 400, 600
+
+
+def misled(batch: tuple[int, ...] = (), where: object = True) -> tuple[VelocityFusion, Signals]:
+    """A fusion that has driven straight for 2 s at 20 m/s and is then sure of a V_y of 1.5 m/s; what follows."""
+    signals = sensed(course(phases((5.0, 0.0)), start=20.0))
+    fusion = VelocityFusion(CAR, STEP, batch)
+    first, rest = (Signals(*(value[part] for value in signals)) for part in (slice(BEFORE), slice(BEFORE, None)))
+    tiled = [Signals(*(np.broadcast_to(v[:, *(None,) * len(batch)], (len(v), *batch, *v.shape[1:])) for v in each))
+             for each in (first, rest)]  # fmt: skip
+    driven(tiled[0], fusion)
+    fusion.lateral_filter.restart(where, 1.5, 0.01**2)
+    return fusion, tiled[1]
+
+
+def test_unloaded_axles_bring_it_back_and_sensors_stay_known() -> None:
+    fusion, rest = misled()
+    known = fusion.lateral_filter.state[0, 1:]
+    steps, _ = driven(rest, fusion)
+    vy = np.array([step.vy for step in steps])
+    flagged = np.flatnonzero([step.flags & Flag.RESET for step in steps])
+    assert flagged.size == 1 and flagged[0] * STEP == pytest.approx(SETTINGS.lost_time, abs=2 * STEP)
+    assert vy[: flagged[0]].min() > 1.0  # it does not come back by itself
+    assert np.abs(vy[flagged[0] + 1 :]).max() < 0.1
+    bias = np.abs(fusion.lateral_filter.state[0, 1:] - known)
+    assert (bias < 3.0 * np.sqrt(np.diag(fusion.lateral_filter.covariance[0])[1:])).all()
+
+
+def test_only_the_lost_car_of_a_batch_starts_again() -> None:
+    fusion, rest = misled((3,), np.array([False, True, False]))
+    steps, _ = driven(rest, fusion)
+    flagged = np.array([step.flags & Flag.RESET for step in steps]) != 0
+    assert flagged.sum(axis=0).tolist() == [0, 1, 0]
+    assert np.abs(steps[-1].vy).max() < 0.1
+    alone, _ = driven(*reversed(misled()))
+    np.testing.assert_allclose([s.vy[1] for s in steps], [s.vy for s in alone], rtol=1e-7, atol=1e-9)
+
+
+CALM = AxleVerdict((-1.5, -1.45), (False, False), (0.01, -0.02), False)
+CASES = {
+    "lost": (CALM, (True, True), True),
+    "one axle carries a side force": (CALM._replace(friction=(0.01, 0.2)), (True, True), False),
+    "the axles contradict each other": (CALM._replace(innovation=(-1.5, 1.5)), (True, True), False),
+    "one axle is believed": (CALM._replace(used=(True, False)), (True, True), False),
+    "the wheels of one axle slip": (CALM, (True, False), False),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("count", [1, 2])
+def test_what_is_evidence(case: str, count: int) -> None:
+    verdict, usable, expected = CASES[case]
+    fusion = VelocityFusion(CAR, STEP, () if count == 1 else (count,))
+    if count > 1:
+        pairs = [[np.full(count, value) for value in pair] for pair in (*verdict[:3], usable)]
+        verdict, usable = AxleVerdict(*pairs[:3], np.full(count, False)), tuple(pairs[3])
+    clock: FusionAdrift = fusion.adrift
+    found = [bool(np.all(clock(STEP, 20.0, verdict, usable))) for _ in range(AFTER)]
+    assert any(found) is expected
+
+
+def test_evidence_with_a_gap_starts_over() -> None:
+    clock = VelocityFusion(CAR, STEP).adrift
+    for _ in range(3):
+        assert not any(clock(STEP, 20.0, CALM, (True, True)) for _ in range(int(0.9 * SETTINGS.lost_time / STEP)))
+        assert not clock(STEP, 20.0, CALM._replace(used=(True, True)), (True, True))
+    saved = VelocityFusion(CAR, STEP)
+    for _ in range(150):
+        clock(STEP, 20.0, CALM, (True, True))
+    saved.adrift.restore(clock.save())
+    assert saved.adrift.astray == clock.astray > 0.7
