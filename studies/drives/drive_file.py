@@ -7,17 +7,15 @@ the observers run with. Every quantity carries its unit; nothing is guessed from
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from studies.drives.drive_checks import check_alignment, check_columns, check_estimators, check_logs, check_signals
 from studies.drives.drive_tables import Column, Estimators, LogFile, Observer, Schedules, Table, Vehicle
 from studies.drives.quantities import Duration
-from studies.drives.validation import first_error
-from synthesis.errors import SpecError
+from studies.drives.validation import read_toml
 
 
 class DriveFile(Table):
@@ -51,13 +49,4 @@ class DriveFile(Table):
 
 def read_drive(path: Path) -> DriveFile:
     """Read and check a drive file. Raises SpecError, one line: file, key, what is wrong, what would be right."""
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SpecError(f"{path.name}: cannot be read ({error.strerror}); give the path of a drive file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SpecError(f"{path.name}: not a TOML file: {error}") from error
-    try:
-        return DriveFile.model_validate(content)
-    except ValidationError as error:
-        raise SpecError(f"{path.name}: {first_error(error, DriveFile)}") from error
+    return read_toml(path, DriveFile, "drive")

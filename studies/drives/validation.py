@@ -2,14 +2,34 @@
 
 from __future__ import annotations
 
+import tomllib
 import typing
 from collections.abc import Sequence
+from pathlib import Path
 
 from pydantic import BaseModel, ValidationError
 
-from synthesis.errors import unknown
+from synthesis.errors import SpecError, unknown
 
 _Step = int | str
+_Model = typing.TypeVar("_Model", bound=BaseModel)
+
+
+def read_toml(path: Path, model: type[_Model], what: str) -> _Model:
+    """The content of a TOML file; ``what`` it is, for the message.
+
+    Raises SpecError, one line: file, key, what is wrong, what would be right.
+    """
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SpecError(f"{path.name}: cannot be read ({error.strerror}); give the path of a {what} file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SpecError(f"{path.name}: not a TOML file: {error}") from error
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        raise SpecError(f"{path.name}: {first_error(error, model)}") from error
 
 
 def first_error(error: ValidationError, model: type[BaseModel]) -> str:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from estimators.vehicle import CORNERS
+from estimators.pipeline import DifferentiatedPid
+from estimators.vehicle import CORNERS, VehicleParameters
 from studies.experiments.accuracy import Spread, nrms, spread
 from studies.experiments.driven import LUGRE, driven
 from studies.experiments.play import QUICK_SECONDS, Parts, Reading, measured, play, run_of
@@ -38,6 +40,11 @@ class Driven:
     manoeuvre: str
     title: str
     printed: Mapping[tuple[str, str, str], float] = field(default_factory=dict)
+
+
+def differentiated_pid(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) -> Mapping[str, Any]:
+    """Parts with the PID-type observer of P1 (2)-(8) at the wheels."""
+    return {"longitudinal_force": DifferentiatedPid(car, sample_time, (*shape, 4))}
 
 
 def force_part(

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
-from studies.drives.validation import first_error
+from studies.drives.validation import read_toml
 from studies.truth.manoeuvre import Manoeuvre
 from studies.truth.monte_carlo import simulate_in_processes
 from studies.truth.record import Truth
@@ -36,16 +33,7 @@ def load_manoeuvre(name: str | Path) -> Manoeuvre:
         if str(name) not in known:
             raise SpecError(unknown("manoeuvre", str(name), known) + "; a file of your own ends with .toml")
         path = known[str(name)]
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SpecError(f"{path.name}: cannot be read ({error.strerror}); give the path of a manoeuvre file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SpecError(f"{path.name}: not a TOML file: {error}") from error
-    try:
-        return Manoeuvre.model_validate(content)
-    except ValidationError as error:
-        raise SpecError(f"{path.name}: {first_error(error, Manoeuvre)}") from error
+    return read_toml(path, Manoeuvre, "manoeuvre")
 
 
 def drive(

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
 
-from estimators.pipeline import DifferentiatedPid
-from estimators.vehicle import VehicleParameters
 from studies.experiments.driven import MAGIC_FORMULA, driven_part
-from studies.experiments.forces import Driven, force_part
+from studies.experiments.forces import Driven, differentiated_pid, force_part
 from studies.experiments.motion import Moved, motion_part
 from studies.experiments.velocities import Printed, corner_observers, velocity_part
 
@@ -33,10 +30,6 @@ FORCES = (
     Driven("p1-steering-ice-snow", "steering, ice to snow (Fig. 8)"),
 )
 """Table II is lost; the text gives 7.4 % for F_x, 7.1 % for F_y, 4 % for F_z at most."""
-
-
-def _pid(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) -> Mapping[str, DifferentiatedPid]:
-    return {"longitudinal_force": DifferentiatedPid(car, sample_time, (*shape, 4))}
 
 
 MOTION = (
@@ -78,7 +71,7 @@ PARTS = (
     driven_part(
         "forces",
         "Figs. 6 to 8 on the truth vehicle: forces",
-        partial(force_part, "forces", FORCES, {"PID": _pid}),
+        partial(force_part, "forces", FORCES, {"PID": differentiated_pid}),
         cost=58.0,
     ),
     driven_part(

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
 
-from estimators.pipeline import DifferentiatedPid
-from estimators.vehicle import VehicleParameters
 from studies.experiments.driven import MAGIC_FORMULA, driven_part
-from studies.experiments.forces import Driven, force_part
+from studies.experiments.forces import Driven, differentiated_pid, force_part
 from studies.experiments.motion import Moved, motion_part
 from studies.experiments.velocities import Printed, corner_observers, velocity_part
 from studies.papers.resilient_velocity.compliance_report import TESTS, compliance_part
@@ -21,10 +18,6 @@ ROWS = (
 )
 """P3 prints no table: its text bounds the RMS error by 5.8 % (longitudinal) and 7.5 % (lateral)."""
 FORCES = (Driven("p3-lane-change-snow", "lane change on snow (Fig. 14)"),)
-
-
-def _pid(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) -> Mapping[str, DifferentiatedPid]:
-    return {"longitudinal_force": DifferentiatedPid(car, sample_time, (*shape, 4))}
 
 
 MOTION = (
@@ -49,7 +42,7 @@ PARTS = (
     driven_part(
         "normal-forces",
         "Fig. 14 on the truth vehicle: forces",
-        partial(force_part, "forces", FORCES, {"PID": _pid}),
+        partial(force_part, "forces", FORCES, {"PID": differentiated_pid}),
         cost=20.0,
     ),
     driven_part(
