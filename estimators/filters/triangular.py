@@ -6,6 +6,8 @@ elsewhere. Factors are lower triangular, and the signs of their columns are free
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from estimators.errors import EstimatorError
@@ -78,6 +80,12 @@ def left_divide(lower: FloatArray, rows: FloatArray, out: FloatArray | None = No
     return out
 
 
+def products(columns: FloatArray) -> Iterator[FloatArray]:
+    """The columns of the lower triangle of columns columns', (n-k, b) for k = 0, 1, ..., from columns (n, k, b)."""
+    for k in range(len(columns)):
+        yield np.einsum("rjb,jb->rb", columns[k:], columns[k])
+
+
 def summed_factor(
     matrix: FloatArray, base: FloatArray, columns: FloatArray, out: FloatArray | None = None
 ) -> FloatArray:
@@ -88,8 +96,11 @@ def summed_factor(
     A Cholesky factor of the sum costs a third of the orthogonal triangularisation and has its accuracy as long as no
     pivot is small against its diagonal entry; where one is, `lower_factor` does it.
     """
-    lower, safest = _cholesky(matrix, columns, _SAFE, out)
-    return lower if safest > _SAFE else lower_factor(base, columns)
+    lower = np.zeros((len(matrix), len(matrix), columns.shape[2])) if out is None else out
+    for k, product in enumerate(products(columns)):
+        np.add(product, matrix[k:, k], lower[k:, k])
+    done = checked_factor(lower, np.einsum("kkb->kb", lower).copy(), lower)
+    return lower if done else lower_factor(base, columns)
 
 
 def cholesky(matrix: FloatArray, what: str) -> FloatArray:
@@ -98,35 +109,28 @@ def cholesky(matrix: FloatArray, what: str) -> FloatArray:
     Raises:
         EstimatorError: not positive definite; names `what`.
     """
-    lower, safest = _cholesky(matrix, None, 0.0)
-    if not safest > 0:
+    lower = np.zeros(matrix.shape)
+    if not checked_factor(matrix, np.einsum("kkb->kb", matrix), lower, 0.0):
         raise EstimatorError(f"{what} is not positive definite; give every channel a noise variance above zero")
     return lower
 
 
-def _cholesky(
-    matrix: FloatArray, columns: FloatArray | None, least: float, out: FloatArray | None = None
-) -> tuple[FloatArray, float]:
-    """L L' = matrix + columns columns', and the smallest pivot relative to its diagonal entry, -1 where that is not
-    above `least`: L means nothing then."""
-    n = matrix.shape[0]
-    diagonal = np.einsum("kkb->kb", matrix)
-    if columns is not None:
-        diagonal = diagonal + np.einsum("kjb,kjb->kb", columns, columns)
-    lower = np.zeros((n, n, diagonal.shape[1])) if out is None else out
+def checked_factor(matrix: FloatArray, against: FloatArray, out: FloatArray, least: float = _SAFE) -> bool:
+    """L L' = matrix (n, n, b) into the lower triangle of `out`, which may be the matrix itself.
+
+    False where the square of a diagonal entry of L is not above `least` times its entry of `against` (n, b): L then
+    lost too many digits, or means nothing.
+    """
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        for k in range(n):
-            column = lower[k:, k]
-            if columns is None:
-                column[:] = matrix[k:, k]
-            else:
-                np.add(np.einsum("rjb,jb->rb", columns[k:], columns[k]), matrix[k:, k], column)
+        for k in range(len(matrix)):
+            column = out[k:, k]
             if k:
-                column -= np.einsum("rjb,jb->rb", lower[k:, :k], lower[k, :k])
+                np.subtract(matrix[k:, k], np.einsum("rjb,jb->rb", out[k:, :k], out[k, :k]), column)
+            elif out is not matrix:
+                column[:] = matrix[:, 0]
             column *= 1.0 / np.sqrt(column[0])
-        share = np.square(np.einsum("kkb->kb", lower)) / diagonal
-    safest = float(np.minimum.reduce(share, None))  # NaN where a pivot was not positive
-    return lower, safest if safest > least else -1.0
+        share = np.square(np.einsum("kkb->kb", out)) / against
+    return bool(np.minimum.reduce(share, None) > least)  # NaN where a pivot was not positive: False
 
 
 def semidefinite_factor(matrix: FloatArray, what: str, definite: bool = False) -> FloatArray:

@@ -11,11 +11,12 @@ import numpy.typing as npt
 
 from estimators.errors import EstimatorError
 from estimators.faults import BoolArray
+from estimators.filters.affine import Affine
 from estimators.filters.gaussian import GaussianFilter
 from estimators.filters.sigma import SigmaWeights
 from estimators.filters.step import FilterStep, broadcast, fits, gate_threshold, numbers, quiet
 from estimators.filters.triangular import FEW, semidefinite_factor
-from estimators.filters.unscented_few import FewPoints
+from estimators.filters.unscented_few import Directions, FewPoints
 from estimators.filters.unscented_many import ManyPoints
 from estimators.interpolate import FloatArray
 
@@ -38,10 +39,9 @@ class UnscentedKalmanFilter(GaussianFilter):
     Drawing anew makes the filter equal the Kalman filter on a linear model; the listing of the source reuses the
     propagated points for y and so leaves Q out of Pyy.
 
-    A function that is affine in its last states, from index k on with those before them held, has no even part along
-    the columns k, k+1, ... of a lower triangular factor, for these move the last states alone: `affine_from=k` takes
-    one point a column there, x + S_i (k = 0: the function is affine), and the function gets 1 + n + k of them. The
-    result is the same; whether the function is affine is not checked.
+    A function that is affine in its last states, from k on with those before them held, has no even part along the
+    columns k, k+1, ... of a lower triangular factor, for these move the last states alone: told so by an `Affine`, the
+    filter asks the function for 1 + 2k points, and for its slope along the other columns.
 
     Source: weights of the corner estimation paper (P1 section 3, with W_i = 1/(2 (N + eta))); Van der Merwe, Wan (2001)
     for the square-root form; Kaminski, Bryson, Schmidt (1971) for square-root measurement updates.
@@ -72,13 +72,13 @@ class UnscentedKalmanFilter(GaussianFilter):
     @property
     def state(self) -> FloatArray:
         """A copy of the mean, shape (..., n)."""
-        return self._points.arrays()[0].copy().reshape(*self.batch_shape, self.size)
+        return self._points.centre().copy(order="K").reshape(*self.batch_shape, self.size)
 
     @quiet
-    def predict(self, transition: StateFunction, Q: npt.ArrayLike, affine_from: int | None = None) -> BoolArray:
+    def predict(self, transition: StateFunction, Q: npt.ArrayLike, affine: Affine | None = None) -> BoolArray:
         """xhat = sum W f(X_i), P = sum W (f(X_i) - xhat)(.)' + Q; Q (..., n, n) positive semidefinite.
 
-        `affine_from`: the first state in which f is affine, see the class; None: in none.
+        `affine`: where f is affine, see the class; None: nowhere.
 
         Returns a mask (...) of the entries that stayed as they were because the prediction was not finite.
 
@@ -88,8 +88,8 @@ class UnscentedKalmanFilter(GaussianFilter):
         noise = numbers(Q, "Q")
         if not self._process.holds(noise):
             self._process = self._factored(noise, self.size, "Q", definite=False)
-        moved = self._through(transition, self.size, "transition", affine_from)
-        return self._points.absorb(moved, self._process.each, self._process.factor).reshape(self.batch_shape)
+        moved, slope = self._through(transition, self.size, "transition", affine)
+        return self._points.absorb(moved, slope, self._process.each, self._process.factor).reshape(self.batch_shape)
 
     @quiet
     def correct(
@@ -98,11 +98,11 @@ class UnscentedKalmanFilter(GaussianFilter):
         measurement: StateFunction,
         R: npt.ArrayLike,
         gate: float | None = None,
-        affine_from: int | None = None,
+        affine: Affine | None = None,
     ) -> FilterStep:
         """Corrects with y = h(x) + v, y (..., m), R (..., m, m); missing channels and gate as `KalmanFilter`.
 
-        `affine_from`: the first state in which h is affine, as for `predict`.
+        `affine`: where h is affine, as for `predict`.
 
         Raises:
             EstimatorError: shapes that do not fit, a gate outside (0, 1), R not positive definite, no such state.
@@ -113,9 +113,9 @@ class UnscentedKalmanFilter(GaussianFilter):
             self._sensor = self._factored(noise, m, "R", definite=True)
         shape = self.batch_shape
         measured = broadcast(y, (*shape, m), "y").reshape(self._count, m)
-        seen = self._through(measurement, m, "measurement", affine_from)
+        seen, slope = self._through(measurement, m, "measurement", affine)
         innovation, total, gain, used, gated = self._points.correct(
-            seen, measured, self._sensor.each, self._sensor.factor, gate_threshold(gate)
+            seen, slope, measured, self._sensor.each, self._sensor.factor, gate_threshold(gate)
         )
         return FilterStep(
             *self._read(),
@@ -126,16 +126,29 @@ class UnscentedKalmanFilter(GaussianFilter):
             gated.reshape(*shape, m),
         )
 
-    def _through(self, function: StateFunction, rows: int, what: str, affine_from: int | None) -> FloatArray:
-        """The sigma points through f or h, shape (1+n+k, b, rows)."""
-        n, shape = self.size, self.batch_shape
-        k = n if affine_from is None else affine_from
+    def _through(
+        self, function: StateFunction, rows: int, what: str, affine: Affine | None
+    ) -> tuple[FloatArray, Directions | None]:
+        """f or h at the sigma points, (1+2k, b, rows), and, where k < n, its slope along directions (count, b, n)."""
+        n, shape, entries = self.size, self.batch_shape, self._count
+        k = n if affine is None else affine.start
         if not 0 <= k <= n:
-            raise EstimatorError(f"affine_from = {affine_from!r} must be the index of a state, 0 to {n - 1}, or None")
-        count = 1 + n + k
-        found = function(self._points.points(k).reshape(count, *shape, n))
-        found = broadcast(found, (count, *shape, rows), what)
-        return found.reshape(count, self._count, rows)
+            raise EstimatorError(f"affine.start = {k!r} must be the index of a state, 0 to {n - 1}, or {n} for none")
+
+        def checked(found: FloatArray, count: int) -> FloatArray:
+            return broadcast(found, (count, *shape, rows), what).reshape(count, entries, rows)
+
+        count = 1 + 2 * k
+        values = checked(function(self._points.points(k).reshape(count, *shape, n)), count)
+        if affine is None or k == n:
+            return values, None
+        centre = self._points.centre().reshape(*shape, n)
+
+        def slope(directions: FloatArray) -> FloatArray:
+            count = len(directions)
+            return checked(affine.slope(centre, directions.reshape(count, *shape, n)), count)
+
+        return values, slope
 
     def _factored(self, noise: FloatArray, rows: int, what: str, definite: bool) -> _Remembered:
         """Factor of a noise covariance; one that stays the same is factored once."""

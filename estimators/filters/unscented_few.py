@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from estimators.errors import EstimatorError
@@ -12,10 +14,12 @@ from estimators.filters.triangular import upper_factor
 from estimators.interpolate import FloatArray
 
 Corrected = tuple[FloatArray, FloatArray, FloatArray, BoolArray, BoolArray]
+Directions = Callable[[FloatArray], FloatArray]
+"""Slope of an affine function along directions: (count, b, n) -> (count, b, r)."""
 
 
 class FewPoints:
-    """Mean (b, n) and upper factor U (b, n, n) of P = U'U; values of functions are (1+n+k, b, r), see `points`."""
+    """Mean (b, n) and upper factor U (b, n, n) of P = U'U; values of functions are (1+2k, b, r), see `points`."""
 
     def __init__(self, weights: SigmaWeights, count: int, size: int) -> None:
         self.weights, self.size = weights, size
@@ -27,23 +31,21 @@ class FewPoints:
         return np.array(np.broadcast_to(matrix, (len(self.mean), *matrix.shape[-2:])))
 
     def points(self, pairs: int) -> FloatArray:
-        """(1+n+k, b, n): x, x + tau S_i and x - tau S_i for the first k columns (`pairs`), x + S_i for the others."""
-        n, columns = self.size, self.upper.swapaxes(0, 1)
-        out = np.empty((1 + n + pairs, *self.mean.shape))
-        offset = self.weights.tau * columns[:pairs]
+        """(1+2k, b, n): x, x + tau S_i and x - tau S_i for the first k columns (`pairs`)."""
+        out = np.empty((1 + 2 * pairs, *self.mean.shape))
+        offset = self.weights.tau * self.upper.swapaxes(0, 1)[:pairs]
         out[0] = self.mean
         np.add(self.mean, offset, out[1 : 1 + pairs])
-        np.add(self.mean, columns[pairs:], out[1 + pairs : 1 + n])
-        np.subtract(self.mean, offset, out[n + 1 :])
+        np.subtract(self.mean, offset, out[1 + pairs :])
         return out
 
-    def absorb(self, values: FloatArray, noise: FloatArray, root: FloatArray) -> BoolArray:
+    def absorb(self, values: FloatArray, slope: Directions | None, noise: FloatArray, root: FloatArray) -> BoolArray:
         """Takes the moments of the values plus noise as its own; returns the entries (b,) that stayed.
 
-        The noise covariance, as `prepared`, comes with its lower factor, which is all that is needed here.
+        `slope` is asked for the columns that have no pair of points. The noise covariance, as `prepared`, comes with its
+        lower factor, which is all that is needed here.
         """
-        mean, odd, even = _parts(self.weights, values, self.size)
-        weight = self.weights.centre_weight(2 * self.size + 1 - len(values))
+        mean, odd, even, weight = self._parts(values, slope)
         centre = even[:, -1].copy()
         even[:, -1] *= np.sqrt(max(weight, 0.0))
         stack = np.concatenate((odd, even, root.swapaxes(1, 2)), axis=1)
@@ -59,21 +61,26 @@ class FewPoints:
         return np.logical_not(good)
 
     def correct(
-        self, values: FloatArray, measured: FloatArray, noise: FloatArray, root: FloatArray, threshold: float | None
+        self,
+        values: FloatArray,
+        slope: Directions | None,
+        measured: FloatArray,
+        noise: FloatArray,
+        root: FloatArray,
+        threshold: float | None,
     ) -> Corrected:
         """Innovation (b, m), its covariance (b, m, m), gain (b, n, m), used and gated (b, m).
 
         QR of [[L_R', 0], [even, 0], [odd, U]] = [[L_yy', Kbar'], [0, U+]], K = Kbar L_yy^-1.
         """
         n, m = self.size, values.shape[2]
-        expected, odd, even = _parts(self.weights, values, n)
+        expected, odd, even, weight = self._parts(values, slope)
         innovation = measured - expected
         missing: BoolArray | None = None
         if not (all_bounded(innovation) and all_bounded(odd) and all_bounded(even)):
             bad = ~(bounded(odd, 1) & bounded(even, 1))
             missing = bad | ~bounded(innovation)
             odd, even = (np.where(bad[:, None], 0.0, part) for part in (odd, even))
-        weight = self.weights.centre_weight(2 * n + 1 - len(values))
         wide, even = _widened(noise, even, weight)
         total = odd.swapaxes(1, 2) @ odd + wide
         gated, out = refused(innovation, diagonal(total), missing, threshold)
@@ -104,10 +111,30 @@ class FewPoints:
         """Mean (b, n) and covariance (b, n, n), copies."""
         return self.mean.copy(), self.upper.swapaxes(1, 2) @ self.upper
 
+    def centre(self) -> FloatArray:
+        """Mean (b, n), a view to read from."""
+        return self.mean
+
     def arrays(self) -> tuple[FloatArray, FloatArray]:
         """Mean (b, n) and lower factor (b, n, n): views to read from and write to."""
         self.upper = np.array(self.upper)
         return self.mean, self.upper.swapaxes(1, 2)
+
+    def _parts(self, values: FloatArray, slope: Directions | None) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+        """Mean (b, r), odd rows b_i / tau (b, n, r), even rows [a_i / tau, c_0] (b, k+1, r), and the weight of c_0."""
+        n, tau, (_, b, r) = self.size, self.weights.tau, values.shape
+        k = len(values) // 2
+        centre, plus, minus = values[0], values[1 : k + 1], values[k + 1 :]
+        odd = np.empty((b, n, r))
+        odd[:, :k] = ((plus - minus) * (0.5 / tau)).swapaxes(0, 1)
+        if slope is not None:
+            odd[:, k:] = slope(self.upper.swapaxes(0, 1)[k:]).swapaxes(0, 1)
+        pairs = (plus + minus) * 0.5 - centre  # differences from the centre: nothing cancels on a linear function
+        shift = np.add.reduce(pairs, 0) / tau**2
+        even = np.empty((b, k + 1, r))
+        even[:, :k] = ((pairs - shift) / tau).swapaxes(0, 1)
+        even[:, k] = -shift
+        return centre + shift, odd, even, self.weights.centre_weight(n - k)
 
 
 def _widened(noise: FloatArray, even: FloatArray, weight: float) -> tuple[FloatArray, FloatArray]:
@@ -136,18 +163,3 @@ def _less(upper: FloatArray, centre: FloatArray, weight: float) -> FloatArray:
     v *= np.sqrt(allowed / np.maximum(size, 1e-300))
     g = 1.0 / (1.0 + np.sqrt(1.0 - allowed))
     return upper_factor(upper - g * v @ (v.swapaxes(1, 2) @ upper))
-
-
-def _parts(weights: SigmaWeights, values: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Mean (b, r), odd rows b_i / tau (b, n, r), even rows [a_i / tau, c_0] (b, k+1, r) of values (1+n+k, b, r)."""
-    k = len(values) - 1 - n
-    centre, plus, minus = values[0], values[1 : n + 1], values[n + 1 :]
-    odd = np.empty((values.shape[1], n, values.shape[2]))
-    odd[:, :k] = ((plus[:k] - minus) * (0.5 / weights.tau)).swapaxes(0, 1)
-    odd[:, k:] = (plus[k:] - centre).swapaxes(0, 1)
-    pairs = (plus[:k] + minus) * 0.5 - centre  # differences from the centre: nothing cancels on a linear function
-    shift = np.add.reduce(pairs, 0) / weights.tau**2
-    even = np.empty((values.shape[1], k + 1, values.shape[2]))
-    even[:, :k] = ((pairs - shift) / weights.tau).swapaxes(0, 1)
-    even[:, k] = -shift
-    return centre + shift, odd, even

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.filters import ExtendedKalmanFilter, FilterStep, UnscentedKalmanFilter
+from estimators.filters.affine import Affine
 from estimators.filters.step import all_bounded, broadcast, diagonal
 from estimators.filters.workspace import Workspace
 from estimators.interpolate import FloatArray
@@ -107,6 +108,7 @@ class FourWheelObserver:
         self._loads = HeldInput("loads", static, 0.0, LOAD_LIMIT, axes=1)
         self._renewed = np.zeros(self._count, dtype=np.bool_)
         self._memory = Workspace()
+        self._before: list[FourWheelModel] | None = None  # at the inputs of the previous sample
 
     @property
     def state(self) -> FloatArray:
@@ -132,21 +134,21 @@ class FourWheelObserver:
         """
         shape, count = self.batch_shape, self._count
         flags: FlagArray = np.zeros(count, dtype=np.int32)
-        before = self._steering.value, self._loads.value
+        before = self._before or self._models(self._steering.value, self._loads.value)
         angle = self._steering(broadcast(steering, shape, "steering").reshape(count), flags)
         load = self._loads(broadcast(loads, (*shape, 4), "loads").reshape(count, 4), flags)
         measured = broadcast(measurement, (*shape, 4), "measurement").reshape(count, 4)
         rest = np.empty(count, dtype=np.bool_)
         found: list[FilterStep] = []
-        for part, each in zip(self._parts, self._filters, strict=True):
+        now = self._before = self._models(angle, load)
+        for part, each, model, new in zip(self._parts, self._filters, before, now, strict=True):
             rest[part] = ~(each.state[:, 1] >= self.standstill_speed)
-            stands = rest[part] if rest[part].any() else None
-            rest_of_model = self.standstill_speed, stands, self._memory
-            old = FourWheelModel.at(self.vehicle, self.sample_time, before[0][part], before[1][part], *rest_of_model)
-            new = FourWheelModel.at(self.vehicle, self.sample_time, angle[part], load[part], *rest_of_model)
+            old = model._replace(at_rest=rest[part] if rest[part].any() else None)
             if isinstance(each, UnscentedKalmanFilter):
-                held = each.predict(old.transition_of_points, self._process, AFFINE_FROM)
-                result = each.correct(measured[part], new.measurement_of_points, self._sensor, self.gate, affine_from=0)
+                affine = Affine(AFFINE_FROM, old.transition_slope)
+                held = each.predict(old.transition_of_points, self._process, affine)
+                affine = Affine(0, new.measurement_slope)
+                result = each.correct(measured[part], new.measurement_of_points, self._sensor, self.gate, affine)
             else:
                 held = each.predict(old.transition, old.transition_jacobian, self._process)
                 result = each.correct(
@@ -177,6 +179,14 @@ class FourWheelObserver:
             shaped,
         )
 
+    def _models(self, steering: FloatArray, loads: FloatArray) -> list[FourWheelModel]:
+        """The model of every part at the inputs (b), (b, 4), as if no car stood still."""
+        slow, memory = self.standstill_speed, self._memory
+        return [
+            FourWheelModel.at(self.vehicle, self.sample_time, steering[part], loads[part], slow, memory=memory)
+            for part in self._parts
+        ]
+
     def reset(self, where: npt.ArrayLike | None = None, state: npt.ArrayLike = 0.0) -> None:
         """Sets the entries `where` (mask of the batch shape; None: all) to `state`, (..., 8) or what broadcasts to it,
         with the initial covariance, and forgets the inputs; flagged RESET at the next step.
@@ -195,6 +205,7 @@ class FourWheelObserver:
             each.reset(chosen[part], state=full[part])
         self._steering.forget(chosen)
         self._loads.forget(chosen)
+        self._before = None
         self._renewed |= chosen
 
     def save(self) -> dict[str, npt.NDArray[Any]]:
@@ -217,6 +228,7 @@ class FourWheelObserver:
         for part, each in zip(self._parts, self._filters, strict=True):
             each.restore({key: saved[key][part] for key in each.save()})
         self._steering.value, self._loads.value = np.array(saved["steering"]), np.array(saved["loads"])
+        self._before = None
         self._renewed = np.array(saved["renewed"], dtype=np.bool_)
 
 

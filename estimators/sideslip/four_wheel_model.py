@@ -28,7 +28,6 @@ STATES = (
 )
 AFFINE_FROM = 3
 """The first state in which the transition is affine while those before it are held: the forces."""
-_DISTINCT = [0, 1, 2, 3, 9, 10, 11]  # of the sigma points, those that differ in the first three states
 REST_TIME = 0.1  # s, with which sideslip and lateral forces fade away at standstill
 
 
@@ -72,70 +71,59 @@ class FourWheelModel(NamedTuple):
 
     def transition(self, x: FloatArray) -> FloatArray:
         """X + T f(X, U), P4 (11); x (..., 8)."""
-        return self._moved(x, None)
+        return self._moved(x, np.empty((8, *x.shape[:-1])))
 
     def transition_of_points(self, x: FloatArray) -> FloatArray:
-        """`transition` of the sigma points (12, ..., 8) of a lower triangular factor with `AFFINE_FROM`.
+        """`transition`, good until the next call."""
+        return self._moved(x, self.memory("moved", (8, *x.shape[:-1])))
 
-        Its last five columns leave yaw rate, speed and sideslip as they are at the centre, and with them the slip
-        angles: the tires are evaluated at seven points instead of twelve. The result is good until the next call.
-        """
-        return self._moved(x, _DISTINCT)
-
-    def _moved(self, x: FloatArray, distinct: list[int] | None) -> FloatArray:
+    def _moved(self, x: FloatArray, out: FloatArray) -> FloatArray:
         v, time = self.vehicle, self.sample_time
         yaw, beta, drive = x[..., 0], x[..., 2], x[..., 7]
         forces = x.transpose(x.ndim - 1, *range(x.ndim - 1))[3:7]
-        shape = x.shape[:-1]
-        out = np.empty((8, *shape)) if distinct is None else self.memory("moved", (8, *shape))
         targets = out[3:7]
-        if distinct is None:
-            speed = np.maximum(x[..., 1], self.slow)
-            sine, cosine = np.sin(beta), np.cos(beta)
-            self._tangents(yaw, speed, beta, targets)
-            self._saturate(targets)
-        else:
-            pick = self.memory("pick", (3, len(distinct), *shape[1:]))
-            x[..., :3].transpose(x.ndim - 1, *range(x.ndim - 1)).take(distinct, 1, pick)
-            np.maximum(pick[1], self.slow, out=pick[1])
-            few = self.memory("few", (4, *pick.shape[1:]))
-            self._tangents(pick[0], pick[1], pick[2], few)
-            self._saturate(few)
-            speed, sine, cosine = (_all_points(part) for part in (pick[1:2], np.sin(pick[2:]), np.cos(pick[2:])))
-            _all_points(few, targets)
-            speed, sine, cosine = speed[0], sine[0], cosine[0]
+        speed = np.maximum(x[..., 1], self.slow)
+        sine, cosine = np.sin(beta), np.cos(beta)
+        self._tangents(yaw, speed, beta, targets)
+        self._saturate(targets)
         targets -= forces
         share = time * speed
         targets[:2] *= np.minimum(share * (1.0 / v.front_relaxation), 1.0)
         targets[2:] *= np.minimum(share * (1.0 / v.rear_relaxation), 1.0)
         targets += forces
 
-        front, rear = forces[0] + forces[1], forces[2] + forces[3]
-        lateral = front * self.cosine
-        lateral += drive * self.sine  # of the front axle in body axes
-        along = drive * self.cosine
-        along -= front * self.sine
-        moment = forces[0] - forces[1]
-        moment *= self.sine * (0.5 * v.track * time / v.yaw_inertia)
-        moment += lateral * (time / v.yaw_inertia * v.front_lever)
-        moment -= rear * (time / v.yaw_inertia * v.rear_lever)
-        np.add(yaw, moment, out[0, ...])
-        # cos(beta - delta) and sin(beta - delta) of (11) expanded: forces in body axes, turned by beta
-        lateral += rear
-        lateral *= time / v.mass
-        along *= time / v.mass
-        np.add(x[..., 1], along * cosine, out[1, ...])
-        out[1] += lateral * sine
-        lateral *= cosine
-        lateral -= along * sine
-        lateral /= speed
-        lateral -= time * yaw
-        np.add(beta, lateral, out[2, ...])
+        self._push(forces, drive, sine, cosine, out[:3])
+        out[2] /= speed
+        yaw_time = time * yaw
+        out[2] -= yaw_time
+        for k, own in enumerate((yaw, x[..., 1], beta)):
+            out[k] += own
         out[7] = drive
         if self.at_rest is not None:
             fade = math.exp(-time / REST_TIME)
             for k in range(7):
                 out[k] = np.where(self.at_rest, x[..., k] * (1.0 if k < 2 else fade), out[k])
+        return out.transpose(*range(1, out.ndim), 0)
+
+    def transition_slope(self, x: FloatArray, d: FloatArray) -> FloatArray:
+        """transition(x + d) - transition(x) for d (count, ..., 8) that moves the forces alone; good until the next call.
+
+        The forces are relaxed with a share of their own, and enter the motion of the body linearly.
+        """
+        v, time = self.vehicle, self.sample_time
+        speed, beta = np.maximum(x[..., 1], self.slow), x[..., 2]
+        move = d.transpose(d.ndim - 1, *range(d.ndim - 1))
+        out = self.memory("slope", move.shape)
+        share = time * speed
+        np.multiply(move[3:5], 1.0 - np.minimum(share * (1.0 / v.front_relaxation), 1.0), out[3:5])
+        np.multiply(move[5:7], 1.0 - np.minimum(share * (1.0 / v.rear_relaxation), 1.0), out[5:7])
+        out[7] = move[7]
+        self._push(move[3:7], move[7], np.sin(beta), np.cos(beta), out[:3])
+        out[2] /= speed
+        if self.at_rest is not None:
+            fade = math.exp(-time / REST_TIME)
+            for k in range(7):
+                out[k] = np.where(self.at_rest, move[k] * (1.0 if k < 2 else fade), out[k])
         return out.transpose(*range(1, out.ndim), 0)
 
     def transition_jacobian(self, x: FloatArray) -> FloatArray:
@@ -191,8 +179,12 @@ class FourWheelModel(NamedTuple):
         return self._measured(x, np.empty((4, *x.shape[:-1])))
 
     def measurement_of_points(self, x: FloatArray) -> FloatArray:
-        """`measurement`, which is affine, of sigma points; good until the next call."""
+        """`measurement`, good until the next call."""
         return self._measured(x, self.memory("measured", (4, *x.shape[:-1])))
+
+    def measurement_slope(self, _: FloatArray, d: FloatArray) -> FloatArray:
+        """measurement(x + d) - measurement(x), the same for all x: the measurement is linear; good until the next call."""
+        return self._measured(d, self.memory("measured slope", (4, *d.shape[:-1])))
 
     def _measured(self, x: FloatArray, out: FloatArray) -> FloatArray:
         front, drive = x[..., 3] + x[..., 4], x[..., 7]
@@ -217,6 +209,35 @@ class FourWheelModel(NamedTuple):
         H[..., 2, 3:5], H[..., 2, 7:] = -sine, cosine
         H[..., 3, 3:5], H[..., 3, 5:7], H[..., 3, 7:] = cosine, 1.0 / self.vehicle.mass, sine
         return H
+
+    def _push(
+        self, forces: FloatArray, drive: FloatArray, sine: FloatArray, cosine: FloatArray, out: FloatArray
+    ) -> None:
+        """T times the yaw acceleration, T times the accelerations along and across the motion, into `out` (3, ...).
+
+        `forces` (4, ...) and `drive` (...) in N; sine and cosine of the sideslip. Linear in the forces.
+        """
+        v, time = self.vehicle, self.sample_time
+        moment, ahead, aside = out[0, ...], out[1, ...], out[2, ...]
+        front, rear = forces[0] + forces[1], forces[2] + forces[3]
+        lateral = front * self.cosine
+        lateral += drive * self.sine  # of the front axle in body axes
+        along = drive * self.cosine
+        front *= self.sine
+        along -= front
+        np.subtract(forces[0], forces[1], moment)
+        moment *= self.sine * (0.5 * v.track * time / v.yaw_inertia)
+        moment += lateral * (time / v.yaw_inertia * v.front_lever)
+        moment -= rear * (time / v.yaw_inertia * v.rear_lever)
+        # cos(beta - delta) and sin(beta - delta) of (11) expanded: forces in body axes, turned by beta
+        lateral += rear
+        lateral *= time / v.mass
+        along *= time / v.mass
+        np.multiply(along, cosine, ahead)
+        ahead += lateral * sine
+        np.multiply(lateral, cosine, aside)
+        along *= sine
+        aside -= along
 
     def _tangents(self, yaw: FloatArray, speed: FloatArray, beta: FloatArray, out: FloatArray) -> None:
         """tan(alpha) of P4 (2) into `out` (4, ...)."""
@@ -272,14 +293,6 @@ class FourWheelModel(NamedTuple):
             slopes[k, :2] = (top - out[:2] * open_ * (cosine * along[k] + sine * across[k][0])) / below
             slopes[k, 2:] = (-across[k][1] - out[2:] * along[k]) / ahead
         return slopes
-
-
-def _all_points(few: FloatArray, out: FloatArray | None = None) -> FloatArray:
-    """From the points `_DISTINCT` (k, 7, ...) to all (k, 12, ...)."""
-    full = np.empty((few.shape[0], 12, *few.shape[2:])) if out is None else out
-    full[:, :4], full[:, 9:] = few[:, :4], few[:, 4:]
-    full[:, 4:9] = few[:, :1]
-    return full
 
 
 def _stiffness(vehicle: FourWheel, axes: int) -> FloatArray:

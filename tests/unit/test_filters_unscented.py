@@ -7,6 +7,7 @@ import pytest
 
 from estimators.errors import EstimatorError
 from estimators.filters import KalmanFilter, SigmaWeights, UnscentedKalmanFilter
+from estimators.filters.affine import Affine
 from estimators.filters.triangular import FEW, left_divide, lower_factor, right_divide, summed_factor
 
 
@@ -110,7 +111,7 @@ def test_negative_centre_weight_never_breaks_positive_definiteness(count: int) -
 
 @pytest.mark.parametrize("count", [3, FEW + 2])
 @pytest.mark.parametrize(("n", "k"), [(3, 0), (3, 1), (8, 3), (14, 5), (8, 8)])
-def test_affine_states_need_one_point_a_column(n: int, k: int, count: int) -> None:
+def test_affine_states_need_no_points(n: int, k: int, count: int) -> None:
     """Functions that are affine from state k on, with slopes that depend on the states before: the same to round-off."""
     draw = np.random.default_rng(n + k)
     root, mix = 0.2 * draw.normal(size=(count, n, n)), draw.normal(size=(n, n))
@@ -120,40 +121,89 @@ def test_affine_states_need_one_point_a_column(n: int, k: int, count: int) -> No
         slope = np.cos(x[..., :k]).sum(axis=-1, keepdims=True)
         return 0.3 * x @ mix + np.concatenate((np.sin(x[..., :k]), 0.1 * slope * x[..., k:] + 1.0), axis=-1)
 
+    def slope(x: np.ndarray, d: np.ndarray) -> np.ndarray:
+        assert not d[..., :k].any()
+        bend = 0.1 * np.cos(x[..., :k]).sum(axis=-1, keepdims=True)
+        return 0.3 * d @ mix + np.concatenate((d[..., :k], bend * d[..., k:]), axis=-1)
+
     full, short = UnscentedKalmanFilter(x, P), UnscentedKalmanFilter(x, P)
     for _ in range(3):
         y = draw.normal(size=(count, 2))
         y[0, 1] = np.nan
         full.predict(bent, 0.1 * np.eye(n))
-        short.predict(bent, 0.1 * np.eye(n), affine_from=k)
+        short.predict(bent, 0.1 * np.eye(n), Affine(k, slope))
         a = full.correct(y, lambda x: bent(x)[..., -2:], 0.2 * np.eye(2), 0.999)
-        b = short.correct(y, lambda x: bent(x)[..., -2:], 0.2 * np.eye(2), 0.999, affine_from=k)
+        lower = Affine(k, lambda x, d: slope(x, d)[..., -2:])
+        b = short.correct(y, lambda x: bent(x)[..., -2:], 0.2 * np.eye(2), 0.999, lower)
         for name in a._fields:
             np.testing.assert_allclose(getattr(b, name), getattr(a, name), rtol=1e-8, atol=1e-9, err_msg=name)
 
 
 @pytest.mark.parametrize("count", [3, FEW + 2])
-@pytest.mark.parametrize("affine", [None, 0])
-def test_functions_may_return_what_they_are_given(count: int, affine: int | None) -> None:
+@pytest.mark.parametrize("affine", [False, True])
+def test_functions_may_return_what_they_are_given(count: int, affine: bool) -> None:
     """The points themselves, or some of their columns, as views: nothing is overwritten while it is read."""
     draw = np.random.default_rng(6)
     P, x = np.eye(4) + 0.3, draw.normal(size=(count, 4))
     unscented, kalman = UnscentedKalmanFilter(x, P), KalmanFilter(x, P)
     for _ in range(3):
         y = draw.normal(size=(count, 2))
-        unscented.predict(lambda x: x, 0.1 * np.eye(4), affine)
+        unscented.predict(lambda x: x, 0.1 * np.eye(4), Affine(0, lambda x, d: d) if affine else None)
         kalman.predict(np.eye(4), 0.1 * np.eye(4))
-        a = unscented.correct(y, lambda x: x[..., 1:3], np.eye(2), affine_from=affine)
+        slope = Affine(0, lambda x, d: d[..., 1:3]) if affine else None
+        a = unscented.correct(y, lambda x: x[..., 1:3], np.eye(2), affine=slope)
         b = kalman.correct(y, np.eye(4)[1:3], np.eye(2))
         for name in a._fields:
             np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=1e-9, atol=1e-12, err_msg=name)
 
 
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("count", [2, FEW + 2])
+@pytest.mark.parametrize("accuracy", [1.0, 1e-3, 1e-9, 1e-14])
+def test_an_accurate_sensor_costs_no_digits(accuracy: float, count: int, known: bool) -> None:
+    """A sensor far better than the prediction: the difference P - W W' loses digits there, the filter must not.
+
+    In information form: P+^-1 = P-^-1 + C' C / r, whose smallest eigenvalue is that of what is not measured.
+    """
+    draw = np.random.default_rng(11)
+    C = np.array([[1.0, 0.5, 0.0], [0.0, 1.0, -1.0]])
+    stay, whole = (Affine(0, lambda x, d: d), Affine(0, lambda x, d: d @ C.T)) if known else (None, None)
+    unscented, kalman = UnscentedKalmanFilter(np.zeros((count, 3)), np.eye(3)), KalmanFilter(np.zeros(3), np.eye(3))
+    for _ in range(4):
+        y = draw.normal(size=2)
+        unscented.predict(lambda x: x, 0.3 * np.eye(3), stay)
+        kalman.predict(np.eye(3), 0.3 * np.eye(3))
+        inverse = np.linalg.inv(unscented.covariance[0]) if accuracy > 1e-5 else None
+        a = unscented.correct(np.tile(y, (count, 1)), lambda x: x @ C.T, accuracy * np.eye(2), affine=whole)
+        b = kalman.correct(y, C, accuracy * np.eye(2))
+        np.testing.assert_allclose(a.state, np.tile(b.state, (count, 1)), rtol=1e-7, atol=1e-7)
+        measured = np.einsum("mi,bij,nj->bmn", C, a.covariance, C)
+        np.testing.assert_allclose(measured[:, [0, 1], [0, 1]], accuracy, 1e-2 if accuracy < 0.1 else 1.0, 1e-15)
+        assert (np.linalg.eigvalsh(a.covariance) > 0.0).all()
+        if inverse is not None:
+            expected = np.linalg.inv(inverse + C.T @ C / accuracy)
+            np.testing.assert_allclose(a.covariance[0], expected, rtol=1e-8, atol=1e-12)
+
+
+def test_slopes_that_are_not_finite_are_missing_channels() -> None:
+    count, C = FEW + 2, np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]])
+    given = Affine(0, lambda x, d: np.where(np.arange(count)[:, None] == 3, [np.nan, 1.0], 1.0) * (d @ C.T))
+    unscented, kalman = UnscentedKalmanFilter(np.zeros((count, 3)), np.eye(3)), KalmanFilter(np.zeros(3), np.eye(3))
+    unscented.predict(lambda x: x, 0.1 * np.eye(3))
+    kalman.predict(np.eye(3), 0.1 * np.eye(3))
+    step = unscented.correct(np.ones((count, 2)), lambda x: x @ C.T, np.eye(2), affine=given)
+    one = kalman.correct([np.nan, 1.0], C, np.eye(2))
+    np.testing.assert_allclose(step.state[3], one.state, atol=1e-12)
+    np.testing.assert_allclose(step.covariance[3], one.covariance, atol=1e-12)
+    assert step.used[3].tolist() == [False, True] and step.used[4].all()
+    assert np.isnan(step.innovation[3, 0]) and np.isfinite(step.state).all()
+
+
 def test_a_state_that_is_not_there_is_refused() -> None:
     unscented = UnscentedKalmanFilter(np.zeros((2, 3)), np.eye(3))
     for bad in (-1, 4):
-        with pytest.raises(EstimatorError, match=f"affine_from = {bad} must be the index of a state, 0 to 2, or None"):
-            unscented.predict(lambda x: x, np.eye(3), bad)
+        with pytest.raises(EstimatorError, match=f"affine.start = {bad} must be the index of a state, 0 to 2, or 3"):
+            unscented.predict(lambda x: x, np.eye(3), Affine(bad, lambda x, d: d))
 
 
 def test_factors() -> None:

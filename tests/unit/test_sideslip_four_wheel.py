@@ -10,6 +10,7 @@ import pytest
 
 from estimators import EstimatorError, Flag
 from estimators.filters import UnscentedKalmanFilter
+from estimators.filters.affine import Affine
 from estimators.filters.triangular import FEW
 from estimators.sideslip import FourWheel, FourWheelModel, FourWheelObserver
 from estimators.sideslip.four_wheel_model import AFFINE_FROM
@@ -44,16 +45,6 @@ def test_jacobians_are_derivatives(resting: bool) -> None:
         assert np.absolute(error).max() < 2e-6
 
 
-def test_few_distinct_points_give_the_same_transition() -> None:
-    draw = np.random.default_rng(2)
-    mean, root = states(draw, 30), np.tril(draw.normal(size=(30, 8, 8)) * [0.1] * 8)
-    columns = root.transpose(2, 0, 1)
-    points = np.concatenate((mean[None], mean + columns, mean - columns[:AFFINE_FROM]))
-    model = FourWheelModel.at(CAR, PERIOD, np.full(30, 0.05), np.tile(CAR.static_loads, (30, 1)), 1.0)
-    np.testing.assert_array_equal(model.transition_of_points(points), model.transition(points))
-    np.testing.assert_array_equal(model.measurement_of_points(points), model.measurement(points))
-
-
 @pytest.mark.parametrize("at_rest", [False, True])
 def test_the_forces_enter_as_the_filter_takes_for_granted(at_rest: bool) -> None:
     """Affine in the last five states with the first three held, and the measurement in all: f(x+d) + f(x-d) = 2 f(x)."""
@@ -62,9 +53,15 @@ def test_the_forces_enter_as_the_filter_takes_for_granted(at_rest: bool) -> None
     stands = np.full(30, True) if at_rest else None
     model = FourWheelModel.at(CAR, PERIOD, np.full(30, 0.05), np.tile(CAR.static_loads, (30, 1)), 1.0, stands)
     linear = move * (np.arange(8) >= AFFINE_FROM)
-    for function, step in ((model.transition, linear), (model.measurement, move)):
-        both = function(mean + step) + function(mean - step)
-        np.testing.assert_allclose(both, 2 * function(mean), rtol=1e-9, atol=1e-9)
+    for function, slope, step in (
+        (model.transition, model.transition_slope, linear),
+        (model.measurement, model.measurement_slope, move),
+    ):
+        for sign in (1.0, -1.0):
+            there = function(mean) + slope(mean, sign * step[None])[0]
+            np.testing.assert_allclose(function(mean + sign * step), there, rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(model.transition_of_points(mean), model.transition(mean))
+    np.testing.assert_array_equal(model.measurement_of_points(mean), model.measurement(mean))
     if not at_rest:
         bent = model.transition(mean + move) + model.transition(mean - move) - 2 * model.transition(mean)
         assert np.abs(bent).max() > 1.0  # in the first three it is not
@@ -80,10 +77,11 @@ def test_points_left_out_change_nothing(runs: int) -> None:
     Q, R = np.diag([1e-5, 1e-4, 1e-7, 1e3, 1e3, 1e3, 1e3, 1e3]), np.diag([4e-6, 4e-2, 2.5e-3, 2.5e-3])
     for _ in range(5):
         full.predict(model.transition, Q)
-        short.predict(model.transition_of_points, Q, AFFINE_FROM)
+        short.predict(model.transition_of_points, Q, Affine(AFFINE_FROM, model.transition_slope))
         y = model.measurement(full.state) + 0.1 * draw.normal(size=(runs, 4))
         y[0, 1] = np.nan
-        a, b = full.correct(y, model.measurement, R), short.correct(y, model.measurement_of_points, R, affine_from=0)
+        a = full.correct(y, model.measurement, R)
+        b = short.correct(y, model.measurement_of_points, R, affine=Affine(0, model.measurement_slope))
         for name in ("state", "innovation", "gain", "innovation_covariance"):
             np.testing.assert_allclose(getattr(b, name), getattr(a, name), rtol=1e-7, atol=1e-9, err_msg=name)
         scale = np.sqrt(np.einsum("bii->bi", a.covariance))
