@@ -35,7 +35,7 @@ class SpeedInterval(Memory):
     interval open; a stopped wheel or a missing torque breaks it off.
     """
 
-    memory = ("start", "torque", "samples")
+    memory = ("start", "torque", "samples", "closed")
     unknowns = ("start",)
 
     def __init__(self, batch_shape: tuple[int, ...], sample_time: float, radius: FloatArray, inertia: float) -> None:
@@ -44,7 +44,7 @@ class SpeedInterval(Memory):
         self.torque: FloatArray = np.zeros(batch_shape)
         self.samples: FloatArray = np.zeros(batch_shape)
         self._rate = inertia / sample_time
-        self._closed = False  # every corner has its last speed, and an interval of one sample before it
+        self.closed = False  # every corner has its last speed, and an interval of one sample before it
         self.one, self._all, self._none = np.ones(()), np.ones(batch_shape, np.bool_), np.zeros(batch_shape, np.bool_)
 
     def __call__(self, signals: WheelSignals, fresh: npt.ArrayLike | None) -> MeanForce:
@@ -53,7 +53,7 @@ class SpeedInterval(Memory):
         Raises:
             EstimatorError: a mask of another shape.
         """
-        if self._closed and signals.calm and fresh is None:
+        if self.closed and signals.calm and fresh is None:
             before, self.start = self.start, signals.speed
             push = signals.torque - self._rate * (signals.speed - before)
             return MeanForce(push / self.radius, signals.torque, before, self.one, self._all, self._none, True)
@@ -71,7 +71,7 @@ class SpeedInterval(Memory):
         self.start = np.where(new, signals.speed, np.where(broken, np.nan, self.start))
         again = new | broken
         self.torque, self.samples = np.where(again, 0.0, self.torque), np.where(again, 0.0, samples)
-        self._closed = bool(new.all())
+        self.closed = bool(new.all())
         return MeanForce(force, mean, before, samples, closes, waiting, bool(closes.all()))
 
     def forget(self, where: npt.ArrayLike | None) -> None:
@@ -79,11 +79,11 @@ class SpeedInterval(Memory):
         chosen = mask(where, self.batch_shape, "where")
         self.start = np.where(chosen, np.nan, self.start)
         self.torque, self.samples = np.where(chosen, 0.0, self.torque), np.where(chosen, 0.0, self.samples)
-        self._closed = False
+        self.closed = False
 
     def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
         super()._take(saved)
-        self._closed = False
+        self.closed = bool(saved["closed"])
 
 
 class IntervalObserver(Memory):

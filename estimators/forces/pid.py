@@ -49,7 +49,7 @@ class PidForceObserver(Memory):
         EstimatorError: a shape without corners, gains that are not positive, eta_3 Ts of 2 or more (unstable).
     """
 
-    memory = ("force", "integral", "speed", "speed_integral", "before", "starts")
+    memory = ("force", "integral", "speed", "speed_integral", "before", "starts", "flowing")
     parts = ("inputs", "acceleration")
 
     def __init__(
@@ -80,7 +80,7 @@ class PidForceObserver(Memory):
         self.force, self.integral, self.speed = zeros.copy(), zeros.copy(), zeros.copy()
         self.speed_integral, self.before = zeros.copy(), zeros.copy()
         self.starts = np.ones(self.batch_shape, dtype=np.bool_)
-        self._flowing = False  # every corner was used in the last sample
+        self.flowing = False  # every corner was used in the last sample
 
     def step(
         self,
@@ -100,7 +100,7 @@ class PidForceObserver(Memory):
         """
         signals = self.inputs(wheel_speed, torque, vertical_load)
         rate, no_rate = self.acceleration(wheel_acceleration)
-        if self._flowing and signals.calm and no_rate is None and reference_force is None and fresh is None:
+        if self.flowing and signals.calm and no_rate is None and reference_force is None and fresh is None:
             return self._calm(signals, rate)
         used = ~signals.broken
         if no_rate is not None:
@@ -130,7 +130,7 @@ class PidForceObserver(Memory):
         change = np.where(again, 0.0, 0.5 * np.absolute(m - self.before))
         deviation: FloatArray = np.where(used, np.hypot(self._noise, change), signals.load)
         self.before, self.starts = m, ~used
-        self._flowing = bool(used.all())
+        self.flowing = bool(used.all())
         return WheelForceStep(self.force.copy(), deviation, innovation, used, signals.stopped, ~used, signals.flags)
 
     def _calm(self, signals: WheelSignals, rate: FloatArray) -> WheelForceStep:
@@ -156,11 +156,11 @@ class PidForceObserver(Memory):
         self.acceleration.forget(chosen)
         self.force = np.where(chosen, 0.0, self.force)
         self.starts = self.starts | chosen
-        self._flowing = False
+        self.flowing = False
 
     def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
         super()._take(saved)
-        self._flowing = False
+        self.flowing = bool(saved["flowing"])
 
     def _move_speed(self, speed: FloatArray, rate: FloatArray, error: FloatArray, again: npt.NDArray[np.bool_]) -> None:
         """what at the end of the sample: (5) over one sample, exactly."""

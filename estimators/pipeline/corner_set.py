@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from estimators.errors import EstimatorError
-from estimators.faults import FlagArray
+from estimators.faults import BoolArray, FlagArray
 from estimators.interpolate import FloatArray
+from estimators.pipeline.corner_kinds import CornerKind, CornerSample, ScheduledCorners
 from estimators.schedule import GainSchedule
 from estimators.signals import FilteredDerivative
 from estimators.signals.checks import LIMIT, batch, entries, mask
@@ -19,7 +20,6 @@ from estimators.signals.memory import Memory
 from estimators.vehicle import VehicleParameters
 from estimators.velocity.arithmetic import Number, Signals, arithmetic, kept_signals
 from estimators.velocity.corners import rotated, tire_motion
-from estimators.velocity.lpv import LpvVelocityObserver
 from estimators.velocity.mapping import SlipWeights, weighed
 from estimators.velocity.slip import slips
 
@@ -33,50 +33,53 @@ class CornerSetStep(NamedTuple):
     corner_vy: FloatArray  # (..., 4) likewise V_y
     relative_velocity: FloatArray  # (..., 4) R_e w - v_xt, m/s
     innovation: FloatArray  # (..., 4) of the normalised F_x; NaN where missing
-    used: npt.NDArray[np.bool_]  # (..., 4)
+    used: BoolArray  # (..., 4)
     flags: FlagArray  # (..., 4), longitudinal and lateral together
+    high_slip: BoolArray  # (..., 4) whether the longitudinal observer took the wheel for one that slips much
 
 
 class CornerObservers(Memory):
-    """A longitudinal observer at every corner, a lateral one where a schedule is given, and their mapping to the car.
+    """A longitudinal observer at every corner, a lateral one where one is given, and their mapping to the car.
 
     u_x = R_e w' - v_xt', u_y = -v_yt' with the velocities of the last step in the accelerations, P1 section 6. Without a
-    lateral schedule V_y is what `step` is told. Axles are weighed by slip (`SlipWeights`), or equally. One car runs on
+    lateral observer V_y is what `step` is told. Axles are weighed by slip (`SlipWeights`), or equally. One car runs on
     plain numbers, several on arrays, by the same formulas (`arithmetic`).
 
     Args:
         vehicle: radii and lever arms.
-        longitudinal: gain schedule.
-        lateral: gain schedule, or None.
+        longitudinal: a gain schedule, or one of `corner_kinds`.
+        lateral: likewise, or None.
         batch_shape: () for one car; its corners are a last axis.
         weights: of the axles; None: a half each.
         lag: s, of the derivatives of wheel speeds, steering and yaw rate.
 
     Raises:
-        EstimatorError: schedules for different sample times, or as `LpvVelocityObserver`.
+        EstimatorError: observers for different sample times or for another batch, or as `ScheduledCorners`.
     """
 
     memory = ("vx", "vy", "slip", "angle")
-    unknowns = ("raw", "measurement", "reading", "vx")  # the first two are of the observers' screens
+    unknowns = ("reading", "vx")
 
     def __init__(
         self,
         vehicle: VehicleParameters,
-        longitudinal: GainSchedule,
-        lateral: GainSchedule | None = None,
+        longitudinal: GainSchedule | CornerKind,
+        lateral: GainSchedule | CornerKind | None = None,
         batch_shape: tuple[int, ...] = (),
         weights: SlipWeights | None = None,
         lag: float = 0.01,
     ) -> None:
         self.vehicle, self.batch_shape, self.weights = vehicle, batch(batch_shape), weights
-        if lateral is not None and abs(lateral.sample_time - longitudinal.sample_time) > 1e-9:
+        self.along = self._observer(longitudinal)
+        self.sample_time = self.along.sample_time
+        self.across = None if lateral is None else self._observer(lateral)
+        if self.across is not None and abs(self.across.sample_time - self.sample_time) > 1e-9:
             raise EstimatorError(
-                f"schedules '{longitudinal.name}' and '{lateral.name}' are for sample times "
-                f"{longitudinal.sample_time:g} s and {lateral.sample_time:g} s; design both for one"
+                f"the longitudinal and the lateral observer are for sample times {self.sample_time:g} s and "
+                f"{self.across.sample_time:g} s; design both for one"
             )
-        self.sample_time, four = longitudinal.sample_time, (*self.batch_shape, 4)
-        self.along = LpvVelocityObserver(longitudinal, four)
-        self.across = LpvVelocityObserver(lateral, four) if lateral is not None else None
+        self._judged = self.along.judges_slip or (self.across is not None and self.across.judges_slip)
+        self._no_slip = np.zeros((*self.batch_shape, 4))
         self.slope = FilteredDerivative(self.sample_time, lag, (*self.batch_shape, 9))
         self.parts: tuple[str, ...] = ("along", "slope") if lateral is None else ("along", "across", "slope")
         self._count = math.prod(self.batch_shape)
@@ -86,7 +89,7 @@ class CornerObservers(Memory):
         self.vx: Number = kit.full(math.nan)
         self.vy: Number = kit.full(0.0)
         nothing = kit.stacked([kit.full(0.0)] * 4)
-        self.slip: Signals = nothing  # slips and angles of the last sample, where weights ask for them
+        self.slip: Signals = nothing  # slips and angles of the last sample, where somebody asks for them
         self.angle: Signals = nothing
 
     def step(
@@ -102,7 +105,7 @@ class CornerObservers(Memory):
     ) -> CornerSetStep:
         """One sample: rad/s, rad (..., 4); m/s^2, m/s^2, rad/s (...); F_x/F_z and F_y/F_z (..., 4), NaN where unknown.
 
-        `vy` (...) m/s serves where there is no lateral schedule.
+        `vy` (...) m/s serves where there is no lateral observer.
 
         Raises:
             EstimatorError: another shape, or not numbers.
@@ -133,11 +136,18 @@ class CornerObservers(Memory):
         sine, cosine, beside, push_x, push_y = kit.each(
             driven, held[:4], held[4:8], slope[:4], slope[4:8], radius, *levers
         )
-        along = self.along.step(kit.table((push_x,), shape), entries(longitudinal_use, four, "longitudinal_use"), w)
-        relative, flags = along.estimate[..., 1], along.flags
+        rest = (
+            *(w, rate.derivative[..., :4]),
+            kit.table((self.slip,), shape) if self._judged else self._no_slip,
+            *(ax, ay),
+        )
+        use = entries(longitudinal_use, four, "longitudinal_use")
+        along = self.along.step(CornerSample(kit.table((push_x,), shape), use, *rest))
+        relative, flags = along.relative_velocity, along.flags
         if self.across is not None:
-            side = self.across.step(kit.table((push_y,), shape), entries(lateral_use, four, "lateral_use"), w)
-            beside, flags = kit.rows(-side.estimate[..., 1], 4), flags | side.flags
+            use = entries(lateral_use, four, "lateral_use")
+            side = self.across.step(CornerSample(kit.table((push_y,), shape), use, *rest))
+            beside, flags = kit.rows(-side.relative_velocity, 4), flags | side.flags
 
         def placed(
             given: Number,
@@ -161,15 +171,20 @@ class CornerObservers(Memory):
         share_x, share_y = self._shares()
         found_x, found_y = weighed(kit, seen_x, share_x)[0], weighed(kit, seen_y, share_y)[0]
         self.vx, self.vy = choose(kit.known(found_x), found_x, vx), choose(kit.known(found_y), found_y, left)
-        if self.weights is not None:
+        if self.weights is not None or self._judged:
             self.slip, self.angle = kit.each(self._slips, held[:4], ahead, beside, radius)
         told = kit.table(((self.vx, self.vy), seen_x, seen_y), shape)
-        return CornerSetStep(
-            told[..., 0], told[..., 1], told[..., 2:6], told[..., 6:], relative, along.innovation, along.used, flags
-        )
+        corners = told[..., 2:6], told[..., 6:], relative, along.innovation, along.used
+        return CornerSetStep(told[..., 0], told[..., 1], *corners, flags, along.high_slip)
 
-    def reset(self, where: npt.ArrayLike | None = None) -> None:
-        """Starts the entries `where` (bool mask of the batch shape; None: all) afresh, without relative velocity."""
+    def reset(self, where: npt.ArrayLike | None = None, vx: npt.ArrayLike = math.nan, vy: npt.ArrayLike = 0.0) -> None:
+        """Starts the entries `where` (bool mask of the batch shape; None: all) afresh, without relative velocity.
+
+        `vx`, `vy` (...) m/s; NaN for `vx`: the mean surface speed of the wheels at the next step.
+
+        Raises:
+            EstimatorError: a mask or speeds of another shape.
+        """
         chosen = mask(where, self.batch_shape, "where")
         corners = np.repeat(chosen[..., None], 4, axis=-1)
         for observer in (self.along, self.across):
@@ -177,7 +192,8 @@ class CornerObservers(Memory):
                 observer.reset(corners)
         self.slope.reset(np.repeat(chosen[..., None], 9, axis=-1))
         kit, here = self._kit, self._kit.rows(chosen, 1)[0]
-        self.vx, self.vy = kit.where(here, math.nan, self.vx), kit.where(here, 0.0, self.vy)
+        start = kit.car(vx, self.batch_shape, "vx"), kit.car(vy, self.batch_shape, "vy")
+        self.vx, self.vy = kit.where(here, start[0], self.vx), kit.where(here, start[1], self.vy)
         self.slip, self.angle = kit.each(
             lambda slip, angle: (kit.where(here, 0.0, slip), kit.where(here, 0.0, angle)), self.slip, self.angle
         )
@@ -186,6 +202,15 @@ class CornerObservers(Memory):
         super()._take(saved)
         self.vx, self.vy = (self._kit.own(saved[name].copy()) for name in ("vx", "vy"))
         self.slip, self.angle = (kept_signals(saved[name], self._count == 1) for name in ("slip", "angle"))
+
+    def _observer(self, given: GainSchedule | CornerKind) -> CornerKind:
+        """A schedule becomes its observer; one that is given must fit."""
+        four = (*self.batch_shape, 4)
+        if isinstance(given, GainSchedule):
+            return ScheduledCorners(given, four)
+        if given.batch_shape != four:
+            raise EstimatorError(f"corner observer has batch_shape {given.batch_shape}, expected {four}")
+        return given
 
     def _started(self, wheel_speed: Signals) -> Number:
         """V_x of the last sample, m/s; the mean of the wheels' surface speeds at the first one."""

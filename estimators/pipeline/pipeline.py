@@ -47,7 +47,7 @@ class EstimationPipeline(Memory):
     3. F_x of each wheel from torque and wheel speed, made to agree with m a_x = sum F_x - F_yf sin(delta) (`reconcile`):
        what a stopped wheel or a lost torque leaves open is its share of m a_x by load;
     4. V_x, V_y, slips and slip angles, with F_x/F_z as what says how much a wheel may slip;
-    5. F_y of both axles from planar dynamics; front split from the model, rear split by load;
+    5. F_y of both axles from planar dynamics; front split from the model, rear split by load; before 4 where 4 asks for it;
     6. corner observers and a sideslip part (optional), beside the chain: for comparison and cross-check.
 
     Each part is replaced by any object with the same `step`; one with `reset`, `save` and `restore` takes part in these of
@@ -55,8 +55,9 @@ class EstimationPipeline(Memory):
     vertical_load, fresh=)` as `UnknownInputForceObserver`, `WheelForceFilter` and `DifferentiatedPid`, of shape (..., 4);
     `loads.step(ax, ay, az, pitch, roll)` as `VerticalLoads`; `attitude.step(...)` as `AttitudeObserver`;
     `lateral_force.step(ax, ay, yaw_acceleration, steer, force_x, force_z)` as `LateralForceEstimator`; `velocity.step(
-    wheel_speed, steer, ax, ay, yaw_rate, normalised_force, elapsed)` as `VelocityFusion`; `corner_observers.step(...)` as
-    `CornerObservers`; `sideslip.step(...)` as in `sideslip_parts`.
+    wheel_speed, steer, ax, ay, yaw_rate, normalised_force, elapsed)` as `VelocityFusion`, with `lateral_use=` as
+    `CornerVelocity` where it has `uses_lateral_force`; `corner_observers.step(...)` as `CornerObservers`; `sideslip.step(...)`
+    as in `sideslip_parts`.
 
     Estimates are finite whatever comes in; what was wrong is in the flags, and what does not fit together in
     `consistency`. A wheel speed that repeats bit for bit is the old one read again, for up to `repeat_time`.
@@ -111,6 +112,8 @@ class EstimationPipeline(Memory):
         self._named = (*(name for name in names if getattr(self, name) is not None), *own)
         check_parts({name: getattr(self, name) for name in self._named}, shape, time, CORNER_PARTS)
         self.parts = tuple(name for name in self._named if hasattr(getattr(self, name), "save"))
+        self._lateral_first = bool(getattr(self.velocity, "uses_lateral_force", False))
+        self._use_across = self._lateral_first or self.corner_observers is not None
         self._total_deviation = vehicle.mass * setting(acceleration_deviation, "acceleration_deviation", "m/s^2")
         self._least_load = _LIFTED * vehicle.static_loads
         self._kit = kit = arithmetic(shape)
@@ -149,13 +152,14 @@ class EstimationPipeline(Memory):
         use = self._normalised(agreed.force, loads.load, unknown)
         if tilt is None:  # untouched: the velocity part tells the impossible from the missing
             free_x, free_y = ax, ay
-        moved = self.velocity.step(w, steer, free_x, free_y, turn, use, signals.elapsed)
         swing = self.yaw_slope.step(choose(late, math.nan, turn) if delayed else turn).derivative
         swing = choose(abs(turn) < math.inf, kit.own(swing), math.nan)
         lateral = self.lateral_force.step(own_x, own_y, swing, angle, agreed.force, loads.load)
+        across = self._normalised(lateral.corner_force, loads.load, None) if self._use_across else None
+        more = {"lateral_use": across} if self._lateral_first else {}
+        moved = self.velocity.step(w, steer, free_x, free_y, turn, use, signals.elapsed, **more)
         corners = None
         if self.corner_observers is not None:
-            across = self._normalised(lateral.corner_force, loads.load, None)
             corners = self.corner_observers.step(w, steer, own_x, own_y, turn, use, across, moved.vy)
         beside = None
         if self.sideslip is not None:

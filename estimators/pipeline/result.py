@@ -40,7 +40,8 @@ class Consistency(NamedTuple):
 
 
 class PipelineStep(NamedTuple):
-    """Leading axes `...` are those of the batch; corners fl, fr, rl, rr. Everything above `consistency` is finite."""
+    """Leading axes `...` are those of the batch; corners fl, fr, rl, rr. Everything above `consistency` is finite, but
+    for deviations that the velocity part does not state."""
 
     vx: FloatArray  # (...) m/s at the centre of gravity
     vy: FloatArray  # (...) m/s, to the left
@@ -64,7 +65,7 @@ class PipelineStep(NamedTuple):
     reconciled: Any  # `Reconciled`
     loads: Any  # `LoadStep`
     lateral: Any  # `LateralForceStep`
-    velocity: Any  # `FusionStep`
+    velocity: Any  # `FusionStep`, or `CornerVelocityStep`
     attitude: Any  # `AttitudeStep`, None without that part
     corners: Any  # `CornerSetStep`, None without that part
     sideslip_step: Any  # of the sideslip part, None without one

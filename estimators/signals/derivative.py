@@ -54,7 +54,7 @@ class FilteredDerivative(Memory):
         EstimatorError: a time that is not positive (lag: negative), a gap below `hold`, or as `Freshness`.
     """
 
-    memory = ("value", "reading", "slope", "elapsed", "starts")
+    memory = ("value", "reading", "slope", "elapsed", "starts", "flowing")
     parts = ("freshness",)
     unknowns = ("reading",)
 
@@ -81,7 +81,7 @@ class FilteredDerivative(Memory):
         self.elapsed: npt.NDArray[np.int64] = np.zeros(self.batch_shape, dtype=np.int64)
         self.starts: BoolArray = np.ones(self.batch_shape, dtype=np.bool_)  # no slope yet: the next is taken as it is
         self._simple = hold == 1 and stale_after is None  # every finite sample is new
-        self._flowing = False  # the last sample was new everywhere, and has a slope
+        self.flowing = False  # the last sample was new everywhere, and has a slope
         self._all: BoolArray = np.ones(self.batch_shape, dtype=np.bool_)
         self._no_flags: FlagArray = np.zeros(self.batch_shape, dtype=np.int32)
         self._all.flags.writeable = self._no_flags.flags.writeable = False
@@ -93,7 +93,7 @@ class FilteredDerivative(Memory):
             EstimatorError: another shape, or not numbers.
         """
         array = entries(value, self.batch_shape, "signal")
-        if self._flowing and quiet(array):
+        if self.flowing and quiet(array):
             slope = (array - self.reading) * ((1.0 - self._keep) / self.sample_time)
             self.slope = self._keep * self.slope + slope
             self.reading = self.value = array.copy()
@@ -116,7 +116,7 @@ class FilteredDerivative(Memory):
             self.slope = np.where(old, 0.0, self.slope)
             self.starts = self.starts | old
             raise_flag(flags, old, Flag.STALE_MEASUREMENT)
-        self._flowing = self._simple and bool(used.all())
+        self.flowing = self._simple and bool(used.all())
         self.reading = new
         self.value = np.where(fresh, new, self.value)
         return DerivativeStep(self.value.copy(), self.slope.copy(), fresh, used, flags)
@@ -129,8 +129,8 @@ class FilteredDerivative(Memory):
         self.reading = np.where(chosen, np.nan, self.reading)
         self.elapsed = np.where(chosen, 0, self.elapsed)
         self.starts = self.starts | chosen
-        self._flowing = False
+        self.flowing = False
 
     def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
         super()._take(saved)
-        self._flowing = False
+        self.flowing = bool(saved["flowing"])

@@ -20,15 +20,18 @@ from estimators.forces import (
 )
 from estimators.pipeline import (
     CornerObservers,
+    CornerVelocity,
     DifferentiatedPid,
     EstimationPipeline,
     FourWheelSideslip,
     StiffnessSideslip,
     VehicleSignals,
 )
+from estimators.pipeline.corner_kinds import CornerKind
 from estimators.pipeline.pipeline import REAL_SENSORS
 from estimators.sideslip import FourWheel, SingleTrack
 from estimators.vehicle import VehicleParameters
+from estimators.velocity import SlipWeights
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.prepare import CornerInputs
@@ -65,9 +68,11 @@ class Chain:
 
 
 def pipeline_of(
-    drive: DriveFile, longitudinal: GainSchedule, lateral: GainSchedule | None = None
+    drive: DriveFile, longitudinal: GainSchedule | CornerKind, lateral: GainSchedule | None = None
 ) -> tuple[EstimationPipeline, tuple[str, ...]]:
     """The pipeline that the drive file asks for, for one car, and what had to be assumed.
+
+    ``longitudinal``: the corner observers along the wheels, for this pipeline alone; they run where ``lateral`` is given.
 
     Raises SpecError, one line, on vehicle data that no car has.
     """
@@ -98,7 +103,7 @@ def vehicle_of(drive: DriveFile) -> tuple[VehicleParameters, tuple[str, ...]]:
 
 
 def _pipeline_of(
-    drive: DriveFile, longitudinal: GainSchedule, lateral: GainSchedule | None
+    drive: DriveFile, longitudinal: GainSchedule | CornerKind, lateral: GainSchedule | None
 ) -> tuple[EstimationPipeline, tuple[str, ...]]:
     vehicle, assumptions = vehicle_of(drive)
     time, chosen = drive.sample_time, drive.estimators
@@ -110,7 +115,9 @@ def _pipeline_of(
     }
     dynamic = chosen.vertical_load == "dynamic"
     method: Any = chosen.lateral_force
-    corners = CornerObservers(vehicle, longitudinal, lateral) if lateral is not None else None
+    alone = chosen.velocity == "corners"  # a paper's own chain; P1 weighs the axles by slip, P2 and P3 do not
+    weights = SlipWeights() if alone and chosen.corner_velocity == "lpv" else None
+    corners = CornerObservers(vehicle, longitudinal, lateral, weights=weights) if lateral is not None else None
     pipeline = EstimationPipeline(
         vehicle,
         time,
@@ -118,7 +125,8 @@ def _pipeline_of(
         loads=VerticalLoads(vehicle, time, dynamic=dynamic),
         attitude=AttitudeObserver(time) if chosen.attitude == "gyro" else None,
         lateral_force=LateralForceEstimator(vehicle, time, method=method, measurement_deviation=REAL_SENSORS),
-        corner_observers=corners,
+        velocity=CornerVelocity(corners) if alone and corners is not None else None,
+        corner_observers=None if alone else corners,
         sideslip=_sideslip_of(drive, vehicle),
     )
     return pipeline, assumptions

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from studies.drives.drive_tables import Align, Column, Estimators, LogFile, Vehicle
+from studies.drives.drive_tables import Align, Column, Estimators, LogFile, Schedules, Vehicle
 from studies.drives.quantities import CORNERS, REFERENCES, SIGNALS
 from synthesis.errors import unknown
 
@@ -85,8 +85,13 @@ def check_signals(signals: Mapping[str, Column], vehicle: Vehicle) -> None:
         )
 
 
-def check_estimators(chosen: Estimators, signals: Mapping[str, Column], vehicle: Vehicle) -> None:
-    """Every estimator that the file asks for by name has the vehicle data and the signals that it needs."""
+def check_estimators(chosen: Estimators, signals: Mapping[str, Column], vehicle: Vehicle, schedules: Schedules) -> None:
+    """Every estimator that the file asks for by name has the vehicle data, the signals and the schedules that it needs."""
+    if chosen.velocity == "corners" and schedules.lateral is None:
+        raise ValueError(
+            "schedules.lateral: missing, but estimators.velocity = 'corners' has V_y from nothing else; "
+            'add it, such as lateral = "corner-estimation-lateral"'
+        )
     wanted = {name: str(getattr(chosen, name)) for name in chosen.model_fields_set}
     parameters, needed = _PARAMETERS, _SIGNALS
     for place, estimator in wanted.items():

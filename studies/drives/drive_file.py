@@ -39,7 +39,7 @@ class DriveFile(Table):
         check_columns(self.signals, self.reference, self.log)
         check_alignment({**self.reference, **self.signals}, self.log)
         check_signals(self.signals, self.vehicle)
-        check_estimators(self.estimators, self.signals, self.vehicle)
+        check_estimators(self.estimators, self.signals, self.vehicle, self.schedules)
         return self
 
     def log_of(self, column: Column) -> str:

@@ -116,8 +116,8 @@ def _one_of(*names: str) -> Callable[[str], str]:
 class Estimators(Table):
     """Which estimators make up the pipeline, and which run at the corners beside it; the first of each is the default.
 
-    ``corner_velocity`` is what the result calls corner observers; those that cross-check the pipeline where a lateral
-    schedule is given are scheduled ones always.
+    ``corner_velocity`` is what the result calls corner observers; the same kind cross-checks the pipeline where a lateral
+    schedule is given. With ``velocity = "corners"`` they are its only source of velocities, as in the papers.
     """
 
     longitudinal_force: Annotated[str, AfterValidator(_one_of("unknown-input", "pid", "unscented", "linear"))] = (
@@ -126,7 +126,7 @@ class Estimators(Table):
     vertical_load: Annotated[str, AfterValidator(_one_of("dynamic", "quasi-static"))] = "dynamic"
     lateral_force: Annotated[str, AfterValidator(_one_of("linear", "unscented"))] = "linear"
     attitude: Annotated[str, AfterValidator(_one_of("none", "gyro"))] = "none"
-    velocity: Annotated[str, AfterValidator(_one_of("fusion"))] = "fusion"
+    velocity: Annotated[str, AfterValidator(_one_of("fusion", "corners"))] = "fusion"
     corner_velocity: Annotated[
         str, AfterValidator(_one_of("lpv", "gain-switched", "kalman-three-state", "kalman-two-state"))
     ] = "lpv"

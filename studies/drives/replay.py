@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from estimators.pipeline import CornerSample
+from estimators.pipeline.corner_kinds import CornerKind
 from estimators.velocity import slip_ratio
 from studies.drives.baselines import held, mean_over
-from studies.drives.corner_observers import CornerObserver, CornerSample
 from studies.drives.prepare import CornerInputs
 
 Array = npt.NDArray[np.float64]
@@ -32,7 +33,7 @@ class Replay:
     flags: npt.NDArray[np.int64]
 
 
-def replay(inputs: CornerInputs, observer: CornerObserver, progress: Callable[[float], None] | None = None) -> Replay:
+def replay(inputs: CornerInputs, observer: CornerKind, progress: Callable[[float], None] | None = None) -> Replay:
     """Run the four observers; V_x of the last step enters the corner accelerations of the next, P1 section 6.
 
     They start at rest relative to the road (z = v_r = 0) with the first sample. Wheel accelerations are backward
@@ -48,10 +49,9 @@ def replay(inputs: CornerInputs, observer: CornerObserver, progress: Callable[[f
     for k in range(1, n):
         u = wheel_part[k] - inputs.per_speed[k] * vx
         slip = slip_ratio(surface[k - 1], surface[k - 1] - relative[k - 1])
-        mu, ax, ay = inputs.normalised_force[k], float(inputs.ax[k]), float(inputs.ay[k])
-        relative[k], innovation[k], flags[k] = observer.step(
-            CornerSample(u, mu, inputs.wheel_speed[k], dw[k], slip, ax, ay)
-        )
+        measured = inputs.normalised_force[k], inputs.wheel_speed[k], dw[k]
+        step = observer.step(CornerSample(u, *measured, slip, inputs.ax[k], inputs.ay[k]))
+        relative[k], innovation[k], flags[k] = step.relative_velocity, step.innovation, step.flags
         seen = cg_velocity(gain[k] * (surface[k] - relative[k]) + shift[k])
         vx = float(seen) if np.isfinite(seen) else vx
         if progress is not None and k % max(1, n // PROGRESS_STEPS) == 0:

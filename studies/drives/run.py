@@ -59,7 +59,7 @@ def replay_drive(logs: Sequence[Path], drive: Path, *, progress: Progress | None
     schedule = load_schedule(names.longitudinal, drive.parent, time)
     lateral = load_schedule(names.lateral, drive.parent, time, "lateral") if names.lateral is not None else None
     observer = corner_observer(description, drive.parent, schedule)
-    pipeline, assumptions = pipeline_of(description, schedule, lateral)
+    pipeline, assumptions = pipeline_of(description, corner_observer(description, drive.parent, schedule), lateral)
     log = read_log(logs, description)
     told(0.2)
     inputs = corner_inputs_of(log, description)

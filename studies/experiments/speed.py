@@ -15,7 +15,7 @@ from estimators.vehicle import VehicleParameters
 from estimators.velocity import FusionSettings, VelocityFusion
 from studies.experiments.accuracy import Spread, known_spread, nrms
 from studies.experiments.driven import LUGRE, driven
-from studies.experiments.ltv_corners import LtvCornerObservers, SideBySide, bristle_tire
+from studies.experiments.ltv_corners import SideBySide, bristle_tire, kalman_corners
 from studies.experiments.play import QUICK_SECONDS, Reading, baselines, measured, play, run_of
 from studies.experiments.sensors import TEST_CAR
 from studies.experiments.speed_figures import error_dots, speed_history
@@ -57,8 +57,8 @@ def parts(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) ->
         "velocity": VelocityFusion(car, sample_time, shape, settings),
         "corner_observers": SideBySide(
             {
-                THREE: LtvCornerObservers(car, tire, sample_time, shape, 3),
-                TWO: LtvCornerObservers(car, tire, sample_time, shape, 2),
+                THREE: kalman_corners(car, tire, sample_time, shape, 3),
+                TWO: kalman_corners(car, tire, sample_time, shape, 2),
                 LPV: CornerObservers(car, GainSchedule.shipped(SCHEDULE), None, shape),
             }
         ),

@@ -8,8 +8,17 @@ import numpy as np
 import pytest
 
 from estimators import GainSchedule
-from estimators.pipeline import CornerObservers, EstimationPipeline, VehicleSignals
+from estimators.forces import AttitudeObserver
+from estimators.pipeline import (
+    CornerObservers,
+    CornerVelocity,
+    DifferentiatedPid,
+    EstimationPipeline,
+    KalmanCorners,
+    VehicleSignals,
+)
 from estimators.vehicle import VehicleParameters
+from estimators.velocity import BristleTire, SlipWeights
 from tests.unit.schedule_content import schedule_content
 
 CAR, TIME = VehicleParameters.published_suv(), 0.005
@@ -29,13 +38,25 @@ def samples(batch: tuple[int, ...], count: int = 64) -> list[VehicleSignals]:
     ]
 
 
-@pytest.mark.parametrize("parts", ["default", "with corner observers"])
-def test_one_step_for_four_corners(benchmark: Any, parts: str) -> None:
-    corners = None
-    if parts != "default":
-        along, across = (GainSchedule.from_content(schedule_content(n), n) for n in ("longitudinal", "lateral"))
-        corners = CornerObservers(CAR, along, across)
-    pipeline = EstimationPipeline(CAR, TIME, corner_observers=corners)
+def chain(name: str) -> EstimationPipeline:
+    """The default; the same with corner observers beside it; and the chains of two papers, with their own velocities."""
+    along, across = (GainSchedule.from_content(schedule_content(n), n) for n in ("longitudinal", "lateral"))
+    if name == "default":
+        return EstimationPipeline(CAR, TIME)
+    if name == "default and corner observers":
+        return EstimationPipeline(CAR, TIME, corner_observers=CornerObservers(CAR, along, across))
+    if name == "P1":
+        corners = CornerObservers(CAR, along, across, weights=SlipWeights())
+        return EstimationPipeline(
+            CAR, TIME, longitudinal_force=DifferentiatedPid(CAR, TIME), velocity=CornerVelocity(corners)
+        )
+    corners = CornerObservers(CAR, KalmanCorners(BristleTire(), TIME), across)
+    return EstimationPipeline(CAR, TIME, attitude=AttitudeObserver(TIME), velocity=CornerVelocity(corners))
+
+
+@pytest.mark.parametrize("name", ["default", "P1", "P2", "default and corner observers"])
+def test_one_step_for_four_corners(benchmark: Any, name: str) -> None:
+    pipeline = chain(name)
     given = samples(())
     turn = iter(range(10**9))
     step = benchmark(lambda: pipeline.step(given[next(turn) % len(given)]))

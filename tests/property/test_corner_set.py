@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimators import GainSchedule
-from estimators.pipeline import CornerObservers
+from estimators.pipeline import CornerObservers, KalmanCorners, SwitchedCorners
 from estimators.vehicle import VehicleParameters
-from estimators.velocity import SlipWeights
+from estimators.velocity import BristleTire, SlipWeights
 from tests.unit.schedule_content import schedule_content
 
 CAR = VehicleParameters.published_suv()
@@ -26,10 +26,15 @@ SPEEDS = st.lists(st.sampled_from([20.0, 3.0, 0.0, -4.0]), min_size=10, max_size
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-def observers(lateral: bool, weights: SlipWeights | None) -> list[CornerObservers]:
+def observers(lateral: bool, weights: SlipWeights | None, kind: str = "scheduled") -> list[CornerObservers]:
     """Of one car, of a batch of one, and of a batch of two."""
     along, across = SCHEDULES
-    return [CornerObservers(CAR, along, across if lateral else None, b, weights) for b in ((), (1,), (2,))]
+
+    def make(shape: tuple[int, ...]) -> Any:
+        kinds = {"switched": SwitchedCorners, "Kalman": lambda _, four: KalmanCorners(BristleTire(), 0.005, four)}
+        return kinds[kind](along, (*shape, 4)) if kind in kinds else along
+
+    return [CornerObservers(CAR, make(b), across if lateral else None, b, weights) for b in ((), (1,), (2,))]
 
 
 def stepped(corners: CornerObservers, row: Array, speed: float) -> Any:
@@ -52,16 +57,22 @@ def alike(first: Any, second: Any, name: str) -> None:
 
 @pytest.mark.parametrize("lateral", [True, False])
 @pytest.mark.parametrize("weights", [None, SlipWeights()])
+@pytest.mark.parametrize("kind", ["scheduled", "switched", "Kalman"])
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 1000), FAULTS, SPEEDS)
 def test_one_car_is_an_entry_of_many(
-    lateral: bool, weights: SlipWeights | None, seed: int, faults: list[tuple[int, int, float]], speeds: list[float]
+    kind: str,
+    lateral: bool,
+    weights: SlipWeights | None,
+    seed: int,
+    faults: list[tuple[int, int, float]],
+    speeds: list[float],
 ) -> None:
     """Forwards, at standstill and in reverse, with samples missing, infinite or absurd, and a reset on the way."""
     signals = np.random.default_rng(seed).uniform(-1.0, 1.0, (10, 20))
     for sample, channel, value in faults:
         signals[sample, channel] = value
-    one, alone, many = observers(lateral, weights)
+    one, alone, many = observers(lateral, weights, kind)
     for k, row in enumerate(signals):
         if k == 6:
             for each in (one, alone, many):
@@ -85,11 +96,12 @@ def test_a_car_that_is_reset_alone_leaves_the_others() -> None:
     assert first.vx[0] != second.vx[0]
 
 
+@pytest.mark.parametrize("kind", ["scheduled", "switched", "Kalman"])
 @pytest.mark.parametrize("place", [0, 1, 2])
-def test_memory_continues_bit_for_bit(place: int) -> None:
+def test_memory_continues_bit_for_bit(place: int, kind: str) -> None:
     rows = np.random.default_rng(1).uniform(-0.3, 0.3, size=(12, 20))
     rows[4, 2] = math.nan
-    going, other = (observers(True, SlipWeights())[place] for _ in range(2))
+    going, other = (observers(True, SlipWeights(), kind)[place] for _ in range(2))
     for row in rows[:6]:
         stepped(going, row, 12.0)
     other.restore(going.save())

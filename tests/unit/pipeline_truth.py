@@ -35,14 +35,14 @@ class Truth(NamedTuple):
     axle_force_y: FloatArray  # (n, 2)
 
 
-def straight(acceleration: FloatArray, start: float) -> Truth:
-    """V_x from an acceleration that is held over each sample; loads follow at once."""
+def straight(acceleration: FloatArray, start: float, slip: float = SLIP) -> Truth:
+    """V_x from an acceleration that is held over each sample; loads follow at once; `slip` is that at mu = 1."""
     n, car = acceleration.size, CAR
     vx = start + TIME * np.concatenate([[0.0], np.cumsum(acceleration[:-1])])
     vx = np.where(np.absolute(vx) < 1e-9, 0.0, vx)
     load = vertical_loads(car, acceleration, 0.0)
     mu = (acceleration / GRAVITY)[:, None]
-    w = (vx[:, None] + np.absolute(vx[:, None]) * SLIP * mu) / car.radius
+    w = (vx[:, None] + np.absolute(vx[:, None]) * slip * mu) / car.radius
     force = mu * load
     spin = np.concatenate([np.diff(w, axis=0), np.zeros((1, 4))]) / TIME
     torque = force * car.radius + car.wheel_inertia * spin
@@ -51,11 +51,17 @@ def straight(acceleration: FloatArray, start: float) -> Truth:
     return Truth(w, torque, np.zeros((n, 4)), acceleration, zero, zero, vx, zero, force, load, np.zeros((n, 2)))
 
 
-def turning(n: int, speed: float = 20.0, yaw_rate: float = 0.2) -> Truth:
-    """A steady turn to the left."""
+def turning(
+    n: int,
+    speed: float = 20.0,
+    yaw_rate: float = 0.2,
+    slip: float = SLIP,
+    side: tuple[float, float] = (SETTINGS.side_compliance, SETTINGS.side_cubic),
+) -> Truth:
+    """A steady turn to the left; `side` are c_1 and c_3."""
     car, ay = CAR, speed * yaw_rate
     mu = ay / GRAVITY
-    angle = -(SETTINGS.side_compliance * mu + SETTINGS.side_cubic * mu**3)
+    angle = -(side[0] * mu + side[1] * mu**3)
     vy = speed * np.tan(angle) + yaw_rate * car.rear_axle_distance
     delta = np.arctan((vy + yaw_rate * car.front_axle_distance) / speed) - angle
     ax = -yaw_rate * vy
@@ -68,7 +74,7 @@ def turning(n: int, speed: float = 20.0, yaw_rate: float = 0.2) -> Truth:
     steer = np.array([delta, delta, 0.0, 0.0])
     across = vy + yaw_rate * car.corner_x
     along = (speed - yaw_rate * car.corner_y) * np.cos(steer) + across * np.sin(steer)
-    w = (along + speed * SLIP * force / load) / car.radius
+    w = (along + speed * slip * force / load) / car.radius
 
     def repeat(value: FloatArray | float) -> FloatArray:
         out: FloatArray = np.tile(np.asarray(value, dtype=np.float64), (n, *[1] * np.ndim(value)))

@@ -9,11 +9,20 @@ import pytest
 
 from estimators import GainSchedule, LpvVelocityObserver
 from estimators.forces import VerticalLoads, WheelForceFilter
-from estimators.pipeline import DifferentiatedPid, FourWheelSideslip, StiffnessSideslip
+from estimators.pipeline import (
+    CornerSample,
+    CornerVelocity,
+    DifferentiatedPid,
+    FourWheelSideslip,
+    KalmanCorners,
+    StiffnessSideslip,
+    SwitchedCorners,
+)
+from estimators.pipeline.corner_kinds import CornerKind
 from estimators.schedule import write_content
 from estimators.velocity import BristleTire, LtvKalmanObserver, SwitchedVelocityObserver
 from studies.drives.chain import pipeline_of
-from studies.drives.corner_observers import CornerObserver, CornerSample, corner_observer
+from studies.drives.corner_observers import corner_observer
 from studies.drives.drive_file import DriveFile, read_drive
 from studies.drives.judge import judge
 from studies.drives.run import replay_drive
@@ -27,6 +36,7 @@ TIRES = (
     'yaw_inertia = "2600 kg*m^2"\ncornering_stiffness_front = "120 kN/rad"\ncornering_stiffness_rear = "130000 N/rad"\n'
 )
 EQUIPPED = TORQUE.replace("[schedules]", TIRES + 'relaxation_length = "50 cm"\n\n[schedules]')
+SIDEWAYS = EQUIPPED.replace('"schedule.json"', '"schedule.json"\nlateral = "side.json"')
 
 
 def chosen(text: str, **names: str) -> str:
@@ -54,6 +64,7 @@ def read(folder: Path, text: str) -> DriveFile:
         ),
         (chosen(DRIVE, corner_velocity="gain-swiched"), "did you mean gain-switched"),
         (chosen(DRIVE, corner_velocity="kalman"), r"estimators\.corner_velocity: unknown estimator 'kalman'"),
+        (chosen(EQUIPPED, velocity="corners"), r"schedules\.lateral: missing, but estimators\.velocity = 'corners'"),
         (chosen(TORQUE, attitude="gyro"), r"signals\.roll_rate: missing, but estimators\.attitude = 'gyro'"),
     ],
 )
@@ -83,6 +94,29 @@ def test_what_is_chosen_is_built(tmp_path: Path) -> None:
     assert assumptions == ("yaw inertia is not given: taken as m L_f L_r",)
 
 
+@pytest.mark.parametrize("kind", ["lpv", "gain-switched", "kalman-three-state"])
+def test_the_corners_alone_give_the_velocities_where_a_drive_asks_for_them(tmp_path: Path, kind: str) -> None:
+    """The closed-form drive through the whole run: V_x of the pipeline is that of the corner observers."""
+    write_content(tmp_path / "side.json", schedule_content("lateral"))
+    log = write_log(tmp_path / "log.csv", columns(duration=1.5))
+    drive = write_drive(tmp_path, chosen(SIDEWAYS, velocity="corners", corner_velocity=kind))
+    data = replay_drive([log], drive)
+    assert data.chain is not None
+    late = data.log.time > 0.5
+    assert np.abs(data.chain.vx - data.log.reference["vx"])[late].max() < 0.05
+    assert np.isfinite(data.chain.vy).all()
+    pipeline, _ = pipeline_of(
+        read(tmp_path, chosen(SIDEWAYS, velocity="corners", corner_velocity=kind)),
+        corner_observer_of(tmp_path, kind),
+        load_schedule("side.json", tmp_path, 0.005, "lateral"),
+    )
+    assert isinstance(pipeline.velocity, CornerVelocity)
+    assert pipeline.corner_observers is None
+    along = pipeline.velocity.corners.along
+    assert isinstance(along, {"gain-switched": SwitchedCorners, "kalman-three-state": KalmanCorners}.get(kind, object))
+    assert (pipeline.velocity.corners.weights is None) == (kind != "lpv")
+
+
 def test_a_lateral_schedule_for_another_time_is_refused_before_the_log_is_read(tmp_path: Path) -> None:
     drive = write_drive(tmp_path, DRIVE.replace('"schedule.json"', '"schedule.json"\nlateral = "side.json"'))
     write_content(tmp_path / "side.json", {**schedule_content("lateral"), "sample_time": 0.01})
@@ -100,7 +134,7 @@ def test_a_car_that_cannot_be_is_refused_before_the_log_is_read(tmp_path: Path) 
     assert "\n" not in str(caught.value)
 
 
-def corner_observer_of(folder: Path, name: str) -> CornerObserver:
+def corner_observer_of(folder: Path, name: str) -> CornerKind:
     drive = read(folder, chosen(DRIVE, corner_velocity=name))
     return corner_observer(drive, folder, load_schedule("schedule.json", folder, 0.005))
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from estimators.forces import VerticalLoads
-from estimators.pipeline import CornerObservers
+from estimators.pipeline import CornerObservers, CornerSample, CornerStep, ScheduledCorners
 from estimators.schedule import GainSchedule
 from estimators.vehicle import VehicleParameters
-from estimators.velocity import LpvVelocityObserver, SlipWeights, SuspensionCompliance
+from estimators.velocity import SlipWeights, SuspensionCompliance
 from estimators.velocity.corners import CornerVectors, tire_frame, vehicle_frame
 from studies.papers.resilient_velocity.claims_suspension import table_of_estimator
 from studies.papers.resilient_velocity.setting import PRINTED
@@ -44,20 +44,16 @@ class KeptLoads:
         return found
 
 
-class WithWheelMotion:
-    """A corner observer whose input also has the acceleration of the wheel against the body: u_q - psi_q''."""
+class WithWheelMotion(ScheduledCorners):
+    """Corner observers whose input also has the acceleration of the wheel against the body: u_q - psi_q''."""
 
-    def __init__(self, observer: LpvVelocityObserver) -> None:
-        self.observer, self.acceleration = observer, np.zeros(observer.batch_shape)
+    def __init__(self, schedule: GainSchedule, batch_shape: tuple[int, ...]) -> None:
+        super().__init__(schedule, batch_shape)
+        self.acceleration = np.zeros(batch_shape)
 
-    @property
-    def state(self) -> Array:
-        """As `LpvVelocityObserver.state`."""
-        return self.observer.state
-
-    def step(self, held_input: Array, measurement: Array, parameter: Array) -> Any:
-        """As `LpvVelocityObserver.step`."""
-        return self.observer.step(held_input - self.acceleration, measurement, parameter)
+    def step(self, sample: CornerSample) -> CornerStep:
+        """As `ScheduledCorners.step`."""
+        return super().step(sample._replace(relative_acceleration=sample.relative_acceleration - self.acceleration))
 
 
 class CompliantCorners:
@@ -76,9 +72,13 @@ class CompliantCorners:
         loads: KeptLoads,
     ) -> None:
         self.batch_shape, self.sample_time, self.loads = batch_shape, sample_time, loads
-        self.plain, self.inside = (CornerObservers(vehicle, *schedules, batch_shape, SlipWeights()) for _ in range(2))
-        self.shifted = tuple(WithWheelMotion(LpvVelocityObserver(s, (*batch_shape, 4))) for s in schedules)
-        self.inside.along, self.inside.across = self.shifted  # type: ignore[assignment]
+        four = (*batch_shape, 4)
+        self.usual = [ScheduledCorners(schedule, four) for schedule in schedules]
+        self.shifted = [WithWheelMotion(schedule, four) for schedule in schedules]
+        self.plain, self.inside = (
+            CornerObservers(vehicle, along, across, batch_shape, SlipWeights())
+            for along, across in (self.usual, self.shifted)
+        )
         self.compliance = SuspensionCompliance(table_of_estimator(PRINTED), sample_time, batch_shape)
 
     def step(
@@ -99,12 +99,11 @@ class CompliantCorners:
         signals = wheel_speed, steer, ax, ay, yaw_rate, use_x, use_y, vy
         plain, inside = self.plain.step(*signals), self.inside.step(*signals)
         seen, seen_inside = (np.stack([step.corner_vx, step.corner_vy], axis=-1) for step in (plain, inside))
-        return CompliantStep(plain.vx, _relative(self.plain), _relative(self.inside), seen, seen_inside, give)
+        return CompliantStep(plain.vx, _relative(self.usual), _relative(self.shifted), seen, seen_inside, give)
 
 
-def _relative(observers: CornerObservers) -> Array:
-    assert observers.across is not None
-    return np.stack([part.state[..., 1] for part in (observers.along, observers.across)], axis=-1)
+def _relative(kinds: Sequence[ScheduledCorners]) -> Array:
+    return np.stack([kind.observer.state[..., 1] for kind in kinds], axis=-1)
 
 
 def compliant_parts(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) -> Mapping[str, Any]:

@@ -1,0 +1,128 @@
+"""The corner observers as the velocity part of the pipeline: the chain of a paper as it stands, without the fusion."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.errors import EstimatorError
+from estimators.faults import BoolArray, Flag, FlagArray
+from estimators.interpolate import FloatArray
+from estimators.pipeline.corner_set import CornerObservers, CornerSetStep
+from estimators.signals.checks import LIMIT, mask
+from estimators.signals.memory import Memory
+from estimators.velocity.arithmetic import Number, arithmetic
+from estimators.velocity.corners import rotated
+from estimators.velocity.slip import slips
+
+
+class CornerVelocityStep(NamedTuple):
+    """What the pipeline reads of a velocity part; leading axes `...` are those of the batch."""
+
+    vx: FloatArray  # (...) m/s at the centre of gravity
+    vy: FloatArray  # (...) m/s, to the left
+    vx_deviation: FloatArray  # (...) NaN: the papers' observers state none
+    vy_deviation: FloatArray  # (...) NaN
+    yaw_rate: FloatArray  # (...) rad/s as measured, the last one where it is missing
+    sensor_bias: FloatArray  # (..., 3) zero: none is estimated
+    slip: FloatArray  # (..., 4) slip ratio of the car's velocity, positive when driving
+    slip_angle: FloatArray  # (..., 4) rad, positive where v_yt is (P1)
+    innovation: FloatArray  # (..., 4) of the normalised F_x; NaN where missing
+    used: BoolArray  # (..., 4) whether the wheel supports V_x: its speed is there, and its force was used
+    high_slip: BoolArray  # (..., 4) see `CornerStep`
+    standing: BoolArray  # (...) never: a standstill is not recognised
+    flags: FlagArray  # (...) MISSING_INPUT where a_x, a_y or the yaw rate is missing
+    wheel_flags: FlagArray  # (..., 4)
+    corners: CornerSetStep
+
+
+class CornerVelocity(Memory):
+    """Slips, slip angles, V_x and V_y from `CornerObservers` alone: P1 sections 5 to 7, P3 section 3.
+
+    With saturated friction, observers of this structure hardly see how fast a wheel slips; the fusion does. This part is
+    for what a paper says, beside it. It runs at the sample time of its observers, whatever time has passed.
+
+    Args:
+        corners: with a lateral observer, for nothing else says V_y.
+
+    Raises:
+        EstimatorError: no lateral observer.
+    """
+
+    parts = ("corners",)
+    uses_lateral_force = True  # the pipeline gives F_y/F_z of the wheels as `lateral_use`
+
+    def __init__(self, corners: CornerObservers) -> None:
+        if corners.across is None:
+            raise EstimatorError("corner observers without a lateral one say nothing of V_y; give a lateral schedule")
+        self.corners, self.batch_shape, self.sample_time = corners, corners.batch_shape, corners.sample_time
+        self._kit = kit = arithmetic(self.batch_shape)
+        car = corners.vehicle
+        self._wheels = [kit.signals(v) for v in (car.radii, car.corner_x.tolist(), car.corner_y.tolist())]
+        self._unsaid = np.full(self.batch_shape, math.nan)
+        self._still: BoolArray = np.zeros(self.batch_shape, dtype=np.bool_)
+        self._unbiased = np.zeros((*self.batch_shape, 3))
+        for constant in (self._unsaid, self._still, self._unbiased):
+            constant.flags.writeable = False
+
+    def step(
+        self,
+        wheel_speed: npt.ArrayLike,
+        steer: npt.ArrayLike,
+        ax: npt.ArrayLike,
+        ay: npt.ArrayLike,
+        yaw_rate: npt.ArrayLike,
+        normalised_force: npt.ArrayLike,
+        elapsed: npt.ArrayLike | None = None,
+        lateral_use: npt.ArrayLike = math.nan,
+    ) -> CornerVelocityStep:
+        """One sample, as `VelocityFusion.step`; `lateral_use` (..., 4) F_y/F_z, NaN where unknown; `elapsed` is not used.
+
+        Raises:
+            EstimatorError: another shape, or not numbers.
+        """
+        kit, shape = self._kit, self.batch_shape
+        found = self.corners.step(wheel_speed, steer, ax, ay, yaw_rate, normalised_force, lateral_use)
+        held = kit.rows(self.corners.slope.value, 9)
+        vx, vy, turn = kit.own(found.vx), kit.own(found.vy), held[8]
+
+        def mapped(w: Number, angle: Number, radius: float, x: float, y: float) -> tuple[Number, Number]:
+            ahead, beside = rotated(vx - turn * y, vy + turn * x, kit.sin(angle), kit.cos(angle))
+            return slips(kit, radius * w, ahead, beside)
+
+        told = kit.table(kit.each(mapped, held[:4], held[4:8], *self._wheels), shape)
+        given = (kit.car(value, shape, name) for value, name in ((ax, "ax"), (ay, "ay"), (yaw_rate, "yaw_rate")))
+        lost = kit.full(False)
+        for value in given:
+            lost = lost | kit.no(abs(value) <= LIMIT)
+        return CornerVelocityStep(
+            vx=found.vx,
+            vy=found.vy,
+            vx_deviation=self._unsaid,
+            vy_deviation=self._unsaid,
+            yaw_rate=np.asarray(turn).reshape(shape),
+            sensor_bias=self._unbiased,
+            slip=told[..., :4],
+            slip_angle=told[..., 4:],
+            innovation=found.innovation,
+            used=found.used & np.isfinite(found.corner_vx),
+            high_slip=found.high_slip,
+            standing=self._still,
+            flags=np.asarray(kit.where(lost, int(Flag.MISSING_INPUT), 0), dtype=np.int32).reshape(shape),
+            wheel_flags=found.flags,
+            corners=found,
+        )
+
+    def reset(self, where: npt.ArrayLike | None = None, vx: npt.ArrayLike = math.nan, vy: npt.ArrayLike = 0.0) -> None:
+        """Starts the entries `where` (bool mask of the batch shape; None: all) afresh at `vx`, `vy` (...), m/s.
+
+        NaN for `vx`: from the wheel speeds of the next step.
+
+        Raises:
+            EstimatorError: a mask or speeds of another shape.
+        """
+        chosen = mask(where, self.batch_shape, "where")
+        self.corners.reset(chosen, vx, vy)
