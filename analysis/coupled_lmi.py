@@ -6,18 +6,16 @@ P_i - A_i' (sum_j p_ij P_j) A_i > 0   for every mode i   (Costa, Fragoso and Mar
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import matrix_balance
 
+from analysis.constant_lmi import constant_problem, matrix_of
 from analysis.errors import AnalysisError
 from analysis.markov import MarkovJumpSystem
-from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Margin, Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
-from synthesis.models.param import SchedulingParameter
 from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
 
 
@@ -71,22 +69,6 @@ def weighted_sum(terms: list[MatrixPolynomial], weights: FloatArray) -> MatrixPo
         if weight:
             total = total + term * float(weight)
     return total
-
-
-def constant_problem() -> LmiProblem:
-    """A margin-maximising problem without parameters."""
-    # Its one parameter appears in no matrix: relaxations need at least one axis to place their points on.
-    return LmiProblem((_idle(),), maximise_margin=True)
-
-
-@lru_cache(maxsize=1)
-def _idle() -> SchedulingParameter:
-    return SchedulingParameter("idle", "1", -1.0, 1.0, 0.0, 0.0)
-
-
-def matrix_of(polynomial: MatrixPolynomial) -> FloatArray:
-    """The value of a substituted unknown that depends on no parameter."""
-    return np.asarray(polynomial.coefficients[(0,) * polynomial.variables][..., 0])
 
 
 def state_scale(pattern: FloatArray) -> FloatArray:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from analysis.checks import as_stack, probability, square
-from analysis.coupled_lmi import constant_problem, matrix_of
+from analysis.constant_lmi import constant_problem, matrix_of
 from analysis.errors import AnalysisError
 from analysis.second_moment import lifted, spectral_radius
 from synthesis.errors import unknown

@@ -17,7 +17,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from analysis.checks import probability
-from analysis.coupled_lmi import constant_problem, matrix_of, weighted_sum
+from analysis.constant_lmi import constant_problem, matrix_of
+from analysis.coupled_lmi import weighted_sum
 from analysis.dropout import drop_radius
 from analysis.dropout_cells import ROUNDING, Cells, curvature, ends, exponents
 from analysis.dropout_modes import schedule_drop_modes

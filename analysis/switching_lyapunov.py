@@ -17,17 +17,15 @@ from scipy.linalg import matrix_balance
 from scipy.sparse.csgraph import connected_components
 
 from analysis.checks import square
+from analysis.constant_lmi import constant_problem, matrix_of
 from analysis.errors import AnalysisError
 from analysis.exact import Rational, congruence, is_positive, rationals, total
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
-from synthesis.models.param import SchedulingParameter
-from synthesis.polynomials.matrix import FloatArray, IndexArray, MatrixPolynomial
+from synthesis.polynomials.matrix import FloatArray, IndexArray
 
-# A constant LMI: nothing depends on this parameter, the engine wants at least one.
-NOTHING = (SchedulingParameter("nothing", "1", -1.0, 1.0, 0.0, 0.0),)
 SETTINGS = LmiSettings(relaxation="vertex")
 
 
@@ -108,7 +106,7 @@ def _decide(A: FloatArray, block: IndexArray, discrete: bool) -> CommonLyapunov:
 
 
 def _primal(A: FloatArray, discrete: bool) -> tuple[FloatArray | None, float]:
-    problem = LmiProblem(NOTHING, maximise_margin=True)
+    problem = constant_problem()
     P = problem.symmetric("P", A.shape[-1])
     problem.require("P > 0", P)
     problem.require("P < 1", problem.constant(np.eye(A.shape[-1])) - P, strict=False)
@@ -120,7 +118,7 @@ def _primal(A: FloatArray, discrete: bool) -> tuple[FloatArray | None, float]:
 
 
 def _dual(A: FloatArray, discrete: bool) -> tuple[FloatArray | None, float]:
-    problem = LmiProblem(NOTHING, maximise_margin=True)
+    problem = constant_problem()
     names, change, trace = [], None, None
     one = np.eye(A.shape[-1])
     for i, mode in enumerate(A):
@@ -148,14 +146,10 @@ def _answer(problem: LmiProblem, names: list[str]) -> tuple[FloatArray | None, f
     result = solve(problem, SETTINGS)
     if not result.margins:
         return None, float("-inf")
-    values = np.stack([_constant(result.values[name]) for name in names])
+    values = np.stack([matrix_of(result.values[name]) for name in names])
+    values = 0.5 * (values + values.swapaxes(-1, -2))
     margin = min(entry.value for entry in result.margins)
     return (values[0] if names == ["P"] else values), margin
-
-
-def _constant(value: MatrixPolynomial) -> FloatArray:
-    matrix = value.coefficients[0, 0, ..., 0]
-    return np.asarray(0.5 * (matrix + matrix.T))
 
 
 def _certifies(A: FloatArray, P: FloatArray, discrete: bool) -> bool:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_discrete_are, solve_discrete_lyapunov
 
-from analysis.coupled_lmi import constant_problem, matrix_of, mean_square_lmi, weighted_sum
+from analysis.constant_lmi import constant_problem, matrix_of
+from analysis.coupled_lmi import mean_square_lmi, weighted_sum
 from analysis.coupled_lyapunov import expected_cost, solve_coupled_lyapunov, stationary_second_moment
 from analysis.coupled_riccati import jump_regulator
 from analysis.errors import AnalysisError
