@@ -59,6 +59,8 @@ class CovarianceFilter(GaussianFilter):
         """P = A P A' + Q; entries whose result is not finite stay as they were. Returns these, shape (...)."""
         n = self.size
         A, added = self._shaped(A, "A", n), self._shaped(numbers(Q, "Q"), "Q", n)
+        if not np.minimum.reduce(diagonal(added), None) >= 0.0:
+            raise EstimatorError("Q has a variance below zero, or one that is not a number; it is a covariance")
         spread = _symmetric(A @ self._spread @ A.swapaxes(-1, -2) + added)
         mean = broadcast(mean, self._mean.shape, "predicted state")
         if all_bounded(mean) and all_bounded(spread):
@@ -81,6 +83,10 @@ class CovarianceFilter(GaussianFilter):
         noise = numbers(R, "R")
         if noise.shape[-2:] != (m, m) or not fits(noise.shape[:-2], self.batch_shape):
             raise EstimatorError(f"R {noise.shape} does not fit {m} channels of batch {self.batch_shape}: (..., m, m)")
+        if not np.minimum.reduce(diagonal(noise), None) >= 0.0:
+            raise EstimatorError("R has a variance below zero, or one that is not a number; it is a covariance")
+        if expected.shape[-1] != m:
+            raise EstimatorError(f"predicted measurement has {expected.shape[-1]} channels, C and R have {m}")
         innovation = broadcast(y, (*self.batch_shape, m), "y") - expected
         if innovation.shape != (*self.batch_shape, m):
             raise EstimatorError(f"predicted measurement {np.shape(expected)} does not fit batch {self.batch_shape}")

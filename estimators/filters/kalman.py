@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import numpy.typing as npt
 
+from estimators.errors import EstimatorError
 from estimators.faults import BoolArray
 from estimators.filters.joseph import CovarianceFilter
-from estimators.filters.step import FilterStep, numbers, quiet
+from estimators.filters.step import FilterStep, broadcast, fits, numbers, quiet
 from estimators.interpolate import FloatArray
 
 
@@ -30,12 +32,14 @@ class KalmanFilter(CovarianceFilter):
         Returns a mask (...) of the entries that stayed as they were because the prediction was not finite.
 
         Raises:
-            EstimatorError: shapes that do not fit.
+            EstimatorError: shapes that do not fit, B without u, variances of Q below zero.
         """
         matrix = self._shaped(numbers(A, "A"), "A", self.size)
         mean: FloatArray = (matrix @ self._mean[..., None])[..., 0]
+        if (B is None) != (u is None):
+            raise EstimatorError("B and u belong together: give both, or neither")
         if B is not None and u is not None:
-            mean = mean + (numbers(B, "B") @ numbers(u, "u")[..., None])[..., 0]
+            mean = mean + self._input(numbers(B, "B"), numbers(u, "u"))
         return self._advance(mean, matrix, Q)
 
     @quiet
@@ -53,10 +57,18 @@ class KalmanFilter(CovarianceFilter):
         with which a good channel passes: one with nu_i^2 / S_ii beyond that chi-square quantile is left out too.
 
         Raises:
-            EstimatorError: shapes that do not fit, a gate outside (0, 1), C P C' + R singular.
+            EstimatorError: shapes that do not fit, a gate outside (0, 1), variances of R below zero, C P C' + R singular.
         """
         matrix = self._shaped(numbers(C, "C"), "C", None)
         expected: FloatArray = (matrix @ self._mean[..., None])[..., 0]
         if offset is not None:
-            expected = expected + numbers(offset, "offset")
+            expected = expected + broadcast(offset, expected.shape, "offset")
         return self._correct(y, expected, matrix, R, gate)
+
+    def _input(self, B: FloatArray, u: FloatArray) -> FloatArray:
+        """B u (..., n)."""
+        n, k = self.size, u.shape[-1] if u.ndim else 0
+        fit = B.shape[-2:] == (n, k) and fits(B.shape[:-2], self.batch_shape) and fits(u.shape[:-1], self.batch_shape)
+        if not fit:
+            raise EstimatorError(f"B {B.shape} and u {u.shape} do not fit {n} states of batch {self.batch_shape}")
+        return np.asarray((B @ u[..., None])[..., 0])

@@ -103,15 +103,15 @@ def summed_factor(
     return lower if done else lower_factor(base, columns)
 
 
-def cholesky(matrix: FloatArray, what: str) -> FloatArray:
+def cholesky(matrix: FloatArray, complaint: str) -> FloatArray:
     """L (n, n, b) of a positive definite matrix (n, n, b).
 
     Raises:
-        EstimatorError: not positive definite; names `what`.
+        EstimatorError: not positive definite, with that message.
     """
     lower = np.zeros(matrix.shape)
     if not checked_factor(matrix, np.einsum("kkb->kb", matrix), lower, 0.0):
-        raise EstimatorError(f"{what} is not positive definite; give every channel a noise variance above zero")
+        raise EstimatorError(complaint)
     return lower
 
 

@@ -136,6 +136,8 @@ class UnscentedKalmanFilter(GaussianFilter):
             raise EstimatorError(f"affine.start = {k!r} must be the index of a state, 0 to {n - 1}, or {n} for none")
 
         def checked(found: FloatArray, count: int) -> FloatArray:
+            if np.ndim(found) < 1 or found.shape[-1] != rows:
+                raise EstimatorError(f"{what} has shape {np.shape(found)}, expected {rows} on the last axis")
             return broadcast(found, (count, *shape, rows), what).reshape(count, entries, rows)
 
         count = 1 + 2 * k

@@ -13,6 +13,10 @@ from estimators.filters.step import all_bounded, bounded, diagonal, refused
 from estimators.filters.triangular import upper_factor
 from estimators.interpolate import FloatArray
 
+UNRESOLVED = (
+    "R is lost in the curvature of the measurement: it is smaller than the rounding of its even parts; give every channel a "
+    "noise variance that its measurement can have"
+)
 Corrected = tuple[FloatArray, FloatArray, FloatArray, BoolArray, BoolArray]
 Directions = Callable[[FloatArray], FloatArray]
 """Slope of an affine function along directions: (count, b, n) -> (count, b, r)."""
@@ -89,7 +93,7 @@ class FewPoints:
             wide = np.where(out[:, :, None] | out[:, None], np.eye(m), wide)
             odd, clean = np.where(out[:, None], 0.0, odd), np.where(out, 0.0, innovation)
         if out is not None or weight < 0:
-            root, even = np.asarray(np.linalg.cholesky(wide), dtype=np.float64), even[:, :0]
+            root, even = _root(wide), even[:, :0]
         split = m + even.shape[1]
         array = np.zeros((len(clean), split + n, m + n))
         array[:, :m, :m] = root.swapaxes(1, 2)
@@ -135,6 +139,13 @@ class FewPoints:
         even[:, :k] = ((pairs - shift) / tau).swapaxes(0, 1)
         even[:, k] = -shift
         return centre + shift, odd, even, self.weights.centre_weight(n - k)
+
+
+def _root(wide: FloatArray) -> FloatArray:
+    try:
+        return np.asarray(np.linalg.cholesky(wide), dtype=np.float64)
+    except np.linalg.LinAlgError as error:
+        raise EstimatorError(UNRESOLVED) from error
 
 
 def _widened(noise: FloatArray, even: FloatArray, weight: float) -> tuple[FloatArray, FloatArray]:

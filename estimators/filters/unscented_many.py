@@ -16,7 +16,7 @@ from estimators.filters.triangular import (
     right_divide,
     summed_factor,
 )
-from estimators.filters.unscented_few import Corrected, Directions
+from estimators.filters.unscented_few import UNRESOLVED, Corrected, Directions
 from estimators.filters.workspace import Workspace
 from estimators.interpolate import FloatArray
 
@@ -211,7 +211,7 @@ class ManyPoints:
         if out is not None:
             wide, root, odd = _alone(wide, out), None, np.where(out[:, None], 0.0, odd)
         if root is None:
-            root = cholesky(wide, "R")
+            root = cholesky(wide, UNRESOLVED)
         n, m, count = self.size, odd.shape[0], odd.shape[2]
         lower, self._covariance = self.lower, None
         total = summed_factor(wide, root, odd.copy())
@@ -263,7 +263,7 @@ def _widened(noise: FloatArray, even: FloatArray, tail: FloatArray, weight: floa
     wide = noise + np.einsum("ikb,jkb->ijb", even, even)
     if weight >= 0:
         return np.asarray(wide + weight * tail[:, None] * tail)
-    whitened = left_divide(cholesky(wide, "R"), tail[:, None])[:, 0]
+    whitened = left_divide(cholesky(wide, UNRESOLVED), tail[:, None])[:, 0]
     share = -weight * np.einsum("mb,mb->b", whitened, whitened)
     return np.asarray(wide + weight * np.minimum(1.0, MOST / np.maximum(share, 1e-300)) * tail[:, None] * tail)
 

@@ -15,7 +15,8 @@ from estimators.filters.step import gate_threshold
 from estimators.forces.lateral_few import FEW, KILO, LateralFew
 from estimators.forces.planar import PlanarModel, planar_model
 from estimators.interpolate import FloatArray
-from estimators.signals.checks import any_missing, batch, bounded, entries, mask, quiet, setting
+from estimators.signals import limits
+from estimators.signals.checks import any_missing, batch, entries, mask, quiet, setting
 from estimators.signals.held import Held
 from estimators.signals.renewable import Renewable
 from estimators.vehicle import VehicleParameters
@@ -24,6 +25,7 @@ PUBLISHED_PROCESS = 0.13
 """kN a sample of 5 ms: Q = 0.13^2 I of P1 section 1, read in kN (in N the filter would lag by a second, P1 section 11)."""
 PUBLISHED_MEASUREMENT = (0.012, 0.012, 0.012)
 """m/s^2, m/s^2, rad/s^2: R = 0.012^2 I of P1 section 1. Real sensors need more, see the class."""
+_LARGEST = np.array([limits.ACCELERATION, limits.ACCELERATION, limits.YAW_ACCELERATION])
 _EYE = np.eye(3)
 _DIAGONAL = np.arange(3)
 
@@ -44,10 +46,10 @@ class LateralForceEstimator(Renewable):
 
     With the front wheels straight the front difference does not show in y (rank 2), and would wander without bounds.
     A fourth, weak measurement holds it: 0 = dF_yf - rho F_yf + noise, rho = (F_z,fr - F_z,fl)/(F_z,fr + F_z,fl), the
-    split by load, with the standard deviation `split_deviation`. Then its variance stays below
-    q/2 + sqrt(q^2/4 + q s^2) (s = split_deviation) whatever the steering. F_yf and F_yr are seen for every angle below
-    90 degrees. Corners: F_yf,R/L = (F_yf +- dF_yf)/2 from the model; the rear ones, which the paper leaves open,
-    share F_yr by load.
+    split by load, with the standard deviation `split_deviation`. Then the variance of dF_yf - rho F_yf stays below
+    r/2 + sqrt(r^2/4 + r s^2), r = q (1 + rho^2), s = split_deviation, whatever the steering, as long as the loads stand
+    still; dF_yf has rho times the deviation of F_yf on top. F_yf and F_yr are seen for every angle below 90 degrees.
+    Corners: F_yf,R/L = (F_yf +- dF_yf)/2 from the model; the rear ones, which the paper leaves open, share F_yr by load.
 
     Without a_y or dr/dt nothing tells the two axles apart, and the forces fade to zero with a variance that returns to
     the square of the axle's load: covariances do not run away.
@@ -109,9 +111,9 @@ class LateralForceEstimator(Renewable):
             self.filter = LateralFew(axles**2, self.batch_shape, vehicle, variance, noise, self._fade)
         else:
             self.filter = KalmanFilter(start, self._prior)
-        self.steer = Held(self.batch_shape, "steer")
-        self.force_x = Held((*self.batch_shape, 4), "longitudinal_force")
-        self.load = Held((*self.batch_shape, 4), "vertical_load", vehicle.static_loads)
+        self.steer = Held(self.batch_shape, "steer", limit=limits.ANGLE)
+        self.force_x = Held((*self.batch_shape, 4), "longitudinal_force", limit=limits.FORCE)
+        self.load = Held((*self.batch_shape, 4), "vertical_load", vehicle.static_loads, limits.FORCE)
         self._stay = np.ones((*self.batch_shape, 1))
 
     def step(
@@ -143,8 +145,10 @@ class LateralForceEstimator(Renewable):
             if lost is not None:
                 raise_flag(flags, any_missing(lost, shape), Flag.MISSING_INPUT)
         unseen = None
-        if not quiet(y):
-            missing = ~bounded(y)
+        if not quiet(y, limits.ACCELERATION):
+            missing = np.absolute(y) > _LARGEST
+            missing |= np.isnan(y)
+            y[missing] = np.nan
             raise_flag(flags, any_missing(missing, shape), Flag.MISSING_MEASUREMENT)
             unseen = any_missing(missing[..., 1:], shape)
         self._flag_renewed(flags)

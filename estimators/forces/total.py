@@ -32,14 +32,14 @@ def reconcile(
     """Least squares between corner forces and their sum, F + w (total - sum F)/(sum w + s^2), w = deviation^2.
 
     A corner that its wheel equation leaves `unknown` (wheel stopped, torque lost) first gets its share by load,
-    total F_z/sum F_z, with a deviation of `unknown_share` of its load: all wheels using the same part of their load is
-    a fair guess, and at standstill it is zero. Corners that changed much since the last sample are the uncertain ones
-    (`WheelForceStep.deviation`), and take most of the correction.
+    total F_z/sum F_z (a quarter where no wheel carries any), with a deviation of `unknown_share` of its load: all
+    wheels using the same part of their load is a fair guess, and at standstill it is zero. Corners that changed much
+    since the last sample are the uncertain ones (`WheelForceStep.deviation`), and take most of the correction.
 
     Where the total is missing, forces and deviations come back unchanged (an unknown one with its load as deviation).
 
     Args:
-        force, deviation, load: (..., 4) N, load positive.
+        force, deviation, load: (..., 4) N, load not negative.
         total: (...) N, m a_x of the level car, in the direction of the wheel planes: plus F_y,f sin(delta) with the front
             wheels steered, plus drag and m g sin(grade) where known.
         total_deviation: N; the mass times what the accelerometer may be wrong.
@@ -51,7 +51,9 @@ def reconcile(
     calm = bool(there.all())
     if not calm or unknown.any():
         present = there[..., None]
-        share = np.where(there, given, 0.0)[..., None] * load / load.sum(axis=-1, keepdims=True)
+        whole = load.sum(axis=-1, keepdims=True)
+        part = np.where(whole > 0.0, load, 1.0) / np.where(whole > 0.0, whole, 4.0)  # no load at all: a quarter each
+        share = np.where(there, given, 0.0)[..., None] * part
         prior = np.where(unknown & present, share, force)
         weight = np.where(unknown, (np.where(present, unknown_share, 1.0) * load) ** 2, weight)
     gap = given - np.add.reduce(prior, -1)

@@ -20,7 +20,8 @@ import numpy.typing as npt
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.forces.body_response import PITCH, ROLL, BodyResponse
 from estimators.interpolate import FloatArray
-from estimators.signals.checks import LIMIT, any_missing, batch, mask, number, pair
+from estimators.signals import limits
+from estimators.signals.checks import any_missing, batch, mask, number, pair
 from estimators.signals.held import Held
 from estimators.signals.renewable import Renewable
 from estimators.vehicle import GRAVITY, VehicleParameters
@@ -143,9 +144,9 @@ class VerticalLoads(Renewable):
         super().__init__(batch(batch_shape))
         self.vehicle, self.dynamic = vehicle, dynamic
         self.response = BodyResponse(sample_time, self.batch_shape, (pitch, roll))
-        self.along = Held((*self.batch_shape, 2), "ax and ay")
-        self.up = Held(self.batch_shape, "az", GRAVITY)
-        self.angles = Held((*self.batch_shape, 2), "pitch and roll")
+        self.along = Held((*self.batch_shape, 2), "ax and ay", limit=limits.ACCELERATION)
+        self.up = Held(self.batch_shape, "az", GRAVITY, limits.ACCELERATION)
+        self.angles = Held((*self.batch_shape, 2), "pitch and roll", limit=limits.ANGLE)
         self._transfer = _Transfer(vehicle)
         self._level = np.full(self.batch_shape, GRAVITY)
         self._nowhere: BoolArray = np.zeros((*self.batch_shape, 4), dtype=np.bool_)
@@ -209,7 +210,7 @@ class VerticalLoads(Renewable):
         along, across = number(ax, shape, "ax"), number(ay, shape, "ay")
         up = GRAVITY if az is None else number(az, shape, "az")
         nose, lean = (0.0 if angle is None else number(angle, shape, "angle") for angle in (pitch, roll))
-        if not abs(along) + abs(across) + abs(up) + abs(nose) + abs(lean) <= LIMIT:
+        if not (abs(along) + abs(across) + abs(up) <= limits.ACCELERATION and abs(nose) + abs(lean) <= limits.ANGLE):
             return None
         self.along.last = np.array((along, across)).reshape(*shape, 2)
         if az is not None:

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.interpolate import FloatArray
+from estimators.signals import limits
 from estimators.signals.checks import batch, mask, setting
 from estimators.signals.held import Held
 from estimators.signals.renewable import Renewable
@@ -85,9 +86,9 @@ class WheelInputs(Renewable):
         self.sensor_gain: FloatArray = np.sqrt(2.0) * self.inertia / (self.radius * self.sample_time)  # N s/rad
         self._resistance = vehicle.radius * vehicle.rolling_resistance
         self._rolls = vehicle.rolling_resistance > 0
-        self.speed = Held(self.batch_shape, "wheel_speed")
-        self.torque = Held(self.batch_shape, "torque")
-        self.load = Held(self.batch_shape, "vertical_load", vehicle.static_loads)
+        self.speed = Held(self.batch_shape, "wheel_speed", limit=limits.WHEEL_SPEED)
+        self.torque = Held(self.batch_shape, "torque", limit=limits.TORQUE)
+        self.load = Held(self.batch_shape, "vertical_load", vehicle.static_loads, limits.FORCE)
         self.slow: BoolArray = np.zeros(self.batch_shape, dtype=np.bool_)
         self._any_slow = False
         self._none: BoolArray = np.zeros(self.batch_shape, dtype=np.bool_)

@@ -10,18 +10,20 @@ import numpy as np
 import numpy.typing as npt
 
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray, FlagArray
+from estimators.faults import BoolArray, Flag, FlagArray
 from estimators.interpolate import FloatArray
 from estimators.pipeline.corner_kinds import CornerKind, CornerSample, ScheduledCorners
 from estimators.schedule import GainSchedule
-from estimators.signals import FilteredDerivative
-from estimators.signals.checks import LIMIT, batch, entries, mask
+from estimators.signals import FilteredDerivative, limits
+from estimators.signals.checks import batch, entries, mask
 from estimators.signals.memory import Memory
 from estimators.vehicle import VehicleParameters
 from estimators.velocity.arithmetic import Number, Signals, arithmetic, kept_signals
 from estimators.velocity.corners import rotated, tire_motion
 from estimators.velocity.mapping import SlipWeights, weighed
 from estimators.velocity.slip import slips
+
+_MOST = np.array([limits.WHEEL_SPEED] * 4 + [limits.ANGLE] * 4 + [limits.YAW_RATE])
 
 
 class CornerSetStep(NamedTuple):
@@ -43,7 +45,9 @@ class CornerObservers(Memory):
 
     u_x = R_e w' - v_xt', u_y = -v_yt' with the velocities of the last step in the accelerations, P1 section 6. Without a
     lateral observer V_y is what `step` is told. Axles are weighed by slip (`SlipWeights`), or equally. One car runs on
-    plain numbers, several on arrays, by the same formulas (`arithmetic`).
+    plain numbers, several on arrays, by the same formulas (`arithmetic`). What no car measures (`signals.limits`) is missing;
+    a missing steering angle or yaw rate is held and flagged MISSING_INPUT at the corners concerned, a missing
+    acceleration counts as zero.
 
     Args:
         vehicle: radii and lever arms.
@@ -114,13 +118,20 @@ class CornerObservers(Memory):
         four, radius, *levers = (*shape, 4), *self._wheels
         w = entries(wheel_speed, four, "wheel_speed")
         speed, angles = kit.rows(w, 4), kit.wheels(steer, shape, "steer")
-        rate = self.slope.step(kit.table((speed, angles, (kit.car(yaw_rate, shape, "yaw_rate"),)), shape))
+        raw = kit.table((speed, angles, (kit.car(yaw_rate, shape, "yaw_rate"),)), shape)
+        good = np.absolute(raw) <= _MOST  # False for NaN
+        calm = np.count_nonzero(good) == good.size
+        if not calm:
+            raw = np.where(good, raw, math.nan)
+            w = raw[..., :4]
+            speed = kit.rows(w, 4)
+        rate = self.slope.step(raw)
         held, slope = kit.rows(rate.value, 9), kit.rows(rate.derivative, 9)
         turn, swing = held[8], slope[8]
         left = self.vy if self.across is not None else kit.car(vy, shape, "vy")
         vx = self._started(held)
         given = kit.car(ax, shape, "ax"), kit.car(ay, shape, "ay")
-        own_x, own_y = (choose(abs(value) <= LIMIT, value, 0.0) for value in given)
+        own_x, own_y = (choose(abs(value) <= limits.ACCELERATION, value, 0.0) for value in given)
         forward, leftward = own_x + turn * left, own_y - turn * vx
 
         def driven(
@@ -161,7 +172,7 @@ class CornerObservers(Memory):
             y: float,
         ) -> tuple[Number, ...]:
             """V_x, V_y of the centre of gravity as the corner sees them, and v_xt, NaN without a wheel speed."""
-            ahead = choose(abs(given) <= LIMIT, R * w - slip_speed, math.nan)
+            ahead = choose(abs(given) < math.inf, R * w - slip_speed, math.nan)
             corner_x, corner_y = rotated(ahead, beside, -sine, cosine)
             return corner_x + turn * y, corner_y - turn * x, ahead
 
@@ -174,6 +185,9 @@ class CornerObservers(Memory):
         if self.weights is not None or self._judged:
             self.slip, self.angle = kit.each(self._slips, held[:4], ahead, beside, radius)
         told = kit.table(((self.vx, self.vy), seen_x, seen_y), shape)
+        if not calm:
+            no_angle = np.logical_not(good[..., 4:8] & good[..., 8:])
+            flags = flags | np.where(no_angle, np.int32(Flag.MISSING_INPUT), np.int32(0))
         corners = told[..., 2:6], told[..., 6:], relative, along.innovation, along.used
         return CornerSetStep(told[..., 0], told[..., 1], *corners, flags, along.high_slip)
 

@@ -12,7 +12,8 @@ from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray
 from estimators.interpolate import FloatArray
 from estimators.pipeline.corner_set import CornerObservers, CornerSetStep
-from estimators.signals.checks import LIMIT, mask
+from estimators.signals import limits
+from estimators.signals.checks import mask
 from estimators.signals.memory import Memory
 from estimators.velocity.arithmetic import Number, arithmetic
 from estimators.velocity.corners import rotated
@@ -94,10 +95,10 @@ class CornerVelocity(Memory):
             return slips(kit, radius * w, ahead, beside)
 
         told = kit.table(kit.each(mapped, held[:4], held[4:8], *self._wheels), shape)
-        given = (kit.car(value, shape, name) for value, name in ((ax, "ax"), (ay, "ay"), (yaw_rate, "yaw_rate")))
-        lost = kit.full(False)
-        for value in given:
-            lost = lost | kit.no(abs(value) <= LIMIT)
+        pulls = kit.car(ax, shape, "ax"), kit.car(ay, shape, "ay")
+        lost = kit.no(abs(kit.car(yaw_rate, shape, "yaw_rate")) <= limits.YAW_RATE)
+        for value in pulls:
+            lost = lost | kit.no(abs(value) <= limits.ACCELERATION)
         return CornerVelocityStep(
             vx=found.vx,
             vy=found.vy,

@@ -24,7 +24,7 @@ from estimators.pipeline.parts import CORNER_PARTS, check_parts
 from estimators.pipeline.readings import WheelReadings
 from estimators.pipeline.result import PipelineStep
 from estimators.pipeline.signals import VehicleSignals
-from estimators.signals import FilteredDerivative
+from estimators.signals import FilteredDerivative, limits
 from estimators.signals.checks import batch, entries, mask, setting
 from estimators.signals.memory import Memory
 from estimators.vehicle import GRAVITY, VehicleParameters
@@ -36,7 +36,6 @@ REAL_SENSORS = (0.3, 0.1, 0.3)
 """m/s^2, m/s^2, rad/s^2: deviations of a_x, a_y, dr/dt for the lateral forces, sensors and model together."""
 _LIFTED = 0.05  # share of its static load below which a wheel's F/F_z means nothing
 _LATE = 0.5  # relative error of the sample time beyond which a difference quotient of wheel speeds is no acceleration
-_FASTEST_BODY = 100.0  # m/s^2: an accelerometer of a car reads no more
 
 
 class EstimationPipeline(Memory):
@@ -134,7 +133,8 @@ class EstimationPipeline(Memory):
         kit, shape, car, choose = self._kit, self.batch_shape, self.vehicle, self._kit.where
         w, steer, torque, *body = signals.arrays(shape)
         ax, ay, turn = (kit.own(value) for value in body)
-        read_x, read_y = _possible(kit, ax), _possible(kit, ay)
+        read_x, read_y = (_possible(kit, value, limits.ACCELERATION) for value in (ax, ay))
+        turned = _possible(kit, turn, limits.YAW_RATE)
         late = self._late(signals.elapsed)
         fresh = self.readings.step(w)
         tilt, own_x, own_y, free_x, free_y = self._tilted(signals, read_x, read_y, turn)
@@ -152,8 +152,8 @@ class EstimationPipeline(Memory):
         use = self._normalised(agreed.force, loads.load, unknown)
         if tilt is None:  # untouched: the velocity part tells the impossible from the missing
             free_x, free_y = ax, ay
-        swing = self.yaw_slope.step(choose(late, math.nan, turn) if delayed else turn).derivative
-        swing = choose(abs(turn) < math.inf, kit.own(swing), math.nan)
+        swing = self.yaw_slope.step(choose(late, math.nan, turned) if delayed else turned).derivative
+        swing = choose(abs(turned) < math.inf, kit.own(swing), math.nan)
         lateral = self.lateral_force.step(own_x, own_y, swing, angle, agreed.force, loads.load)
         across = self._normalised(lateral.corner_force, loads.load, None) if self._use_across else None
         more = {"lateral_use": across} if self._lateral_first else {}
@@ -163,8 +163,10 @@ class EstimationPipeline(Memory):
             corners = self.corner_observers.step(w, steer, own_x, own_y, turn, use, across, moved.vy)
         beside = None
         if self.sideslip is not None:
-            bare = np.asarray(angle), np.asarray(turn), moved.vx, np.asarray(own_x), np.asarray(own_y)
-            beside = self.sideslip.step(*bare, agreed.force, loads.load, lateral.axle_force)
+            steered, turning, pull_x, pull_y = (np.asarray(v).reshape(shape) for v in (angle, turned, own_x, own_y))
+            beside = self.sideslip.step(
+                steered, turning, moved.vx, pull_x, pull_y, agreed.force, loads.load, lateral.axle_force
+            )
         open_ = kit.rows(unknown, 4)
         lost = open_[0] | open_[1] | open_[2] | open_[3]
         consistency = self.checks(agreed, lateral, loads, moved, corners, signals.az, lost, late)
@@ -281,6 +283,6 @@ class EstimationPipeline(Memory):
         return tilt, *(kit.own(value) for value in (own_x, own_y, *free))
 
 
-def _possible(kit: Arithmetic, value: Number) -> Number:
-    """NaN for what no accelerometer of a car reads."""
-    return kit.where(abs(value) <= _FASTEST_BODY, value, math.nan)
+def _possible(kit: Arithmetic, value: Number, limit: float) -> Number:
+    """NaN for what no sensor of a car reads."""
+    return kit.where(abs(value) <= limit, value, math.nan)

@@ -33,12 +33,15 @@ class VehicleSignals(NamedTuple):
     def arrays(
         self, shape: tuple[int, ...]
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """wheel_speed, steer, torque (..., 4) and ax, ay, yaw_rate (...).
+        """wheel_speed, steer, torque (..., 4) and ax, ay, yaw_rate (...); the others are checked as well.
 
         Raises:
             EstimatorError: another shape, or not numbers.
         """
         four = (*shape, 4)
+        for name, value in zip(self._fields[6:], self[6:], strict=True):
+            if value is not None and not isinstance(value, float):
+                entries(value, shape, name)
         return (
             entries(self.wheel_speed, four, "wheel_speed"),
             entries(self.steer, four, "steer"),

@@ -20,6 +20,7 @@ from estimators.sideslip.dugoff import used_friction
 from estimators.sideslip.four_wheel_model import AFFINE_FROM, FourWheelModel
 from estimators.sideslip.inputs import HeldInput, check_saved, checked_noise
 from estimators.sideslip.vehicle import FourWheel, positive
+from estimators.signals import limits
 
 # Not published; declared choices. Process noise per second: (rad/s)^2, (m/s)^2, rad^2, N^2 (tires), N^2 (drive).
 PROCESS = (1e-4, 1e-2, 1e-4, 1e5, 1e5, 1e5, 1e5, 1e7)
@@ -28,6 +29,7 @@ INITIAL = (1e-2, 400.0, 1e-2, 1e6, 1e6, 1e6, 1e6, 1e6)
 STEERING_LIMIT = 1.0  # rad, of the front wheels
 LOAD_LIMIT = 1e5  # N
 _MOST = 100.0  # times its initial variance: an entry that knows so little starts again
+_IMPOSSIBLE = np.array([limits.YAW_RATE, limits.SPEED, limits.ACCELERATION, limits.ACCELERATION])  # of the measurement
 _CHUNK = 1000  # batch entries worked on at once: their sigma points stay in the cache
 
 
@@ -54,7 +56,8 @@ class FourWheelObserver:
     Straight ahead (delta = 0) is not special while the car moves: the left-right difference in front, which no sensor
     sees there, relaxes with sigma / V, so that its covariance stays bounded; nothing is set to zero (P4 sets F_y and
     beta to zero, which fails when steering crosses zero). Below `standstill_speed` (and in reverse) the model is
-    singular: the entry is `at_rest`, sideslip and lateral forces fade to zero with 0.1 s and their variance settles.
+    singular: the entry is `at_rest`, sideslip and lateral forces fade with 0.1 s to zero (with a_x and a_y at zero: what
+    these still show, of a bank or a bias, is held by the forces) and their variance settles.
     Without measurements variances grow; an entry with one beyond 100 times its initial value starts again from zero and
     the initial covariance, flagged RESET, as does one whose prediction is not finite.
 
@@ -127,7 +130,7 @@ class FourWheelObserver:
             steering: (...) rad, of the front wheels, at this sample.
             loads: (..., 4) N.
             measurement: (..., 4) yaw rate in rad/s, speed in m/s, a_x and a_y in m/s^2, gravity removed; a channel
-                that is not finite is missing.
+                that is not finite, or beyond what cars do (`signals.limits`), is missing.
 
         Raises:
             EstimatorError: shapes that do not fit, not numbers.
@@ -135,9 +138,11 @@ class FourWheelObserver:
         shape, count = self.batch_shape, self._count
         flags: FlagArray = np.zeros(count, dtype=np.int32)
         before = self._before or self._models(self._steering.value, self._loads.value)
-        angle = self._steering(broadcast(steering, shape, "steering").reshape(count), flags)
-        load = self._loads(broadcast(loads, (*shape, 4), "loads").reshape(count, 4), flags)
         measured = broadcast(measurement, (*shape, 4), "measurement").reshape(count, 4)
+        if not (np.absolute(measured) <= _IMPOSSIBLE).all():  # False for NaN
+            measured = np.where(np.absolute(measured) <= _IMPOSSIBLE, measured, np.nan)
+        given = broadcast(steering, shape, "steering").reshape(count), broadcast(loads, (*shape, 4), "loads")
+        angle, load = self._steering(given[0], flags), self._loads(given[1].reshape(count, 4), flags)
         rest = np.empty(count, dtype=np.bool_)
         found: list[FilterStep] = []
         now = self._before = self._models(angle, load)
@@ -224,12 +229,20 @@ class FourWheelObserver:
         Raises:
             EstimatorError: incomplete, of another shape, of another kind of filter or not finite; nothing is changed.
         """
-        check_saved(saved, self.save())
-        for part, each in zip(self._parts, self._filters, strict=True):
-            each.restore({key: saved[key][part] for key in each.save()})
+        before = self.save()
+        check_saved(saved, before)
+        try:
+            self._restore_filters(saved)
+        except EstimatorError:  # of a later part: the earlier ones go back
+            self._restore_filters(before)
+            raise
         self._steering.value, self._loads.value = np.array(saved["steering"]), np.array(saved["loads"])
         self._before = None
         self._renewed = np.array(saved["renewed"], dtype=np.bool_)
+
+    def _restore_filters(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+        for part, each in zip(self._parts, self._filters, strict=True):
+            each.restore({key: saved[key][part] for key in each.save()})
 
 
 def _joined(steps: list[FilterStep]) -> FilterStep:

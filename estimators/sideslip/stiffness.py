@@ -11,16 +11,18 @@ import numpy.typing as npt
 from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.filters import ExtendedKalmanFilter, FilterStep
-from estimators.filters.step import bounded, broadcast
+from estimators.filters.step import broadcast
 from estimators.interpolate import FloatArray
 from estimators.sideslip.cornering_model import CorneringModel
 from estimators.sideslip.inputs import HeldInput, check_saved
 from estimators.sideslip.vehicle import SingleTrack, positive
+from estimators.signals import limits
 
 GOOD_NOISE = (0.1, 0.1, 0.1)  # zones 5, 6: N^2, N^2, (m/s^2)^2, per sample; P5 section 4
 POOR_NOISE = (1e6, 1e6, 1e6)  # zones 1 to 4
 SIDESLIP_NOISE = 1e-13  # rad^2 per sample
 STIFFNESS_NOISE = 0.24  # (N/rad)^2 per sample, zones 5, 6 alone
+_MOST = np.array([limits.FORCE, limits.FORCE, limits.ACCELERATION])  # of the measurement
 _LIMITS = ((-1.0, 1.0), (-10.0, 10.0), (0.0, 200.0), (-1e5, 1e5))  # rad, rad/s, m/s, N
 
 
@@ -125,16 +127,19 @@ class AdaptiveStiffnessObserver:
         flags: FlagArray = np.zeros(self.batch_shape, dtype=np.int32)
         before = self._model([held.value for held in self._inputs])
         given = (steering, yaw_rate, speed, drive_force)
-        model = self._model([held(value, flags) for held, value in zip(self._inputs, given, strict=True)])
         measured = broadcast(measurement, (*self.batch_shape, 3), "measurement")
-        present = bounded(measured)
+        shaped = [
+            broadcast(value, self.batch_shape, held.what) for held, value in zip(self._inputs, given, strict=True)
+        ]
+        model = self._model([held(value, flags) for held, value in zip(self._inputs, shaped, strict=True)])
+        present = np.absolute(measured) <= _MOST  # False for NaN
         excited = self._excited(model, measured, present)
         self._filter.predict(before.transition, before.transition_jacobian, self._process(excited))
-        usable = np.where(model.at_rest[..., None], np.nan, measured)
+        usable = np.where(present & ~model.at_rest[..., None], measured, np.nan)
         noise = np.where(self._good(excited), GOOD_NOISE, POOR_NOISE)[..., None] * np.eye(3)
         step = self._filter.correct(usable, model.measurement, model.measurement_jacobian, noise, self.gate)
         step = self._limited(step)
-        raise_flag(flags, np.logical_not(bounded(measured, -1)), Flag.MISSING_MEASUREMENT)
+        raise_flag(flags, np.logical_not(present.all(axis=-1)), Flag.MISSING_MEASUREMENT)
         raise_flag(flags, self._renewed, Flag.RESET)
         self._renewed[...] = False
         beta = step.state[..., 0]
@@ -195,9 +200,10 @@ class AdaptiveStiffnessObserver:
         return np.asarray(variances[..., None] * np.eye(3))
 
     def _limited(self, step: FilterStep) -> FilterStep:
-        """Keeps the stiffnesses physical."""
-        nominal = np.array([self.vehicle.front_stiffness, self.vehicle.rear_stiffness])
+        """Keeps sideslip and stiffnesses physical."""
+        nominal = np.array([self.vehicle.front_stiffness, self.vehicle.rear_stiffness])[: self._states - 1]
         clipped = step.state.copy()
+        clipped[..., 0] = np.clip(clipped[..., 0], -limits.ANGLE, limits.ANGLE)
         clipped[..., 1:] = np.clip(clipped[..., 1:], -0.95 * nominal, nominal)
         if np.array_equal(clipped, step.state):
             return step
@@ -221,6 +227,3 @@ class FixedStiffnessObserver(AdaptiveStiffnessObserver):
 
     def _process(self, excited: BoolArray) -> FloatArray:
         return np.array([[SIDESLIP_NOISE]])
-
-    def _limited(self, step: FilterStep) -> FilterStep:
-        return step

@@ -64,24 +64,24 @@ def mask(value: npt.ArrayLike | None, shape: tuple[int, ...], what: str) -> Bool
     return array
 
 
-def bounded(value: FloatArray) -> BoolArray:
+def bounded(value: FloatArray, limit: float = LIMIT) -> BoolArray:
     """Which entries are finite and of a size that means something; comparisons with NaN are false."""
-    return np.absolute(value) <= LIMIT
+    return np.absolute(value) <= limit
 
 
-def quiet(value: FloatArray) -> bool:
-    """Whether all entries are `bounded`: what every step asks first. False for NaN.
+def quiet(value: FloatArray, limit: float = LIMIT) -> bool:
+    """Whether all entries are within `limit`: what every step asks first. False for NaN.
 
-    Plain numbers for a handful; one dot product for small arrays; for large ones BLAS would start threads, and extrema are
-    as fast.
+    Plain numbers for a handful (their sum: False may also mean that they are large together); one dot product for small
+    arrays; for large ones BLAS would start threads, and extrema are as fast.
     """
     if value.ndim == 0:
-        return bool(abs(value.item()) <= LIMIT)
+        return bool(abs(value.item()) <= limit)
     if value.ndim == 1 and value.size <= _FEW:
-        return bool(sum(map(abs, value.tolist())) <= LIMIT)
-    if value.size <= _SMALL:
+        return bool(sum(map(abs, value.tolist())) <= limit)
+    if value.size <= _SMALL and limit == LIMIT:
         return bool(np.vdot(value, value) <= LIMIT * LIMIT)
-    return bool(np.minimum.reduce(value, None) >= -LIMIT and np.maximum.reduce(value, None) <= LIMIT)
+    return bool(np.minimum.reduce(value, None) >= -limit and np.maximum.reduce(value, None) <= limit)
 
 
 def any_missing(missing: BoolArray, shape: tuple[int, ...]) -> BoolArray:

@@ -37,7 +37,12 @@ class Memory:
             EstimatorError: incomplete, of another batch shape or type, or not finite; nothing is changed then.
         """
         self._check(saved)
-        self._take(saved)
+        before = self.save()
+        try:
+            self._take(saved)
+        except EstimatorError:  # a part has conditions of its own, and found it after others had taken theirs
+            self._take(before)
+            raise
 
     def _check(self, saved: Mapping[str, npt.NDArray[Any]], prefix: str = "") -> None:
         for name, own in self.save().items():

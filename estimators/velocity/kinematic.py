@@ -17,7 +17,7 @@ from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.filters import KalmanFilter
 from estimators.interpolate import FloatArray
 from estimators.signals.checks import any_missing, batch, entries, mask, setting
-from estimators.signals.memory import Memory
+from estimators.signals.renewable import Renewable
 
 _LARGEST_SPREAD = 30.0  # m/s of standard deviation: more is no knowledge of a car's velocity
 
@@ -33,7 +33,7 @@ class KinematicStep(NamedTuple):
     flags: FlagArray  # (...)
 
 
-class KinematicKalman(Memory):
+class KinematicKalman(Renewable):
     """State [u_x, u_y, a_xb, a_yb].
 
     Args:
@@ -48,7 +48,7 @@ class KinematicKalman(Memory):
         EstimatorError: a value that is not above zero.
     """
 
-    memory = ("seen",)
+    memory = ("seen", "renewed")
     parts = ("filter",)
 
     def __init__(
@@ -60,7 +60,8 @@ class KinematicKalman(Memory):
         bias_memory: float = 3600.0,
         missing: float = 2.0,
     ) -> None:
-        self.batch_shape, self.sample_time = batch(batch_shape), setting(sample_time, "sample_time", "s")
+        super().__init__(batch(batch_shape))
+        self.sample_time = setting(sample_time, "sample_time", "s")
         self._quiet = setting(acceleration_noise, "acceleration_noise", "m/s^2")
         self._loud = setting(missing, "missing", "m/s^2")
         self._bias = setting(bias, "bias", "m/s^2")
@@ -101,6 +102,7 @@ class KinematicKalman(Memory):
         R = np.where(usable, np.square(np.where(usable, spread, 1.0)), 1.0)[..., None] * np.eye(2)
         step = self.filter.correct(np.where(usable, measured, np.nan), np.eye(2, 4), R)
         raise_flag(flags, ~any_missing(usable, shape), Flag.MISSING_MEASUREMENT)
+        self._flag_renewed(flags)
         x = step.state
         return KinematicStep(x[..., :2], x[..., 2:], step.covariance, step.innovation, step.used, flags)
 
@@ -114,6 +116,7 @@ class KinematicKalman(Memory):
         start = np.concatenate([np.broadcast_to(np.asarray(velocity, dtype=np.float64), (2,)), [0.0, 0.0]])
         self.filter.reset(chosen, state=start)
         self.seen[:, chosen] = 0.0
+        self._renew(chosen)
 
     def _model(self, turn: FloatArray, missing: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Exact for held inputs: the velocity turns by -r T while it is driven; S = int_0^T of that rotation."""

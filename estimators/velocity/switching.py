@@ -23,6 +23,7 @@ from estimators.interpolate import FloatArray
 from estimators.schedule import GainSchedule
 from estimators.signals.checks import any_missing, batch, entries, mask, quiet
 from estimators.signals.memory import Memory
+from estimators.signals.renewable import Renewable
 from estimators.velocity.exact_update import ExactUpdate, refuse_explosive
 from estimators.velocity.exact_update_few import ExactUpdateFew
 from estimators.velocity.screening import FEW, LIMIT, MEMORY, Screen, Screened
@@ -91,7 +92,7 @@ class SwitchedStep(NamedTuple):
     high_slip: BoolArray  # (...) mode 2
 
 
-class SwitchedVelocityObserver(Memory):
+class SwitchedVelocityObserver(Renewable):
     """Two-state observer of every corner with two gain schedules over one plant.
 
     Args:
@@ -107,7 +108,7 @@ class SwitchedVelocityObserver(Memory):
         ScheduleError: gains whose error grows beyond all bounds within a sample.
     """
 
-    memory = ("state",)
+    memory = ("state", "renewed")
     parts = ("switch", "screen")
 
     def __init__(
@@ -129,7 +130,7 @@ class SwitchedVelocityObserver(Memory):
                 f"schedules '{normal.name}' and '{second.name}' are for sample times {normal.sample_time:g} s and "
                 f"{second.sample_time:g} s; design both for one"
             )
-        self.batch_shape = batch(batch_shape)
+        super().__init__(batch(batch_shape))
         self.switch = SlipSwitch(self.batch_shape, limit, hysteresis)
         count = math.prod(self.batch_shape)
         self._updates = (ExactUpdate(normal), ExactUpdate(second))
@@ -157,6 +158,10 @@ class SwitchedVelocityObserver(Memory):
             gone = any_missing(~(np.absolute(self.state.T) <= LIMIT), (p.size,))
             self.state[:, gone] = 0.0
             raise_flag(flags, gone, Flag.RESET)
+        if self._any_renewed:
+            flags = flags.reshape(self.batch_shape)
+            self._flag_renewed(flags)
+            flags = flags.reshape(-1)
         if seen.missing is not None:
             innovation[seen.missing] = np.nan
         used = np.ones(p.size, dtype=np.bool_) if seen.coast is None else ~seen.coast
@@ -201,3 +206,4 @@ class SwitchedVelocityObserver(Memory):
         self.state[:, chosen] = value[:, None]
         self.screen.forget(chosen)
         self.switch.high[chosen.reshape(self.batch_shape)] = False
+        self._renew(chosen.reshape(self.batch_shape))

@@ -76,6 +76,20 @@ def test_known_forces_are_found_with_the_wheels_turned() -> None:
     assert not found.flags.any()
 
 
+@pytest.mark.parametrize("steer", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize("noise", [(0.012, 0.012, 0.012), (0.3, 0.1, 0.3), (5.0, 5.0, 5.0)])
+def test_the_front_difference_stays_within_the_stated_bound(steer: float, noise: tuple[float, float, float]) -> None:
+    """A scalar filter of dF_yf - rho F_yf with the split alone is the bound: what else is measured can but help."""
+    load = np.array([500.0, 9500.0, 4000.0, 6000.0])
+    rho, runner = 0.9, LateralForceEstimator(CAR, TIME, split_deviation=1000.0, measurement_deviation=noise)
+    walk = 130.0**2 * (1.0 + rho**2)
+    bound = math.sqrt(walk / 2 + math.sqrt(walk**2 / 4 + walk * 1000.0**2))
+    for k in range(2000):
+        found = runner.step(0.0, 0.0, 0.0, steer, np.zeros(4), load)
+        if k > 600:
+            assert found.deviation[2] <= bound + rho * found.deviation[0]
+
+
 def test_wheels_straight_the_covariance_stays_bounded_and_the_front_splits_by_load() -> None:
     fy = np.array([1000.0, 3000.0, 1500.0, 2500.0])
     load = np.array([2500.0, 7500.0, 4000.0, 6000.0])
