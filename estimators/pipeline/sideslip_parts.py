@@ -18,6 +18,7 @@ from estimators.sideslip import (
     FourWheel,
     FourWheelObserver,
     SingleTrack,
+    SlidingModeObserver,
 )
 from estimators.sideslip.four_wheel import FourWheelStep
 from estimators.sideslip.stiffness import StiffnessStep
@@ -67,26 +68,31 @@ class FourWheelSideslip(Memory):
 
 
 class StiffnessSideslip(Memory):
-    """`AdaptiveStiffnessObserver` or `FixedStiffnessObserver` (P5) on the pipeline's axle forces.
+    """`AdaptiveStiffnessObserver` or `FixedStiffnessObserver` (P5) on axle forces.
 
-    The paper's sliding-mode observer of these forces is `estimators.sideslip.SlidingModeObserver`; the pipeline has them
-    already.
+    The forces are those of the pipeline, or, with `sliding`, of the paper's own sliding-mode observer: P5 as it stands.
 
     Args:
         vehicle: single track.
         sample_time: s.
         batch_shape: () for one car.
         adaptive: False keeps the stiffnesses given.
+        sliding: forces from yaw rate and accelerations by `SlidingModeObserver`.
     """
 
-    parts = ("observer",)
-
     def __init__(
-        self, vehicle: SingleTrack, sample_time: float, batch_shape: tuple[int, ...] = (), adaptive: bool = True
+        self,
+        vehicle: SingleTrack,
+        sample_time: float,
+        batch_shape: tuple[int, ...] = (),
+        adaptive: bool = True,
+        sliding: bool = False,
     ) -> None:
         self.batch_shape = batch_shape
         kind = AdaptiveStiffnessObserver if adaptive else FixedStiffnessObserver
         self.observer = kind(vehicle, batch_shape, sample_time=sample_time)
+        self.sliding = SlidingModeObserver(vehicle, batch_shape, sample_time) if sliding else None
+        self.parts = ("observer", "sliding") if sliding else ("observer",)
 
     def step(
         self,
@@ -100,9 +106,15 @@ class StiffnessSideslip(Memory):
         axle_force_y: FloatArray,
     ) -> StiffnessStep:
         """One sample."""
+        drive = force_x[..., :2].sum(axis=-1)
+        if self.sliding is not None:
+            found = self.sliding.step(np.stack([yaw_rate, ay, ax], axis=-1), steer).wheel_forces
+            drive, axle_force_y = found[..., 0], found[..., 1:]
         measurement = np.concatenate([axle_force_y, np.asarray(ay)[..., None]], axis=-1)
-        return self.observer.step(steer, yaw_rate, vx, force_x[..., :2].sum(axis=-1), measurement)
+        return self.observer.step(steer, yaw_rate, vx, drive, measurement)
 
     def reset(self, where: npt.ArrayLike | None = None) -> None:
         """Starts the entries `where` (bool mask of the batch shape; None: all) afresh."""
         self.observer.reset(where)
+        if self.sliding is not None:
+            self.sliding.reset(where)

@@ -15,8 +15,10 @@ from estimators.filters.step import bounded, broadcast
 from estimators.interpolate import FloatArray
 from estimators.sideslip.inputs import HeldInput, check_saved
 from estimators.sideslip.vehicle import SingleTrack, positive
+from estimators.signals import limits
 
 _STEERING_LIMIT = 1.0  # rad
+_IMPOSSIBLE = np.array([limits.YAW_RATE, limits.ACCELERATION, limits.ACCELERATION])  # of the measurement
 
 
 @dataclass(frozen=True)
@@ -127,13 +129,13 @@ class SlidingModeObserver:
         flags: FlagArray = np.zeros(self.batch_shape, dtype=np.int32)
         measured = broadcast(measurement, (*self.batch_shape, 3), "measurement")
         angle = self._steering(steering, flags)
-        used = bounded(measured)
+        used = np.absolute(measured) <= _IMPOSSIBLE  # False for NaN
         innovation = np.where(used, measured, 0.0) - self._state @ self._outputs.T
         switching = np.where(used, np.clip(innovation / self.widths, -1.0, 1.0), 0.0)
         drift = self._state @ self._model.T
         drift[..., 0] = np.where(used[..., 0], drift[..., 0], 0.0)
         self._state = self._state + self.sample_time * (drift + switching @ self._injection.T)
-        raise_flag(flags, np.logical_not(bounded(measured, -1)), Flag.MISSING_MEASUREMENT)
+        raise_flag(flags, np.logical_not(used.all(axis=-1)), Flag.MISSING_MEASUREMENT)
         raise_flag(flags, self._renewed, Flag.RESET)
         self._renewed[...] = False
         innovation = np.where(used, innovation, np.nan)

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.filters import KalmanFilter
+from estimators.filters.step import broadcast
 from estimators.interpolate import FloatArray
 from estimators.signals.checks import any_missing, batch, entries, mask, setting
 from estimators.signals.renewable import Renewable
@@ -107,14 +108,14 @@ class KinematicKalman(Renewable):
         return KinematicStep(x[..., :2], x[..., 2:], step.covariance, step.innovation, step.used, flags)
 
     def reset(self, where: npt.ArrayLike | None = None, velocity: npt.ArrayLike = 0.0) -> None:
-        """Starts the entries `where` (mask of the batch shape; None: all) at `velocity` (2,), m/s, with unknown biases.
+        """Starts the entries `where` (mask of the batch shape; None: all) at `velocity` (..., 2), m/s, with unknown biases.
 
         Raises:
             EstimatorError: another shape, or a velocity that is not finite.
         """
         chosen = mask(where, self.batch_shape, "where")
-        start = np.concatenate([np.broadcast_to(np.asarray(velocity, dtype=np.float64), (2,)), [0.0, 0.0]])
-        self.filter.reset(chosen, state=start)
+        first = np.where(chosen[..., None], broadcast(velocity, (*self.batch_shape, 2), "velocity"), 0.0)
+        self.filter.reset(chosen, state=np.concatenate((first, np.zeros_like(first)), axis=-1))
         self.seen[:, chosen] = 0.0
         self._renew(chosen)
 

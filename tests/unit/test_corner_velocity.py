@@ -16,24 +16,26 @@ from estimators.pipeline import (
     KalmanCorners,
     SwitchedCorners,
 )
-from estimators.velocity import BristleTire, SlipWeights
+from estimators.velocity import BristleTire, KinematicKalman, SlipWeights
 from tests.unit.pipeline_truth import CAR, TIME, Truth, finite, noisy, run, sample, straight, turning
 from tests.unit.schedule_content import PUBLISHED, schedule_content
 
 ALONG, ACROSS = (GainSchedule.from_content(schedule_content(n), n) for n in ("longitudinal", "lateral"))
 SLIP, SIDE = (PUBLISHED[n]["constants"][3] / PUBLISHED[n]["constants"][0] for n in ("longitudinal", "lateral"))
 """kappa/sigma0: slip of a bristle tire per unit of normalised force, where the force is far from the friction."""
-KINDS = ["scheduled", "switched", "Kalman"]
+KINDS = ["scheduled", "switched", "Kalman", "Kalman and kinematic"]
 
 
 def pipeline_of(batch: tuple[int, ...] = (), kind: str = "scheduled") -> EstimationPipeline:
     along: Any = ALONG
+    kind, _, filtered = kind.partition(" and ")
     if kind == "switched":
         along = SwitchedCorners(ALONG, (*batch, 4))
     if kind == "Kalman":
         along = KalmanCorners(BristleTire(*PUBLISHED["longitudinal"]["constants"], CAR.radii[0]), TIME, (*batch, 4))
     corners = CornerObservers(CAR, along, ACROSS, batch, SlipWeights() if kind == "scheduled" else None)
-    return EstimationPipeline(CAR, TIME, batch, velocity=CornerVelocity(corners))
+    kinematic = KinematicKalman(TIME, batch) if filtered else None
+    return EstimationPipeline(CAR, TIME, batch, velocity=CornerVelocity(corners, kinematic))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -81,6 +83,16 @@ def test_a_batch_equals_a_loop_and_a_restored_one_goes_on(kind: str) -> None:
             assert together[k].flags[place] == alone.flags
 
 
+def test_the_kinematic_filter_finds_the_bias_of_an_accelerometer() -> None:
+    """0.15 m/s^2 along, which the corners do not have: their V_x comes from wheels that hardly slip."""
+    truth = noisy(straight(np.zeros(6000), 20.0, SLIP), 5, (0.15, 0.0, 0.0))
+    last = run(pipeline_of(kind="scheduled and kinematic"), truth)[-1]
+    assert last.velocity.sensor_bias[0] == pytest.approx(0.15, abs=0.03)
+    assert last.vx == pytest.approx(20.0, abs=0.1)
+    assert 0.0 < last.vx_deviation < 0.2
+    assert last.flags == 0
+
+
 def test_faults_are_flagged_and_survived() -> None:
     truth = noisy(straight(np.full(200, 1.0), 15.0, SLIP), 0)
     truth.yaw_rate[50:60], truth.wheel_speed[80:90], truth.ax[100:110] = np.nan, np.inf, np.nan
@@ -109,6 +121,8 @@ def test_what_does_not_fit_is_refused() -> None:
         CornerVelocity(CornerObservers(CAR, ALONG))
     with pytest.raises(EstimatorError, match=r"batch_shape \(4,\), expected \(3, 4\)"):
         CornerObservers(CAR, SwitchedCorners(ALONG), None, (3,))
+    with pytest.raises(EstimatorError, match=r"kinematic is for sample_time = 0\.01 s"):
+        CornerVelocity(CornerObservers(CAR, ALONG, ACROSS), KinematicKalman(0.01))
     late = KalmanCorners(BristleTire(), 0.01)
     with pytest.raises(EstimatorError, match=r"sample times 0\.01 s and 0\.005 s"):
         CornerObservers(CAR, late, ACROSS)

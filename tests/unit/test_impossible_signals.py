@@ -27,6 +27,7 @@ ALONG, ACROSS = (GainSchedule.from_content(schedule_content(n), n) for n in ("lo
 BODY = (2270.0, 4650.0, 1.42, 1.43)
 SIDESLIP = {
     "four wheels": lambda batch: FourWheelSideslip(FourWheel(*BODY, 1.59, 9e4, 9e4, 0.5, 0.5), TIME, batch),
+    "sliding mode": lambda batch: StiffnessSideslip(SingleTrack(*BODY, 1.8e5, 1.8e5), TIME, batch, sliding=True),
     "stiffness": lambda batch: StiffnessSideslip(SingleTrack(*BODY, 1.8e5, 1.8e5), TIME, batch),
 }
 

@@ -261,7 +261,11 @@ def test_sideslip_parts_follow_the_turn() -> None:
     front, rear = (float(force) / angle for force in truth.axle_force_y[0])
     track = SingleTrack(CAR.mass, CAR.yaw_inertia, 1.42, 1.43, front, rear)
     wheels = FourWheel(CAR.mass, CAR.yaw_inertia, 1.42, 1.43, 1.59, front / 2, rear / 2, 0.5, 0.5)
-    parts: list[Any] = [FourWheelSideslip(wheels, TIME), StiffnessSideslip(track, TIME, adaptive=False)]
+    parts: list[Any] = [
+        FourWheelSideslip(wheels, TIME),
+        StiffnessSideslip(track, TIME, adaptive=False),
+        StiffnessSideslip(track, TIME, adaptive=False, sliding=True),
+    ]
     expected = np.arctan(truth.vy[0] / truth.vx[0])
     for part in parts:
         last = run(EstimationPipeline(CAR, TIME, sideslip=part), truth)[-1]
