@@ -41,7 +41,9 @@ class UnscentedKalmanFilter(GaussianFilter):
 
     A function that is affine in its last states, from k on with those before them held, has no even part along the
     columns k, k+1, ... of a lower triangular factor, for these move the last states alone: told so by an `Affine`, the
-    filter asks the function for 1 + 2k points, and for its slope along the other columns.
+    filter asks the function for 1 + 2k points, and for its slope along the other columns. Where the measurement is
+    affine everywhere, many entries at once take P+ = P- - K Pyy K', whose factor is as good as the orthogonal one while
+    none of its pivots is small, which is checked; the form above otherwise (`predicted.Predicted`).
 
     Source: weights of the corner estimation paper (P1 section 3, with W_i = 1/(2 (N + eta))); Van der Merwe, Wan (2001)
     for the square-root form; Kaminski, Bryson, Schmidt (1971) for square-root measurement updates.
