@@ -11,7 +11,7 @@ from rich.table import Table
 
 from studies.commands.progress import progress_bar
 from studies.drives.run import run_drive
-from studies.drives.summary import HEADER, summary_rows
+from studies.drives.summary import HEADER, remarks, summary_rows
 
 
 def run_log(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int:
@@ -28,5 +28,7 @@ def run_log(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int:
     for row in summary_rows(result):
         table.add_row(*row)
     Console(width=None if sys.stdout.isatty() else 120).print(table)
+    for line in remarks(result):
+        print(line)
     print(f"written to {out}")
     return 0

@@ -31,7 +31,7 @@ from estimators.pipeline.corner_kinds import CornerKind
 from estimators.pipeline.pipeline import REAL_SENSORS
 from estimators.sideslip import FourWheel, SingleTrack
 from estimators.vehicle import VehicleParameters
-from estimators.velocity import SlipWeights
+from estimators.velocity import KinematicKalman, SlipWeights
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.prepare import CornerInputs
@@ -115,9 +115,11 @@ def _pipeline_of(
     }
     dynamic = chosen.vertical_load == "dynamic"
     method: Any = chosen.lateral_force
-    alone = chosen.velocity == "corners"  # a paper's own chain; P1 weighs the axles by slip, P2 and P3 do not
-    weights = SlipWeights() if alone and chosen.corner_velocity == "lpv" else None
+    weights = SlipWeights() if chosen.axle_weights == "slip" else None
     corners = CornerObservers(vehicle, longitudinal, lateral, weights=weights) if lateral is not None else None
+    velocity: CornerVelocity | None = None  # the fusion; else a paper's own chain
+    if chosen.velocity != "fusion" and corners is not None:
+        velocity = CornerVelocity(corners, KinematicKalman(time) if chosen.velocity == "kinematic" else None)
     pipeline = EstimationPipeline(
         vehicle,
         time,
@@ -125,8 +127,8 @@ def _pipeline_of(
         loads=VerticalLoads(vehicle, time, dynamic=dynamic),
         attitude=AttitudeObserver(time) if chosen.attitude == "gyro" else None,
         lateral_force=LateralForceEstimator(vehicle, time, method=method, measurement_deviation=REAL_SENSORS),
-        velocity=CornerVelocity(corners) if alone and corners is not None else None,
-        corner_observers=None if alone else corners,
+        velocity=velocity,
+        corner_observers=corners if velocity is None else None,
         sideslip=_sideslip_of(drive, vehicle),
     )
     return pipeline, assumptions
@@ -138,9 +140,9 @@ def _sideslip_of(drive: DriveFile, vehicle: VehicleParameters) -> Any:
     if kind == "none" or front is None or rear is None:
         return None
     base = (vehicle.mass, vehicle.yaw_inertia, vehicle.front_axle_distance, vehicle.rear_axle_distance)
-    if kind.endswith("stiffness"):
-        adaptive = kind == "adaptive-stiffness"
-        return StiffnessSideslip(SingleTrack(*base, front, rear), drive.sample_time, adaptive=adaptive)
+    if kind.endswith("stiffness") or kind == "sliding-mode":
+        car_model, sliding = SingleTrack(*base, front, rear), kind == "sliding-mode"
+        return StiffnessSideslip(car_model, drive.sample_time, adaptive=kind != "fixed-stiffness", sliding=sliding)
     track, length = 0.5 * (vehicle.front_track + vehicle.rear_track), car.relaxation_length or 0.5
     wheels = FourWheel(*base, track, front / 2, rear / 2, length, length)
     method: Any = kind.removeprefix("four-wheel-")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,8 @@ from studies.drives.prepare import CornerInputs
 from studies.drives.quantities import CORNERS
 
 Array = npt.NDArray[np.float64]
+Axle = Literal["front", "rear"]
+AXLES: tuple[Axle, ...] = ("front", "rear")
 LEAST_FORCE = 1000.0
 """N that a reference force must exceed for a sample to count: the papers report forces that do something."""
 LEAST_SPEED = 2.0
@@ -43,14 +45,48 @@ def lateral_motion(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: Dri
         if np.isfinite(value).any()
     }
     if "vx" in reference:
-        fast = np.abs(reference["vx"]) > LEAST_SPEED
-        true = np.where(fast, np.arctan(reference["vy"] / np.where(fast, np.abs(reference["vx"]), 1.0)), np.nan)
+        true = reference_sideslip(log)
         angles = {"pipeline": chain.sideslip, drive.estimators.sideslip: chain.sideslip_part}
         angles["integrated_acceleration"] = np.arctan(integrated / np.maximum(np.abs(wheels), LEAST_SPEED))
         found["sideslip"] = {
             name: deviation(value, true, "rad").as_dict() for name, value in angles.items() if np.isfinite(value).any()
         }
     return found
+
+
+def reference_sideslip(log: DriveLog) -> Array:
+    """arctan(V_y / |V_x|) (n,) of the references, rad; NaN up to 2 m/s, where a small velocity error is a large angle."""
+    vx, vy = log.reference["vx"], log.reference["vy"]
+    fast = np.abs(vx) > LEAST_SPEED
+    return np.where(fast, np.arctan(vy / np.where(fast, np.abs(vx), 1.0)), np.nan)
+
+
+def quasi_static_axle_forces(log: DriveLog, drive: DriveFile) -> Array:
+    """F_y of each axle (n, 2), N, of a car that does not yaw: the share of m a_y that its distance from the CG gives it."""
+    front, rear = drive.vehicle.front_axle_to_cg, drive.vehicle.rear_axle_to_cg
+    ay = log.signals.get("ay", np.zeros_like(log.time))
+    return np.outer(drive.vehicle.mass * ay, np.array([rear, front]) / (front + rear))
+
+
+def reference_axle_force(log: DriveLog, axle: Axle) -> Array | None:
+    """Sum of F_y over both wheels of an axle (n,), N, if the log has both."""
+    pair = CORNERS[:2] if axle == "front" else CORNERS[2:]
+    wheels = [log.reference.get(f"force_y_{corner}") for corner in pair]
+    found = [wheel for wheel in wheels if wheel is not None]
+    return found[0] + found[1] if len(found) == 2 else None
+
+
+def notes(drive: DriveFile) -> dict[str, str]:
+    """What a reader of a row must know to judge it, by signal."""
+    measured, reference = drive.signals["ax"], drive.reference.get("ax")
+    if reference is None or (drive.log_of(measured), measured.column) != (drive.log_of(reference), reference.column):
+        return {}
+    torques = any(name.startswith("torque_") for name in drive.signals)
+    forces_from = "its forces come from the wheel torques" if torques else "its forces are shares of it"
+    return {
+        "total_force_x": f"circular: the reference is m times column '{reference.column}', which the pipeline gets as "
+        f"signals.ax; {forces_from}, and quasi_static is that column itself"
+    }
 
 
 def forces(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: DriveFile) -> dict[str, dict[str, Any]]:
@@ -68,17 +104,17 @@ def forces(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: DriveFile) 
         for name, estimates in ((f"force_x_{corner}", along), (f"force_z_{corner}", up)):
             if name in reference:
                 found[name] = _judged(estimates, reference[name])
-    base = car.front_axle_to_cg + car.rear_axle_to_cg
-    share = (car.rear_axle_to_cg / base, car.front_axle_to_cg / base)
-    for k, (axle, pair) in enumerate((("front", CORNERS[:2]), ("rear", CORNERS[2:]))):
-        if all(f"force_y_{corner}" in reference for corner in pair):
-            true = sum((reference[f"force_y_{corner}"] for corner in pair), np.zeros_like(log.time))
-            estimates = {"pipeline": chain.axle_force_y[:, k], "quasi_static": share[k] * car.mass * ay}
+    rigid = quasi_static_axle_forces(log, drive)
+    for k, axle in enumerate(AXLES):
+        true = reference_axle_force(log, axle)
+        if true is not None:
+            estimates = {"pipeline": chain.axle_force_y[:, k], "quasi_static": rigid[:, k]}
             found[f"force_y_{axle}"] = _judged(estimates, true)
     if "ax" in reference:
         total = np.sum(chain.force_x * np.cos(inputs.steer), axis=1)
         total -= chain.axle_force_y[:, 0] * np.sin(inputs.steer[:, :2].mean(axis=1))
-        found["total_force_x"] = {"pipeline": deviation(total, car.mass * reference["ax"], "N").as_dict()}
+        estimates = {"pipeline": total, "quasi_static": car.mass * ax}
+        found["total_force_x"] = _judged(estimates, car.mass * reference["ax"])
     return found
 
 

@@ -73,7 +73,7 @@ def check_signals(signals: Mapping[str, Column], vehicle: Vehicle) -> None:
     """What the observers cannot do without is there, and the vehicle has what the signals need."""
     for name in (*WHEEL_SPEEDS, "ax"):
         if name not in signals:
-            raise ValueError(f'signals.{name}: missing; add {name} = {{ column = "...", unit = "{SIGNALS[name]}" }}')
+            raise ValueError(f"signals.{name}: missing; {_add_signal(name)}")
     if any(name in signals for name in TORQUES) and vehicle.wheel_inertia is None:
         raise ValueError('vehicle.wheel_inertia: missing, but wheel torques are given; add it, such as "1.6 kg*m^2"')
     if "hand_wheel" in signals and vehicle.steering_ratio is None:
@@ -83,13 +83,25 @@ def check_signals(signals: Mapping[str, Column], vehicle: Vehicle) -> None:
         raise ValueError(
             f"signals: {' and '.join(steering)} say the same thing; keep steering, hand_wheel, or steer_fl and steer_fr"
         )
+    for pair in (("steer_fl", "steer_fr"), ("steer_rl", "steer_rr")):
+        given = [name for name in pair if name in signals]
+        if len(given) == 1:
+            (missing,) = set(pair) - set(given)
+            raise ValueError(
+                f"signals.{missing}: missing, but {given[0]} is given; {_add_signal(missing)}"
+                + (", or give steering for both front wheels" if missing.startswith("steer_f") else "")
+            )
+
+
+def _add_signal(name: str) -> str:
+    return f'add {name} = {{ column = "...", unit = "{SIGNALS[name]}" }}'
 
 
 def check_estimators(chosen: Estimators, signals: Mapping[str, Column], vehicle: Vehicle, schedules: Schedules) -> None:
     """Every estimator that the file asks for by name has the vehicle data, the signals and the schedules that it needs."""
-    if chosen.velocity == "corners" and schedules.lateral is None:
+    if chosen.velocity != "fusion" and schedules.lateral is None:
         raise ValueError(
-            "schedules.lateral: missing, but estimators.velocity = 'corners' has V_y from nothing else; "
+            f"schedules.lateral: missing, but estimators.velocity = '{chosen.velocity}' has V_y from nothing else; "
             'add it, such as lateral = "corner-estimation-lateral"'
         )
     wanted = {name: str(getattr(chosen, name)) for name in chosen.model_fields_set}
@@ -104,9 +116,15 @@ def check_estimators(chosen: Estimators, signals: Mapping[str, Column], vehicle:
         for signal in needed.get((place, estimator), ()):
             if signal not in signals:
                 raise ValueError(
-                    f"signals.{signal}: missing, but estimators.{place} = '{estimator}' needs it; add "
-                    f'{signal} = {{ column = "...", unit = "{SIGNALS[signal]}" }}'
+                    f"signals.{signal}: missing, but estimators.{place} = '{estimator}' needs it; {_add_signal(signal)}"
                 )
+        if (place, estimator) in _STEERED and not any(
+            name in signals for name in ("steering", "hand_wheel", "steer_fl")
+        ):
+            raise ValueError(
+                f"signals.steering: missing, but estimators.{place} = '{estimator}' needs it; {_add_signal('steering')}, "
+                "or hand_wheel, or steer_fl and steer_fr"
+            )
 
 
 _YAW = ("yaw_inertia", "3900 kg*m^2")
@@ -119,8 +137,11 @@ _PARAMETERS = {
     ("sideslip", "four-wheel-unscented"): _TIRE,
     ("sideslip", "adaptive-stiffness"): _STIFFNESS,
     ("sideslip", "fixed-stiffness"): _STIFFNESS,
+    ("sideslip", "sliding-mode"): _STIFFNESS,
 }
+_STEERED = {(place, name) for place, name in _PARAMETERS if place == "sideslip"}
 _SIGNALS = {
+    **dict.fromkeys((*_STEERED, ("lateral_force", "linear"), ("lateral_force", "unscented")), ("yaw_rate", "ay")),
     **{("longitudinal_force", name): TORQUES for name in ("unknown-input", "pid", "unscented", "linear")},
     ("attitude", "gyro"): ("roll_rate", "pitch_rate"),
 }

@@ -21,10 +21,10 @@ from studies.drives.validation import read_toml
 class DriveFile(Table):
     """A drive file that was read, checked and converted to SI."""
 
-    schema_: Literal["gainsmith.drive/1"] = Field(alias="schema")
-    name: str = Field(min_length=1)
+    schema_: Literal["gainsmith.drive/1"] = Field(alias="schema", examples=["gainsmith.drive/1"])
+    name: str = Field(min_length=1, examples=["brake test"])
     source: str = ""
-    sample_time: Duration
+    sample_time: Duration = Field(examples=["5 ms"])
     vehicle: Vehicle
     schedules: Schedules
     observer: Observer = Observer()

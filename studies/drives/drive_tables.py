@@ -36,11 +36,11 @@ class Table(BaseModel):
 class Column(Table):
     """One log column: value in SI = factor * sign * (column in ``unit``)."""
 
-    column: str = Field(min_length=1)
-    unit: str = Field(min_length=1)
+    column: str = Field(min_length=1, examples=["omega_fl"])
+    unit: str = Field(min_length=1, examples=["rad/s"])
     log: str | None = None
     sign: Literal["positive", "negative"] = "positive"
-    factor: float = 1.0
+    factor: float = Field(default=1.0, examples=[0.5])
 
     def scale(self, si_unit: str) -> float:
         """The number that turns the column into ``si_unit`` with the sign of this project (x forward, y left, z up)."""
@@ -50,7 +50,7 @@ class Column(Table):
 class Align(Table):
     """Estimate a clock offset: the derivative of ``velocity`` must look like ``acceleration`` (:mod:`.align`)."""
 
-    to: str
+    to: str = Field(examples=["imu"])
     velocity: str = "vx"
     acceleration: str = "ax"
     search: Duration | None = None
@@ -59,8 +59,8 @@ class Align(Table):
 class LogFile(Table):
     """One log file: its clock, its rate, and the longest pause that may be bridged by interpolation."""
 
-    name: str = Field(min_length=1)
-    rate: Rate
+    name: str = Field(min_length=1, examples=["car"])
+    rate: Rate = Field(examples=["200 Hz"])
     file: str | None = None
     time: str = "time"
     time_unit: Annotated[str, AfterValidator(_a_time)] = "s"
@@ -80,17 +80,17 @@ class LogFile(Table):
 class Vehicle(Table):
     """Rigid-body and wheel data, SI. Lengths are to the centre of gravity; tracks are wheel centre to wheel centre."""
 
-    mass: Mass
-    front_axle_to_cg: Length
-    rear_axle_to_cg: Length
-    cg_height: Length
-    track_front: Length
-    track_rear: Length
-    effective_radius_front: Length
-    effective_radius_rear: Length
+    mass: Mass = Field(examples=["1600 kg"])
+    front_axle_to_cg: Length = Field(examples=["1.4 m"])
+    rear_axle_to_cg: Length = Field(examples=["1.5 m"])
+    cg_height: Length = Field(examples=["0.55 m"])
+    track_front: Length = Field(examples=["1.6 m"])
+    track_rear: Length = Field(examples=["1.6 m"])
+    effective_radius_front: Length = Field(examples=["0.34 m"])
+    effective_radius_rear: Length = Field(examples=["0.34 m"])
     wheel_inertia: Inertia | None = None
-    rolling_resistance: float = Field(default=0.0, ge=0.0, le=0.2)
-    steering_ratio: float | None = Field(default=None, gt=0.0)
+    rolling_resistance: float = Field(default=0.0, ge=0.0, le=0.2, examples=[0.012])
+    steering_ratio: float | None = Field(default=None, gt=0.0, examples=[15.0])
     yaw_inertia: Inertia | None = None
     cornering_stiffness_front: Stiffness | None = None  # of the axle, both wheels
     cornering_stiffness_rear: Stiffness | None = None
@@ -117,7 +117,8 @@ class Estimators(Table):
     """Which estimators make up the pipeline, and which run at the corners beside it; the first of each is the default.
 
     ``corner_velocity`` is what the result calls corner observers; the same kind cross-checks the pipeline where a lateral
-    schedule is given. With ``velocity = "corners"`` they are its only source of velocities, as in the papers.
+    schedule is given. With ``velocity = "corners"`` they are its only source of velocities, as in the papers; with
+    ``"kinematic"`` they correct the kinematic model with bias states, P2 (15). ``axle_weights``: P1 weighs by slip.
     """
 
     longitudinal_force: Annotated[str, AfterValidator(_one_of("unknown-input", "pid", "unscented", "linear"))] = (
@@ -126,14 +127,22 @@ class Estimators(Table):
     vertical_load: Annotated[str, AfterValidator(_one_of("dynamic", "quasi-static"))] = "dynamic"
     lateral_force: Annotated[str, AfterValidator(_one_of("linear", "unscented"))] = "linear"
     attitude: Annotated[str, AfterValidator(_one_of("none", "gyro"))] = "none"
-    velocity: Annotated[str, AfterValidator(_one_of("fusion", "corners"))] = "fusion"
+    velocity: Annotated[str, AfterValidator(_one_of("fusion", "corners", "kinematic"))] = "fusion"
     corner_velocity: Annotated[
         str, AfterValidator(_one_of("lpv", "gain-switched", "kalman-three-state", "kalman-two-state"))
     ] = "lpv"
+    axle_weights: Annotated[str, AfterValidator(_one_of("equal", "slip"))] = "equal"
     sideslip: Annotated[
         str,
         AfterValidator(
-            _one_of("none", "four-wheel-extended", "four-wheel-unscented", "adaptive-stiffness", "fixed-stiffness")
+            _one_of(
+                "none",
+                "four-wheel-extended",
+                "four-wheel-unscented",
+                "adaptive-stiffness",
+                "fixed-stiffness",
+                "sliding-mode",
+            )
         ),
     ] = "none"
 
@@ -141,5 +150,5 @@ class Estimators(Table):
 class Schedules(Table):
     """The gain schedule of each direction: a shipped name, or the path of a JSON file beside the drive file."""
 
-    longitudinal: str = Field(min_length=1)
+    longitudinal: str = Field(min_length=1, examples=["corner-estimation-longitudinal"])
     lateral: str | None = None

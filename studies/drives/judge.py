@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntFlag
 from functools import cached_property
 from typing import Any
@@ -40,6 +40,7 @@ class DriveData:
     inputs: CornerInputs
     replay: Replay
     chain: Chain | None = None
+    assumptions: tuple[str, ...] = ()
 
     @cached_property
     def baselines(self) -> dict[str, Array]:
@@ -54,16 +55,27 @@ class DriveData:
     @cached_property
     def slip(self) -> Array:
         """Slip ratio (n, 4) from the estimated V_x at the centre of gravity, mapped back to each corner: P1 6.3."""
-        return self._slip_at(self.replay.velocity)
+        return _slip_at(self.inputs, self.replay.velocity)
 
     @cached_property
     def reference_slip(self) -> Array | None:
-        """Slip ratio (n, 4) from the reference velocity, if the log has one."""
-        return self._slip_at(self.log.reference["vx"]) if "vx" in self.log.reference else None
+        """Slip ratio (n, 4) from V_x, V_y and yaw rate of the reference, if the log has V_x; a measured yaw rate else.
 
-    def _slip_at(self, velocity: Array) -> Array:
-        gain, shift = centre_map(self.inputs)
-        return slip_ratio(self.inputs.surface_speed, (velocity[:, None] - shift) / gain)
+        A steered wheel rolls along a part of V_y: where nobody knows V_y, steered wheels have no reference (NaN).
+        """
+        known, inputs = self.log.reference, self.inputs
+        if "vx" not in known:
+            return None
+        lateral = known.get("vy", inputs.vy)
+        found = _slip_at(replace(inputs, vy=lateral, yaw_rate=known.get("yaw_rate", inputs.yaw_rate)), known["vx"])
+        if "vy" in known or "vy" in self.log.signals:
+            return found
+        return np.where(np.abs(inputs.steer) < STRAIGHT, found, np.nan)
+
+
+def _slip_at(inputs: CornerInputs, velocity: Array) -> Array:
+    gain, shift = centre_map(inputs)
+    return slip_ratio(inputs.surface_speed, (velocity[:, None] - shift) / gain)
 
 
 def slip_ratio(surface_speed: Array, wheel_velocity: Array) -> Array:
@@ -82,6 +94,7 @@ def judge(data: DriveData) -> dict[str, Any]:
         pipeline = {
             "estimators": data.drive.estimators.model_dump(),
             "rules": comparison.RULES,
+            "notes": comparison.notes(data.drive),
             "signals": comparison.lateral_motion(*given) | comparison.forces(*given),
             "flagged_samples": _counts(chain.flags, Flag),
             "failed_checks": _counts(chain.checks, Check),
@@ -96,7 +109,7 @@ def judge(data: DriveData) -> dict[str, Any]:
         "pipeline": pipeline,
         "flagged_samples": flag_counts(data.replay.flags),
         "force_sources": dict(zip(CORNERS, data.inputs.force_sources, strict=True)),
-        "assumptions": list(data.inputs.assumptions),
+        "assumptions": [*data.assumptions, *data.inputs.assumptions],
     }
 
 

@@ -12,14 +12,19 @@ import numpy as np
 import numpy.typing as npt
 
 from studies.drives.align import find_offset
-from studies.drives.csv_log import read_columns
+from studies.drives.csv_log import line_of, read_columns
 from studies.drives.drive_file import DriveFile
 from studies.drives.drive_tables import Column, LogFile
 from studies.drives.errors import LogError
+from studies.drives.plausible import check_plausible
 from studies.drives.quantities import REFERENCES, SIGNALS, factor_to
 from studies.drives.resample import Stamped, clean_stamps, resample
 
 Array = npt.NDArray[np.float64]
+LONGEST_GAP = 60.0
+"""s without a row: beyond it the clock has jumped, or it is another drive."""
+MOST_SAMPLES = 5_000_000
+"""Of the common grid, seven hours at 5 ms: all signals are held in memory."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,7 @@ def read_log(paths: Sequence[Path], drive: DriveFile) -> DriveLog:
     """Read every log of the drive, put it on one clock, and resample it to ``drive.sample_time``.
 
     Raises LogError: a file that belongs to no log, a log without a file, logs that do not overlap, and whatever
-    :mod:`studies.drives.csv_log`, :mod:`.resample` and :mod:`.align` refuse.
+    :mod:`studies.drives.csv_log`, :mod:`.resample`, :mod:`.align` and :mod:`.plausible` refuse.
     """
     files = assign_files(paths, drive.log)
     report: dict[str, Any] = {"logs": {}}
@@ -66,6 +71,7 @@ def read_log(paths: Sequence[Path], drive: DriveFile) -> DriveLog:
         return out
 
     signals, reference = on_grid(drive.signals, "signals"), on_grid(drive.reference, "reference")
+    check_plausible(drive, signals, reference, {name: path.name for name, path in files.items()})
     report["grid"] = {
         "samples": int(grid.size),
         "sample_time_s": drive.sample_time,
@@ -90,17 +96,25 @@ def assign_files(paths: Sequence[Path], entries: Sequence[LogFile]) -> dict[str,
     for path in paths:
         if path.is_dir():
             found += sorted(p for p in path.iterdir() if any(fnmatch(p.name, pattern) for pattern in patterns))
-        else:
+        elif path.exists():
             found.append(path)
+        else:
+            raise LogError(f"{path.name}: cannot be read (no such file); check the path")
     if not patterns and len(found) == len(entries):
         return {entry.name: path for entry, path in zip(entries, found, strict=True)}
     files: dict[str, Path] = {}
     for entry in entries:
         matching = [path for path in found if entry.file is None or fnmatch(path.name, entry.file)]
         if len(matching) != 1:
-            wanted = f"a file like '{entry.file}'" if entry.file else "one file"
-            got = ", ".join(path.name for path in matching) or "none"
-            raise LogError(f"log '{entry.name}' needs {wanted}, given: {got}; name one file for each log of the drive")
+            wanted = f"one file like '{entry.file}'" if entry.file else "one file"
+            got = ", ".join(path.name for path in matching or paths) or "none"
+            fits = (
+                "" if matching else ", which is none" if all(path.is_file() for path in paths) else ", with none in it"
+            )
+            raise LogError(
+                f"log '{entry.name}' needs {wanted}, given: {got}{fits}; "
+                f"name one file for each log, or correct file of log '{entry.name}' in the drive file"
+            )
         files[entry.name] = matching[0]
     spare = [path.name for path in found if path not in files.values()]
     if spare:
@@ -122,6 +136,7 @@ def _read_track(path: Path, entry: LogFile, drive: DriveFile) -> tuple[_Track, d
         raise LogError(f"{path.name}: holds a single time stamp; a drive needs at least two")
     spacing = np.diff(stamped.time)
     _check_rate(path, entry, float(np.median(spacing)))
+    _check_gap(path, entry, seconds, stamped.time)
     report: dict[str, Any] = {
         "file": path.name,
         "rows": table.rows,
@@ -148,6 +163,19 @@ def _check_rate(path: Path, entry: LogFile, spacing: float) -> None:
         raise LogError(
             f"{path.name}: rows are {spacing:g} s apart where log '{entry.name}' says {entry.rate:g} Hz; "
             f"correct its rate or its time_unit (now '{entry.time_unit}')"
+        )
+
+
+def _check_gap(path: Path, entry: LogFile, raw: Array, time: Array) -> None:
+    """``raw``: stamps as they stand in the file, ``time``: those of the track, both in s."""
+    k = int(np.argmax(np.diff(time)))
+    gap = float(time[k + 1] - time[k])
+    if gap > LONGEST_GAP:
+        line = line_of(int(np.flatnonzero(raw == time[k + 1])[0]))
+        raise LogError(
+            f"{path.name}: time column '{entry.time}' jumps by {gap:g} s on line {line} (from {time[k]:.10g} s to "
+            f"{time[k + 1]:.10g} s), at most {LONGEST_GAP:g} s may be missing; correct the clock from there on, or cut "
+            "the log in two"
         )
 
 
@@ -192,5 +220,10 @@ def _common_grid(drive: DriveFile, tracks: dict[str, _Track], offsets: dict[str,
         raise LogError(
             f"the logs {', '.join(tracks)} do not overlap on one clock (from {start:g} s to {end:g} s); "
             "check clock_offset, or let align estimate it"
+        )
+    if samples > MOST_SAMPLES:
+        raise LogError(
+            f"the logs {', '.join(tracks)} span {end - start:g} s, {samples} samples at sample_time = "
+            f"{drive.sample_time:g} s, and at most {MOST_SAMPLES} are replayed at once; cut them into shorter drives"
         )
     return np.asarray(start + drive.sample_time * np.arange(samples), dtype=np.float64)

@@ -17,6 +17,18 @@ import polars as pl
 from studies.drives.errors import LogError
 
 
+def check_folder(out: Path) -> None:
+    """As :func:`ready_folder`, before there is anything to write: nothing is created.
+
+    Raises LogError when ``out`` or a folder above it is a file or cannot be written.
+    """
+    there = next(path for path in (out.absolute(), *out.absolute().parents) if path.exists())
+    if not there.is_dir():
+        raise LogError(f"{out}: cannot be a folder for results ({there.name} is a file); give another --out")
+    if not os.access(there, os.W_OK):
+        raise LogError(f"{out}: cannot be written; give another --out")
+
+
 def ready_folder(out: Path) -> None:
     """Create ``out`` if needed; LogError when it is a file or cannot be written."""
     try:

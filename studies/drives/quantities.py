@@ -43,6 +43,7 @@ REFERENCES: dict[str, str] = {
     "vx": "m/s",
     "vy": "m/s",
     "ax": "m/s^2",
+    "yaw_rate": "rad/s",
     **_corners("force_x", "N"),
     **_corners("force_y", "N"),
     **_corners("force_z", "N"),

@@ -14,11 +14,11 @@ from studies.drives.corner_observers import corner_observer
 from studies.drives.drive_file import read_drive
 from studies.drives.judge import DriveData, judge
 from studies.drives.log import read_log
-from studies.drives.output import ready_folder, whole_file, write_csv, write_json
+from studies.drives.output import check_folder, ready_folder, whole_file, write_csv, write_json
 from studies.drives.prepare import corner_inputs_of
 from studies.drives.quantities import CORNERS
 from studies.drives.replay import replay
-from studies.drives.schedules import load_schedule
+from studies.drives.schedules import check_radii, load_schedule
 
 Progress = Callable[[float], None]
 
@@ -40,6 +40,7 @@ def run_drive(logs: Sequence[Path], drive: Path, out: Path, *, progress: Progres
     each, before anything is written.
     """
     told = progress if progress is not None else _silent
+    check_folder(out)
     data = replay_drive(logs, drive, progress=lambda done: told(0.4 * done))
     metrics = judge(data)
     ready_folder(out)
@@ -58,6 +59,7 @@ def replay_drive(logs: Sequence[Path], drive: Path, *, progress: Progress | None
     names, time = description.schedules, description.sample_time
     schedule = load_schedule(names.longitudinal, drive.parent, time)
     lateral = load_schedule(names.lateral, drive.parent, time, "lateral") if names.lateral is not None else None
+    assumed = check_radii(description, drive.parent)
     observer = corner_observer(description, drive.parent, schedule)
     pipeline, assumptions = pipeline_of(description, corner_observer(description, drive.parent, schedule), lateral)
     log = read_log(logs, description)
@@ -65,7 +67,7 @@ def replay_drive(logs: Sequence[Path], drive: Path, *, progress: Progress | None
     inputs = corner_inputs_of(log, description)
     replayed = replay(inputs, observer, lambda done: told(0.2 + 0.1 * done))
     chain = run_chain(log, inputs, pipeline, assumptions, lambda done: told(0.3 + 0.7 * done))
-    return DriveData(description, schedule, log, inputs, replayed, chain)
+    return DriveData(description, schedule, log, inputs, replayed, chain, assumed)
 
 
 def _silent(_done: float) -> None:
@@ -90,13 +92,13 @@ def estimate_columns(data: DriveData) -> dict[str, np.ndarray[Any, Any]]:
         columns |= {pattern.format(corner): values[:, k] for k, corner in enumerate(CORNERS)}
     if data.chain is not None:
         columns |= chain_columns(data.chain)
-    units = {"v": "mps", "a": "mps2", "f": "N"}
+    units = {"v": "mps", "a": "mps2", "y": "radps", "f": "N"}
     columns |= {f"reference_{name}_{units[name[0]]}": value for name, value in data.log.reference.items()}
     return columns
 
 
 def chain_columns(chain: Chain) -> dict[str, np.ndarray[Any, Any]]:
-    """The pipeline's columns of estimates.csv."""
+    """The pipeline's columns of estimates.csv; those of parts that a drive did not ask for are left out."""
     columns: dict[str, np.ndarray[Any, Any]] = {
         "pipeline_vx_mps": chain.vx,
         "pipeline_vy_mps": chain.vy,
@@ -106,6 +108,8 @@ def chain_columns(chain: Chain) -> dict[str, np.ndarray[Any, Any]]:
         "pipeline_flags": chain.flags,
         "pipeline_checks": chain.checks,
     }
+    parts = {"sideslip_part_rad": chain.sideslip_part, "corner_observers_vy_mps": chain.corner_vy}
+    columns |= {name: value for name, value in parts.items() if np.isfinite(value).any()}
     per_corner = {
         "pipeline_force_x_{}_N": chain.force_x,
         "pipeline_force_z_{}_N": chain.force_z,

@@ -8,11 +8,18 @@ from typing import Any, Literal
 from estimators import EstimatorError, GainSchedule
 from estimators.schedule import SHIPPED, read_content
 from estimators.velocity import BristleTire
+from studies.drives.drive_file import DriveFile
 from synthesis.errors import SpecError
 
 MODEL = "corner-velocity-{}"
 _TIRE = {"sigma0": "sigma0", "sigma1": "sigma1", "sigma2": "sigma2", "kappa": "kappa", "radius": "effective_radius"}
 Direction = Literal["longitudinal", "lateral"]
+OTHER_WHEEL = 0.10
+"""Share by which a radius of the car may differ from that of a schedule: beyond it the schedule is another car's."""
+OTHER_PAIR = 0.01
+"""Share by which the radii of a longitudinal and a lateral schedule may differ: they are of one car."""
+SAME_WHEEL = 1e-3
+"""Share below which two radii are the same one, rounded."""
 
 
 def load_schedule(name: str, folder: Path, sample_time: float, direction: Direction = "longitudinal") -> GainSchedule:
@@ -56,11 +63,80 @@ def load_tire(name: str, folder: Path) -> BristleTire:
         raise SpecError(f"schedules.longitudinal: '{name}': {error}") from error
 
 
+def check_radii(drive: DriveFile, folder: Path) -> tuple[str, ...]:
+    """Are the schedules for wheels like those of the car? Returns what has to be assumed where they nearly are.
+
+    Compared is ``effective_radius`` of each schedule's model, as a share of it. Raises SpecError, one line: more than 10 %
+    off the car's radii, or schedules whose radii differ by more than 1 %.
+    """
+    named: dict[Direction, str | None] = {
+        "longitudinal": drive.schedules.longitudinal,
+        "lateral": drive.schedules.lateral,
+    }
+    radii: dict[Direction, float] = {}
+    assumptions = []
+    for direction, name in named.items():
+        if name is None:
+            continue
+        radius = _radius(name, folder, direction)
+        if radius is None:
+            assumptions.append(
+                f"{direction} schedule '{name}' does not say for which effective_radius: taken as fitting"
+            )
+            continue
+        radii[direction] = radius
+        assumptions += _against_car(drive, direction, name, radius)
+    if len(radii) == 2 and abs(radii["lateral"] / radii["longitudinal"] - 1.0) > OTHER_PAIR:
+        raise SpecError(
+            f"schedules: '{named['longitudinal']}' is for effective_radius = {radii['longitudinal']:g} m, "
+            f"'{named['lateral']}' for {radii['lateral']:g} m; name two schedules of one car"
+        )
+    return tuple(assumptions)
+
+
+def _against_car(drive: DriveFile, direction: Direction, name: str, radius: float) -> list[str]:
+    car = drive.vehicle
+    off = {"front": car.effective_radius_front / radius - 1.0, "rear": car.effective_radius_rear / radius - 1.0}
+    axle = max(off, key=lambda one: abs(off[one]))
+    found = f"{radius * (1.0 + off[axle]):g} m"
+    if abs(off[axle]) > OTHER_WHEEL:
+        raise SpecError(
+            f"schedules.{direction}: '{name}' is for effective_radius = {radius:g} m, vehicle.effective_radius_{axle} is "
+            f"{found}, {100 * off[axle]:+.0f} % (at most {100 * OTHER_WHEEL:g} %); correct the radius, or make a "
+            "schedule for this car with gainsmith schedules"
+        )
+    if abs(off[axle]) <= SAME_WHEEL:
+        return []
+    return [
+        f"{direction} schedule '{name}' is for effective_radius = {radius:g} m, the car has up to {found} "
+        f"({100 * off[axle]:+.1f} %): taken as fitting"
+    ]
+
+
+def _radius(name: str, folder: Path, direction: Direction) -> float | None:
+    """``effective_radius`` of the model behind a schedule, m; None where it has none."""
+    content, _ = _content(name, folder, direction)
+    constant = content["model"].get("constants", {}).get("effective_radius")
+    if constant is None:
+        return None
+    radius = float(constant["value"])
+    if not radius > 0.0:
+        raise SpecError(
+            f"schedules.{direction}: '{name}' has effective_radius = {radius:g} m; no wheel has, name another schedule"
+        )
+    return radius
+
+
 def _content(name: str, folder: Path, direction: Direction) -> tuple[dict[str, Any], str]:
     """The content of the file, and its name."""
     try:
         if name.endswith(".json"):
             path = folder / name
+            if not path.is_file():
+                raise SpecError(
+                    f"schedules.{direction}: no file '{name}' beside the drive file; give its path from there, or the "
+                    f"name of a shipped schedule: {', '.join(sorted(file.stem for file in SHIPPED.glob('*.json')))}"
+                )
         else:
             GainSchedule.shipped(name)  # refuses an unknown name with a list of those there are
             path = SHIPPED / f"{name}.json"

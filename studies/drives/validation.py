@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 import typing
 from collections.abc import Sequence
 from pathlib import Path
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
 
 from synthesis.errors import SpecError, unknown
 
@@ -40,18 +43,66 @@ def first_error(error: ValidationError, model: type[BaseModel]) -> str:
     complaints = error.errors(include_url=False)
     complaints.sort(key=lambda item: item["type"] != "extra_forbidden")
     more = f" (and {len(complaints) - 1} more)" if len(complaints) > 1 else ""
-    first = complaints[0]
-    return _sentence(first["loc"], first["type"], first["msg"], model) + more
+    return _sentence(complaints[0], model) + more
 
 
-def _sentence(place: Sequence[_Step], kind: str, message: str, model: type[BaseModel]) -> str:
+def _sentence(complaint: ErrorDetails, model: type[BaseModel]) -> str:
+    place, kind = complaint["loc"], complaint["type"]
     if kind == "extra_forbidden":
-        keys = _keys_at(place[:-1], model)
+        table = _table_at(place[:-1], model)
+        keys = [field.alias or name for name, field in table.model_fields.items()] if table is not None else []
         return f"{_dotted(place[:-1], 'top level')}: {unknown('key', str(place[-1]), keys)}"
+    field = _field_at(place, model)
+    example = field.examples[0] if field is not None and field.examples else None
     if kind == "missing":
-        return f"{_dotted(place)}: missing; add it"
-    text = message.removeprefix("Value error, ")
+        return f"{_dotted(place)}: missing; {_addition(place, field, example)}"
+    text = _expected(complaint, example) or complaint["msg"].removeprefix("Value error, ")
     return f"{_dotted(place)}: {text}" if place else text
+
+
+def _addition(place: Sequence[_Step], field: FieldInfo | None, example: object) -> str:
+    """What a missing key would look like."""
+    if example is not None:
+        return f"add it, such as {place[-1]} = {json.dumps(example)}"
+    if field is not None and _model_in(field.annotation) is not None:
+        table = _dotted(place)
+        return f"add a table [[{table}]]" if typing.get_origin(field.annotation) is list else f"add a table [{table}]"
+    return "add it"
+
+
+_BOUNDS = {"greater_than_equal": "ge", "greater_than": "gt", "less_than_equal": "le", "less_than": "lt"}
+_WORDS = {"ge": "at least", "gt": "above", "le": "at most", "lt": "below"}
+
+
+def _expected(complaint: ErrorDetails, example: object) -> str | None:
+    """What was found and what is expected instead, for the complaints of pydantic that do not say it."""
+    kind, context = complaint["type"], complaint.get("ctx", {})
+    found = repr(complaint["input"])
+    such = "" if example is None else f", such as {json.dumps(example)}"
+    if len(found) > 60:
+        found = found[:57] + "..."
+    if kind in ("float_type", "float_parsing", "int_type", "int_parsing"):
+        return f"{found} is not a number; write one without quotes{such}"
+    if kind == "finite_number":
+        return f"{found} is not finite; write a finite number{such}"
+    if kind in _BOUNDS:
+        bound = context[_BOUNDS[kind]]
+        return f"{found} is out of range; it must be {_WORDS[_BOUNDS[kind]]} {bound:g}{such}"
+    if kind == "literal_error":
+        return f"{found} is not known; write {context['expected']}"
+    if kind == "string_type":
+        return f"{found} is not text; write it in quotes{such}"
+    if kind == "string_too_short":
+        return f"is empty; write at least one character{such}"
+    if kind == "string_too_long":
+        return f"{found} is too long; write at most {context['max_length']} character(s)"
+    if kind == "bool_type":
+        return f"{found} is not a truth value; write true or false"
+    if kind in ("model_type", "dict_type"):
+        return f"{found} is not a table; write key = value pairs in braces or below a [header]"
+    if kind == "list_type":
+        return f"{found} is not a list; write it as [[...]] tables or in square brackets"
+    return None
 
 
 def _dotted(place: Sequence[_Step], empty: str = "") -> str:
@@ -61,19 +112,27 @@ def _dotted(place: Sequence[_Step], empty: str = "") -> str:
     return text or empty
 
 
-def _keys_at(place: Sequence[_Step], model: type[BaseModel]) -> list[str]:
-    """The keys that the table at ``place`` may have."""
+def _field_at(place: Sequence[_Step], model: type[BaseModel]) -> FieldInfo | None:
+    """The field of the key at ``place``, if it is one of a model."""
+    table = _table_at(place[:-1], model) if place else None
+    return None if table is None else _field_of(table, place[-1])
+
+
+def _field_of(model: type[BaseModel], step: _Step) -> FieldInfo | None:
+    return next((field for name, field in model.model_fields.items() if step in (name, field.alias)), None)
+
+
+def _table_at(place: Sequence[_Step], model: type[BaseModel]) -> type[BaseModel] | None:
+    """The model of the table at ``place``."""
     for step in place:
-        if isinstance(step, int) or model is None:
-            continue
-        field = next((f for name, f in model.model_fields.items() if step in (name, f.alias)), None)
-        if field is None:  # a key of a mapping: its table is the model already stepped into
+        field = None if isinstance(step, int) else _field_of(model, step)
+        if field is None:  # an index, or a key of a mapping: its table is the model already stepped into
             continue
         found = _model_in(field.annotation)
         if found is None:
-            return []
+            return None
         model = found
-    return [field.alias or name for name, field in model.model_fields.items()]
+    return model
 
 
 def _model_in(annotation: object) -> type[BaseModel] | None:

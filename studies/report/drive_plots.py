@@ -1,4 +1,4 @@
-"""Plots of a replayed drive: velocity against the baselines, slip and force of each corner."""
+"""Plots of a replayed drive: velocities against the baselines, slip, forces and loads of each corner and axle."""
 
 from __future__ import annotations
 
@@ -10,24 +10,27 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from studies.drives.chain import Chain
+from studies.drives.comparison import AXLES, quasi_static_axle_forces, reference_axle_force, reference_sideslip
 from studies.drives.judge import LEAST_SPEED, DriveData
 from studies.drives.quantities import CORNERS
-from studies.report.colours import BLUE, RED
+from studies.report import colours
 
 Array = npt.NDArray[np.float64]
 Save = Callable[[Path], None]
 
-REFERENCE = {"color": "0.1", "linewidth": 1.8, "label": "reference"}
-ESTIMATE = {"color": BLUE, "linewidth": 1.1, "label": "corner observers"}
-PIPELINE = {"color": RED, "linewidth": 1.2, "label": "pipeline"}
+REFERENCE = {"color": colours.TRUTH, "linewidth": 1.8, "label": "reference"}
+ESTIMATE = {"color": colours.OWN_OBSERVERS, "linewidth": 1.1, "label": "corner observers"}
+PIPELINE = {"color": colours.PIPELINE, "linewidth": 1.2, "label": "pipeline"}
+SIDESLIP_PART = {"color": colours.SCHEDULE, "linewidth": 1.1, "linestyle": (0, (5, 2))}
+QUASI_STATIC = {"color": colours.MEAN_WHEEL_SPEED, "linewidth": 1.1, "linestyle": (0, (4, 2)), "label": "quasi-static"}
 BASELINES = {
-    "mean_wheel_speed": {"color": "#f4a261", "linewidth": 2.4, "label": "mean wheel speed"},
+    "mean_wheel_speed": {"color": colours.MEAN_WHEEL_SPEED, "linewidth": 2.4, "label": "mean wheel speed"},
     "integrated_acceleration": {
-        "color": "#4d9a2a",
+        "color": colours.INTEGRATED_ACCELERATION,
         "linewidth": 1.3,
         "linestyle": (0, (4, 2)),
         "label": "integrated acceleration",
@@ -49,6 +52,10 @@ def figures(data: DriveData) -> dict[str, Save]:
     """Every plot of a drive by file stem: a function that writes it to a path, in the format of its suffix."""
     with mpl.rc_context(STYLE):
         drawn = {"velocity": velocity(data), "slip": slip(data), "forces": forces(data)}
+        if data.chain is not None:
+            drawn["lateral"] = lateral(data, data.chain)
+            drawn["axle_forces"] = axle_forces(data, data.chain)
+            drawn["loads"] = loads(data, data.chain)
     return {name: partial(_save, figure) for name, figure in drawn.items()}
 
 
@@ -72,7 +79,7 @@ def velocity(data: DriveData) -> Figure:
         axes[0].plot(time, value, **style)
     axes[0].set_ylabel("longitudinal velocity (m/s)")
     axes[-1].set_xlabel("time (s)")
-    _finish(figure, axes[0], data, "longitudinal velocity")
+    _finish(figure, axes, data, "longitudinal velocity")
     return figure
 
 
@@ -88,13 +95,13 @@ def slip(data: DriveData) -> Figure:
             fast = np.where(np.abs(data.chain.vx) >= LEAST_SPEED, data.chain.slip[:, k], np.nan)
             ax.plot(data.log.time, fast, **PIPELINE)
     _label_corners(axes, "slip ratio (1)")
-    _finish(figure, axes[0, 0], data, "slip ratio from the velocity at the centre of gravity")
+    _finish(figure, axes, data, "slip ratio from the velocity at the centre of gravity")
     return figure
 
 
 def forces(data: DriveData) -> Figure:
     """Longitudinal force of each corner as fed to the observers, and the measured one where the log has it."""
-    scale, unit = (1e3, "kN") if np.nanmax(np.abs(data.inputs.force), initial=0.0) > 1e3 else (1.0, "N")
+    scale, unit = _force_unit(data.inputs.force)
     figure = _figure(9.0, 5.6)
     axes = figure.subplots(2, 2, sharex=True, sharey=True)
     for k, (corner, ax) in enumerate(zip(CORNERS, axes.flat, strict=True)):
@@ -106,8 +113,70 @@ def forces(data: DriveData) -> Figure:
             ax.plot(data.log.time, data.chain.force_x[:, k] / scale, **PIPELINE)
     _label_corners(axes, f"longitudinal force ({unit})")
     sources = ", ".join(sorted(set(data.inputs.force_sources)))
-    _finish(figure, axes[0, 0], data, f"longitudinal force ({sources})")
+    _finish(figure, axes, data, f"longitudinal force ({sources})")
     return figure
+
+
+def lateral(data: DriveData, chain: Chain) -> Figure:
+    """V_y and sideslip angle of the pipeline, and of the corner observers and the sideslip part where they run."""
+    time, reference = data.log.time, data.log.reference
+    figure = _figure(9.0, 5.6)
+    axes = figure.subplots(2, 1, sharex=True)
+    if "vy" in reference:
+        axes[0].plot(time, reference["vy"], **REFERENCE)
+        if "vx" in reference:
+            axes[1].plot(time, np.degrees(reference_sideslip(data.log)), **REFERENCE)
+    if np.isfinite(chain.corner_vy).any():
+        axes[0].plot(time, chain.corner_vy, **ESTIMATE)
+    axes[0].plot(time, chain.vy, **PIPELINE)
+    if np.isfinite(chain.sideslip_part).any():
+        name = data.drive.estimators.sideslip.replace("-", " ")
+        axes[1].plot(time, np.degrees(chain.sideslip_part), **SIDESLIP_PART, label=f"{name} estimator")
+    fast = np.where(np.abs(chain.vx) >= LEAST_SPEED, chain.sideslip, np.nan)
+    axes[1].plot(time, np.degrees(fast), **PIPELINE)
+    axes[0].set_ylabel("lateral velocity (m/s)")
+    axes[1].set_ylabel("sideslip angle (deg)")
+    axes[1].set_xlabel("time (s)")
+    _finish(figure, axes, data, "lateral motion at the centre of gravity")
+    return figure
+
+
+def axle_forces(data: DriveData, chain: Chain) -> Figure:
+    """F_y of each axle, and what its share of m a_y is."""
+    references = [reference_axle_force(data.log, axle) for axle in AXLES]
+    rigid = quasi_static_axle_forces(data.log, data.drive)
+    scale, unit = _force_unit(chain.axle_force_y)
+    figure = _figure(9.0, 5.6)
+    axes = figure.subplots(2, 1, sharex=True)
+    for k, (ax, reference) in enumerate(zip(axes, references, strict=True)):
+        if reference is not None:
+            ax.plot(data.log.time, reference / scale, **REFERENCE)
+        ax.plot(data.log.time, rigid[:, k] / scale, **QUASI_STATIC)
+        ax.plot(data.log.time, chain.axle_force_y[:, k] / scale, **PIPELINE)
+        ax.set_title(f"{AXLES[k]} axle", loc="left", fontsize=9)
+        ax.set_ylabel(f"lateral force ({unit})")
+    axes[1].set_xlabel("time (s)")
+    _finish(figure, axes, data, "lateral force of the axles")
+    return figure
+
+
+def loads(data: DriveData, chain: Chain) -> Figure:
+    """F_z of each corner: pipeline, quasi-static, and measured where the log has it."""
+    figure = _figure(9.0, 5.6)
+    axes = figure.subplots(2, 2, sharex=True, sharey=True)
+    for k, (corner, ax) in enumerate(zip(CORNERS, axes.flat, strict=True)):
+        measured = data.log.reference.get(f"force_z_{corner}")
+        if measured is not None:
+            ax.plot(data.log.time, measured / 1e3, **REFERENCE)
+        ax.plot(data.log.time, data.inputs.vertical_load[:, k] / 1e3, **QUASI_STATIC)
+        ax.plot(data.log.time, chain.force_z[:, k] / 1e3, **PIPELINE)
+    _label_corners(axes, "vertical load (kN)")
+    _finish(figure, axes, data, "vertical load of the wheels")
+    return figure
+
+
+def _force_unit(force: Array) -> tuple[float, str]:
+    return (1e3, "kN") if np.nanmax(np.abs(force), initial=0.0) > 1e3 else (1.0, "N")
 
 
 def _figure(width: float, height: float) -> Figure:
@@ -125,11 +194,14 @@ def _label_corners(axes: Any, label: str) -> None:
         ax.set_xlabel("time (s)")
 
 
-def _finish(figure: Figure, first: Axes, data: DriveData, what: str) -> None:
-    """Title, and one legend for all panels, above them where it covers nothing."""
+def _finish(figure: Figure, axes: Any, data: DriveData, what: str) -> None:
+    """Title, and one legend for all panels, below them where it covers nothing."""
     figure.suptitle(f"{data.drive.name}: {what}", fontsize=10, x=0.01, ha="left")
-    handles, labels = first.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(handles), frameon=False)
+    found: dict[str, Any] = {}
+    for ax in axes.flat:
+        for handle, text in zip(*ax.get_legend_handles_labels(), strict=True):
+            found.setdefault(text, handle)
+    figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=len(found), frameon=False)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # laid out once; the layout does not depend on the file format
 

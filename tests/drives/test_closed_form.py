@@ -95,7 +95,8 @@ def test_every_file_is_written_and_nothing_else(whole_run: tuple[RunResult, Path
     assert names == {path.name for path in result.paths}
     assert names == {
         *("estimates.csv", "metrics.json", "velocity.svg", "velocity.png"),
-        *("slip.svg", "slip.png", "forces.svg", "forces.png"),
+        *("slip.svg", "slip.png", "forces.svg", "forces.png", "lateral.svg", "lateral.png"),
+        *("axle_forces.svg", "axle_forces.png", "loads.svg", "loads.png"),
     }
     assert (out / "velocity.png").read_bytes().startswith(b"\x89PNG")
     assert "<svg" in (out / "velocity.svg").read_text()
@@ -192,7 +193,8 @@ def test_unknown_shipped_schedule_lists_those_there_are(tmp_path: Path) -> None:
 
 
 def test_out_that_is_a_file_is_refused(tmp_path: Path) -> None:
+    """At once: the log, which is not there either, is not even looked for."""
     (tmp_path / "out").write_text("mine")
     with pytest.raises(LogError, match="give another --out"):
-        run_drive([write_log(tmp_path / "log.csv", columns(0.5))], write_drive(tmp_path), tmp_path / "out")
+        run_drive([tmp_path / "no-such-log.csv"], write_drive(tmp_path), tmp_path / "out")
     assert (tmp_path / "out").read_text() == "mine"

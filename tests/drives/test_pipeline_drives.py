@@ -5,7 +5,8 @@ NRMS is P1 (46); forces count where the reference exceeds 1 kN. `python -m tests
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,9 +15,10 @@ import pytest
 from estimators.interpolate import FloatArray
 from estimators.pipeline import Check, EstimationPipeline, VehicleSignals
 from estimators.vehicle import CORNERS
+from studies.drives.csv_log import read_columns
 from studies.drives.drive_file import read_drive
 from studies.drives.judge import judge
-from studies.drives.log import read_log
+from studies.drives.log import DriveLog, read_log
 from studies.drives.run import replay_drive
 from tests.drives.test_fusion_drives import (
     DATA,
@@ -143,6 +145,7 @@ def test_recorded_drive_through_its_own_drive_file() -> None:
     data = replay_drive([DATA], HERE / "bmw_m8_launch_brake.toml")
     metrics = judge(data)
     assert metrics["velocity"]["pipeline"]["rms"] < 0.3
+    # Not so the integrated acceleration: 0.028 m/s RMS beside 0.135. It is no fair baseline on this log, see the next two tests.
     for other in ("mean_wheel_speed", "corner_observers"):
         assert metrics["velocity"]["pipeline"]["rms"] < metrics["velocity"][other]["rms"]
     assert metrics["pipeline"]["signals"]["total_force_x"]["pipeline"]["nrms_percent"] < 10.0
@@ -154,6 +157,46 @@ def test_recorded_drive_through_its_own_drive_file() -> None:
     assert np.sqrt(np.nanmean((total - true) ** 2)) < 0.1 * np.nanmax(np.abs(true))
 
 
+def test_acceleration_of_the_recorded_drive_is_no_accelerometer_of_a_car() -> None:
+    """Why its integral is hard to beat there: it carries neither the gravity of the car's pitch nor a bias.
+
+    The drive file takes it from log B and the reference V_x from log A, so no file says that they are of one device. But an
+    accelerometer in the car reads g sin(pitch) on top (here up to 0.2 m/s^2), and this one a fifteenth of it: what it gives is
+    the level acceleration of a navigation solution, that is of a unit that knows attitude and velocity.
+    """
+    drive = read_drive(HERE / "bmw_m8_launch_brake.toml")
+    log = read_log([DATA], drive)
+    half = 10  # samples, 0.05 s: both are mean accelerations over 0.1 s
+    vx, ax = log.reference["vx"], log.signals["ax"]
+    slope = (vx[2 * half :] - vx[: -2 * half]) / (2 * half * STEP)
+    mean = np.convolve(ax, np.r_[0.5, np.ones(2 * half - 1), 0.5] / (2 * half), "valid")
+    (unit,) = (entry.file for entry in drive.log if entry.name == drive.log_of(drive.signals["ax"]))
+    attitude = read_columns(DATA / str(unit), {"car_time": "time", "Pitch": "pitch"}).values
+    pitch = np.interp(log.time, attitude["car_time"], attitude["Pitch"])[half:-half]
+    model = np.stack([9.80665 * (pitch - pitch.mean()), np.ones_like(pitch)], axis=1)
+    (gravity, bias), *_ = np.linalg.lstsq(model, mean - slope, rcond=None)
+    assert np.ptp(pitch) > 0.04
+    assert abs(gravity) < 0.2
+    assert abs(bias) < 0.02  # m/s^2: 0.2 m/s after the ten seconds
+
+
+@pytest.mark.parametrize("bias", [-0.15, 0.15])
+def test_with_the_bias_of_a_sensor_it_beats_all_three_on_the_recorded_drive(
+    bias: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same drive with the constant error that the simulated ones get, m/s^2: the comparison that is fair."""
+
+    def biased(*arguments: Any) -> DriveLog:
+        log = read_log(*arguments)
+        return replace(log, signals={**log.signals, "ax": log.signals["ax"] + bias})
+
+    monkeypatch.setattr("studies.drives.run.read_log", biased)
+    velocity = judge(replay_drive([DATA], HERE / "bmw_m8_launch_brake.toml"))["velocity"]
+    assert velocity["pipeline"]["rms"] < 0.3
+    for other in ("mean_wheel_speed", "corner_observers", "integrated_acceleration", *(f"corner_{c}" for c in CORNERS)):
+        assert velocity["pipeline"]["rms"] < velocity[other]["rms"]
+
+
 @pytest.mark.parametrize("name", SIMULATED.values())
 def test_every_signal_of_a_run_has_its_baselines(name: str) -> None:
     signals = judge(replay_drive([DATA], HERE / f"{name}.toml"))["pipeline"]["signals"]
@@ -162,6 +205,7 @@ def test_every_signal_of_a_run_has_its_baselines(name: str) -> None:
         assert set(signals[f"force_z_{corner}"]) == {"pipeline", "quasi_static"}
     assert set(signals["force_y_front"]) == set(signals["force_y_rear"]) == {"pipeline", "quasi_static"}
     assert {"pipeline", "integrated_acceleration"} <= set(signals["vy"])
+    assert set(signals["total_force_x"]) == {"pipeline", "quasi_static"}
     for signal, estimates in signals.items():
         if signal.startswith("force_z"):
             assert estimates["pipeline"]["nrms_percent"] < estimates["quasi_static"]["nrms_percent"]

@@ -6,12 +6,14 @@ seconds after a known start an unbiased accelerometer beats both. The bounds lea
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from studies.drives.csv_log import read_columns
 from studies.drives.judge import DriveData, judge
 from studies.drives.quantities import CORNERS
 from studies.drives.run import replay_drive
@@ -95,6 +97,26 @@ def test_rolling_wheels_leave_nothing_to_gain_and_unknown_lateral_velocity_drift
     assert nrms(steer, "integrated_acceleration") > 3.0  # r V_y is missing
     for corner in CORNERS:
         assert nrms(steer, f"corner_{corner}") < 0.5
+
+
+def test_reference_slip_of_steered_wheels_is_that_of_the_simulation(steer: Drive) -> None:
+    """The tire's own slip, a column that no estimate sees; 0.0035 at its peak, and off by that much with V_y = 0."""
+    columns = {f"kappa_{corner}": "slip of the tire" for corner in CORNERS}
+    table = read_columns(DATA / "ocd_suv_step_steer_22mps_200hz.csv", columns).values
+    slip = steer[0].reference_slip
+    assert slip is not None
+    settled = steer[0].log.time > 1.5  # the tire's slip comes late, and is read as its steady value
+    for k, corner in enumerate(CORNERS):
+        np.testing.assert_allclose(slip[settled, k], table[f"kappa_{corner}"][settled], atol=1e-4)
+    wrong = replace(steer[0], log=replace(steer[0].log, reference={**steer[0].log.reference, "vy": np.zeros(1600)}))
+    assert wrong.reference_slip is not None
+    assert np.abs(wrong.reference_slip[settled, 0] - table["kappa_fl"][settled]).max() > 3e-3
+
+
+def test_a_schedule_of_another_radius_is_said(bmw: Drive, steer: Drive) -> None:
+    for drive, percent in ((bmw, "+7.2 %"), (steer, "+9.1 %")):
+        (line,) = (line for line in drive[1]["assumptions"] if "schedule" in line)
+        assert percent in line
 
 
 @pytest.mark.parametrize(("name", "bound"), [("launch", 4.0), ("brake", 9.0), ("steer", 4.0)])

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from estimators import GainSchedule
-from studies.drives.corner_observers import CornerSample
+from estimators.pipeline import CornerSample
 
 SCHEDULE = GainSchedule.shipped("corner-estimation-longitudinal")
 

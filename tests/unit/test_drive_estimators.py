@@ -36,6 +36,11 @@ TIRES = (
     'yaw_inertia = "2600 kg*m^2"\ncornering_stiffness_front = "120 kN/rad"\ncornering_stiffness_rear = "130000 N/rad"\n'
 )
 EQUIPPED = TORQUE.replace("[schedules]", TIRES + 'relaxation_length = "50 cm"\n\n[schedules]')
+LATERAL = "".join(
+    f'{name} = {{ column = "{name}", unit = "{unit}" }}\n'
+    for name, unit in (("ay", "m/s^2"), ("yaw_rate", "rad/s"), ("steering", "rad"))
+)
+STEERED = EQUIPPED.replace("[reference]", LATERAL + "[reference]")
 SIDEWAYS = EQUIPPED.replace('"schedule.json"', '"schedule.json"\nlateral = "side.json"')
 
 
@@ -65,6 +70,25 @@ def read(folder: Path, text: str) -> DriveFile:
         (chosen(DRIVE, corner_velocity="gain-swiched"), "did you mean gain-switched"),
         (chosen(DRIVE, corner_velocity="kalman"), r"estimators\.corner_velocity: unknown estimator 'kalman'"),
         (chosen(EQUIPPED, velocity="corners"), r"schedules\.lateral: missing, but estimators\.velocity = 'corners'"),
+        *(
+            (
+                chosen(STEERED.replace(f"{lost} = {{", f"{other} = {{"), sideslip=kind),
+                rf"signals\.{lost}: missing, but estimators\.sideslip = '{kind}' needs it; add {lost} = ",
+            )
+            for kind in ("four-wheel-extended", "four-wheel-unscented", "adaptive-stiffness", "fixed-stiffness")
+            for lost, other in (("yaw_rate", "roll_rate"), ("ay", "az"))
+        ),
+        (
+            chosen(
+                STEERED.replace("steering = {", "pitch_rate = {").replace('"rad" }\n[ref', '"rad/s" }\n[ref'),
+                sideslip="fixed-stiffness",
+            ),
+            r"signals\.steering: missing, but estimators\.sideslip = 'fixed-stiffness' needs it.*or hand_wheel, or steer_fl and",
+        ),
+        (
+            chosen(EQUIPPED, lateral_force="linear"),
+            r"signals\.yaw_rate: missing, but estimators\.lateral_force = 'linear'",
+        ),
         (chosen(TORQUE, attitude="gyro"), r"signals\.roll_rate: missing, but estimators\.attitude = 'gyro'"),
     ],
 )
@@ -77,17 +101,17 @@ def test_what_cannot_be_built_is_refused_in_one_line(tmp_path: Path, text: str, 
 def test_what_is_chosen_is_built(tmp_path: Path) -> None:
     schedule = load_schedule("schedule.json", write_drive(tmp_path).parent, 0.005)
     names = {"longitudinal_force": "unscented", "vertical_load": "quasi-static", "sideslip": "four-wheel-unscented"}
-    pipeline, assumptions = pipeline_of(read(tmp_path, chosen(EQUIPPED, **names)), schedule)
+    pipeline, assumptions = pipeline_of(read(tmp_path, chosen(STEERED, **names)), schedule)
     assert isinstance(pipeline.longitudinal_force, WheelForceFilter)
     assert isinstance(pipeline.loads, VerticalLoads)
     assert not pipeline.loads.dynamic
     assert isinstance(pipeline.sideslip, FourWheelSideslip)
     assert not assumptions
     assert pipeline.longitudinal_force.method == "unscented"
-    pipeline, _ = pipeline_of(read(tmp_path, chosen(EQUIPPED, longitudinal_force="linear")), schedule)
+    pipeline, _ = pipeline_of(read(tmp_path, chosen(STEERED, longitudinal_force="linear")), schedule)
     assert pipeline.longitudinal_force.method == "linear"
     names = {"longitudinal_force": "pid", "sideslip": "adaptive-stiffness"}
-    pipeline, _ = pipeline_of(read(tmp_path, chosen(EQUIPPED, **names)), schedule)
+    pipeline, _ = pipeline_of(read(tmp_path, chosen(STEERED, **names)), schedule)
     assert isinstance(pipeline.longitudinal_force, DifferentiatedPid)
     assert isinstance(pipeline.sideslip, StiffnessSideslip)
     _, assumptions = pipeline_of(read(tmp_path, DRIVE), schedule)
@@ -114,7 +138,21 @@ def test_the_corners_alone_give_the_velocities_where_a_drive_asks_for_them(tmp_p
     assert pipeline.corner_observers is None
     along = pipeline.velocity.corners.along
     assert isinstance(along, {"gain-switched": SwitchedCorners, "kalman-three-state": KalmanCorners}.get(kind, object))
-    assert (pipeline.velocity.corners.weights is None) == (kind != "lpv")
+    assert pipeline.velocity.corners.weights is None
+
+
+def test_every_chain_of_the_papers_can_be_chosen(tmp_path: Path) -> None:
+    """Weights by slip (P1), the kinematic filter behind the corners (P2), sliding-mode forces (P5)."""
+    write_content(tmp_path / "side.json", schedule_content("lateral"))
+    side = load_schedule("side.json", tmp_path, 0.005, "lateral")
+    names = {"velocity": "kinematic", "axle_weights": "slip", "sideslip": "sliding-mode"}
+    drive = read(tmp_path, chosen(SIDEWAYS.replace("[reference]", LATERAL + "[reference]"), **names))
+    pipeline, _ = pipeline_of(drive, corner_observer_of(tmp_path, "kalman-three-state"), side)
+    assert isinstance(pipeline.velocity, CornerVelocity)
+    assert pipeline.velocity.kinematic is not None
+    assert pipeline.velocity.corners.weights is not None
+    assert isinstance(pipeline.sideslip, StiffnessSideslip)
+    assert pipeline.sideslip.sliding is not None
 
 
 def test_a_lateral_schedule_for_another_time_is_refused_before_the_log_is_read(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from studies.drives.drive_file import read_drive
+from studies.drives.drive_tables import Vehicle
 from studies.drives.quantities import factor_to, to_si
 from synthesis.errors import SpecError
 from tests.drives.synthetic_drive import DRIVE, TORQUES
@@ -95,21 +96,32 @@ def edited(old: str, new: str) -> str:
 
 
 REFUSALS = [
-    (edited('mass = "1600.0 kg"\n', ""), "vehicle.mass: missing; add it"),
+    (edited('mass = "1600.0 kg"\n', ""), 'vehicle.mass: missing; add it, such as mass = "1600 kg"'),
     (edited("mass =", "mas ="), "vehicle: unknown key 'mas'; did you mean mass? (and 1 more)"),
+    (edited('rate = "200 Hz"\n', ""), 'log[0].rate: missing; add it, such as rate = "200 Hz"'),
+    (edited('sample_time = "5 ms"\n', ""), 'sample_time: missing; add it, such as sample_time = "5 ms"'),
+    (edited('[schedules]\nlongitudinal = "schedule.json"\n', ""), "schedules: missing; add a table [schedules]"),
+    (edited('name = "closed form"', "name = 5"), 'name: 5 is not text; write it in quotes, such as "brake test"'),
+    (edited('name = "closed form"', 'name = ""'), 'name: is empty; write at least one character, such as "brake test"'),
+    (edited('time = "t"', 'time = "t"\nsort = 1'), "log[0].sort: 1 is not a truth value; write true or false"),
+    (edited("[vehicle]", '[vehicle]\nrolling_resistance = "0.012"'), "vehicle.rolling_resistance: '0.012' is not a number; write one without quotes, such as 0.012"),
+    (edited("[vehicle]", "[vehicle]\nrolling_resistance = 3.0"), "vehicle.rolling_resistance: 3.0 is out of range; it must be at most 0.2, such as 0.012"),
+    (edited("[vehicle]", "[vehicle]\nsteering_ratio = -2.0"), "vehicle.steering_ratio: -2.0 is out of range; it must be above 0, such as 15.0"),
+    (edited("[reference]", 'steer_fl = { column = "s", unit = "rad" }\n[reference]'), 'signals.steer_fr: missing, but steer_fl is given; add steer_fr = { column = "...", unit = "rad" }, or give steering for both front wheels'),
+    (edited("[reference]", 'steer_rr = { column = "s", unit = "rad" }\n[reference]'), 'signals.steer_rl: missing, but steer_rr is given; add steer_rl = { column = "...", unit = "rad" }'),
     (edited("[vehicle]", "[vehicel]"), "top level: unknown key 'vehicel'; did you mean vehicle? (and 1 more)"),
     (edited('"1600.0 kg"', '"1600.0 m"'), "vehicle.mass: unit 'm' has another dimension than kg; use one such as kg, t"),
     (edited('"1600.0 kg"', "1600.0"), 'vehicle.mass: 1600.0 has no unit; write it in quotes with its unit, such as "1600.0 kg"'),
     (edited('"1600.0 kg"', '"-1600 kg"'), "vehicle.mass: '-1600 kg' is out of range; it must be finite and above 0 kg"),
     (edited('"5 ms"', '"0 ms"'), "sample_time: '0 ms' is out of range; it must be finite and above 0 s"),
-    (edited("drive/1", "drive/7"), "schema: Input should be 'gainsmith.drive/1'"),
+    (edited("drive/1", "drive/7"), "schema: 'gainsmith.drive/7' is not known; write 'gainsmith.drive/1'"),
     (edited('ax = {', 'axe = {'), "signals.axe: unknown signal 'axe'; did you mean ax?"),
     (edited('ax = { column = "ax", unit = "m/s^2" }\n', ""), 'signals.ax: missing; add ax = { column = "...", unit = "m/s^2" }'),
     (edited('column = "ax", unit = "m/s^2"', 'column = "ax", unit = "rad/s^2"'), "signals.ax.unit: unit 'rad/s^2' has another dimension than m/s^2; use one such as m/s^2, standard_gravity"),
     (edited('column = "ax", unit', 'column = "ax", units'), "signals.ax: unknown key 'units'; did you mean unit? (and 1 more)"),
     (edited('column = "ax",', 'column = "ax", factor = 0.0,'), "signals.ax.factor: 0 is not a scale; use a finite number other than zero"),
-    (edited('column = "ax",', 'column = "ax", factor = nan,'), "signals.ax.factor: Input should be a finite number"),
-    (edited('column = "ax",', 'column = "ax", sign = "minus",'), "signals.ax.sign: Input should be 'positive' or 'negative'"),
+    (edited('column = "ax",', 'column = "ax", factor = nan,'), "signals.ax.factor: nan is not finite; write a finite number, such as 0.5"),
+    (edited('column = "ax",', 'column = "ax", sign = "minus",'), "signals.ax.sign: 'minus' is not known; write 'positive' or 'negative'"),
     (edited('column = "ax",', 'log = "lok", column = "ax",'), "signals.ax.log: unknown log 'lok'; did you mean log?"),
     (edited('time = "t"', 'time = "t"\ntime_unit = "m"'), "log[0].time_unit: unit 'm' has another dimension than s; use one such as s, ms, us, min"),
     (edited('time = "t"', 'time = "t"\nmax_gab = "1 s"'), "log[0]: unknown key 'max_gab'; did you mean max_gap?"),
@@ -128,6 +140,23 @@ REFUSALS = [
 @pytest.mark.parametrize(("text", "message"), REFUSALS, ids=[message[:40] for _, message in REFUSALS])
 def test_refusals_name_the_key_and_the_remedy(tmp_path: Path, text: str, message: str) -> None:
     assert refusal(tmp_path, text) == message
+
+
+@pytest.mark.parametrize("key", [name for name, field in Vehicle.model_fields.items() if field.is_required()])
+def test_every_missing_quantity_of_the_car_is_asked_for_with_an_example_that_is_one(tmp_path: Path, key: str) -> None:
+    lines = [line for line in DRIVE.splitlines() if not line.startswith(f"{key} =")]
+    message = refusal(tmp_path, "\n".join(lines))
+    assert message.startswith(f"vehicle.{key}: missing; add it, such as {key} = ")
+    path = tmp_path / "drive.toml"
+    path.write_text(DRIVE.replace(f"{key} = ", f"{message.split('such as ')[1]} # "), encoding="utf-8")
+    read_drive(path)
+
+
+def test_a_pair_of_steering_angles_is_one(tmp_path: Path) -> None:
+    both = "".join(f'steer_{corner} = {{ column = "s_{corner}", unit = "deg" }}\n' for corner in ("fl", "fr"))
+    path = tmp_path / "drive.toml"
+    path.write_text(DRIVE.replace("[reference]", both + "[reference]"), encoding="utf-8")
+    assert {"steer_fl", "steer_fr"} <= set(read_drive(path).signals)
 
 
 def test_not_toml_and_not_there(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from studies.drives.drive_file import DriveFile, read_drive
 from studies.drives.errors import LogError
 from studies.drives.log import DriveLog, read_log
 from tests.drives.synthetic_drive import DRIVE, columns, write_log
+from tests.unit.schedule_content import EFFECTIVE_RADIUS
 
 HEADER = "t,v,ax,w_fl,w_fr,w_rl,w_rr"
 
@@ -61,6 +62,11 @@ REFUSALS = {
         rows(["0.000", "0.010", "0.005", "0.015"]),
         "log.csv: time runs backwards on line 4 (0.005 s after 0.01 s); repair the log, or set sort = true for it in "
         "the drive file",
+    ),
+    "clock set during the log": (
+        rows(["0", "0.005", "0.01", "1700000000.015", "1700000000.02"]),
+        "log.csv: time column 't' jumps by 1.7e+09 s on line 5 (from 0.01 s to 1700000000 s), at most 60 s may be missing; "
+        "correct the clock from there on, or cut the log in two",
     ),
     "wrong time unit": (
         rows(["0", "5", "10", "15"]),
@@ -155,7 +161,9 @@ def two_files(folder: Path, shift: float) -> list[Path]:
     car, imu = np.arange(0, 8, 0.001), np.arange(0.5, 7.2, 0.01)
     table = {name: value for name, value in columns(0.0).items() if not name.startswith("T_")}
     values = {name: np.full_like(car, 1.0) for name in table}
-    values |= {"t": car, "v": 20 + np.sin(1.3 * car) + 0.3 * np.cos(7 * car)}
+    velocity = 20 + np.sin(1.3 * car) + 0.3 * np.cos(7 * car)
+    values |= dict.fromkeys((name for name in values if name.startswith("w_")), velocity / EFFECTIVE_RADIUS)
+    values |= {"t": car, "v": velocity}
     felt = {"t": imu + shift, "ax": 1.3 * np.cos(1.3 * imu) - 2.1 * np.sin(7 * imu)}
     return [write_log(folder / "run_car.csv", values), write_log(folder / "run_imu.csv", felt)]
 
@@ -199,7 +207,9 @@ def test_files_find_their_logs(tmp_path: Path) -> None:
     plan = drive(tmp_path, TWO.replace("CLOCK", ""))
     for given in ([car, imu], [imu, car], [tmp_path]):
         assert read_log(given, plan).report["logs"]["imu"]["file"] == "run_imu.csv"
-    with pytest.raises(LogError, match=r"log 'imu' needs a file like '\*_imu.csv', given: none"):
+    with pytest.raises(
+        LogError, match=r"log 'imu' needs one file like '\*_imu.csv', given: run_car.csv, which is none"
+    ):
         read_log([car], plan)
     other = write_log(tmp_path / "other.csv", columns(0.1))
     with pytest.raises(LogError, match=r"other\.csv: belongs to no log of the drive file"):

@@ -12,7 +12,7 @@ import pytest
 
 import studies.truth
 from estimators import GainSchedule
-from studies.drives.corner_observers import ScheduledObserver
+from estimators.pipeline import ScheduledCorners
 from studies.drives.drive_file import read_drive
 from studies.drives.errors import LogError
 from studies.drives.log import read_log
@@ -100,7 +100,7 @@ def test_every_design_is_that_of_its_own_observers(subject: Subject, tmp_path: P
     found.check(subject)
     values = found(subject.at(DESIGNS, subject.grid(2)))
     inputs, reference = inputs_of(log, description)
-    runtime = replay(inputs, ScheduledObserver(SCHEDULE)).velocity
+    runtime = replay(inputs, ScheduledCorners(SCHEDULE)).velocity
     assert values[0] == pytest.approx(nrms(runtime, reference), rel=1e-9)
     for row in range(3):
         constants = {name: p.nominal for name, p in subject.plant.parameters.items()}

@@ -1,0 +1,142 @@
+"""Is what a log says what a car can do? A unit of the right dimension but the wrong size shows here, before the run.
+
+Compared is the 99 % quantile of the magnitude: single spikes are for the estimators to refuse, sample by sample. Wheel
+speeds are also compared with a reference velocity: rpm declared for rad/s is R_e w / V_x = 0.105, the other way round 9.55.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from studies.drives.drive_file import DriveFile
+from studies.drives.drive_tables import Column
+from studies.drives.errors import LogError
+from studies.drives.quantities import CORNERS, SIGNALS, factor_to
+
+Array = npt.NDArray[np.float64]
+
+
+class Limit(NamedTuple):
+    """The largest magnitude in SI that a car reaches, and the units that are taken for one another, likeliest first."""
+
+    largest: float
+    units: tuple[str, ...]
+
+
+_ACCELERATION = Limit(50.0, ("m/s^2", "cm/s^2", "mm/s^2"))
+_RATE = Limit(10.0, ("rad/s", "deg/s"))
+_STEER = Limit(1.3, ("rad", "deg"))
+_WHEEL_UNITS = ("rad/s", "rpm", "deg/s", "turn/s")
+LIMITS: dict[str, Limit] = {
+    **dict.fromkeys(("ax", "ay", "az"), _ACCELERATION),
+    **dict.fromkeys(("yaw_rate", "roll_rate", "pitch_rate"), _RATE),
+    **dict.fromkeys(("steering", *(f"steer_{corner}" for corner in CORNERS)), _STEER),
+    "hand_wheel": Limit(20.0, _STEER.units),
+    **dict.fromkeys((f"wheel_speed_{corner}" for corner in CORNERS), Limit(400.0, _WHEEL_UNITS)),
+    **dict.fromkeys((f"torque_{corner}" for corner in CORNERS), Limit(50e3, ("N*m",))),
+}
+QUANTILE = 99.0
+FAST = 5.0
+"""m/s of V_x above which wheels roll: a start or a stop says little about units."""
+ROLLING = (0.7, 1.4)
+"""R_e w / V_x of all wheels, at the median of a drive."""
+ONE_WHEEL = (0.4, 2.5)
+"""The same of one wheel among good ones, which may spin or slide for most of a drive."""
+STANDING = 0.012
+"""R_e w / V_x below which a wheel is locked or its sensor dead: a fault, not a unit (the smallest one is 0.0175)."""
+ENOUGH = 20
+"""Samples of a wheel that make a median."""
+
+
+def check_plausible(
+    drive: DriveFile, signals: Mapping[str, Array], reference: Mapping[str, Array], files: Mapping[str, str]
+) -> None:
+    """Refuse signals in SI (n,) that no car produces; ``files`` names the file of each log.
+
+    Raises LogError, one line: file, column, unit, the largest value seen and the unit that would explain it.
+    """
+    for name, limit in LIMITS.items():
+        if name in signals:
+            _check_size(drive, files, name, signals[name], limit)
+    if "vx" in reference:
+        _check_rolling(drive, signals, reference["vx"], files)
+
+
+def _check_size(drive: DriveFile, files: Mapping[str, str], name: str, value: Array, limit: Limit) -> None:
+    size = np.abs(value[np.isfinite(value)])
+    high = float(np.percentile(size, QUANTILE)) if size.size else 0.0
+    if high <= limit.largest:
+        return
+    column, si = drive.signals[name], SIGNALS[name]
+    given = factor_to(column.unit, si)
+    fitting = [f'unit = "{unit}"' for unit in limit.units if high * factor_to(unit, si) / given <= limit.largest]
+    raise LogError(
+        f"{_place(drive, files, f'signals.{name}', column)} in {column.unit} reaches {size.max():.4g} {si}, and more than "
+        f"{limit.largest:g} {si} too often to be spikes; {_remedy(fitting, column)}"
+    )
+
+
+def _check_rolling(drive: DriveFile, signals: Mapping[str, Array], vx: Array, files: Mapping[str, str]) -> None:
+    car = drive.vehicle
+    radius = np.repeat([car.effective_radius_front, car.effective_radius_rear], 2)
+    surface = np.stack([signals[f"wheel_speed_{corner}"] for corner in CORNERS], axis=-1) * radius
+    fast = np.isfinite(vx) & (vx > FAST)
+    ratio = surface[fast] / vx[fast, None]
+    turning = np.isfinite(ratio) & (np.abs(ratio) > STANDING)
+    median = np.array(
+        [np.median(r[t]) if t.sum() >= ENOUGH else np.nan for r, t in zip(ratio.T, turning.T, strict=True)]
+    )
+    known = np.isfinite(median)
+    strange = known & ~((median >= ONE_WHEEL[0]) & (median <= ONE_WHEEL[1]))
+    if strange.any() and not strange[known].all():
+        wheel = int(np.flatnonzero(strange)[0])
+        raise LogError(_odd_wheel(drive, files, wheel, float(median[wheel]), surface / radius, whole=False))
+    if known.any():
+        whole = float(np.median(ratio[turning & known]))
+        if not ROLLING[0] <= whole <= ROLLING[1]:
+            wheel = int(np.flatnonzero(known)[0])
+            raise LogError(_odd_wheel(drive, files, wheel, whole, surface / radius, whole=True))
+
+
+def _odd_wheel(
+    drive: DriveFile, files: Mapping[str, str], wheel: int, ratio: float, speed: Array, *, whole: bool
+) -> str:
+    name = f"wheel_speed_{CORNERS[wheel]}"
+    column, velocity = drive.signals[name], drive.reference["vx"]
+    given = factor_to(column.unit, "rad/s")
+    fitting = [f'unit = "{unit}"' for unit in _WHEEL_UNITS if _rolls(ratio * factor_to(unit, "rad/s") / given)]
+    place = f"{_place(drive, files, f'signals.{name}', column)} in {column.unit}"
+    peak = float(np.nanmax(np.abs(speed[:, wheel])))
+    if not fitting and whole:
+        given = factor_to(velocity.unit, "m/s")
+        units = ("m/s", "km/h", "mph")
+        fitting = [
+            f'unit = "{unit}" for reference.vx' for unit in units if _rolls(ratio * given / factor_to(unit, "m/s"))
+        ]
+    if not fitting and _rolls(-ratio):
+        fitting = [f'sign = "{"positive" if column.sign == "negative" else "negative"}"']
+    return (
+        f"{place} reaches {peak:.4g} rad/s: R_e w / V_x is {ratio:.3g} at the median{' of all wheels' if whole else ''} "
+        f"while reference.vx (column '{velocity.column}' in {velocity.unit}) is above {FAST:g} m/s, a rolling wheel has "
+        f"{ROLLING[0]:g} to {ROLLING[1]:g}; {_remedy(fitting, column, 'or effective_radius' if whole else '')}"
+    )
+
+
+def _rolls(ratio: float) -> bool:
+    return ROLLING[0] <= ratio <= ROLLING[1]
+
+
+def _place(drive: DriveFile, files: Mapping[str, str], key: str, column: Column) -> str:
+    return f"{files[drive.log_of(column)]}: {key}: column '{column.column}'"
+
+
+def _remedy(fitting: list[str], column: Column, more: str = "") -> str:
+    """Which unit would explain it; without one, and with a factor that may be the culprit, what to look at."""
+    if fitting and column.factor == 1.0:
+        return f"likely {fitting[0]}: correct it in the drive file"
+    words = ("correct its unit or factor", f"(now {column.factor:g})", more, "in the drive file")
+    return " ".join(word for word in words if word)
