@@ -18,15 +18,16 @@ from estimators.velocity import lateral_fusion as lateral
 from estimators.velocity import longitudinal_fusion as longitudinal
 from estimators.velocity.arithmetic import Number, Signals, arithmetic, kept_signals
 from estimators.velocity.fusion_adrift import FusionAdrift
+from estimators.velocity.fusion_against import FusionAgainst
 from estimators.velocity.fusion_lost import FusionLost
 from estimators.velocity.fusion_report import Judged, reported
 from estimators.velocity.fusion_screen import FusionScreen, Screened
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.fusion_standing import FusionStanding
 from estimators.velocity.fusion_step import FusionStep
+from estimators.velocity.fusion_thrust import FusionThrust
 
-_MISSING_INPUT, _RESET = int(Flag.MISSING_INPUT), int(Flag.RESET)
-_LARGEST_FRICTION = 1.5  # a larger |F/F_z| is no tire's
+_MISSING_INPUT, _RESET, _GATED = int(Flag.MISSING_INPUT), int(Flag.RESET), int(Flag.GATED)
 _FASTEST = 200.0  # m/s: an estimate beyond it is lost
 _FORGET = 0.05  # s after which parameters forget; they remember for 5 s at least, the slopes of the road at 40 m/s
 _WIDEST = 50.0  # m/s of standard deviation: a wider one says no more, and is kept from growing
@@ -37,7 +38,8 @@ class VelocityFusion(Memory):
 
     Which wheel to believe is decided at every sample from what its force explains (`longitudinal_fusion`); V_y comes
     from the kinematics and from the side slip that the axle forces demand (`lateral_fusion`). At standstill both
-    speeds and the yaw rate are zero, which gives the biases. An estimate that rolling wheels contradict for long is
+    speeds and the yaw rate are zero, which gives the biases. An a_x that is missing, frozen or contradicted by forces and
+    wheels is replaced (`fusion_thrust`, `fusion_against`). An estimate that rolling wheels contradict for long is
     lost and starts again from them (`fusion_lost`). Wheel speeds are signed: backwards is negative.
 
     One car runs on plain numbers, several on arrays, by the same formulas (`arithmetic`).
@@ -53,7 +55,7 @@ class VelocityFusion(Memory):
     """
 
     memory = ("new", "renewed", "start")
-    parts = ("screen", "longitudinal_filter", "lateral_filter", "lost", "adrift", "standing")
+    parts = ("screen", "longitudinal_filter", "lateral_filter", "thrust", "against", "lost", "adrift", "standing")
     unknowns = ("start",)
 
     def __init__(
@@ -77,6 +79,8 @@ class VelocityFusion(Memory):
         self._across = lateral.LateralFusion(vehicle, self.settings, every, count)
         self.longitudinal_filter, self.lateral_filter = self._along.filter, self._across.filter
         self.screen = FusionScreen(self._radius, self.settings, count)
+        self.thrust = FusionThrust(vehicle, self._along, count)
+        self.against = FusionAgainst(self._along, count)
         self.lost = FusionLost(self.settings, count)
         self.adrift = FusionAdrift(self.settings, self._across, count)
         self.standing = FusionStanding(self.settings, self._along, self._across, count)
@@ -106,7 +110,8 @@ class VelocityFusion(Memory):
             normalised_force: (..., 4) F_x/F_z of the wheels; NaN (or None) where unknown: then a_x/g.
             elapsed: (...) s since the last step, if not `sample_time`: jitter, gaps.
 
-        Whatever is not finite counts as missing and is flagged; the estimates stay finite.
+        Whatever is not finite counts as missing and is flagged; the estimates stay finite. A car whose a_x contradicts its
+        forces and wheels carries the flag GATED.
 
         Raises:
             EstimatorError: another shape, or not numbers.
@@ -120,10 +125,13 @@ class VelocityFusion(Memory):
         seen = self.screen(inertial, wheels, turned, dt)
         self._begin(seen)
         a, b, r = seen.inertial
+        given = None if normalised_force is None else kit.wheels(normalised_force, shape, "normalised_force")
+        disproved = self.against.left > 0.0
+        pull = self.thrust(dt, seen, given, self.screen.slope, disproved)
+        a, noise, doubt, blind, unbelieved, mu = pull
         turn, before = across.yaw_rate(r), along.speed
-        along.predict(dt, a, seen.noise[0], turn, across.speed)
+        along.predict(dt, a, noise, turn, across.speed, doubt > 0.0)
         across.predict(dt, b, seen.noise[1], r, seen.noise[2], before)
-        mu = self._force(normalised_force, a)
         swing, left, own = self.screen.swing, across.speed, along.acceleration(a) + turn * across.speed
 
         def moves(angle: Number, x: Number, y: Number) -> tuple[Number, ...]:
@@ -131,8 +139,9 @@ class VelocityFusion(Memory):
             return cosine, (left + turn * x) * sine - turn * y * cosine, own - swing * y, sine
 
         *course, sine = kit.each(moves, seen.steer, *self._places)
-        slipping = self.screen.slipping(course[2], seen.fresh, dt)
-        wheel = along.correct(dt, seen, slipping, mu, b / GRAVITY, longitudinal.WheelCourse(*course))
+        slipping = self.screen.slipping(course[2], seen.fresh, dt, doubt)
+        wheel = along.correct(dt, seen, slipping, mu, b / GRAVITY, longitudinal.WheelCourse(*course), blind)
+        self.against(dt, seen, wheel.innovation, mu)
         standing, lost = self.standing(seen, a, turn, dt)
         lost = lost | self.lost(dt, standing, seen, wheel, slipping, mu, self._radius)
         along.stand(standing)
@@ -145,7 +154,8 @@ class VelocityFusion(Memory):
         adrift = self.adrift(dt, along.speed, axle, usable)
         across.blind(dt, seen.blind)
         across.stand(standing, r)
-        flags = seen.flags | kit.where(odd, _MISSING_INPUT, 0) | kit.where(self.renewed | adrift, _RESET, 0)
+        flags = seen.flags | kit.where(odd, _MISSING_INPUT, 0) | kit.where(unbelieved, _GATED, 0)
+        flags = flags | kit.where(self.renewed | adrift, _RESET, 0)
         self.renewed = self._never
         self._guard(seen, lost)
         judged = Judged(slipping, wheel, axle, standing, self.standing.stopped(seen.silent))
@@ -203,30 +213,9 @@ class VelocityFusion(Memory):
         middle = np.nanmedian(np.where(np.isfinite(known).any(axis=0), known, 0.0), axis=0)
         return middle.item() if self._count == 1 else middle
 
-    def _force(self, normalised_force: npt.ArrayLike | None, ax: Number) -> Signals:
-        """F_x/F_z, of a size that a tire can have; a_x/g where unknown: all wheels use the same share."""
-        x, kit = self.longitudinal_filter.mean, self._kit
-        share = (ax * (1.0 - x[longitudinal.SCALE]) - x[longitudinal.BIAS]) / GRAVITY
-        share = kit.maximum(kit.minimum(share, _LARGEST_FRICTION), -_LARGEST_FRICTION)
-        if normalised_force is None:
-            return kit.stacked((share,) * 4)
-
-        mu = kit.wheels(normalised_force, self.batch_shape, "normalised_force")
-        (usual,) = kit.each(lambda given: (abs(given) <= _LARGEST_FRICTION,), mu)
-        if not kit.some(kit.no(usual[0] & usual[1] & usual[2] & usual[3])):
-            return mu
-
-        def limited(given: Number) -> tuple[Number, ...]:
-            known = kit.maximum(kit.minimum(given, _LARGEST_FRICTION), -_LARGEST_FRICTION)
-            return (kit.where(abs(given) < math.inf, known, share),)
-
-        return kit.each(limited, mu)[0]
-
     def _forget(self, where: Number) -> None:
-        self.screen.forget(where)
-        self.lost.forget(where)
-        self.adrift.forget(where)
-        self.standing.forget(where)
+        for part in (self.screen, self.thrust, self.against, self.lost, self.adrift, self.standing):
+            part.forget(where)
         self.new, self.renewed = self.new | where, self.renewed | where
 
     def _guard(self, seen: Screened, lost: Number) -> None:

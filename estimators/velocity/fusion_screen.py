@@ -40,6 +40,7 @@ class Screened(NamedTuple):
     steer: Signals
     steered: Number  # whether all steering angles were there
     present: Number  # whether all inertial signals were there
+    alive: Number  # whether a_x was there, and has not been the same for longer than a slow sensor is
     blind: Number  # a_y or r has been missing for long: both are given as 0
     flags: Number
     wheel_flags: Signals
@@ -132,17 +133,20 @@ class FusionScreen(Memory):
             wheel, wheel_speed, self.wheel_speed, self.age, self.slope, self.radius
         )
         wheels = (speed, fresh, gap, silent, self.steer)
-        return Screened(value, noise, *wheels, steered, present, blind, flags, wheel_flags)
+        alive = good[0] & (run[0] < _LONGEST_RUN) & ((run[0] - 1.0) * elapsed < self.settings.slowest_unit)
+        return Screened(value, noise, *wheels, steered, present, alive, blind, flags, wheel_flags)
 
-    def slipping(self, acceleration: Signals, fresh: Signals, elapsed: Number) -> Signals:
+    def slipping(self, acceleration: Signals, fresh: Signals, elapsed: Number, doubt: Number) -> Signals:
         """Fresh wheels whose surface leaves the car, |R w' - a| too large, now or within the hold time.
 
-        The wheel-acceleration criterion of P2 section 7, relative to the measured acceleration of the car.
+        The wheel-acceleration criterion of P2 section 7, relative to the acceleration of the car, which may be off by
+        twice its `doubt`, m/s^2.
         """
         s, choose, largest = self.settings, self.kit.where, self.kit.maximum
+        most = s.excess_acceleration + 2.0 * doubt
 
         def wheel(slope: Number, pull: Number, left: Number, new: Number, radius: Number) -> tuple[Number, ...]:
-            excess = abs(radius * slope - pull) > s.excess_acceleration
+            excess = abs(radius * slope - pull) > most
             left = choose(excess, s.high_slip_hold, largest(left - elapsed, 0.0))
             return left, new & (left > 0.0)
 

@@ -48,7 +48,7 @@ class FusionStanding(Memory):
         calm = calm & (abs(turn) < s.still_yaw_rate + 3.0 * unsure)
         self.calm = kit.where(calm, self.calm + elapsed, 0.0)
         moves = self._moves()
-        return (self.calm > s.still_time) & kit.no(moves), (self.calm > s.lost_time) & moves
+        return (self.calm > s.still_time) & kit.no(moves), (self.calm > s.lost_time) & moves & seen.alive
 
     def stopped(self, silent: Signals) -> Signals:
         """Wheels that do not turn though the car moves."""

@@ -72,16 +72,32 @@ class LongitudinalFusion:
         x = self.filter.mean
         return measured * (1.0 - x[SCALE]) - x[BIAS] - x[GRADE]
 
-    def predict(self, elapsed: Number, measured: Number, noise: Number, yaw_rate: Number, lateral: Number) -> None:
-        """`measured` a_x with the standard deviation `noise` of its mean over the sample, m/s^2; `lateral` V_y."""
-        shift, blur = elapsed * (measured + yaw_rate * lateral), elapsed * noise
-        coupling = (-elapsed, -elapsed, -elapsed * measured)
+    def predict(
+        self, elapsed: Number, measured: Number, noise: Number, yaw_rate: Number, lateral: Number, doubted: Number
+    ) -> None:
+        """`measured` a_x with the standard deviation `noise` of its mean over the sample, m/s^2; `lateral` V_y.
+
+        A reading that is `doubted` teaches nothing about the sensor, nor about the road.
+        """
+        blur, teaching, pull = elapsed * noise, elapsed, measured
+        if self.kit.some(doubted):
+            teaching = self.kit.where(doubted, 0.0, elapsed)
+            pull = self.kit.where(doubted, self.acceleration(measured), measured)
+        shift = elapsed * (pull + yaw_rate * lateral)
+        coupling = (-teaching, -teaching, -teaching * measured)
         self.filter.move(elapsed, abs(self.speed), _MOVING, coupling, shift, blur * blur)
 
     def correct(
-        self, elapsed: Number, seen: Screened, slipping: Signals, mu: Signals, across: Number, course: WheelCourse
+        self,
+        elapsed: Number,
+        seen: Screened,
+        slipping: Signals,
+        mu: Signals,
+        across: Number,
+        course: WheelCourse,
+        blind: Number,
     ) -> WheelVerdict:
-        """`mu` F_x/F_z of the wheels; `across` is what the car uses of its friction sideways."""
+        """`mu` F_x/F_z of the wheels; `across`: friction used sideways; `blind`: mu may be that of any braking car."""
         s, x, kit = self.settings, self.filter.mean, self.kit
         choose, largest = kit.where, kit.maximum
         speed, compliance = x[SPEED], x[SLIP]
@@ -89,6 +105,7 @@ class LongitudinalFusion:
         per_speed = s.tooth_pitch / largest(pace, s.dead_speed)
         held = largest(1.0, 2.0 * s.error_memory / elapsed)
         wrong_way, gate, freely = s.wrong_way_gate**2, s.gate**2, s.free_rolling
+        hidden = choose(blind, s.unseen_acceleration / GRAVITY, 0.0)
 
         def predicted(
             w: Number,
@@ -100,8 +117,9 @@ class LongitudinalFusion:
             radius: Number,
             error: Number,
         ) -> tuple[Number, ...]:
-            surface, slip, strain, late = radius * w, compliance * force, abs(force), per_speed * pull
+            surface, slip, late = radius * w, compliance * force, per_speed * pull
             innovation = surface * (1.0 + error) - gain * speed - shift - pace * slip
+            strain = largest(abs(force), hidden)
             share = s.slip_floor + (s.slip_linear + s.slip_cubic * strain * strain) * strain
             blur = pace * share + s.slip_speed
             model = blur * blur + late * late  # what slip compliance and pulse ring leave unexplained
@@ -123,7 +141,7 @@ class LongitudinalFusion:
         gated, used, variance, free = kit.each(
             judged, explained, innovation, model, self._white, mu, seen.fresh, slipping
         )
-        learning = free[0] & free[1] & free[2] & free[3] & (across * across < freely * freely)
+        learning = free[0] & free[1] & free[2] & free[3] & (across * across < freely * freely) & kit.no(blind)
         self.filter.weigh(innovation, variance, used, learning)
         return WheelVerdict(innovation, used, gated)
 

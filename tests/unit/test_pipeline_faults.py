@@ -148,6 +148,30 @@ def test_fault_is_survived_flagged_and_forgotten(faulted: Faulted, name: str) ->
     assert error[SETTLED].max() < TOLERANCE
 
 
+def test_an_accelerometer_that_fails_while_the_driver_brakes() -> None:
+    """From 0.1 s before 2 m/s^2 turn into -3 to 0.9 s behind it: missing, frozen, of the wrong sign, and off by 5 m/s^2."""
+    changes: list[Callable[[FloatArray], FloatArray]] = [
+        lambda ax: np.full_like(ax, np.nan),
+        lambda ax: np.full_like(ax, ax[0]),
+        lambda ax: -ax,
+        lambda ax: ax - 5.0,
+        lambda ax: ax + 5.0,
+    ]
+    fails = slice(380, 580)
+    runs = [copied(noisy(DRIVE, 7, BIAS)) for _ in changes]
+    for truth, change in zip(runs, changes, strict=True):
+        truth.ax[fails] = change(truth.ax[fails])
+    together = Truth(*(np.stack(column) for column in zip(*runs, strict=True)))
+    steps = run(EstimationPipeline(CAR, TIME, (len(runs),)), together)
+    error = np.array([step.vx for step in steps]) - DRIVE.vx[:, None]
+    wheels = np.abs((CAR.radius * DRIVE.wheel_speed).mean(axis=1) - DRIVE.vx)[fails].max()
+    assert np.abs(error[fails]).max() < 0.6 + wheels
+    assert np.abs(error[fails.stop + 100 :]).max() < 0.15
+    deviation = np.array([step.vx_deviation for step in steps])
+    assert (np.abs(error) < 0.1 + 3.0 * deviation)[fails.stop :].all()
+    assert all(finite(step) for step in steps)
+
+
 def test_everything_stays_finite(faulted: Faulted) -> None:
     assert all(finite(step) for step in faulted.steps)
 

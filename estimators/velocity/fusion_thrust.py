@@ -1,0 +1,148 @@
+"""Which acceleration moves the car: the one that is measured, or the one that the tire forces make?
+
+    a_F = g (s_f mu_f + s_r mu_r)/(1 + (h/L)(mu_f - mu_r)),      mu = F_x/F_z, mean of an axle, s its static load share
+
+from sum F_x = m a and loads that shift by m a h/L. The accelerometer feels forces alone, so grade is in neither. Forces
+come from torques and wheel speeds, thus a_x has no part in a_F. Two sources that contradict each other leave it open which
+is wrong; the wheels decide: the middle of their surface accelerations follows the car, unless it leaves both.
+
+    believed   a_x                    as long as it is there, alive and within `thrust_floor` + `thrust_linear` |a_F| of a_F
+    pending    a_x, as unsure as the two are apart, until the wheels side with one of them
+    doubted    a_F, if the wheels side with it, or a_x is missing, frozen or disproved (`fusion_against`)
+    blind      what the wheels gain, +-`unseen_acceleration`, if the forces are not known either
+
+Reading a_F, the filter stays as sure as the forces are, unless the wheels leave to a side to which these cannot make them
+slip. An error of this kind stays: its deviation s counts (2 j - 1) s^2 in the j-th sample, up to `error_memory`. Nothing
+that is not believed teaches bias, scale or grade.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy.typing as npt
+
+from estimators.signals.memory import Memory
+from estimators.vehicle import GRAVITY, VehicleParameters
+from estimators.velocity.arithmetic import Number, Signals, arithmetic
+from estimators.velocity.fusion_screen import Screened
+from estimators.velocity.longitudinal_fusion import BIAS, SCALE, LongitudinalFusion
+
+_LARGEST_FRICTION = 1.5  # a larger |F/F_z| is no tire's
+STRONGEST = _LARGEST_FRICTION * GRAVITY  # m/s^2 of a car on its tires
+_UNDECIDED, _FORCES, _UNIT = 0.45, 0.35, 0.5  # how far from a_F towards a_x the wheels are: neither, with a_F, with a_x
+
+
+class Thrust(NamedTuple):
+    """What moves the car over this sample."""
+
+    reading: Number  # m/s^2, as a_x with its bias and scale error would read
+    noise: Number  # m/s^2, deviation of its mean over the sample
+    doubt: Number  # m/s^2 by which it may be off for long; 0 where a_x is believed
+    blind: Number  # whether neither a_x nor the forces tell
+    gated: Number  # whether a_x is there and alive, and is not believed
+    mu: Signals  # F_x/F_z of the wheels, of a size that a tire can have; shares of a_x where unknown
+
+
+class FusionThrust(Memory):
+    """Remembers how far a_x, forces and wheels of `count` cars are apart."""
+
+    memory = ("gap", "apart", "since")
+
+    def __init__(self, vehicle: VehicleParameters, along: LongitudinalFusion, count: int) -> None:
+        self.settings, self.along, self.kit = along.settings, along, arithmetic((count,))
+        length = vehicle.wheelbase
+        self._front, self._rear = vehicle.rear_axle_distance / length, vehicle.front_axle_distance / length
+        self._lever = vehicle.cg_height / length
+        self._zero, self._never = self.kit.full(0.0), self.kit.full(False)
+        self.gap: Number = self._zero  # m/s^2, a_x - a_F, low-passed
+        self.apart: Number = self._zero  # m/s^2, wheels - a_F, low-passed since the contradiction began
+        self.since: Number = self._zero  # s since it began
+
+    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+        for name in self.memory:
+            setattr(self, name, self.kit.own(saved[name].copy()))
+
+    def forget(self, where: Number) -> None:
+        """Starts the cars `where` afresh."""
+        for name in self.memory:
+            setattr(self, name, self.kit.where(where, 0.0, getattr(self, name)))
+
+    def __call__(
+        self, elapsed: Number, seen: Screened, given: Signals | None, slope: Signals, disproved: Number
+    ) -> Thrust:
+        """`given` F_x/F_z of the wheels, not finite where unknown, if any; `slope` of their speeds, rad/s^2.
+
+        An a_x that is `disproved` counts as missing.
+        """
+        s, kit, choose, x = self.settings, self.kit, self.kit.where, self.along.filter.mean
+        reading, noise = seen.inertial[0], seen.noise[0]
+        mu, known = self._shares(given, reading)
+        alive = seen.alive & kit.no(disproved)
+        ahead, behind = 0.5 * (mu[0] + mu[1]), 0.5 * (mu[2] + mu[3])
+        force = GRAVITY * (self._front * ahead + self._rear * behind) / (1.0 + self._lever * (ahead - behind))
+        unit = reading * (1.0 - x[SCALE]) - x[BIAS]
+        kept = kit.exp(-elapsed / s.thrust_memory)
+        self.gap = gap = choose(known & alive, kept * self.gap + (1.0 - kept) * (unit - force), 0.0)
+        # steered front wheels pull backwards with their side force, about half of m a_y
+        allowed = s.thrust_floor + s.thrust_linear * abs(force) + abs(seen.inertial[1] * seen.steer[0])
+        wrong = kit.no(alive) | (abs(gap) > 0.5 * allowed)
+        if not kit.some(wrong):
+            self.since = self._zero
+            return Thrust(reading, noise, self._zero, self._never, self._never, mu)
+
+        pulls = [R * rate for R, rate in zip(self.along.radius, slope, strict=True)]
+        top, least = (pick(pick(pulls[0], pulls[1]), pick(pulls[2], pulls[3])) for pick in (kit.maximum, kit.minimum))
+        middle = 0.5 * (sum(pulls) - top - least)
+        recent = kit.minimum(kit.minimum(*seen.gap[:2]), kit.minimum(*seen.gap[2:])) < s.error_memory
+        middle = choose(recent, kit.maximum(kit.minimum(middle, STRONGEST), -STRONGEST), 0.0)
+        blind = kit.no(alive | known)
+        votes = kit.no(alive) | (kit.minimum(abs(middle - force), abs(middle - unit)) < s.excess_acceleration)
+        fresh = choose(alive, _UNDECIDED * gap, choose(known, 0.0, choose(disproved, middle, unit)))
+        before = choose(self.since > 0.0, self.apart, fresh)
+        base = choose(blind, 0.0, force)
+        self.apart = apart = choose(votes, kept * before + (1.0 - kept) * (middle - base), before)
+        self.since = choose(wrong, kit.minimum(self.since + elapsed, s.error_memory), 0.0)
+
+        share = apart * kit.sign(gap)  # of the gap
+        with_force = wrong & known & (kit.no(alive) | ((share < _FORCES * abs(gap)) & (abs(gap) > allowed)))
+        pending = wrong & alive & kit.no(with_force) & (share < _UNIT * abs(gap))
+        explained = force * kit.sign(apart) > GRAVITY * s.unloaded  # wheels slip to the side of their force
+        leaves = choose(explained, 0.0, kit.minimum(kit.maximum(abs(apart) - allowed, 0.0), s.unseen_acceleration))
+        # forces that were corrected with a_x have a part of its error
+        doubt = choose(with_force, 0.5 * allowed + 0.25 * abs(gap) + leaves, choose(pending, abs(gap), 0.0))
+        doubt = choose(blind, s.unseen_acceleration, doubt)
+        samples = kit.maximum(2.0 * self.since / elapsed - 1.0, 1.0)
+        told = (choose(blind, apart, force) + x[BIAS]) / (1.0 - x[SCALE])
+        told = choose(with_force | blind, told, reading)
+        if kit.some(blind):
+            mu, _ = self._shares(given, told)
+        return Thrust(
+            told,
+            choose(doubt > 0.0, kit.maximum(doubt * kit.sqrt(samples), choose(alive, noise, 0.0)), noise),
+            doubt,
+            blind,
+            seen.alive & (with_force | disproved),
+            mu,
+        )
+
+    def _shares(self, given: Signals | None, reading: Number) -> tuple[Signals, Number]:
+        """F_x/F_z, of a size that a tire can have, a_x/g where unknown: the same share; and whether all were known."""
+        kit, x = self.kit, self.along.filter.mean
+        share = (reading * (1.0 - x[SCALE]) - x[BIAS]) / GRAVITY
+        share = kit.maximum(kit.minimum(share, _LARGEST_FRICTION), -_LARGEST_FRICTION)
+        if given is None:
+            return kit.stacked((share,) * 4), self._never
+        (usual,) = kit.each(lambda mu: (abs(mu) <= _LARGEST_FRICTION,), given)
+        all_usual = usual[0] & usual[1] & usual[2] & usual[3]
+        if not kit.some(kit.no(all_usual)):
+            return given, all_usual
+
+        def limited(mu: Number) -> tuple[Number, ...]:
+            size = kit.maximum(kit.minimum(mu, _LARGEST_FRICTION), -_LARGEST_FRICTION)
+            return kit.where(abs(mu) < math.inf, size, share), abs(mu) <= 2.0 * _LARGEST_FRICTION
+
+        mu, known = kit.each(limited, given)
+        return mu, known[0] & known[1] & known[2] & known[3]
