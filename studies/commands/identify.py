@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from studies.commands.progress import progress_bar
+from studies.drives.output import check_folder
 from studies.identify.identify import identify_drive
 from studies.identify.result import HEADER, content, rows, warnings
 from studies.identify.write import write_identification
@@ -17,6 +18,7 @@ from studies.identify.write import write_identification
 
 def run_identify(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int:
     """Identify the car from the log, write the files, print the table; 0 when done, warnings to standard error."""
+    check_folder(out)
     with progress_bar() as progress:
         task = progress.add_task("identifying", total=1.0)
         found = identify_drive(logs, drive, progress=lambda done: progress.update(task, completed=0.95 * done))

@@ -10,9 +10,15 @@ the long-run covariance of the scores u_t = J_t' e_t, summed over the rows of on
 
     Omega = sum_{|l| <= L} (1 - |l|/(L + 1)) sum_t u_t u_{t+l}',    cov = (J'J)^-1 Omega (J'J)^-1   (Newey, West 1987),
 
-but falls short where a log holds few independent stretches. Each parameter gets the wider of both, with Student's t of
-n/tau - p degrees of freedom. Bandwidth L (for tau as well): Andrews (1991) for the Bartlett kernel, 1.1447 (alpha n)^(1/3),
-alpha from first-order autoregressions.
+but falls short where few independent stretches of a log tell a parameter: one jump of the torque is one experiment however
+many samples it has. So each parameter gets the widest of three intervals: the first and the second with Student's t of
+n/tau - p degrees of freedom, and their mean, the second weighed by the number m of such stretches
+(:func:`effective_stretches`), the first by 4, with m + 4 degrees. Bandwidth L (for tau as well): Andrews (1991) for the
+Bartlett kernel, 1.1447 (alpha n)^(1/3), alpha from first-order autoregressions.
+
+What the intervals cover: noise of the sensors, residuals that hang together, priors, and what is held at one. Fits of low
+slip (:mod:`.slip_limit`) add what narrower limits say otherwise. Not covered: wrong masses, lengths and heights of the drive
+file, and scales of its sensors: a stiffness is in units of their forces.
 """
 
 from __future__ import annotations
@@ -71,3 +77,15 @@ def correlation_time(residual: Array, least_bandwidth: int) -> float:
     total = residual.sum(axis=1, keepdims=True)
     power = float(np.sum(residual**2))
     return float(long_run_covariance(total, least_bandwidth).covariance[0, 0]) / power if power > 0 else 1.0
+
+
+def effective_stretches(influence: Array, rows: npt.NDArray[np.int64], length: int) -> Array:
+    """How many independent stretches tell each parameter: (sum g_b)^2/sum g_b^2, g_b the influence squared in stretch b.
+
+    ``influence`` (n, p) of the residuals on the estimates, ``rows`` (n,) their instants, ``length`` of a stretch in samples.
+    A variance known from m stretches has m degrees of freedom (Bell and McCaffrey 2002, with equal residuals).
+    """
+    power = np.zeros((int(rows.max()) // length + 1, influence.shape[1]))
+    np.add.at(power, rows // length, influence**2)
+    total = power.sum(axis=0)
+    return np.asarray(total**2 / np.maximum(np.sum(power**2, axis=0), 1e-300 + 1e-12 * total**2))

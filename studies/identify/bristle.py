@@ -6,9 +6,15 @@ v_r (1 - s |mu|) = dz/dt + kappa R|w| z, so
 
     F[v_r] = (1/C) ( l D[G(mu)] + F[R|w| mu/(1 - s |mu|)] ),   G(mu) = -sign(mu) ln(1 - s |mu|)/s,   dG/dmu = 1/(1 - s|mu|),
 
-linear in 1/C and l/C. Where a log does not tell s it is 0: then C is the stiffness of the linear corner model (20)-(23)
-that the observers use, over the slip range of the log, and its interval allows for the curvature of a straight tire. At one
-speed v only l - T1 v shows: damping is held at the prior unless the log tells it apart.
+linear in 1/C and l/C. Tires need not bend as LuGre does: the curve of a Magic Formula is odd and smooth, without the term
+s |mu|, and forced into it the slope at the origin comes out too steep by 15 %. So the steady curve is
+
+    v_r/|v| = mu/(C (1 - s |mu| - c mu^2)),
+
+c = 0 being LuGre, and s = 0 (c about half of 1/friction^2) a Magic Formula, of which the slip is lagged, so that its part of
+the curve enters l D[.] as it is. c has a prior; where a log does not tell s clearly from 0 it is 0 (both free, noise trades
+one for the other and C with them), and the intervals allow for ``curvature`` of it. At one speed v only l - T1 v shows:
+damping is held at the prior unless the log tells it apart.
 
 The slip velocity, which carries the noise of the velocity reference, is what is predicted; the normalised force, which is
 far better known against its range, is the regressor: the other way round the noise of slip would pull the stiffness down
@@ -35,7 +41,7 @@ MOST_DAMPING = 0.01
 
 
 def tire_unknowns(tire: Tire, settings: IdentifySettings) -> tuple[Unknown, ...]:
-    """C [1], l [m], T1 [s] and s [1] with the values of ``tire`` as prior (s: linear)."""
+    """C [1], l [m], T1 [s], s [1] and c [1], with the first three of ``tire`` as prior."""
     stiffness = tire.sigma0.value / tire.kappa.value
     far = (float(np.log(2.0 / stiffness)), float(np.log(300.0 / stiffness)))
     relaxation = 1.0 / tire.kappa.value
@@ -73,15 +79,21 @@ def tire_unknowns(tire: Tire, settings: IdentifySettings) -> tuple[Unknown, ...]
             positive=False,
             informed=False,
             considered=settings.curvature / settings.saturation_spread,
+            apart=settings.saturation_apart,
         ),
+        Unknown("bend", settings.bend, settings.bend_spread, settings.bend_spread, (-2.0, 5.0), positive=False),
     )
 
 
 def slip_velocity(p: Mapping[str, float], mu: Array, rolling: Array, filter_: Prefilter, step: float) -> Array:
     """F[v_r] (n, k), m/s, that belongs to the normalised force mu (n, k) [1] at the rolling speed R|w| (n, k), m/s."""
-    s = p["saturation"]
+    s, c = p["saturation"], p["bend"]
     lagged = first_order_lag(mu, step, p["damping_time"], filter_.runs)
-    left = 1.0 - np.minimum(s * np.abs(lagged), MOST_USED)
-    stretched = lagged if abs(s) < 1e-6 else -np.sign(lagged) * np.log(left) / s
+    size = np.abs(lagged)
+    used = np.minimum(s * size, MOST_USED)
+    bristles = size if abs(s) < 1e-6 else -np.log(1.0 - used) / s
+    left = 1.0 - np.minimum(used + c * size**2, MOST_USED)
+    odd = 1.0 - np.minimum(c * size**2, MOST_USED)
+    stretched = np.sign(lagged) * (bristles + size / odd - size)
     moved = p["relaxation_length"] * filter_.rate(stretched)
     return np.asarray((moved + filter_.smooth(rolling * lagged / left)) / p["slip_stiffness"])

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from studies.identify.autocorrelation import correlation_time, long_run_covariance
+from studies.identify.autocorrelation import correlation_time, effective_stretches, long_run_covariance
 from studies.identify.unknowns import Estimate, Unknown
 
 Array = npt.NDArray[np.float64]
@@ -27,7 +27,11 @@ Mask = npt.NDArray[np.bool_]
 PASSES = 2
 """The first weighs the priors by a guess of the residual, the second by the residual of the first."""
 
-STOP: Any = {"xtol": 1e-5, "ftol": 1e-6, "max_nfev": 40}
+COMMON = 4.0
+"""Stretches that the common residual size counts as, where the few that tell a parameter have residuals of their own."""
+
+STOP: tuple[Any, ...] = ({"xtol": 1e-4, "ftol": 1e-3, "max_nfev": 40}, {"xtol": 1e-5, "ftol": 3e-5, "max_nfev": 40})
+"""Of each pass. A few hundred independent rows: what is left below ``ftol`` is worth a hundredth of a standard deviation."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +146,7 @@ def _fit(problem: _Problem, active: Mask, x: Array, many: bool) -> Array:
         if many and k == 0:
             for place, u in enumerate(unknowns):
                 starts += [np.concatenate([starts[0][:place], [s], starts[0][place + 1 :]]) for s in u.starts]
-        fits = [least_squares(cost, s, bounds=(low, high), x_scale=spread, **STOP) for s in starts]
+        fits = [least_squares(cost, s, bounds=(low, high), x_scale=spread, **STOP[k]) for s in starts]
         x = x.copy()
         x[free] = min(fits, key=lambda fit: float(fit.cost)).x
         size, time = problem.size(x)
@@ -162,27 +166,39 @@ def _judge(problem: _Problem, active: Mask, x: Array) -> Estimate:
     singular = np.linalg.svd(jacobian, compute_uv=False) / (size * np.sqrt(time))
     free, held = np.flatnonzero(active), np.flatnonzero(~active)
     covariance = np.diag(np.ones(x.size))
-    scores = np.zeros((mask.shape[0], free.size))
-    np.add.at(scores, np.nonzero(mask)[0], jacobian[:, free] * e[:, None])
-    run = long_run_covariance(scores, problem.rules.correlation)
+    rows = np.nonzero(mask)[0]
+    freedom = max(e.size / time - free.size, 2.0)
+    factors = np.full(x.size, student.ppf(0.5 + problem.rules.confidence / 2, freedom))
     if free.size:
         J = jacobian[:, free]
+        scores = np.zeros((mask.shape[0], free.size))
+        np.add.at(scores, rows, J * e[:, None])
+        run = long_run_covariance(scores, problem.rules.correlation)
         informed = np.array([problem.unknowns[i].informed for i in free], dtype=float)
         prior = np.diag(informed * size**2 * time)
         weak = 1e-6 * size**2 * np.eye(free.size)  # a direction of which nothing is known gets a thousand spreads
         inverse = np.linalg.inv(J.T @ J + prior + weak)
-        known = prior * size**2 * time + weak * size**2
-        part = inverse @ (size**2 * time * (J.T @ J) + known) @ inverse
-        robust = inverse @ (run.covariance + known) @ inverse
-        wider = np.sqrt(np.maximum(np.diag(robust) / np.diag(part), 1.0))
-        part = part * np.outer(wider, wider)
+        # as squares: their diagonals cannot turn negative by rounding where the problem is near singular
+        certain = np.sqrt(np.diag(prior) * size**2 * time + 1e-6 * size**4)[:, None] * inverse
+        influence = J @ inverse
+        known, white = certain.T @ certain, size**2 * time * influence.T @ influence
+        robust = inverse.T @ run.covariance @ inverse
         considered = np.array([problem.unknowns[i].considered for i in held])
         pull = inverse @ J.T @ (jacobian[:, held] * considered)
-        covariance[np.ix_(free, free)] = part + pull @ pull.T
+        sure = np.diag(known) + np.sum(pull**2, axis=1)
+        stretches = effective_stretches(influence, rows, max(run.bandwidth, problem.rules.correlation))
+        confidence = problem.rules.confidence
+        plain = _half_width(np.diag(white), sure, freedom, confidence)
+        both = np.minimum(freedom, stretches + COMMON)
+        pooled = np.diag(white) + (np.diag(robust) - np.diag(white)) * stretches / (stretches + COMMON)
+        wide = np.maximum(
+            _half_width(np.diag(robust), sure, freedom, confidence), _half_width(pooled, sure, both, confidence)
+        )
+        grown = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(white), 1e-300), 1.0))
+        covariance[np.ix_(free, free)] = white * np.outer(grown, grown) + known + pull @ pull.T
+        factors[free] = np.maximum(plain, wide) / np.sqrt(np.diag(covariance)[free])
+    half = factors * np.sqrt(np.diag(covariance)) * spread
     covariance *= np.outer(spread, spread)
-    freedom = max(e.size / time - free.size, 2.0)
-    factor = float(student.ppf(0.5 + problem.rules.confidence / 2, freedom))
-    half = factor * np.sqrt(np.diag(covariance))
     out = np.full(mask.shape, np.nan)
     out[mask] = e
     names = [u.name for u in problem.unknowns]
@@ -197,9 +213,16 @@ def _judge(problem: _Problem, active: Mask, x: Array) -> Estimate:
         rms=float(np.sqrt(np.mean(e**2))),
         correlation=time,
         freedom=freedom,
-        factor=factor,
+        factors={name: float(f) for name, f in zip(names, factors, strict=True)},
         singular_values=tuple(float(v) for v in singular),
     )
+
+
+def _half_width(estimated: Array, sure: Array, freedom: Array | float, confidence: float) -> Array:
+    """Of variances that are in part estimated: the rest has no degrees of freedom to lose (Satterthwaite 1946)."""
+    whole = np.maximum(estimated + sure, 1e-300)
+    each = np.maximum(freedom / np.clip(estimated / whole, 1e-3, 1.0) ** 2, 1.0)
+    return np.asarray(student.ppf(0.5 + confidence / 2, each) * np.sqrt(whole))
 
 
 def _nothing(problem: _Problem) -> Estimate:
@@ -211,4 +234,17 @@ def _nothing(problem: _Problem) -> Estimate:
     covariance = np.diag(problem.spread**2)
     off = dict.fromkeys(names, False)
     none = (0.0,) * len(names)
-    return Estimate(problem.unknowns, problem.home, covariance, off, half, empty, 0, 0.0, 1.0, 0.0, factor, none)
+    return Estimate(
+        problem.unknowns,
+        problem.home,
+        covariance,
+        off,
+        half,
+        empty,
+        0,
+        0.0,
+        1.0,
+        0.0,
+        dict.fromkeys(names, factor),
+        none,
+    )

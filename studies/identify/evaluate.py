@@ -38,6 +38,7 @@ def tire_residual(found: Identification, direction: str, tire: Tire, limit: floa
         "relaxation_length": 1.0 / tire.kappa.value,
         "damping_time": tire.sigma1.value / tire.sigma0.value,
         "saturation": 0.0,
+        "bend": 0.0,
     }
     mask = limited.model.mask(limit, values)
     if not mask.any():

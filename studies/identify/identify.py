@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,7 +88,7 @@ def identify_log(
     told(0.1)
     fits: dict[str, LimitedFit] = {}
     absent: dict[str, str] = {}
-    along = LongitudinalSlip(data, base.tire["longitudinal"], inertia, chosen)
+    along = LongitudinalSlip(data, base.tire["longitudinal"], inertia, chosen, torque_delay(spin, chosen))
     fits["longitudinal"] = fit_low_slip(along, chosen, correlation, lambda done: told(0.1 + 0.45 * done))
     missing = [name for name, there in _lateral_needs(data, base).items() if not there]
     if missing:
@@ -95,9 +96,17 @@ def identify_log(
     else:
         force = np.nan_to_num(wheel_force(data, inertia), nan=0.0)
         across = LateralSlip(data, base.tire["lateral"], force, yaw_inertia_prior(drive), chosen)
-        fits["lateral"] = fit_low_slip(across, chosen, correlation, lambda done: told(0.55 + 0.45 * done))
+        fits["lateral"] = fit_low_slip(across, chosen, across.filter.correlation, lambda done: told(0.55 + 0.45 * done))
     told(1.0)
     return Identification(drive, base, names, data, chosen, fits, spin, inertia, absent)
+
+
+def torque_delay(spin: Estimate | None, settings: IdentifySettings) -> tuple[float, float]:
+    """Of the torques against the wheel speeds, s, with its standard deviation: that of the car, and skewed sensor clocks."""
+    if spin is None or not spin.samples:
+        return 0.0, settings.torque_delay
+    found = spin.value("torque_delay"), spin.deviation(torque_delay=1.0)
+    return found[0], min(math.hypot(found[1], settings.clock_skew), settings.torque_delay)
 
 
 def _lateral_needs(data: DriveSignals, base: ParameterSet) -> dict[str, bool]:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from studies.drives.corner_inputs import GRAVITY, shared_forces, wheel_forces
 from studies.identify.bristle import slip_velocity, tire_unknowns
 from studies.identify.data import DriveSignals
-from studies.identify.prefilter import first_order_lag
+from studies.identify.prefilter import pitched
 from studies.identify.settings import IdentifySettings
 from studies.identify.unknowns import Unknown
 from synthesis.models.parameter_set import Tire
@@ -23,18 +23,28 @@ from synthesis.models.parameter_set import Tire
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 RADII = ("radius_front", "radius_rear")
+SIDES = ("side_front", "side_rear")
+DAMPINGS = ("pitch_damping_front", "pitch_damping_rear")
 
 
 class LongitudinalSlip:
     """Rows (n, 5): the four corners and their load-weighted mean, m/s.
 
-    Unknowns: the tire, R_e of both axles relative to the drive file, and the lag of load transfer: the quasi-static loads of
-    a replay are too early, which would look like a longer relaxation.
+    Unknowns: the tire, R_e of both axles relative to the drive file, half of what left has more than right, the delay of the
+    torques (``delay``: value and standard deviation, s, as the balance of the whole car tells; at one speed v it acts like
+    a relaxation length v*delay), and the pitching of the body: springs and dampers carry the load that an acceleration transfers,
+
+        (2 z w s + w^2)/(s^2 + 2 z w s + w^2),   w = 2 pi f,
+
+    a tenth of a second late and with an overshoot. The quasi-static loads of a replay would bend mu by as much as 13 %
+    under pulsed brakes, and look like a longer relaxation. Heave makes the dampings of the axles differ.
     """
 
     direction = "longitudinal"
 
-    def __init__(self, data: DriveSignals, tire: Tire, inertia: float, settings: IdentifySettings) -> None:
+    def __init__(
+        self, data: DriveSignals, tire: Tire, inertia: float, settings: IdentifySettings, delay: tuple[float, float]
+    ) -> None:
         self.data, self.settings = data, settings
         self.unknowns: tuple[Unknown, ...] = tire_unknowns(tire, settings)
         reach = (-0.1, 0.1)
@@ -42,15 +52,20 @@ class LongitudinalSlip:
             Unknown(name, 1.0, settings.radius_spread, settings.radius_width, reach) for name in RADII
         )
         inputs, load = data.inputs, data.load
+        side, late, damped = settings.side_spread, settings.pitch_frequency_spread, settings.pitch_damping_spread
+        self.unknowns += tuple(Unknown(name, 0.0, side, side, (-0.05, 0.05), positive=False) for name in SIDES)
         self.unknowns += (
-            Unknown(
-                "pitch_lag", settings.pitch_lag, settings.pitch_lag, settings.pitch_lag, (0.0, 0.5), positive=False
-            ),
+            Unknown("torque_delay", delay[0], delay[1], delay[1], (-0.2, 0.2), positive=False),
+            Unknown("pitch_frequency", settings.pitch_frequency, late, late, (-1.5, 2.5)),
+            *(Unknown(name, settings.pitch_damping, damped, damped, (-2.0, 2.5)) for name in DAMPINGS),
         )
         self.along, self.surface = data.along, inputs.surface_speed
         self.torques_known = data.torque is not None
         force = wheel_force(data, inertia)
         self.force = np.where(np.isfinite(force), force, 0.0)
+        self._late = np.zeros_like(force)
+        if data.torque is not None:
+            self._late = np.where(np.isfinite(force), np.gradient(data.torque, data.step, axis=0) / inputs.radius, 0.0)
         self.viscous = tire.sigma2.value * (self.surface - self.along)
         self.mu = self.force / load - self.viscous
         car, g = data.drive.vehicle, GRAVITY
@@ -64,23 +79,33 @@ class LongitudinalSlip:
 
     def residual(self, p: Mapping[str, float]) -> Array:
         """F[R_e w - v_xt] minus what the force asks for, m/s."""
-        ratio = np.repeat([p[name] for name in RADII], 2)
+        ratio = self._ratio(p)
         surface, along = self._measured
-        mu = self._friction(p["pitch_lag"]) / (ratio if self.torques_known else 1.0)
+        mu = self._friction(p) / (ratio if self.torques_known else 1.0)
         asked = slip_velocity(p, mu, np.abs(self.surface) * ratio, self.data.filter, self.data.step)
         corners = surface * ratio - along - asked
         return np.concatenate([corners, np.sum(self.share * corners, axis=1, keepdims=True)], axis=1)
 
-    def _friction(self, lag: float) -> Array:
-        """mu (n, 4): transferred load follows acceleration with the lag of the pitching body, s."""
+    def _ratio(self, p: Mapping[str, float]) -> Array:
+        """R_e of the corners (4,) relative to the drive file."""
+        sides = np.outer([p.get(name, 0.0) for name in SIDES], [1.0, -1.0]).ravel()
+        return np.asarray(np.repeat([p.get(name, 1.0) for name in RADII], 2) * (1.0 + sides))
+
+    def _friction(self, p: Mapping[str, float]) -> Array:
+        """mu (n, 4): transferred load follows acceleration as the body pitches."""
         if not self.torques_known:
             return self.mu  # shared by load: mu is a_x/g at every wheel
-        moved = first_order_lag(self.data.load - self._static, self.data.step, lag, self.data.filter.runs)
-        return np.asarray(self.force / np.maximum(self._static + moved, self._least) - self.viscous)
+        moved, step, runs = self.data.load - self._static, self.data.step, self.data.filter.runs
+        sides = [
+            pitched(moved[:, axle], step, p["pitch_frequency"], p[name], runs)
+            for axle, name in zip((slice(0, 2), slice(2, 4)), DAMPINGS, strict=True)
+        ]
+        load = np.maximum(self._static + np.concatenate(sides, axis=1), self._least)
+        return np.asarray((self.force - p["torque_delay"] * self._late) / load - self.viscous)
 
     def slip(self, p: Mapping[str, float]) -> Array:
         """F[R_e w - v_xt]/F[v_xt] (n, 4) [1]: what the slip limit is compared with."""
-        ratio = np.repeat([p.get(name, 1.0) for name in RADII], 2)
+        ratio = self._ratio(p)
         surface, along = self._measured
         size = np.maximum(np.abs(along), self.settings.least_speed)
         return np.asarray((surface * ratio - along) / size)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -57,7 +58,8 @@ def tire_parameters(found: Identification, direction: str) -> dict[str, Identifi
         source = where if yes else f"not excited by {', '.join(found.logs)}; {prior}"
         return Identified(value, unit, interval if yes else None, yes, fit.samples, source, _finite(half))
 
-    half0 = fit.factor * fit.deviation(slip_stiffness=1.0, relaxation_length=-1.0)
+    factor = max(fit.factors[name] for name in ("slip_stiffness", "relaxation_length"))
+    half0 = factor * fit.deviation(slip_stiffness=1.0, relaxation_length=-1.0)
     if not (stiff and relaxed):
         half0 = max(fit.half["slip_stiffness"], fit.half["relaxation_length"])
     sigma0 = ratio * kappa
@@ -72,7 +74,7 @@ def tire_parameters(found: Identification, direction: str) -> dict[str, Identifi
         ),
         "kappa": entry(kappa, "1/m", (1 / high, 1 / max(low, 1e-9)), relaxed, fit.half["relaxation_length"], f"prior: {base}"),
         "sigma0": entry(
-            sigma0, "1/m", (sigma0 * np.exp(-half0), sigma0 * np.exp(min(half0, 300.0))), stiff and relaxed, half0,
+            sigma0, "1/m", (sigma0 * math.exp(-half0), sigma0 * math.exp(min(half0, 300.0))), stiff and relaxed, half0,
             follows if stiff != relaxed else f"prior: {base}",
         ),
         "sigma1": entry(time * sigma0, "s/m", _times(fit.interval("damping_time"), sigma0), damped, half1, keeps),
@@ -83,7 +85,8 @@ def tire_parameters(found: Identification, direction: str) -> dict[str, Identifi
         "saturation": Identified(
             fit.value("saturation") if fit.excited["saturation"] else 0.0, "1",
             fit.interval("saturation") if fit.excited["saturation"] else None, fit.excited["saturation"], fit.samples,
-            "1/(theta g) of this road" if fit.excited["saturation"] else "not excited; linear within the slip limit",
+            "1/(theta g) of this road, if the tire bends as LuGre does" if fit.excited["saturation"]
+            else "not told from 0; the curve bends with the square of the force",
         ),
     }  # fmt: skip
 

@@ -30,8 +30,10 @@ class Prefilter:
         self.start = self.memory // 3  # a run starts at rest at its first sample: only its slope is forgotten
         self.correlation = max(1, int(np.ceil(2 * lag / step)))
         denominator = [lag**2, 2 * lag, 1.0]
-        self._smooth = bilinear([1.0], denominator, fs=1.0 / step)
-        self._rate = bilinear([1.0, 0.0], denominator, fs=1.0 / step)
+        smooth = bilinear([1.0], denominator, fs=1.0 / step)
+        rate = bilinear([1.0, 0.0], denominator, fs=1.0 / step)
+        self._smooth = (*smooth, lfilter_zi(*smooth))
+        self._rate = (*rate, lfilter_zi(*rate))
 
     def smooth(self, value: Array) -> Array:
         """F[value] of (n,) or (n, k); NaN outside the runs."""
@@ -40,6 +42,16 @@ class Prefilter:
     def rate(self, value: Array) -> Array:
         """D[value] = F[d value/dt], per second."""
         return self._apply(self._rate, value)
+
+    def power(self, variance: Array) -> Array:
+        """Variance of F[noise], noise independent from sample to sample with this ``variance`` (n,)."""
+        pulse = np.zeros(2 * self.memory)
+        pulse[0] = 1.0
+        weights = lfilter(*self._smooth[:2], pulse) ** 2
+        out = np.full(variance.shape, np.nan)
+        for run in self.runs:
+            out[run] = lfilter(weights, [1.0], variance[run])
+        return out
 
     def settled(self, bad: Mask) -> Mask:
         """Where neither a bad sample (n,) or (n, k) nor the start of a run is remembered."""
@@ -53,10 +65,9 @@ class Prefilter:
             out[run.start : run.start + self.start] = False
         return out
 
-    def _apply(self, filter_: tuple[Array, Array], value: Array) -> Array:
-        numerator, denominator = filter_
+    def _apply(self, filter_: tuple[Array, Array, Array], value: Array) -> Array:
+        numerator, denominator, rest = filter_
         out = np.full(value.shape, np.nan)
-        rest = lfilter_zi(numerator, denominator)
         for run in self.runs:
             part = value[run]
             start = rest.reshape(-1, *[1] * (part.ndim - 1)) * part[:1]
@@ -75,4 +86,20 @@ def first_order_lag(value: Array, step: float, lag: float, runs: list[slice]) ->
         part = value[run]
         # y[k] = a y[k-1] + (b - a) x[k-1] + (1 - b) x[k]; at rest before the run
         out[run] = lfilter([1 - b, b - a], [1.0, -a], part, axis=0, zi=b * part[:1])[0]
+    return out
+
+
+def pitched(value: Array, step: float, frequency: float, damping: float, runs: list[slice]) -> Array:
+    """(2 z w s + w^2)/(s^2 + 2 z w s + w^2) of (n, k), w = 2 pi ``frequency`` in Hz, by the trapezoidal rule; at rest before.
+
+    scipy's `bilinear` takes general polynomials and two hundred times as long, inside a fit.
+    """
+    k, w = 2 / step, 2 * np.pi * frequency
+    damped, square = 2 * damping * w * k, w**2
+    numerator = [square + damped, 2 * square, square - damped]
+    denominator = [k**2 + damped + square, 2 * (square - k**2), k**2 - damped + square]
+    out = np.full(value.shape, np.nan)
+    for run in runs:
+        rest = value[run][:1]
+        out[run] = rest + lfilter(numerator, denominator, value[run] - rest, axis=0)
     return out

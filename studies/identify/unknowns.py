@@ -19,7 +19,8 @@ class Unknown:
     measurement (nuisances, and what the catalogue knows well: radii); without it the data alone decide, and where they
     say less than the prior, the parameter is held there: it then adds ``considered`` times its spread to the intervals of
     the others. ``width`` is the largest half width of the confidence interval in x (times |x| if ``relative``) at which it
-    counts as identified; ``reach`` bounds x; ``starts`` are further x to start from.
+    counts as identified; it is held as well where it is not ``apart`` half widths from the prior; ``reach`` bounds x;
+    ``starts`` are further x to start from.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Unknown:
     informed: bool = True
     relative: bool = False
     considered: float = 1.0
+    apart: float = 0.0
     starts: tuple[float, ...] = ()
 
     def value(self, x: float) -> float:
@@ -53,7 +55,10 @@ class Unknown:
 
     def silence(self, x: float, half: float) -> float:
         """Half width over that of the prior: above 1 the log says less than the prior; infinite at a bound."""
-        return math.inf if self.stuck(x) else half / (2.0 * self.spread)
+        if self.stuck(x):
+            return math.inf
+        near = self.apart * half / max(abs(x - self.home), 1e-12) if self.apart else 0.0
+        return max(half / (2.0 * self.spread), near)
 
 
 @dataclass(frozen=True)
@@ -61,10 +66,10 @@ class Estimate:
     """``x`` and ``covariance`` of all unknowns (held ones: prior and spread), and which of them the log ``excited``.
 
     ``half`` are the half widths of the confidence intervals in x: for a held unknown the one at which it was refused.
-    ``residual`` (n, k) is NaN where nothing was used, ``rms`` its size, ``correlation`` its correlation time in samples,
-    ``freedom`` the degrees of freedom left. ``singular_values`` are those of the Jacobian of all unknowns at the first fit,
-    each column times its spread, over the residual size times the root of the correlation time: below 1 the log says less
-    in that direction than the prior.
+    ``factors`` are half widths over standard deviations. ``residual`` (n, k) is NaN where nothing was used, ``rms`` its size,
+    ``correlation`` its correlation time in samples, ``freedom`` the degrees of freedom left. ``singular_values`` are those of
+    the Jacobian of all unknowns at the first fit, each column times its spread, over the residual size times the root of the
+    correlation time: below 1 the log says less in that direction than the prior.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -77,7 +82,7 @@ class Estimate:
     rms: float
     correlation: float
     freedom: float
-    factor: float
+    factors: dict[str, float]
     singular_values: tuple[float, ...]
 
     def index(self, name: str) -> int:

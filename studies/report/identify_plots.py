@@ -72,11 +72,11 @@ def _force(ax: Axes, limited: LimitedFit) -> None:
     near = np.abs(slip) <= 2 * limited.limit
     ax.plot(slip[near & ~used], mu[near & ~used], ".", color=LEFT_OUT, markersize=2, label="left out")
     ax.plot(slip[used], mu[used], ".", color=USED, markersize=2, label="used")
-    grid = np.linspace(-limited.limit, limited.limit, 101)
-    stiffness = values["slip_stiffness"]
-    ax.plot(
-        grid, stiffness * grid / (1 + values["saturation"] * stiffness * np.abs(grid)), color=LINE, label="fit, steady"
-    )
+    force = np.linspace(-1.5, 1.5, 601)
+    left = 1 - values["saturation"] * np.abs(force) - values["bend"] * force**2
+    steady = force / (values["slip_stiffness"] * np.maximum(left, 0.1))
+    shown = np.abs(steady) <= limited.limit
+    ax.plot(steady[shown], force[shown], color=LINE, label="fit, steady")
     _label(ax, "slip (1)", "normalised force (1)")
     ax.legend(frameon=False, fontsize=7, markerscale=4)
 

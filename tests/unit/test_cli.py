@@ -133,6 +133,16 @@ def test_output_folder_that_cannot_be_made(tmp_path: Path, capsys: pytest.Captur
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
 
 
+@pytest.mark.parametrize("command", ["run", "identify"])
+def test_an_output_that_is_a_file_is_refused_before_anything_is_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    (tmp_path / "file").write_text("")
+    missing = [str(tmp_path / "no-such-log.csv"), "--drive", str(tmp_path / "no-such-drive.toml")]
+    assert main([command, *missing, "--out", str(tmp_path / "file")]) == 2
+    assert "cannot be a folder for results (file is a file)" in capsys.readouterr().err
+
+
 def test_killed_in_the_middle_leaves_whole_files(tmp_path: Path) -> None:
     """kill -9 at several moments: what is in the folder is either the old file or the new one, never half of one."""
     name = "longitudinal-speed"

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from studies.commands.identify import run_identify
-from studies.identify.autocorrelation import correlation_time
+from studies.identify.autocorrelation import correlation_time, effective_stretches
 from studies.identify.errors import IdentifyError
 from studies.identify.estimate import Rules, estimate
 from studies.identify.identify import identify_drive
-from studies.identify.prefilter import Prefilter, first_order_lag
+from studies.identify.parameters import tire_parameters
+from studies.identify.prefilter import Prefilter, first_order_lag, pitched
 from studies.identify.settings import IdentifySettings
 from studies.identify.unknowns import Unknown
 from studies.spec import load_spec
@@ -60,13 +61,22 @@ def test_every_file_is_there_and_nothing_else(written: Path) -> None:
     assert set(entry) == {"value", "unit", "interval", "excited", "samples", "source", "half_width"}
 
 
-def test_closed_form_gives_the_slip_stiffness(written: Path) -> None:
-    stiffness = json.loads((written / "identification.json").read_text())["parameters"]["longitudinal"][
-        "slip_stiffness"
-    ]
-    assert stiffness["excited"]
-    assert stiffness["value"] == pytest.approx(SIGMA0 / KAPPA, rel=0.03)
-    assert stiffness["interval"][0] < SIGMA0 / KAPPA < stiffness["interval"][1]
+def test_closed_form_of_a_linear_tire_gives_the_slip_stiffness(tmp_path: Path) -> None:
+    linear = IdentifySettings(bend=1e-6, bend_spread=1e-2, curvature=1e-2)
+    log, drive = write_log(tmp_path / "log.csv", rolling()), write_drive(tmp_path, WITH_TORQUE)
+    stiffness = tire_parameters(identify_drive([log], drive, settings=linear), "longitudinal")["slip_stiffness"]
+    assert stiffness.interval is not None
+    assert stiffness.value == pytest.approx(SIGMA0 / KAPPA, rel=0.03)
+    assert stiffness.interval[0] < SIGMA0 / KAPPA < stiffness.interval[1]
+
+
+def test_one_level_of_high_force_does_not_tell_the_slope_at_the_origin(written: Path) -> None:
+    """At mu = 0.6 curves of tires differ by a third: a secant is all that this log has."""
+    content = json.loads((written / "identification.json").read_text())
+    stiffness = content["parameters"]["longitudinal"]["slip_stiffness"]
+    assert not stiffness["excited"]
+    assert stiffness["half_width"] > 0.2
+    assert any(line.startswith("longitudinal slip_stiffness: not excited") for line in content["warnings"])
 
 
 def test_parameter_file_feeds_the_schedules(written: Path) -> None:
@@ -138,6 +148,25 @@ def test_lag_of_a_ramp_is_late_by_the_lag() -> None:
     ramp = np.arange(0.0, 3.0, 0.005)[:, None]
     late = first_order_lag(ramp, 0.005, 0.1, [slice(0, len(ramp))])
     np.testing.assert_allclose(ramp[-1] - late[-1], 0.1, atol=1e-6)
+
+
+def test_pitching_follows_its_differential_equation() -> None:
+    """Step response of (2 z w s + w^2)/(s^2 + 2 z w s + w^2): 1 - exp(-z w t)(cos w_d t - z w/w_d sin w_d t)."""
+    t, w, z = np.arange(0.0, 3.0, 0.005), 2 * np.pi * 1.5, 0.4
+    damped = w * math.sqrt(1 - z**2)
+    exact = 1 - np.exp(-z * w * t) * (np.cos(damped * t) - z * w / damped * np.sin(damped * t))
+    step = np.concatenate([[0.0], np.ones(t.size)])[:, None]  # trapezoidal: the jump is half a sample before t = 0
+    moved = pitched(step, 0.005, 1.5, z, [slice(0, len(step))])[1:, 0]
+    assert np.abs(moved - np.interp(t + 0.0025, t, exact)).max() < 5e-3
+
+
+def test_stretches_count_experiments_and_not_samples() -> None:
+    even = np.ones((1000, 1))
+    jump = np.zeros((1000, 1))
+    jump[500:510] = 1.0
+    rows = np.arange(1000)
+    both = effective_stretches(np.hstack([even, jump]), rows, 50)
+    np.testing.assert_allclose(both, [20.0, 1.0])
 
 
 def test_correlation_time_of_white_and_of_autoregressive_noise() -> None:

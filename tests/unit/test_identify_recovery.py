@@ -131,7 +131,7 @@ def steering(t: float) -> float:
 
 @cache
 def steered(seconds: float = 12.0, speed: float = 6.0) -> dict[str, Array]:
-    """Single track at constant V_x with LuGre axles; slow, because at speed relaxation and damping look alike."""
+    """Two axles at constant V_x, LuGre, side forces shared by load; slow: at speed relaxation and damping look alike."""
     sigma0 = LATERAL["C"] * LATERAL["kappa"]
     sigma1 = 0.81 / 181.5 * sigma0  # the damping time of the base set, which a slow drive cannot tell
     arms = np.array([FRONT, -REAR])
@@ -148,7 +148,9 @@ def steered(seconds: float = 12.0, speed: float = 6.0) -> dict[str, Array]:
 
     def rate(t: float, x: Array) -> Array:
         side, dz = forces(t, x)
-        return np.concatenate([[side.sum() / MASS - x[1] * speed, arms @ side / YAW], dz])
+        # the outer wheel has most of the side force of the steered axle, and pulls it back
+        outward = -HEIGHT * side.sum() / (MASS * GRAVITY) * side[0] * np.tan(steering(t))
+        return np.concatenate([[side.sum() / MASS - x[1] * speed, (arms @ side + outward) / YAW], dz])
 
     n = round(seconds / STEP)
     states = heun(rate, np.zeros(4), n)
@@ -179,10 +181,10 @@ def identified(table: dict[str, Array], seed: int) -> Identification:
 
 
 def covers(entries: list[Identified], truth: float) -> bool:
-    """Excited in at least 8 of 10 seeds, and of those at least 90 % with the truth in the interval."""
+    """Excited in at least 8 of 10 seeds, and of those 80 % with the truth inside: 95 % intervals fail 10 with 1.2 %."""
     intervals = [entry.interval for entry in entries if entry.excited and entry.interval is not None]
     inside = sum(low <= truth <= high for low, high in intervals)
-    return len(intervals) >= 0.8 * len(entries) and inside >= 0.9 * len(intervals)
+    return len(intervals) >= 0.8 * len(entries) and inside >= 0.8 * len(intervals)
 
 
 @pytest.fixture(scope="module")
