@@ -146,8 +146,7 @@ class LateralForceEstimator(Renewable):
                 raise_flag(flags, any_missing(lost, shape), Flag.MISSING_INPUT)
         unseen = None
         if not quiet(y, limits.ACCELERATION):
-            missing = np.absolute(y) > _LARGEST
-            missing |= np.isnan(y)
+            missing = ~(np.absolute(y) <= _LARGEST)  # True for NaN
             y[missing] = np.nan
             raise_flag(flags, any_missing(missing, shape), Flag.MISSING_MEASUREMENT)
             unseen = any_missing(missing[..., 1:], shape)

@@ -27,7 +27,6 @@ PROCESS = (1e-4, 1e-2, 1e-4, 1e5, 1e5, 1e5, 1e5, 1e7)
 MEASUREMENT = (4e-6, 4e-2, 2.5e-3, 2.5e-3)  # (rad/s)^2, (m/s)^2, (m/s^2)^2, (m/s^2)^2
 INITIAL = (1e-2, 400.0, 1e-2, 1e6, 1e6, 1e6, 1e6, 1e6)
 STEERING_LIMIT = 1.0  # rad, of the front wheels
-LOAD_LIMIT = 1e5  # N
 _MOST = 100.0  # times its initial variance: an entry that knows so little starts again
 _IMPOSSIBLE = np.array([limits.YAW_RATE, limits.SPEED, limits.ACCELERATION, limits.ACCELERATION])  # of the measurement
 _CHUNK = 1000  # batch entries worked on at once: their sigma points stay in the cache
@@ -108,7 +107,7 @@ class FourWheelObserver:
         ]
         static = np.tile(vehicle.static_loads, (self._count, 1))
         self._steering = HeldInput("steering", np.zeros(self._count), -STEERING_LIMIT, STEERING_LIMIT)
-        self._loads = HeldInput("loads", static, 0.0, LOAD_LIMIT, axes=1)
+        self._loads = HeldInput("loads", static, 0.0, limits.FORCE, axes=1)
         self._renewed = np.zeros(self._count, dtype=np.bool_)
         self._memory = Workspace()
         self._before: list[FourWheelModel] | None = None  # at the inputs of the previous sample

@@ -7,18 +7,13 @@ again from what they see. What is known of sensors and tires stays.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
-import numpy.typing as npt
-
-from estimators.signals.memory import Memory
 from estimators.velocity.arithmetic import Number, Signals, arithmetic
+from estimators.velocity.cars_memory import CarsMemory
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.lateral_fusion import AxleVerdict, LateralFusion
 
 
-class FusionAdrift(Memory):
+class FusionAdrift(CarsMemory):
     """Counts how long unloaded axles have contradicted V_y of `count` cars."""
 
     memory = ("astray",)
@@ -26,13 +21,6 @@ class FusionAdrift(Memory):
     def __init__(self, settings: FusionSettings, across: LateralFusion, count: int) -> None:
         self.settings, self.across, self.kit = settings, across, arithmetic((count,))
         self.astray: Number = self.kit.full(0.0)  # s
-
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        self.astray = self.kit.own(saved["astray"].copy())
-
-    def forget(self, where: Number) -> None:
-        """Starts the cars `where` afresh."""
-        self.astray = self.kit.where(where, 0.0, self.astray)
 
     def __call__(self, elapsed: Number, speed: Number, axle: AxleVerdict, usable: Signals) -> Number:
         """Sets V_y of the cars that are lost, and says which these are; `speed` V_x, `usable`: the axle does not slip."""

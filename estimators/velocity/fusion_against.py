@@ -9,20 +9,15 @@ these are unknown, forces are shares of a_x, and an a_x that points to the wrong
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
-import numpy.typing as npt
-
-from estimators.signals.memory import Memory
 from estimators.velocity.arithmetic import Number, Signals, arithmetic
+from estimators.velocity.cars_memory import CarsMemory
 from estimators.velocity.fusion_screen import Screened
 from estimators.velocity.longitudinal_fusion import SLIP, SPEED, LongitudinalFusion
 
 _FAR = 1e9
 
 
-class FusionAgainst(Memory):
+class FusionAgainst(CarsMemory):
     """Remembers of `count` cars for how long a_x is not to be believed."""
 
     memory = ("left",)
@@ -31,13 +26,6 @@ class FusionAgainst(Memory):
         self.along, self.settings, self.kit = along, along.settings, arithmetic((count,))
         self._zero = self.kit.full(0.0)
         self.left: Number = self._zero  # s for which a_x is not believed
-
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        self.left = self.kit.own(saved["left"].copy())
-
-    def forget(self, where: Number) -> None:
-        """Starts the cars `where` afresh."""
-        self.left = self.kit.where(where, 0.0, self.left)
 
     def __call__(self, elapsed: Number, seen: Screened, innovation: Signals, mu: Signals) -> None:
         """`innovation` of the wheels, m/s, from which slip as their forces `mu` make it has been taken."""

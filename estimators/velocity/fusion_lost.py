@@ -13,13 +13,8 @@ stands beyond doubt for `lost_time` while its estimate moves is lost too; a slid
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
-import numpy.typing as npt
-
-from estimators.signals.memory import Memory
 from estimators.velocity.arithmetic import Number, Signals, arithmetic
+from estimators.velocity.cars_memory import CarsMemory
 from estimators.velocity.fusion_screen import Screened
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.longitudinal_fusion import WheelVerdict
@@ -28,7 +23,7 @@ _PATIENCE = 0.1  # pace of the clock where the force could explain the wheels
 _FAR = 1e9
 
 
-class FusionLost(Memory):
+class FusionLost(CarsMemory):
     """Counts how long the wheels of `count` cars have contradicted the estimate as rolling wheels do."""
 
     memory = ("astray", "since", "apart", "supported")
@@ -40,15 +35,6 @@ class FusionLost(Memory):
         self.since: Number = zero  # s since it began
         self.apart: Number = zero  # m/s between the wheels and the prediction when it began
         self.supported: Number = zero  # s of standstill, or of wheels that turned and were used
-
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        for name in self.memory:
-            setattr(self, name, self.kit.own(saved[name].copy()))
-
-    def forget(self, where: Number) -> None:
-        """Starts the cars `where` afresh."""
-        for name in self.memory:
-            setattr(self, name, self.kit.where(where, 0.0, getattr(self, name)))
 
     def __call__(
         self,

@@ -16,13 +16,11 @@ from typing import Any, NamedTuple
 import numpy.typing as npt
 
 from estimators.faults import Flag
+from estimators.signals import limits
 from estimators.signals.memory import Memory
 from estimators.velocity.arithmetic import Number, Signals, arithmetic, kept_signals
 from estimators.velocity.fusion_settings import FusionSettings
 
-_LIMITS = (100.0, 100.0, 20.0)  # m/s^2, m/s^2, rad/s: beyond, a signal is not that of a car
-_LARGEST_WHEEL_SPEED = 1000.0  # rad/s
-_LARGEST_STEER = 1.5  # rad
 _LONGEST_RUN = 40.0  # samples a signal may repeat before it counts as stale; its noise grows no further
 _MISSING_INPUT, _OUT_OF_RANGE = int(Flag.MISSING_INPUT), int(Flag.PARAMETER_OUT_OF_RANGE)
 _MISSING, _STALE = int(Flag.MISSING_MEASUREMENT), int(Flag.STALE_MEASUREMENT)
@@ -56,7 +54,7 @@ class FusionScreen(Memory):
         s = self.settings = settings
         self.radius, self.count = radius, count
         self.kit = kit = arithmetic((count,))
-        self._limits = kit.signals(_LIMITS)
+        self._limits = kit.signals((limits.ACCELERATION, limits.ACCELERATION, limits.YAW_RATE))
         self._quiet = kit.signals((s.acceleration_noise, s.acceleration_noise, s.yaw_rate_noise))
         self._loud = kit.signals((s.missing_acceleration, s.missing_acceleration, s.missing_yaw_rate))
         three, four = kit.signals((0.0,) * 3), kit.signals((0.0,) * 4)
@@ -101,7 +99,7 @@ class FusionScreen(Memory):
             blind = gone[1] | gone[2]  # a_y without r, or r without a_y, misleads V_y
             lost = zip((gone[0], blind, blind), value, strict=True)
             value = kit.stacked([choose(nothing, 0.0, v) for nothing, v in lost])
-        (turned,) = kit.each(lambda angle: (abs(angle) <= _LARGEST_STEER,), steer)
+        (turned,) = kit.each(lambda angle: (abs(angle) <= limits.ANGLE,), steer)
         steered = turned[0] & turned[1] & turned[2] & turned[3]
         if some(no(steered)):
             flags = flags | choose(steered, 0, _MISSING_INPUT)
@@ -112,7 +110,7 @@ class FusionScreen(Memory):
         self.inertial, self.run = value, run
 
         def wheel(new: Number, before: Number, age: Number, slope: Number, radius: Number) -> tuple[Number, ...]:
-            good = abs(new) <= _LARGEST_WHEEL_SPEED
+            good = abs(new) <= limits.WHEEL_SPEED
             gap, still = age + elapsed, abs(radius * new) < self.settings.still_speed
             fresh = good & ((new != before) | still | (gap >= self.settings.error_memory))
             known = abs(before) < math.inf  # NaN: never seen

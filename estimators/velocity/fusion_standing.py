@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
-import numpy.typing as npt
-
-from estimators.signals.memory import Memory
 from estimators.velocity.arithmetic import Number, Signals, arithmetic
+from estimators.velocity.cars_memory import CarsMemory
 from estimators.velocity.fusion_screen import Screened
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.lateral_fusion import YAW_BIAS, LateralFusion
 from estimators.velocity.longitudinal_fusion import SPEED, LongitudinalFusion
 
 
-class FusionStanding(Memory):
+class FusionStanding(CarsMemory):
     """Counts how long `count` cars have been calm; the two filters say how calm is calm."""
 
     memory = ("calm",)
@@ -25,13 +20,6 @@ class FusionStanding(Memory):
         self._along, self._across = along, across
         self._zero, self._never = self.kit.full(0.0), self.kit.full(False)
         self.calm: Number = self._zero  # s of silent wheels and calm body
-
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        self.calm = self.kit.own(saved["calm"].copy())
-
-    def forget(self, where: Number) -> None:
-        """Starts the cars `where` afresh."""
-        self.calm = self.kit.where(where, 0.0, self.calm)
 
     def __call__(self, seen: Screened, ax: Number, turn: Number, elapsed: Number) -> tuple[Number, Number]:
         """Whether the car stands; and whether it does for so long that an estimate which moves must be lost."""

@@ -19,19 +19,16 @@ that is not believed teaches bias, scale or grade.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy.typing as npt
-
-from estimators.signals.memory import Memory
+from estimators.signals import limits
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity.arithmetic import Number, Signals, arithmetic
+from estimators.velocity.cars_memory import CarsMemory
 from estimators.velocity.fusion_screen import Screened
 from estimators.velocity.longitudinal_fusion import BIAS, SCALE, LongitudinalFusion
 
-_LARGEST_FRICTION = 1.5  # a larger |F/F_z| is no tire's
-STRONGEST = _LARGEST_FRICTION * GRAVITY  # m/s^2 of a car on its tires
+STRONGEST = limits.FRICTION * GRAVITY  # m/s^2 of a car on its tires
 _UNDECIDED, _FORCES, _UNIT = 0.45, 0.35, 0.5  # how far from a_F towards a_x the wheels are: neither, with a_F, with a_x
 
 
@@ -46,7 +43,7 @@ class Thrust(NamedTuple):
     mu: Signals  # F_x/F_z of the wheels, of a size that a tire can have; shares of a_x where unknown
 
 
-class FusionThrust(Memory):
+class FusionThrust(CarsMemory):
     """Remembers how far a_x, forces and wheels of `count` cars are apart."""
 
     memory = ("gap", "apart", "since")
@@ -60,15 +57,6 @@ class FusionThrust(Memory):
         self.gap: Number = self._zero  # m/s^2, a_x - a_F, low-passed
         self.apart: Number = self._zero  # m/s^2, wheels - a_F, low-passed since the contradiction began
         self.since: Number = self._zero  # s since it began
-
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        for name in self.memory:
-            setattr(self, name, self.kit.own(saved[name].copy()))
-
-    def forget(self, where: Number) -> None:
-        """Starts the cars `where` afresh."""
-        for name in self.memory:
-            setattr(self, name, self.kit.where(where, 0.0, getattr(self, name)))
 
     def __call__(
         self, elapsed: Number, seen: Screened, given: Signals | None, slope: Signals, disproved: Number
@@ -132,17 +120,17 @@ class FusionThrust(Memory):
         """F_x/F_z, of a size that a tire can have, a_x/g where unknown: the same share; and whether all were known."""
         kit, x = self.kit, self.along.filter.mean
         share = (reading * (1.0 - x[SCALE]) - x[BIAS]) / GRAVITY
-        share = kit.maximum(kit.minimum(share, _LARGEST_FRICTION), -_LARGEST_FRICTION)
+        share = kit.maximum(kit.minimum(share, limits.FRICTION), -limits.FRICTION)
         if given is None:
             return kit.stacked((share,) * 4), self._never
-        (usual,) = kit.each(lambda mu: (abs(mu) <= _LARGEST_FRICTION,), given)
+        (usual,) = kit.each(lambda mu: (abs(mu) <= limits.FRICTION,), given)
         all_usual = usual[0] & usual[1] & usual[2] & usual[3]
         if not kit.some(kit.no(all_usual)):
             return given, all_usual
 
         def limited(mu: Number) -> tuple[Number, ...]:
-            size = kit.maximum(kit.minimum(mu, _LARGEST_FRICTION), -_LARGEST_FRICTION)
-            return kit.where(abs(mu) < math.inf, size, share), abs(mu) <= 2.0 * _LARGEST_FRICTION
+            size = kit.maximum(kit.minimum(mu, limits.FRICTION), -limits.FRICTION)
+            return kit.where(abs(mu) < math.inf, size, share), abs(mu) <= 2.0 * limits.FRICTION
 
         mu, known = kit.each(limited, given)
         return mu, known[0] & known[1] & known[2] & known[3]

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimators.signals import limits
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity.arithmetic import Number, Signals, arithmetic
 from estimators.velocity.fusion_settings import FusionSettings
@@ -29,7 +30,6 @@ SIZE = 10
 _MOVING = (BIAS, BANK, YAW_BIAS, SCALE, TURN_SCALE)
 _SEEN = tuple((SPEED, BIAS, YAW_BIAS, SCALE, TURN_SCALE, TIRES + 2 * axle, TIRES + 2 * axle + 1) for axle in (0, 1))
 _STILL = ((SPEED, TURN_SCALE), (YAW_BIAS, TURN_SCALE))
-_LARGEST_FRICTION = 1.5  # a larger |mu| is no tire's
 
 
 class AxleVerdict(NamedTuple):
@@ -123,7 +123,7 @@ class LateralFusion:
         ) -> tuple[Number, ...]:
             load = largest(share * GRAVITY + tilt * acceleration, 0.1 * GRAVITY * share)
             mu = (share * own + spin * yaw_acceleration) / load
-            mu = largest(smallest(mu, _LARGEST_FRICTION), -_LARGEST_FRICTION)
+            mu = largest(smallest(mu, limits.FRICTION), -limits.FRICTION)
             square = mu * mu
             side, linear = (c1 + c3 * square) * mu, pace * mu
             innovation = speed * kit.tan(angle) - left - arm * turn - pace * side

@@ -20,10 +20,9 @@ from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.interpolate import FloatArray
 from estimators.phi import phi
+from estimators.signals import limits
 from estimators.signals.checks import any_missing, batch, entries, mask, setting
 from estimators.signals.memory import Memory
-
-_LARGEST_FORCE = 1e6  # N: beyond, it is not that of a tire
 
 
 @dataclass(frozen=True)
@@ -90,7 +89,7 @@ class SuspensionCompliance(Memory):
         """
         shape = (*self.batch_shape, 4)
         force = np.stack([entries(force_x, shape, "force_x"), entries(force_y, shape, "force_y")], axis=-1)
-        good: BoolArray = np.absolute(force) < _LARGEST_FORCE
+        good: BoolArray = np.absolute(force) <= limits.FORCE
         flags: FlagArray = np.zeros(shape, dtype=np.int32)
         raise_flag(flags, any_missing(~good, shape), Flag.MISSING_INPUT)
         self.force = np.where(good, force, self.force)
