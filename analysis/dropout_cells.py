@@ -1,14 +1,16 @@
 r"""Bounds between grid points: a matrix inequality with matrix exponentials, checked on a whole cell of the parameter.
 
-On a cell w = low + h t, t in [0, 1], inside one segment of the table, the exponent of each update is a matrix polynomial
-M(t) = c_0 + c_1 t + ... (plant and linear gains), and with m1 >= |M'|, m2 >= |M''|, beta >= |e^{s M(t)}| for s in [0, 1]
+On a cell w = low + h t, t in [0, 1], inside one segment of the table, each update is Phi(t) = e^{M(t)} + G(t), both matrix
+polynomials in t (plant and linear gains): G = 0 and M = T A for a dropped sample; M = T (A - L C) for a received one, or,
+where the gains correct once a sample, M = T A and G = -K C. With m1 >= |M'|, m2 >= |M''|, g1 >= |G'|, g2 >= |G''| and
+beta >= |e^{s M(t)}| for s in [0, 1]
 
-    |Phi'| <= beta^2 m1,    |Phi''| <= beta^2 m2 + beta^3 m1^2,    Phi = e^M,
+    |Phi'| <= beta^2 m1 + g1,    |Phi''| <= beta^2 m2 + beta^3 m1^2 + g2,    |Phi| <= beta + |G|,    |Phi| <= |Phi(0)| + |Phi'|,
 
 from d e^M = int_0^1 e^{(1-s) M} dM e^{s M} ds and its derivative. Linear interpolation of Phi' P Phi errs by at most 1/8 of its
 second derivative, |P| (2 |Phi| |Phi''| + 2 |Phi'|^2) / 8: if an inequality that is linear in t otherwise holds at both ends of
 the cell by more than that, it holds inside. beta comes from samples of s and the logarithmic norm mu between them,
-|e^{(s + r) M}| <= |e^{s M}| e^{r mu}, and from c_0 to M(t) by Gronwall: beta e^{beta |M(t) - c_0|}.
+|e^{(s + r) M}| <= |e^{s M}| e^{r mu}, and from M(0) to M(t) by Gronwall: beta e^{beta |M(t) - M(0)|}.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from estimators.schedule import GainSchedule, PlantPolynomial
 from synthesis.polynomials.matrix import FloatArray
 
 SAMPLES = 32  # of s in the bound on e^{s M}
+_HOPELESS = 1e100  # a bound that proves nothing: larger ones overflow
 ROUNDING = 1e-10  # relative guard for the rounding of exponentials and eigenvalues
 
 
@@ -39,52 +42,88 @@ class Cells:
         return Cells(np.concatenate([low, middle]), np.concatenate([middle, high]))
 
 
-def exponents(schedule: GainSchedule, cells: Cells, scale: FloatArray) -> FloatArray:
-    """Coefficients (2, c, degree+1, n, n) in t of T A (dropped) and T (A - L C) (received), states scaled: S M S^-1."""
+@dataclass(frozen=True)
+class CellUpdates:
+    """Coefficients in t, lowest first, of `exponent` M and `added` G, (2 updates: dropped and received, c, degree+1, n, n)."""
+
+    exponent: FloatArray
+    added: FloatArray
+
+
+def cell_updates(schedule: GainSchedule, cells: Cells, scale: FloatArray) -> CellUpdates:
+    """Both updates of the runtime on every cell, states scaled: S M S^-1, S G S^-1."""
     A, C = (_local(schedule.plant[key], cells) for key in ("A", "C"))
     ends = schedule.gain(np.stack([cells.low, cells.high], axis=1))
     gain = np.stack([ends[:, 0], ends[:, 1] - ends[:, 0]], axis=1)
-    degree = max(A.shape[1], C.shape[1] + 1)
-    out = np.zeros((2, len(cells.low), degree, *A.shape[-2:]))
-    out[:, :, : A.shape[1]] = A
+    corrected = np.zeros((len(cells.low), C.shape[1] + 1, *A.shape[-2:]))  # -L C or -K C
     for power in (0, 1):
-        out[1, :, power : power + C.shape[1]] -= gain[:, power, None] @ C
-    return np.asarray(schedule.sample_time * (scale @ out @ np.linalg.inv(scale)))
+        corrected[:, power : power + C.shape[1]] -= gain[:, power, None] @ C
+    exponent = np.zeros((2, len(cells.low), max(A.shape[1], corrected.shape[1]), *A.shape[-2:]))
+    added = np.zeros((2, *corrected.shape))
+    exponent[:, :, : A.shape[1]] = schedule.sample_time * A
+    if schedule.update == "sampled":
+        added[1] = corrected
+    else:
+        exponent[1, :, : corrected.shape[1]] += schedule.sample_time * corrected
+    back = np.linalg.inv(scale)
+    return CellUpdates(scale @ exponent @ back, scale @ added @ back)
 
 
 def _local(polynomial: PlantPolynomial, cells: Cells) -> FloatArray:
-    """Coefficients (c, degree+1, rows, columns) in t of a matrix polynomial in w."""
-    highest = int(polynomial.powers.max(initial=0))
-    out = np.zeros((len(cells.low), highest + 1, *polynomial.coefficients.shape[1:]))
-    for power, matrix in zip(polynomial.powers, polynomial.coefficients, strict=True):
-        binomial = np.ones(1)
-        for k in range(int(power) + 1):  # C(power, k) low^(power-k) h^k
-            weight = binomial[0] * cells.low ** (power - k) * (cells.high - cells.low) ** k
-            out[:, k] += weight[:, None, None] * matrix
-            binomial = binomial * (int(power) - k) / (k + 1)
-    return out
+    """Coefficients (c, degree+1, rows, columns) in t of a matrix polynomial in w: Clenshaw's recurrence on power series."""
+    start = (cells.low - polynomial.middle) / polynomial.half
+    slope = (cells.high - cells.low) / polynomial.half
+    count, *shape = polynomial.coefficients.shape
+
+    def times_u(series: FloatArray) -> FloatArray:  # u = start + slope t; the highest power is never needed
+        moved = start[:, None, None, None] * series
+        moved[:, 1:] += slope[:, None, None, None] * series[:, :-1]
+        return moved
+
+    here, later = np.zeros((2, len(cells.low), max(count, 1), *shape))
+    for k in range(count - 1, -1, -1):
+        here, later = (2.0 if k else 1.0) * times_u(here) - later, here
+        here[:, 0] += polynomial.coefficients[k]
+    return np.asarray(here)
 
 
-def ends(exponent: FloatArray) -> FloatArray:
+def ends(updates: CellUpdates) -> FloatArray:
     """Phi at both ends of every cell, (2 updates, 2 ends, c, n, n)."""
-    return np.asarray(expm(np.stack([exponent[:, :, 0], exponent.sum(axis=2)], axis=1)))
+    exponent, added = (np.stack([m[:, :, 0], m.sum(axis=2)], axis=1) for m in (updates.exponent, updates.added))
+    return np.asarray(expm(exponent) + added)
 
 
-def curvature(exponent: FloatArray) -> FloatArray:
-    """1/8 of a bound on |d2/dt2 Phi' P Phi| for |P| = 1, (2 updates, c)."""
-    powers = np.arange(exponent.shape[2], dtype=float)
-    size = np.linalg.norm(exponent, ord=2, axis=(-2, -1))
-    first, second = size @ powers, size @ (powers * (powers - 1.0))
-    change = size[..., 1:].sum(axis=-1)
-    start = exponent[:, :, 0]
+def curvature(updates: CellUpdates) -> FloatArray:
+    """1/8 of a bound on |d2/dt2 Phi' P Phi| for |P| = 1, (2 updates, c); at most 1e100, which proves nothing."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = _curvature(updates)
+    return np.where(found < _HOPELESS, found, _HOPELESS)  # also where it is not a number
+
+
+def _curvature(updates: CellUpdates) -> FloatArray:
+    start, added = updates.exponent[:, :, 0], updates.added[:, :, 0]
+    whole, first, second = _sizes(updates.exponent)
+    moved, first_added, second_added = _sizes(updates.added)
     growth = np.linalg.eigvalsh(0.5 * (start + np.swapaxes(start, -1, -2)))[..., -1]
     step = power = expm(start / SAMPLES)
     sampled = np.ones(start.shape[:-2])
     for _ in range(SAMPLES):
-        sampled = np.maximum(sampled, np.linalg.norm(power, ord=2, axis=(-2, -1)))
+        sampled = np.maximum(sampled, _norm(power))
         power = power @ step
     beta = sampled * np.exp(np.maximum(growth, 0.0) / SAMPLES)
-    beta = beta * np.exp(beta * change)
-    slope = beta**2 * first
-    bend = beta**2 * second + beta**3 * first**2
-    return np.asarray((2.0 * beta * bend + 2.0 * slope**2) / 8.0)
+    beta = beta * np.exp(beta * whole)
+    slope = beta**2 * first + first_added
+    bend = beta**2 * second + beta**3 * first**2 + second_added
+    size = np.minimum(_norm(expm(start) + added) + slope, beta + _norm(added) + moved)
+    return np.asarray((2.0 * size * bend + 2.0 * slope**2) / 8.0)
+
+
+def _norm(matrix: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.norm(matrix, ord=2, axis=(-2, -1)))
+
+
+def _sizes(polynomial: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Bounds on |M(t) - M(0)|, |M'| and |M''| for t in [0, 1], (2 updates, c)."""
+    powers = np.arange(polynomial.shape[2], dtype=float)
+    size = _norm(polynomial)
+    return size[..., 1:].sum(axis=-1), size @ powers, size @ (powers * (powers - 1.0))

@@ -20,7 +20,7 @@ from analysis.checks import probability
 from analysis.constant_lmi import constant_problem, matrix_of
 from analysis.coupled_lmi import weighted_sum
 from analysis.dropout import drop_radius
-from analysis.dropout_cells import ROUNDING, Cells, curvature, ends, exponents
+from analysis.dropout_cells import ROUNDING, Cells, cell_updates, curvature, ends
 from analysis.dropout_modes import schedule_drop_modes
 from analysis.dropout_schedule import FrozenDropProbability, frozen_critical_probability
 from analysis.errors import AnalysisError
@@ -111,7 +111,7 @@ def design(
     scale = _scale(schedule, p, nodes)
     points = _refined(nodes, SHARE)
     still = Cells(points, points)
-    (dropped, received) = ends(exponents(schedule, still, scale))[:, 0]
+    (dropped, received) = ends(cell_updates(schedule, still, scale))[:, 0]
     (here,), after = _weights(nodes, points), _vertices(schedule, nodes, still)
     n = scale.shape[0]
     problem = constant_problem()
@@ -146,7 +146,7 @@ def judge(schedule: GainSchedule, p: float, nodes: FloatArray, P: FloatArray, sc
         worst = int(exact.argmin())
         if exact[worst] < margin:
             margin, place = float(exact[worst]), float(waiting.low[worst])
-        open_ = value - bound <= ROUNDING
+        open_ = ~(value - bound > ROUNDING)
         count += int((~open_).sum())
         if not open_.any():
             break
@@ -162,14 +162,14 @@ def _cell_margins(
     schedule: GainSchedule, p: float, nodes: FloatArray, P: FloatArray, scale: FloatArray, cells: Cells
 ) -> tuple[FloatArray, FloatArray]:
     """Smallest eigenvalue at the ends of each cell over all vertices of the next parameter, and the allowance inside it (c,)."""
-    exponent = exponents(schedule, cells, scale)
-    phi = ends(exponent)
+    updates = cell_updates(schedule, cells, scale)
+    phi = ends(updates)
     here = np.einsum("ecb,bij->ecij", _weights(nodes, cells.low, cells.high), P)
     future = np.einsum("cvb,bij->vcij", _vertices(schedule, nodes, cells), P)
     turned = np.swapaxes(phi, -1, -2)[:, :, None] @ future @ phi[:, :, None]
     slack = here[:, None] - p * turned[0] - (1.0 - p) * turned[1]
     value = np.linalg.eigvalsh(slack)[..., 0].min(axis=(0, 1))
-    bend = curvature(exponent)
+    bend = curvature(updates)
     largest = np.linalg.eigvalsh(future)[..., -1].max(axis=0)
     return value, largest * (p * bend[0] + (1.0 - p) * bend[1])
 

@@ -8,18 +8,26 @@ from time import perf_counter
 
 from estimators.errors import ScheduleError
 from estimators.schedule import read_content
-from synthesis.verify import Proof, prove
+from estimators.schedule.checker import printable
+from estimators.schedule.files import place_of
+from synthesis.certificate.claims import written
+from synthesis.certificate.proof import Proof, certificate
+from synthesis.errors import GainsmithError
+
+LONGEST = 300  # characters of a message
+UNTIED = "format 1: constants and units are words only, tied to nothing that is proved"
 
 
 @dataclass(frozen=True)
 class Certification:
-    """One file: its proofs, or why it was refused."""
+    """One file: its proofs and what is to be said beside them, or why it was refused."""
 
     path: Path
     name: str
     proofs: tuple[Proof, ...]
     refusal: str
     seconds: float
+    remarks: tuple[str, ...] = ()
 
     @property
     def certified(self) -> bool:
@@ -34,16 +42,20 @@ class Certification:
         failed = [proof for proof in self.proofs if not proof.proved]
         if not failed:
             return f"certified: {len(self.proofs)} claims"
-        kind = "refuted: the closed loop is unstable" if failed[0].refuted else "not proved"
-        return f"{kind}: '{failed[0].claim}' at {failed[0].level:g} {failed[0].unit} fails at {failed[0].place}"
+        kind = "refuted: the loop itself breaks it" if failed[0].refuted else "not proved"
+        claim, place = printable(failed[0].claim, 90), printable(failed[0].place, 100)  # in full where claims are listed
+        return f"{kind}: '{claim}' at {written(failed[0].level)} {printable(failed[0].unit, 40)} fails at {place}"
 
 
 def certify(path: Path) -> Certification:
     """Read, check and prove one file; a file that cannot be trusted is a refusal, not an exception."""
-    start = perf_counter()
+    start, where = perf_counter(), place_of(path)
     try:
         content = read_content(path)
-        proofs = tuple(prove(content, str(path)))
-    except ScheduleError as error:
-        return Certification(path, path.stem, (), str(error), perf_counter() - start)
-    return Certification(path, str(content["name"]), proofs, "", perf_counter() - start)
+        found = certificate(content, where)
+    except (ScheduleError, GainsmithError) as error:
+        words = printable(str(error).removeprefix(f"{where}: "), LONGEST - len("refused: "))
+        return Certification(path, path.stem, (), words, perf_counter() - start)
+    remarks = [f"a parameter moving inside a sample adds to the error of {line}" for line in found.inside_sample]
+    remarks += [] if found.tied else [UNTIED]
+    return Certification(path, str(content["name"]), found.proofs, "", perf_counter() - start, tuple(remarks))

@@ -11,11 +11,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from synthesis.deploy import DeploySettings
 from synthesis.errors import SpecError, unknown
-from synthesis.hinf_observer import Channel, ObserverDesign
+from synthesis.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
 from synthesis.lmi.settings import LmiSettings
 from synthesis.models.catalogue import CATALOGUE
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
+from synthesis.sampled_observer import design_sampled_observer
 
 
 class _Strict(BaseModel):
@@ -54,8 +55,9 @@ class DesignSpec(_Strict):
 
 
 class DeploySpec(_Strict):
-    """How the gains become a table (synthesis.deploy)."""
+    """How the gains become a table (synthesis.deploy) and how they are run (synthesis.loop.observer)."""
 
+    update: Literal["held", "sampled"] = "held"
     sample_time: float
     dtype: Literal["float32", "float64"] = "float64"
     interpolation_cost: float = 0.01
@@ -67,7 +69,7 @@ class ScheduleSpec(_Strict):
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$")
     description: str
     model: ModelSpec
-    design: DesignSpec
+    gains: DesignSpec = Field(alias="design")
     deploy: DeploySpec
 
     def parameter_set(self, folder: Path | None = None) -> ParameterSet:
@@ -87,7 +89,7 @@ class ScheduleSpec(_Strict):
 
     def observer_design(self) -> ObserverDesign:
         """As the synthesis takes it."""
-        spec = self.design
+        spec = self.gains
         channels = tuple(
             Channel(tuple(c.disturbances), tuple(c.errors), c.bound, tuple(c.weights) if c.weights else None)
             for c in spec.channels
@@ -97,13 +99,22 @@ class ScheduleSpec(_Strict):
             channels, spec.degree, spec.decay_rate, spec.fastest_pole, backoff=spec.backoff, settings=settings
         )
 
+    def design(self, model: LpvModel) -> ObserverGains:
+        """The gains for the update that the specification names."""
+        if self.deploy.update == "sampled":
+            return design_sampled_observer(model, self.observer_design(), self.deploy.sample_time)
+        return design_observer(model, self.observer_design())
+
     def deploy_settings(self) -> DeploySettings:
         """As the deployment takes it."""
         return DeploySettings(self.deploy.sample_time, self.deploy.dtype, self.deploy.interpolation_cost)
 
     def resolved(self, parameters: ParameterSet) -> dict[str, Any]:
         """The specification with the parameter values in it: what the digest in a schedule file speaks of."""
-        return {**self.model_dump(mode="json"), "parameter_set": parameters.model_dump(mode="json", exclude_none=True)}
+        return {
+            **self.model_dump(mode="json", by_alias=True),
+            "parameter_set": parameters.model_dump(mode="json", exclude_none=True),
+        }
 
 
 def shipped_specs() -> dict[str, Path]:

@@ -9,20 +9,28 @@ With V = e'P(p)e, X = P L and phi = A'P + P A - X C - C'X' + dP/dt, for the erro
 The blocks have the form of (30), so one P serves all channels and weighs channel i by 1/g_i. Leaving that weight free would
 push the noise gain down to its static floor, where the gains are not determined any more (0.6075 against 0.634 on the
 longitudinal values of P1). A denominator of a rational model multiplies every inequality (it is positive on the range).
+
+Errors are measured in the size that the disturbances give them (`error_unit`), so that the answer does not depend on the units
+of disturbances and states. A level counts only if every inequality holds at it when re-evaluated.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from synthesis.certificate.refute import undetectable_place
+from synthesis.certificate.rounding import round_down, round_up
 from synthesis.errors import ProblemError, unknown
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.scaling import observer_scale
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
+from synthesis.loop.from_model import plant_of
+from synthesis.loop.observer import Update
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.matrix import FloatArray, symmetric_block
 
@@ -83,10 +91,11 @@ class ObserverDesign:
 
 @dataclass(frozen=True)
 class ObserverGains:
-    """L(p) = P(p)^-1 X(p) with the bound that was minimised.
+    """L(p) = P(p)^-1 X(p) (or K(p) = G(p)^-1 X(p) of a sampled design) with the bound that was minimised.
 
-    `gamma_lower` is a bound from below for every P and X of this degree (weak duality, margins taken out),
-    `gamma` the verified one. `result` carries verdict and margins, `optimum` the first solve.
+    `gamma_lower` is a bound from below for every P and X of this degree (weak duality, margins taken out), where there is one;
+    `gamma` the verified level. `result` carries verdict and margins, `optimum` the first solve. `update` and `sample_time` say
+    how the gains are run (`synthesis.loop.observer`).
     """
 
     design: ObserverDesign
@@ -96,6 +105,8 @@ class ObserverGains:
     result: LmiResult
     optimum: LmiResult
     scale: FloatArray
+    update: Update = "held"
+    sample_time: float | None = None
 
     @property
     def verdict(self) -> Verdict:
@@ -104,38 +115,122 @@ class ObserverGains:
 
     def gain(self, points: FloatArray) -> FloatArray:
         """L at parameter values (g,) or (g, p): array (g, nx, ny)."""
-        grid = np.asarray(points, float).reshape(-1, len(self.model.parameters))
+        count, grid = len(self.model.parameters), np.asarray(points, float)
+        grid = grid.reshape(-1, count) if count else grid.reshape(len(grid), 0)
         middle = np.array([p.middle for p in self.model.parameters])
         half = np.array([p.half_width for p in self.model.parameters])
         scaled = np.hstack([(grid - middle) / half, np.zeros_like(grid)])
-        P = self.result.values["P"].at(scaled)[..., 0]
+        left = self.result.values["G" if self.update == "sampled" else "P"].at(scaled)[..., 0]
         X = self.result.values["X"].at(scaled)[..., 0]
-        return np.asarray(np.linalg.solve(P, X) / self.scale[:, None])
+        return np.asarray(np.linalg.solve(left, X) / self.scale[:, None])
 
 
 def design_observer(model: LpvModel, design: ObserverDesign) -> ObserverGains:
-    """Minimise the open channel, then give back `backoff` of it and maximise the margin of every inequality.
+    """Minimise the open channel, then give back `backoff` of it and take the gains that vary least and keep most of the margin.
 
-    The second solve makes the gains well determined (the optimum itself is attained only at the boundary of
-    feasibility, where gains may be unbounded). Raises ProblemError if the first solve finds nothing.
+    The optimum itself is attained only at the boundary of feasibility, where gains may be unbounded, and largest margins are
+    flat: so the last step is strictly convex, and every number that is handed on is rounded to the digits that matter.
+    Raises ProblemError if nothing is found; a model with a hidden unstable mode is called undetectable.
     """
-    scale = observer_scale(model.polynomial, model.parameters)
-    problem = observer_problem(model, design, scale)
-    optimum = solve(problem, design.settings)
-    if optimum.objective is None or not optimum.margins or optimum.objective <= 0.0:
+    scale = design_scale(model, design)
+
+    def problem(gamma: float | None, maximise_margin: bool = True, floor: float = 0.0) -> LmiProblem:
+        return observer_problem(model, design, scale, gamma, maximise_margin, floor)
+
+    return minimised(model, design, scale, problem)
+
+
+KEPT = 0.95  # of the largest common margin, when the gains are chosen
+Problem = Callable[..., LmiProblem]
+
+
+def minimised(
+    model: LpvModel,
+    design: ObserverDesign,
+    scale: FloatArray,
+    problem: Problem,
+    update: Update = "held",
+    sample_time: float | None = None,
+) -> ObserverGains:
+    """The three solves of a design; `problem(gamma, maximise_margin, floor)` builds its inequalities."""
+    refuse_undetectable(model)
+    optimum = solve(problem(None), design.settings)
+    lower = None if optimum.lower_bound is None else to_gamma(model, design, scale, max(optimum.lower_bound, 0.0))
+    if optimum.verdict is Verdict.CERTIFIED and optimum.objective is not None and optimum.objective > 0.0:
+        gamma, result = to_gamma(model, design, scale, optimum.objective), optimum
+    else:
+        gamma, result = _least_certified(model, design, scale, problem, optimum)
+    if design.backoff > 0.0:
+        gamma = round_up(gamma * (1.0 + design.backoff))
+        result = solve(problem(gamma), design.settings)
+        if result.verdict is not Verdict.CERTIFIED:
+            raise ProblemError(f"model '{model.name}': {result.message}")
+        floor = round_down(KEPT * float(result.objective or 0.0), 2)
+        if floor > 0.0:
+            settled = solve(problem(gamma, False, floor), design.settings)
+            result = settled if settled.verdict is Verdict.CERTIFIED else result
+    return ObserverGains(design, model, lower, gamma, result, optimum, scale, update, sample_time)
+
+
+STEPS = (1.001, 1.01, 1.1, 1.5, 3.0, 10.0, 100.0)  # from the level that a solver names to one that holds
+BISECTIONS = 14
+
+
+def _least_certified(
+    model: LpvModel, design: ObserverDesign, scale: FloatArray, problem: Problem, optimum: LmiResult
+) -> tuple[float, LmiResult]:
+    """A solve that stalled names a level that holds nowhere: bracket the least one at which a largest margin is certified."""
+    named = optimum.objective if optimum.objective is not None and optimum.objective > 0.0 else 1.0
+    low = to_gamma(model, design, scale, named)
+    found, high = None, low
+    for step in STEPS:
+        high = low * step
+        found = solve(problem(high), design.settings)
+        if found.verdict is Verdict.CERTIFIED:
+            break
+    if found is None or found.verdict is not Verdict.CERTIFIED:
         raise ProblemError(
             f"model '{model.name}': {optimum.message}; loosen a bound, the decay rate or the fastest pole"
         )
-    lower = None if optimum.lower_bound is None else to_gamma(design, max(optimum.lower_bound, 0.0))
-    best = to_gamma(design, optimum.objective)
-    result, gamma = optimum, best
-    if design.backoff > 0.0:
-        gamma = best * (1.0 + design.backoff)
-        settled = solve(observer_problem(model, design, scale, gamma), design.settings)
-        if settled.verdict is not Verdict.CERTIFIED:
-            raise ProblemError(f"model '{model.name}': {settled.message}")
-        result = settled
-    return ObserverGains(design, model, lower, gamma, result, optimum, scale)
+    for _ in range(BISECTIONS):
+        if high <= low * 1.0005:
+            break
+        middle = float(np.sqrt(low * high))
+        tried = solve(problem(middle), design.settings)
+        if tried.verdict is Verdict.CERTIFIED:
+            found, high = tried, middle
+        else:
+            low = middle
+    return high, found
+
+
+def refuse_undetectable(model: LpvModel) -> None:
+    """Raise ProblemError where an unstable mode does not show in the output: no gain helps there."""
+    place = undetectable_place(plant_of(model))
+    if place is not None:
+        where = ", ".join(
+            f"{p.name} = {p.middle + p.half_width * int(u.p) / int(u.q):.6g} {p.unit}"
+            for p, u in zip(model.parameters, place, strict=True)
+        )
+        raise ProblemError(
+            f"model '{model.name}' is undetectable at {where or 'its only point'}: a mode that does not decay does not show in "
+            f"the output(s) {', '.join(o.name for o in model.outputs)}; measure it, or shrink the range"
+        )
+
+
+def design_scale(model: LpvModel, design: ObserverDesign) -> FloatArray:
+    """`observer_scale` with every disturbance in the largest size that a channel gives it: units of sizes do not matter."""
+    sizes = np.zeros(len(model.disturbances))
+    for channel in design.channels:
+        sizes = np.maximum(sizes, np.abs(channel_matrices(model, channel)[0]).max(axis=1))
+    sizes[sizes == 0.0] = 1.0  # in no channel
+    poly = model.polynomial
+    return observer_scale(replace(poly, E=poly.E * sizes, F=poly.F * sizes), model.parameters)
+
+
+def error_unit(model: LpvModel, design: ObserverDesign, scale: FloatArray) -> float:
+    """The largest error of any channel when the scaled states are one: what unit disturbances make of it, roughly."""
+    return max(float(np.abs(channel_matrices(model, channel)[1] / scale).max()) for channel in design.channels)
 
 
 def objective_name(design: ObserverDesign) -> str:
@@ -143,9 +238,9 @@ def objective_name(design: ObserverDesign) -> str:
     return "gamma^2" if len(design.channels) == 1 else "gamma"
 
 
-def to_gamma(design: ObserverDesign, objective: float) -> float:
-    """The gain that belongs to an objective value."""
-    return float(np.sqrt(objective)) if len(design.channels) == 1 else float(objective)
+def to_gamma(model: LpvModel, design: ObserverDesign, scale: FloatArray, objective: float) -> float:
+    """The gain that belongs to an objective value of `observer_problem`."""
+    return error_unit(model, design, scale) * float(np.sqrt(objective) if len(design.channels) == 1 else objective)
 
 
 def observer_problem(
@@ -154,15 +249,18 @@ def observer_problem(
     scale: FloatArray,
     gamma: float | None = None,
     maximise_margin: bool = True,
+    floor: float = 0.0,
 ) -> LmiProblem:
     """The LMIs of the module docstring in the states diag(scale) x.
 
     Without `gamma` the open channel is minimised; with it that channel is bounded by gamma and, unless told otherwise, a
-    common margin of all inequalities is maximised.
+    common margin of all inequalities is maximised. With a `floor` every inequality keeps that margin, and the decisions of
+    least norm are sought.
     """
-    problem = LmiProblem(model.parameters, maximise_margin=maximise_margin and gamma is not None)
+    problem = LmiProblem(model.parameters, maximise_margin and gamma is not None, least_norm=floor > 0.0, floor=floor)
+    unit = error_unit(model, design, scale)
     scaled = model.polynomial.with_states_scaled(scale)
-    known = {key: problem.known(getattr(scaled, key)) for key in ("A", "C", "E", "F", "denominator")}
+    known = {key: problem.scaled(getattr(scaled, key)) for key in ("A", "C", "E", "F", "denominator")}
     below, nx, ny = known["denominator"], len(model.states), len(model.outputs)
     P = problem.symmetric("P", nx, design.degree)
     X = problem.matrix("X", nx, ny, design.degree)
@@ -180,6 +278,7 @@ def observer_problem(
     compact = len(design.channels) == 1
     for channel in design.channels:
         d, z = channel_matrices(model, channel)
+        z = z / unit
         force = (P @ known["E"] - X @ known["F"]) @ problem.constant(d)
         inputs, errors = problem.constant(np.eye(d.shape[1])), problem.constant(np.eye(len(z)))
         level = channel.bound or gamma
@@ -187,7 +286,7 @@ def observer_problem(
             unknown_level = problem.scalar(objective_name(design))
             problem.minimise(objective_name(design))
         else:
-            unknown_level = problem.constant(np.array([[level**2 if compact else level]]))
+            unknown_level = problem.constant(np.array([[(level / unit) ** 2 if compact else level / unit]]))
         unknown_level = unknown_level.scaled_by(below)
         if compact:  # Schur complement of (30), with P scaled by gamma: a smaller block for the same bound
             corner = phi + problem.constant(z.T @ z / np.outer(scale, scale)).scaled_by(below)

@@ -11,9 +11,11 @@ from flint import fmpq, fmpq_poly
 
 from synthesis.errors import ProblemError, unknown
 from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.enclosure import PolynomialMatrix
 from synthesis.polynomials.rational import (
     Matrix,
     add,
+    decimal,
     derivative,
     multiply,
     polynomial_matrix,
@@ -63,9 +65,11 @@ def judge(
     low, high = search or (parameter.minimum, parameter.maximum)
     powers = [[k] for k in range(len(lyapunov))]
     M = polynomial_matrix(powers, lyapunov)
+    middle, half = (decimal(parameter.maximum) + s * decimal(parameter.minimum) for s in (1, -1))
+    u = fmpq_poly([-middle / half, 2 / half])
     plant = {
-        key: polynomial_matrix([[k] for k in range(len(values))], values.tolist())
-        for key, values in (("A", model.polynomial.A), ("C", model.polynomial.C))
+        key: [[in_powers(model.exact.matrices[key], i, j)(u) for j in range(columns)] for i in range(rows)]
+        for key, (rows, columns) in (("A", model.A.shape), ("C", model.C.shape))
     }
     L = polynomial_matrix([[0]], [gains])
     A_e = add(plant["A"], scale(multiply(L, plant["C"]), fmpq(-1)))
@@ -76,6 +80,14 @@ def judge(
         total = add(product, transpose(product), scale(derivative(M), sign * rational(rate)))
         matrices.append(scale(total, fmpq(-1)))
     return _intervals([minor for matrix in matrices for minor in leading_minors(matrix)], rational(low), rational(high))
+
+
+def in_powers(matrix: PolynomialMatrix, row: int, column: int) -> fmpq_poly:
+    """One entry of a matrix polynomial of one variable."""
+    powers = [fmpq(0)] * (matrix.degrees[0] + 1)
+    for (power,), entries in matrix.terms.items():
+        powers[power] = entries[row, column]
+    return fmpq_poly(powers)
 
 
 def _check_numbers(what: str, matrix: Sequence[Sequence[float | str]], shape: tuple[int, int]) -> None:

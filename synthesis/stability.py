@@ -13,15 +13,26 @@ from itertools import product
 from typing import Literal, get_args
 
 import numpy as np
+from flint import fmpq, fmpq_mat
 
+from synthesis.certificate.claims import Claim
+from synthesis.certificate.proof import place_words
+from synthesis.certificate.refute import unstable_place
+from synthesis.certificate.rounding import rounded_lyapunov
+from synthesis.certificate.verify import Names, Outcome, Verifier
 from synthesis.errors import ProblemError, unknown
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Margin, Verdict
 from synthesis.lmi.scaling import error_scale
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
+from synthesis.loop.from_model import plant_of
+from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.matrix import FloatArray
+from synthesis.polynomials.rational import decimal, rational
+
+PRECISE = 15  # digits of P when it is proved right here
 
 Form = Literal["primal", "dual"]
 
@@ -73,7 +84,8 @@ def affine_quadratic_stability(
 ) -> StabilityResult:
     """Search a Lyapunov matrix of the given degree; with `decay_rate` alpha for V' < -2 alpha V.
 
-    CERTIFIED: proved on the continuum of parameters, rates and gains. REFUTED: a frozen pole is not stable.
+    CERTIFIED: proved for the exact model on the continuum of parameters, rates and gains, in ball arithmetic. REFUTED: a frozen
+    pole is not left of -decay_rate, by exact signs.
     INCONCLUSIVE: neither; the message names the tightest inequality. Raises ProblemError for gains of a wrong shape.
     """
     settings = settings or LmiSettings()
@@ -89,7 +101,7 @@ def affine_quadratic_stability(
     scale = _scale(model, box)
     problem = LmiProblem(model.parameters, maximise_margin=True)
     scaled = model.polynomial.with_states_scaled(scale)
-    A, C, below = (problem.known(getattr(scaled, key)) for key in ("A", "C", "denominator"))
+    A, C, below = (problem.scaled(getattr(scaled, key)) for key in ("A", "C", "denominator"))
     P = problem.symmetric("P", shape[0], degree)
     problem.require("P > 0", P)
     problem.require("P < 1", problem.constant(np.eye(shape[0])) - P, strict=False)
@@ -102,13 +114,52 @@ def affine_quadratic_stability(
         name = "dV/dt < 0" if len(vertices) == 1 else f"dV/dt < 0 with L = {np.round(gain.ravel(), 6).tolist()}"
         problem.require(name, -(product_ + product_.T + rate + shift))
     result = solve(problem, settings)
-    weights = np.outer(scale, scale) if form == "primal" else 1.0 / np.outer(scale, scale)
-    verdict, message = result.verdict, result.message
-    if verdict is not Verdict.CERTIFIED:
-        place = unstable_place(model, vertices)
-        if place:
-            verdict, message = Verdict.REFUTED, f"refuted: {place}"
-    return StabilityResult(verdict, message, form, physical(model, result, "P") * weights, result, result.margins)
+    weights = scale if form == "primal" else 1.0 / scale
+    lyapunov = physical(model, result, "P") * np.outer(weights, weights)
+    verdict, message = _judged(model, vertices, result, weights, form, decay_rate)
+    return StabilityResult(verdict, message, form, lyapunov, result, result.margins)
+
+
+def _judged(
+    model: LpvModel, gains: FloatArray, result: LmiResult, weights: FloatArray, form: Form, decay_rate: float
+) -> tuple[Verdict, str]:
+    """The verdict on the exact model and the P that was found, in ball arithmetic; refuted where a frozen pole is not stable."""
+    plant, rate = plant_of(model), decimal(float(decay_rate))
+    loops = [
+        ObserverLoop.constant_gain(plant, fmpq_mat([[rational(float(x)) for x in row] for row in gain]))
+        for gain in gains
+    ]
+    names = Names(tuple(s.name for s in model.states), ())
+    failed: Outcome | None = None
+    if result.verdict is Verdict.CERTIFIED or (result.margins and result.verdict is Verdict.INCONCLUSIVE):
+        P = rounded_lyapunov(result.values["P"].coefficients[..., 0], weights, len(model.parameters), digits=PRECISE)
+        claim = Claim("decay rate", float(decay_rate), P)
+        outcomes = (Verifier(loop, names).prove(claim, dual=form == "dual") for loop in loops)
+        failed = next((outcome for outcome in outcomes if not outcome.proved), None)
+        if failed is None:
+            return Verdict.CERTIFIED, result.message.replace("not certified", "certified").split("; scale the states")[
+                0
+            ]
+    first = [] if failed is None else [failed.place[: len(model.parameters)]]
+    for loop, gain in zip(loops, gains, strict=True):
+        place = unstable_place(loop, rate, first)
+        if place is not None:
+            return Verdict.REFUTED, f"refuted: {_pole_words(model, gain, place, decay_rate)}"
+    if result.verdict is Verdict.CERTIFIED and failed is not None:
+        words = place_words(plant.axes, failed.place)
+        return Verdict.INCONCLUSIVE, f"not certified: '{failed.inequality}' is not proved at {words}; raise the degree"
+    # That no P of this degree exists refutes the degree, not the stability of the loop.
+    return Verdict.INCONCLUSIVE, result.message.replace("refuted:", "inconclusive:")
+
+
+def _pole_words(model: LpvModel, gain: FloatArray, place: tuple[fmpq, ...], decay_rate: float) -> str:
+    values = [p.middle + p.half_width * int(u.p) / int(u.q) for p, u in zip(model.parameters, place, strict=True)]
+    point = np.array([values]).reshape(1, len(values))
+    inside = np.clip(point, [p.minimum for p in model.parameters], [p.maximum for p in model.parameters])
+    pole = float(np.linalg.eigvals(model.on(inside).error_dynamics(gain)[0]).real.max())
+    where = ", ".join(f"{p.name} = {v:.6g} {p.unit}" for p, v in zip(model.parameters, values, strict=True))
+    asked = f", not below {-decay_rate:g}" if decay_rate else ""
+    return f"pole at {pole:+.3g} 1/s{asked}, {where or 'no parameter'}, L = {np.round(gain.ravel(), 6).tolist()}"
 
 
 def physical(model: LpvModel, result: LmiResult, name: str) -> FloatArray:
@@ -118,23 +169,6 @@ def physical(model: LpvModel, result: LmiResult, name: str) -> FloatArray:
     factors = np.array([1.0 / p.half_width for p in model.parameters] + [1.0] * count)
     coefficients = result.values[name].affine(offsets, factors).coefficients[..., 0]
     return np.asarray(coefficients.reshape(*coefficients.shape[:count], *coefficients.shape[-2:]))
-
-
-def unstable_place(model: LpvModel, gains: FloatArray, points: int = 401) -> str:
-    """Where a frozen loop has a pole that is not in the open left half-plane, in words; empty if nowhere on the grid."""
-    number = max(2, round(points ** (1.0 / len(model.parameters))))
-    axes = [np.linspace(p.minimum, p.maximum, number) for p in model.parameters]
-    grid = np.stack([g.ravel() for g in np.meshgrid(*axes, indexing="ij")], axis=1)
-    numeric = model.on(grid)
-    for gain in gains:
-        slowest = np.linalg.eigvals(numeric.error_dynamics(gain)[0]).real.max(axis=1)
-        worst = int(np.argmax(slowest))
-        if slowest[worst] >= 0.0:
-            where = ", ".join(
-                f"{p.name} = {v:.4g} {p.unit}" for p, v in zip(model.parameters, grid[worst], strict=True)
-            )
-            return f"pole at {slowest[worst]:+.3g} 1/s, {where}, L = {np.round(gain.ravel(), 6).tolist()}"
-    return ""
 
 
 def _scale(model: LpvModel, box: GainBox) -> FloatArray:

@@ -13,9 +13,8 @@ from itertools import pairwise
 import numpy as np
 
 from synthesis.errors import ProblemError
-from synthesis.hinf_observer import ObserverDesign, observer_problem, to_gamma
+from synthesis.hinf_observer import ObserverDesign, design_scale, observer_problem, to_gamma
 from synthesis.lmi.problem import LmiProblem
-from synthesis.lmi.scaling import observer_scale
 from synthesis.lmi.solve import solve
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.matrix import FloatArray, symmetric_block
@@ -50,11 +49,11 @@ class WellPosedness:
 
 def well_posedness(model: LpvModel, design: ObserverDesign, backoffs: tuple[float, ...] = BACKOFFS) -> WellPosedness:
     """Minimise gamma, then the gain energy at several distances from it. Raises ProblemError if nothing is feasible."""
-    scale = observer_scale(model.polynomial, model.parameters)
+    scale = design_scale(model, design)
     optimum = solve(observer_problem(model, design, scale), design.settings)
     if optimum.objective is None or not optimum.margins:
         raise ProblemError(f"model '{model.name}': {optimum.message}")
-    gamma = to_gamma(design, optimum.objective)
+    gamma = to_gamma(model, design, scale, optimum.objective)
     if len(backoffs) < 2:
         raise ProblemError("well-posedness needs at least two back-offs to see a trend")
     energies = []

@@ -1,10 +1,12 @@
-"""The exact closed-loop update of a two-state observer over one sample with everything held.
+"""The update of a two-state observer over one sample with u and y held, exact in either form.
 
-    xhat' = A xhat + B u + L (y - C xhat - D u),   M = T (A - L C)
-    xhat+ = e^M xhat + T phi(M) (B u + L (y - D u)) = xhat + T phi(M) (A xhat + B u + L innovation)
+    held     xhat' = A xhat + B u + L (y - C xhat - D u) integrated over the sample,   M = T (A - L C)
+             xhat+ = xhat + T phi(M) (A xhat + B u + L innovation)
+    sampled  xhat+ = xhat + T phi(M) (A xhat + B u) + K innovation,                    M = T A
 
-The second form needs phi(M) = int_0^1 e^(M s) ds alone. It is the update for which P1 section 9 gives the poles:
-forward Euler and "predict, then correct with T L" are unstable with the published gains at 200 Hz.
+with phi(M) = int_0^1 e^(M s) ds and innovation = y - C xhat - D u at the start of the sample. `held` is the update for which
+P1 section 9 gives the poles: forward Euler and "predict, then correct with T L" are unstable with the published gains at 200 Hz.
+Its error follows the plant's own motion within a sample; that of `sampled` does not (synthesis.loop.observer).
 """
 
 from __future__ import annotations
@@ -20,30 +22,41 @@ from estimators.schedule import GainSchedule
 
 Factor = npt.NDArray[np.float64] | None  # an entry of a matrix: None where zero, 0-d where constant, else (n,)
 _MOST_GROWTH = 50.0  # exponent of growth in one sample; from e^700 on float64 overflows
+_LARGEST_STEP = 1e50  # of the numbers in T A, T L C: their products meet states of up to 1e100 (screening.LIMIT)
+_LOOKS = 65  # places between which growth may hide: it has room from e^50 to e^700
 
 
 def plant_entries(schedule: GainSchedule) -> list[tuple[float, ...]]:
-    """Coefficients, highest power first, of T A (4, by rows), T B (2), C (2) and D; () is zero, one is a constant."""
+    """Chebyshev coefficients, lowest order first, of T A (4, by rows), T B (2), C (2) and D; () is zero, one is a constant."""
     found: list[tuple[float, ...]] = []
     for key, scale in (("A", schedule.sample_time), ("B", schedule.sample_time), ("C", 1.0), ("D", 1.0)):
-        powers, coefficients = schedule.plant[key]
-        for column in coefficients.reshape(len(powers), -1).T if len(powers) else np.zeros((4, 0)):
-            ascending = [0.0] * (int(powers.max(initial=-1)) + 1)
-            for power, value in zip(powers, column, strict=True):
-                ascending[power] = scale * float(value)
-            while ascending and ascending[-1] == 0:
-                ascending.pop()
-            found.append(tuple(reversed(ascending)))
+        coefficients = schedule.plant[key].coefficients
+        shape = {"A": 4, "B": 2, "C": 2, "D": 1}[key]
+        for column in coefficients.reshape(len(coefficients), shape).T:
+            entry = [scale * float(value) for value in column]
+            while entry and entry[-1] == 0:
+                entry.pop()
+            found.append(tuple(entry))
     return found
 
 
 def refuse_explosive(schedule: GainSchedule) -> None:
     """A proved schedule never comes here; a wrong sign or sample time must not end in an overflow."""
-    plant = schedule.plant_at(schedule.breakpoints)
-    for matrices in (plant.A, plant.A - schedule.table @ plant.C):
-        growth = schedule.sample_time * np.linalg.eigvals(matrices).real.max(axis=-1)
+    largest = {key: float(np.abs(schedule.plant[key].coefficients).sum(axis=0).max(initial=0.0)) for key in "ABCD"}
+    period, gain = schedule.sample_time, float(np.abs(schedule.table).max())
+    gain *= 1.0 if schedule.update == "sampled" else period
+    if not period * (largest["A"] + largest["B"]) + gain * (largest["C"] + largest["D"]) <= _LARGEST_STEP:
+        raise ScheduleError(
+            f"schedule '{schedule.name}': plant, gains and sample time multiply to more than {_LARGEST_STEP:g} in one "
+            "sample, where float64 overflows; check their units"
+        )
+    places = np.union1d(schedule.breakpoints, np.linspace(schedule.parameter.min, schedule.parameter.max, _LOOKS))
+    plant = schedule.plant_at(places)
+    closed = plant.A - schedule.gain(places) @ plant.C if schedule.update == "held" else plant.A
+    for matrices in (plant.A, closed):
+        growth = period * np.linalg.eigvals(matrices).real.max(axis=-1)
         if not growth.max() <= _MOST_GROWTH:
-            at = f"{schedule.parameter.name} = {schedule.breakpoints[growth.argmax()]:g} {schedule.parameter.unit}"
+            at = f"{schedule.parameter.name} = {places[growth.argmax()]:g} {schedule.parameter.unit}"
             raise ScheduleError(
                 f"schedule '{schedule.name}': the error grows by e^{growth.max():.0f} in one sample at {at}; "
                 "check the signs of the gains and the sample time"
@@ -66,7 +79,8 @@ class _Scratch:
         self.D: Factor = rest[4]
         self.gain, self.rate, self.correction = np.empty((3, 2, count))
         self.M = np.empty((2, 2, count))  # later its traceless part N
-        self.mean, self.delta, self.alpha, self.beta, self.line = np.empty((5, count))
+        self.mean, self.delta, self.alpha, self.beta, self.line, self.place = np.empty((6, count))
+        self.later, self.before = np.empty((2, count))
         self.phi = Phi(count)
 
 
@@ -75,7 +89,10 @@ class ExactUpdate:
 
     def __init__(self, schedule: GainSchedule) -> None:
         self.entries = plant_entries(schedule)
-        self.gains = PiecewiseLinear(schedule.breakpoints, schedule.sample_time * schedule.table[:, :, 0])  # T L
+        self.middle, self.half = schedule.plant["A"].middle, schedule.plant["A"].half
+        self.sampled = schedule.update == "sampled"
+        factor = 1.0 if self.sampled else schedule.sample_time
+        self.gains = PiecewiseLinear(schedule.breakpoints, factor * schedule.table[:, :, 0])  # K or T L
         self.scratches: dict[int, _Scratch] = {}
 
     def advance(
@@ -97,25 +114,41 @@ class ExactUpdate:
         self.gains.into(parameter, w.lookup, w.gain)
         if coast is not None:
             w.gain[:, coast] = 0.0
+        np.subtract(parameter, self.middle, w.place)
+        np.divide(w.place, self.half, w.place)
         for entry, out in w.varying:
-            _horner(entry, parameter, out)
+            _clenshaw(w, entry, out)
         _innovate(w, state, held_input, measurement, innovation)
         for row in (0, 1):
-            _rate(w, row, state, held_input, innovation)
+            _rate(w, row, state, held_input, None if self.sampled else innovation)
             for column in (0, 1):
-                _error_matrix(w, row, column)
+                _error_matrix(w, row, column, self.sampled)
         _split(w)
         w.phi.into(w.mean, w.delta, w.alpha, w.beta)
         _correct(w, state)
+        if self.sampled:
+            np.multiply(w.gain, innovation, w.gain)
+            np.add(state, w.gain, state)
 
 
-def _horner(entry: tuple[float, ...], parameter: FloatArray, out: FloatArray) -> None:
-    np.multiply(parameter, entry[0], out)
-    for coefficient in entry[1:-1]:
-        np.add(out, coefficient, out)
-        np.multiply(out, parameter, out)
-    if entry[-1]:
-        np.add(out, entry[-1], out)
+def _clenshaw(w: _Scratch, entry: tuple[float, ...], out: FloatArray) -> None:
+    """sum over k of entry[k] T_k(u) by Clenshaw's recurrence b_k = c_k + 2 u b_k+1 - b_k+2."""
+    u = w.place
+    if len(entry) == 2:
+        np.multiply(u, entry[1], out)
+        np.add(out, entry[0], out)
+        return
+    here, later = w.before, w.later
+    here[:], later[:] = entry[-1], 0.0
+    for coefficient in entry[-2:0:-1]:
+        np.multiply(u, here, out)
+        np.add(out, out, out)
+        np.subtract(out, later, later)
+        np.add(later, coefficient, later)
+        here, later = later, here
+    np.multiply(u, here, out)
+    np.subtract(out, later, out)
+    np.add(out, entry[0], out)
 
 
 def _innovate(w: _Scratch, state: FloatArray, held_input: FloatArray, measurement: FloatArray, out: FloatArray) -> None:
@@ -127,20 +160,23 @@ def _innovate(w: _Scratch, state: FloatArray, held_input: FloatArray, measuremen
             np.subtract(out, w.line, out)
 
 
-def _rate(w: _Scratch, row: int, state: FloatArray, held_input: FloatArray, innovation: FloatArray) -> None:
-    """T (A xhat + B u + L innovation)."""
+def _rate(w: _Scratch, row: int, state: FloatArray, held_input: FloatArray, innovation: FloatArray | None) -> None:
+    """T (A xhat + B u + L innovation); without the last term if the gains correct once a sample."""
     out = w.rate[row]
-    np.multiply(w.gain[row], innovation, out)
+    if innovation is None:
+        out[:] = 0.0
+    else:
+        np.multiply(w.gain[row], innovation, out)
     for factor, vector in ((w.A[row][0], state[0]), (w.A[row][1], state[1]), (w.B[row], held_input)):
         if factor is not None:
             np.multiply(factor, vector, w.line)
             np.add(out, w.line, out)
 
 
-def _error_matrix(w: _Scratch, row: int, column: int) -> None:
-    """M = T A - T L C."""
+def _error_matrix(w: _Scratch, row: int, column: int, sampled: bool) -> None:
+    """M = T A - T L C, or T A."""
     out, A, C = w.M[row, column], w.A[row][column], w.C[column]
-    if C is None:
+    if C is None or sampled:
         out[:] = 0.0 if A is None else A
         return
     np.multiply(w.gain[row], C, out)

@@ -33,7 +33,7 @@ HIGH_SLIP_GAIN = (0.22, 0.1)
 
 
 def with_constant_gain(schedule: GainSchedule, gain: tuple[float, float] = HIGH_SLIP_GAIN) -> GainSchedule:
-    """The plant of a schedule with one constant gain, and without its certificate: nothing is proved about it.
+    """The plant of a schedule with one constant gain L of the update "held", unproved, so without a digest.
 
     Raises:
         EstimatorError: a gain that is not two finite numbers.
@@ -44,7 +44,7 @@ def with_constant_gain(schedule: GainSchedule, gain: tuple[float, float] = HIGH_
     table = np.tile(pair[None, :, None], (len(schedule.breakpoints), 1, 1))
     table.flags.writeable = False
     name = f"{schedule.name} with L = [{pair[0]:g}, {pair[1]:g}]"
-    return dataclasses.replace(schedule, name=name, table=table, guarantee={}, sha256="")
+    return dataclasses.replace(schedule, name=name, table=table, update="held", sha256="")
 
 
 class SlipSwitch(Memory):

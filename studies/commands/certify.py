@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from studies.certify import certify
+from synthesis.certificate.claims import written
 
 
 def run_certify(files: list[Path], as_json: bool) -> int:
@@ -15,16 +16,23 @@ def run_certify(files: list[Path], as_json: bool) -> int:
     if as_json:
         rows = [
             {"path": str(r.path), "name": r.name, "certified": r.certified, "message": r.message, "seconds": r.seconds,
-             "proofs": [asdict(proof) for proof in r.proofs]}
+             "proofs": [asdict(proof) for proof in r.proofs], "remarks": r.remarks}
             for r in results
         ]  # fmt: skip
         print(json.dumps(rows, indent=1))
     else:
         for result in results:
-            print(f"{result.path}: {result.message} ({result.seconds:.2f} s)")
+            print(f"{printable(str(result.path))}: {printable(result.message)} ({result.seconds:.2f} s)")
             for proof in result.proofs:
                 state = "proved" if proof.proved else "FAILS "
-                print(f"  {state}  {proof.claim} {proof.level:g} {proof.unit}  {proof.place}".rstrip())
+                print(printable(f"  {state}  {proof.claim} {written(proof.level)} {proof.unit}  {proof.place}").rstrip())
+            for remark in result.remarks:
+                print(printable(f"  note    {remark}"))
     if any(result.refusal for result in results):
         return 2
     return 0 if all(result.certified for result in results) else 1
+
+
+def printable(text: str) -> str:
+    """The text on one line, without control characters: nothing in a file can write a line of its own."""
+    return "".join(c if c.isprintable() else "?" for c in text)

@@ -44,33 +44,36 @@ def run_schedules(specs: list[str], out: Path | None, check: bool, figures: Path
 
 
 HEADINGS = (
-    "schedule", "points", "L1 [m/s]", "published", "L2 [m/s^2]", "published", "friction", "noise [m/s]",
-    "decay", "contracts", "state", "s",
+    "schedule", "update", "points", "first gain", "published", "second gain", "published", "friction", "noise",
+    "decay", "drops", "state", "s",
 )  # fmt: skip
 
 
 def _table(runs: list[ScheduleRun]) -> Table:
     table = Table(
         title="Gain schedules",
-        caption="friction, noise: L2 gain, lower bound .. proved for the deployed table at any rate; "
-        "decay [1/s] and contraction per sample: proved",
+        caption="friction, noise: gain of the update to the velocity error, lower bound .. proved for the deployed table at any "
+        "admissible rate; decay of the update [1/s] and drop probability: proved",
     )
     for heading in HEADINGS:
-        left = heading in ("schedule", "state")
+        left = heading in ("schedule", "update", "state")
         table.add_column(heading, justify="left" if left else "right", no_wrap=True)
     for run in runs:
         if not run.content:
-            table.add_row(run.name, *[""] * 9, run.state, f"{run.seconds:.1f}")
+            table.add_row(run.name, *[""] * 10, run.state, f"{run.seconds:.1f}")
             continue
         gains = np.array(run.content["gain"]["table"])[..., 0]
-        guarantee = run.content["guarantee"]
+        proved = {kind: [p.level for p in run.proofs if p.kind == kind] for kind in {p.kind for p in run.proofs}}
         bands = [f"{low:g}..{high:g}" for low, high in run.published or ((np.nan, np.nan),) * 2]
-        channels = [f"{c['gamma_lower']:.4g}..{c['gamma_certified']:.4g}" for c in guarantee["channels"]]
+        levels = proved.get("sampled gain", [])
+        channels = [f"{low:.4g}..{level:.4g}" for low, level in zip(run.least, levels, strict=False)] or ["", ""]
+        decay = (proved.get("internal update") or proved.get("sampled error") or [np.nan])[0]
+        drops = proved.get("drop probability")
         table.add_row(
-            run.name, str(len(gains)),
+            run.name, run.content["update"]["kind"], str(len(gains)),
             f"{gains[:, 0].min():.3f}..{gains[:, 0].max():.3f}", bands[0],
             f"{gains[:, 1].min():.1f}..{gains[:, 1].max():.1f}", bands[1],
-            channels[0], channels[-1], f"{guarantee['decay_rate']:g}", f"{guarantee['sampled_contraction']:.4f}",
+            channels[0], channels[-1], f"{decay:g}", f"{drops[0]:g}" if drops else "none",
             run.state, f"{run.seconds:.1f}",
         )  # fmt: skip
     return table
@@ -79,8 +82,8 @@ def _table(runs: list[ScheduleRun]) -> Table:
 def _row(run: ScheduleRun) -> dict[str, Any]:
     gains = np.array(run.content["gain"]["table"])[..., 0].T if run.content else np.empty((0, 0))
     return {
-        "name": run.name, "state": run.state, "good": run.good, "message": run.message, "drift": run.drift,
+        "name": run.name, "state": run.state, "good": run.good, "message": run.message, "gains_moved": run.moved,
         "seconds": run.seconds, "gain_range": [[float(g.min()), float(g.max())] for g in gains],
-        "published_range": run.published, "guarantee": run.content.get("guarantee"),
-        "proofs": [{"claim": p.claim, "level": p.level, "proved": p.proved} for p in run.proofs],
+        "published_range": run.published, "lower_bounds": run.least,
+        "proofs": [{"claim": p.claim, "level": p.level, "unit": p.unit, "proved": p.proved} for p in run.proofs],
     }  # fmt: skip

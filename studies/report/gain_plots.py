@@ -12,6 +12,7 @@ import numpy as np
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
+from estimators.schedule import GainSchedule
 from studies.report.colours import PRINTED_BAND
 
 if TYPE_CHECKING:
@@ -29,6 +30,8 @@ def plot_schedule(run: ScheduleRun, folder: Path) -> list[Path]:
     parameter = run.content["scheduling"][0]
     breakpoints = np.array(parameter["breakpoints"])
     table = np.array(run.content["gain"]["table"])[..., 0]
+    units = GainSchedule.from_content(run.content).gain_units
+    symbol = "$L$" if run.content["update"]["kind"] == "held" else "$K$"
     figure, axes = plt.subplots(
         1, table.shape[1], figsize=(4.4 * table.shape[1], 3.4), layout="constrained", squeeze=False
     )
@@ -39,16 +42,14 @@ def plot_schedule(run: ScheduleRun, folder: Path) -> list[Path]:
         axis.plot(breakpoints, table[:, i], "o-", color="#aa3377", ms=4, lw=1.5, label="deployed, proved")
         axis.set_xlabel(f"{parameter['name'].replace('_', ' ')} [{parameter['unit']}]")
         axis.set_ylabel(
-            f"$L_{i + 1}$ [{('m/s', 'm/s²')[i] if table.shape[1] == 2 else run.content['gain']['unit'][i][0]}]"
+            f"{symbol}$_{i + 1}$ [{units[i][0]}]"
         )
         axis.set_xlim(breakpoints[0], breakpoints[-1])
         axis.set_ylim(bottom=0.0)
         axis.grid(alpha=0.3)
         axis.legend(loc="best", frameon=False, fontsize=8)
-    guarantee = run.content["guarantee"]
-    figure.suptitle(
-        f"{run.name}: decay {guarantee['decay_rate']:g} 1/s, proved over the whole range and rate box", fontsize=10
-    )
+    decay = next(p.level for p in run.proofs if p.kind in ("internal update", "sampled error"))
+    figure.suptitle(f"{run.name}: update decays at {decay:g} 1/s, proved over the whole range and rate box", fontsize=10)
     paths = [folder / f"{run.name}.{kind}" for kind in ("svg", "png")]
     for path in paths:
         figure.savefig(path, dpi=130)

@@ -61,7 +61,8 @@ def nrms(drive: Recorded, batch: Batch) -> FloatArray:
 def replay_batch(batch: Batch, drive: Recorded, part: slice) -> FloatArray:
     """V_x (n, samples) of some designs: `studies.drives.replay` with one observer for each design and corner.
 
-    x+ = F x + g u + h y with F = I + S (A - L C), g = S (B - L D), h = S L, S = T phi(T (A - L C)): the exact update.
+    x+ = F x + g u + h y, the exact update: F = I + S (A - L C), g = S (B - L D), h = S L, S = T phi(T (A - L C)) where y is
+    held; F = I + S A - K C, g = S B - K D, h = K, S = T phi(T A) where the gains correct once a sample.
     A missing u is held at its last value, as at run time. The loop runs over samples alone.
     """
     inputs = drive.inputs
@@ -122,10 +123,12 @@ def _updates(
     whole = subject.at(columns, Grid((box.name,), (box.unit,), points[:, None]))
     M = whole.matrices
     L = np.where(np.isfinite(force)[:, None, None], whole.gain, 0.0)
-    closed = np.broadcast_to(M.A - L @ M.C, (count, len(points), 2, 2))
+    sampled = subject.update == "sampled"
+    closed = np.broadcast_to(M.A if sampled else M.A - L @ M.C, (count, len(points), 2, 2))
     S = subject.sample_time * planar_phi(subject.sample_time * closed)
-    F = np.eye(2) + S @ closed
-    g, pull = S @ (M.B - L @ M.D), S @ L * np.nan_to_num(force)[:, None, None]
+    jump = L if sampled else S @ L  # what the innovation moves, beside what it changes of F
+    F = np.eye(2) + S @ closed - (L @ M.C if sampled else 0.0)
+    g, pull = S @ M.B - jump @ M.D, jump * np.nan_to_num(force)[:, None, None]
     corners = (count, *inputs.wheel_speed.shape)
     return (
         np.ascontiguousarray(F.reshape(*corners, 2, 2).transpose(3, 4, 1, 0, 2)),

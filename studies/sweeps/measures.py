@@ -41,7 +41,10 @@ class MeasureSpec(Strict):
 
 
 class StabilityMargin(MeasureSpec):
-    """max Re lambda(A_e) in 1/s; negative is stable (P3 section IV)."""
+    """Growth of the error in 1/s, max Re lambda(A_e), or that of the update which the runtime performs; negative is stable.
+
+    P3 section IV.
+    """
 
     id: Literal["stability_margin"]
 
@@ -67,7 +70,7 @@ class HinfNorm(MeasureSpec):
 
 
 class SampledRadius(MeasureSpec):
-    """Spectral radius of e^{A_e T}, the update that the runtime performs with a received sample (P1 section 9)."""
+    """Spectral radius of the runtime's update with a received sample: e^{A_e T} (P1 section 9), or e^{A T} - K C."""
 
     id: Literal["sampled_radius"]
 
@@ -116,7 +119,7 @@ def _norm(disturbances: tuple[str, ...], errors: tuple[str, ...], tolerance: flo
 
 
 def _sampled(batch: Batch) -> FloatArray:
-    # The eigenvalues of e^{A_e T} are the exponentials of those of A_e T: the margin serves, at no cost.
+    # The eigenvalues of e^{A_e T} are the exponentials of those of A_e T: the margin serves, at no cost, and is made so for K.
     return np.asarray(np.exp(batch.subject.sample_time * batch.margin))
 
 
@@ -143,6 +146,7 @@ def channel(subject: Subject, disturbances: tuple[str, ...], errors: tuple[str, 
 
 
 def _has_channel(disturbances: tuple[str, ...], errors: tuple[str, ...], subject: Subject) -> None:
+    subject.require_error_equation()
     channel(subject, disturbances, errors)
 
 

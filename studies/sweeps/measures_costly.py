@@ -17,9 +17,8 @@ from studies.sweeps.measure import Measure
 from studies.sweeps.measures import MeasureSpec
 from studies.sweeps.plant import ModelPlant
 from studies.sweeps.subject import Batch, Subject
-from synthesis.deploy import deploy
+from synthesis.deploy import claim_channel, deploy
 from synthesis.errors import SpecError
-from synthesis.hinf_observer import design_observer
 from synthesis.lmi.result import Verdict
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.matrix import FloatArray
@@ -96,10 +95,13 @@ def _certified(channel: str | None, deployed: bool, batch: Batch) -> FloatArray:
 
 def _gamma(spec: ScheduleSpec, model: LpvModel, channel: str | None, deployed: bool) -> float:
     design = spec.observer_design()
-    gains = design_observer(model, design)
+    gains = spec.design(model)
     wanted = channel or design.minimised.name
     if deployed:
-        return next(c.level for c in deploy(gains, spec.deploy_settings()).claims if c.name == f"gain {wanted}")
+        claims = deploy(gains, spec.deploy_settings()).claims
+        kind = "gain" if gains.update == "held" else "sampled gain"
+        asked = claim_channel(next(c for c in design.channels if c.name == wanted))
+        return next(claim.level for claim in claims if (claim.kind, claim.channel) == (kind, asked))
     bound = next(c.bound for c in design.channels if c.name == wanted)
     return (bound or gains.gamma) if gains.verdict is Verdict.CERTIFIED else float("nan")
 

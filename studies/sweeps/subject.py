@@ -16,7 +16,9 @@ from analysis.norms import stability_margin
 from analysis.perturbed import Matrices
 from analysis.planar import planar_margin
 from analysis.planar_exponential import planar_exponential
+from analysis.second_moment import spectral_radius
 from estimators.interpolate import PiecewiseLinear
+from estimators.schedule import Update
 from studies.spec import ScheduleSpec
 from studies.sweeps.plant import Grid, ModelPlant, Parameter, Plant
 from synthesis.errors import SpecError, unknown
@@ -48,7 +50,9 @@ class Gains:
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """An observer x^' = A x^ + B u + L (y - C x^ - D u) of a plant, sampled with `sample_time` s.
+    """An observer of a plant with sample time `sample_time` in s, running one `update` of `estimators.velocity.exact_update`.
+
+    "held" is x^' = A x^ + B u + L (y - C x^ - D u) with y held over a sample; the gains K of "sampled" correct once a sample.
 
     A perturbed design changes plant and observer model alike and keeps the gains (P3 section IV): the question is what gains
     designed for one tire are worth on another. `origin` says where the gains come from, for messages; `specification` is what
@@ -62,6 +66,7 @@ class Subject:
     origin: str = "gain"
     specification: ScheduleSpec | None = None
     proved_for: Mapping[str, float] | None = None
+    update: Update = "held"
 
     def unproved(self) -> list[str]:
         """The constants that are not those which the schedule's certificate speaks of, each in words."""
@@ -80,10 +85,18 @@ class Subject:
         for (i, state), (j, output) in product(enumerate(self.plant.states), enumerate(outputs)):
             suffix = state.name if len(outputs) == 1 else f"{state.name}_{output.name}"
             if self.gains.constant:
-                unit = f"({state.unit}/s)/({output.unit})"
+                unit = f"({state.unit}{'/s' if self.update == 'held' else ''})/({output.unit})"
                 found[f"gain_{suffix}"] = Parameter(f"gain_{suffix}", unit, float(self.gains.table[0, i, j]), "gain")
             found[f"gain_factor_{suffix}"] = Parameter(f"gain_factor_{suffix}", "1", 1.0, "gain factor")
         return found
+
+    def require_error_equation(self) -> None:
+        """Raises SpecError where there is no error equation e' = (A - L C) e, so no norm of it."""
+        if self.update != "held":
+            raise SpecError(
+                f"subject '{self.name}': its gains correct once a sample (update '{self.update}'): it has no error equation in "
+                "continuous time; use sampled_radius, second_moment_radius or critical_drop_probability"
+            )
 
     def require(self, name: str) -> Parameter:
         """The parameter of this name. Raises SpecError with the nearest names."""
@@ -163,29 +176,35 @@ class Batch:
 
     @cached_property
     def error(self) -> tuple[FloatArray, FloatArray]:
-        """A_e = A - L C (n, g, nx, nx) and B_e = E - L F (n, g, nx, nd)."""
+        """A_e = A - L C (n, g, nx, nx) and B_e = E - L F (n, g, nx, nd). Raises SpecError for the update "sampled"."""
+        self.subject.require_error_equation()
         A_e, B_e = self.matrices.error_dynamics(self.gain)
         return self._whole(A_e), self._whole(B_e)
 
     @cached_property
     def margin(self) -> FloatArray:
-        """max Re lambda(A_e) in 1/s, (n, g)."""
+        """Growth of the error in 1/s (n, g): max Re lambda(A_e), or log(radius of a received sample)/T, which is the same."""
+        if self.subject.update == "sampled":
+            with np.errstate(divide="ignore"):  # deadbeat: -inf
+                return np.asarray(np.log(spectral_radius(self.coast.received)) / self.subject.sample_time)
         A_e = self.error[0]
         return planar_margin(A_e) if A_e.shape[-1] == 2 else stability_margin(A_e)
 
     @cached_property
     def coast(self) -> DropModes:
-        """e^{A T} and e^{A_e T}: what the runtime does with a dropped and with a received sample."""
-        if self.error[0].shape[-1] != 2:
+        """What the runtime does with a dropped and with a received sample: e^{A T}, and e^{A_e T} or e^{A T} - K C."""
+        if self.matrices.A.shape[-1] != 2:
             return self.modes("coast")
         T = self.subject.sample_time
         dropped = planar_exponential(self._whole(self.matrices.A) * T)
+        if self.subject.update == "sampled":
+            return DropModes(dropped, dropped - self.gain @ self.matrices.C, "coast")
         return DropModes(dropped, planar_exponential(self.error[0] * T), "coast")
 
     def modes(self, policy: DropPolicy) -> DropModes:
         """Both updates for any drop policy."""
         A, C, L = (self._whole(M) for M in (self.matrices.A, self.matrices.C, self.gain))
-        return runtime_drop_modes(A, C, L, self.subject.sample_time, policy)
+        return runtime_drop_modes(A, C, L, self.subject.sample_time, policy, self.subject.update)
 
     def _whole(self, array: FloatArray) -> FloatArray:
         return np.broadcast_to(array, (self.count, len(self.grid), *array.shape[2:]))

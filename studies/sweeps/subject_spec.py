@@ -81,7 +81,8 @@ class SubjectSpec(Strict):
         origin = f"the schedule '{schedule.name}'"
         proved = {name: float(c["value"]) for name, c in content["model"]["constants"].items()}
         return Subject(
-            self.name or schedule.name, plant, gains, schedule.sample_time, origin, designed_from(content), proved
+            self.name or schedule.name, plant, gains, schedule.sample_time, origin, designed_from(content), proved,
+            schedule.update,
         )  # fmt: skip
 
     def _model(self, name: str, parameters: ParameterSet) -> LpvModel:

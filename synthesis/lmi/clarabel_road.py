@@ -44,9 +44,10 @@ def solve_with_clarabel(data: ConicData, decisions: int, settings: LmiSettings) 
     options.tol_gap_abs = options.tol_gap_rel = options.tol_feas = settings.tolerance
     cones = [clarabel.ZeroConeT(data.equalities)] if data.equalities else []
     cones += [clarabel.PSDTriangleConeT(size) for size in data.semidefinite]
-    width = len(data.q)
+    quadratic = sparse.csc_matrix(sparse.diags_array(data.weights))
+    quadratic.eliminate_zeros()
     start = perf_counter()
-    solver = clarabel.DefaultSolver(sparse.csc_matrix((width, width)), data.q, data.A, data.b, cones, options)
+    solver = clarabel.DefaultSolver(quadratic, data.q, data.A, data.b, cones, options)
     solution = solver.solve()
     seconds = perf_counter() - start
     status = str(solution.status)

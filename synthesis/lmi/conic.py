@@ -16,12 +16,14 @@ class ConicData:
     """Equality rows first, then one triangle of rows for each positive semidefinite cone.
 
     `b` already has the margins taken off; `slack` is what they took, so that b + slack is the problem without margins.
+    `weights` (one for every variable) is the diagonal of a quadratic cost x' diag(weights) x / 2.
     """
 
     A: sparse.csc_array
     b: FloatArray
     slack: FloatArray
     q: FloatArray
+    weights: FloatArray
     equalities: int
     semidefinite: tuple[int, ...]  # sizes of the matrices
 
@@ -79,6 +81,7 @@ def assemble(relaxed: RelaxedProblem) -> ConicData:
         np.concatenate([*equality_b, *cone_b]) - slack,
         slack,
         np.concatenate([relaxed.cost, np.zeros(extra)]),
+        np.concatenate([relaxed.weights, np.zeros(extra)]),
         equality.shape[0],
         tuple(sizes),
     )

@@ -44,7 +44,10 @@ def solve_with_cvxpy(relaxed: RelaxedProblem, solver: str, settings: LmiSettings
             pick[np.arange(len(first)), first * gram.shape[0] + second] = svec
             total = total - (matching @ pick) @ cp.reshape(gram, (gram.size,), order="C")
         constraints.append(total == 0)
-    problem = cp.Problem(cp.Minimize(relaxed.cost @ x), constraints)
+    cost = relaxed.cost @ x + (
+        0.5 * cp.sum_squares(cp.multiply(np.sqrt(relaxed.weights), x)) if relaxed.weights.any() else 0.0
+    )
+    problem = cp.Problem(cp.Minimize(cost), constraints)
     start = perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # inaccurate answers are judged by re-evaluation, not by a warning

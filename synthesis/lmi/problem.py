@@ -12,15 +12,17 @@ from synthesis.models.param import SchedulingParameter
 from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial, constant, variable
 
 MARGIN = "margin"
+CURVED = 100.0
 SYMMETRY = 1e-12  # relative; products of symmetric expressions differ from their transposes by rounding
 
 
 @dataclass(frozen=True)
 class Inequality:
-    """`matrix` > 0 for every parameter and rate of its window, in local variables that run over [-1, 1].
+    """`matrix` > 0 for every parameter and rate of its box, in local variables that run over [-1, 1].
 
     `offset` and `factor` (v,) lead back from local variables to those of the problem. An inequality that is not `strict`
-    only normalises the unknowns: it takes no margin and no part in the verdict.
+    only normalises the unknowns: it takes no margin and no part in the verdict. `floor` has been taken off `matrix` for the
+    solver; the verdict is about matrix + floor I.
     """
 
     name: str
@@ -28,6 +30,7 @@ class Inequality:
     offset: FloatArray
     factor: FloatArray
     strict: bool = True
+    floor: float = 0.0
 
 
 @dataclass
@@ -39,11 +42,18 @@ class LmiProblem:
 
     With `maximise_margin` every strict inequality becomes M > t I for a common unknown t, which is maximised: the sign
     of t decides, its size tells how far. The problem must then normalise its unknowns. Re-evaluation judges M itself.
+
+    With `least_norm` the decisions with the least sum of squares are sought under M > floor I, those that belong to powers of a
+    parameter counted CURVED times: a strictly convex problem, whose one answer moves little when the data or the processor
+    change. (Maximal margins and least gammas are attained on flat sets.) Of all answers it takes one that varies little.
     """
 
     parameters: tuple[SchedulingParameter, ...]
     maximise_margin: bool = False
+    least_norm: bool = False
+    floor: float = 0.0
     decisions: int = 0
+    curved: list[bool] = field(default_factory=list)
     unknowns: dict[str, MatrixPolynomial] = field(default_factory=dict)
     inequalities: list[Inequality] = field(default_factory=list)
     objective: str | None = None
@@ -71,6 +81,11 @@ class LmiProblem:
         offsets = np.array([p.middle for p in self.parameters] + [0.0] * count)
         factors = np.array([p.half_width for p in self.parameters] + [1.0] * count)
         return MatrixPolynomial(shaped).affine(offsets, factors)
+
+    def scaled(self, coefficients: FloatArray) -> MatrixPolynomial:
+        """A known matrix from its coefficients (d_1+1, ..., d_p+1, rows, columns) in the scaled parameters u."""
+        count, array = len(self.parameters), np.asarray(coefficients, float)
+        return MatrixPolynomial(array.reshape(*array.shape[:count], *(1,) * count, *array.shape[count:], 1))
 
     def constant(self, matrix: FloatArray) -> MatrixPolynomial:
         """A matrix that depends on no parameter."""
@@ -107,6 +122,8 @@ class LmiProblem:
         terms = np.einsum("f...,eij->...ijfe", basis, entries).reshape(*basis.shape[1:], rows, columns, -1)
         out[..., 1 + self.decisions :] = terms.reshape(*basis.shape[1:], *(1,) * count, rows, columns, -1)
         self.decisions += functions * number
+        total = basis.reshape(functions, -1)
+        self.curved += [bool(np.flatnonzero(row)[-1]) for row in total for _ in range(number)]
         self.unknowns[name] = MatrixPolynomial(out)
         return self.unknowns[name]
 
@@ -131,13 +148,8 @@ class LmiProblem:
             total = total + slope.scaled_by(rate) * (1.0 / p.half_width)
         return total
 
-    def require(
-        self, name: str, matrix: MatrixPolynomial, window: tuple[float, float] | None = None, strict: bool = True
-    ) -> None:
-        """matrix > 0 on the whole box (pass the negative for < 0), or on a window of the only parameter.
-
-        `window` is in physical units; with it the matrix may differ from window to window (a gain table).
-        """
+    def require(self, name: str, matrix: MatrixPolynomial, strict: bool = True) -> None:
+        """matrix > 0 on the whole box (pass the negative for < 0)."""
         coefficients = matrix.coefficients
         if matrix.shape[0] != matrix.shape[1]:
             raise ProblemError(f"inequality '{name}' has the shape {matrix.shape}; it must be square and symmetric")
@@ -148,22 +160,32 @@ class LmiProblem:
         if np.abs(coefficients - np.swapaxes(coefficients, -3, -2)).max() > SYMMETRY * np.abs(coefficients).max():
             raise ProblemError(f"inequality '{name}' is not symmetric; add its transpose")
         matrix = (matrix + matrix.T) * 0.5  # takes off the rounding, so that no triangle is preferred
-        if self.maximise_margin and strict:
-            matrix = matrix - self.constant(np.eye(matrix.shape[0])).scaled_by(self.unknowns[MARGIN])
+        if strict:
+            matrix = self._with_margin(matrix)
         offset, factor = np.zeros(self.variables), np.ones(self.variables)
-        if window is not None:
-            if len(self.parameters) != 1:
-                raise ProblemError(
-                    f"inequality '{name}': a window needs exactly one parameter, not {len(self.parameters)}"
-                )
-            if not self.parameters[0].minimum <= window[0] < window[1] <= self.parameters[0].maximum:
-                raise ProblemError(
-                    f"inequality '{name}': the window {window} is reversed or outside the parameter's range"
-                )
-            low, high = ((edge - self.parameters[0].middle) / self.parameters[0].half_width for edge in window)
-            offset[0], factor[0] = 0.5 * (low + high), 0.5 * (high - low)
-            matrix = matrix.affine(offset, factor)
-        self.inequalities.append(Inequality(name, matrix, offset, factor, strict))
+        self.inequalities.append(Inequality(name, matrix, offset, factor, strict, self.floor if strict else 0.0))
+
+    def _with_margin(self, matrix: MatrixPolynomial) -> MatrixPolynomial:
+        unit = self.constant(np.eye(matrix.shape[0]))
+        if self.floor:
+            matrix = matrix - unit * self.floor
+        return matrix - unit.scaled_by(self.unknowns[MARGIN]) if self.maximise_margin else matrix
+
+    def require_on(self, name: str, matrix: MatrixPolynomial, offset: FloatArray, factor: FloatArray) -> None:
+        """matrix > 0 on a box of the variables, where it may be another one than elsewhere (the cell of a gain table).
+
+        The matrix is given in the local variables t, variable = offset + factor t. Raises ProblemError for a box that is not
+        inside [-1, 1] in every variable.
+        """
+        if not (np.abs(offset) + np.abs(factor) <= 1.0 + 1e-12).all():
+            raise ProblemError(f"inequality '{name}': its box reaches beyond the range of the parameters")
+        if not np.isfinite(matrix.coefficients).all():
+            raise ProblemError(
+                f"inequality '{name}' has coefficients that are not finite; look for NaN in its matrices"
+            )
+        matrix = self._with_margin((matrix + matrix.T) * 0.5)
+        places = np.asarray(offset, float), np.asarray(factor, float)
+        self.inequalities.append(Inequality(name, matrix, *places, floor=self.floor))
 
     def minimise(self, name: str) -> None:
         """Minimise the unknown number of this name."""
@@ -197,8 +219,13 @@ class LmiProblem:
             q[self._objective_index(self.objective)] = self.sense
         return q
 
+    @property
+    def weights(self) -> FloatArray:
+        """Weights of the squares of the decisions in the cost."""
+        return np.where(self.curved, CURVED, 1.0) * float(self.least_norm)
+
     def place(self, entry: Inequality, local: FloatArray) -> str:
-        """A point of an inequality's window in physical words."""
+        """A point of an inequality's box in physical words."""
         point = entry.offset + entry.factor * local
         count, words = len(self.parameters), []
         for i, p in enumerate(self.parameters):

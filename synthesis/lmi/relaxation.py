@@ -46,6 +46,7 @@ class RelaxedProblem:
     sampled: tuple[SampledInequality, ...]
     sos: tuple[SosInequality, ...]
     cost: FloatArray
+    weights: FloatArray  # of the squares of the decisions; all zero: the cost is linear
 
 
 def relax(problem: LmiProblem, settings: LmiSettings) -> RelaxedProblem:
@@ -59,7 +60,7 @@ def relax(problem: LmiProblem, settings: LmiSettings) -> RelaxedProblem:
         sos = tuple(
             part for entry in problem.inequalities for part in _sums_of_squares(problem, entry, settings.margin)
         )
-        return RelaxedProblem(kind, (), sos, problem.cost)
+        return RelaxedProblem(kind, (), sos, problem.cost, problem.weights)
     if kind == "vertex":
         sampled = tuple(part for entry in problem.inequalities for part in _vertices(problem, entry, settings.margin))
     else:
@@ -67,7 +68,7 @@ def relax(problem: LmiProblem, settings: LmiSettings) -> RelaxedProblem:
             _sample(problem, entry, _axes(problem, entry, settings.points), settings.margin)
             for entry in problem.inequalities
         )
-    return RelaxedProblem(kind, sampled, (), problem.cost)
+    return RelaxedProblem(kind, sampled, (), problem.cost, problem.weights)
 
 
 def cheaper(problem: LmiProblem, settings: LmiSettings) -> str:
@@ -98,8 +99,17 @@ def rate_vertices(matrix: MatrixPolynomial, parameters: int) -> list[tuple[float
     return list(product(*((-1.0, 1.0) if degree else (0.0,) for degree in matrix.degrees[parameters:])))
 
 
+def rate_samples(matrix: MatrixPolynomial, parameters: int) -> list[tuple[float, ...]]:
+    """Vertices of the rates, and points between them for those in which the matrix is not affine (P one sample later)."""
+    degrees = matrix.degrees[parameters:]
+    if max(degrees, default=0) <= 1:
+        return rate_vertices(matrix, parameters)
+    axes = [np.linspace(-1.0, 1.0, 2 if d == 1 else 2 * d + 1) if d else np.zeros(1) for d in degrees]
+    return [tuple(float(x) for x in point) for point in product(*axes)]
+
+
 def _axes(problem: LmiProblem, entry: Inequality, points: int) -> list[FloatArray]:
-    """Sample points along each parameter; a window gets its share of them, three at least."""
+    """Sample points along each parameter; a smaller box gets its share of them, three at least."""
     share = [max(3, round(points * factor)) if factor < 1.0 else points for factor in entry.factor]
     return [np.linspace(-1.0, 1.0, n) for n in share[: len(problem.parameters)]]
 
@@ -110,7 +120,7 @@ def _sample(problem: LmiProblem, entry: Inequality, axes: list[FloatArray], marg
     used = [axis if degree else np.zeros(1) for axis, degree in zip(axes, entry.matrix.degrees[:count], strict=True)]
     points = list(product(*used))  # one empty point for an LMI without parameters
     grid = np.array(points, float).reshape(len(points), count)
-    rates = np.array(rate_vertices(entry.matrix, count))
+    rates = np.array(rate_samples(entry.matrix, count))
     places = np.hstack([np.tile(grid, (len(rates), 1)), np.repeat(rates, len(grid), axis=0)])
     values = widened(entry.matrix.at(places), problem.decisions)
     return SampledInequality(entry.name, values, places, margin if entry.strict else 0.0)
@@ -124,6 +134,7 @@ def _vertices(problem: LmiProblem, entry: Inequality, margin: float) -> list[Sam
     count = len(problem.parameters)
     corners = [np.array([-1.0, 1.0])] * count
     out = [_sample(problem, entry, corners, margin)]
+    rate_vertices(entry.matrix, count)  # refuses what its vertices do not decide
     for i in range(count):
         if entry.matrix.degrees[i] > 2:
             raise ProblemError(

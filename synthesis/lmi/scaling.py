@@ -17,7 +17,7 @@ def observer_scale(model: PolynomialModel, parameters: tuple[SchedulingParameter
     Rescaling the states of the given model rescales these variances with them, so the scaled problem, and with it the
     answer, does not depend on the units of the states. (With given gains `error_scale` needs no filter.)
     """
-    middle = evaluate(model, np.array([[p.middle for p in parameters]]))
+    middle = evaluate(model, parameters, np.array([[p.middle for p in parameters]]))
     A, C, E, F = middle.A[0], middle.C[0], middle.E[0], middle.F[0]
     process, cross = E @ E.T, E @ F.T
     sensor = F @ F.T

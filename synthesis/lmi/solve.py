@@ -13,7 +13,7 @@ from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.relaxation import RelaxedProblem, relax
 from synthesis.lmi.result import LmiResult, Margin, SolverReport, Verdict
 from synthesis.lmi.settings import LmiSettings
-from synthesis.polynomials.matrix import FloatArray
+from synthesis.polynomials.matrix import FloatArray, constant
 from synthesis.polynomials.positivity import prove_positive
 
 # An objective on the boundary of feasibility is loosened by these fractions, in turn, until every inequality is proved.
@@ -84,7 +84,10 @@ def margins_of(problem: LmiProblem, decisions: FloatArray, depth: int) -> tuple[
     for entry in problem.inequalities:
         if not entry.strict:
             continue
-        found = prove_positive(entry.matrix.substitute(decisions), depth)
+        matrix, size = entry.matrix.substitute(decisions), entry.matrix.magnitude(decisions)
+        if entry.floor:
+            matrix = matrix + constant(entry.floor * np.eye(matrix.shape[0]), matrix.variables)
+        found = prove_positive(matrix, depth, size)
         place = problem.place(entry, found.place)
         out.append(Margin(entry.name, found.smallest / found.scale, place, found.proved))
     return tuple(out)

@@ -1,4 +1,8 @@
-"""From symbolic matrices to coefficient arrays over one common denominator."""
+"""From symbolic matrices to exact polynomials over one common denominator, in parameters scaled to [-1, 1].
+
+With p = middle + half_width u every coefficient belongs to a term that is at most one on the range. In powers of p itself the
+coefficients of a range far from zero cancel: (p - 635.15)^5 on [634.65, 635.65] has terms of 1e14 that add up to one.
+"""
 
 from __future__ import annotations
 
@@ -7,21 +11,33 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import sympy as sp
+from flint import fmpq, fmpq_mat
 
 from synthesis.errors import ModelError
 from synthesis.models.param import Constant, SchedulingParameter
+from synthesis.polynomials.definite import sign_on_box
+from synthesis.polynomials.enclosure import PolynomialMatrix, Powers
 from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
 from synthesis.polynomials.positivity import prove_positive
+from synthesis.polynomials.rational import decimal
 
 MATRICES = ("A", "B", "C", "D", "E", "F")
 
 
 @dataclass(frozen=True)
-class PolynomialModel:
-    """Matrices as numerator(p) / denominator(p).
+class ExactModel:
+    """The matrices (by their letters) as numerators over one denominator, exact rationals in the scaled parameters u."""
 
-    Every array has the shape (d_1+1, ..., d_p+1, rows, columns) in the physical parameters; `denominator` has
-    1 x 1 entries and is positive on the whole range. A polynomial model has denominator 1.
+    matrices: Mapping[str, PolynomialMatrix]
+    denominator: PolynomialMatrix
+
+
+@dataclass(frozen=True)
+class PolynomialModel:
+    """Matrices as numerator(u) / denominator(u), float64, with p = middle + half_width u and u in [-1, 1]^p.
+
+    Every array has the shape (d_1+1, ..., d_p+1, rows, columns), powers of u; `denominator` has 1 x 1 entries and is
+    positive on the whole range. A polynomial model has denominator 1.
     """
 
     A: FloatArray
@@ -58,8 +74,11 @@ def extract(
     symbolic: Mapping[str, sp.Matrix],
     parameters: Sequence[SchedulingParameter],
     constants: Mapping[str, Constant],
-) -> PolynomialModel:
-    """Substitute constants, clear denominators and collect coefficients; `where` names the model in messages."""
+) -> ExactModel:
+    """Substitute constants, clear denominators and collect coefficients; `where` names the model in messages.
+
+    Numbers are the decimals that are written (0.1 is one tenth); irrational ones are taken at 17 digits.
+    """
     # Symbols are known by their names: assumptions a user put on them (real, positive) are of no interest here.
     symbolic = {
         key: matrix.subs({symbol: sp.Symbol(symbol.name) for symbol in matrix.free_symbols})
@@ -78,24 +97,42 @@ def extract(
         for row in rows:
             for _, below in row:
                 denominator = sp.lcm(denominator, below)
-    middle = {g: sp.Rational(str(p.middle)) for g, p in zip(generators, parameters, strict=True)}
+    middle = {g: sp.Rational(*decimal_pair(p)) for g, p in zip(generators, parameters, strict=True)}
     size = sp.expand(denominator).subs(middle)
     if size == 0:
         raise ModelError(f"{where}: a denominator vanishes at the middle of the range; shrink the range")
     denominator = sp.expand(denominator / size)  # one where the range has its middle: positive if it has no root
-    arrays = {}
+    exact = {}
     for key, rows in fractions.items():
         numerators = [[sp.expand(sp.cancel(above * denominator / below)) for above, below in row] for row in rows]
-        arrays[key] = _coefficients(numerators, matrices[key].shape, generators)
-    below = _coefficients([[denominator]], (1, 1), generators)
+        exact[key] = _polynomial(numerators, matrices[key].shape, generators, parameters)
+    below = _polynomial([[denominator]], (1, 1), generators, parameters)
     _check_denominator(where, parameters, below)
-    return PolynomialModel(denominator=below, **arrays)
+    return ExactModel(exact, below)
+
+
+def in_floats(exact: ExactModel) -> PolynomialModel:
+    """The coefficients correctly rounded."""
+    arrays = {key: _array(matrix) for key, matrix in exact.matrices.items()}
+    return PolynomialModel(denominator=_array(exact.denominator), **arrays)
+
+
+def decimal_pair(parameter: SchedulingParameter) -> tuple[int, int]:
+    """Numerator and denominator of the exact middle of the range."""
+    middle = (decimal(parameter.minimum) + decimal(parameter.maximum)) / 2
+    return int(middle.p), int(middle.q)
+
+
+def _rational(number: sp.Expr) -> sp.Rational:
+    """A number as the decimals that it shows."""
+    return number if number.is_Rational else sp.Rational(str(sp.Float(number, 17)))
 
 
 def _fraction(entry: sp.Expr, generators: list[sp.Symbol], where: str) -> tuple[sp.Expr, sp.Expr]:
     if entry.has(sp.nan, sp.oo, -sp.oo, sp.zoo, sp.I):
         raise ModelError(f"{where} = {entry} is not a finite real expression")
-    above, below = sp.fraction(sp.cancel(sp.together(entry)))
+    written = entry.replace(lambda e: e.is_Float, lambda e: sp.Rational(str(e)))
+    above, below = sp.fraction(sp.cancel(sp.together(written)))
     for part in (above, below):
         if not part.is_polynomial(*generators):
             raise ModelError(f"{where} = {entry} is neither polynomial nor rational in the parameters")
@@ -104,32 +141,44 @@ def _fraction(entry: sp.Expr, generators: list[sp.Symbol], where: str) -> tuple[
     return above, below
 
 
-def _coefficients(rows: list[list[sp.Expr]], shape: tuple[int, int], generators: list[sp.Symbol]) -> FloatArray:
+def _polynomial(
+    rows: list[list[sp.Expr]],
+    shape: tuple[int, int],
+    generators: list[sp.Symbol],
+    parameters: Sequence[SchedulingParameter],
+) -> PolynomialMatrix:
+    """Exact coefficients in u of a matrix whose entries are polynomials in p."""
     # A model without parameters still needs a variable for sympy to collect in; it never appears.
     variables = generators or [sp.Symbol("constant")]
-    polynomials = [[sp.Poly(entry, *variables) for entry in row] for row in rows]
-    degrees = [0] * len(generators)
-    for row in polynomials:
-        for polynomial in row:
-            degrees = [max(d, n, 0) for d, n in zip(degrees, polynomial.degree_list(), strict=False)]
-    out = np.zeros((*(d + 1 for d in degrees), *shape))
-    for i, row in enumerate(polynomials):
-        for j, polynomial in enumerate(row):
-            for powers, coefficient in polynomial.terms():
-                out[(*powers[: len(generators)], i, j)] = float(coefficient)
+    cells: dict[Powers, list[fmpq]] = {}
+    for i, row in enumerate(rows):
+        for j, entry in enumerate(row):
+            for powers, coefficient in sp.Poly(entry, *variables).terms():
+                number = _rational(coefficient)
+                place = cells.setdefault(tuple(powers[: len(generators)]), [fmpq(0)] * (shape[0] * shape[1]))
+                place[i * shape[1] + j] = fmpq(int(number.p), int(number.q))
+    terms = {powers: fmpq_mat(*shape, entries) for powers, entries in cells.items() if any(entries)}
+    low, high = [decimal(p.minimum) for p in parameters], [decimal(p.maximum) for p in parameters]
+    return PolynomialMatrix(terms, shape, len(generators)).affine(
+        [(a + b) / 2 for a, b in zip(low, high, strict=True)], [(b - a) / 2 for a, b in zip(low, high, strict=True)]
+    )
+
+
+def _array(matrix: PolynomialMatrix) -> FloatArray:
+    out = np.zeros((*(d + 1 for d in matrix.degrees), *matrix.shape))
+    for powers, entries in matrix.terms.items():
+        out[powers] = [[int(x.p) / int(x.q) for x in row] for row in entries.tolist()]
     out.setflags(write=False)
     return out
 
 
-def _check_denominator(where: str, parameters: Sequence[SchedulingParameter], denominator: FloatArray) -> None:
-    if denominator.size == 1:
+def _check_denominator(where: str, parameters: Sequence[SchedulingParameter], denominator: PolynomialMatrix) -> None:
+    if not any(denominator.degrees) or sign_on_box(denominator.balls()).positive:
         return
-    offsets = np.array([p.middle for p in parameters])
-    factors = np.array([p.half_width for p in parameters])
-    found = prove_positive(MatrixPolynomial(denominator[..., None]).affine(offsets, factors))
+    found = prove_positive(MatrixPolynomial(_array(denominator)[..., None]))
     if not found.proved:
         place = ", ".join(
-            f"{p.name} = {o + f * u:.4g} {p.unit}"
-            for p, o, f, u in zip(parameters, offsets, factors, found.place, strict=True)
+            f"{p.name} = {p.middle + p.half_width * u:.4g} {p.unit}"
+            for p, u in zip(parameters, found.place, strict=True)
         )
         raise ModelError(f"{where}: a denominator vanishes inside the range, near {place}; shrink the range")

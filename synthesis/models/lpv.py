@@ -11,7 +11,7 @@ import numpy as np
 import sympy as sp
 
 from synthesis.errors import ModelError, unknown
-from synthesis.models.extract import MATRICES, PolynomialModel, extract
+from synthesis.models.extract import MATRICES, ExactModel, PolynomialModel, extract, in_floats
 from synthesis.models.numeric import NumericModel, evaluate
 from synthesis.models.param import Constant, SchedulingParameter, Signal
 from synthesis.polynomials.matrix import FloatArray
@@ -90,10 +90,19 @@ class LpvModel:
             raise ModelError(f"model '{self.name}': parameter(s) {', '.join(idle)} appear in no matrix; remove them")
 
     @cached_property
-    def polynomial(self) -> PolynomialModel:
-        """Coefficient arrays of the matrices in the physical parameters, over a common denominator."""
+    def exact(self) -> ExactModel:
+        """Exact polynomials of the matrices in the scaled parameters u in [-1, 1], over a common denominator."""
         matrices = {key: getattr(self, key) for key in MATRICES}
         return extract(f"model '{self.name}'", matrices, self.parameters, self.constants)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Without the exact coefficients, which cannot be pickled and are worked out again where they are needed."""
+        return {key: value for key, value in self.__dict__.items() if key != "exact"}
+
+    @cached_property
+    def polynomial(self) -> PolynomialModel:
+        """`exact` as float64 coefficient arrays."""
+        return in_floats(self.exact)
 
     def on(self, grid: ArrayLike) -> NumericModel:
         """The model at g parameter values: the only border between sympy and numpy.
@@ -110,7 +119,7 @@ class LpvModel:
         if points.ndim != 2 or points.shape[-1] != count:
             raise ModelError(f"model '{self.name}': a grid of shape {points.shape} does not fit {count} parameters")
         self._check_range(points)
-        return evaluate(self.polynomial, points)
+        return evaluate(self.polynomial, self.parameters, points)
 
     def _check_range(self, points: FloatArray) -> None:
         for column, p in zip(points.T, self.parameters, strict=True):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from synthesis.models.extract import MATRICES, PolynomialModel
+from synthesis.models.param import SchedulingParameter
 from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
 
 
@@ -28,10 +29,11 @@ class NumericModel:
         return self.A - gain @ self.C, self.E - gain @ self.F
 
 
-def evaluate(model: PolynomialModel, points: FloatArray) -> NumericModel:
-    """All matrices at all points at once."""
-    below = values(model.denominator, points)
-    arrays = {key: values(getattr(model, key), points) / below for key in MATRICES}
+def evaluate(model: PolynomialModel, parameters: tuple[SchedulingParameter, ...], points: FloatArray) -> NumericModel:
+    """All matrices at all points (g, p), in physical units, at once."""
+    scaled = (points - np.array([p.middle for p in parameters])) / np.array([p.half_width for p in parameters])
+    below = values(model.denominator, scaled)
+    arrays = {key: values(getattr(model, key), scaled) / below for key in MATRICES}
     points = points.copy()
     for array in (points, *arrays.values()):
         array.setflags(write=False)
@@ -39,5 +41,5 @@ def evaluate(model: PolynomialModel, points: FloatArray) -> NumericModel:
 
 
 def values(coefficients: FloatArray, points: FloatArray) -> FloatArray:
-    """A coefficient array (d_1+1, ..., rows, columns) at points (g, p)."""
+    """A coefficient array (d_1+1, ..., rows, columns) at scaled points (g, p)."""
     return MatrixPolynomial(np.asarray(coefficients)[..., None]).at(points)[..., 0]

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from functools import lru_cache
 
 from synthesis.errors import ModelError
+from synthesis.models.formula import shown
+
+# Names, 1, products, quotients and single powers: a tower like 9**9**9 would be worked out by pint, digit by digit.
+_POWER = r"(?:\*\*|\^) ?(?:[+-]?\d{1,2}(?:\.\d{1,4})?(?![\w.])|\([+-]?\d{1,2}(?:[/.]\d{1,4})?\))(?! ?(?:\*\*|\^))"
+_UNIT = re.compile(rf"(?>[A-Za-zµμΩ°%][A-Za-z0-9_µμΩ°%]*+|1(?![\w.])|{_POWER}|[*/() ])++")
+LARGEST_POWER, LONGEST_UNIT = 100, 64
 
 
 @lru_cache(maxsize=1)
-def _registry() -> object:
+def registry() -> object:
+    """The one registry of units."""
     import pint  # 0.2 s: paid only when a model is built
 
     return pint.UnitRegistry()
@@ -21,14 +29,17 @@ def check_unit(unit: str, where: str) -> str:
     """Return the unit if pint knows it; '1' is dimensionless. Raises ModelError naming the place."""
     if unit == "1":
         return unit
-    try:
-        _registry().parse_units(unit)  # type: ignore[attr-defined]
-    except Exception as error:  # pint raises tokenizer, attribute and value errors alike
-        raise ModelError(
-            f"{where}: '{unit}' is not a unit ({error}); write for example 'rad/s', 'm/s^2' or '1'"
-        ) from None
     if not unit.strip():
         raise ModelError(f"{where}: the unit is missing; write '1' for a pure number")
+    words = "write for example 'rad/s', 'm/s^2' or '1'"
+    if len(unit) > LONGEST_UNIT or not _UNIT.fullmatch(unit):
+        raise ModelError(f"{where}: '{shown(unit)}' is not a unit; {words}")
+    try:
+        powers = registry().parse_units(unit)._units.values()  # type: ignore[attr-defined]
+    except Exception as error:  # pint raises tokenizer, attribute and value errors alike
+        raise ModelError(f"{where}: '{shown(unit)}' is not a unit ({shown(str(error), 100)}); {words}") from None
+    if any(abs(power) > LARGEST_POWER for power in powers):
+        raise ModelError(f"{where}: '{shown(unit)}' has powers beyond {LARGEST_POWER}; {words}")
     return unit
 
 

@@ -107,6 +107,12 @@ class MatrixPolynomial:
         weights = np.concatenate([[1.0], decisions[: self.decisions]])
         return MatrixPolynomial((self.coefficients @ weights)[..., None])
 
+    def magnitude(self, decisions: FloatArray) -> float:
+        """Largest row sum of what `substitute` adds up, signs left out: its rounding is a few eps of this."""
+        weights = np.abs(np.concatenate([[1.0], decisions[: self.decisions]]))
+        sizes = (np.abs(self.coefficients) @ weights).sum(axis=tuple(range(self.variables)))
+        return float(sizes.sum(axis=-1).max(initial=0.0))
+
     def affine(self, offsets: FloatArray, factors: FloatArray) -> MatrixPolynomial:
         """The same polynomial in new variables u, where p = offset + factor * u."""
         coefficients = self.coefficients

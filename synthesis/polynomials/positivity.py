@@ -23,19 +23,20 @@ class Positivity:
     scale: float
 
 
-def prove_positive(matrix: MatrixPolynomial, depth: int = 16) -> Positivity:
+def prove_positive(matrix: MatrixPolynomial, depth: int = 16, magnitude: float = 0.0) -> Positivity:
     r"""Decide M(u) > 0 on [-1, 1]^v in floating point with a guard for rounding.
 
     M(u) = sum_k B_k(u) M_k with Bernstein polynomials B_k >= 0 that sum to one, so M_k > 0 for all k proves M > 0; corner
     coefficients are values of M, so a non-positive one refutes it. Boxes that decide nothing are halved, all at once.
     The guard bounds every rounding error: conversion and halving are averages, so nothing grows beyond the sum of the
-    absolute coefficients. Raises ProblemError for coefficients that are not finite.
+    absolute coefficients. `magnitude` says how large the numbers were of which the coefficients were added up: what cancelled
+    there left rounding errors of that size. Raises ProblemError for coefficients that are not finite.
     """
     v = matrix.variables
     local = matrix.coefficients[..., 0]
     if not np.isfinite(local).all():
         raise ProblemError("a matrix polynomial with coefficients that are not finite has no sign")
-    size = float(np.abs(local).sum(axis=tuple(range(v))).sum(axis=-1).max())
+    size = max(float(np.abs(local).sum(axis=tuple(range(v))).sum(axis=-1).max()), magnitude)
     for axis in range(v):
         local = np.moveaxis(np.tensordot(_to_bernstein(local.shape[axis] - 1), local, axes=(1, axis)), 0, axis)
     boxes, lower, width = local[None], np.zeros((1, v)), np.ones((1, v))

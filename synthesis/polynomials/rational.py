@@ -24,6 +24,12 @@ def rational(number: float | int | str) -> fmpq:
     return fmpq(*number.as_integer_ratio())
 
 
+def decimal(number: float | int) -> fmpq:
+    """The decimal that is written for a number: 0.1 is one tenth, not the float64 next to it."""
+    exact = Fraction(repr(float(number))) if isinstance(number, float) else Fraction(int(number))
+    return fmpq(exact.numerator, exact.denominator)
+
+
 def polynomial_matrix(monomials: Sequence[Sequence[int]], coefficients: Sequence[Any]) -> Matrix:
     """sum_k p^(monomials[k]) coefficients[k] for one parameter p."""
     rows, columns = len(coefficients[0]), len(coefficients[0][0])

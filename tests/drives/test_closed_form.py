@@ -176,10 +176,10 @@ def test_mass_only_scales_the_forces(tmp_path: Path) -> None:
     ],
 )
 def test_schedule_that_does_not_fit_is_refused(
-    tmp_path: Path, direction: str, change: dict[str, float], message: str
+    tmp_path: Path, direction: str, change: dict[str, Any], message: str
 ) -> None:
     log, drive = write_log(tmp_path / "log.csv", columns(0.5)), write_drive(tmp_path)
-    write_content(tmp_path / "schedule.json", {**schedule_content(direction), **change})
+    write_content(tmp_path / "schedule.json", schedule_content(direction, **change))
     with pytest.raises(ValueError, match=message) as caught:
         run_drive([log], drive, tmp_path / "out")
     assert "\n" not in str(caught.value)

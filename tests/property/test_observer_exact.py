@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 from estimators import GainSchedule, LpvVelocityObserver
 from estimators.phi import Phi, phi
-from tests.unit.schedule_content import PUBLISHED, polynomial, schedule_content
+from tests.unit.schedule_content import PUBLISHED, schedule_content, with_matrix
 
 FEW, MANY = (4,), (7, 4)  # plain numbers, arrays
 
@@ -76,14 +76,14 @@ def test_any_model_of_the_same_size_will_do(
 ) -> None:
     a, b, c = entries[:6], entries[6:12], entries[12:]
     content = schedule_content(gains=[(0.01 * c[0], c[1]), (0.0, 0.0), (0.1, 0.2), (0.01 * c[2], c[3])])
-    content["sample_time"] = sample_time
+    content["update"]["sample_time"] = sample_time
     square = np.array([[0.0, 1e-4], [-1e-4, 0.0]]) * c[4] * 1e-2
-    content["plant"]["A"] = polynomial(
-        [[-abs(a[0]), 0.005 * a[1]], [a[2], -abs(a[3])]], [[0, 0], [0.01 * a[4], 0]], square.tolist()
+    with_matrix(
+        content, "A", [[-abs(a[0]), 0.005 * a[1]], [a[2], -abs(a[3])]], [[0, 0], [0.01 * a[4], 0]], square.tolist()
     )
-    content["plant"]["B"] = polynomial([[b[0] * 0.01], [b[1]]], [[0], [b[2] * 0.01]])
-    content["plant"]["C"] = polynomial([[b[3] * 1e-2, 0.0]], [[0.0, b[4] * 1e-4]])
-    content["plant"]["D"] = polynomial([[b[5] * 1e-2]], [[c[5] * 1e-5]])
+    with_matrix(content, "B", [[b[0] * 0.01], [b[1]]], [[0], [b[2] * 0.01]])
+    with_matrix(content, "C", [[b[3] * 1e-2, 0.0]], [[0.0, b[4] * 1e-4]])
+    with_matrix(content, "D", [[b[5] * 1e-2]], [[c[5] * 1e-5]])
     check(GainSchedule.from_content(content), shape, seed, tolerance=1e-9)
 
 
@@ -92,8 +92,8 @@ def test_any_model_of_the_same_size_will_do(
 def test_double_poles_need_no_case_of_their_own(shape: tuple[int, ...], offset: float) -> None:
     """C = [1 0], A = [[0 1], [0 0]], L = [2 s, s^2 (1 + offset)]: poles at -s, -s, or nearly so."""
     content = schedule_content(gains=(2 * 300.0, 300.0**2 * (1 + offset)))
-    content["plant"]["A"] = polynomial([[0, 1], [0, 0]])
-    content["plant"]["C"] = polynomial([[1, 0]])
+    with_matrix(content, "A", [[0, 1], [0, 0]])
+    with_matrix(content, "C", [[1, 0]])
     check(GainSchedule.from_content(content), shape, 1)
 
 

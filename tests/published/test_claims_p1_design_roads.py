@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 from typing import Any
@@ -10,10 +11,18 @@ import numpy as np
 import pytest
 
 from analysis.norms import hinf_norm
+from studies.claim import Verdict
+from studies.papers.corner_estimation.claims_solve_size import (
+    expressions,
+    one_by_one,
+    relaxed_problem,
+    solve_size,
+)
 from studies.papers.corner_estimation.hinf import optima, signed_model, velocity_floor
 from studies.papers.corner_estimation.inputs import corner_model, printed_gains, printed_numbers
 from studies.papers.corner_estimation.kalman import fitted, schedule
 from studies.papers.corner_estimation.tables_forces import filter_lag
+from synthesis.lmi.relaxation import RelaxedProblem
 from tests.unit.p1_findings import PRINT, RADIUS, finding
 
 Direction = Any
@@ -60,6 +69,75 @@ def test_kalman_gains_by_spectral_factorisation(direction: Direction) -> None:
     p1 = np.sqrt(2 * p0 + (noise.friction * s0**2 + noise.acceleration * (s1 + s2) ** 2 + a * a) / sensor)
     L1 = (p1 - a - L2 * (s1 + s2)) / (s0 - s1 * a)
     np.testing.assert_allclose(schedule(direction, noise, omega), np.stack([L1, np.full(6, L2)], axis=1), rtol=1e-7)
+
+
+# ---- (30): its size ---------------------------------------------------------------------------------------------------------
+
+
+def test_size_of_the_conic_problem_by_hand() -> None:
+    """Per point P > 0 (2x2) and two rates of the compact gain block (4x4); sums of squares of degrees 1 and 2 on an interval."""
+    points, degree, (states, disturbances) = 140, 1, (2, 2)
+
+    def triangle(size: int) -> int:
+        return size * (size + 1) // 2
+
+    block = states + disturbances
+    free = (degree + 1) * (triangle(states) + states) + 1  # P, chi, gamma^2
+    found = finding("P1-hinf-time").computed
+    assert found["conic_problem"] == {
+        "unknowns": free,
+        "rows": points * (triangle(states) + 2 * triangle(block)),
+        "cones": {f"{states}x{states}": points, f"{block}x{block}": 2 * points},
+    }
+    # degree 1: (1 + u) X1 + (1 - u) X2 at 2 nodes; degree 2: [1 u]' X1 [1 u] + (1 - u^2) X2 at 3, for both rates
+    cones = [states] * 2 + [2 * block, block] * 2
+    gram = sum(map(triangle, cones))
+    assert found["exact_relaxation"] == found["exact_relaxation_with_twice_the_points"] == {
+        "unknowns": free + gram,
+        "rows": gram + 2 * triangle(states) + 2 * 3 * triangle(block),
+        "cones": {"2x2": 2, "4x4": 2, "8x8": 2},
+    }  # fmt: skip
+
+
+def test_the_layer_walks_the_same_for_every_point() -> None:
+    """Three inequalities a point, each of at least a product, a constant and a sum; no other work than that of the points."""
+    counts = {points: expressions(one_by_one(relaxed_problem(points, 1, "grid"))) for points in (5, 10, 20)}
+    assert counts[20] == 2 * counts[10] == 4 * counts[5]
+    assert counts[5] >= 5 * 3 * 3
+
+
+def test_a_layer_that_hands_over_something_else_is_found_out() -> None:
+    def forgetful(relaxed: RelaxedProblem) -> Any:
+        problem = one_by_one(relaxed)
+        return type(problem)(problem.objective, problem.constraints[:-1])
+
+    def rounding(relaxed: RelaxedProblem) -> Any:
+        """The last inequality in single precision."""
+        last = relaxed.sampled[-1]
+        coarse = replace(last, values=last.values.astype(np.float32).astype(float))
+        return one_by_one(replace(relaxed, sampled=(*relaxed.sampled[:-1], coarse)))
+
+    assert solve_size(10).verdict is Verdict.DERIVED
+    assert solve_size(5).verdict is Verdict.NOT_REPRODUCED  # 5 points have fewer rows than the exact relaxation
+    for layer in (forgetful, rounding):
+        found = solve_size(10, layer=layer)
+        assert not found.computed["layer_hands_over_the_same_problem"]
+        assert found.verdict is Verdict.NOT_REPRODUCED
+
+
+def test_no_clock_decides_what_a_solve_costs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Twice the same words and numbers, and no clock is read for them."""
+
+    def stopped() -> float:
+        raise AssertionError("the claim read a clock")
+
+    for module in (
+        "time.perf_counter",
+        "time.monotonic",
+        "studies.papers.corner_estimation.claims_solve_size.perf_counter",
+    ):
+        monkeypatch.setattr(module, stopped)
+    assert solve_size(10) == solve_size(10)
 
 
 # ---- forces -----------------------------------------------------------------------------------------------------------------

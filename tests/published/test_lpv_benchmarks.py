@@ -19,13 +19,17 @@ from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import solve
 from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
 from tests.unit.lmi_cases import (
+    SLACK,
+    capped,
     corner,
     gain_inequality,
     gain_problem,
+    held,
     lyapunov_problem,
     parameter,
     reference_problem,
     small_model,
+    within,
 )
 
 # ---- quadratic stability: Zelentsovsky 1994 -----------------------------------------------------------------------------
@@ -113,15 +117,26 @@ def test_peni_seiler_unbounded_rate(kind: Relaxation) -> None:
     problem = gain_problem((parameter("delta", rate=np.inf),), *DELTA, 0)
     result = solve(problem, LmiSettings(relaxation=kind, points=10))
     assert result.verdict is Verdict.CERTIFIED
-    assert result.objective == pytest.approx(1.0, rel=1e-5)
+    assert within(result.objective, 1.0)
 
 
 @pytest.mark.parametrize(("rate", "gamma"), [(0.01, 0.01), (0.2, 0.19436), (4.0, 0.8663)])
 def test_peni_seiler_bounded_rate(rate: float, gamma: float) -> None:
-    """P of degree 3: about 1 % at rate 0.01 and 20 % at 0.2, as printed."""
-    result = solve(gain_problem((parameter("delta", rate=rate),), *DELTA, 3), LmiSettings(relaxation="exact"))
-    assert result.verdict is Verdict.CERTIFIED
-    assert result.objective == pytest.approx(gamma, rel=2e-3)
+    """P of degree 3: about 1 % at rate 0.01 and 20 % at 0.2, as printed; 0.5 % above that is proved, and 1 % below is not.
+
+    The gain is at most the rate: delta/(s+1) - 1/(s+1) delta = 1/(s+1) (d delta/dt) 1/(s+1). At rate 0.01 these 0.5 % leave a
+    margin of 7e-8 of the largest eigenvalue, so at the optimum itself a proof is found on some processors only.
+    """
+    exact = LmiSettings(relaxation="exact")
+
+    def problem() -> LmiProblem:
+        return gain_problem((parameter("delta", rate=rate),), *DELTA, 3)
+
+    assert solve(problem(), exact).objective == pytest.approx(gamma, rel=2e-3)
+    proved = solve(held(problem(), "gamma", 1.005 * gamma), exact)
+    assert proved.verdict is Verdict.CERTIFIED
+    assert proved.objective == pytest.approx(1.005 * gamma, rel=1e-3)
+    assert solve(capped(problem(), "gamma", 0.99 * gamma), exact).verdict is not Verdict.CERTIFIED
 
 
 def test_ten_points_are_not_enough_for_a_proof() -> None:
@@ -186,8 +201,8 @@ def all_coefficients_positive(degree: tuple[int, ...]) -> float | None:
 def test_rolmip_table(degree: int, printed: float, gamma: float) -> None:
     found = all_coefficients_positive((degree,) * 3)
     assert found is not None
-    assert found == pytest.approx(gamma, rel=1e-5)
-    assert found == pytest.approx(printed, abs=5.1e-5)
+    assert within(found, gamma, digits=5e-7)
+    assert within(found, printed, digits=5e-5)
     assert found >= worst_frozen_gain()
 
 
@@ -196,7 +211,7 @@ def test_rolmip_constant_matrix_by_both_relaxations_for_several_parameters(kind:
     """Affine in every parameter up to products, so three relaxations agree: degree 0 gives 2.842944."""
     result = solve(gain_problem(PARAMETERS, *rolmip(), 0), LmiSettings(relaxation=kind, points=3))
     assert result.verdict is Verdict.CERTIFIED
-    assert result.objective == pytest.approx(2.842944, rel=1e-5)
+    assert within(result.objective, 2.842944, digits=5e-7)
 
 
 def test_rolmip_vertices_are_sufficient_and_conservative() -> None:
@@ -235,10 +250,11 @@ def scalar_observer(low: float, high: float, degree: int, kind: Relaxation) -> t
 @pytest.mark.parametrize("kind", ["grid", "exact"])
 def test_scalar_observer_closed_form(kind: Relaxation) -> None:
     gamma, lower, gains = scalar_observer(-1.0 - 1e-6, -1.0 + 1e-6, 0, kind)
-    assert gamma == pytest.approx(0.8944271909999159, rel=1e-5)
+    assert within(gamma, 0.8944271909999159, digits=1e-6)
     assert lower is not None
     assert lower <= 2.0 / np.sqrt(5.0) * (1.0 + 1e-6)
-    np.testing.assert_allclose(gains, 4.0, rtol=1e-3)
+    for gain in gains:
+        assert_best(gain, -1.0, gamma, digits=1e-6)
 
 
 @pytest.mark.parametrize(("low", "high"), [(-3.0, -1.0), (-2.0, -0.5)])
@@ -247,10 +263,21 @@ def test_scheduled_scalar_observer_closed_form(low: float, high: float, kind: Re
     """With a in a range and any rate, the slowest a decides: 2/sqrt(a_max^2 + 4), and L = 4/|a_max| there."""
     gamma, lower, gains = scalar_observer(low, high, degree, kind)
     truth = 2.0 / np.hypot(high, 2.0)
-    assert truth * (1.0 - 1e-9) <= gamma <= truth * (1.0 + 1e-5)
+    assert within(gamma, truth)
     assert (lower is None) == (kind == "vertex")  # vertices with multi-convexity bound nothing from below
     assert lower is None or lower <= gamma
-    assert gains[1] == pytest.approx(4.0 / abs(high), rel=2e-3)
+    assert_best(gains[1], high, gamma)
+
+
+def assert_best(gain: float, a: float, gamma: float, digits: float = 1e-9) -> None:
+    """A frozen loop has the gain f(L) = sqrt(4 + L^2)/(L - a), least at L = 4/|a|, where f is flat: what `gamma` leaves to L.
+
+    No more than f <= gamma is true of a certified L; how near it comes to 4/|a| within that is the solver's choice.
+    """
+    best = 4.0 / abs(a)
+    assert np.hypot(2.0, gain) / (gain - a) <= gamma + digits
+    curvature = (4.0 - best**2) / (4.0 + best**2) ** 2 + 1.0 / (best - a) ** 2  # of log f at its minimum
+    assert abs(gain - best) <= 1.5 * np.sqrt(2.0 * (2.0 * SLACK + digits / gamma) / curvature)
 
 
 REFERENCE = 1.0441868  # P1 longitudinal values, wheel speed 0..140 rad/s, +-800 rad/s^2, noise weight 0.5
@@ -268,9 +295,9 @@ def reference_design(degree: int, kind: Relaxation, solver: str = "CLARABEL") ->
 def test_reference_problem(kind: Relaxation, degree: int) -> None:
     found = design_observer(corner("corner-estimation", "longitudinal", 140.0)[0], reference_design(degree, kind))
     assert found.verdict is Verdict.CERTIFIED
-    assert abs(found.gamma - REFERENCE) <= 2e-6
+    assert within(found.gamma, REFERENCE, digits=5e-8)
     assert found.gamma_lower is not None
-    assert found.gamma - 3e-4 < found.gamma_lower < REFERENCE + 1e-7
+    assert REFERENCE - 1e-3 < found.gamma_lower < REFERENCE + 5e-8
 
 
 @pytest.mark.parametrize(("kind", "degree"), [("exact", 1), ("exact", 2), ("exact", 3), ("grid", 2)])
@@ -279,7 +306,7 @@ def test_reference_problem_by_the_second_road(kind: Relaxation, degree: int) -> 
     model = corner("corner-estimation", "longitudinal", 140.0)[0]
     found = design_observer(model, reference_design(degree, kind, "cvxpy:CLARABEL"))
     assert found.verdict is Verdict.CERTIFIED
-    assert abs(found.gamma - REFERENCE) <= 2e-6
+    assert within(found.gamma, REFERENCE, digits=5e-8)
 
 
 @pytest.mark.parametrize("given", [1.0, 30.0, 1000.0])
@@ -290,7 +317,7 @@ def test_reference_problem_whatever_the_units_of_the_states(kind: Relaxation, de
     result = solve(problem, LmiSettings(relaxation=kind))
     assert result.verdict is Verdict.CERTIFIED
     assert result.objective is not None
-    assert abs(np.sqrt(result.objective) - REFERENCE) <= 2e-6
+    assert within(np.sqrt(result.objective), REFERENCE, digits=5e-8)
 
 
 def test_the_reference_bound_cannot_be_beaten_by_a_looser_problem_either() -> None:
@@ -311,5 +338,6 @@ def test_the_literal_problem_has_infimum_one_and_unbounded_gains() -> None:
         channel = Channel(("friction", "acceleration_error"), ERRORS)
         settings = LmiSettings(relaxation="exact")
         found = design_observer(model, ObserverDesign((channel,), degree=degree, backoff=0.0, settings=settings))
-        assert 1.0 <= found.gamma <= 1.0 + 2e-5
+        assert found.verdict is Verdict.CERTIFIED
+        assert within(found.gamma, 1.0)
         assert np.abs(found.gain(np.linspace(0.0, 140.0, 8))).max() > 1e3

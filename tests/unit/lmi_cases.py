@@ -98,6 +98,35 @@ def gain_problem(
     return problem
 
 
+SLACK = 1e-5  # relative: the most that `solve` loosens an optimum so that a proof is found
+
+
+def within(value: float | None, optimum: float, digits: float = 1e-9) -> bool:
+    """A certified bound is never below the optimum (known to `digits`), and above it by the loosening at most.
+
+    What lies between these two hangs on the last digits of a solver; that it lies between them does not.
+    """
+    assert value is not None
+    size = max(abs(optimum), 1e-3)
+    return optimum - digits <= value <= optimum + digits + 2.0 * SLACK * size
+
+
+def held(problem: LmiProblem, name: str, level: float) -> LmiProblem:
+    """The problem with the unknown that it minimises held at `level` or above.
+
+    At an optimum every proof is on the edge, and a processor that rounds differently may miss it; at a level above the
+    optimum the other inequalities have room.
+    """
+    problem.require(f"{name} > {level:g}", problem.unknowns[name] - problem.constant(np.array([[level]])))
+    return problem
+
+
+def capped(problem: LmiProblem, name: str, level: float) -> LmiProblem:
+    """The problem with the unknown that it minimises below `level`."""
+    problem.require(f"{name} < {level:g}", problem.constant(np.array([[level]])) - problem.unknowns[name])
+    return problem
+
+
 def reference_problem(model: LpvModel, degree: int, given: float, noise: float = 0.5) -> LmiProblem:
     """The reference problem with the first state of the model as given multiplied by `given`.
 
@@ -108,7 +137,7 @@ def reference_problem(model: LpvModel, degree: int, given: float, noise: float =
     scale = observer_scale(poly, model.parameters)
     balanced = poly.with_states_scaled(scale)
     problem = LmiProblem(model.parameters)
-    A, C, E, F = (problem.known(getattr(balanced, key)) for key in "ACEF")
+    A, C, E, F = (problem.scaled(getattr(balanced, key)) for key in "ACEF")
     weights = problem.constant(np.diag([1.0, 1.0, noise]))
     P, X = problem.symmetric("P", 2, degree), problem.matrix("X", 2, 1, degree)
     squared = problem.scalar("gamma^2")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cache
 
 from studies.claim import Finding
-from studies.papers.corner_estimation.claims_gains import solve_time
 from studies.papers.corner_estimation.study import CLAIMS
 
 # sigma0, sigma1, sigma2, kappa, L1, L2 of P1 section IV and the text after (28), (40); R_e of Table I.
@@ -18,5 +17,5 @@ RADIUS = "0.33"
 
 @cache
 def finding(name: str) -> Finding:
-    """Our half of a claim; the one that measures seconds on a coarser grid."""
-    return solve_time(40) if name == "P1-hinf-time" else CLAIMS[name]()
+    """Our half of a claim."""
+    return CLAIMS[name]()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 # P1 Table I and the fixed gains of (29), (41); P3 Table I and its road-test gains.
@@ -19,19 +20,21 @@ def schedule_content(
     gains: Any = None,
     breakpoints: Any = (0.0, 30.0, 80.0, 140.0),
     dtype: str = "float64",
+    update: str = "held",
+    sample_time: float = 0.005,
 ) -> dict[str, Any]:
     """Unsealed content: `gains` is one pair (L1, L2) for all breakpoints or a pair for each."""
     values = PUBLISHED[direction]
-    sigma0, sigma1, sigma2, kappa = values["constants"]
-    decay = kappa * EFFECTIVE_RADIUS
     pairs = values["gains"] if gains is None else gains
     if not isinstance(pairs[0], (list, tuple)):
         pairs = [pairs] * len(breakpoints)
     units = {"sigma0": "1/m", "sigma1": "s/m", "sigma2": "s/m", "kappa": "1/m"}
     constants = {name: {"value": value, "unit": units[name]} for name, value in zip(units, values["constants"])}  # noqa: B905
     constants["effective_radius"] = {"value": EFFECTIVE_RADIUS, "unit": "m"}
-    return {
-        "schema": "gainsmith.schedule/1",
+    sigma0, sigma1, sigma2, kappa = map(decimal, values["constants"])
+    decay = kappa * decimal(EFFECTIVE_RADIUS)
+    found = {
+        "schema": "gainsmith.schedule/2",
         "name": f"test-{direction}",
         "description": "published values, nothing proved",
         "model": {
@@ -46,6 +49,14 @@ def schedule_content(
                 {"name": "force_noise", "unit": "1"},
             ],
             "constants": constants,
+            "matrices": {
+                "A": [["-kappa*effective_radius*wheel_speed", "1"], ["0", "0"]],
+                "B": [["0"], ["1"]],
+                "C": [["sigma0 - sigma1*kappa*effective_radius*wheel_speed", "sigma1 + sigma2"]],
+                "D": [["0"]],
+                "E": [["1", "0", "0"], ["0", "1", "0"]],
+                "F": [["sigma1", "0", "0.5"]],
+            },
         },
         "scheduling": [
             {
@@ -59,28 +70,70 @@ def schedule_content(
                 "breakpoints": list(breakpoints),
             }
         ],
-        "sample_time": 0.005,
-        "plant": {
-            "abs": ["wheel_speed"],
-            "A": polynomial([[0, 1], [0, 0]], [[-decay, 0], [0, 0]]),
-            "B": polynomial([[0], [1]]),
-            "C": polynomial([[sigma0, sigma1 + sigma2]], [[-sigma1 * decay, 0]]),
-            "D": polynomial([[0]]),
-            "E": polynomial([[1, 0, 0], [0, 1, 0]]),
-            "F": polynomial([[sigma1, 0, 0.5]]),
-        },
+        "update": {"kind": update, "sample_time": sample_time},
+        "plant": {},
         "gain": {
-            "unit": [["m/s"], ["m/s^2"]],
             "dtype": dtype,
             "interpolation": "linear",
             "table": [[[first], [second]] for first, second in pairs],
         },
-        "guarantee": {"decay_rate": 80.0},
-        "certificate": {"method": "none"},
+        "claims": [
+            {"kind": "decay rate", "level": 80.0, "P": {"orders": [[0]], "coefficients": [[[1.0, 0.0], [0.0, 1.0]]]}}
+        ],
         "provenance": {"created": "2024-01-01"},
+    }
+    powers: dict[str, list[Any]] = {
+        "A": [[[0, 1], [0, 0]], [[-decay, 0], [0, 0]]],
+        "B": [[[0], [1]]],
+        "C": [[[sigma0, sigma1 + sigma2]], [[-sigma1 * decay, 0]]],
+        "D": [[[0]]],
+        "E": [[[1, 0, 0], [0, 1, 0]]],
+        "F": [[[sigma1, 0, 0.5]]],
+    }
+    for key, coefficients in powers.items():
+        found["plant"][key] = chebyshev(breakpoints[0], breakpoints[-1], *coefficients)
+    return found
+
+
+def with_matrix(content: dict[str, Any], key: str, *coefficients: Any) -> None:
+    """Puts another matrix into unsealed content, from its coefficients of 1, p, p^2, ...: in numbers and as formulas."""
+    entry = content["scheduling"][0]
+    content["plant"][key] = chebyshev(entry["min"], entry["max"], *coefficients)
+    content["model"]["matrices"][key] = [
+        [
+            " + ".join(f"({value!r})*{entry['name']}**{power}" for power, value in enumerate(cell))
+            for cell in zip(*rows, strict=True)
+        ]
+        for rows in zip(*coefficients, strict=True)
+    ]
+
+
+def chebyshev(low: float, high: float, *coefficients: Any) -> dict[str, Any]:
+    """The stored form, T_0(u), T_1(u), ..., of a matrix polynomial in p on [low, high]: exact, rounded once at the end.
+
+    Horner's scheme over Chebyshev series, p = middle + half u and u T_k = (T_k+1 + T_|k-1|)/2.
+    """
+    middle, half = (decimal(low) + decimal(high)) / 2, (decimal(high) - decimal(low)) / 2
+
+    def series(powers: list[Any]) -> list[Fraction]:
+        found: list[Fraction] = []
+        for value in reversed(powers):
+            moved = [middle * c for c in found] + [Fraction(0)]
+            for k, c in enumerate(found):
+                moved[k + 1] += half * c / 2
+                moved[abs(k - 1)] += half * c / 2
+            moved[0] += decimal(value)
+            found = moved
+        return found[: len(powers)]
+
+    cells = [[series(list(cell)) for cell in zip(*rows, strict=True)] for rows in zip(*coefficients, strict=True)]
+    orders = range(len(coefficients))
+    return {
+        "orders": [[order] for order in orders],
+        "coefficients": [[[float(cell[order]) for cell in row] for row in cells] for order in orders],
     }
 
 
-def polynomial(*coefficients: Any) -> dict[str, Any]:
-    """Matrix polynomial in one parameter from its coefficients of degree 0, 1, ..."""
-    return {"monomials": [[power] for power in range(len(coefficients))], "coefficients": list(coefficients)}
+def decimal(value: float | Fraction) -> Fraction:
+    """The number that is written."""
+    return value if isinstance(value, Fraction) else Fraction(repr(float(value)))

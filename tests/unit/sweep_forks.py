@@ -63,13 +63,26 @@ def dead_worker(whole: Sweep, out: Path) -> str:
     return ""
 
 
+def held_after(chunks: int) -> Callable[[int, int], None]:
+    """A progress that lets a run keep so many chunks and then holds it: a fast run waits for its kill as a slow one does."""
+    left = iter(range(chunks))
+
+    def told(done: int, total: int) -> None:
+        if next(left, None) is None:
+            while True:
+                signal.pause()
+
+    return told
+
+
 def killed(whole: Sweep, folder: Path, kills: int, executor: Executor) -> dict[str, Any]:
     """How many were killed while they ran, the chunks there after each, and those that the last run had left to do."""
     draw, there = Random(kills), [0]
+    each = (whole.chunk_count() - 1) // kills - 1  # held_after keeps one more; so the last run has something left
     for _ in range(kills):
         child = os.fork()
         if child == 0:
-            run_sweep(whole, folder, executor, resume=True)
+            run_sweep(whole, folder, executor, resume=True, progress=held_after(each))
             os._exit(0)
         wanted = there[-1] + draw.randrange(3)
         while count(folder) < wanted:

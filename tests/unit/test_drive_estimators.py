@@ -157,7 +157,7 @@ def test_every_chain_of_the_papers_can_be_chosen(tmp_path: Path) -> None:
 
 def test_a_lateral_schedule_for_another_time_is_refused_before_the_log_is_read(tmp_path: Path) -> None:
     drive = write_drive(tmp_path, DRIVE.replace('"schedule.json"', '"schedule.json"\nlateral = "side.json"'))
-    write_content(tmp_path / "side.json", {**schedule_content("lateral"), "sample_time": 0.01})
+    write_content(tmp_path / "side.json", schedule_content("lateral", sample_time=0.01))
     with pytest.raises(SpecError, match=r"schedules\.lateral: 'side\.json' was proved at sample_time = 0\.01 s"):
         replay_drive([tmp_path / "no-such-log.csv"], drive)
     write_content(tmp_path / "side.json", schedule_content("longitudinal"))

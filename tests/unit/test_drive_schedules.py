@@ -22,6 +22,8 @@ def content(radius: float | None, direction: str = "longitudinal") -> dict[str, 
     """A schedule whose model says ``radius`` m, or does not say; the dynamics stay those of the tests."""
     found = schedule_content(direction)
     del found["model"]["constants"]["effective_radius"]
+    for rows in found["model"]["matrices"].values():
+        rows[:] = [[text.replace("effective_radius", str(EFFECTIVE_RADIUS)) for text in row] for row in rows]
     if radius is not None:
         found["model"]["constants"]["effective_radius"] = {"value": radius, "unit": "m"}
     return found

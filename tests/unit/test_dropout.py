@@ -20,6 +20,10 @@ from estimators.errors import RangeError
 from tests.unit.schedule_content import schedule_content
 
 SCHEDULE = GainSchedule.from_content(schedule_content())
+SAMPLED = GainSchedule.from_content(
+    schedule_content(update="sampled", gains=[(6e-4, 0.5), (3e-4, 0.4), (0.0, 0.3), (-1e-4, 0.2)])
+)
+EITHER = pytest.mark.parametrize("schedule", [SCHEDULE, SAMPLED], ids=["held", "sampled"])
 
 
 def bisected(A0: np.ndarray, A1: np.ndarray) -> float:
@@ -148,24 +152,37 @@ def test_bad_probabilities_are_refused() -> None:
         drop_radius(np.zeros((3, 2, 2)), np.zeros((3, 2, 2)), [0.1, 0.2])
 
 
-def test_coasting_and_received_updates_are_those_of_the_runtime() -> None:
+@EITHER
+def test_coasting_and_received_updates_are_those_of_the_runtime(schedule: GainSchedule) -> None:
     """Two runtime observers that see the same samples differ by the homogeneous update: its matrix is the mode."""
     speeds = np.array([0.0, 7.0, 65.0, 140.0])
-    modes = schedule_drop_modes(SCHEDULE, speeds)
+    modes = schedule_drop_modes(schedule, speeds)
     for measurement, matrix in ((np.full(4, 0.3), modes.received), (np.full(4, np.nan), modes.dropped)):
         for column in np.eye(2):
-            pair = [LpvVelocityObserver(SCHEDULE), LpvVelocityObserver(SCHEDULE)]
+            pair = [LpvVelocityObserver(schedule), LpvVelocityObserver(schedule)]
             pair[0].reset(state=column)
             ends = [o.step(np.full(4, 2.0), measurement, speeds).estimate for o in pair]
             np.testing.assert_allclose(ends[0] - ends[1], matrix @ column, rtol=1e-9, atol=1e-13)
 
 
-def test_held_measurement_is_what_the_runtime_makes_of_a_repeated_one() -> None:
+@EITHER
+def test_modes_of_a_schedule_are_the_formulas_of_its_update(schedule: GainSchedule) -> None:
+    for speed in (0.0, 50.0, 140.0):
+        modes, plant, T = schedule_drop_modes(schedule, speed), schedule.plant_at(speed), schedule.sample_time
+        correction = schedule.gain(speed) @ plant.C
+        coasting = expm(T * plant.A)
+        received = coasting - correction if schedule is SAMPLED else expm(T * (plant.A - correction))
+        np.testing.assert_allclose(modes.dropped, coasting, rtol=1e-12, atol=1e-15)
+        np.testing.assert_allclose(modes.received, received, rtol=1e-12, atol=1e-15)
+
+
+@EITHER
+def test_held_measurement_is_what_the_runtime_makes_of_a_repeated_one(schedule: GainSchedule) -> None:
     """A plant that moves by C dx per sample: the error of the observer follows the modes of (e, x, y used last)."""
-    speed, T = 40.0, SCHEDULE.sample_time
-    plant = SCHEDULE.plant_at(speed)
-    modes = schedule_drop_modes(SCHEDULE, speed, "hold with plant")
-    observer = LpvVelocityObserver(SCHEDULE, (1,))
+    speed, T = 40.0, schedule.sample_time
+    plant = schedule.plant_at(speed)
+    modes = schedule_drop_modes(schedule, speed, "hold with plant")
+    observer = LpvVelocityObserver(schedule, (1,))
     observer.reset(state=np.array([[0.0, 0.5]]))
     x, used = np.array([1e-3, 1.0]), 0.0
     state = np.concatenate([x - observer.state[0], x, [used]])
@@ -192,7 +209,24 @@ def test_policies_answer_differently() -> None:
     assert critical_drop_probability(at_rest.dropped, at_rest.received) == 1.0
 
 
+def test_gains_that_correct_once_a_sample() -> None:
+    """The same plant, K = 0.8: c = a - K, and the error of a moving plant has no part of the plant in it."""
+    A, C, K, T = [[0.5]], [[1.0]], [[0.8]], 0.5
+    coast, hold, full = (
+        runtime_drop_modes(A, C, K, T, policy, "sampled") for policy in ("coast", "hold", "hold with plant")
+    )
+    a = np.exp(0.25)
+    c = a - 0.8
+    assert critical_drop_probability(coast.dropped, coast.received) == pytest.approx((1 - c**2) / (a**2 - c**2))
+    np.testing.assert_allclose(hold.dropped, [[c, 0.8], [0.0, 1.0]], rtol=1e-14)
+    np.testing.assert_allclose(hold.received, [[c, 0.0], [0.0, 0.0]], rtol=1e-14)
+    np.testing.assert_allclose(full.received, [[c, 0.0, 0.0], [0.0, a, 0.0], [0.0, 1.0, 0.0]], atol=1e-15)
+    np.testing.assert_allclose(full.dropped, [[c, 0.8, -0.8], [0.0, a, 0.0], [0.0, 0.0, 1.0]], rtol=1e-14)
+
+
 def test_bad_modes_are_refused() -> None:
+    with pytest.raises(AnalysisError, match="unknown update 'hold'; did you mean held"):
+        runtime_drop_modes([[1.0]], [[1.0]], [[1.0]], 0.1, "coast", "hold")  # type: ignore[arg-type]
     with pytest.raises(AnalysisError, match="unknown drop policy 'cost'; did you mean coast"):
         runtime_drop_modes([[1.0]], [[1.0]], [[1.0]], 0.1, "cost")  # type: ignore[arg-type]
     with pytest.raises(AnalysisError, match="do not fit"):

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
 from analysis.dropout import critical_drop_probability
-from analysis.dropout_cells import Cells, curvature, exponents
+from analysis.dropout_cells import Cells, cell_updates, curvature
 from analysis.dropout_modes import schedule_drop_modes
 from analysis.dropout_schedule import frozen_critical_probability
 from analysis.errors import AnalysisError
 from analysis.mean_square_schedule import certified_drop_probability, design, judge, mean_square_schedule
 from estimators import GainSchedule
 from synthesis.lmi.result import Verdict
-from tests.unit.schedule_content import polynomial, schedule_content
+from tests.unit.schedule_content import schedule_content, with_matrix
 
 SHIPPED = GainSchedule.shipped("corner-estimation-longitudinal")
+SAMPLED = GainSchedule.from_content(
+    schedule_content(update="sampled", gains=[(1.18e-3, 0.048), (8.8e-4, 0.076), (5.9e-4, 0.134), (4.2e-4, 0.217)])
+)
 NAMES = [
     "corner-estimation-longitudinal",
     "corner-estimation-lateral",
@@ -32,11 +33,10 @@ NAMES = [
 
 def rotating(rate: float) -> GainSchedule:
     """x' = [[-1, w], [w - 10.1, -1]] x, w in [0.1, 10], gain 0: every frozen pole at -1 +- j; unstable if w may jump."""
-    content: dict[str, Any] = copy.deepcopy(schedule_content(gains=(0.0, 0.0), breakpoints=(0.1, 5.0, 10.0)))
-    content["plant"]["A"] = polynomial([[-1, 0], [-10.1, -1]], [[0, 1], [1, 0]])
-    content["plant"]["C"] = polynomial([[1, 0]])
+    content = schedule_content(gains=(0.0, 0.0), breakpoints=(0.1, 5.0, 10.0), sample_time=0.2)
+    with_matrix(content, "A", [[-1, 0], [-10.1, -1]], [[0, 1], [1, 0]])
+    with_matrix(content, "C", [[1, 0]])
     content["scheduling"][0] |= {"rate_min": -rate, "rate_max": rate}
-    content["sample_time"] = 0.2
     return GainSchedule.from_content(content)
 
 
@@ -70,12 +70,12 @@ def test_held_measurements_never_open_the_loop() -> None:
     assert frozen_critical_probability(SHIPPED, "hold").smallest == 1.0
 
 
-def test_curvature_bounds_the_error_of_interpolation() -> None:
+@pytest.mark.parametrize("schedule", [GainSchedule.from_content(schedule_content()), SAMPLED], ids=["held", "sampled"])
+def test_curvature_bounds_the_error_of_interpolation(schedule: GainSchedule) -> None:
     """Against the largest error seen on 200 points of each cell, with exponentials written out."""
-    schedule = GainSchedule.from_content(schedule_content())
     scale = np.diag([300.0, 1.0])
     cells = Cells(np.array([0.0, 31.0, 100.0]), np.array([4.0, 36.0, 120.0]))
-    bound = curvature(exponents(schedule, cells, scale))
+    bound = curvature(cell_updates(schedule, cells, scale))
     P = np.array([[0.8, 0.1], [0.1, 0.3]])
     P = P / np.linalg.eigvalsh(P)[-1]
     for c in range(3):
@@ -89,29 +89,95 @@ def test_curvature_bounds_the_error_of_interpolation() -> None:
             assert 0.0 < seen <= bound[k, c]
 
 
-def test_certificate_survives_a_dense_check_written_out() -> None:
+def cubic(update: str) -> GainSchedule:
+    content = schedule_content(update=update, gains=[(0.02, 0.1), (0.05, -0.2), (-0.03, 0.3), (0.0, 0.1)])
+    second, third = [[2e-3, 0], [0, -1e-3]], [[0, 1e-8], [2e-5, 0]]
+    with_matrix(content, "A", [[-20, 1], [3, -9]], [[0, 1e-3], [0.1, 0]], second, third)
+    with_matrix(content, "C", [[1, 2]], [[0.01, 0]], [[0, 1e-3]], [[-1e-5, 1e-5]])
+    return GainSchedule.from_content(content)
+
+
+@pytest.mark.parametrize("update", ["held", "sampled"])
+def test_updates_on_a_cell_are_those_of_the_schedule(update: str) -> None:
+    """The polynomials in t, summed up, beside plant and gains at the place."""
+    schedule, T = cubic(update), 0.005
+    scale = np.array([[3.0, 1.0], [0.5, 2.0]])
+    cells = Cells(np.array([0.0, 31.0, 80.0]), np.array([30.0, 36.0, 140.0]))
+    found = cell_updates(schedule, cells, scale)
+    for t in (0.0, 0.3, 1.0):
+        places = cells.low + t * (cells.high - cells.low)
+        exponent, added = (
+            np.einsum("ucdij,d->ucij", M, t ** np.arange(M.shape[2])) for M in (found.exponent, found.added)
+        )
+        plant = schedule.plant_at(places)
+        correction = schedule.gain(places) @ plant.C
+        expected = [plant.A * T, (plant.A if update == "sampled" else plant.A - correction) * T]
+        np.testing.assert_allclose(exponent, scale @ np.array(expected) @ np.linalg.inv(scale), rtol=1e-11, atol=1e-13)
+        jump = scale @ -correction @ np.linalg.inv(scale) if update == "sampled" else np.zeros_like(correction)
+        np.testing.assert_allclose(added, [np.zeros_like(jump), jump], rtol=1e-11, atol=1e-13)
+
+
+@pytest.mark.parametrize("update", ["held", "sampled"])
+def test_curvature_is_no_larger_than_it_need_be(update: str) -> None:
+    """Motion along one direction: e^(2 m t) and (1 - k c t)^2 curve by nearly what the bound says."""
+    content = schedule_content(update=update, gains=(0.0, 0.01))
+    slope = 0.0 if update == "sampled" else -1e-2
+    with_matrix(content, "A", [[0, 0], [0, 0]], [[slope, 0], [0, slope]])
+    with_matrix(content, "C", [[0, 0]], [[0, 0.1]] if update == "sampled" else [[0, 0]])
+    schedule = GainSchedule.from_content(content)
+    cells = Cells(np.array([0.0]), np.array([10.0]))
+    bound = curvature(cell_updates(schedule, cells, np.eye(2)))[1, 0]
+    modes = schedule_drop_modes(schedule, np.linspace(0.0, 10.0, 201))
+    value = np.swapaxes(modes.received, 1, 2) @ modes.received
+    chord = value[:1] + np.linspace(0.0, 1.0, 201)[:, None, None] * (value[-1:] - value[:1])
+    seen = np.abs(np.linalg.eigvalsh(value - chord)).max()
+    assert 0.99 * bound < seen <= bound
+
+
+def test_a_bound_that_proves_nothing_is_large_and_finite() -> None:
+    schedule = GainSchedule.from_content(schedule_content(gains=[(0.7, 180.0), (5.0, 2000.0), (1.0, 1.0), (0.0, 0.0)]))
+    bound = curvature(cell_updates(schedule, Cells(np.array([0.0]), np.array([30.0])), np.eye(2)))
+    assert np.isfinite(bound).all()
+    assert bound[1, 0] > 1e40
+    assert (
+        judge(schedule, 0.0, schedule.breakpoints, np.tile(np.eye(2), (4, 1, 1)), np.eye(2)).verdict
+        is Verdict.INCONCLUSIVE
+    )
+
+
+def test_curvature_of_a_plant_of_third_order_is_bounded() -> None:
+    """Polynomials of the parameter that the shipped plants do not have, for both updates."""
+    for update in ("held", "sampled"):
+        test_curvature_bounds_the_error_of_interpolation(cubic(update))
+
+
+@pytest.mark.parametrize(("schedule", "p"), [(SHIPPED, 0.6), (SAMPLED, 0.3)], ids=["held", "sampled"])
+def test_certificate_survives_a_dense_check_written_out(schedule: GainSchedule, p: float) -> None:
     """Every pair (w, w+) within the rate on a grid that the proof does not use."""
-    found = mean_square_schedule(SHIPPED, 0.6)
+    found = mean_square_schedule(schedule, p)
     assert found.verdict is Verdict.CERTIFIED, found.message
     draw = np.random.default_rng(1)
-    reach = 800.0 * SHIPPED.sample_time
+    reach = 800.0 * schedule.sample_time
     for w in draw.uniform(0.0, 140.0, 300):
         after = np.clip(w + draw.choice([-1.0, 1.0, draw.uniform(-1, 1)]) * reach, 0.0, 140.0)
         now, later = (
             np.array([[np.interp(x, found.nodes, found.lyapunov[:, i, j]) for j in (0, 1)] for i in (0, 1)])
             for x in (w, after)
         )
-        plant, gain = SHIPPED.plant_at(w), SHIPPED.gain(w)
-        open_, closed = (expm(SHIPPED.sample_time * (plant.A - k * gain @ plant.C)) for k in (0, 1))
-        slack = now - 0.6 * open_.T @ later @ open_ - 0.4 * closed.T @ later @ closed
+        plant, gain = schedule.plant_at(w), schedule.gain(w)
+        open_ = expm(schedule.sample_time * plant.A)
+        held = expm(schedule.sample_time * (plant.A - gain @ plant.C))
+        closed = held if schedule is SHIPPED else open_ - gain @ plant.C
+        slack = now - p * open_.T @ later @ open_ - (1.0 - p) * closed.T @ later @ closed
         size = np.sqrt(np.diag(now))
         assert np.linalg.eigvalsh(slack / np.outer(size, size))[0] > 0.0
 
 
-def test_certified_below_and_refuted_above_the_frozen_value() -> None:
-    frozen = frozen_critical_probability(SHIPPED)
-    assert mean_square_schedule(SHIPPED, 0.97 * frozen.smallest, frozen).verdict is Verdict.CERTIFIED
-    refuted = mean_square_schedule(SHIPPED, frozen.smallest + 1e-3, frozen)
+@pytest.mark.parametrize("schedule", [SHIPPED, SAMPLED], ids=["held", "sampled"])
+def test_certified_below_and_refuted_above_the_frozen_value(schedule: GainSchedule) -> None:
+    frozen = frozen_critical_probability(schedule)
+    assert mean_square_schedule(schedule, 0.97 * frozen.smallest, frozen).verdict is Verdict.CERTIFIED
+    refuted = mean_square_schedule(schedule, frozen.smallest + 1e-3, frozen)
     assert refuted.verdict is Verdict.REFUTED
     assert f"{frozen.place:.6g} rad/s" in refuted.message
 

@@ -99,9 +99,7 @@ def content(part: Any) -> list[bytes]:
 
 def test_a_refused_restore_changes_nothing() -> None:
     """The refusal comes from a part that is asked late: a schedule of another name, a factor in the second thousand."""
-    other = GainSchedule.from_content(
-        {**schedule_content("longitudinal"), "sample_time": TIME, "name": "other"}, "other"
-    )
+    other = GainSchedule.from_content({**schedule_content("longitudinal", sample_time=TIME), "name": "other"}, "other")
     truth = noisy(straight(np.full(30, 1.0), 15.0), 1)
     first, second = (EstimationPipeline(CAR, TIME, corner_observers=CornerObservers(CAR, s)) for s in (ALONG, other))
     run(first, truth, 0, 30)

@@ -1,4 +1,4 @@
-"""Problems before any solver: scaling, unknowns, rates, windows, margins, and what is refused."""
+"""Problems before any solver: scaling, unknowns, rates, boxes, margins, and what is refused."""
 
 from __future__ import annotations
 
@@ -89,15 +89,18 @@ def test_a_parameter_that_may_jump_must_not_enter_an_unknown() -> None:
         problem.time_derivative(problem.symmetric("Q", 2, 1))
 
 
-def test_a_window_is_rewritten_on_the_unit_interval() -> None:
+BOX = (np.array([-0.25, 0.0]), np.array([0.25, 1.0]))  # speeds from 20 to 30, all rates
+
+
+def test_a_part_of_the_range_has_local_variables() -> None:
     problem = LmiProblem((SPEED,))
     u = variable(0, 2)  # scaled speed: (speed - 30) / 20
-    problem.require("part", u, window=(20.0, 30.0))
+    problem.require_on("part", u.affine(*BOX), *BOX)
     (entry,) = problem.inequalities
     np.testing.assert_allclose(entry.matrix.at(np.array([[-1.0, 0.0], [1.0, 0.0]]))[:, 0, 0, 0], [-0.5, 0.0])
     assert problem.place(entry, np.array([-1.0, 0.0])) == "speed = 20 m/s"
-    with pytest.raises(ProblemError, match="a window needs exactly one parameter, not 2"):
-        LmiProblem(BOTH).require("part", variable(0, 4), window=(20.0, 30.0))
+    with pytest.raises(ProblemError, match="its box reaches beyond the range"):
+        problem.require_on("part", u, np.array([0.9, 0.0]), np.array([0.2, 1.0]))
 
 
 def test_places_are_named_in_physical_units() -> None:

@@ -208,11 +208,12 @@ def test_numbers_equal_sympy_at_random_points(points: list[tuple[float, float]])
 
 def test_extracted_coefficients_are_those_of_the_symbols() -> None:
     poly = MODEL.polynomial
-    below = sum(sp.Float(c) * p**i * q**j for (i, j), c in np.ndenumerate(poly.denominator[..., 0, 0]))
+    u, v = p, (q - sp.Rational(1, 2)) / sp.Rational(3, 2)  # the scaled parameters of [-1, 1] and [-1, 2]
+    below = sum(sp.Float(c) * u**i * v**j for (i, j), c in np.ndenumerate(poly.denominator[..., 0, 0]))
     for key in RATIONAL:
         array = getattr(poly, key)
         for row, column in np.ndindex(array.shape[2:]):
-            above = sum(sp.Float(c) * p**i * q**j for (i, j), c in np.ndenumerate(array[..., row, column]))
+            above = sum(sp.Float(c) * u**i * v**j for (i, j), c in np.ndenumerate(array[..., row, column]))
             exact = sp.Matrix(RATIONAL[key])[row, column].subs({k: sp.Rational("0.7"), m: sp.Rational("-1.25")})
             difference = sp.Poly(sp.expand(sp.numer(sp.together(above - exact * below))), p, q)
             assert max((abs(float(c)) for c in difference.coeffs()), default=0.0) < 1e-12

@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import expm
 
 from estimators import EstimatorError, Flag, GainSchedule, LpvVelocityObserver, RangeError, ScheduleError
-from tests.unit.schedule_content import polynomial, schedule_content
+from tests.unit.schedule_content import schedule_content, with_matrix
 
 SCHEDULE = GainSchedule.from_content(schedule_content(gains=[(0.9, 210.0), (0.8, 183.1), (0.7, 100.0), (0.5, 60.0)]))
 SIZES = [(4,), (5, 4)]  # plain numbers, arrays
@@ -188,8 +188,8 @@ def test_estimates_stay_finite_whatever_arrives(shape: tuple[int, ...]) -> None:
 @pytest.mark.parametrize("shape", SIZES)
 def test_an_unstable_model_that_coasts_for_long_starts_again(shape: tuple[int, ...]) -> None:
     content = schedule_content(gains=(100.0, 100.0))
-    content["plant"]["A"] = polynomial([[50, 1], [0, 50]])
-    content["plant"]["C"] = polynomial([[1, 1]])
+    with_matrix(content, "A", [[50, 1], [0, 50]])
+    with_matrix(content, "C", [[1, 1]])
     runner = LpvVelocityObserver(GainSchedule.from_content(content), shape)
     runner.reset(state=1.0)
     seen = 0
@@ -220,9 +220,17 @@ def test_options_that_mean_nothing_are_refused() -> None:
 def test_other_sizes_and_explosive_gains_are_refused() -> None:
     content = schedule_content()
     content["model"]["inputs"] = []
-    content["plant"]["B"]["coefficients"] = [[[], []]]
-    content["plant"]["D"]["coefficients"] = [[[]]]
+    with_matrix(content, "B", [[], []])
+    with_matrix(content, "D", [[]])
     with pytest.raises(EstimatorError, match="2 states, 0 inputs and 1 outputs; this observer is for 2, 1 and 1"):
+        LpvVelocityObserver(GainSchedule.from_content(content))
+    content = schedule_content()
+    with_matrix(content, "A", [[0, 1], [0, 0]], [[-1e40, 0], [0, 0]], [[0, 0], [0, -1e90]])
+    with pytest.raises(ScheduleError, match=r"multiply to more than 1e\+50 in one sample, .* check their units"):
+        LpvVelocityObserver(GainSchedule.from_content(content))
+    content = schedule_content(gains=(0.0, 0.0))
+    with_matrix(content, "A", [[-1e4, 1], [0, 0]], [[900, 0], [0, 0]], [[-9, 0], [0, 0]])  # 12500 1/s at 50 rad/s
+    with pytest.raises(ScheduleError, match=r"grows by e\^\d+ in one sample at wheel_speed = \d+.* rad/s; check"):
         LpvVelocityObserver(GainSchedule.from_content(content))
     content = schedule_content(gains=(-50.0, 183.1))
     with pytest.raises(ScheduleError, match=r"grows by e\^\d+ in one sample at wheel_speed = 0 rad/s; check the signs"):

@@ -12,6 +12,7 @@ from estimators import EstimatorError, Flag, GainSchedule, LpvStep, LpvVelocityO
 from tests.unit.schedule_content import schedule_content
 
 SCHEDULE = GainSchedule.from_content(schedule_content())
+SAMPLED = GainSchedule.from_content(schedule_content(gains=(1e-3, 0.05), update="sampled"))
 SIZES = [(4,), (5, 4)]
 
 
@@ -28,9 +29,10 @@ def steps(runner: LpvVelocityObserver, seed: int, count: int) -> list[LpvStep]:
     return found
 
 
+@pytest.mark.parametrize("schedule", [SCHEDULE, SAMPLED], ids=["held", "sampled"])
 @pytest.mark.parametrize("shape", SIZES)
-def test_a_restored_observer_continues_bit_for_bit(shape: tuple[int, ...]) -> None:
-    first, second = (LpvVelocityObserver(SCHEDULE, shape, stale_after=2) for _ in range(2))
+def test_a_restored_observer_continues_bit_for_bit(shape: tuple[int, ...], schedule: GainSchedule) -> None:
+    first, second = (LpvVelocityObserver(schedule, shape, stale_after=2) for _ in range(2))
     steps(first, 1, 40)
     first.reset(np.arange(np.prod(shape)).reshape(shape) % 3 == 0, [1e-3, 2.0])
     buffer = io.BytesIO()
@@ -87,6 +89,7 @@ def test_bad_savings_are_refused_and_change_nothing() -> None:
         ({**before, "state": np.zeros((2, 5))}, r"'state' has shape \(2, 5\), expected \(2, 4\)"),
         ({**before, "state": np.full((2, 4), np.nan)}, "'state' is not finite"),
         (LpvVelocityObserver(other).save(), "saved with another schedule than 'test-longitudinal'"),
+        (LpvVelocityObserver(SAMPLED).save(), "saved with another schedule than 'test-longitudinal'"),
     ]
     for saved, message in bad:
         with pytest.raises(EstimatorError, match=message):

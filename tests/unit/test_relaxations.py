@@ -92,12 +92,13 @@ def test_sampled_places_are_all_points_times_all_rate_vertices() -> None:
     assert relax(problem, VERTEX).sampled[0].places.shape == (8, 4)
 
 
-def test_windows_get_their_share_of_the_points() -> None:
+def test_boxes_get_their_share_of_the_points() -> None:
     problem = LmiProblem((parameter(low=0.0, high=10.0),))
     u = variable(0, 2)
     problem.require("all", u)
-    problem.require("half", u, window=(0.0, 5.0))
-    problem.require("sliver", u, window=(0.0, 0.01))
+    for name, middle, half in (("half", -0.5, 0.5), ("sliver", -0.999, 0.001)):
+        box = np.array([middle, 0.0]), np.array([half, 1.0])
+        problem.require_on(name, u.affine(*box), *box)
     counts = [len(entry.places) for entry in relax(problem, LmiSettings(relaxation="grid", points=100)).sampled]
     assert counts == [100, 50, 3]
 
@@ -121,7 +122,7 @@ def test_multi_convexity_is_one_inequality_for_each_quadratic_parameter() -> Non
             VERTEX,
             "has degree 3 in p; the vertex relaxation takes at most 2",
         ),
-        (lambda u, w, r: r.scaled_by(r), GRID, "has degree 2 in rate 0; inequalities must be affine in the rates"),
+        (lambda u, w, r: r.scaled_by(r), VERTEX, "has degree 2 in rate 0; inequalities must be affine in the rates"),
         (lambda u, w, r: u + w, EXACT, "the exact relaxation is for one parameter, this problem has 2"),
     ],
 )

@@ -20,8 +20,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimators import GainSchedule, ScheduleError
-from estimators.schedule import canonical, read_content, sealed, write_content
-from estimators.schedule_check import SECTIONS
+from estimators.schedule import SECTIONS, canonical, read_content, sealed, write_content
 from tests.unit.schedule_content import schedule_content
 
 NUMBERS = st.floats(min_value=-1e100, max_value=1e100)
@@ -74,12 +73,11 @@ def test_single_precision_gains_read_back_bit_for_bit(pairs: Any, tmp_path_facto
 EDITS = {
     "gain": ("183.1", "183.2"),
     "scheduling": ('"rate_max": 800', '"rate_max": 900'),
-    "plant": ("-2.7456", "-2.7457"),
+    "plant": ("-192.192", "-192.193"),
     "model": ("632.1", "632.2"),
-    "guarantee": ('"decay_rate": 80.0', '"decay_rate": 90.0'),
-    "certificate": ('"method": "none"', '"method": "nine"'),
+    "claims": ('"level": 80.0', '"level": 90.0'),
     "provenance": ("2024-01-01", "2025-01-01"),
-    "sample_time": ('"sample_time": 0.005', '"sample_time": 0.004'),
+    "update": ('"sample_time": 0.005', '"sample_time": 0.004'),
     "name": ("test-longitudinal", "test-longitudinam"),
     "description": ("nothing proved", "nothing prover"),
 }
@@ -145,7 +143,7 @@ def test_duplicate_keys_are_refused(path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('{"schema": "gainsmith.schedule/2"}', "'gainsmith.schedule/2' is not understood; .* 'gainsmith.schedule/1'"),
+        ('{"schema": "gainsmith.schedule/3"}', "'gainsmith.schedule/3' is not understood; .* 'gainsmith.schedule/2'"),
         ('{"name": "x"}', "not a gain schedule"),
         ("[1, 2]", "not a gain schedule"),
         ("[" * 100_000, "nested too deeply"),
@@ -177,8 +175,8 @@ def test_content_that_json_cannot_carry_is_refused(value: Any) -> None:
 def test_a_failed_write_leaves_the_old_file_and_nothing_beside_it(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = path.read_bytes()
     broken = schedule_content()
-    broken["certificate"] = {"P": math.nan}
-    with pytest.raises(ScheduleError, match="not plain JSON data"):
+    broken["claims"][0]["P"]["coefficients"][0][0][0] = math.nan
+    with pytest.raises(ScheduleError, match=r"claims\[0\]\.P\.coefficients\[0\]\[0\]\[0\]: nan is not a finite"):
         write_content(path, broken)
 
     def full(_: int) -> None:
@@ -196,7 +194,7 @@ import sys
 from estimators.schedule import read_content, write_content
 path = sys.argv[1]
 contents = [read_content(path), read_content(path)]
-contents[1]["description"] = "b" * 200_000
+contents[1]["provenance"]["created"] = "b" * 200_000
 print("ready", flush=True)
 while True:
     for content in contents:

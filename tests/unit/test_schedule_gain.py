@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from estimators import EstimatorError, GainSchedule, RangeError, ScheduleError
 from estimators.interpolate import PiecewiseLinear
 from estimators.schedule import Signal, sealed
-from tests.unit.schedule_content import PUBLISHED, polynomial, schedule_content
+from synthesis.certificate.content import subject_of
+from tests.unit.schedule_content import PUBLISHED, schedule_content, with_matrix
 
 GAINS = [(0.9, 210.0), (0.8, 183.1), (0.7, 100.0), (0.5, 60.0)]
 SCHEDULE = GainSchedule.from_content(schedule_content(gains=GAINS))
@@ -97,8 +98,7 @@ def test_what_is_no_number_is_refused() -> None:
 def test_a_signed_parameter_keeps_its_sign() -> None:
     content = schedule_content(breakpoints=(-10.0, 0.0, 10.0), gains=[(1.0, 2.0), (2.0, 3.0), (5.0, 4.0)])
     content["scheduling"][0]["absolute"] = False
-    content["plant"]["abs"] = []
-    content["plant"]["A"] = polynomial([[0, 1], [0, 0]], [[0, 0], [0, 0]], [[-0.1, 0], [0, 0]])
+    with_matrix(content, "A", [[0, 1], [0, 0]], [[0, 0], [0, 0]], [[-0.1, 0], [0, 0]])
     schedule = GainSchedule.from_content(content)
     assert schedule.gain(-5.0)[0, 0] == 1.5
     np.testing.assert_allclose(schedule.plant_at(-3.0).A, [[-0.9, 1], [0, 0]])
@@ -122,3 +122,16 @@ def test_content_in_memory_is_checked_against_its_digests() -> None:
     content["gain"]["table"][0][0][0] = 0.7
     with pytest.raises(ScheduleError, match=r"my content: gain: .*edited"):
         GainSchedule.from_content(content, "my content")
+
+
+@pytest.mark.parametrize("direction", PUBLISHED)
+def test_the_content_of_these_tests_is_one_plant_in_formulas_and_numbers(direction: str) -> None:
+    """Rebuilt by the verifier from formulas and constants; also after a matrix was exchanged."""
+    content = schedule_content(direction)
+    assert subject_of(content, "here").tied
+    with_matrix(content, "C", [[600.0, 0.76]], [[0, 0]], [[0, 1e-6]])
+    content["model"]["source"] = "format 1, constants and units not tied to the plant: none"  # for the idle constants
+    assert not subject_of(content, "here").tied
+    content["plant"]["C"]["coefficients"][2][0][1] *= 1.0 + 1e-12
+    with pytest.raises(ScheduleError, match=r"here: plant\.C: entry \[0\]\[1\] of order \[2\]"):
+        subject_of(content, "here")

@@ -145,7 +145,7 @@ def condition_problem(A: FloatArray, scale: FloatArray, degree: int) -> LmiProbl
     """Least t with 1 < P < t and dV/dt < 0 in the states diag(scale) x."""
     model, _ = corner("corner-estimation", "longitudinal")
     problem = LmiProblem(model.parameters)
-    known = problem.known(A * scale[:, None] / scale)
+    known = problem.scaled(A * scale[:, None] / scale)
     P = problem.symmetric("P", 2, degree)
     t = problem.scalar("t")
     problem.minimise("t")

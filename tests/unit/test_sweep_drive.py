@@ -13,6 +13,7 @@ import pytest
 import studies.truth
 from estimators import GainSchedule
 from estimators.pipeline import ScheduledCorners
+from estimators.schedule import write_content
 from studies.drives.drive_file import read_drive
 from studies.drives.errors import LogError
 from studies.drives.log import read_log
@@ -33,6 +34,7 @@ from studies.truth import draw, drive, load_manoeuvre, write_drive
 from synthesis.errors import SpecError
 from tests.drives.synthetic_drive import DRIVE, TORQUES, columns, write_log
 from tests.drives.synthetic_drive import write_drive as write_drive_file
+from tests.unit.schedule_content import schedule_content
 from tests.unit.sweep_cases import contents, small
 from tests.unit.sweep_integrated import Integrated
 
@@ -111,6 +113,26 @@ def test_every_design_is_that_of_its_own_observers(subject: Subject, tmp_path: P
     assert len({round(v, 6) for v in values}) == 3
     alone = found(subject.at({name: column[1:2] for name, column in DESIGNS.items()}, subject.grid(2)))
     assert alone[0] == pytest.approx(values[1], rel=1e-12)  # whoever else is in the batch
+
+
+def test_gains_that_correct_once_a_sample_are_replayed_as_the_runtime_does(tmp_path: Path) -> None:
+    log, description = uneven_log(tmp_path)
+    content = schedule_content(
+        update="sampled", gains=[(1.18e-3, 0.048), (8.8e-4, 0.076), (5.9e-4, 0.134), (4.2e-4, 0.217)]
+    )
+    write_content(tmp_path / "own.json", content)
+    found = measure(tmp_path, drive="drive.toml", logs=["log.csv"])
+    own = SubjectSpec(schedule="own.json", parameters="corner-estimation").build(tmp_path)
+    found.check(own)
+    values = found(own.at({"gain_factor_relative_velocity": np.array([1.0, 1.3])}, own.grid(2)))
+    inputs, reference = inputs_of(log, description)
+    for value, factor in zip(values, (1.0, 1.3), strict=True):
+        content["gain"]["table"] = [
+            [first, [factor * gain for gain in second]] for first, second in content["gain"]["table"]
+        ]
+        runtime = replay(inputs, ScheduledCorners(GainSchedule.from_content(content))).velocity
+        assert value == pytest.approx(nrms(runtime, reference), rel=1e-9)
+    assert values[0] != pytest.approx(values[1], rel=1e-3)
 
 
 def test_a_diverging_design_is_infinite_and_touches_no_other(subject: Subject, tmp_path: Path) -> None:

@@ -9,18 +9,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.linalg import expm
 
+from analysis.dropout import critical_drop_probability
 from analysis.dropout_schedule import frozen_critical_probability
 from analysis.error_norms import error_hinf_norm
 from analysis.mean_square_schedule import drop_radius
 from analysis.rank_loss_speeds import RankLossSpeeds
 from estimators import GainSchedule, LpvVelocityObserver
+from estimators.schedule import SHIPPED, read_content, write_content
 from studies.sweeps.designs import STAGES
 from studies.sweeps.evaluate import INVALID, NOT_A_NUMBER, VALID, evaluate
 from studies.sweeps.measure import Measure
 from studies.sweeps.spec import MEASURES
 from studies.sweeps.subject import Batch, Subject, model_subject
-from studies.sweeps.subject_spec import SubjectSpec
+from studies.sweeps.subject_spec import SubjectSpec, designed_from
 from studies.sweeps.sweep import Sweep
 from studies.sweeps.vary import Vary
 from synthesis.errors import SpecError
@@ -28,16 +31,29 @@ from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Constant, SchedulingParameter, Signal
 from synthesis.models.parameter_set import load_parameter_set
+from tests.unit.schedule_content import schedule_content
 
 NAME = "corner-estimation-longitudinal"
 SCHEDULE = GainSchedule.shipped(NAME)
 MODEL = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal")
+CONTENT = schedule_content(
+    update="sampled", gains=[(1.18e-3, 0.048), (8.8e-4, 0.076), (5.9e-4, 0.134), (4.2e-4, 0.217)]
+)
+SAMPLED = GainSchedule.from_content(CONTENT)
 DESIGNS = {"sigma1": np.array([0.76, 0.65, 0.9]), "kappa": np.array([8.32, 9.5, 7.0])}
 
 
 @pytest.fixture(scope="module")
 def subject() -> Subject:
     return SubjectSpec(schedule=NAME, parameters="corner-estimation").build(Path())
+
+
+@pytest.fixture(scope="module")
+def sampled(tmp_path_factory: pytest.TempPathFactory) -> Subject:
+    """The same model with gains that correct once a sample, from a file."""
+    folder = tmp_path_factory.mktemp("sampled")
+    write_content(folder / "own.json", CONTENT)
+    return SubjectSpec(schedule="own.json", parameters="corner-estimation").build(folder)
 
 
 def measure(kind: str, **options: object) -> Measure:
@@ -79,16 +95,57 @@ def test_margin_norm_and_radius_are_those_of_single_models(subject: Subject) -> 
         np.testing.assert_allclose(everything[row], found.norm, rtol=1e-5)
 
 
-def test_received_update_is_the_one_that_the_runtime_performs(subject: Subject) -> None:
-    """One step of the real observer from unit errors, the plant at rest."""
-    grid = subject.grid(5)
-    received = subject.at({"sigma1": np.array([0.76])}, grid).coast.received[0]
-    for g, speed in enumerate(grid.points[:, 0]):
-        for state in range(2):
-            observer = LpvVelocityObserver(SCHEDULE, batch_shape=(1,))
-            observer.reset(state=np.eye(2)[state])
-            step = observer.step([0.0], [0.0], [speed])
-            np.testing.assert_allclose(step.estimate[0], received[g, :, state], rtol=1e-9, atol=1e-12)
+@pytest.mark.parametrize("update", ["held", "sampled"])
+def test_updates_are_those_that_the_runtime_performs(update: str, subject: Subject, sampled: Subject) -> None:
+    """One step of the real observer from unit errors, the plant at rest, with and without a measurement."""
+    own, schedule = (subject, SCHEDULE) if update == "held" else (sampled, SAMPLED)
+    grid = own.grid(5)
+    modes = own.at({"sigma1": np.array([0.76])}, grid).coast
+    for measurement, matrices in ((0.0, modes.received[0]), (np.nan, modes.dropped[0])):
+        for g, speed in enumerate(grid.points[:, 0]):
+            for state in range(2):
+                observer = LpvVelocityObserver(schedule, batch_shape=(1,))
+                observer.reset(state=np.eye(2)[state])
+                step = observer.step([0.0], [measurement], [speed])
+                np.testing.assert_allclose(step.estimate[0], matrices[g, :, state], rtol=1e-9, atol=1e-12)
+
+
+def test_gains_that_correct_once_a_sample_are_measured_by_the_radius_of_their_update(sampled: Subject) -> None:
+    """e^(TA) - K C of single models; the margin is its growth in 1/s, and there is no error equation to take a norm of."""
+    grid = sampled.grid(6)
+    speeds, T = grid.points[:, 0], SAMPLED.sample_time
+    batch = sampled.at(DESIGNS, grid)
+    radius, margin = (measure(kind)(batch) for kind in ("sampled_radius", "stability_margin"))
+    critical = measure("critical_drop_probability")(batch)
+    for row in range(3):
+        plant = perturbed(row).on(speeds)
+        dropped = expm(T * plant.A)
+        received = dropped - SAMPLED.gain(speeds) @ plant.C
+        expected = np.abs(np.linalg.eigvals(received)).max(axis=-1)
+        np.testing.assert_allclose(radius[row], expected, rtol=1e-9)
+        np.testing.assert_allclose(np.exp(T * margin[row]), expected, rtol=1e-9)
+        np.testing.assert_allclose(critical[row], critical_drop_probability(dropped, received), rtol=1e-7, atol=1e-9)
+        held = batch.modes("hold")
+        np.testing.assert_allclose(held.dropped[row, :, :2, :2], received, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(held.dropped[row, :, :2, 2:], SAMPLED.gain(speeds), rtol=1e-12)
+    assert sampled.parameters["gain_factor_relative_velocity"].unit == "1"
+    norm = measure("hinf_norm", disturbances=["force_noise"], errors=["relative_velocity"])
+    with pytest.raises(SpecError, match=r"correct once a sample .*no error equation.*use sampled_radius"):
+        norm.check(sampled)
+    with pytest.raises(SpecError, match="correct once a sample"):
+        norm(batch)
+
+
+def test_units_of_a_constant_gain_are_those_of_the_update() -> None:
+    for update, unit in (("held", "(m/s)/(m/s)"), ("sampled", "(m)/(m/s)")):
+        own = replace(model_subject("mass", MASS, GAIN, 0.01), update=update)
+        assert own.parameters["gain_position_rate"].unit == unit
+        grid = own.grid(2)
+        modes = own.at({"mass": np.array([2.0])}, grid).coast  # three states: no closed form
+        plant = MASS.on(grid.points)
+        A_e = plant.A - GAIN @ plant.C
+        expected = expm(0.01 * A_e) if update == "held" else expm(0.01 * plant.A) - GAIN @ plant.C
+        np.testing.assert_allclose(modes.received[0], expected, rtol=1e-9, atol=1e-12)
 
 
 def test_drop_measures_are_those_of_the_schedule(subject: Subject) -> None:
@@ -118,7 +175,14 @@ def test_switching_bound_of_one_speed_is_its_radius(subject: Subject) -> None:
 def test_designing_again_gives_the_design_bound_of_the_schedule(subject: Subject) -> None:
     constants = {"sigma1": np.array([0.76, 0.68])}
     gamma = measure("certified_gamma")(subject.at(constants, subject.grid(2)))
-    assert gamma[0] == pytest.approx(SCHEDULE.guarantee["design"]["gamma"], rel=1e-6)
+    content = read_content(SHIPPED / f"{NAME}.json")
+    spec = designed_from(content)
+    assert spec is not None
+    assert gamma[0] == pytest.approx(spec.design(MODEL).gamma, rel=1e-6)
+    claimed = next(
+        c["level"] for c in content["claims"] if c["kind"] == "gain" and "force_noise" in c["channel"]["inputs"]
+    )
+    assert 0.9 * gamma[0] < claimed < (1.0 + spec.deploy.interpolation_cost) * gamma[0]
     assert gamma[1] != pytest.approx(gamma[0], rel=1e-4)
     with pytest.raises(SpecError, match="is not one of"):
         measure("certified_gamma", channel="friction").check(subject)

@@ -91,7 +91,7 @@ def _constant(name: str, parameters: str, direction: str, gains: tuple[float, ..
     column = np.array(gains)[:, None]
     shipped = GainSchedule.shipped(f"{parameters}-{direction}")
     schedule = replace(
-        shipped, name=name, breakpoints=np.array(WHEEL_SPEED), table=np.stack([column, column]), guarantee={}
+        shipped, name=name, breakpoints=np.array(WHEEL_SPEED), table=np.stack([column, column])
     )
     return Design(
         name,

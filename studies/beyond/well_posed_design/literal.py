@@ -68,7 +68,7 @@ def approach(case: Case, design: ObserverDesign, backoffs: tuple[float, ...] = B
     optimum = solve(observer_problem(case.model, design, scale), design.settings)
     if optimum.objective is None:
         raise ProblemError(f"model '{case.model.name}': {optimum.message}")
-    gamma, largest = to_gamma(design, optimum.objective), []
+    gamma, largest = to_gamma(case.model, design, scale, optimum.objective), []
     for backoff in backoffs:
         level = gamma * (1.0 + backoff)
         found = solve(energy_problem(case.model, design, scale, level), design.settings)

@@ -1,10 +1,8 @@
-"""P1-hinf-figs and P1-hinf-time: which problems have the plotted gains as their answer, and how long (30) takes."""
+"""P1-hinf-figs: which problems have the plotted gains as their answer."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from time import perf_counter
 
 import numpy as np
 
@@ -12,10 +10,7 @@ from studies.claim import ClaimFunction, Finding, JsonValue
 from studies.papers.corner_estimation.hinf import POINTS, STATES, least_gamma, literal_design
 from studies.papers.corner_estimation.inputs import DESIGN_SPEED, DIRECTIONS, corner_model, printed_gains, printed_value
 from studies.papers.corner_estimation.kalman import fitted, schedule
-from studies.papers.verdicts import derived, under_specified
-from synthesis.hinf_observer import observer_problem
-from synthesis.lmi.scaling import observer_scale
-from synthesis.lmi.solve import solve
+from studies.papers.verdicts import under_specified
 from synthesis.models.catalogue.corner import Direction
 from synthesis.polynomials.matrix import FloatArray
 from synthesis.well_posedness import well_posedness
@@ -79,33 +74,9 @@ def plotted_gains(degree: int = 1, outputs: Mapping[str, tuple[str, ...]] = OUTP
     return Finding(computed, under_specified(spread, 0.01, all(printed_problem)), reading)
 
 
-def solve_time(points: int = 140, degree: int = 1, least_ratio: float = 10.0) -> Finding:
-    """Seconds of one longitudinal solve of (30) on both roads, measured now on this machine."""
-    model, design = corner_model("longitudinal", DESIGN_SPEED), literal_design(degree, points=points)
-    problem = observer_problem(model, design, observer_scale(model.polynomial, model.parameters))
-    computed: dict[str, JsonValue] = {"points": points, "degree": degree}
-    for name, solver in (("direct", "CLARABEL"), ("cvxpy", "cvxpy:CLARABEL")):
-        solve(problem, replace(design.settings, solver=solver, points=2))  # imports and first calls are not counted
-        start = perf_counter()
-        found = solve(problem, replace(design.settings, solver=solver))
-        total, report = perf_counter() - start, found.report
-        around = total - report.seconds - report.verification_seconds
-        computed[name] = {"preparation_s": around, "solver_s": report.seconds, "gamma_squared": found.objective}
-    layer, direct = computed["cvxpy"], computed["direct"]
-    computed["preparation_ratio"] = layer["preparation_s"] / direct["preparation_s"]
-    reading = (
-        f"With {points} points and degree {degree} cvxpy prepares the problem in {layer['preparation_s']:.2g} s and "
-        f"the solver takes {layer['solver_s']:.2g} s; conic data assembled directly is ready in "
-        f"{1e3 * direct['preparation_s']:.2g} ms, {computed['preparation_ratio']:.0f} times sooner (this run, this "
-        "machine)."
-    )
-    slow = layer["preparation_s"] > layer["solver_s"] and computed["preparation_ratio"] > least_ratio
-    return Finding(computed, derived(slow), reading)
-
-
 def _ends(values: FloatArray) -> list[float]:
     """At standstill and at the end of the range."""
     return [float(values[0]), float(values[-1])]
 
 
-CLAIMS: dict[str, ClaimFunction] = {"P1-hinf-figs": plotted_gains, "P1-hinf-time": solve_time}
+CLAIMS: dict[str, ClaimFunction] = {"P1-hinf-figs": plotted_gains}

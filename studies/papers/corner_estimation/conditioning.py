@@ -75,7 +75,7 @@ def _problem(name: str, direction: Direction, scale: FloatArray, degree: int, ma
     model = corner_model(direction, STATED_SPEED, name)
     problem = LmiProblem(model.parameters, maximise_margin=margin)
     scaled = model.polynomial.with_states_scaled(scale)
-    A, C = problem.known(scaled.A), problem.known(scaled.C)
+    A, C = problem.scaled(scaled.A), problem.scaled(scaled.C)
     P = problem.symmetric("P", 2, degree)
     product = P @ (A - problem.constant(scale[:, None] * _gain(name, direction)) @ C)
     problem.require("dV/dt < 0", -(product + product.T + problem.time_derivative(P)))

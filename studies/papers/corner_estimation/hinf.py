@@ -65,7 +65,7 @@ def least_gamma(
     found = solve(observer_problem(model, design, scale), design.settings)
     if found.objective is None or not found.margins:
         raise ProblemError(f"model '{model.name}', degree {degree}: {found.message}")
-    gamma = to_gamma(design, found.objective)
+    gamma = to_gamma(model, design, scale, found.objective)
     omega = np.linspace(0.0, DESIGN_SPEED, 71)
     gains = ObserverGains(design, model, None, gamma, found, found, scale).gain(omega)[..., 0]
     return Optimum(degree, gamma, found, omega, gains)

@@ -11,9 +11,12 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from estimators.errors import ScheduleError
-from estimators.schedule_check import SCHEMA, SEALS, SECTIONS, check_content
+from estimators.schedule.check import SCHEMA, SEALS, SECTIONS, check_content, check_depth
+from estimators.schedule.checker import printable, quoted, shown
+from estimators.schedule.upgrade import FIRST_FORMAT, upgraded
 
 REGENERATE = "regenerate the file instead of editing it"
+LARGEST_FILE = 8_000_000  # bytes
 
 
 def canonical(content: Mapping[str, Any]) -> bytes:
@@ -51,10 +54,12 @@ def check_seal(content: Mapping[str, Any], where: str) -> None:
     sections = [key for key in content if key not in SEALS]
     for key in sections:
         if digests.get(key) != _digest(content[key]):
-            raise ScheduleError(f"{where}: {key}: this section does not match its sha256: it was edited; {REGENERATE}")
+            words = f"{shown(key)}: this section does not match its sha256: it was edited; {REGENERATE}"
+            raise ScheduleError(f"{where}: {words}")
     for key in digests:
         if key not in content:
-            raise ScheduleError(f"{where}: {key}: this section is missing although it has a sha256; {REGENERATE}")
+            words = f"{shown(key)}: this section is missing although it has a sha256; {REGENERATE}"
+            raise ScheduleError(f"{where}: {words}")
     body = {key: value for key, value in content.items() if key != "sha256"}
     if content.get("sha256") != _digest(body):
         raise ScheduleError(f"{where}: sha256: the digest of the whole does not match; {REGENERATE}")
@@ -63,22 +68,32 @@ def check_seal(content: Mapping[str, Any], where: str) -> None:
 def read_content(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Reads and checks a schedule file: JSON, version, digests, then structure; see `check_content`.
 
+    A file of format 1 is returned as format 2, unsealed (`estimators.schedule.upgrade`).
+
     Raises:
         ScheduleError: names the file, the place in it and what to do.
     """
-    where = os.fspath(path)
+    where = place_of(path)
     try:
-        text = Path(path).read_bytes().decode("utf-8")
+        with Path(path).open("rb") as file:
+            data = file.read(LARGEST_FILE + 1)
+        text = data.decode("utf-8")
     except OSError as error:
         raise ScheduleError(f"{where}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise ScheduleError(f"{where}: byte {error.start} is not UTF-8; this is no schedule file") from error
+    if len(data) > LARGEST_FILE:
+        raise ScheduleError(f"{where}: more than {LARGEST_FILE} bytes; this is no schedule file")
     content = _parsed(text, where)
     if not isinstance(content, dict) or not isinstance(content.get("schema"), str):
         raise ScheduleError(f"{where}: schema: not a gain schedule; expected an object with schema '{SCHEMA}'")
-    if content["schema"] != SCHEMA:
-        raise ScheduleError(f"{where}: schema: '{content['schema']}' is not understood; this version reads '{SCHEMA}'")
+    if content["schema"] not in (SCHEMA, FIRST_FORMAT):
+        words = f"{quoted(content['schema'])} is not understood; this version reads '{SCHEMA}'"
+        raise ScheduleError(f"{where}: schema: {words}")
+    check_depth(content, where)
     check_seal(content, where)
+    if content["schema"] == FIRST_FORMAT:
+        return upgraded(content, where)
     check_content(content, where)
     return content
 
@@ -90,7 +105,7 @@ def write_content(path: str | os.PathLike[str], content: Mapping[str, Any]) -> N
     leave a hidden `.*.tmp` beside it, which nothing reads.
     """
     target = Path(path)
-    check_content(content, os.fspath(path))
+    check_content(content, place_of(path))
     data = _layout(sealed(content), 0).encode("ascii") + b"\n"
     beside = target.with_name(f".{target.name}.{os.getpid()}.{os.urandom(4).hex()}.tmp")
     try:
@@ -103,6 +118,11 @@ def write_content(path: str | os.PathLike[str], content: Mapping[str, Any]) -> N
         beside.unlink(missing_ok=True)
         raise
     _sync_folder(target.parent)
+
+
+def place_of(path: str | os.PathLike[str]) -> str:
+    """A file's name for messages; a name is foreign text, too."""
+    return printable(os.fspath(path), 4096)
 
 
 def _digest(value: Any) -> str:
@@ -131,12 +151,12 @@ def _parsed(text: str, where: str) -> Any:
         found: dict[str, Any] = {}
         for key, value in pairs:
             if key in found:
-                raise ScheduleError(f"{where}: the key '{key}' appears twice in one object; {REGENERATE}")
+                raise ScheduleError(f"{where}: the key '{shown(key)}' appears twice in one object; {REGENERATE}")
             found[key] = value
         return found
 
     def constant(word: str) -> NoReturn:
-        raise ScheduleError(f"{where}: {word} is not a finite number; {REGENERATE}")
+        raise ScheduleError(f"{where}: {shown(word)} is not a finite number; {REGENERATE}")
 
     def number(digits: str) -> float:
         value = float(digits)
@@ -152,7 +172,7 @@ def _parsed(text: str, where: str) -> Any:
     except ScheduleError:
         raise
     except ValueError as error:  # an integer with thousands of digits
-        raise ScheduleError(f"{where}: {error}; {REGENERATE}") from error
+        raise ScheduleError(f"{where}: {printable(str(error), 160)}; {REGENERATE}") from error
 
 
 def _layout(value: Any, depth: int) -> str:

@@ -6,31 +6,21 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from estimators.errors import EstimatorError, RangeError, ScheduleError
 from estimators.interpolate import FloatArray, PiecewiseLinear
-from estimators.schedule_check import SCHEMA, check_content
-from estimators.schedule_format import canonical, check_seal, read_content, sealed, write_content
+from estimators.schedule.check import SHAPES, SIGNALS, check_content, check_depth
+from estimators.schedule.checker import shown
+from estimators.schedule.files import check_seal, read_content, sealed
+from estimators.schedule.plant import PlantPolynomial, plant_polynomial
+from estimators.schedule.upgrade import FIRST_FORMAT, upgraded
 
-__all__ = [
-    "SCHEMA",
-    "GainSchedule",
-    "PlantMatrices",
-    "PlantPolynomial",
-    "SchedulingParameter",
-    "Signal",
-    "canonical",
-    "check_content",
-    "check_seal",
-    "read_content",
-    "sealed",
-    "write_content",
-]
-SHIPPED = Path(__file__).parent / "schedules"
+SHIPPED = Path(__file__).parents[1] / "schedules"
+Update = Literal["held", "sampled"]
 
 
 class Signal(NamedTuple):
@@ -53,18 +43,6 @@ class SchedulingParameter:
     absolute: bool  # gains and plant depend on the magnitude
 
 
-class PlantPolynomial(NamedTuple):
-    """M(p) = sum over k of coefficients[k] p^powers[k]."""
-
-    powers: npt.NDArray[np.int64]  # (m,)
-    coefficients: FloatArray  # (m, rows, columns)
-
-    def at(self, parameter: FloatArray) -> FloatArray:
-        """M(p), shape (*parameter.shape, rows, columns)."""
-        terms = parameter[..., None] ** self.powers
-        return np.tensordot(terms, self.coefficients, axes=1)
-
-
 class PlantMatrices(NamedTuple):
     """xdot = A x + B u, y = C x + D u at given parameters; leading axes as the parameters."""
 
@@ -76,24 +54,24 @@ class PlantMatrices(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class GainSchedule:
-    """Gains over one scheduling parameter, with the plant, the units and what was proved.
+    """Gains over one scheduling parameter, with the plant, the units and the update that they are proved for.
 
-    `table` has the shape (breakpoints, states, outputs), unit `gain_units`; arrays are read-only. The plant is
-    xdot = A x + B u + E d, y = C x + D u + F d. `sample_time` in s.
+    `table` has the shape (breakpoints, states, outputs); arrays are read-only. The plant is xdot = A x + B u + E d,
+    y = C x + D u + F d. `sample_time` in s. `update` "held": the gains L belong to the continuous-time observer, integrated
+    exactly with y held over a sample; "sampled": the gains K correct once a sample (see `LpvVelocityObserver`).
     """
 
     name: str
     parameter: SchedulingParameter
     breakpoints: FloatArray
     table: FloatArray
-    gain_units: tuple[tuple[str, ...], ...]
     sample_time: float
+    update: Update
     plant: Mapping[str, PlantPolynomial]
     states: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
     disturbances: tuple[Signal, ...]
-    guarantee: Mapping[str, Any]
     sha256: str
 
     @classmethod
@@ -103,7 +81,7 @@ class GainSchedule:
         Raises:
             ScheduleError: unreadable, edited, truncated, wrong version or structure; names the place.
         """
-        return _build(read_content(path), os.fspath(path))
+        return cls.from_content(read_content(path), os.fspath(path))
 
     @classmethod
     def shipped(cls, name: str) -> GainSchedule:
@@ -124,10 +102,21 @@ class GainSchedule:
         Raises:
             ScheduleError: names `where` and the place.
         """
-        check_content(content, where)
-        if "sha256" in content or "section_sha256" in content:
+        check_depth(content, where)
+        if isinstance(content, Mapping) and ("sha256" in content or "section_sha256" in content):
             check_seal(content, where)
+        if isinstance(content, Mapping) and content.get("schema") == FIRST_FORMAT:
+            content = upgraded(content, where)
+        check_content(content, where)
         return _build(content if "sha256" in content else sealed(content), where)
+
+    @property
+    def gain_units(self) -> tuple[tuple[str, ...], ...]:
+        """Units of the gains, one for every state and output: (state/s)/output where held, state/output where sampled."""
+        rate = "/s" if self.update == "held" else ""
+        return tuple(
+            tuple(_quotient(state.unit, rate, output.unit) for output in self.outputs) for state in self.states
+        )
 
     def gain(self, parameter: npt.ArrayLike) -> FloatArray:
         """L(p), linear between the stored breakpoints: shape (*parameter.shape, states, outputs).
@@ -170,6 +159,19 @@ def outside_range(parameter: SchedulingParameter, value: float, place: str) -> s
     return f"{parameter.name} = {value:.12g} {parameter.unit} is outside the certified range {box}{place}"
 
 
+def _quotient(unit: str, rate: str, below: str) -> str:
+    above = _per_second(unit) if rate else unit
+    return above if below == "1" else f"({above})/({below})"
+
+
+def _per_second(unit: str) -> str:
+    if unit == "1":
+        return "1/s"
+    if unit.endswith("/s"):
+        return f"{unit}^2"
+    return f"({unit})/s" if any(c in unit for c in "*/") else f"{unit}/s"
+
+
 def _frozen(value: Any, shape: tuple[int, ...]) -> FloatArray:
     array = np.array(value, dtype=np.float64).reshape(shape)
     array.flags.writeable = False
@@ -179,7 +181,7 @@ def _frozen(value: Any, shape: tuple[int, ...]) -> FloatArray:
 def _build(content: Mapping[str, Any], where: str) -> GainSchedule:
     """From checked and sealed content."""
     if len(content["scheduling"]) != 1:
-        names = ", ".join(entry["name"] for entry in content["scheduling"])
+        names = shown(", ".join(entry["name"] for entry in content["scheduling"]), 120)
         raise ScheduleError(
             f"{where}: scheduling: {len(content['scheduling'])} parameters ({names}); the runtime interpolates over one"
         )
@@ -187,26 +189,20 @@ def _build(content: Mapping[str, Any], where: str) -> GainSchedule:
     breakpoints = entry.pop("breakpoints")
     for key in ("min", "max", "rate_min", "rate_max"):
         entry[key] = float(entry[key])
-    signals = {
-        kind: tuple(Signal(signal["name"], signal["unit"]) for signal in model[kind])
-        for kind in ("states", "inputs", "outputs", "disturbances")
+    signals = {kind: tuple(Signal(signal["name"], signal["unit"]) for signal in model[kind]) for kind in SIGNALS}
+    sizes = {kind: len(found) for kind, found in signals.items()}
+    plant = {
+        key: plant_polynomial(content["plant"][key], entry["min"], entry["max"], (sizes[rows], sizes[columns]))
+        for key, (rows, columns) in SHAPES.items()
     }
-    nx, nu, ny, nd = (len(found) for found in signals.values())
-    shapes = {"A": (nx, nx), "B": (nx, nu), "C": (ny, nx), "D": (ny, nu), "E": (nx, nd), "F": (ny, nd)}
-    plant = {}
-    for key, shape in shapes.items():
-        powers = np.array([power for (power,) in content["plant"][key]["monomials"]], dtype=np.int64)
-        powers.flags.writeable = False
-        plant[key] = PlantPolynomial(powers, _frozen(content["plant"][key]["coefficients"], (len(powers), *shape)))
     return GainSchedule(
         name=content["name"],
         parameter=SchedulingParameter(**entry),
         breakpoints=_frozen(breakpoints, (len(breakpoints),)),
-        table=_frozen(content["gain"]["table"], (len(breakpoints), nx, ny)),
-        gain_units=tuple(tuple(units) for units in content["gain"]["unit"]),
-        sample_time=float(content["sample_time"]),
+        table=_frozen(content["gain"]["table"], (len(breakpoints), sizes["states"], sizes["outputs"])),
+        sample_time=float(content["update"]["sample_time"]),
+        update=content["update"]["kind"],
         plant=plant,
-        guarantee=dict(content["guarantee"]),
         sha256=content["sha256"],
         **signals,
     )

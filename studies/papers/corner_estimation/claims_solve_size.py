@@ -1,0 +1,135 @@
+"""P1-hinf-time: what (30) costs, counted: what a modelling layer walks, what the solver gets, what the exact form needs.
+
+Seconds belong to a machine and to its load, so they decide nothing: `solve_seconds` measures them for the report alone.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from studies.claim import ClaimFunction, Finding, JsonValue
+from studies.papers.corner_estimation.hinf import POINTS, literal_design
+from studies.papers.corner_estimation.inputs import DESIGN_SPEED, corner_model
+from studies.papers.verdicts import derived
+from synthesis.hinf_observer import observer_problem
+from synthesis.lmi.conic import ConicData, assemble
+from synthesis.lmi.problem import LmiProblem
+from synthesis.lmi.relaxation import RelaxedProblem, relax
+from synthesis.lmi.scaling import observer_scale
+from synthesis.lmi.settings import LmiSettings, Relaxation
+from synthesis.lmi.solve import solve
+
+ROUNDING = 1e-12  # relative: all that two assemblies of the same numbers may differ by
+
+
+def conic_problem(points: int, degree: int) -> tuple[LmiProblem, LmiSettings]:
+    """(30) for the longitudinal corner, with the settings that put it on a grid of wheel speeds."""
+    model, design = corner_model("longitudinal", DESIGN_SPEED), literal_design(degree, points=points)
+    return observer_problem(model, design, observer_scale(model.polynomial, model.parameters)), design.settings
+
+
+def relaxed_problem(points: int, degree: int, relaxation: Relaxation) -> RelaxedProblem:
+    """(30) point by point (`grid`), or on the whole range at once by sums of squares (`exact`)."""
+    problem, settings = conic_problem(points, degree)
+    return relax(problem, replace(settings, relaxation=relaxation))
+
+
+def one_by_one(relaxed: RelaxedProblem) -> Any:
+    """The sampled inequalities as a cvxpy problem: one matrix inequality for every point and rate."""
+    import cvxpy as cp  # takes 1 s
+
+    x = cp.Variable(len(relaxed.cost))
+    constraints = []
+    for sampled in relaxed.sampled:
+        size = sampled.values.shape[1]
+        for values in sampled.values.reshape(-1, size * size, len(relaxed.cost) + 1):
+            matrix = cp.reshape(values[:, 1:] @ x + values[:, 0], (size, size), order="C")
+            constraints.append((matrix + matrix.T) / 2 >> sampled.margin * np.eye(size))
+    return cp.Problem(cp.Minimize(relaxed.cost @ x), constraints)
+
+
+def expressions(problem: Any) -> int:
+    """Nodes in the expression trees of all constraints: the layer visits each before the solver sees anything."""
+
+    def nodes(expression: Any) -> int:
+        return 1 + sum(nodes(part) for part in expression.args)
+
+    return sum(nodes(constraint) for constraint in problem.constraints)
+
+
+def solve_size(
+    points: int = POINTS,
+    degree: int = 1,
+    layer: Callable[[RelaxedProblem], Any] = one_by_one,
+    walked: Callable[[Any], int] = expressions,
+) -> Finding:
+    """Count (30) on both roads and in its exact form, on `points` wheel speeds and on twice as many."""
+    grid, finer = (relaxed_problem(number, degree, "grid") for number in (points, 2 * points))
+    exact, again = (assemble(relaxed_problem(number, degree, "exact")) for number in (points, 2 * points))
+    direct, modelled = assemble(grid), layer(grid)
+    work = {"points": walked(modelled), "twice_the_points": walked(layer(finer))}
+    arrays = {"points": len(grid.sampled), "twice_the_points": len(finer.sampled)}
+    same = _hands_over(modelled, direct)
+    computed: dict[str, JsonValue] = {
+        "points": points,
+        "degree": degree,
+        "conic_problem": _size(direct),
+        "layer_hands_over_the_same_problem": same,
+        "expressions_walked_by_the_layer": work,
+        "arrays_stacked_by_direct_assembly": arrays,
+        "exact_relaxation": _size(exact),
+        "exact_relaxation_with_twice_the_points": _size(again),
+    }
+    grows = work["twice_the_points"] - work["points"] >= points and arrays["twice_the_points"] == arrays["points"]
+    smaller = _size(exact) == _size(again) and exact.A.shape[0] < direct.A.shape[0]
+    reading = (
+        f"Counted, not timed: with {points} points and degree {degree}, (30) is {len(direct.semidefinite)} matrix "
+        f"inequalities in {direct.A.shape[1]} unknowns, {direct.A.shape[0]} rows for the solver. Written in cvxpy, one "
+        f"inequality for each point and rate, it is {work['points']} expressions for the layer to walk, and "
+        f"{work['twice_the_points']} for twice the points, before it hands over "
+        f"{'the very same' if same else 'other'} rows, which direct assembly stacks from {arrays['points']} arrays "
+        "whatever the number of points: what the layer adds is preparation alone. The exact relaxation, which also "
+        f"holds between the points, has {exact.A.shape[0]} rows, {exact.A.shape[1]} unknowns and "
+        f"{len(exact.semidefinite)} cones for any number of points. It holds as derived if the rows are the same, only "
+        "the layer's work grows with the points, and the exact relaxation has fewer rows. Seconds are printed beside "
+        "the claim and decide nothing."
+    )
+    return Finding(computed, derived(same and grows and smaller), reading)
+
+
+def solve_seconds(points: int = POINTS, degree: int = 1) -> dict[str, dict[str, float]]:
+    """Seconds of one solve of (30) on both roads, on this machine as busy as it is: for the report, not for a verdict."""
+    problem, settings = conic_problem(points, degree)
+    measured: dict[str, dict[str, float]] = {}
+    for name, solver in (("cvxpy", "cvxpy:CLARABEL"), ("direct", "CLARABEL")):
+        solve(problem, replace(settings, solver=solver, points=2))  # imports and first calls are not counted
+        start = perf_counter()
+        report = solve(problem, replace(settings, solver=solver)).report
+        around = perf_counter() - start - report.seconds - report.verification_seconds
+        measured[name] = {"preparation_s": around, "solver_s": report.seconds}
+    return measured
+
+
+def _size(data: ConicData) -> dict[str, JsonValue]:
+    """Unknowns, rows of A x + s = b, and how many positive semidefinite cones there are of each size."""
+    cones = {f"{size}x{size}": number for size, number in sorted(Counter(data.semidefinite).items())}
+    return {"unknowns": data.A.shape[1], "rows": data.A.shape[0], "cones": cones}
+
+
+def _hands_over(problem: Any, direct: ConicData) -> bool:
+    """Whether the layer ends with the rows, cones and numbers of direct assembly."""
+    data = problem.get_problem_data("CLARABEL")[0]
+    cones, A = data["dims"], data["A"]
+    if (cones.zero, tuple(cones.psd), A.shape) != (direct.equalities, direct.semidefinite, direct.A.shape):
+        return False
+    pairs = ((A.toarray(), direct.A.toarray()), (data["b"], direct.b), (data["c"], direct.q))
+    return all(float(np.abs(a - b).max()) <= ROUNDING * float(np.abs(b).max()) for a, b in pairs)
+
+
+CLAIMS: dict[str, ClaimFunction] = {"P1-hinf-time": solve_size}

@@ -1,0 +1,120 @@
+"""What a claim says: data from which its name, its unit and every number that a person reads are derived."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from synthesis.polynomials.enclosure import PolynomialMatrix
+
+ERROR_EQUATION = ("decay rate", "fastest pole", "gain")
+UPDATE = ("internal update", "sampled error", "sampled gain", "motion gain", "drop probability")
+KINDS = (*ERROR_EQUATION, *UPDATE)
+WITH_CHANNEL = {"gain": "disturbances", "sampled gain": "disturbances", "motion gain": "motion"}
+KINDS_OF = {  # which kinds say something true about which update (synthesis.loop.observer)
+    "held": (
+        "decay rate",
+        "fastest pole",
+        "gain",
+        "internal update",
+        "sampled gain",
+        "motion gain",
+        "drop probability",
+    ),
+    "sampled": ("sampled error", "sampled gain", "drop probability"),
+}
+UPDATE_OF = {"held": "internal update", "sampled": "sampled error"}
+
+WORDS = {
+    "decay rate": "error equation: decay rate",
+    "fastest pole": "error equation: fastest pole",
+    "gain": "error equation: gain",
+    "internal update": "update: decay while the plant stands still",
+    "sampled error": "update: decay",
+    "sampled gain": "update: gain",
+    "motion gain": "update: gain of motion",
+    "drop probability": "update: drop probability",
+}
+
+
+@dataclass(frozen=True)
+class ClaimChannel:
+    """From inputs, each with the size that counts as one, to estimation errors. For motion the inputs are states."""
+
+    inputs: Mapping[str, float]
+    errors: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One property of a loop: `level` in the unit that follows from the kind and the channel, P(u) exact and symmetric."""
+
+    kind: str
+    level: float
+    P: PolynomialMatrix
+    channel: ClaimChannel | None = None
+
+
+def claim_name(kind: str, channel: ClaimChannel | None, units: Mapping[str, str]) -> str:
+    """What is claimed, in words; sizes of inputs with their units wherever they are not plainly one."""
+    if channel is None:
+        return WORDS[kind]
+    plain = plain_unit(channel)
+    motion = "/s" if WITH_CHANNEL[kind] == "motion" else ""
+    mark = "'" if motion else ""
+    parts = [
+        f"{name}{mark}" if plain else f"{written(size)} {_unit(units[name], motion)} {name}{mark}"
+        for name, size in channel.inputs.items()
+    ]
+    return f"{WORDS[kind]} {' + '.join(parts)} -> {' + '.join(channel.errors)}"
+
+
+def claim_unit(kind: str, channel: ClaimChannel | None, units: Mapping[str, str]) -> str:
+    """The unit of a claim's level.
+
+    A gain from one input of size one has the unit error/input. With sizes the inputs are numbers of their sizes, and the gain has
+    the unit of the errors ('mixed' if they differ).
+    """
+    if channel is None:
+        return "1" if kind == "drop probability" else "1/s"
+    above = {units[name] for name in channel.errors}
+    top = above.pop() if len(above) == 1 else "mixed"
+    if not plain_unit(channel):
+        return top
+    (name,) = channel.inputs
+    if WITH_CHANNEL[kind] == "motion" and units[name] == top:
+        return "s"
+    return quotient(top, _unit(units[name], "/s" if WITH_CHANNEL[kind] == "motion" else ""))
+
+
+def written(number: float) -> str:
+    """The number as it stands in a file, with every digit: a rounded level is another claim."""
+    return repr(float(number)).removesuffix(".0")
+
+
+def plain_unit(channel: ClaimChannel) -> bool:
+    """Whether the channel has one input, of size one."""
+    return list(channel.inputs.values()) == [1.0]
+
+
+def _unit(unit: str, per_second: str) -> str:
+    if not per_second or unit == "1":
+        return "1/s" if per_second else unit
+    return f"{unit}^2" if unit.endswith("/s") else f"{enclosed(unit)}/s"
+
+
+def quotient(above: str, below: str) -> str:
+    """The unit above/below as text."""
+    if above == below:
+        return "1"
+    return above if below == "1" else f"{enclosed(above)}/({below})"
+
+
+def enclosed(unit: str) -> str:
+    """In parentheses if the unit is a product or a quotient."""
+    return f"({unit})" if any(c in unit for c in "*/ ") else unit
+
+
+def rows_of(names: Sequence[str], channel: ClaimChannel) -> tuple[list[int], list[float]]:
+    """Places of the channel's inputs among `names`, and their sizes."""
+    return [list(names).index(name) for name in channel.inputs], list(channel.inputs.values())

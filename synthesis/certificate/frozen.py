@@ -1,0 +1,95 @@
+"""The loop at constant parameters, in floats on a grid: bounds of what can be claimed, and where to look. No proofs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from flint import fmpq
+
+from synthesis.certificate.refute import grid
+from synthesis.hinf_observer import Channel, channel_matrices
+from synthesis.loop.observer import ObserverLoop
+from synthesis.loop.system import Region, System
+from synthesis.polynomials.enclosure import PolynomialMatrix
+from synthesis.polynomials.matrix import FloatArray
+
+if TYPE_CHECKING:
+    from synthesis.deploy import Deployment
+
+BISECTIONS = 40
+
+
+def frozen_gain(deployment: Deployment, channel: Channel) -> float:
+    """Largest gain of the channel over constant parameters and a grid of frequencies: a bound from below for the update.
+
+    A constant parameter is one of the admissible motions, and every frequency bounds the gain there from below. The disturbances
+    are held over a sample, as in the claims.
+    """
+    d, z = channel_matrices(deployment.gains.model, channel)
+    systems = _systems(deployment.loop, "discrete")
+    if not systems:
+        return 0.0
+    A = np.array([_numbers(system.A) for system in systems])
+    B = np.array([_numbers(system.B["disturbances"]) @ d for system in systems])
+    angles = np.concatenate([[0.0], np.geomspace(1e-4, np.pi, 41)])
+    resolvent = np.exp(1j * angles)[:, None, None, None] * np.eye(A.shape[-1]) - A
+    response = z @ np.linalg.solve(resolvent, np.broadcast_to(B, (len(angles), *B.shape)))
+    return float(np.linalg.norm(response, 2, axis=(-2, -1)).max())
+
+
+def frozen_update(loop: ObserverLoop) -> tuple[FloatArray, FloatArray]:
+    """A of the update (g, n, n) with and without a measurement, on a grid."""
+    received, lost = [], []
+    for system in _systems(loop, "discrete"):
+        received.append(_numbers(system.A))
+        lost.append(_numbers(system.coasting))
+    return np.array(received), np.array(lost)
+
+
+def slowest_decay(loop: ObserverLoop) -> float:
+    """The least decay rate of the update over constant parameters, 1/s; not positive where one is unstable."""
+    received, _ = frozen_update(loop)
+    if not len(received) or loop.sample_time is None:
+        return 0.0
+    radius = np.abs(np.linalg.eigvals(received)).max()
+    return float(-np.log(max(radius, 1e-12)) / _float(loop.sample_time))
+
+
+def critical_probability(loop: ObserverLoop) -> float:
+    """The largest drop probability with a frozen second-moment radius below one everywhere on the grid."""
+    received, lost = frozen_update(loop)
+    if not len(received):
+        return 0.0
+    squares = [np.einsum("gij,gkl->gikjl", m, m).reshape(len(m), -1, m.shape[-1] ** 2) for m in (received, lost)]
+
+    def stable(p: float) -> bool:
+        return bool(np.abs(np.linalg.eigvals((1.0 - p) * squares[0] + p * squares[1])).max() < 1.0)
+
+    if not stable(0.0):
+        return 0.0
+    low, high = 0.0, 1.0
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return low
+
+
+def _systems(loop: ObserverLoop, time: str) -> list[System]:
+    found = []
+    for point in dict.fromkeys(grid(loop)):
+        system = loop.system(Region((*point, *(fmpq(0),) * len(point)), (fmpq(0),) * (2 * len(point))), time)  # type: ignore[arg-type]
+        if system is not None:
+            found.append(system)
+    return found
+
+
+def _numbers(matrix: PolynomialMatrix) -> FloatArray:
+    entries = matrix.terms.get((0,) * matrix.variables)
+    if entries is None:
+        return np.zeros(matrix.shape)
+    return np.array([float(x.mid()) for x in entries.entries()]).reshape(matrix.shape)
+
+
+def _float(number: fmpq) -> float:
+    return int(number.p) / int(number.q)

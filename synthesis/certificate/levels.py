@@ -1,0 +1,74 @@
+"""Which claims a deployed table gets, and the best level of each that is proved.
+
+Levels come from the solver or from frozen parameters and are taken a little worse, until the proof holds: what is claimed is what
+was proved, with the digits that are written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from synthesis.certificate.claims import UPDATE_OF, Claim, ClaimChannel
+from synthesis.certificate.frozen import critical_probability, slowest_decay
+from synthesis.certificate.rounding import round_down, round_up
+from synthesis.certificate.search import Search, Wish
+
+SHARES = (0.99, 0.97, 0.94, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1)  # of what frozen parameters allow
+SETTLE = (1.0, 2.0, 5.0, 20.0)  # times the wanted distance from the least gain
+
+
+def held_claims(
+    search: Search, channels: Sequence[ClaimChannel], decay_rate: float, fastest_pole: float | None, settle: float
+) -> tuple[Claim, ...] | None:
+    """Claims of the error equation and of its update with held measurements; None if a wanted one cannot be had."""
+    wanted = [Wish("decay rate", decay_rate)] if decay_rate else []
+    wanted += [] if fastest_pole is None else [Wish("fastest pole", fastest_pole)]
+    found = [search.prove(wish)[0] for wish in wanted]
+    found += [best_gain(search, Wish("gain", None, channel), settle) for channel in channels]
+    return _with_update(search, channels, found, settle)
+
+
+def sampled_claims(search: Search, channels: Sequence[ClaimChannel], settle: float) -> tuple[Claim, ...] | None:
+    """Claims of the update that corrects once a sample."""
+    return _with_update(search, channels, [], settle)
+
+
+def _with_update(
+    search: Search, channels: Sequence[ClaimChannel], found: list[Claim | None], settle: float
+) -> tuple[Claim, ...] | None:
+    """What the runtime's update gets beside: only the claims about drops and motion may be missing."""
+    update = search.loop.update
+    found += [largest(search, UPDATE_OF[update], slowest_decay(search.loop))]
+    found += [best_gain(search, Wish("sampled gain", None, channel), settle) for channel in channels]
+    if any(claim is None for claim in found):
+        return None
+    extra: list[Claim | None] = []
+    if update == "held":
+        errors = dict.fromkeys(name for channel in channels for name in channel.errors)
+        extra += [
+            best_gain(search, Wish("motion gain", None, ClaimChannel({state: 1.0}, (error,))), settle)
+            for error in errors for state in search.names.states
+        ]  # fmt: skip
+    extra += [largest(search, "drop probability", critical_probability(search.loop))]
+    return tuple(claim for claim in (*found, *extra) if claim is not None)
+
+
+def best_gain(search: Search, wish: Wish, settle: float) -> Claim | None:
+    """The least gain of the solver, loosened by `settle` (which buys margin for the proof) or a few times that."""
+    least = search.least_gain(wish)
+    if not np.isfinite(least):
+        return None
+    tried = (
+        search.prove(Wish(wish.kind, round_up(least * (1.0 + settle * times)), wish.channel))[0] for times in SETTLE
+    )
+    return next((claim for claim in tried if claim is not None), None)
+
+
+def largest(search: Search, kind: str, limit: float) -> Claim | None:
+    """The largest proved level among some shares of what holds while the parameters stand still."""
+    if not limit > 0.0:
+        return None
+    tried = (search.prove(Wish(kind, round_down(share * limit, 3)))[0] for share in SHARES)
+    return next((claim for claim in tried if claim is not None), None)

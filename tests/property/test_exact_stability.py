@@ -1,0 +1,159 @@
+"""`affine_quadratic_stability` on random and offset ranges next to the boundary: nothing false certified, nothing false refuted.
+
+Every answer is judged in rational numbers by Sturm's and Routh's theorems (`tests.support.exact_road`), which share no code with
+the prover. 10,000 cases by hand: `python -m tests.support.stability_cases 10000`.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+import sympy as sp
+from flint import fmpq, fmpq_poly
+
+from synthesis.lmi.result import Verdict
+from synthesis.lmi.settings import LmiSettings
+from synthesis.stability import affine_quadratic_stability
+from tests.support import exact_road as road
+from tests.support.stability_cases import FAMILIES, Case, asked, case_of, complaint, survey
+from tests.unit.lmi_cases import parameter, small_model
+
+CASES, PARTS = 306, 6
+p = sp.Symbol("p")
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+def test_no_verdict_is_false(part: int) -> None:
+    each = CASES // PARTS
+    counts, complaints = survey(range(part * each, (part + 1) * each))
+    assert complaints == []
+    verdicts: Counter[str] = Counter()
+    for (_, verdict), number in counts.items():
+        verdicts[verdict] += number
+    assert {family for family, _ in counts} == set(FAMILIES)
+    assert min(verdicts["certified"], verdicts["refuted"]) >= each // 5  # it does decide
+    assert counts["multiple pole", "refuted"] == 0
+
+
+# ---- the cases that were wrong -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize(("low", "high"), [(634.65, 635.65), (-0.5, 0.5), (999999.5, 1000000.5)])
+@pytest.mark.parametrize(
+    ("a", "verdict"), [("1/2", Verdict.REFUTED), ("0.9999", Verdict.REFUTED), ("1.0001", Verdict.CERTIFIED)]
+)
+def test_a_range_far_from_zero_is_a_range_like_any_other(
+    a: str, verdict: Verdict, low: float, high: float, degree: int
+) -> None:
+    """A = u^5 - a with u = 2 (p - middle): A = 1 - a at the upper end. In powers of p the terms are 1e14 and more."""
+    u = 2 * (p - sp.Rational(str((low + high) / 2)))
+    for entry in (u**5 - sp.Rational(a), sp.expand(u**5 - sp.Rational(a))):
+        model = small_model([[entry]], [[1]], (parameter("p", low, high),))
+        assert affine_quadratic_stability(model, np.zeros((1, 1)), degree).verdict is verdict
+
+
+def test_the_same_written_with_floats() -> None:
+    model = small_model([[(2.0 * (p - 635.15)) ** 5 - 0.5]], [[1]], (parameter("p", 634.65, 635.65),))
+    result = affine_quadratic_stability(model, np.zeros((1, 1)))
+    assert result.verdict is Verdict.REFUTED
+    assert "pole at +0.5 1/s" in result.message
+
+
+@pytest.mark.parametrize("size", [2, 3, 4])
+@pytest.mark.parametrize("turn", [False, True])
+def test_a_multiple_pole_that_is_stable_is_never_refuted(size: int, turn: bool) -> None:
+    """One Jordan block at -1e-3: floating point splits it into a ring that reaches across the axis. Exactly: stable."""
+    A = sp.Matrix(size, size, lambda i, j: sp.Rational(-1, 1000) if i == j else int(j == i + 1))
+    if turn:
+        S = sp.Matrix(size, size, lambda i, j: int(bool(i >= j)))
+        A = S * A * S.inv()
+    model = small_model(A + p * sp.zeros(size), sp.Matrix(1, size, lambda i, j: p if j == 0 else 0))
+    for form in ("primal", "dual"):
+        result = affine_quadratic_stability(model, np.zeros((size, 1)), 0, form)  # type: ignore[arg-type]
+        assert result.verdict is not Verdict.REFUTED
+    bad = small_model(A + sp.eye(size) / 999, sp.Matrix(1, size, lambda i, j: p if j == 0 else 0))
+    assert affine_quadratic_stability(bad, np.zeros((size, 1)), 0).verdict is Verdict.REFUTED
+
+
+@pytest.mark.parametrize(("middle", "verdict"), [("0.37", Verdict.REFUTED), ("-0.81", Verdict.REFUTED)])
+def test_what_is_unstable_between_the_points_of_a_grid_is_found(middle: str, verdict: Verdict) -> None:
+    """-1 - 1e-3 + 1.002 / (1 + 1e4 (p - p0)^2): unstable on a width of 6e-4 that no grid of nine points sees."""
+    spike = sp.Rational("1.002") / (1 + 10**4 * (p - sp.Rational(middle)) ** 2)
+    model = small_model([[spike - sp.Rational("1.001")]], [[1]])
+    assert affine_quadratic_stability(model, np.zeros((1, 1)), 0).verdict is verdict
+
+
+def test_a_model_without_parameters_is_a_model() -> None:
+    for shift, verdict in ((Fraction(-1, 10**6), Verdict.CERTIFIED), (Fraction(1, 10**6), Verdict.REFUTED)):
+        case = Case("no parameter", [[[shift, Fraction(1)], [Fraction(0), Fraction(-1)]]])
+        assert not case.has_parameter
+        assert asked(case).verdict is verdict
+
+
+# ---- the judge ------------------------------------------------------------------------------------------------------------
+
+
+def test_the_judge_knows_what_numpy_knows() -> None:
+    """Sturm and Routh against eigenvalues on a grid, where these are clear."""
+    draw, clear = np.random.default_rng(0), Counter()  # type: Counter[bool]
+    for _ in range(200):
+        n, degree = int(draw.integers(1, 5)), int(draw.integers(0, 4))
+        series = [
+            [[Fraction(int(x), 10) for x in row] for row in draw.integers(-9, 10, (n, n))] for _ in range(degree + 1)
+        ]
+        series = road.shifted(series, Fraction(-int(draw.integers(0, 3))))
+        v = np.linspace(-1.0, 1.0, 501)
+        worst = np.linalg.eigvals(
+            sum(np.array(m, float) * v[:, None, None] ** k for k, m in enumerate(series))
+        ).real.max()
+        if abs(worst) > 1e-2:
+            assert road.stable_on_range(series) == (worst < 0.0)
+            clear[bool(worst < 0.0)] += 1
+    assert min(clear.values()) > 40
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "free"),
+    [
+        ([0, 1], False), ([1, 0, 1], True), ([fmpq(1, 4), -1, 1], False), ([-4, 0, 1], True), ([1, 1], False),
+        ([-1, 1], False), ([fmpq(10001, 10000), 1], True), ([3], True), ([0], False), ([1, -2, 1], False),
+    ],
+)  # fmt: skip
+def test_roots_in_the_range_are_counted_exactly(coefficients: list[fmpq], free: bool) -> None:
+    assert road.no_root(fmpq_poly(coefficients)) is free
+
+
+def test_false_answers_are_seen() -> None:
+    """Verdicts turned round, and Lyapunov matrices spoiled: each is a complaint."""
+    seen: Counter[str] = Counter()
+    for seed in range(60):
+        case = case_of(seed)
+        result = asked(case)
+        if result.verdict is Verdict.REFUTED:
+            assert "a frozen pole" in str(complaint(case, replace(result, verdict=Verdict.CERTIFIED)))
+            seen["turned"] += 1
+        if result.verdict is Verdict.CERTIFIED:
+            assert "every frozen pole" in str(complaint(case, replace(result, verdict=Verdict.REFUTED)))
+            P = result.result.values["P"]
+            spoiled = replace(result.result, values={"P": type(P)(-P.coefficients)})
+            assert "does not prove it" in str(complaint(case, replace(result, result=spoiled)))
+            seen["spoiled"] += 1
+    assert min(seen.values()) > 10
+
+
+def test_the_lyapunov_matrix_in_physical_parameters_proves_it_too() -> None:
+    """Where the range is not far from zero its coefficients lose nothing."""
+    case = Case("2 states", [[[Fraction(-1), Fraction(2)], [Fraction(-1), Fraction(-1)]],
+                             [[Fraction(0), Fraction(1, 2)], [Fraction(1, 2), Fraction(0)]]], half=Fraction(2))  # fmt: skip
+    result = affine_quadratic_stability(case.model, np.zeros((2, 1)), 1, settings=LmiSettings(points=21))
+    assert result.verdict is Verdict.CERTIFIED
+    P = [[[Fraction(float(x)) * case.half**k for x in row] for row in m] for k, m in enumerate(result.lyapunov)]
+    for m in P:
+        m[1][0] = m[0][1]
+    rates = [Fraction(repr(rate)) / case.half for rate in case.rates]
+    assert road.lyapunov_on_range(case.closed, P, case.below, rates, Fraction(0), dual=False)
