@@ -23,6 +23,7 @@ from synthesis.errors import ModelError
 from synthesis.loop.observer import ObserverLoop
 from synthesis.loop.plant import Axis, Plant
 from synthesis.models.formula import parse, read, used
+from synthesis.models.param import check_unit
 from synthesis.polynomials.chebyshev import from_chebyshev, to_chebyshev
 from synthesis.polynomials.enclosure import PolynomialMatrix, identity
 from synthesis.polynomials.rational import decimal, rational
@@ -58,6 +59,9 @@ def subject_of(content: Mapping[str, Any], where: str) -> Subject:
         plant = Plant(axes, _rebuilt(content, axes, where, tied), identity(1, len(axes)))
         if tied:
             check_dimensions(model, content["scheduling"], where)
+        else:  # words only, but still units: they are printed
+            for named in (*(signal for kind in SIGNALS for signal in model[kind]), *content["scheduling"]):
+                check_unit(named["unit"], f"{where}: unit of {named['name']}")
     except ModelError as error:
         raise ScheduleError(str(error)) from None
     for key, matrix in plant.matrices.items():

@@ -76,7 +76,9 @@ def number(node: ast.Constant, text: str, where: str) -> Fraction:
     segment = text[node.col_offset : node.end_col_offset].replace("_", "")  # one line of ASCII: columns are places
     value = node.value if isinstance(node.value, (int, float)) else float("nan")
     size = abs(float(value)) if not isinstance(value, int) or abs(value) < 10**DIGITS else float("inf")
-    if len(segment) > DIGITS or not (size == 0.0 or 1e-100 <= size <= 1e100):
+    if size == 0.0 and not segment.lower().partition("e")[0].strip("0."):
+        return Fraction(0)  # 0e-1000000000 included
+    if len(segment) > DIGITS or not 1e-100 <= size <= 1e100:
         raise ModelError(f"{where}: the number '{shown(segment)}' is beyond 1e100 or {DIGITS} characters")
     try:
         return Fraction(segment)

@@ -8,10 +8,9 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from studies.certify import certify
 from studies.spec import load_spec
+from synthesis.certificate.export import schedule_content
+from synthesis.certificate.proof import prove
 from synthesis.deploy import deploy
-from synthesis.export import schedule_content
-from synthesis.hinf_observer import design_observer
-from synthesis.verify import prove
 
 FOLDER = Path(__file__).parents[2] / "estimators" / "schedules"
 
@@ -20,7 +19,7 @@ def test_specification_to_proof(benchmark: BenchmarkFixture) -> None:
     def whole() -> bool:
         spec, folder = load_spec("corner-estimation-lateral")
         parameters = spec.parameter_set(folder)
-        gains = design_observer(spec.build_model(parameters), spec.observer_design())
+        gains = spec.design(spec.build_model(parameters))
         content = schedule_content(deploy(gains, spec.deploy_settings()), spec.name)
         return all(proof.proved for proof in prove(content))
 

@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import solve
 from synthesis.polynomials.matrix import FloatArray
-from tests.unit.lmi_cases import confirmed, gain_problem, lyapunov_problem, parameter
+from tests.unit.lmi_cases import SLACK, confirmed, gain_problem, held, lyapunov_problem, parameter, within
 
 SMALL = settings(deadline=None, max_examples=12)
 SEEDS = st.integers(0, 2**32 - 1)
@@ -39,29 +40,34 @@ def frozen_gain(A: FloatArray, B: FloatArray, C: FloatArray) -> float:
     )
 
 
-@settings(SMALL, max_examples=8)  # six solves each
+@settings(SMALL, max_examples=8)  # nine solves each
 @given(SEEDS, st.sampled_from([0.0, 0.3]))
 def test_certified_gains_lie_above_frozen_ones_and_fall_with_the_degree(seed: int, rate: float) -> None:
+    """What a solver calls the optimum is near it; a bound proved 1 % above it is one, and dual bounds lie below it."""
     A, B, C = random_plant(seed, 0.5)
     floor = frozen_gain(A, B, C)
     previous = np.inf
     for degree in (0, 1, 2):
-        results = {
-            kind: solve(gain_problem((parameter(rate=rate),), A, B, C, degree), LmiSettings(relaxation=kind, points=41))
-            for kind in KINDS
-        }
-        exact = results["exact"]
+
+        def problem(degree: int = degree) -> LmiProblem:
+            return gain_problem((parameter(rate=rate),), A, B, C, degree)
+
+        results = {kind: solve(problem(), LmiSettings(relaxation=kind, points=41)) for kind in KINDS}
+        exact, grid = results["exact"], results["grid"]
         if exact.report.status != "Solved":
             return  # degree 0 need not have a solution: nothing to compare
-        assert exact.objective is not None
-        assert exact.lower_bound is not None
-        assert exact.lower_bound <= exact.objective * (1.0 + 1e-7)
-        assert exact.objective >= floor * (1.0 - 1e-6)
+        assert exact.objective is not None and exact.lower_bound is not None
+        assert grid.objective is not None and grid.lower_bound is not None
+        proved = solve(held(problem(), "gamma", 1.01 * exact.objective), LmiSettings(relaxation="exact"))
+        assert proved.verdict is Verdict.CERTIFIED
+        assert proved.objective == pytest.approx(1.01 * exact.objective, rel=1e-3)
+        for certified in (result for result in (exact, proved) if result.verdict is Verdict.CERTIFIED):
+            assert certified.objective is not None
+            assert certified.objective >= floor
+            assert certified.objective >= exact.lower_bound
+            assert certified.objective >= grid.lower_bound  # fewer inequalities: a bound from below all the more
+        assert exact.objective == pytest.approx(exact.lower_bound, rel=5e-3)
         assert exact.objective <= previous * (1.0 + 1e-4)  # a higher degree is never worse
-        grid = results["grid"]
-        assert grid.objective is not None
-        assert grid.lower_bound is not None
-        assert grid.lower_bound <= exact.objective * (1.0 + 1e-7)  # fewer inequalities: a bound from below all the more
         assert grid.objective == pytest.approx(exact.objective, rel=2e-3)
         previous = exact.objective
 
@@ -83,15 +89,18 @@ def test_certified_means_certified(seed: int, shift: float, kind: Relaxation) ->
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("kind", ["grid", "vertex", "exact"])
 def test_cvxpy_comes_to_the_same_answer(seed: int, kind: Relaxation) -> None:
+    """The same optimum, and a gain 1 % above it is proved on both roads."""
     A, B, C = random_plant(seed, 1.5)
-    answers = []
+    answers, proofs = [], []
     for solver in ("CLARABEL", "cvxpy:CLARABEL"):
-        problem = gain_problem((parameter(rate=0.2),), A, B, C, 1)
-        answers.append(solve(problem, LmiSettings(relaxation=kind, points=7, solver=solver)))
+        used = LmiSettings(relaxation=kind, points=7, solver=solver)
+        answers.append(solve(gain_problem((parameter(rate=0.2),), A, B, C, 1), used))
+        level = 1.01 * (answers[0].objective or np.nan)
+        proofs.append(solve(held(gain_problem((parameter(rate=0.2),), A, B, C, 1), "gamma", level), used).verdict)
     first, second = answers
     assert first.objective is not None
-    assert first.objective == pytest.approx(second.objective, rel=1e-5)
-    assert first.verdict == second.verdict
+    assert first.objective == pytest.approx(second.objective, rel=2.0 * SLACK)
+    assert proofs == [Verdict.CERTIFIED] * 2
     assert (first.report.solver, second.report.solver) == ("clarabel", "cvxpy:CLARABEL")
     assert second.lower_bound is None  # cvxpy hands out no common form of the dual objective
 
@@ -121,8 +130,8 @@ def test_the_answer_does_not_depend_on_the_units_of_the_parameter(seed: int) -> 
         scaled = np.stack([A[0], A[1] / unit])
         problem = gain_problem((parameter("p", -unit, unit, 0.3 * unit),), scaled, B, C, 1)
         gains.append(solve(problem, LmiSettings(relaxation="exact")).objective)
-    assert gains[1] == pytest.approx(gains[0], rel=1e-6)
-    assert gains[2] == pytest.approx(gains[0], rel=1e-6)
+    assert gains[1] == pytest.approx(gains[0], rel=2.0 * SLACK)
+    assert gains[2] == pytest.approx(gains[0], rel=2.0 * SLACK)
 
 
 @pytest.mark.parametrize(("first", "second"), list(product([1.0, 1e-3], [1.0, 1e4])))
@@ -134,4 +143,4 @@ def test_parameters_of_very_different_size(first: float, second: float) -> None:
     parameters = (parameter("a", 0.0, first, first), parameter("b", 0.0, second, np.inf))
     result = solve(gain_problem(parameters, A, ones, ones, (1, 0)), LmiSettings(relaxation="vertex"))
     assert result.verdict is Verdict.CERTIFIED
-    assert result.objective == pytest.approx(1.0, abs=1e-6)
+    assert within(result.objective, 1.0)

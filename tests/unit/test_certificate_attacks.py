@@ -1,7 +1,7 @@
 """Lies that were sealed again: `gainsmith certify` refuses them, or what it prints of them is true.
 
-Every attack is a change of a shipped schedule (or of one of the test data). What is printed is read from the terminal, as a person
-would read it; whether it is true is judged by `tests.support.schedule_judge`.
+Every attack is a change of a shipped schedule (or of one of the test data). What is printed is read from the terminal, as a
+person would read it; whether it is true is judged by `tests.support.schedule_judge`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 from estimators.schedule import read_content, sealed
+from estimators.schedule.upgrade import UNTIED
 from studies.cli import main
 from tests.support.schedule_judge import Judge, Statement, statement
 
@@ -268,7 +269,7 @@ def test_disturbances_have_their_columns(tmp_path: Path, capsys: pytest.CaptureF
 
 @pytest.mark.parametrize("source", [LATERAL, SPRING], ids=lambda path: path.stem)
 @pytest.mark.parametrize(
-    "unit", ["kg", "ft", "ft/s", "ft/s^2", "1/min", "rpm", "mm", "%", "K^2", "N/ft", "1/km", "min/m"]
+    "unit", ["A", "ft", "ft/s", "ft/s^2", "1/min", "rpm", "mm", "%", "K^2", "N/ft", "1/km", "min/m"]
 )
 def test_units_are_tied(source: Path, unit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Any other unit of any signal, of the parameter, or of a constant."""
@@ -285,6 +286,18 @@ def places_of_units(data: Content) -> list[tuple[Any, ...]]:
     kinds = ("states", "inputs", "outputs", "disturbances")
     found: list[tuple[Any, ...]] = [("model", kind, i) for kind in kinds for i in range(len(data["model"][kind]))]
     return [*found, *(("model", "constants", name) for name in data["model"]["constants"]), ("scheduling", 0)]
+
+
+def test_what_is_tied_to_nothing_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A file that calls itself one of format 1 escapes the check of its units: then that stands beside its claims."""
+    data = content()
+    data["model"]["source"] = UNTIED + data["model"]["source"]
+    data["model"]["disturbances"][2]["unit"] = "kg"
+    told = Told(write(tmp_path / "attack.json", data), capsys)
+    assert told.code == 0
+    assert "  note    format 1: constants and units are words only, tied to nothing that is proved" in told.lines
+    data["model"]["disturbances"][2]["unit"] = "m  proved  decay rate 9 1/s"
+    assert "is not a unit" in refused(data, tmp_path, capsys)
 
 
 def test_a_unit_in_other_words_is_the_same_unit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -327,7 +340,7 @@ def test_breakpoints_rates_and_table_are_what_is_proved(tmp_path: Path, capsys: 
         data = content()
         change(data)
         codes.append(true(data, tmp_path, capsys).code)
-    assert codes == [1, 1, 0, 1, 1, 1, 1]
+    assert codes == [0, 1, 0, 1, 1, 1, 1]
 
 
 # Form
@@ -385,12 +398,13 @@ def test_malformed_lyapunov_matrices_are_refused(name: str, tmp_path: Path, caps
 
 
 BAD_FORMULAS = [
-    "9**9**9", "wheel_speed**9**9", "(9**9)**9", "wheel_speed**20000", "wheel_speed**-1", "wheel_speed**0.5", "wheel_speed**kappa",
-    "1e1000000000", "1e99999", "1e-1000000000", "1" * 60, "9" * 1999, "0x10", "1j", "1e5e5", "((wheel_speed + 1)**16)**16",
-    "(" * 300 + "1" + ")" * 300, "-" * 1900 + "1", "+" * 1900 + "wheel_speed", "1 +", "", " ", "wheel_speed wheel_speed", "1/0",
-    "1/(kappa - kappa)", "kappa if 1 else 2", "kappa or 1", "not kappa", "lambda: 1", "__import__('os').system('true')", "exp(1)",
-    "kappa.real", "kappa[0]", "[1]", "{1}", "'1'", "True", "None", "...", "kappa := 1", "kappa\n", "kappa\x00", "kappa\x1b[31m", "κ",
-    "other", "kappa//2", "kappa % 2", "kappa @ 2", "~1", "1 < 2", "f'{1}'", "print", "1_", "#", "1;2", "A", "await kappa", "*kappa",
+    "9**9**9", "wheel_speed**9**9", "wheel_speed**20000", "wheel_speed**-1", "wheel_speed**0.5",
+    "wheel_speed**kappa", "1e1000000000", "1e99999", "1e-1000000000", "1" * 60, "9" * 1999, "0x10", "1j", "1e5e5", "1_",
+    "((wheel_speed + 1)**16)**16", "(" * 300 + "1" + ")" * 300, "-" * 1900 + "1", "+" * 1900 + "wheel_speed", "1 +", "", " ",
+    "wheel_speed wheel_speed", "1/0", "1/(kappa - kappa)", "kappa if 1 else 2", "kappa or 1", "not kappa", "lambda: 1",
+    "__import__('os').system('true')", "exp(1)", "kappa.real", "kappa[0]", "[1]", "{1}", "'1'", "True", "None", "...",
+    "kappa := 1", "kappa\n", "kappa\x00", "kappa\x1b[31m", "κ", "other", "kappa//2", "kappa % 2", "kappa @ 2", "~1", "1 < 2",
+    "f'{1}'", "print", "#", "1;2", "A", "await kappa", "*kappa",
 ]  # fmt: skip
 
 
@@ -402,10 +416,11 @@ def test_bad_formulas_are_refused(text: str, tmp_path: Path, capsys: pytest.Capt
 
 
 BAD_UNITS = [
-    "9**9**9", "m**9**9**9", "m**(9**9)", "(m**9)**9**9", "m**20000", "m^1e9", "1e1000000000", "1e9", "2*m", "m*1000", "m/0", "m - m",
-    "m + m", "m**m", "m(2)", "m**(1/0)", "((((m^99)^99)^99)^99)", "(" * 30 + "m" + ")" * 29, "degC", "dB", "", " ", " m", "proved",
-    "1\n  proved  decay rate 999999 1/s", "1\r  proved  decay rate 999999 1/s", "m\x1b[2K\x1b[1A", "m\u2028", "m\x00", "m\t", "m\u202e", "m" * 65,
-    "m  proved  error equation: decay rate 9 1/s", "import os", "__import__('os')", "m;s", "m,s", "[m]", "{m}", "m\\n", "$m$", "m!", "nan", "inf",
+    "9**9**9", "m**9**9**9", "m**(9**9)", "(m**9)**9**9", "m**20000", "m^1e9", "1e1000000000", "1e9", "2*m", "m*1000", "m/0",
+    "m - m", "m + m", "m**m", "m(2)", "m**(1/0)", "((((m^99)^99)^99)^99)", "(" * 30 + "m" + ")" * 29, "degC", "dB", "", " ", " m",
+    "1\n  proved  decay rate 999999 1/s", "1\r  proved  decay rate 999999 1/s", "m\x1b[2K\x1b[1A", "m\u2028", "m\x00", "m\t",
+    "m\u202e", "m" * 65, "m  proved  error equation: decay rate 9 1/s", "proved", "import os", "__import__('os')", "m;s", "m,s",
+    "[m]", "{m}", "m\\n", "$m$", "m!", "nan", "inf",
 ]  # fmt: skip
 
 

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
 
 from synthesis.errors import ProblemError
+from synthesis.lmi import solve as solve_module
+from synthesis.lmi.clarabel_road import RawAnswer
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.scaling import error_scale
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import margins_of, solve
 from synthesis.polynomials.matrix import FloatArray
-from tests.unit.lmi_cases import confirmed, corner, gain_problem, lyapunov_problem, parameter
+from tests.unit.lmi_cases import confirmed, corner, gain_problem, lyapunov_problem, parameter, within
 
 STABLE = np.array([[[-1.0, 0.0], [0.0, -2.0]], [[0.0, 0.5], [-0.5, 0.0]]])
 ONE = np.ones((1, 1, 1))
@@ -36,8 +40,9 @@ def test_an_optimum_comes_with_bounds_from_both_sides() -> None:
     assert result.verdict is Verdict.CERTIFIED
     assert result.objective is not None
     assert result.lower_bound is not None
-    assert result.lower_bound <= 3.0 < result.objective < 3.0 + 1e-6
-    assert 3.0 - result.lower_bound < 1e-5
+    assert result.lower_bound <= 3.0 < result.objective
+    assert within(result.objective, 3.0)
+    assert 3.0 - result.lower_bound < 1e-4
     assert result.values["t"].at(np.zeros((1, 2)))[0, 0, 0, 0] == result.objective
     assert result.message.startswith('certified: tightest "above" at p = ')
 
@@ -164,9 +169,11 @@ def closed_loop(direction: str) -> tuple[FloatArray, FloatArray]:
     return A, error_scale(model.on([90.0]).error_dynamics(gain)[0][0])
 
 
-def test_without_balanced_states_a_solver_says_solved_and_is_wrong() -> None:
-    """The trap of these models: P has a natural condition number of 1e5. Verification decides, not the status."""
-    wrong = 0
+def test_without_balanced_states_verification_decides_and_not_the_status() -> None:
+    """The trap of these models: P has a natural condition number of 1e5, and a solver says solved where nothing is proved.
+
+    In which of these cases it does hangs on its last digits: four on one processor, eight on another.
+    """
     for direction, scale, degree in product(("longitudinal", "lateral"), (1.0, 0.1), (1, 2, 3)):
         A, _ = closed_loop(direction)
         problem = condition_problem(A, np.array([scale, 1.0]), degree)
@@ -175,8 +182,28 @@ def test_without_balanced_states_a_solver_says_solved_and_is_wrong() -> None:
             assert confirmed(problem, result)
         elif result.report.status == "Solved" and result.tightest.value < 0.0:
             assert not confirmed(problem, result)
-            wrong += 1
-    assert wrong >= 1
+
+
+@pytest.mark.parametrize("direction", ["longitudinal", "lateral"])
+def test_a_solver_that_says_solved_and_is_wrong_is_not_believed(
+    direction: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same trap on every machine: the last digits of a good answer are spoilt and its status is kept."""
+    honest = solve_module.solve_with_clarabel
+    A, balance = closed_loop(direction)
+    problem = condition_problem(A, balance, 1)
+    good = solve(problem, LmiSettings(relaxation="exact"))
+    assert good.verdict is Verdict.CERTIFIED and confirmed(problem, good)
+
+    def spoilt(*arguments: Any) -> RawAnswer:
+        answer = honest(*arguments)
+        return replace(answer, status="Solved", decisions=answer.decisions * (1.0 - 1e-4))
+
+    monkeypatch.setattr(solve_module, "solve_with_clarabel", spoilt)
+    result = solve(problem, LmiSettings(relaxation="exact"))
+    assert result.report.status == "Solved"
+    assert result.verdict is Verdict.INCONCLUSIVE and not confirmed(problem, result)
+    assert result.message.startswith('not certified: tightest "P > 1" at wheel_speed = ')
 
 
 @pytest.mark.parametrize("direction", ["longitudinal", "lateral"])
@@ -187,14 +214,14 @@ def test_balanced_states_avoid_the_trap(direction: str, kind: Relaxation) -> Non
     for degree in (0, 1, 2):
         result = solve(condition_problem(A, balance, degree), LmiSettings(relaxation=kind, points=20))
         assert result.verdict is Verdict.CERTIFIED
-        assert result.objective == pytest.approx(1.0, abs=1e-6)
+        assert within(result.objective, 1.0)
 
 
 def test_vertices_alone_are_solved_and_violated_in_between() -> None:
     """Two grid points and no multi-convexity: solved, and wrong by far in the middle of the range."""
     A, _ = closed_loop("longitudinal")
     result = solve(condition_problem(A, np.ones(2), 2), LmiSettings(relaxation="grid", points=2))
-    assert result.report.status == "Solved"
+    assert result.report.status in ("Solved", "AlmostSolved")
     assert result.verdict is Verdict.INCONCLUSIVE
     assert result.tightest.name == "dV/dt < 0"
     assert result.tightest.value < -0.1
