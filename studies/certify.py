@@ -43,7 +43,10 @@ class Certification:
         if not failed:
             return f"certified: {len(self.proofs)} claims"
         kind = "refuted: the loop itself breaks it" if failed[0].refuted else "not proved"
-        claim, place = printable(failed[0].claim, 90), printable(failed[0].place, 100)  # in full where claims are listed
+        claim, place = (
+            printable(failed[0].claim, 90),
+            printable(failed[0].place, 100),
+        )  # in full where claims are listed
         return f"{kind}: '{claim}' at {written(failed[0].level)} {printable(failed[0].unit, 40)} fails at {place}"
 
 

@@ -49,7 +49,7 @@ class DeploySettings:
 
 @dataclass(frozen=True)
 class Deployment:
-    """A table with the claims that are proved for it: `table` (b_1, .., b_p, nx, ny) as stored, `breakpoints` one array a parameter."""
+    """A table with the claims that are proved for it: `table` (b_1, .., b_p, nx, ny) as stored, `breakpoints` (b_i,) each."""
 
     gains: ObserverGains
     settings: DeploySettings

@@ -132,10 +132,10 @@ def design_observer(model: LpvModel, design: ObserverDesign) -> ObserverGains:
     flat: so the last step is strictly convex, and every number that is handed on is rounded to the digits that matter.
     Raises ProblemError if nothing is found; a model with a hidden unstable mode is called undetectable.
     """
-    scale = design_scale(model, design)
+    scale, clock = timed_scale(model, design)
 
     def problem(gamma: float | None, maximise_margin: bool = True, floor: float = 0.0) -> LmiProblem:
-        return observer_problem(model, design, scale, gamma, maximise_margin, floor)
+        return observer_problem(model, design, scale, gamma, maximise_margin, floor, clock)
 
     return minimised(model, design, scale, problem)
 
@@ -179,12 +179,12 @@ BISECTIONS = 14
 def _least_certified(
     model: LpvModel, design: ObserverDesign, scale: FloatArray, problem: Problem, optimum: LmiResult
 ) -> tuple[float, LmiResult]:
-    """A solve that stalled names a level that holds nowhere: bracket the least one at which a largest margin is certified."""
+    """A solve that stalled names some level, below or above the least one where a largest margin is certified: bracket that."""
     named = optimum.objective if optimum.objective is not None and optimum.objective > 0.0 else 1.0
-    low = to_gamma(model, design, scale, named)
+    level = low = to_gamma(model, design, scale, named)
     found, high = None, low
     for step in STEPS:
-        high = low * step
+        high = level * step
         found = solve(problem(high), design.settings)
         if found.verdict is Verdict.CERTIFIED:
             break
@@ -192,6 +192,12 @@ def _least_certified(
         raise ProblemError(
             f"model '{model.name}': {optimum.message}; loosen a bound, the decay rate or the fastest pole"
         )
+    for step in STEPS[1:] if high == level * STEPS[0] else ():  # the level that was named holds: what about lower ones?
+        low = level / step
+        tried = solve(problem(low), design.settings)
+        if tried.verdict is not Verdict.CERTIFIED:
+            break
+        found, high = tried, low
     for _ in range(BISECTIONS):
         if high <= low * 1.0005:
             break
@@ -220,12 +226,29 @@ def refuse_undetectable(model: LpvModel) -> None:
 
 def design_scale(model: LpvModel, design: ObserverDesign) -> FloatArray:
     """`observer_scale` with every disturbance in the largest size that a channel gives it: units of sizes do not matter."""
+    poly, sizes = model.polynomial, _sizes(model, design)
+    return observer_scale(replace(poly, E=poly.E * sizes, F=poly.F * sizes), model.parameters)
+
+
+def timed_scale(model: LpvModel, design: ObserverDesign) -> tuple[FloatArray, float]:
+    """`design_scale` where time is counted in units of 1/clock s, and the clock: a power of 1e6 that follows the speed of errors.
+
+    It is one for speeds from 0.01 to 1e4 1/s. Margins and tolerances of the solver are meant for numbers not far from one.
+    """
+    scale = design_scale(model, design)
+    middle = model.on(np.array([[p.middle for p in model.parameters]]).reshape(1, len(model.parameters)))
+    A, E = middle.A[0] * scale[:, None] / scale, middle.E[0] * scale[:, None] * _sizes(model, design)
+    speed = max(float(np.linalg.norm(A, 2)), float(np.linalg.norm(E, 2)) ** 2 if E.size else 0.0)
+    clock = 10.0 ** (6 * round((np.log10(speed) - 1.0) / 6)) if 0.0 < speed < np.inf else 1.0
+    return scale * np.sqrt(clock), clock
+
+
+def _sizes(model: LpvModel, design: ObserverDesign) -> FloatArray:
     sizes = np.zeros(len(model.disturbances))
     for channel in design.channels:
         sizes = np.maximum(sizes, np.abs(channel_matrices(model, channel)[0]).max(axis=1))
     sizes[sizes == 0.0] = 1.0  # in no channel
-    poly = model.polynomial
-    return observer_scale(replace(poly, E=poly.E * sizes, F=poly.F * sizes), model.parameters)
+    return sizes
 
 
 def error_unit(model: LpvModel, design: ObserverDesign, scale: FloatArray) -> float:
@@ -250,8 +273,9 @@ def observer_problem(
     gamma: float | None = None,
     maximise_margin: bool = True,
     floor: float = 0.0,
+    clock: float = 1.0,
 ) -> LmiProblem:
-    """The LMIs of the module docstring in the states diag(scale) x.
+    """The LMIs of the module docstring in the states diag(scale) x, time counted in units of 1/clock s.
 
     Without `gamma` the open channel is minimised; with it that channel is bounded by gamma and, unless told otherwise, a
     common margin of all inequalities is maximised. With a `floor` every inequality keeps that margin, and the decisions of
@@ -264,22 +288,22 @@ def observer_problem(
     below, nx, ny = known["denominator"], len(model.states), len(model.outputs)
     P = problem.symmetric("P", nx, design.degree)
     X = problem.matrix("X", nx, ny, design.degree)
-    closed = P @ known["A"] - X @ known["C"]
+    closed = (P @ known["A"] - X @ known["C"]) * (1.0 / clock)
     frozen = closed + closed.T
-    phi = frozen + problem.time_derivative(P).scaled_by(below)
+    phi = frozen + problem.time_derivative(P).scaled_by(below) * (1.0 / clock)
+    decay = 2.0 * design.decay_rate * (1.0 + design.reserve) / clock
 
     problem.require("P > 0", P)
     if design.decay_rate > 0.0 or not design.channels:
-        problem.require("decay rate", -(phi + P.scaled_by(below) * (2.0 * design.decay_rate * (1.0 + design.reserve))))
+        problem.require("decay rate", -(phi + P.scaled_by(below) * decay))
     if design.fastest_pole is not None:
-        problem.require(
-            "fastest pole", frozen + P.scaled_by(below) * (2.0 * design.fastest_pole / (1.0 + design.reserve))
-        )
+        fastest = 2.0 * design.fastest_pole / (1.0 + design.reserve) / clock
+        problem.require("fastest pole", frozen + P.scaled_by(below) * fastest)
     compact = len(design.channels) == 1
     for channel in design.channels:
         d, z = channel_matrices(model, channel)
         z = z / unit
-        force = (P @ known["E"] - X @ known["F"]) @ problem.constant(d)
+        force = (P @ known["E"] - X @ known["F"]) @ problem.constant(d) * (1.0 / clock)
         inputs, errors = problem.constant(np.eye(d.shape[1])), problem.constant(np.eye(len(z)))
         level = channel.bound or gamma
         if level is None:
@@ -318,5 +342,7 @@ def channel_matrices(model: LpvModel, channel: Channel) -> tuple[FloatArray, Flo
         raise ProblemError(
             f"channel '{channel.name}' has {len(weights)} weights for {len(channel.disturbances)} disturbances"
         )
+    if not all(0.0 < weight < np.inf for weight in weights):
+        raise ProblemError(f"channel '{channel.name}' has the weights {list(weights)}; give positive sizes")
     d = np.eye(len(disturbances))[:, [disturbances.index(name) for name in channel.disturbances]] * np.array(weights)
     return d, np.eye(len(states))[[states.index(name) for name in channel.errors]]

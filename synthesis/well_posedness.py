@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from synthesis.errors import ProblemError
-from synthesis.hinf_observer import ObserverDesign, design_scale, observer_problem, to_gamma
+from synthesis.hinf_observer import ObserverDesign, observer_problem, timed_scale, to_gamma
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.solve import solve
 from synthesis.models.lpv import LpvModel
@@ -49,8 +49,8 @@ class WellPosedness:
 
 def well_posedness(model: LpvModel, design: ObserverDesign, backoffs: tuple[float, ...] = BACKOFFS) -> WellPosedness:
     """Minimise gamma, then the gain energy at several distances from it. Raises ProblemError if nothing is feasible."""
-    scale = design_scale(model, design)
-    optimum = solve(observer_problem(model, design, scale), design.settings)
+    scale, clock = timed_scale(model, design)
+    optimum = solve(observer_problem(model, design, scale, clock=clock), design.settings)
     if optimum.objective is None or not optimum.margins:
         raise ProblemError(f"model '{model.name}': {optimum.message}")
     gamma = to_gamma(model, design, scale, optimum.objective)
@@ -58,16 +58,18 @@ def well_posedness(model: LpvModel, design: ObserverDesign, backoffs: tuple[floa
         raise ProblemError("well-posedness needs at least two back-offs to see a trend")
     energies = []
     for backoff in backoffs:
-        problem = energy_problem(model, design, scale, gamma * (1.0 + backoff))
+        problem = energy_problem(model, design, scale, gamma * (1.0 + backoff), clock)
         found = solve(problem, replace(design.settings, verify=False))
         energies.append(float(found.objective or np.inf))
     ratios = [later / earlier for earlier, later in pairwise(energies)]
     return WellPosedness(gamma, tuple(backoffs), tuple(energies), bool(min(ratios) > GROWTH))
 
 
-def energy_problem(model: LpvModel, design: ObserverDesign, scale: FloatArray, gamma: float) -> LmiProblem:
+def energy_problem(
+    model: LpvModel, design: ObserverDesign, scale: FloatArray, gamma: float, clock: float = 1.0
+) -> LmiProblem:
     """The constraints of the design at this gamma, and the least w with w I > X'P^-1 X = L'PL everywhere."""
-    problem = observer_problem(model, design, scale, gamma, maximise_margin=False)
+    problem = observer_problem(model, design, scale, gamma, maximise_margin=False, clock=clock)
     P, X = problem.unknowns["P"], problem.unknowns["X"]
     energy = problem.scalar("gain energy")
     size = problem.constant(np.eye(len(model.outputs))).scaled_by(energy)

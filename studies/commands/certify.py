@@ -25,7 +25,9 @@ def run_certify(files: list[Path], as_json: bool) -> int:
             print(f"{printable(str(result.path))}: {printable(result.message)} ({result.seconds:.2f} s)")
             for proof in result.proofs:
                 state = "proved" if proof.proved else "FAILS "
-                print(printable(f"  {state}  {proof.claim} {written(proof.level)} {proof.unit}  {proof.place}").rstrip())
+                print(
+                    printable(f"  {state}  {proof.claim} {written(proof.level)} {proof.unit}  {proof.place}").rstrip()
+                )
             for remark in result.remarks:
                 print(printable(f"  note    {remark}"))
     if any(result.refusal for result in results):

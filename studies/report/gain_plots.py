@@ -41,15 +41,15 @@ def plot_schedule(run: ScheduleRun, folder: Path) -> list[Path]:
             axis.axhspan(low, high, color=PRINTED_BAND, alpha=0.15, lw=0, label=f"published range {low:g} to {high:g}")
         axis.plot(breakpoints, table[:, i], "o-", color="#aa3377", ms=4, lw=1.5, label="deployed, proved")
         axis.set_xlabel(f"{parameter['name'].replace('_', ' ')} [{parameter['unit']}]")
-        axis.set_ylabel(
-            f"{symbol}$_{i + 1}$ [{units[i][0]}]"
-        )
+        axis.set_ylabel(f"{symbol}$_{i + 1}$ [{units[i][0]}]")
         axis.set_xlim(breakpoints[0], breakpoints[-1])
         axis.set_ylim(bottom=0.0)
         axis.grid(alpha=0.3)
         axis.legend(loc="best", frameon=False, fontsize=8)
     decay = next(p.level for p in run.proofs if p.kind in ("internal update", "sampled error"))
-    figure.suptitle(f"{run.name}: update decays at {decay:g} 1/s, proved over the whole range and rate box", fontsize=10)
+    figure.suptitle(
+        f"{run.name}: update decays at {decay:g} 1/s, proved over the whole range and rate box", fontsize=10
+    )
     paths = [folder / f"{run.name}.{kind}" for kind in ("svg", "png")]
     for path in paths:
         figure.savefig(path, dpi=130)

@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from math import prod
 from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly_ctx
 
 from estimators.errors import ScheduleError
-from estimators.schedule.check import HIGHEST_ORDER, SIGNALS
+from estimators.schedule.check import HIGHEST_ORDER, SHAPES, SIGNALS
 from estimators.schedule.upgrade import UNTIED
 from synthesis.certificate.claims import KINDS, KINDS_OF, UPDATE_OF, WITH_CHANNEL, Claim, ClaimChannel
 from synthesis.certificate.units import check_dimensions
@@ -30,6 +31,8 @@ from synthesis.polynomials.rational import decimal, rational
 
 LAST_DIGIT = fmpq(1, 2**51)  # of the sum of an entry's coefficients: what rounding them to float64 can change
 MOST_TERMS, MOST_BITS, MOST_DEGREE = 2000, 20_000, 2 * HIGHEST_ORDER  # of what a formula multiplies out to on its way
+MOST_PARAMETERS = 3  # of a proof: polynomials of order 8 in more of them have too many terms
+MOST_DENSE = 1100  # terms of P one sample later, in parameters and rates, if none is left out
 MOST_WORK = 400_000  # products of terms, those of many digits counted by their length, in all formulas together
 MOST_TEXT = 100_000  # characters of all formulas together
 
@@ -54,6 +57,10 @@ def subject_of(content: Mapping[str, Any], where: str) -> Subject:
         Axis(p["name"], p["unit"], *(decimal(p[key]) for key in ("min", "max", "rate_min", "rate_max")))
         for p in content["scheduling"]
     )
+    if len(axes) > MOST_PARAMETERS:
+        raise ScheduleError(
+            f"{where}: scheduling: {len(axes)} parameters; proofs are made over {MOST_PARAMETERS} at most"
+        )
     tied = not model["source"].startswith(UNTIED)
     try:
         plant = Plant(axes, _rebuilt(content, axes, where, tied), identity(1, len(axes)))
@@ -106,6 +113,8 @@ def claims_of(content: Mapping[str, Any], subject: Subject, where: str) -> list[
                     if name not in known_names:
                         raise ScheduleError(f"{place}.channel: '{name}' is none of {', '.join(known_names)}")
         P = stored_polynomial(claim["P"], len(content["scheduling"]), (len(subject.names.states),) * 2)
+        if prod((degree + 1) ** 2 for degree in P.degrees) > MOST_DENSE:
+            raise ScheduleError(f"{place}.P: orders {list(P.degrees)} are too high for {P.variables} parameters")
         if any(m != m.transpose() for m in P.terms.values()):
             raise ScheduleError(f"{place}.P: not symmetric; it proves nothing")
         found.append(Claim(kind, claim["level"], from_chebyshev(P), channel))
@@ -178,8 +187,6 @@ def _rebuilt(content: Mapping[str, Any], axes: tuple[Axis, ...], where: str, tie
 
 
 def _shape(content: Mapping[str, Any], key: str) -> tuple[int, int]:
-    from estimators.schedule.check import SHAPES
-
     above, beside = SHAPES[key]
     return len(content["model"][above]), len(content["model"][beside])
 

@@ -36,7 +36,7 @@ class Proof:
 
 @dataclass(frozen=True)
 class Certificate:
-    """The proofs of a content, what moving parameters add inside a sample, and whether constants and units are tied to the plant."""
+    """The proofs of a content, what moving parameters add inside a sample, and whether constants and units are tied."""
 
     proofs: tuple[Proof, ...]
     inside_sample: tuple[str, ...]

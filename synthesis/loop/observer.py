@@ -11,10 +11,10 @@ e = x - xhat of either, with d held as well and x' the plant's own motion at the
     held     e+ = e^M e + T phi(M) (E - L F) d + T (phi(TA) - phi(M)) x'
     sampled  e+ = (e^(TA) - K C) e + (T phi(TA) E - K F) d
 
-What float64 rounds when the runtime evaluates plant and gains is inside the balls of these matrices; that it then computes phi and
-adds up in float64 leaves an error of about 1e-15 of the states, which no claim speaks of. While no measurement comes in both are
-e+ = e^(TA) e + T phi(TA) E d. Between samples the error of `held` obeys, if nothing is
-held, the error equation e' = (A - L C) e + (E - L F) d.
+What float64 rounds when the runtime evaluates plant and gains is inside the balls of these matrices; that it then computes phi
+and adds up in float64 leaves an error of about 1e-15 of the states, which no claim speaks of. While no measurement comes in,
+both are e+ = e^(TA) e + T phi(TA) E d. Between samples the error of `held` obeys, if nothing is held, the error equation
+e' = (A - L C) e + (E - L F) d.
 """
 
 from __future__ import annotations

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from math import comb
+from math import comb, prod
 from typing import Any
 
 from flint import fmpq
 
 from synthesis.polynomials.enclosure import Entries, PolynomialMatrix, Powers
+
+MOST_COEFFICIENTS = 20_000  # of a box; more are not looked at, and decide nothing
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,8 @@ class Sign:
 def sign_on_box(matrix: PolynomialMatrix) -> Sign:
     """Decide M(t) > 0 on [-1, 1]^v from its Bernstein coefficients; only the upper triangle is read."""
     degrees = matrix.degrees
+    if prod(degree + 1 for degree in degrees) > MOST_COEFFICIENTS:
+        return Sign(False)
     terms = bernstein(matrix)
     if not terms:  # the zero matrix, written without any term
         return Sign(False, (-1,) * matrix.variables)

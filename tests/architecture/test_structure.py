@@ -30,7 +30,8 @@ def test_layers_hold() -> None:
 
 
 @pytest.mark.parametrize(
-    ("module", "allowed"), [("estimators", {"numpy"}), ("studies.cli", set()), ("synthesis.certificate.proof", {"numpy", "flint"})]
+    ("module", "allowed"),
+    [("estimators", {"numpy"}), ("studies.cli", set()), ("synthesis.certificate.proof", {"numpy", "flint"})],
 )
 def test_imports_pull_in_nothing_else(module: str, allowed: set[str]) -> None:
     code = (

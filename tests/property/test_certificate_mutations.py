@@ -69,6 +69,8 @@ def violations(path: Path, result: Certification, seed: int) -> list[str]:
             wrong += judge.truth(said)
         elif proof.refuted and not judge.broken(said, float(proof.place.split(" = ")[1].split()[0])):
             wrong.append(f"'{proof.claim}' at {proof.level} is refuted at {proof.place}, but holds there")
+    moving = [line for line in result.remarks if line != UNTIED]
+    wrong += judge.remarks(moving) if moving and seed % 3 == 0 else []
     lines = [result.message, *(f"{proof.claim} {proof.unit} {proof.place}" for proof in result.proofs), *result.remarks]
     return wrong + [f"prints {line!r}" for line in lines if not line.isprintable()]
 
@@ -105,17 +107,12 @@ def test_what_is_printed_of_a_mutated_file_is_true(tmp_path: Path) -> None:
     assert tally["proved"] > COUNT // 10 and tally["refuted"] + tally["not proved"] > COUNT // 10, tally
 
 
-@pytest.mark.parametrize("factor", [1.001, 1.1, 3.0])
-def test_the_judge_sees_what_is_overstated(factor: float) -> None:
-    """Negative control: one loop that is proved, said to do better than its frozen parameters allow."""
-    for base in sorted(set(BASES)):
-        content, result = json.loads(base.read_text("utf-8")), certify(base)
-        judge = Judge(content)
-        for proof, stored in zip(result.proofs, content["claims"], strict=True):
-            said = statement(proof.claim, proof.level, proof.unit, stored)
-            assert judge.truth(said) == []
-            gain = "gain" in proof.kind or proof.kind == "fastest pole"
-            level = proof.level / factor**4 if gain else min(proof.level * factor**4, 1.0 + proof.level)
-            if factor == 3.0 or (gain and factor == 1.1):
-                better = statement(proof.claim, level, proof.unit, stored)
-                assert judge.truth(better) != [], proof.claim
+@pytest.mark.parametrize("base", sorted(set(BASES)), ids=lambda path: path.stem)
+def test_the_judge_sees_what_is_overstated(base: Path) -> None:
+    """Negative control: a loop that is proved, said to be half as good again (or to decay three times as fast)."""
+    content, result = json.loads(base.read_text("utf-8")), certify(base)
+    judge = Judge(content)
+    for proof, stored in zip(result.proofs, content["claims"], strict=True):
+        bounded = "gain" in proof.kind or proof.kind == "fastest pole"
+        level = proof.level / 1.5 if bounded else min(3.0 * proof.level, 0.999 if "drop" in proof.kind else np.inf)
+        assert judge.truth(statement(proof.claim, level, proof.unit, stored)) != [], proof.claim

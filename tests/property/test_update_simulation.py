@@ -177,6 +177,36 @@ def test_the_judge_is_not_blind(seed: int) -> None:
             assert judge.tally.violations, (seed, claim["kind"])
 
 
+# ---- the search -----------------------------------------------------------------------------------------------------------
+
+ONES = dict.fromkeys(("x1", "x2", "u", "y", "d1", "d2"), 1.0)
+WILD = {"x1": 1e4, "x2": 1e-3, "u": 1e4, "y": 1e-2, "d1": 10.0, "d2": 1e4}
+
+
+@pytest.mark.parametrize("seed", [1, 3, 4, 17, 22, 39])
+def test_claims_do_not_hang_on_units(seed: int) -> None:
+    """The same plant in units of one and in wild ones: the same claims, and levels that are the same in those units.
+
+    Integrators among them (noise leaves an error alone at rest), and triangular matrices (nothing to balance a large entry with).
+    """
+    found = []
+    for units in (ONES, WILD):
+        case = random_case(seed, units)
+        assert case is not None
+        levels = {}
+        for claim in searched(case):
+            size = 1.0
+            if claim.channel is not None:
+                (error,) = claim.channel.errors
+                source = "d2" if list(claim.channel.inputs) == ["noise"] else next(iter(claim.channel.inputs))
+                size = units[error] / (1.0 if len(claim.channel.inputs) == 2 else units[source])
+            inputs = () if claim.channel is None else tuple(claim.channel.inputs)
+            levels[claim.kind, inputs] = claim.level / size
+        found.append(levels)
+    assert len(found[0]) >= 4
+    assert found[0] == pytest.approx(found[1], rel=0.06)  # shares of a limit are tried in steps
+
+
 # ---- what is stated beside the claims ------------------------------------------------------------------------------------
 
 

@@ -117,9 +117,9 @@ def swapped(data: Content, rng: np.random.Generator) -> str:
 
 
 def copied(data: Content, rng: np.random.Generator) -> str:
-    places = places({k: v for k, v in data.items() if k != "provenance"})
-    to = pick(rng, places)
-    source = pick(rng, [way for way in places if type(at(data, way)) is type(at(data, to))])
+    ways = places({k: v for k, v in data.items() if k != "provenance"})
+    to = pick(rng, ways)
+    source = pick(rng, [way for way in ways if type(at(data, way)) is type(at(data, to))])
     at(data, to[:-1])[to[-1]] = copy.deepcopy(at(data, source))
     return f"{source} to {to}"
 

@@ -142,11 +142,11 @@ def few_digits(x: float, digits: int = 5) -> float:
     return float(f"{x:.{digits - 1}e}")
 
 
-def random_plant(seed: int, kind: str | None = None, span: str | None = None) -> RandomPlant:
-    """Units, speeds, sample times and rates over several decades; about the same chance for every kind of pole."""
+def random_plant(seed: int, given: dict[str, float] | None = None) -> RandomPlant:
+    """Units (unless given), speeds, sample times and rates over several decades; about the same chance for every kind of pole."""
     draw = np.random.default_rng(seed)
-    kind = kind or KINDS[draw.integers(len(KINDS))]
-    low, high = (span or RANGES[draw.integers(len(RANGES))]).split()
+    kind = KINDS[draw.integers(len(KINDS))]
+    low, high = RANGES[draw.integers(len(RANGES))].split()
     T = few_digits(10 ** draw.uniform(-2.7, -0.7), 2)
     speed = 10 ** draw.uniform(-2.0, -0.3) / T
     half = float(Fraction(high) - Fraction(low)) / 2
@@ -155,6 +155,7 @@ def random_plant(seed: int, kind: str | None = None, span: str | None = None) ->
     units = {name: 10.0 ** int(draw.integers(-4, 5)) for name in ("x1", "x2", "u", "y", "d1", "d2")}
     if draw.random() < 0.3:
         units = dict.fromkeys(units, 1.0)
+    units = given or units
     plain = _normalised(kind, draw)
     rows = {"A": ("x1", "x2"), "B": ("x1", "x2"), "C": ("y",), "D": ("y",), "E": ("x1", "x2"), "F": ("y",)}
     columns = {"A": ("x1", "x2"), "B": ("u",), "C": ("x1", "x2"), "D": ("u",), "E": ("d1", "d2"), "F": ("d1", "d2")}

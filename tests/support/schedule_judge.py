@@ -145,6 +145,32 @@ class Judge:
         near = place + (self.road.high - self.road.low) * 1e-5 * np.linspace(-1.0, 1.0, 9)
         return bool(self._attempts(s, np.clip(near, self.road.low, self.road.high), -LOOSE))
 
+    def remarks(self, lines: Sequence[str]) -> list[str]:
+        """What a parameter that moves inside a sample adds, against the plant in short pieces beside the frozen one."""
+        road, model, wrong, pieces = self.road, self.road.content["model"], [], 24
+        states, inputs = road.names["states"], [signal["name"] for signal in model["inputs"]]
+        said = np.zeros((len(states), len(states) + len(inputs)))
+        for line in lines:
+            state, rest = re.fullmatch(r"a parameter moving .* error of (\w+) by at most (.*)", line).groups()  # type: ignore[union-attr]
+            for part in rest.split(" + "):
+                bound, unit, name = re.fullmatch(r"(\S+) (.+) \|(\w+)\|", part).groups()  # type: ignore[union-attr]
+                said[states.index(state), [*states, *inputs].index(name)] = float(bound)
+                wrong += [] if _same(unit, f"({self.units[state]})/({self.units[name]})") else [f"remark in {unit}"]
+        for rate in (float(road.parameter["rate_min"]), float(road.parameter["rate_max"])):
+            start = self.rng.uniform(road.low, road.high, 5)
+            start[:2] = road.low, road.high
+            way = np.clip(start + rate * road.period, road.low, road.high) - start
+            moved, frozen = None, None
+            for k in range(pieces):
+                piece = road.driven(start + way * (k + 0.5) / pieces, road.period / pieces)
+                still = road.driven(start, road.period / pieces)
+                moved, frozen = (b if a is None else b @ a for a, b in ((moved, piece), (frozen, still)))
+            assert moved is not None and frozen is not None
+            off = np.abs(moved - frozen)[:, : len(states)].max(0)
+            size = np.abs(moved).max()
+            wrong += [] if (off <= 1.02 * said + 1e-9 * size).all() else [f"remark: {off} beyond {said}"]
+        return wrong
+
     def _attempts(self, s: Statement, p: np.ndarray, loose: float) -> list[str]:
         """Frozen parameters (and frequencies) that break the statement, its level loosened."""
         road, level = self.road, s.level * (1.0 - loose if _from_below(s) else 1.0 + loose)

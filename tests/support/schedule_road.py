@@ -105,6 +105,15 @@ class Road:
             out = {"A": closed, "B": driven[..., n:], "motion": integral[..., :n] - driven[..., :n]}
         return out | {"coasting": coasting}
 
+    def driven(self, p: np.ndarray, period: float) -> np.ndarray:
+        """(x, u) over a period with u held and p at rest: the plant itself, without an observer."""
+        A, B = self.matrix("A", p), self.matrix("B", p)
+        state, forced = _held(A, B, period)
+        n, m = B.shape[-2:]
+        out = np.zeros((len(p), n + m, n + m))
+        out[:, :n, :n], out[:, :n, n:], out[:, n:, n:] = state, forced, np.eye(m)
+        return out
+
     def grid(self, inside: int = 8) -> np.ndarray:
         """Points of every cell, breakpoints among them."""
         parts = [np.linspace(a, b, inside, endpoint=False) for a, b in zip(self.points, self.points[1:], strict=False)]

@@ -92,9 +92,9 @@ class Case:
         return schedule_content(found, f"random-{self.plant.seed}")
 
 
-def random_case(seed: int) -> Case | None:
+def random_case(seed: int, units: dict[str, float] | None = None) -> Case | None:
     """Gains by pole placement, every seventh time by a design; None if none of a few draws is stable at frozen parameters."""
-    plant, draw = random_plant(seed), np.random.default_rng(seed + 1_000_000)
+    plant, draw = random_plant(seed, units), np.random.default_rng(seed + 1_000_000)
     update = ("held", "sampled")[seed % 2]
     low, high = float(plant.low), float(plant.high)
     breakpoints = places(low, high, int(draw.integers(2, 4)))

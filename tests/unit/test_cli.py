@@ -64,7 +64,9 @@ def test_schedules_write_check_and_drift(tmp_path: Path, capsys: pytest.CaptureF
     assert "kept" in capsys.readouterr().out
     assert (tmp_path / f"{name}.json").read_bytes() == before
     content = read_content(tmp_path / f"{name}.json")
-    content["gain"]["table"][3][1][0] += 0.0625  # other gains, and every claim still proved: claims are judged, gains reported
+    content["gain"]["table"][3][1][0] += (
+        0.0625  # other gains, and every claim still proved: claims are judged, gains reported
+    )
     write_content(tmp_path / f"{name}.json", content)
     assert main(["schedules", name, *out, "--check", "--json"]) == 0
     row = json.loads(capsys.readouterr().out)[0]
@@ -80,7 +82,10 @@ def test_schedules_write_check_and_drift(tmp_path: Path, capsys: pytest.CaptureF
         (lambda content: content["claims"][0].update(level=90.0), "is not proved at wheel_speed"),
         (lambda content: content["gain"]["table"][3][1].__setitem__(0, -60.0), "is not proved at wheel_speed"),
         (lambda content: content["provenance"].update(spec_sha256="0" * 64), "another specification"),
-        (lambda content: content["model"]["constants"]["sigma0"].update(value=700.0), "the formula and the constants give"),
+        (
+            lambda content: content["model"]["constants"]["sigma0"].update(value=700.0),
+            "the formula and the constants give",
+        ),
     ],
     ids=["weaker level", "claim removed", "overstated", "flipped gain", "other specification", "other constant"],
 )

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from synthesis import hinf_observer
 from synthesis.errors import ProblemError
 from synthesis.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
-from synthesis.lmi.result import Verdict
+from synthesis.lmi.result import LmiResult, Verdict
+from synthesis.lmi.solve import solve
 from synthesis.models.lpv import LpvModel
 from synthesis.sampled_observer import design_sampled_observer
 from tests.unit.lmi_cases import parameter, small_model
@@ -46,15 +48,38 @@ def few(x: float) -> float:
     return float(f"{x:.3g}")
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", [*range(40), 61, 91, 108, 208, 240, 249, 293, 344, 367, 379, 407, 418, 438, 504, 686])
 def test_a_scalar_plant_gets_the_gamma_of_its_closed_form(seed: int) -> None:
-    """Not less than is possible, not more than the back-off and the digits, and its gain keeps it."""
+    """Not less than is possible, not more than the back-off and the digits, and its gain keeps it; over ten decades each."""
     draw = np.random.default_rng(seed)
-    a, b, c = (few(x * 10**k) for x, k in zip(draw.normal(size=3), draw.uniform(-2.0, 2.0, 3), strict=True))
+    a, b, c = (few(x * 10**k) for x, k in zip(draw.normal(size=3), draw.uniform(-5.0, 5.0, 3), strict=True))
     gains = design_observer(scalar(a, b, c), DESIGN)
     best = least_gamma(a, b, c)
     assert gains.verdict is Verdict.CERTIFIED
     assert best * (1.0 - 1e-6) <= gains.gamma <= best * (1.0 + BACKOFF) * (1.0 + 5e-3)
+    assert gamma_of(float(gains.gain(np.zeros((1, 0)))[0, 0, 0]), a, b, c) <= gains.gamma * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("factor", [0.03, 0.19, 0.9, 1.0, 3.0])
+@pytest.mark.parametrize(("a", "b", "c"), [(-0.5, 1.0, 2.48), (0.3, 2.0, 0.1)])
+def test_a_first_solve_that_stalls_costs_time_and_no_truth(
+    a: float, b: float, c: float, factor: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever objective the stalled solve leaves behind, gamma is one that is certified, and near the least there is."""
+    calls = []
+
+    def stalling(problem: Any, settings: Any) -> LmiResult:
+        found = solve(problem, settings)
+        calls.append(found)
+        if len(calls) > 1:
+            return found
+        return replace(found, verdict=Verdict.INCONCLUSIVE, objective=found.objective * factor**2, message="stalled")  # type: ignore[operator]
+
+    monkeypatch.setattr(hinf_observer, "solve", stalling)
+    gains = design_observer(scalar(a, b, c), DESIGN)
+    best = least_gamma(a, b, c)
+    assert gains.verdict is Verdict.CERTIFIED
+    assert best * (1.0 - 1e-6) <= gains.gamma <= best * (1.0 + BACKOFF) * 1.01
     assert gamma_of(float(gains.gain(np.zeros((1, 0)))[0, 0, 0]), a, b, c) <= gains.gamma * (1.0 + 1e-9)
 
 
@@ -139,9 +164,8 @@ def test_units_of_states_change_nothing(kind: str, gamma: float, states: tuple[f
     assert designed(kind, mass_spring(states=states)) / states[0] == pytest.approx(gamma, rel=1e-2)
 
 
-@pytest.mark.parametrize(("kind", "gamma", "time"), [
-    ("held", 0.2119, 1e-3), ("held", 0.2119, 1e3), ("sampled", 0.2061, 1e-2), ("sampled", 0.2061, 1e3), ("sampled", 0.2061, 1e6),
-])  # fmt: skip
+@pytest.mark.parametrize(("kind", "gamma"), [("held", 0.2119), ("sampled", 0.2061)])
+@pytest.mark.parametrize("time", [1e-6, 1e3, 1e6])
 def test_the_unit_of_time_changes_nothing(kind: str, gamma: float, time: float) -> None:
     assert designed(kind, mass_spring(time=time), time=time) == pytest.approx(gamma, rel=1e-2)
 

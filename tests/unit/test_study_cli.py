@@ -85,7 +85,7 @@ def test_an_interrupt_is_one_line_and_ends_the_workers(tmp_path: Path, monkeypat
         assert process.poll() is None
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
-    message = process.communicate(timeout=60)[1]
+    message = process.communicate(timeout=300)[1]
     assert process.returncode == 1
     assert message == "gainsmith: interrupted; the same command goes on where it stopped\n"
     with pytest.raises(ProcessLookupError):

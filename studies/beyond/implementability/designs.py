@@ -90,9 +90,7 @@ def _constant(name: str, parameters: str, direction: str, gains: tuple[float, ..
     """Printed gains in the shape of a schedule, on the plant of the shipped one with the same tires."""
     column = np.array(gains)[:, None]
     shipped = GainSchedule.shipped(f"{parameters}-{direction}")
-    schedule = replace(
-        shipped, name=name, breakpoints=np.array(WHEEL_SPEED), table=np.stack([column, column])
-    )
+    schedule = replace(shipped, name=name, breakpoints=np.array(WHEEL_SPEED), table=np.stack([column, column]))
     return Design(
         name,
         "printed",

@@ -20,7 +20,7 @@ def present(name: str) -> bool:
     return VARIABLE in os.environ and (Path(os.environ[VARIABLE]) / name).exists()
 
 
-def hold_until(name: str, seconds: float = 60.0) -> None:
+def hold_until(name: str, seconds: float = 600.0) -> None:
     """Wait for the file ``name``; the limit keeps a lost worker from waiting forever."""
     end = time.monotonic() + seconds
     while not present(name) and time.monotonic() < end:
