@@ -13,6 +13,8 @@ from estimators import GainSchedule, LpvVelocityObserver
 from estimators.faults import Flag
 from tests.support.random_plant import RandomPlant, interpolated
 
+LARGEST = 1e50  # of a state: the runtime starts afresh from 1e100 on
+
 
 @dataclass(frozen=True)
 class Paths:
@@ -81,7 +83,11 @@ def simulate(plant: RandomPlant, schedule: GainSchedule, paths: Paths, feedback:
         shown = _times(np.abs(M["C"]), known) + np.abs(y)[:, None] + np.abs(_times(M["D"], paths.u[k][:, None]))
         size[k] = _times(np.abs(coast[k]) + np.eye(2), known) + _times(np.abs(weight[k]), shown)
         size[k] += _times(np.abs(drive[k]), _times(np.abs(M["B"]), np.abs(paths.u[k])[:, None]) + np.abs(forced))
-    return Run(paths, x, estimate, motion, coasted, size)
+        if not np.abs(x[k + 1]).max() < LARGEST:  # it runs away in spite of all: what was seen so far is enough
+            steps = k + 1
+            break
+    cut = Paths(paths.p[: steps + 1], paths.u[:steps], paths.d[:steps], paths.lost[:steps], paths.x, paths.estimate)
+    return Run(cut, x[: steps + 1], estimate[: steps + 1], motion[:steps], coasted[:steps], size[:steps])
 
 
 def probed(schedule: GainSchedule, parameters: np.ndarray, lost: bool = False) -> np.ndarray:

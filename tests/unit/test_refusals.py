@@ -35,8 +35,9 @@ BAD = {
     "degree tuple": lambda: LmiProblem((parameter(),)).symmetric("P", 2, (1, 1)),
     "no inequality": lambda: (lambda q: (q.scalar("x"), solve(q)))(LmiProblem((parameter(),))),
     "two unknowns": lambda: (lambda q: q.scalar("x") @ q.scalar("y"))(LmiProblem((parameter(),))),
-    "window outside": lambda: (lambda q: q.require("a", q.scalar("x"), (5.0, 7.0)))(LmiProblem((parameter(),))),
-    "window reversed": lambda: (lambda q: q.require("a", q.scalar("x"), (0.5, -0.5)))(LmiProblem((parameter(),))),
+    "box outside": lambda: (lambda q: q.require_on("a", q.scalar("x"), np.array([0.8, 0.0]), np.array([0.5, 1.0])))(
+        LmiProblem((parameter(),))
+    ),
     "nan known": lambda: LmiProblem((parameter(),)).known(np.full((1, 1, 1), np.nan)),
     "design nan decay": lambda: ObserverDesign((Channel(("d1",), ("x1",)),), decay_rate=float("nan")),
     "design nan fastest": lambda: ObserverDesign((Channel(("d1",), ("x1",)),), fastest_pole=float("nan")),
