@@ -261,6 +261,22 @@ def test_one_claim_about_the_update_is_needed(tmp_path: Path) -> None:
         assert f"claims: none about the update that the runtime performs ('{kind}')" in refusal(data, tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("corner-estimation-lateral", "sampled error"),
+        *(("sampled-longitudinal", k) for k in ("internal update", "decay rate")),
+    ],
+)
+def test_kinds_belong_to_an_update(tmp_path: Path, name: str, kind: str) -> None:
+    """The held update has no error of its own, the sampled one no error equation between samples."""
+    data = content(name)
+    data["claims"].append(copy.deepcopy(claims(data, "internal update", "sampled error")[0]) | {"kind": kind})
+    assert f"'{kind}' says nothing about the update" in refusal(data, tmp_path)
+    data["claims"][-1]["kind"] = "stability"
+    assert "'stability' is no kind of claim" in refusal(data, tmp_path)
+
+
 def test_probability_of_one_is_no_claim(tmp_path: Path) -> None:
     data = content("corner-estimation-longitudinal")
     for level in (1.0, 1.5):

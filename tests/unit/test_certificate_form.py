@@ -144,6 +144,7 @@ HUGE: dict[str, Callable[[], Any]] = {
     "powers in formulas": lambda: large("+".join(["(wheel_speed + 0.123456789)**16"] * 20)),
     "towers in formulas": lambda: large("-".join(["((wheel_speed + 0.1)**16)**2"] * 20)),
     "long name": lambda: content() | {"name": "x" * 10_000},
+    "four parameters": lambda: several(4, 1),
     "six parameters": lambda: several(6, 1),
     "order 16 in two parameters": lambda: several(2, 16),
     "order 4 in three parameters": lambda: several(3, 4),

@@ -10,9 +10,10 @@ from flint import fmpq, fmpq_mat
 from synthesis.certificate.claims import Claim, ClaimChannel
 from synthesis.certificate.refute import refuting_place
 from synthesis.certificate.verify import Names, Outcome, Verifier
+from synthesis.loop.motion import one_sample_later, rates, time_derivative
 from synthesis.loop.observer import ObserverLoop, Update
 from synthesis.loop.plant import Axis, Plant
-from synthesis.polynomials.enclosure import PolynomialMatrix, identity
+from synthesis.polynomials.enclosure import PolynomialMatrix, identity, variable
 
 NAMES = Names(("x",), ("d",))
 PERIOD = fmpq(1, 10)
@@ -136,6 +137,27 @@ def test_one_sample_later_counts(slope: float) -> None:
     border = (2.718281828459045**0.2 - 1.0) / 0.1
     assert prove(loop_of(scalar(-1.0), rate=0.98 * border), "internal update", 0.001, P).proved
     assert not prove(loop_of(scalar(-1.0), rate=1.02 * border), "internal update", 0.001, P).proved
+
+
+def test_one_sample_later_is_the_polynomial_elsewhere() -> None:
+    """P(u + T du/dt) and dP/dt of degree (3, 2) in two parameters, exactly, for rates anywhere between their bounds."""
+    axes = (
+        Axis("p", "1", fmpq(2), fmpq(6), fmpq(-3), fmpq(1)),
+        Axis("q", "1", fmpq(-1), fmpq(0), fmpq(-1, 2), fmpq(1, 3)),
+    )
+    terms = {(i, j): fmpq_mat([[fmpq((7 * i + 3 * j * j + 1) % 11 - 5, i + 1)]]) for i in range(4) for j in range(3)}
+    P, one = (
+        PolynomialMatrix(terms, (1, 1), 2).in_variables(4),
+        PolynomialMatrix({(0,) * 4: fmpq_mat([[1]])}, (1, 1), 4),
+    )
+    speeds = rates(axes, P, one, lambda i: variable(2 + i, 4), lambda x: x)
+    later, slope = one_sample_later(P, speeds, PERIOD), time_derivative(P, speeds)
+    for u, v, r, s in ((fmpq(1, 3), fmpq(-1, 2), fmpq(1), fmpq(-1)), (fmpq(-1), fmpq(1), fmpq(1, 7), fmpq(0))):
+        speed = (fmpq(-1) + 2 * r) / 2, (fmpq(-1, 12) + fmpq(5, 12) * s) * 2  # (middle + half r) over half the range
+        moved = (u + PERIOD * speed[0], v + PERIOD * speed[1], r, s)
+        assert later.at((u, v, r, s)) == P.at(moved)
+        partial = [P.derivative(i).at((u, v, r, s))[0, 0] for i in range(2)]
+        assert slope.at((u, v, r, s))[0, 0] == partial[0] * speed[0] + partial[1] * speed[1]
 
 
 def test_asymmetric_rates_count() -> None:
