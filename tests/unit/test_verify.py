@@ -176,6 +176,18 @@ def test_asymmetric_rates_count() -> None:
         assert prove(Verifier(moved, NAMES), "decay rate", 0.001, scalar(1.0, 0.5)).proved is proved, (low, high)
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "proved"), [(-1.9, 0.0, True), (-2.1, 0.0, False), (0.0, 9.0, True), (-2.1, 9.0, False)]
+)
+def test_the_dual_form_counts_motion_with_the_other_sign(low: float, high: float, proved: bool) -> None:
+    """V = e^2/Q with Q = 1 + u/2 on x' = -x: -2 Q - dQ/dt < 0 bounds how fast the parameter falls, where Q is least."""
+    axis = Axis("p", "1", fmpq(-1), fmpq(1), rational(low), rational(high))
+    plant = Plant((axis,), loop_of(scalar(-1.0)).loop.plant.matrices, identity(1, 1))
+    verifier = Verifier(ObserverLoop.constant_gain(plant, fmpq_mat([[0]])), NAMES)
+    claim = Claim("decay rate", 0.001, scalar(1.0, 0.5))
+    assert verifier.prove(claim, dual=True).proved is proved
+
+
 def test_an_indefinite_P_proves_nothing() -> None:
     """P = -1 satisfies every Lyapunov inequality of an unstable loop; P > 0 is asked everywhere, also between the ends."""
     unstable = loop_of(scalar(1.0))
