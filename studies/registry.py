@@ -46,7 +46,7 @@ class Registry:
 
     def claim_ids(self, study_id: str) -> tuple[str, ...]:
         """Ids of the claims in the ``claims.toml`` beside the study's module; none where there is no such file."""
-        from studies.papers.claims_file import published_claims
+        from studies.papers.published import published_claims
 
         package = self.modules[study_id].partition(":")[0].rpartition(".")[0]
         if not (resources.files(package) / "claims.toml").is_file():

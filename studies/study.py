@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 from studies.claim import Claim
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Sheet
+
+    from studies.plots import Figure
 
 Cell = str | int | float | bool | None
 
@@ -50,7 +52,7 @@ class Drawing:
     name: str
     caption: str
     alternative: str
-    figure: Figure
+    figure: Sheet
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class PartResult:
 
     claims: Sequence[Claim] = ()
     tables: Sequence[Table] = ()
-    drawings: Sequence[Drawing] = ()
+    drawings: Sequence[Drawing | Figure] = ()
     notes: Sequence[str] = ()
     measures: dict[str, float] = field(default_factory=dict)
 

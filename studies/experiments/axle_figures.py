@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from studies.experiments.axle_forces import FORCES, RIGHT, AxleRun
 from studies.experiments.panels import estimate_line, finished, true_line
-from studies.report.colours import SETTINGS
+from studies.plots.colours import SETTINGS
 from studies.study import Drawing
 
 _LABELS = {"F_y1": "$F_{y1}$ [kN]", "F_y2": "$F_{y2}$ [kN]", "F_x1": "$F_{x1}$ [kN]", "yaw_rate": "yaw rate [deg/s]"}

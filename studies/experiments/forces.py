@@ -16,7 +16,7 @@ from studies.experiments.accuracy import Spread, nrms, spread
 from studies.experiments.driven import LUGRE, driven
 from studies.experiments.play import QUICK_SECONDS, Parts, Reading, measured, play, run_of
 from studies.experiments.sensors import TEST_CAR
-from studies.report import colours
+from studies.plots import colours
 from studies.study import Cell, Drawing, PartResult, Scope, Table
 from studies.truth import Truth
 

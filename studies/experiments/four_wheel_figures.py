@@ -13,7 +13,7 @@ from estimators.vehicle import CORNERS
 from studies.experiments.accuracy import Spread
 from studies.experiments.four_wheel import EKF, PIPELINE, SHARE, STEADY, UKF, FourWheelRun
 from studies.experiments.panels import estimate_line, finished, true_line
-from studies.report import colours
+from studies.plots import colours
 from studies.study import Drawing
 
 if TYPE_CHECKING:

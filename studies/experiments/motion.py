@@ -13,7 +13,7 @@ from estimators.vehicle import CORNERS, GRAVITY
 from studies.experiments.driven import LUGRE, driven
 from studies.experiments.panels import finished
 from studies.experiments.play import run_of
-from studies.report.colours import BLUE, ORANGE, RED
+from studies.plots.colours import BLUE, ORANGE, RED
 from studies.study import Cell, Drawing, PartResult, Scope, Table
 from studies.truth import Truth, load_manoeuvre
 

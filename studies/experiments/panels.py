@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from studies.report.colours import TRUTH
+from studies.plots.colours import TRUTH
 
 Array = npt.NDArray[np.float64]
 BAND = (2.5, 97.5)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from studies.experiments.accuracy import Spread
 from studies.experiments.panels import estimate_line, finished, true_line
 from studies.experiments.play import believed, run_of
-from studies.report.colours import (
+from studies.plots.colours import (
     FUSION,
     HIGH_SLIP,
     INTEGRATED_ACCELERATION,

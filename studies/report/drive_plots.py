@@ -17,7 +17,7 @@ from studies.drives.chain import Chain
 from studies.drives.comparison import AXLES, quasi_static_axle_forces, reference_axle_force, reference_sideslip
 from studies.drives.judge import LEAST_SPEED, DriveData
 from studies.drives.quantities import CORNERS
-from studies.report import colours
+from studies.plots import colours
 
 Array = npt.NDArray[np.float64]
 Save = Callable[[Path], None]

@@ -13,7 +13,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 from estimators.schedule import GainSchedule
-from studies.report.colours import PRINTED_BAND
+from studies.plots.colours import PRINTED_BAND
 
 if TYPE_CHECKING:
     from studies.schedules import ScheduleRun

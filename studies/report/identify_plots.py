@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from studies.identify.identify import Identification
 from studies.identify.slip_limit import LimitedFit
-from studies.report.colours import BLUE
+from studies.plots.colours import BLUE
 from studies.report.drive_plots import STYLE
 
 Array = npt.NDArray[np.float64]

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from studies.report.colours import BLUE, RED
+from studies.plots.colours import BLUE, RED
 from studies.sweeps.measure import Measure
 
 LOW, HIGH, NOMINAL, WORST, BEST = BLUE, "#d1495b", "0.1", RED, "#4d9a2a"

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from studies.claim import JsonValue
-from studies.running.drawing import save_drawing
+from studies.plots import Figure
+from studies.plots.save import save_figure, save_sheet
 from studies.running.plain import plain
 from studies.running.whole_folder import sweep, whole_folder
 from studies.study import PartResult
@@ -43,7 +44,10 @@ def write_part(folder: Path, result: PartResult, fingerprint: str) -> None:
     content = content_of(result, fingerprint)
     with whole_folder(folder) as beside:
         for drawing in result.drawings:
-            save_drawing(drawing, beside)
+            if isinstance(drawing, Figure):
+                save_figure(drawing, beside)
+            else:
+                save_sheet(drawing.figure, *(beside / f"{drawing.name}.{kind}" for kind in ("svg", "png")))
         (beside / FILE).write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 

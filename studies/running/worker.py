@@ -13,8 +13,8 @@ from multiprocessing.process import parent_process
 from pathlib import Path
 from threading import Thread
 
+from studies.plots.draw import look
 from studies.registry import Registry
-from studies.running.drawing import drawing_style
 from studies.running.fingerprint import SOURCE_ROOT
 from studies.running.prepared import prepare, prepared_root
 from studies.running.store import part_folder, write_part
@@ -63,7 +63,7 @@ def work(job: Job, registry: Registry, parent: Connection) -> None:
             need = next(need for need in part.needs if need.name == job.preparation)
             prepare(need, job.out, job.scope, job.fingerprint)
         else:
-            with drawing_style():
+            with look():
                 result = part.run(replace(job.scope, prepared=prepared_root(job.out)))
                 computed = True
                 write_part(part_folder(job.out, job.study, job.part), result, job.fingerprint)

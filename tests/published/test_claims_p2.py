@@ -7,11 +7,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from studies.papers.claims_file import published_claims
 from studies.papers.longitudinal_speed.inputs import PACKAGE, accelerating
 from studies.papers.longitudinal_speed.study import CLAIMS, STUDY
 from studies.papers.longitudinal_speed.unknown_start import both_tests
-from studies.running.drawing import drawing_style
+from studies.papers.published import published_claims
+from studies.plots.draw import look
 from studies.study import QUICK, PartResult
 from tests.unit.p2_findings import finding
 from tests.unit.study_checks import check_result, check_study, desk_parts
@@ -21,7 +21,7 @@ from tests.unit.study_reference import numbers, reference_claims
 @cache
 def part(name: str) -> PartResult:
     (found,) = (p for p in desk_parts(STUDY) if p.name == name)
-    with drawing_style():
+    with look():
         return found.run(QUICK)
 
 

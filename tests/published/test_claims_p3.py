@@ -18,9 +18,9 @@ import pytest
 from scipy.linalg import expm
 
 from studies.claim import Claim, Verdict
-from studies.papers.claims_file import published_claims
+from studies.papers.published import published_claims
 from studies.papers.resilient_velocity.study import PACKAGE, STUDY
-from studies.running.drawing import drawing_style
+from studies.plots.draw import look
 from studies.study import QUICK
 from tests.unit.study_checks import desk_parts
 
@@ -35,7 +35,7 @@ RADIUS, STEP = "0.33", "0.005"
 @cache
 def results() -> dict[str, Any]:
     """Every part of the study, run once as a user would."""
-    with drawing_style():
+    with look():
         return {part.name: part.run(QUICK) for part in desk_parts(STUDY)}
 
 

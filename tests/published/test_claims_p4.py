@@ -13,7 +13,6 @@ from scipy.integrate import solve_ivp
 
 from estimators.sideslip import FourWheelModel
 from studies.claim import Finding, Verdict
-from studies.papers.claims_file import published_claims
 from studies.papers.ekf_ukf_lateral import claims_equations, claims_observability, claims_table
 from studies.papers.ekf_ukf_lateral.equations import SPEED, single_track, single_track_poles, straight_poles
 from studies.papers.ekf_ukf_lateral.observability import (
@@ -29,6 +28,7 @@ from studies.papers.ekf_ukf_lateral.observability import (
 from studies.papers.ekf_ukf_lateral.published_table import table_1
 from studies.papers.ekf_ukf_lateral.study import PACKAGE, STUDY
 from studies.papers.ekf_ukf_lateral.twins import SPLIT, STEP, twins
+from studies.papers.published import published_claims
 from studies.study import QUICK
 from tests.unit.study_checks import check_result, check_study, desk_parts
 from tests.unit.study_reference import numbers, reference_claims

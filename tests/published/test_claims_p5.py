@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from analysis.bounds_sliding_mode import PUBLISHED, SlidingModeGains
 from estimators.sideslip import CorneringModel, SlidingModeObserver
 from studies.claim import Finding, Verdict
-from studies.papers.claims_file import published_claims
+from studies.papers.published import published_claims
 from studies.papers.smo_ekf_sideslip import (
     claims_fixed_stiffness,
     claims_gains,

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.colors import to_rgb
 
 import studies
-from studies.report import colours
+from studies.plots import colours
 
 ROOT = Path(studies.__file__).parent
 NAMELESS = re.compile(r"[\"'](#[0-9a-fA-F]{3,8}|tab:\w+)[\"']")

@@ -16,7 +16,7 @@ from studies.drives.judge import DriveData, judge
 from studies.drives.quantities import CORNERS
 from studies.drives.run import RunResult, estimate_columns, replay_drive, run_drive
 from studies.drives.summary import remarks, summary_rows
-from studies.report import colours, drive_plots
+from studies.plots import colours, drive_plots
 from tests.drives.synthetic_drive import DRIVE, FRONT, MASS, REAR, TORQUES, TRACK, columns, write_drive, write_log
 from tests.unit.schedule_content import EFFECTIVE_RADIUS, schedule_content
 

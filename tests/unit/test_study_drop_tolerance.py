@@ -32,8 +32,8 @@ from studies.beyond.drop_tolerance.prediction import (
 from studies.beyond.drop_tolerance.questions import questions
 from studies.beyond.drop_tolerance.study import STUDY
 from studies.beyond.drop_tolerance.trial import run_trial
+from studies.plots.draw import look
 from studies.registry import load_study
-from studies.running.drawing import drawing_style
 from studies.study import QUICK
 from synthesis.lmi.result import Verdict
 
@@ -218,7 +218,7 @@ def test_parts_and_their_results() -> None:
     assert load_study("drop-tolerance") is STUDY
     names = [part.name for part in STUDY.parts]
     assert len(set(names)) == len(names) == 2 * len(NAMES) + 3
-    with drawing_style():
+    with look():
         table = overview(QUICK).tables[0]
     found = {row[0]: row for row in table.rows}
     assert len(found) == len(NAMES) and all(len(row) == len(table.columns) for row in table.rows)

@@ -11,7 +11,7 @@ from studies.beyond.drop_tolerance.observers import SHIPPED, observer
 from studies.beyond.drop_tolerance.population import START
 from studies.beyond.drop_tolerance.prediction import critical, independent_drops, radius, system
 from studies.papers.resilient_velocity.ink import sheet
-from studies.report.colours import BLUE, GREEN, GREY, ORANGE, RED
+from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, RED
 from studies.study import Cell, Drawing, PartResult, Scope, Table
 from synthesis.lmi.result import Verdict
 

@@ -17,7 +17,7 @@ from studies.beyond.drop_tolerance.observers import NAMES, Observer, observer
 from studies.beyond.drop_tolerance.population import START, evolve
 from studies.beyond.drop_tolerance.trial import MISS
 from studies.papers.resilient_velocity.ink import sheet
-from studies.report.colours import BLUE, GREY, RED
+from studies.plots.colours import BLUE, GREY, RED
 from studies.study import Drawing, PartResult, Scope, Table
 from synthesis.lmi.result import Verdict
 from synthesis.polynomials.matrix import FloatArray

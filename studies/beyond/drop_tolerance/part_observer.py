@@ -18,7 +18,7 @@ from studies.beyond.drop_tolerance.prediction import (
 from studies.beyond.drop_tolerance.questions import HIGH_DROP
 from studies.beyond.drop_tolerance.trial import MISS, Row, Trial, run_trial
 from studies.papers.resilient_velocity.ink import SPEED_LABEL, sheet
-from studies.report.colours import BLUE, GREEN, GREY, RED
+from studies.plots.colours import BLUE, GREEN, GREY, RED
 from studies.study import Cell, Drawing, PartResult, Scope, Table
 
 

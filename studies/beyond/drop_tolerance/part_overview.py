@@ -8,7 +8,7 @@ from analysis.dropout_schedule import frozen_critical_probability
 from studies.beyond.drop_tolerance.observers import NAMES, observer
 from studies.beyond.drop_tolerance.prediction import boundary, critical, critical_bursts, harmless_from
 from studies.papers.resilient_velocity.ink import SPEED_LABEL, sheet
-from studies.report.colours import BLUE, GREEN, ORANGE, PURPLE
+from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE
 from studies.study import Cell, Drawing, PartResult, Scope, Table
 
 LOSS_RATES = (0.1, 0.2, 0.3, 0.5)

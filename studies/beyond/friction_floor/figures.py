@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from studies.beyond.friction_floor.launches import Launch
 from studies.beyond.friction_floor.runtime import WHEEL_SPEEDS, Missed
 from studies.beyond.friction_floor.theory import missed_share
-from studies.report.colours import FUSION, INTEGRATED_ACCELERATION, MEAN_WHEEL_SPEED, OWN_OBSERVERS, ROADS
+from studies.plots.colours import FUSION, INTEGRATED_ACCELERATION, MEAN_WHEEL_SPEED, OWN_OBSERVERS, ROADS
 from studies.study import Drawing
 from synthesis.models.parameter_set import load_parameter_set
 

@@ -12,7 +12,7 @@ from studies.beyond.implementability.break_rates import BreakCurve, break_curve
 from studies.beyond.implementability.designs import WHEEL_SPEED, Design, printed_designs, shipped_designs
 from studies.beyond.implementability.simulate import RUNTIME, STEPS, launch, run
 from studies.beyond.implementability.updates import BREAKABLE, LASTING, UPDATES, exact_closed_loop, spectral_radius
-from studies.report.colours import BLUE, GREEN, ORANGE, PURPLE, RED
+from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE, RED
 from studies.study import Drawing
 
 PAPER_RATE = 200.0  # Hz, P1 and P3

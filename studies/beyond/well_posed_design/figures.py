@@ -16,7 +16,7 @@ from studies.beyond.well_posed_design.cases import Case
 from studies.beyond.well_posed_design.gain_plane import gain_plane
 from studies.beyond.well_posed_design.literal import Approach, explicit_family
 from studies.beyond.well_posed_design.sweeps import Sweep
-from studies.report.colours import BLUE, GREEN, ORANGE, PURPLE, RED
+from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE, RED
 from studies.study import Drawing
 
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)

@@ -18,8 +18,8 @@ from studies.papers.corner_estimation.inputs import (
     printed_gains,
 )
 from studies.papers.corner_estimation.kalman import fitted, schedule
+from studies.plots.colours import BLUE, CURVES, GREEN, GREY, ORANGE, PRINTED_BAND, RED
 from studies.report.canvas import DASHES, canvas, grid, label, legend
-from studies.report.colours import BLUE, CURVES, GREEN, GREY, ORANGE, PRINTED_BAND, RED
 from studies.study import Drawing
 from synthesis.well_posedness import well_posedness
 

@@ -11,8 +11,8 @@ from studies.papers.corner_estimation.claims_filter import SIZES, STEER, determi
 from studies.papers.corner_estimation.claims_forces import DISTURBANCE_RATE, STEP, force_errors
 from studies.papers.corner_estimation.inputs import FORCE_GAINS, parameters
 from studies.papers.corner_estimation.sigma_points import weights
+from studies.plots.colours import BLUE, CURVES, GREY, RED
 from studies.report.canvas import DASHES, canvas, grid, label, legend
-from studies.report.colours import BLUE, CURVES, GREY, RED
 from studies.study import Drawing
 
 

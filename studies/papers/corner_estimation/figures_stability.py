@@ -18,8 +18,8 @@ from studies.papers.corner_estimation.inputs import (
     printed_gains,
 )
 from studies.papers.corner_estimation.lyapunov import Reading, certificate
+from studies.plots.colours import BLUE, FORBIDDEN, GREEN, GREY, ORANGE, RED
 from studies.report.canvas import DASHES, canvas, grid, label, legend
-from studies.report.colours import BLUE, FORBIDDEN, GREEN, GREY, ORANGE, RED
 from studies.study import Drawing
 from synthesis.models.catalogue.corner import Direction
 from synthesis.polynomials.matrix import FloatArray

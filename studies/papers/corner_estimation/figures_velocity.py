@@ -16,8 +16,8 @@ from studies.papers.corner_estimation.inputs import (
     printed_numbers,
     printed_value,
 )
+from studies.plots.colours import BLUE, GREY, ORANGE, RED
 from studies.report.canvas import DASHES, canvas, grid, label, legend
-from studies.report.colours import BLUE, GREY, ORANGE, RED
 from studies.study import Drawing
 from synthesis.models.catalogue.corner import Direction
 from synthesis.polynomials.matrix import FloatArray

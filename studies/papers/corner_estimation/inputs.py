@@ -8,7 +8,7 @@ from importlib import resources
 from typing import Any
 
 from studies.claim import JsonValue
-from studies.papers.claims_file import published_claims
+from studies.papers.published import published_claims
 from synthesis.errors import SpecError
 from synthesis.models.catalogue.corner import Direction, corner_velocity_model
 from synthesis.models.lpv import LpvModel

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 
 from studies.claim import Claim, ClaimFunction
-from studies.papers.claims_file import computed_claims
 from studies.papers.corner_estimation import (
     claims_accuracy,
     claims_conditioning,
@@ -30,6 +29,7 @@ from studies.papers.corner_estimation import (
 from studies.papers.corner_estimation.hinf import POINTS
 from studies.papers.corner_estimation.inputs import PACKAGE
 from studies.papers.parameter_table import parameter_part
+from studies.papers.published import computed_claims
 from studies.study import Part, PartResult, Scope, Study
 
 CLAIMS: dict[str, ClaimFunction] = {

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from studies.papers.ekf_ukf_lateral.observability import sight, substitute_car
 from studies.papers.ekf_ukf_lateral.twins import twins
-from studies.report.colours import BLUE, GREEN, PURPLE, RED
+from studies.plots.colours import BLUE, GREEN, PURPLE, RED
 from studies.study import Drawing
 
 FLOOR = 1e-17  # singular values below rounding are drawn here

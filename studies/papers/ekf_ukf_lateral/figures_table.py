@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from studies.papers.ekf_ukf_lateral.claims_table import LIMIT
 from studies.papers.ekf_ukf_lateral.published_table import table_1
-from studies.report.colours import EXTENDED, RED, UNSCENTED
+from studies.plots.colours import EXTENDED, RED, UNSCENTED
 from studies.study import Drawing
 
 

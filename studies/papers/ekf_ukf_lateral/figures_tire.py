@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from estimators.sideslip import dugoff_force
 from studies.papers.ekf_ukf_lateral.equations import SPEED, single_track_poles, step_response
-from studies.report.colours import BLUE, GREEN, ORANGE, RED
+from studies.plots.colours import BLUE, GREEN, ORANGE, RED
 from studies.study import Drawing
 from synthesis.models.catalogue.four_wheel import SUBSTITUTES
 from synthesis.polynomials.matrix import FloatArray

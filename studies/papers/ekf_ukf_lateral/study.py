@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from studies.papers.claims_file import computed_claims
 from studies.papers.ekf_ukf_lateral import claims_equations, claims_observability, claims_table, experiments
 from studies.papers.ekf_ukf_lateral.figures_observability import rank_map, twin_motions
 from studies.papers.ekf_ukf_lateral.figures_table import printed_errors
 from studies.papers.ekf_ukf_lateral.figures_tire import dugoff_curves, sign_of_the_force
 from studies.papers.ekf_ukf_lateral.tables_observability import rank_table
 from studies.papers.ekf_ukf_lateral.tables_printed import output_table, printed_table
+from studies.papers.published import computed_claims
 from studies.study import Part, PartResult, Scope, Study
 
 PACKAGE = "studies.papers.ekf_ukf_lateral"

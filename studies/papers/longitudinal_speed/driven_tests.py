@@ -13,8 +13,8 @@ from studies.experiments.play import run_of
 from studies.papers.longitudinal_speed.figures_observability import gramian_rank
 from studies.papers.longitudinal_speed.inputs import WheelRecord, printed_value, sample_time, speed_model
 from studies.papers.longitudinal_speed.unknown_start import both_tests
+from studies.plots.colours import CURVES
 from studies.report.canvas import DASHES, canvas, label, legend
-from studies.report.colours import CURVES
 from studies.study import Cell, Drawing, PartResult, Scope, Table
 from studies.truth import Truth
 

@@ -12,8 +12,8 @@ from studies.papers.longitudinal_speed.claims_slip import LOWER, RATE, UPPER, VA
 from studies.papers.longitudinal_speed.covariance import MODES, steady_filter
 from studies.papers.longitudinal_speed.inputs import printed_numbers, printed_value, sample_time
 from studies.papers.longitudinal_speed.unknown_start import STRUCTURES
+from studies.plots.colours import BLUE, CURVES, GREY, ORANGE, RED
 from studies.report.canvas import DASHES, canvas, label, legend
-from studies.report.colours import BLUE, CURVES, GREY, ORANGE, RED
 from studies.study import Drawing
 
 

@@ -19,8 +19,8 @@ from studies.papers.longitudinal_speed.inputs import (
     slalom,
 )
 from studies.papers.longitudinal_speed.unknown_start import RAMP, SPEEDS, both_tests, two_states
+from studies.plots.colours import BLUE, CURVES, GREEN, GREY, ORANGE, PURPLE, RED
 from studies.report.canvas import DASHES, canvas, label, legend
-from studies.report.colours import BLUE, CURVES, GREEN, GREY, ORANGE, PURPLE, RED
 from studies.study import Drawing
 from synthesis.polynomials.matrix import FloatArray
 

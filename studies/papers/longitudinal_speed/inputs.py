@@ -12,7 +12,7 @@ import numpy as np
 
 from analysis.gramians import SampledSequence, sampled_sequence
 from studies.claim import JsonValue
-from studies.papers.claims_file import published_claims
+from studies.papers.published import published_claims
 from synthesis.models.catalogue.longitudinal_speed import longitudinal_speed_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set

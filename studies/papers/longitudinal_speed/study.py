@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 
 from studies.claim import Claim, ClaimFunction
-from studies.papers.claims_file import computed_claims
 from studies.papers.longitudinal_speed import (
     claims_accuracy,
     claims_appendix,
@@ -21,6 +20,7 @@ from studies.papers.longitudinal_speed import (
 )
 from studies.papers.longitudinal_speed.inputs import PACKAGE
 from studies.papers.parameter_table import parameter_part
+from studies.papers.published import computed_claims
 from studies.study import Part, PartResult, Scope, Study
 
 CLAIMS: dict[str, ClaimFunction] = {

@@ -14,8 +14,8 @@ from studies.experiments.play import believed, run_of
 from studies.papers.resilient_velocity.compliance_trial import INSIDE, PRINTED_WAY, WITHOUT, ComplianceTrial
 from studies.papers.resilient_velocity.ink import sheet
 from studies.papers.resilient_velocity.setting import DIRECTIONS
+from studies.plots.colours import BLUE, GREY, ORANGE, RED
 from studies.report.canvas import legend
-from studies.report.colours import BLUE, GREY, ORANGE, RED
 from studies.study import Drawing
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from studies.papers.resilient_velocity.claims_example3 import PRINTED_RADIUS, tu
 from studies.papers.resilient_velocity.drops import critical, harmless_from, radius
 from studies.papers.resilient_velocity.ink import COLOUR, SERIES, SPEED_LABEL, sheet
 from studies.papers.resilient_velocity.setting import DIRECTIONS, HIGHEST_SPEED, PRINTED, Setting
-from studies.report.colours import GREY, ORANGE
+from studies.plots.colours import GREY, ORANGE
 from studies.study import Drawing
 
 SPEEDS = np.linspace(0.0, HIGHEST_SPEED, 561)

@@ -8,7 +8,7 @@ from studies.papers.resilient_velocity.claims_norms import AXES, SPEEDS, floor, 
 from studies.papers.resilient_velocity.exact_norms import norm_crosses_one
 from studies.papers.resilient_velocity.ink import SPEED_LABEL, sheet
 from studies.papers.resilient_velocity.setting import DIRECTIONS, HIGHEST_SPEED, PRINTED, Setting
-from studies.report.colours import BLUE, GREY, RED
+from studies.plots.colours import BLUE, GREY, RED
 from studies.study import Drawing
 
 

@@ -12,7 +12,7 @@ from analysis.sensitivity import OneAtATime
 from studies.papers.resilient_velocity.deviations import FACTORS, margin_deviations, norm_deviations
 from studies.papers.resilient_velocity.ink import SPEED_LABEL, sheet
 from studies.papers.resilient_velocity.setting import DIRECTIONS, HIGHEST_SPEED, PRINTED, Setting
-from studies.report.colours import BLUE, GREEN, GREY, ORANGE, RED
+from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, RED
 from studies.study import Drawing
 from synthesis.polynomials.matrix import FloatArray
 

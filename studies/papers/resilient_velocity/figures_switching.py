@@ -8,7 +8,7 @@ from studies.papers.resilient_velocity.claims_markov import STAY_NORMAL, margins
 from studies.papers.resilient_velocity.claims_switching import common_function_from, windows
 from studies.papers.resilient_velocity.ink import SERIES, SPEED_LABEL, sheet
 from studies.papers.resilient_velocity.setting import HIGHEST_SPEED, PRINTED, Setting
-from studies.report.colours import BLUE, GREY, RED
+from studies.plots.colours import BLUE, GREY, RED
 from studies.study import Drawing
 
 STAYS = np.linspace(0.0, 1.0, 101)

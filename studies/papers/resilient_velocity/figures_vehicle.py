@@ -10,7 +10,7 @@ from studies.papers.resilient_velocity.claims_suspension import oscillator, tabl
 from studies.papers.resilient_velocity.friction import SPEED, peak, steady
 from studies.papers.resilient_velocity.ink import COLOUR, SERIES, sheet
 from studies.papers.resilient_velocity.setting import DIRECTIONS, PRINTED, Setting
-from studies.report.colours import GREY
+from studies.plots.colours import GREY
 from studies.study import Drawing
 from synthesis.polynomials.matrix import FloatArray
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from studies.report.colours import BLUE, GREEN, ORANGE, PURPLE, RED
+from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE, RED
 
 SERIES: tuple[tuple[str, Any], ...] = (
     (BLUE, "-"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from studies.papers.claims_file import computed_claims
+from studies.papers.published import computed_claims
 from studies.papers.resilient_velocity import (
     claims_accuracy,
     claims_drops,

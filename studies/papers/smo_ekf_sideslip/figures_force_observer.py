@@ -10,7 +10,7 @@ from analysis.bounds_sliding_mode import OUTPUTS, PUBLISHED, smallest_zone_width
 from studies.papers.smo_ekf_sideslip.claims_gains import FINE
 from studies.papers.smo_ekf_sideslip.claims_sampling import NARROW, SAMPLE_TIME, WIDE, radius
 from studies.papers.smo_ekf_sideslip.error_motion import CAR, LARGEST, error_motion, split, split_tracking
-from studies.report.colours import BLUE, GREEN, ORANGE, RED
+from studies.plots.colours import BLUE, GREEN, ORANGE, RED
 from studies.study import Drawing
 
 RATE = 3.44  # 1/s, (A.12)

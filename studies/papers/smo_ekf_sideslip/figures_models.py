@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from studies.papers.smo_ekf_sideslip.axle_drive import GRAVITY, SAMPLE_TIME, AxleDrive, published_car
 from studies.papers.smo_ekf_sideslip.observer_chain import ChainRun
-from studies.report.colours import BLUE, GREEN, ORANGE, PURPLE, RED
+from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE, RED
 from studies.study import Drawing
 from synthesis.polynomials.matrix import FloatArray
 

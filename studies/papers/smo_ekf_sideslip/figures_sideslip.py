@@ -9,7 +9,7 @@ from studies.papers.smo_ekf_sideslip.axle_drive import LINEAR, SAMPLE_TIME, Axle
 from studies.papers.smo_ekf_sideslip.observer_chain import ChainRun
 from studies.papers.smo_ekf_sideslip.published_tables import MASS_SETTINGS, STIFFNESS_SETTINGS
 from studies.papers.smo_ekf_sideslip.stiffness_rank import third_singular_value
-from studies.report.colours import BLUE, GREEN, ORANGE, RED
+from studies.plots.colours import BLUE, GREEN, ORANGE, RED
 from studies.study import Drawing
 
 COLOURS = (ORANGE, BLUE, GREEN)

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from studies.claim import Claim, Finding, Verdict
-from studies.papers.claims_file import published_claims
+from studies.papers.published import published_claims
 from studies.study import Drawing, Part, PartResult, Scope, Study, Table
 from tests.unit.study_fakes.trace import computed
 

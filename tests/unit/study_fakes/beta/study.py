@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from studies.claim import Finding, judged
-from studies.papers.claims_file import computed_claims
+from studies.papers.published import computed_claims
 from studies.study import Part, PartResult, Scope, Study
 from tests.unit.study_fakes.trace import computed, present
 

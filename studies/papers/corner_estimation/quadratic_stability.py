@@ -1,0 +1,237 @@
+"""P1-aqs-feas, P1-aqs-box: are the printed gains and gain boxes affinely quadratically stable?
+
+Constant diagonal Lyapunov matrices are found and proved in closed form. For P = diag(w, 1) the inequality
+A_e'P + P A_e < 0 with A_e = [[a, b], [c, d]] says a < 0, d < 0 and (b w + c)^2 < 4 a d w: an interval of w. A constant P proves
+stability for any rate of the wheel speed, and A_e is affine in each of omega, L1 and L2 separately, so the corners of a box of
+these three decide for the whole box.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import sympy as sp
+
+from studies.claim import Finding, JsonValue, judged
+from studies.papers.corner_estimation.inputs import (
+    DESIGNS,
+    DIRECTIONS,
+    PACKAGE,
+    PAPER,
+    PARAMETERS,
+    STATED_SPEED,
+    corner_model,
+    printed_box,
+    printed_gains,
+)
+from studies.papers.topic import Topic
+from studies.plots import Box as Outline
+from studies.plots import Contours, Figure, Mark, Panel, dots
+from studies.plots.colours import BLUE, FORBIDDEN, RED
+from studies.study import PartResult, Scope, Table
+from synthesis.lmi.result import Verdict as Proof
+from synthesis.lmi.settings import LmiSettings, Relaxation
+from synthesis.models.catalogue.corner import Direction
+from synthesis.polynomials.matrix import FloatArray
+from synthesis.stability import affine_quadratic_stability
+
+TOPIC = Topic(PACKAGE)
+# Affine P with multi-convexity at the vertices, affine P on the continuum, constant P: (name, relaxation, degree).
+ROADS: tuple[tuple[str, Relaxation, int], ...] = (
+    ("with multi-convexity", "vertex", 1), ("without", "exact", 1), ("constant P", "exact", 0),
+)  # fmt: skip
+Span = tuple[float, float]
+Box = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class DiagonalProof:
+    """Weights w for which diag(w, 1) proves stability at every vertex; empty (low >= high) if there is none.
+
+    `chosen` is a round number from the middle of them, and `proved` what exact arithmetic says of it at all `vertices`.
+    """
+
+    low: float
+    high: float
+    chosen: int
+    proved: bool
+    vertices: int
+
+
+def diagonal_proof(
+    direction: Direction,
+    box: Box,
+    name: str = PARAMETERS,
+    speeds: Span = (0.0, STATED_SPEED),
+    weight: int | None = None,
+) -> DiagonalProof:
+    """Stability of all gains of `box` ((low, high) of L1 and of L2) at all wheel speeds of `speeds` and any rate.
+
+    `weight` tries a certain w instead of one from the middle.
+    """
+    matrices = exact_matrices(direction, box, name, speeds)
+    spans = [admissible(matrix) for matrix in matrices]
+    low, high = max(span[0] for span in spans), min(span[1] for span in spans)
+    if weight is None:
+        weight = _round(float(np.sqrt(low * high))) if 0.0 < low < high else 1
+    return DiagonalProof(low, high, weight, all(decreases(matrix, weight) for matrix in matrices), len(matrices))
+
+
+def exact_matrices(direction: Direction, box: Box, name: str, speeds: Span) -> list[sp.Matrix]:
+    """A_e at every vertex of wheel speed and gains, in rational numbers read from the printed decimals."""
+    model = corner_model(direction, STATED_SPEED, name)
+    values = {key: sp.Rational(str(constant.value)) for key, constant in model.constants.items()}
+    A, C = (sp.Matrix(matrix.subs(values)) for matrix in (model.A, model.C))
+    ends = [sorted({sp.Rational(str(end)) for end in span}) for span in (speeds, *box)]
+    return [(A - sp.Matrix([first, second]) * C).subs("wheel_speed", w) for w, first, second in product(*ends)]
+
+
+def admissible(A_e: sp.Matrix) -> Span:
+    """All w with diag(w, 1) A_e + A_e' diag(w, 1) < 0: roots of b^2 w^2 + (2 b c - 4 a d) w + c^2; (inf, -inf) if none."""
+    a, b, c, d = (float(x) for x in A_e)
+    if not (a < 0.0 and d < 0.0):
+        return np.inf, -np.inf
+    if b == 0.0:
+        return c * c / (4.0 * a * d), np.inf
+    middle = 2.0 * a * d - b * c
+    inside = middle * middle - (b * c) ** 2
+    if not (inside > 0.0 and middle > 0.0):
+        return np.inf, -np.inf
+    larger = (middle + np.sqrt(inside)) / (b * b)
+    return float(c * c / (b * b * larger)), float(larger)
+
+
+def decreases(A_e: sp.Matrix, weight: int) -> bool:
+    """Whether diag(weight, 1) proves stability of A_e: signs of rational minors, no rounding."""
+    P = sp.diag(weight, 1)
+    total = -(A_e.T * P + P * A_e)
+    return bool(total[0, 0] > 0 and total.det() > 0)
+
+
+def _round(value: float, digits: int = 2) -> int:
+    """To so many significant digits."""
+    step = int(10 ** max(int(np.floor(np.log10(value))) + 1 - digits, 0))
+    return round(value / step) * step
+
+
+@TOPIC.claim("P1-aqs-feas")
+def printed_gains_are_stable(gains: dict[tuple[str, Direction], tuple[float, ...]] | None = None) -> Finding:
+    """(28), (40) by LMI on three roads, and a constant diagonal P in exact arithmetic, for the gains of P1 and of P3."""
+    computed: dict[str, JsonValue] = {}
+    holds = []
+    for key in DESIGNS:
+        name, direction = key
+        given = printed_gains(direction, name) if gains is None else gains[key]
+        model, column = corner_model(direction, STATED_SPEED, name), np.array(given)[:, None]
+        verdicts = {
+            road: affine_quadratic_stability(model, column, degree, settings=LmiSettings(relaxation=relaxation)).verdict
+            for road, relaxation, degree in ROADS
+        }
+        proof = diagonal_proof(direction, tuple((gain, gain) for gain in given), name)
+        holds.append(proof.proved and all(verdict is Proof.CERTIFIED for verdict in verdicts.values()))
+        computed[f"{PAPER[name]} {direction}"] = {
+            "gains": list(given), "lmi": {road: str(verdict) for road, verdict in verdicts.items()},
+            "weights_of_diag_w_1": [proof.low, proof.high], "weight": proof.chosen, "proved_exactly": proof.proved,
+        }  # fmt: skip
+    weights = ", ".join(f"{entry['weight']:,}" for entry in computed.values())
+    reading = (
+        f"{sum(holds)} of {len(holds)} sets of printed gains (P1 and P3, both directions) are stable with P = "
+        f"diag(w, 1) that does not depend on the wheel speed, w = {weights}, proved in rational numbers on 0 to "
+        f"{STATED_SPEED:g} rad/s for any rate: plain quadratic stability holds already, the affine form and "
+        "multi-convexity are not needed."
+    )
+    return Finding(computed, judged(all(holds)), reading)
+
+
+@TOPIC.claim("P1-aqs-box")
+def printed_boxes_are_stable(boxes: dict[Direction, Box] | None = None) -> Finding:
+    """One constant P for all gains of each printed box, exact at the eight vertices of (omega, L1, L2)."""
+    computed: dict[str, JsonValue] = {}
+    for direction in DIRECTIONS:
+        box = printed_box(direction) if boxes is None else boxes[direction]
+        proof = diagonal_proof(direction, box)
+        slowest = slowest_poles(direction, *gain_grid(box, 21))
+        computed[direction] = {
+            "L1": list(box[0]), "L2": list(box[1]), "vertices": proof.vertices,
+            "weights_of_diag_w_1": [proof.low, proof.high], "weight": proof.chosen, "proved_exactly": proof.proved,
+            "slowest_pole_1_s": float(slowest.max()),
+        }  # fmt: skip
+    x, y = (computed[direction] for direction in DIRECTIONS)
+    proved = bool(x["proved_exactly"] and y["proved_exactly"])
+    reading = (
+        "A_e is affine in omega, L1 and L2 one at a time, so a constant P decides at the eight vertices. "
+        + (
+            f"P = diag({x['weight']:,}, 1) longitudinally and diag({y['weight']:,}, 1) laterally prove every gain "
+            f"of both boxes on 0 to {STATED_SPEED:g} rad/s, for any rate, in rational numbers. "
+            if proved
+            else "No constant diagonal P proves both boxes. "
+        )
+        + f"The slowest pole on a grid is {x['slowest_pole_1_s']:.3g} and {y['slowest_pole_1_s']:.3g} 1/s."
+    )
+    return Finding(computed, judged(proved), reading)
+
+
+def gain_grid(box: Box, points: int) -> tuple[FloatArray, FloatArray]:
+    """L1 and L2 over a box, each (points, points)."""
+    first, second = (np.linspace(low, high, points) for low, high in box)
+    L1, L2 = np.meshgrid(first, second)
+    return L1, L2
+
+
+def slowest_poles(direction: Direction, L1: FloatArray, L2: FloatArray, speeds: int = 91) -> FloatArray:
+    """Largest real part of the frozen poles in 1/s over all wheel speeds, for each pair of gains."""
+    numeric = corner_model(direction).on(np.linspace(0.0, STATED_SPEED, speeds))
+    gains = np.stack([L1, L2], axis=-1)[..., None, :, None]
+    return np.asarray(np.linalg.eigvals(numeric.A - gains @ numeric.C).real.max(axis=(-2, -1)))
+
+
+@TOPIC.part("quadratic-stability", "Stability of the printed gains and gain boxes", 3.0)
+def quadratic_stability(scope: Scope) -> PartResult:
+    """Both claims, every proof in a table, and the boxes over the plane of gains."""
+    claims = TOPIC.found()
+    return PartResult(claims, [proof_table(*(c.finding for c in claims))], [box_figure(41 if scope.quick else 81)])
+
+
+def proof_table(gains: Finding, boxes: Finding) -> Table:
+    """Constant diagonal P for the printed gains and for the printed boxes."""
+    rows = []
+    for name, entry in (*gains.computed.items(), *((f"box of P1, {d}", e) for d, e in boxes.computed.items())):
+        low, high = entry["weights_of_diag_w_1"]
+        rows.append([name, float(low), float(high), entry["weight"], entry["proved_exactly"]])
+    caption = (
+        "Constant Lyapunov matrices diag(w, 1) that prove stability for every wheel speed from 0 to 180 rad/s and "
+        "any rate: the interval of admissible weights w in closed form, and a round one that was checked in "
+        "rational numbers."
+    )
+    columns = ["gains", "least w [1/s^2]", "greatest w [1/s^2]", "w checked [1/s^2]", "proved exactly"]
+    return Table("diagonal-proofs", caption, columns, rows)
+
+
+def box_figure(points: int = 81) -> Figure:
+    """Slowest frozen pole over the plane of gains, with the printed boxes."""
+    panels = []
+    for direction in DIRECTIONS:
+        box, (L1, L2) = printed_box(direction), printed_gains(direction)
+        wide = tuple((low - 0.6 * (high - low), high + 0.6 * (high - low)) for low, high in box)
+        first, second = gain_grid(wide, points)
+        slowest = slowest_poles(direction, first, second, speeds=46)
+        steps = [-200.0, -100.0, -50.0, -25.0, 0.0] if direction == "longitudinal" else [-10.0, -5.0, -2.5, -1.0, 0.0]
+        marks: list[Mark] = [
+            Contours(first, second, slowest, [0.0, max(1.0, slowest.max())], FORBIDDEN, filled=True),
+            Contours(first, second, slowest, steps),
+            Outline(box[0], box[1], "printed box", BLUE, 1.8),
+            dots(L1, L2, "printed gains", RED),
+        ]
+        panels.append(Panel(marks, "L₁ [m/s]", "L₂ [m/s²]", direction, grid=False))
+    return Figure(
+        "gain-boxes",
+        f"Slowest pole in 1/s (largest real part over wheel speeds from 0 to {STATED_SPEED:g} rad/s) over the plane "
+        "of constant gains; shaded: unstable at some wheel speed. The printed boxes lie well inside the stable "
+        "region; one constant Lyapunov matrix proves each of them, exactly. P1, text after (28) and (40).",
+        "Contour maps of the slowest pole with the printed gain boxes inside the stable region.",
+        panels,
+        size=(7.2, 3.6),
+        legend="below",
+    )

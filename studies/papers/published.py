@@ -1,0 +1,45 @@
+"""What a paper prints, read once from its folder: ``claims.toml`` (every claim) and ``printed.toml`` (tables and numbers)."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from types import MappingProxyType
+from typing import Any
+
+from studies.claim import Claim, ClaimFunction, JsonValue, Published
+from synthesis.errors import SpecError
+
+
+@cache
+def published_claims(package: str) -> Mapping[str, Published]:
+    """The claims that ``package`` (a study's folder) keeps in its ``claims.toml``, by id, in the order of the file."""
+    return MappingProxyType(
+        {e["id"]: Published(**{"published": None, **e}) for e in _read(package, "claims.toml")["claims"]}
+    )
+
+
+def printed(package: str, name: str) -> JsonValue:
+    """The printed value of the claim ``name``."""
+    return published_claims(package)[name].published
+
+
+@cache
+def printed_numbers(package: str) -> Mapping[str, Any]:
+    """Printed tables and values by name, from ``printed.toml``."""
+    return MappingProxyType(_read(package, "printed.toml"))
+
+
+def _read(package: str, name: str) -> dict[str, Any]:
+    return tomllib.loads((resources.files(package) / name).read_text(encoding="utf-8"))
+
+
+def computed_claims(package: str, functions: Mapping[str, ClaimFunction]) -> list[Claim]:
+    """Compute the claims of ``functions`` (by id). Raises SpecError for an id that ``claims.toml`` does not hold."""
+    published = published_claims(package)
+    unknown = sorted(set(functions) - set(published))
+    if unknown:
+        raise SpecError(f"{package}: no published claim {', '.join(unknown)} in claims.toml")
+    return [Claim(published[name], compute()) for name, compute in functions.items()]

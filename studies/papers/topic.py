@@ -1,0 +1,58 @@
+"""One topic of a study: what it computes for claims, tables and figures stands in one file and is registered there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from studies.claim import Claim, ClaimFunction, JsonValue
+from studies.papers.published import printed, published_claims
+from studies.study import Part, PartFunction, Preparation
+from synthesis.errors import SpecError
+
+C = TypeVar("C", bound=ClaimFunction)
+P = TypeVar("P", bound=PartFunction)
+
+
+@dataclass(frozen=True)
+class Topic:
+    """Claims by id and parts in order; ``package`` is the study's folder, whose ``claims.toml`` holds what is printed."""
+
+    package: str
+    claims: dict[str, ClaimFunction] = field(default_factory=dict)
+    parts: list[Part] = field(default_factory=list)
+
+    def claim(self, name: str) -> Callable[[C], C]:
+        """Register what computes the claim ``name``: a decorator, or called with a `functools.partial`.
+
+        Raises SpecError for an id that ``claims.toml`` does not hold, or that is registered already.
+        """
+        if name not in published_claims(self.package) or name in self.claims:
+            known = "twice" if name in self.claims else "but claims.toml does not hold it"
+            raise SpecError(f"{self.package}: claim '{name}' is computed {known}")
+
+        def register(compute: C) -> C:
+            self.claims[name] = compute
+            return compute
+
+        return register
+
+    def part(
+        self, name: str, title: str, cost: float = 1.0, needs: tuple[Preparation, ...] = (), quick: bool = True
+    ) -> Callable[[P], P]:
+        """Register a part (`studies.study.Part`) as a decorator."""
+
+        def register(run: P) -> P:
+            self.parts.append(Part(name, title, run, cost, needs, quick))
+            return run
+
+        return register
+
+    def found(self, *names: str) -> list[Claim]:
+        """The claims ``names`` of this topic, all of them without a name, computed now."""
+        return [Claim(published_claims(self.package)[name], self.claims[name]()) for name in names or self.claims]
+
+    def printed(self, name: str) -> JsonValue:
+        """What the paper prints for the claim ``name``."""
+        return printed(self.package, name)

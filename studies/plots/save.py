@@ -1,0 +1,35 @@
+"""Figures as files: SVG and PNG, the same bytes from the same data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Sheet
+
+    from studies.plots.figure import Figure
+
+PNG_DPI = 150
+
+
+def save_figure(figure: Figure, folder: Path) -> None:
+    """Draw ``<name>.svg`` and ``<name>.png`` into ``folder``."""
+    from studies.plots.draw import draw
+
+    save_sheet(draw(figure), folder / f"{figure.name}.svg", folder / f"{figure.name}.png")
+
+
+def save_sheet(sheet: Sheet, *paths: Path) -> None:
+    """Write what is drawn to every path, in the format of its suffix."""
+    from studies.plots.draw import look
+
+    with look():
+        layout = sheet.get_layout_engine()
+        if layout is not None:  # once for all files: it takes as long as drawing
+            layout.execute(sheet)
+            sheet.set_layout_engine("none")
+        for path in paths:
+            more = {"metadata": {"Date": None}} if path.suffix == ".svg" else {"dpi": PNG_DPI}
+            sheet.savefig(path, **more)
+        sheet.clear()
