@@ -29,6 +29,7 @@ from synthesis.certificate.frozen import frozen_gain
 from synthesis.certificate.proof import Proof, prove
 from synthesis.deploy import deploy
 from synthesis.errors import GainsmithError
+from synthesis.hinf_observer import channel_matrices
 from synthesis.models.parameter_set import ParameterSet
 
 # A stored claim may be worse than a fresh one by this share: levels are searched in steps, and solvers differ.
@@ -93,7 +94,8 @@ def run_spec(name: str, out: Path, check: bool = False) -> ScheduleRun:
     parameters = spec.parameter_set(folder)
     deployment = deploy(spec.design(spec.build_model(parameters)), spec.deploy_settings())
     content = schedule_content(deployment, spec.name, spec.description, spec.resolved(parameters))
-    least = tuple(frozen_gain(deployment, channel) for channel in deployment.gains.design.channels)
+    loop, model = deployment.loop, deployment.gains.model
+    least = tuple(frozen_gain(loop, *channel_matrices(model, channel)) for channel in deployment.gains.design.channels)
     path = out / f"{spec.name}.json"
     fresh = tuple(prove(content, str(path)))
     state, message, proofs, moved = compare(path, content, fresh)

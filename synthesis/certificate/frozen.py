@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from flint import fmpq
 
 from synthesis.certificate.refute import grid
-from synthesis.hinf_observer import Channel, channel_matrices
 from synthesis.loop.observer import ObserverLoop
 from synthesis.loop.system import Region, System
 from synthesis.polynomials.enclosure import PolynomialMatrix
 from synthesis.polynomials.matrix import FloatArray
 
-if TYPE_CHECKING:
-    from synthesis.deploy import Deployment
-
 BISECTIONS = 40
 
 
-def frozen_gain(deployment: Deployment, channel: Channel) -> float:
-    """Largest gain of the channel over constant parameters and a grid of frequencies: a bound from below for the update.
+def frozen_gain(loop: ObserverLoop, d: FloatArray, z: FloatArray) -> float:
+    """Largest gain from d w to z e over constant parameters and a grid of frequencies: a bound from below for the update.
+
+    d (disturbances, w) and z (errors, states) are those of a channel (`channel_matrices`).
 
     A constant parameter is one of the admissible motions, and every frequency bounds the gain there from below. The disturbances
     are held over a sample, as in the claims.
     """
-    d, z = channel_matrices(deployment.gains.model, channel)
-    systems = _systems(deployment.loop, "discrete")
+    systems = _systems(loop, "discrete")
     if not systems:
         return 0.0
     A = np.array([_numbers(system.A) for system in systems])
