@@ -7,7 +7,8 @@ import re
 from typing import Any
 
 from studies.claim import Verdict
-from studies.study import Part, PartResult, Study
+from studies.plots.draw import draw
+from studies.study import Drawing, Part, PartResult, Study
 
 
 def check_study(study: Study) -> None:
@@ -27,8 +28,9 @@ def check_result(result: PartResult) -> None:
     """Axes carry names and units, captions say something, rows fit their columns, claims are JSON."""
     for drawing in result.drawings:
         assert len(drawing.caption) > 120 and len(drawing.alternative) > 60, drawing.name
-        drawing.figure.draw_without_rendering()
-        for axis in drawing.figure.axes:
+        sheet = drawing.figure if isinstance(drawing, Drawing) else draw(drawing)
+        sheet.draw_without_rendering()
+        for axis in sheet.axes:
             for label, wanted in ((axis.get_xlabel(), _bottom(axis)), (axis.get_ylabel(), _leftmost(axis))):
                 if wanted or label:
                     assert label, f"{drawing.name}: an axis has no name"

@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg import expm
+from scipy.optimize import brentq
 
+from studies.plots import Axis
+from studies.plots.colours import BLUE, RED
 from synthesis.models.catalogue.corner import Direction, corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
 from synthesis.polynomials.matrix import FloatArray
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-Gain: TypeAlias = tuple[float, float]
+PACKAGE = "studies.papers.resilient_velocity"
 DIRECTIONS: tuple[Direction, Direction] = ("longitudinal", "lateral")
-DISTURBANCES = ("friction", "acceleration_error")  # the two inputs of (8), (13)
-NO_GAIN: Gain = (0.0, 0.0)
 HIGHEST_SPEED = 140.0  # rad/s, the end of the axes of Figs 2 to 8
+SPEEDS = np.linspace(0.0, HIGHEST_SPEED, 141)
+FINE = np.linspace(0.0, HIGHEST_SPEED, 281)  # for curves
+SPEED_AXIS = Axis("wheel speed |ω| [rad/s]", 0.0, HIGHEST_SPEED)
+COLOUR: Mapping[Direction, str] = {"longitudinal": BLUE, "lateral": RED}
+UPDATE_NOTE = (
+    "All sampled results use the exact closed-loop update e+ = exp((A - L C) T) e at T = 5 ms while the force is "
+    "received and exp(A T) while it is lost. That is what the runtime observer does; the printed gains diverge if "
+    "the innovation is sampled and held instead."
+)
+Gain: TypeAlias = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +51,16 @@ class Setting:
         """The corner models (5), (6) and (11) over 0..140 rad/s."""
         return {d: corner_velocity_model(self.parameters, d, HIGHEST_SPEED) for d in DIRECTIONS}
 
+    @cached_property
+    def vehicle(self) -> Mapping[str, float]:
+        """The vehicle's numbers of Table I by name, SI units."""
+        return {name: quantity.value for name, quantity in self.parameters.vehicle.items()}
+
+    @property
+    def switched(self) -> tuple[Gain, Gain]:
+        """The normal and the high-slip gain of Example 2, longitudinal."""
+        return self.gains["longitudinal"], self.high_slip
+
     @property
     def transform(self) -> FloatArray:
         """T = diag(gamma, 1) of Proposition 1."""
@@ -50,7 +69,7 @@ class Setting:
     def rolling_rate(self, direction: Direction, speeds: ArrayLike) -> FloatArray:
         """a = kappa R_e |omega| in 1/s."""
         kappa = self.parameters.tire[direction].kappa.value
-        return np.asarray(kappa * self.parameters.vehicle["effective_radius"].value * np.abs(speeds))
+        return np.asarray(kappa * self.vehicle["effective_radius"] * np.abs(speeds))
 
     def plant(self, direction: Direction, speeds: ArrayLike) -> FloatArray:
         """A (g, 2, 2) of (5) at wheel speeds (g,) in rad/s."""
@@ -75,19 +94,33 @@ def _grid(speeds: ArrayLike) -> FloatArray:
     return np.atleast_1d(np.asarray(speeds, float))
 
 
+def printed_gain(parameters: ParameterSet, direction: Direction, high_slip: bool = False) -> Gain:
+    """A gain that the paper of a parameter set prints. Raises ValueError if there is none."""
+    published = parameters.tire[direction].published
+    gains = None if published is None else published.gains_high_slip if high_slip else published.gains
+    if gains is None:
+        raise ValueError(f"parameter set '{parameters.id}' has no published gains ({direction}, {high_slip = })")
+    return gains[0], gains[1]
+
+
 def printed_setting() -> Setting:
     """Table I and the gains of the road tests as P3 prints them."""
     parameters = load_parameter_set("resilient-velocity")
-    published = {d: parameters.tire[d].published for d in DIRECTIONS}
-    gains: dict[Direction, Gain] = {}
-    for direction, entry in published.items():
-        if entry is None or entry.gains is None:
-            raise ValueError(f"parameter set '{parameters.id}' has no published gains ({direction})")
-        gains[direction] = (entry.gains[0], entry.gains[1])
-    high = published["longitudinal"]
-    if high is None or high.gains_high_slip is None:
-        raise ValueError(f"parameter set '{parameters.id}' has no published gains for high slip")
-    return Setting(parameters, gains, (high.gains_high_slip[0], high.gains_high_slip[1]))
+    gains = {d: printed_gain(parameters, d) for d in DIRECTIONS}
+    return Setting(parameters, gains, printed_gain(parameters, "longitudinal", high_slip=True))
 
 
 PRINTED = printed_setting()
+
+
+def crossing(
+    function: Callable[[float], float], level: float = 0.0, grid: ArrayLike = (0.0, HIGHEST_SPEED)
+) -> float | None:
+    """The first wheel speed in rad/s at which a function of it passes ``level``; None without a change of sign on the grid."""
+    speeds = np.asarray(grid, float)
+    values = np.array([function(float(w)) for w in speeds]) - level
+    change = np.flatnonzero(values[1:] * values[:-1] < 0.0)
+    if not len(change):
+        return None
+    low, high = speeds[change[0] : change[0] + 2]
+    return float(brentq(lambda w: function(w) - level, low, high, xtol=1e-10))
