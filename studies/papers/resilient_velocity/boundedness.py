@@ -108,7 +108,7 @@ def best_transform(setting: Setting = PRINTED) -> Finding:
 
 @TOPIC.claim("P3-prop1-young")
 def young(setting: Setting = PRINTED) -> Finding:
-    """The quadratic forms in |e| and |B rho| that (16) needs to be positive semidefinite, exactly.
+    """The quadratic forms in |e| and |B rho| that (16) needs to be positive semidefinite, exactly (P3 notes 4).
 
     right - left of e'B rho <= p |e|^2 + q |B rho|^2 is the form [[p, -1/2], [-1/2, q]]; B rho = epsilon e makes it tight.
     """

@@ -214,8 +214,8 @@ def wheel_history(name: str, trial: ComplianceTrial, test: Shown) -> Figure:
         centre = surface - trial.slip[:, row, samples, corner, 0]
         low, high = np.percentile(centre, BAND, axis=0)
         marks: list[Mark] = [
-            Line(time, surface[0], "$R_e\\omega$", GREY, width=0.8),
             Line(time, truth["wheel_vx"][row, samples, corner], "truth", TRUTH, width=2.0, alpha=0.8),
+            Line(time, surface[0], "$R_e\\omega$", GREY, width=0.8),
             Band(time, low, high, color=RED, alpha=0.18),
             Line(time, centre[0], "$R_e\\omega-\\hat V_{rx}$", RED, width=0.9),
         ]

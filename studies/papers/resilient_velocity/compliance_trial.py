@@ -1,6 +1,6 @@
 """The corner observers with and without the suspension compliance (14), (15), on truth vehicles with compliant suspensions.
 
-psi' is the velocity of the wheel against the body: V_xt of the wheel centre is that of the body plus psi'.
+psi' is the velocity of the wheel against the body: V_xt of the wheel centre is that of the body plus psi'. P3 notes 3, 9 item 11.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Remark 1, (10): what becomes of the printed continuous gains under the discretisations that the text allows."""
+"""Remark 1, (10): what becomes of the printed continuous gains under the discretisations that it allows (P3 notes 9 item 10)."""
 
 from __future__ import annotations
 
@@ -77,22 +77,18 @@ def zero_order_hold_reading(setting: Setting = PRINTED) -> Finding:
 
 @TOPIC.part("sampling", "What the printed gains need from the discretisation", 0.3)
 def sampling(_: Scope) -> PartResult:
-    """Readings of (10)."""
-    return PartResult(TOPIC.found(), [sampling_table()])
-
-
-def sampling_table(setting: Setting = PRINTED) -> Table:
-    """The readings of (10) over the sample rate."""
+    """The readings of (10), and all of them over the sample rate."""
     pairs = [(d, name) for d in DIRECTIONS for name in READINGS]
 
     def largest(rate: float, direction: Direction, name: str) -> float:
-        model, gain = setting.models[direction], setting.gains[direction]
+        model, gain = PRINTED.models[direction], PRINTED.gains[direction]
         return float(radii(model, gain, 1.0 / rate, READINGS[name], SPEEDS[::2]).max())
 
-    return Table(
+    table = Table(
         "sampling",
         "Largest spectral radius of the error update over 0 to 140 rad/s with the printed gains, for four readings "
         "of the discretisation; above 1 the observer diverges.",
         ("sample rate [Hz]", *(f"{d}, {name.replace('_', ' ')} [1]" for d, name in pairs)),
         [(rate, *(largest(rate, *pair) for pair in pairs)) for rate in SAMPLE_RATES],
     )
+    return PartResult(TOPIC.found(), [table])

@@ -198,24 +198,19 @@ def detectable_mixture(setting: Setting = PRINTED) -> Finding:
 
 @TOPIC.part("drops", "Lost force measurements (Figs 7 and 8)", 1.4)
 def figs_7_and_8(_: Scope) -> PartResult:
-    """Lost measurements: Figs 7 and 8, Remark 4."""
-    figures = [critical_figure(), radius_figure(), map_figure()]
-    return PartResult(TOPIC.found(), [drop_table()], figures, [UPDATE_NOTE])
-
-
-def drop_table(setting: Setting = PRINTED) -> Table:
-    """Figs 7 and 8 in numbers."""
-    columns, names = [TABLE_SPEEDS], []
+    """Lost measurements: Figs 7 and 8, drawn and in numbers, and Remark 4."""
+    columns, names, p = [TABLE_SPEEDS], [], PRINTED.example_drop
     for d in DIRECTIONS:
-        columns += [critical(setting, d, TABLE_SPEEDS), radius(setting, d, TABLE_SPEEDS, setting.example_drop)]
-        names += [f"{d}, critical drop probability [1]", f"{d}, radius at p = {setting.example_drop:g} [1]"]
-    return Table(
+        columns += [critical(PRINTED, d, TABLE_SPEEDS), radius(PRINTED, d, TABLE_SPEEDS, p)]
+        names += [f"{d}, critical drop probability [1]", f"{d}, radius at p = {p:g} [1]"]
+    table = Table(
         "drops",
         "Critical drop probability of the force measurement and second-moment radius at the drop probability of "
         "Example 3, exact update at 200 Hz, printed gains.",
         ("wheel speed [rad/s]", *names),
         np.stack(columns, axis=1).tolist(),
     )
+    return PartResult(TOPIC.found(), [table], [critical_figure(), radius_figure(), map_figure()], [UPDATE_NOTE])
 
 
 def critical_figure(setting: Setting = PRINTED) -> Figure:
@@ -297,5 +292,4 @@ def map_figure(setting: Setting = PRINTED) -> Figure:
         panels,
         size=(9.2, 4.0),
         share_y="all",
-        widths=(1.0, 1.2),
     )

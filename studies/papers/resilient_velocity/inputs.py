@@ -71,12 +71,8 @@ class Setting:
         kappa = self.parameters.tire[direction].kappa.value
         return np.asarray(kappa * self.vehicle["effective_radius"] * np.abs(speeds))
 
-    def plant(self, direction: Direction, speeds: ArrayLike) -> FloatArray:
-        """A (g, 2, 2) of (5) at wheel speeds (g,) in rad/s."""
-        return self.models[direction].on(_grid(speeds)).A
-
     def error(self, direction: Direction, speeds: ArrayLike, gain: Gain | None = None) -> tuple[FloatArray, FloatArray]:
-        """A_e (g, 2, 2) and B_e (g, 2, 2) of (8), (13); the printed gain unless another is given."""
+        """A_e (g, 2, 2) and B_e (g, 2, 2) of (8), (13) at wheel speeds (g,) in rad/s, with the printed or another gain."""
         L = np.reshape(self.gains[direction] if gain is None else gain, (2, 1))
         A_e, B_e = self.models[direction].on(_grid(speeds)).error_dynamics(L)
         return A_e, np.asarray(B_e[..., :2])
@@ -87,7 +83,7 @@ class Setting:
 
     def dropped(self, direction: Direction, speeds: ArrayLike) -> FloatArray:
         """exp(A T_s) (g, 2, 2): the update without the force, (24)."""
-        return np.asarray(expm(self.sample_time * self.plant(direction, speeds)))
+        return np.asarray(expm(self.sample_time * self.models[direction].on(_grid(speeds)).A))
 
 
 def _grid(speeds: ArrayLike) -> FloatArray:

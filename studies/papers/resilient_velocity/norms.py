@@ -144,23 +144,19 @@ def any_gain(setting: Setting = PRINTED) -> Finding:
 
 @TOPIC.part("norms", "H∞ norms over the wheel speed (Fig. 2)", 1.2)
 def fig_2(_: Scope) -> PartResult:
-    """Fig. 2 and its floor."""
-    return PartResult(TOPIC.found(), [norm_table()], [norm_figure()])
-
-
-def norm_table(setting: Setting = PRINTED) -> Table:
-    """Both norms and the floor."""
+    """Fig. 2 and its floor, drawn and in numbers."""
     speeds, columns, names = SPEEDS[::20], [SPEEDS[::20]], []
     for d in DIRECTIONS:
-        columns += [norms(setting, d, speeds), norms(setting, d, speeds, "friction"), floor(setting, d, speeds)]
+        columns += [norms(PRINTED, d, speeds), norms(PRINTED, d, speeds, "friction"), floor(PRINTED, d, speeds)]
         names += [f"{d}, {what} [1]" for what in ("both disturbances", "friction only", "floor of any gain")]
-    return Table(
+    table = Table(
         "norms",
         "H-infinity norm of the error dynamics with the printed gains: from both disturbances of (8), (13) to both "
         "errors, from friction alone, and the floor that no gain can lower.",
         ("wheel speed [rad/s]", *names),
         np.stack(columns, axis=1).tolist(),
     )
+    return PartResult(TOPIC.found(), [table], [norm_figure()])
 
 
 def norm_figure(setting: Setting = PRINTED) -> Figure:

@@ -9,7 +9,6 @@ from studies.papers.resilient_velocity import (
     example_3,
     experiments,
     norms,
-    observability,
     sensitivity,
     switching,
     tire,
@@ -17,7 +16,7 @@ from studies.papers.resilient_velocity import (
 from studies.study import Study
 
 TOPICS = (
-    boundedness, norms, sensitivity, observability, switching, drops, example_3, discretisation, tire, experiments,
+    boundedness, norms, sensitivity, switching, drops, example_3, discretisation, tire, experiments,
 )  # fmt: skip
 STUDY = Study(
     id="resilient-velocity",

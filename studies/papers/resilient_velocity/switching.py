@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from flint import fmpq, fmpq_mat
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from analysis.exact import Rational, rationals
 from analysis.markov import MarkovJumpSystem, second_moment_operator
@@ -34,6 +34,7 @@ from synthesis.lmi.result import Verdict as Proof
 from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
+Tenths = NDArray[np.int64]
 PROVED = (0.0, 20.0, 36.0, 38.0, 80.0, 140.0)  # rad/s, where a common quadratic function is decided in exact arithmetic
 HALF_DIGIT = 5e-5
 SHOWN = (8.0, 9.0, 10.0, 40.0)
@@ -43,10 +44,7 @@ CHAIN_SPEEDS = np.array([1.0, 20.0, 40.0, 80.0, 140.0])
 KRON_SPEED = 10.0  # rad/s, of the examples on the orientation of (22)
 NO_GAIN: Gain = (0.0, 0.0)
 THIRD_GAIN: Gain = (0.68, 183.1)  # the longitudinal gain that P1 prints, as a third mode
-TWO, CYCLIC = (
-    [[fmpq(tenths, 10) for tenths in row] for row in rows]
-    for rows in (((9, 1), (5, 5)), ((1, 8, 1), (1, 1, 8), (8, 1, 1)))
-)
+TWO, CYCLIC = np.array([[9, 1], [5, 5]]), np.array([[1, 8, 1], [1, 1, 8], [8, 1, 1]])  # P in tenths
 
 
 def both_gains(setting: Setting, speeds: ArrayLike) -> FloatArray:
@@ -197,13 +195,13 @@ def orientation(setting: Setting = PRINTED) -> Finding:
     modes = [setting.sampled("longitudinal", KRON_SPEED, gain)[0] for gain in gains]
     pair = [modes[0], modes[2]]
     same_side = _polynomial(pair, TWO) == _polynomial(pair, TWO, left=False)
-    same_transposed = _polynomial(pair, TWO) == _polynomial(pair, _transposed(TWO))
-    three_differ = _polynomial(modes, CYCLIC) != _polynomial(modes, _transposed(CYCLIC))
+    same_transposed = _polynomial(pair, TWO) == _polynomial(pair, TWO.T)
+    three_differ = _polynomial(modes, CYCLIC) != _polynomial(modes, CYCLIC.T)
     computed = {
         "left_and_right_identical": same_side, "two_modes_P_and_transpose_identical": same_transposed,
         "three_modes_P_and_transpose_differ": three_differ,
-        "two_modes": _radius(pair, TWO), "two_modes_transposed": _radius(pair, _transposed(TWO)),
-        "three_modes": _radius(modes, CYCLIC), "three_modes_transposed": _radius(modes, _transposed(CYCLIC)),
+        "two_modes": _radius(pair, TWO), "two_modes_transposed": _radius(pair, TWO.T),
+        "three_modes": _radius(modes, CYCLIC), "three_modes_transposed": _radius(modes, CYCLIC.T),
     }  # fmt: skip
     return Finding(
         computed,
@@ -215,24 +213,19 @@ def orientation(setting: Setting = PRINTED) -> Finding:
     )
 
 
-def _radius(modes: list[FloatArray], P: list[list[Any]]) -> float:
+def _radius(modes: list[FloatArray], tenths: Tenths) -> float:
     # not through MarkovJumpSystem, which refuses a transposed matrix, as it should
-    numbers = np.array([[int(x.p) / int(x.q) for x in row] for row in P])
-    return float(spectral_radius(second_moment_operator(np.stack(modes), numbers)))
+    return float(spectral_radius(second_moment_operator(np.stack(modes), tenths / 10)))
 
 
-def _transposed(P: list[list[Any]]) -> list[list[Any]]:
-    return [list(column) for column in zip(*P, strict=True)]
-
-
-def _polynomial(modes: list[FloatArray], P: list[list[Any]], left: bool = True) -> Any:
+def _polynomial(modes: list[FloatArray], tenths: Tenths, left: bool = True) -> Any:
     """Characteristic polynomial of (P' x I) diag(S(A_i)), or with the factors swapped, in exact rationals."""
     m, S = len(modes), [rationals(A) for A in lifted(np.stack(modes))]
     d = S[0].nrows()
 
     def entry(i: int, j: int, r: int, c: int) -> Any:
-        # (P' x I) D has the block P[j][i] S_j in place (i, j), D (P' x I) the block S_i P[j][i].
-        return P[j][i] * (S[j] if left else S[i])[r, c]
+        # (P' x I) D has the block P_ji S_j in place (i, j), D (P' x I) the block S_i P_ji.
+        return fmpq(int(tenths[j, i]), 10) * (S[j] if left else S[i])[r, c]
 
     matrix: Rational = fmpq_mat(
         m * d, m * d, [entry(i, j, r, c) for i in range(m) for r in range(d) for j in range(m) for c in range(d)]
@@ -242,30 +235,27 @@ def _polynomial(modes: list[FloatArray], P: list[list[Any]], left: bool = True) 
 
 @TOPIC.part("markov", "Switching by a Markov chain (Fig. 6)", 0.2)
 def by_chain(_: Scope) -> PartResult:
-    """Fig. 6 and (22)."""
-    return PartResult(TOPIC.found("P3-fig6", "P3-kron"), [chain_table()], [markov_figure()])
-
-
-def chain_table(setting: Setting = PRINTED) -> Table:
-    """Fig. 6 in numbers."""
-    return Table(
+    """Fig. 6, drawn and in numbers, and (22)."""
+    table = Table(
         "markov-margins",
         "Margin 1 - rho of mean-square stability with the transition matrix (23): rows by the probability of "
         "staying in high slip, columns by wheel speed.",
         ("probability of staying [1]", *(f"{w:g} rad/s" for w in CHAIN_SPEEDS)),
-        np.column_stack([STAYS, margins(setting, STAYS, CHAIN_SPEEDS)]).tolist(),
+        np.column_stack([STAYS, margins(PRINTED, STAYS, CHAIN_SPEEDS)]).tolist(),
     )
+    return PartResult(TOPIC.found("P3-fig6", "P3-kron"), [table], [markov_figure()])
 
 
 def markov_figure(setting: Setting = PRINTED) -> Figure:
     """Margin over the stay probability, and what is left of it beside 1 minus that probability."""
     stays = np.linspace(0.0, 1.0, 101)
     found, rest = margins(setting, stays, CHAIN_SPEEDS), 1.0 - stays
-    left: list[Mark] = [Line(stays, rest, "1 − γ̄", GREY, width=0.8)]
+    left: list[Mark] = []
     right: list[Mark] = [ZERO]
     for column, speed, colour, dash in zip(found.T, CHAIN_SPEEDS, CURVES, DASHES, strict=False):
         left.append(Line(stays, column, f"{speed:g} rad/s", colour, dash))
         right.append(Line(stays, column - rest, "", colour, dash))
+    left.append(Line(stays, rest, "1 − γ̄", GREY, width=0.8))
     x, y = Axis("probability γ̄ of staying in high slip [1]", 0.0, 1.0), Axis("margin 1 − ρ [1]", 0.0, 1.0)
     return Figure(
         "fig-6-markov-margin",
