@@ -64,12 +64,8 @@ def compliance_part(name: str, tests: Sequence[Shown], scope: Scope, tire: str =
     forces, measures = residual_table(f"{name}-forces", trial, tests)
     figures = [residual_history(f"{name}-{test.manoeuvre}", trial, test) for test in tests]
     figures += [wheel_history(f"wheels-{test.manoeuvre}", trial, test) for test in tests if test.direction == 0]
-    return PartResult(
-        tables=[forces, _velocity_table(f"{name}-velocities", trial, tests)],
-        drawings=figures,
-        notes=[_note(forces)],
-        measures=measures,
-    )
+    velocities = _velocity_table(f"{name}-velocities", trial, tests)
+    return PartResult((), [forces, velocities], figures, [_note(forces)], measures)
 
 
 def hard_traction(trial: ComplianceTrial, test: Shown) -> tuple[int, npt.NDArray[np.bool_]]:
@@ -83,8 +79,7 @@ def hard_traction(trial: ComplianceTrial, test: Shown) -> tuple[int, npt.NDArray
 def residual_table(name: str, trial: ComplianceTrial, tests: Sequence[Shown]) -> tuple[Table, dict[str, float]]:
     """Measured minus calculated F/F_z by corner and way, and how the two ways with compliance compare draw by draw."""
     rows: list[list[Cell]] = []
-    measures: dict[str, float] = {}
-    truth = trial.drawn.truth
+    measures, truth = dict[str, float](), trial.drawn.truth
     for test in tests:
         row, hard = hard_traction(trial, test)
         for corner in test.corners:
@@ -95,15 +90,13 @@ def residual_table(name: str, trial: ComplianceTrial, tests: Sequence[Shown]) ->
             error = {way: 100.0 * _rms(trial.residual[way][each]) / peak for way in WAYS}
             compliance = trial.true_compliance[each[1:]]
             changes = [known_spread(error[way] - error[WITHOUT]) for way in (PRINTED_WAY, INSIDE)]
-            rows.append(
-                [
-                    test.title, f"{DIRECTIONS[test.direction]}, {CORNERS[corner]}", round(peak, 3), test.statement,
-                    *(known_spread(error[way]).text() for way in WAYS),
-                    *(cell for change in changes for cell in (change.text(), change.high < 0.0)),
-                    round(float(_rms(compliance)), 4),
-                    round(float(_rms(trial.compliance[each] - compliance).mean()), 4),
-                ]
-            )  # fmt: skip
+            missed = _rms(trial.compliance[each] - compliance).mean()
+            rows.append([
+                test.title, f"{DIRECTIONS[test.direction]}, {CORNERS[corner]}", round(peak, 3), test.statement,
+                *(known_spread(error[way]).text() for way in WAYS),
+                *(cell for change in changes for cell in (change.text(), change.high < 0.0)),
+                round(float(_rms(compliance)), 4), round(float(missed), 4),
+            ])  # fmt: skip
             measures |= {f"{test.manoeuvre} {CORNERS[corner]} {way}": float(error[way].mean()) for way in WAYS}
     caption = (
         "Measured minus calculated normalised force, RMS in % of the peak of F/F_z under hard traction (drive torque above "

@@ -99,14 +99,11 @@ def printed_gain(parameters: ParameterSet, direction: Direction, high_slip: bool
     return gains[0], gains[1]
 
 
-def printed_setting() -> Setting:
-    """Table I and the gains of the road tests as P3 prints them."""
-    parameters = load_parameter_set("resilient-velocity")
-    gains = {d: printed_gain(parameters, d) for d in DIRECTIONS}
-    return Setting(parameters, gains, printed_gain(parameters, "longitudinal", high_slip=True))
-
-
-PRINTED = printed_setting()
+_TABLE_1 = load_parameter_set("resilient-velocity")
+PRINTED = Setting(
+    _TABLE_1, {d: printed_gain(_TABLE_1, d) for d in DIRECTIONS}, printed_gain(_TABLE_1, "longitudinal", high_slip=True)
+)
+"""Table I and the gains of the road tests as P3 prints them."""
 
 
 def crossing(

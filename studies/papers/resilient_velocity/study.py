@@ -19,13 +19,11 @@ TOPICS = (
     boundedness, norms, sensitivity, switching, drops, example_3, discretisation, tire, experiments,
 )  # fmt: skip
 STUDY = Study(
-    id="resilient-velocity",
-    title="Resilient corner-based velocity estimation",
-    paper="P3",
-    summary=(
-        "Pirani et al.: two-state corner observers for slip velocity, their boundedness, H∞ norms and sensitivity, "
-        "switched gains, and force measurements that are lost. Its examples, claims and figures are recomputed from "
-        "Table I and the printed gains."
-    ),
-    parts=tuple(part for topic in TOPICS for part in topic.TOPIC.parts),
+    "resilient-velocity",
+    "Resilient corner-based velocity estimation",
+    "P3",
+    "Pirani et al.: two-state corner observers for slip velocity, their boundedness, H∞ norms and sensitivity, "
+    "switched gains, and force measurements that are lost. Its examples, claims and figures are recomputed from "
+    "Table I and the printed gains.",
+    tuple(part for topic in TOPICS for part in topic.TOPIC.parts),
 )

@@ -119,28 +119,24 @@ def steady_curve(setting: Setting = PRINTED) -> Finding:
 
 @TOPIC.part("vehicle", "Table I, loads, suspension and tire", 0.7)
 def vehicle_and_tire(_: Scope) -> PartResult:
-    """Table I, loads, suspension and tire."""
-    claims = [*vehicle.TOPIC.found(), *TOPIC.found()]
-    return PartResult(claims, [table_1()], [vehicle.compliance_figure(), friction_figure()])
-
-
-def table_1(setting: Setting = PRINTED) -> Table:
-    """Tire constants, vehicle and gains, with the units that the equations need."""
+    """Loads, suspension and tire; tire constants, vehicle and gains, with the units that the equations need."""
     rows: list[tuple[Cell, ...]] = []
     for d in DIRECTIONS:
-        for name, q in quantities(setting.parameters.tire[d]).items():
+        for name, q in quantities(PRINTED.parameters.tire[d]).items():
             rows.append((f"{name}, {d}", q.value, q.unit, PRINTED_UNITS.get(name, q.unit)))
-    rows += [(name.replace("_", " "), q.value, q.unit, q.unit) for name, q in setting.parameters.vehicle.items()]
-    for name, gain in (*setting.gains.items(), ("longitudinal, high slip", setting.high_slip)):
+    rows += [(name.replace("_", " "), q.value, q.unit, q.unit) for name, q in PRINTED.parameters.vehicle.items()]
+    for name, gain in (*PRINTED.gains.items(), ("longitudinal, high slip", PRINTED.high_slip)):
         for index, unit in enumerate(("m/s", "m/s^2")):
             rows.append((f"gain L{index + 1}, {name}", gain[index], unit, "not printed"))
-    return Table(
+    table = Table(
         "table-1",
         "Table I of P3 with the gains of the road tests, as every result of this study uses them. The unit of "
         "kappa is corrected: with s/m the bristle equation (1) would add unlike quantities.",
         ("quantity", "value", "unit used", "unit printed"),
         rows,
     )
+    figures = [vehicle.compliance_figure(), friction_figure()]
+    return PartResult([*vehicle.TOPIC.found(), *TOPIC.found()], [table], figures)
 
 
 def friction_figure(setting: Setting = PRINTED) -> Figure:
