@@ -19,8 +19,10 @@ from scipy.linalg import expm
 
 from studies.claim import Claim, Verdict
 from studies.papers.published import published_claims
-from studies.papers.resilient_velocity.study import PACKAGE, STUDY
-from studies.plots.draw import look
+from studies.papers.resilient_velocity.inputs import PACKAGE
+from studies.papers.resilient_velocity.study import STUDY
+from studies.plots import Figure
+from studies.plots.draw import draw
 from studies.study import QUICK
 from tests.unit.study_checks import desk_parts
 
@@ -35,8 +37,7 @@ RADIUS, STEP = "0.33", "0.005"
 @cache
 def results() -> dict[str, Any]:
     """Every part of the study, run once as a user would."""
-    with look():
-        return {part.name: part.run(QUICK) for part in desk_parts(STUDY)}
+    return {part.name: part.run(QUICK) for part in desk_parts(STUDY)}
 
 
 @cache
@@ -63,7 +64,8 @@ def test_every_figure_and_table_stands_alone() -> None:
         assert any(d.name.startswith(prefix) for d in drawings), prefix
     for drawing in drawings:
         assert len(drawing.caption) > 100 and drawing.alternative
-        labels = [text for axes in drawing.figure.axes for text in (axes.get_xlabel(), axes.get_ylabel()) if text]
+        assert isinstance(drawing, Figure)
+        labels = [text for axes in draw(drawing).axes for text in (axes.get_xlabel(), axes.get_ylabel()) if text]
         assert len(labels) >= 2 and all(text.endswith("]") for text in labels)  # a unit in every label
     for table in (t for result in results().values() for t in result.tables):
         assert table.rows and all(len(row) == len(table.columns) for row in table.rows)

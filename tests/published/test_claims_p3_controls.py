@@ -11,20 +11,18 @@ import sympy as sp
 
 from studies.claim import Verdict
 from studies.papers.resilient_velocity import (
-    claims_accuracy,
-    claims_drops,
-    claims_example1,
-    claims_example3,
-    claims_friction,
-    claims_loads,
-    claims_markov,
-    claims_norms,
-    claims_sampling,
-    claims_sensitivity,
-    claims_suspension,
-    claims_switching,
+    boundedness,
+    discretisation,
+    drops,
+    example_3,
+    experiments,
+    norms,
+    sensitivity,
+    switching,
+    tire,
+    vehicle,
 )
-from studies.papers.resilient_velocity.setting import PRINTED, Setting
+from studies.papers.resilient_velocity.inputs import PRINTED, Setting
 from studies.papers.verdicts import among_readings, derived, erratum, open_choice
 
 
@@ -48,28 +46,28 @@ def with_vehicle(**values: float) -> Setting:
 
 
 FLIPS = [
-    ("P3-ex1-eig", claims_example1.eigenvalue, with_gain((1.18, 385.0)), Verdict.NOT_REPRODUCED),
-    ("P3-ex1-eig", claims_example1.eigenvalue, with_tire("longitudinal", sigma1=1.001), Verdict.NOT_REPRODUCED),
-    ("P3-ex1-sym", claims_example1.symmetric, replace(PRINTED, example_speed=33.5293), Verdict.REPRODUCED),
-    ("P3-ex1-T", claims_example1.transformed, replace(PRINTED, example_speed=30.0), Verdict.REPRODUCED),
-    ("P3-ex1-Topt", claims_example1.best_transform, with_gain((0.1, 387.0)), Verdict.NOT_REPRODUCED),
-    ("P3-prop1-young", claims_example1.young, with_gain((-1.18, -387.0)), Verdict.NOT_REPRODUCED),
-    ("P3-fig2-x", claims_norms.longitudinal, with_tire("longitudinal", sigma2=2.0), Verdict.NOT_REPRODUCED),
-    ("P3-fig2-y", claims_norms.lateral, with_gain(lateral=(1.21, 2.0)), Verdict.NOT_REPRODUCED),
-    ("P3-fig2-nonexp", claims_norms.non_expansive, with_gain((1.18, 1e5), (1.21, 5e3)), Verdict.REPRODUCED),
-    ("P3-fig345", claims_sensitivity.small_deviations, with_gain(lateral=(1.4, 16.8)), Verdict.NOT_REPRODUCED),
-    ("P3-obs", claims_sensitivity.observability, with_tire("lateral", sigma1=0.2), Verdict.REPRODUCED),
-    ("P3-20", claims_switching.common_decay, replace(PRINTED, high_slip=(1.18, 380.0)), Verdict.REPRODUCED),
-    ("P3-ex2-arb", claims_switching.arbitrary_switching, replace(PRINTED, high_slip=(0.22, 1.0)), Verdict.NOT_REPRODUCED),
-    ("P3-fig6", claims_markov.markov_margin, replace(PRINTED, high_slip=(-0.22, -0.1)), Verdict.NOT_REPRODUCED),
-    ("P3-kron", claims_markov.orientation, with_gain((0.0, 0.0)), Verdict.NOT_REPRODUCED),
-    ("P3-ex3", claims_example3.twenty_percent, replace(PRINTED, example_drop=0.8), Verdict.UNDER_SPECIFIED),
-    ("P3-ex3-arb", claims_example3.any_pattern, with_gain((0.3, 1.0)), Verdict.REPRODUCED),
-    ("P3-pcr", claims_drops.critical_probability, replace(PRINTED, example_drop=0.6), Verdict.NOT_REPRODUCED),
-    ("P3-pcr", claims_drops.critical_probability, with_gain((-1.18, -387.0)), Verdict.NOT_REPRODUCED),
-    ("P3-rem4", claims_drops.detectable_mixture, with_gain((0.3, 387.0)), Verdict.NOT_REPRODUCED),
-    ("P3-zoh", claims_sampling.zero_order_hold_reading, replace(PRINTED, sample_time=1e-4), Verdict.REPRODUCED),
-    ("P3-susp", claims_suspension.modes, with_vehicle(suspension_damping=3e4), Verdict.NOT_REPRODUCED),
+    ("P3-ex1-eig", boundedness.eigenvalue, with_gain((1.18, 385.0)), Verdict.NOT_REPRODUCED),
+    ("P3-ex1-eig", boundedness.eigenvalue, with_tire("longitudinal", sigma1=1.001), Verdict.NOT_REPRODUCED),
+    ("P3-ex1-sym", boundedness.symmetric, replace(PRINTED, example_speed=33.5293), Verdict.REPRODUCED),
+    ("P3-ex1-T", boundedness.transformed, replace(PRINTED, example_speed=30.0), Verdict.REPRODUCED),
+    ("P3-ex1-Topt", boundedness.best_transform, with_gain((0.1, 387.0)), Verdict.NOT_REPRODUCED),
+    ("P3-prop1-young", boundedness.young, with_gain((-1.18, -387.0)), Verdict.NOT_REPRODUCED),
+    ("P3-fig2-x", norms.longitudinal, with_tire("longitudinal", sigma2=2.0), Verdict.NOT_REPRODUCED),
+    ("P3-fig2-y", norms.lateral, with_gain(lateral=(1.21, 2.0)), Verdict.NOT_REPRODUCED),
+    ("P3-fig2-nonexp", norms.non_expansive, with_gain((1.18, 1e5), (1.21, 5e3)), Verdict.REPRODUCED),
+    ("P3-fig345", sensitivity.small_deviations, with_gain(lateral=(1.4, 16.8)), Verdict.NOT_REPRODUCED),
+    ("P3-obs", sensitivity.rank_of_observability, with_tire("lateral", sigma1=0.2), Verdict.REPRODUCED),
+    ("P3-20", switching.common_decay, replace(PRINTED, high_slip=(1.18, 380.0)), Verdict.REPRODUCED),
+    ("P3-ex2-arb", switching.arbitrary_switching, replace(PRINTED, high_slip=(0.22, 1.0)), Verdict.NOT_REPRODUCED),
+    ("P3-fig6", switching.markov_margin, replace(PRINTED, high_slip=(-0.22, -0.1)), Verdict.NOT_REPRODUCED),
+    ("P3-kron", switching.orientation, with_gain((0.0, 0.0)), Verdict.NOT_REPRODUCED),
+    ("P3-ex3", example_3.twenty_percent, replace(PRINTED, example_drop=0.8), Verdict.UNDER_SPECIFIED),
+    ("P3-ex3-arb", example_3.any_pattern, with_gain((0.3, 1.0)), Verdict.REPRODUCED),
+    ("P3-pcr", drops.critical_probability, replace(PRINTED, example_drop=0.6), Verdict.NOT_REPRODUCED),
+    ("P3-pcr", drops.critical_probability, with_gain((-1.18, -387.0)), Verdict.NOT_REPRODUCED),
+    ("P3-rem4", drops.detectable_mixture, with_gain((0.3, 387.0)), Verdict.NOT_REPRODUCED),
+    ("P3-zoh", discretisation.zero_order_hold_reading, replace(PRINTED, sample_time=1e-4), Verdict.REPRODUCED),
+    ("P3-susp", vehicle.modes, with_vehicle(suspension_damping=3e4), Verdict.NOT_REPRODUCED),
 ]  # fmt: skip
 
 
@@ -85,21 +83,21 @@ def test_a_changed_formula_changes_the_verdict(monkeypatch: pytest.MonkeyPatch) 
     """Claims without an input that could break them: break the statement instead."""
     other = with_tire("longitudinal", sigma2=3.0)
     other.__dict__["models"] = PRINTED.models  # the floor of one tire, the norm of another
-    assert claims_norms.any_gain(other).verdict is Verdict.NOT_REPRODUCED
+    assert norms.any_gain(other).verdict is Verdict.NOT_REPRODUCED
     flat = np.ones(10**6)
     flat[0] = 0.0
-    assert claims_accuracy.normalised_errors({"longitudinal": flat, "lateral": flat}).verdict is Verdict.REPRODUCED
+    assert experiments.normalised_errors({"longitudinal": flat, "lateral": flat}).verdict is Verdict.REPRODUCED
     with monkeypatch.context() as patch:
-        patch.setattr(claims_drops, "FIG8_DROPS", (0.2, 0.2))
-        assert claims_drops.radius_under_drops().verdict is Verdict.REPRODUCED
-        patch.setattr(claims_drops, "bisected", lambda A0, A1: np.full(len(A0), 0.7))
-        assert claims_drops.exact_critical_probability().verdict is Verdict.NOT_REPRODUCED
-        patch.setattr(claims_loads, "residual", lambda formula: (sp.S(0),) * 3)
-        assert claims_loads.loads().verdict is Verdict.REPRODUCED
-        patch.setattr(claims_friction, "PRINTED_UNITS", claims_friction.CORRECTED_UNITS)
-        assert claims_friction.steady_curve().verdict is Verdict.NOT_REPRODUCED
-        patch.setattr(claims_sensitivity, "CHANGE", 3.0)
-        assert claims_sensitivity.small_deviations().verdict is Verdict.REPRODUCED
+        patch.setattr(drops, "FIG8_DROPS", (0.2, 0.2))
+        assert drops.radius_under_drops().verdict is Verdict.REPRODUCED
+        patch.setattr(drops, "bisected", lambda A0, A1: np.full(len(A0), 0.7))
+        assert drops.exact_critical_probability().verdict is Verdict.NOT_REPRODUCED
+        patch.setattr(vehicle, "residual", lambda formula: (sp.S(0),) * 3)
+        assert vehicle.loads().verdict is Verdict.REPRODUCED
+        patch.setattr(tire, "PRINTED_UNITS", tire.CORRECTED_UNITS)
+        assert tire.steady_curve().verdict is Verdict.NOT_REPRODUCED
+        patch.setattr(sensitivity, "CHANGE", 3.0)
+        assert sensitivity.small_deviations().verdict is Verdict.REPRODUCED
 
 
 def test_the_comparisons_behind_the_verdicts() -> None:

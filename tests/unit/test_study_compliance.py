@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from estimators.velocity import SuspensionParameters
-from studies.papers.resilient_velocity.compliance_figures import residual_history
-from studies.papers.resilient_velocity.compliance_report import TESTS, hard_traction, residual_table
+from studies.papers.resilient_velocity.compliance_report import TESTS, hard_traction, residual_history, residual_table
 from studies.papers.resilient_velocity.compliance_trial import (
     INSIDE,
     PRINTED_WAY,
@@ -16,8 +15,8 @@ from studies.papers.resilient_velocity.compliance_trial import (
     model_force,
     run_trial,
 )
-from studies.papers.resilient_velocity.friction import steady
-from studies.papers.resilient_velocity.setting import DIRECTIONS, PRINTED
+from studies.papers.resilient_velocity.inputs import DIRECTIONS, PRINTED
+from studies.papers.resilient_velocity.tire import steady
 from studies.study import PartResult
 from studies.truth import Measured, Truth, draw, drive, load_manoeuvre, load_vehicle
 from studies.truth.sensors import PERFECT
@@ -65,7 +64,7 @@ def test_the_wheels_of_the_car_that_gives_move_as_the_model_says_and_those_of_th
     _, hard = hard_traction(trial, TESTS[0])
     wrong, true = (
         np.sqrt(np.mean(np.square(value[:, hard][:, :, GRIPPING, 0]), axis=(1, 2)))
-        for value in (trial.give[0] - trial.true_give, trial.true_give)
+        for value in (trial.compliance[0] - trial.true_compliance, trial.true_compliance)
     )
     assert wrong[0] < 0.2 * true[0]
     assert true[1] < 0.05 * true[0] and wrong[1] > 10.0 * true[1]

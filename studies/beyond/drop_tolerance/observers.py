@@ -8,7 +8,7 @@ from functools import cache
 
 from estimators import GainSchedule
 from estimators.velocity import with_constant_gain
-from studies.papers.resilient_velocity.setting import PRINTED
+from studies.papers.resilient_velocity.inputs import PRINTED
 from synthesis.models.catalogue.corner import Direction
 
 

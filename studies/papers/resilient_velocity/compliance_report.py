@@ -1,4 +1,4 @@
-"""Figs. 10 and 12 on truth vehicles: forces and velocities with and without the suspension compliance (14), (15)."""
+"""Figs 9, 10 and 12 on truth vehicles: forces and velocities with and without the suspension compliance (14), (15)."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from estimators.vehicle import CORNERS
 from estimators.velocity.slip import LEAST_SPEED
 from studies.experiments.accuracy import known_spread, nrms
 from studies.experiments.driven import LUGRE, driven
-from studies.experiments.play import measured, run_of
+from studies.experiments.panels import BAND
+from studies.experiments.play import believed, measured, run_of
 from studies.experiments.sensors import TEST_CAR
-from studies.papers.resilient_velocity.compliance_figures import residual_history, wheel_history
+from studies.papers.published import printed
 from studies.papers.resilient_velocity.compliance_trial import (
     INSIDE,
     PRINTED_WAY,
@@ -23,7 +24,9 @@ from studies.papers.resilient_velocity.compliance_trial import (
     ComplianceTrial,
     run_trial,
 )
-from studies.papers.resilient_velocity.setting import DIRECTIONS
+from studies.papers.resilient_velocity.inputs import DIRECTIONS, PACKAGE
+from studies.plots import ZERO, Axis, Band, Dash, Figure, Line, Mark, Panel
+from studies.plots.colours import BLUE, GREY, ORANGE, RED, TRUTH
 from studies.study import Cell, PartResult, Scope, Table
 
 Array = npt.NDArray[np.float64]
@@ -38,7 +41,7 @@ class Shown:
 
     manoeuvre: str
     title: str
-    said: str
+    statement: str
     corners: tuple[int, ...]
     direction: int
 
@@ -47,23 +50,22 @@ TESTS = (
     Shown("p3-launch-split", "harsh launch (Fig. 10)", "smaller with, in hard traction", (0, 1, 2, 3), 0),
     Shown("p3-acceleration-in-turn-dry", "acceleration in a turn (Fig. 12)", "curves alone", (0, 1), 1),
 )
-BOUNDS = (5.8, 7.5)
+BOUNDS: tuple[float, float] = tuple(printed(PACKAGE, "P3-nrms"))
 """%, of V_x and V_y: the text of the paper."""
+STYLE: dict[str, tuple[str, Dash, float]] = {
+    WITHOUT: (GREY, "solid", 1.8), PRINTED_WAY: (RED, "dashed", 1.0), INSIDE: (BLUE, "solid", 0.9),
+}  # fmt: skip
 
 
 def compliance_part(name: str, tests: Sequence[Shown], scope: Scope, tire: str = LUGRE) -> PartResult:
-    """Play every test with the three ways and judge forces and velocities."""
+    """Every test with the three ways: forces and velocities."""
     truth = driven(tuple(test.manoeuvre for test in tests), tire, scope, QUICK_SECONDS)
     trial = run_trial(measured(truth, range(scope.seeds), TEST_CAR))
     forces, measures = residual_table(f"{name}-forces", trial, tests)
-    drawings = [residual_history(f"{name}-{test.manoeuvre}", trial, test) for test in tests]
-    drawings += [wheel_history(f"wheels-{test.manoeuvre}", trial, test) for test in tests if test.direction == 0]
-    return PartResult(
-        tables=[forces, _velocity_table(f"{name}-velocities", trial, tests)],
-        drawings=drawings,
-        notes=[_note(trial, tests)],
-        measures=measures,
-    )
+    figures = [residual_history(f"{name}-{test.manoeuvre}", trial, test) for test in tests]
+    figures += [wheel_history(f"wheels-{test.manoeuvre}", trial, test) for test in tests if test.direction == 0]
+    velocities = _velocity_table(f"{name}-velocities", trial, tests)
+    return PartResult((), [forces, velocities], figures, [_note(forces)], measures)
 
 
 def hard_traction(trial: ComplianceTrial, test: Shown) -> tuple[int, npt.NDArray[np.bool_]]:
@@ -77,24 +79,24 @@ def hard_traction(trial: ComplianceTrial, test: Shown) -> tuple[int, npt.NDArray
 def residual_table(name: str, trial: ComplianceTrial, tests: Sequence[Shown]) -> tuple[Table, dict[str, float]]:
     """Measured minus calculated F/F_z by corner and way, and how the two ways with compliance compare draw by draw."""
     rows: list[list[Cell]] = []
-    measures: dict[str, float] = {}
+    measures, truth = dict[str, float](), trial.drawn.truth
     for test in tests:
         row, hard = hard_traction(trial, test)
         for corner in test.corners:
-            at = (row, hard, corner, test.direction)
-            peak = float(np.abs(_true_use(trial, at)).max())
-            error = {way: 100.0 * _rms(_taken(trial.residual[way], at)) / peak for way in WAYS}
-            give = trial.true_give[row][hard, corner, test.direction]
-            missed = _rms(_taken(trial.give, at) - give)
-            against = {way: known_spread(error[way] - error[WITHOUT]) for way in (PRINTED_WAY, INSIDE)}
-            rows.append(
-                [
-                    test.title, f"{DIRECTIONS[test.direction]}, {CORNERS[corner]}", round(peak, 3), test.said,
-                    *(known_spread(error[way]).text() for way in WAYS),
-                    *(cell for way in against for cell in (against[way].text(), against[way].high < 0.0)),
-                    round(float(np.sqrt(np.mean(give**2))), 4), round(float(missed.mean()), 4),
-                ]
-            )  # fmt: skip
+            at = (row, hard, corner)
+            each = (slice(None), *at, test.direction)
+            force, load = (truth[key][at] for key in (("force_x", "force_y")[test.direction], "force_z"))
+            peak = float(np.abs(force / np.maximum(load, 1.0)).max())
+            error = {way: 100.0 * _rms(trial.residual[way][each]) / peak for way in WAYS}
+            compliance = trial.true_compliance[each[1:]]
+            changes = [known_spread(error[way] - error[WITHOUT]) for way in (PRINTED_WAY, INSIDE)]
+            missed = _rms(trial.compliance[each] - compliance).mean()
+            rows.append([
+                test.title, f"{DIRECTIONS[test.direction]}, {CORNERS[corner]}", round(peak, 3), test.statement,
+                *(known_spread(error[way]).text() for way in WAYS),
+                *(cell for change in changes for cell in (change.text(), change.high < 0.0)),
+                round(float(_rms(compliance)), 4), round(float(missed), 4),
+            ])  # fmt: skip
             measures |= {f"{test.manoeuvre} {CORNERS[corner]} {way}": float(error[way].mean()) for way in WAYS}
     caption = (
         "Measured minus calculated normalised force, RMS in % of the peak of F/F_z under hard traction (drive torque above "
@@ -110,6 +112,10 @@ def residual_table(name: str, trial: ComplianceTrial, tests: Sequence[Shown]) ->
         "RMS of psi' [m/s]", "RMS error of psi' [m/s]",
     )  # fmt: skip
     return Table(name, caption, columns, rows), measures
+
+
+def _rms(error: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(error**2, axis=-1)))
 
 
 def _velocity_table(name: str, trial: ComplianceTrial, tests: Sequence[Shown]) -> Table:
@@ -140,37 +146,86 @@ def _velocity_table(name: str, trial: ComplianceTrial, tests: Sequence[Shown]) -
     )  # fmt: skip
 
 
-def _note(trial: ComplianceTrial, tests: Sequence[Shown]) -> str:
+def _note(forces: Table) -> str:
     """What the ways do, from the numbers of this run."""
-    better = dict.fromkeys((PRINTED_WAY, INSIDE), 0)
-    total = 0
-    for test in tests:
-        row, hard = hard_traction(trial, test)
-        for corner in test.corners:
-            at, total = (row, hard, corner, test.direction), total + 1
-            error = {way: _rms(_taken(trial.residual[way], at)) for way in WAYS}
-            for way in better:
-                better[way] += known_spread(error[way] - error[WITHOUT]).high < 0.0
+    printed_way, inside = (
+        sum(bool(row[forces.columns.index(f"smaller by {way}")]) for row in forces.rows)
+        for way in ("(15)", "the input")
+    )
     return (
-        f"Of {total} forces, (15) as it is printed makes {better[PRINTED_WAY]} agree better with the tire model, and psi'' in "
-        f"the observers' input {better[INSIDE]}. (15) adds psi' to a velocity that it takes to be that of the body; but "
+        f"Of {len(forces.rows)} forces, (15) as it is printed makes {printed_way} agree better with the tire model, and psi'' in "
+        f"the observers' input {inside}. (15) adds psi' to a velocity that it takes to be that of the body; but "
         "observers that are corrected by the force of the tire follow the slip of the wheel itself, so that psi' would count "
         "twice. In the input it is right for any gain."
     )
 
 
-def _taken(value: Array, at: tuple[int, npt.NDArray[np.bool_], int, int]) -> Array:
-    """(S, m) of (S, B, n, 4, 2)."""
-    row, samples, corner, direction = at
-    return value[:, row, :, corner, direction][:, samples]
-
-
-def _true_use(trial: ComplianceTrial, at: tuple[int, npt.NDArray[np.bool_], int, int]) -> Array:
-    row, samples, corner, direction = at
+def residual_history(name: str, trial: ComplianceTrial, test: Shown) -> Figure:
+    """Left: measured minus calculated F/F_z by way; right: psi' of the truth and of (14); a row a corner, first draw."""
     truth = trial.drawn.truth
-    force = truth[("force_x", "force_y")[direction]][row, samples, corner]
-    return np.asarray(force / np.maximum(truth["force_z"][row, samples, corner], 1.0))
+    row, samples = run_of(truth, test.manoeuvre)
+    time, axis, k = truth.time[samples], "xy"[test.direction], test.direction
+    moving = np.abs(truth["vx"][row, samples]) >= LEAST_SPEED
+    shown = trial.residual[WITHOUT][0, row, samples, :, k][moving][:, test.corners]
+    limit = 1.2 * float(np.percentile(np.abs(shown), 99.0))  # all but the greatest hundredth of them
+    rows = []
+    for corner in test.corners:
+        left: list[Mark] = [
+            Line(time, np.where(moving, trial.residual[way][0, row, samples, corner, k], np.nan), way, *STYLE[way])
+            for way in WAYS
+        ]
+        right: list[Mark] = [
+            Line(time, trial.true_compliance[row, samples, corner, k], "truth", TRUTH, width=2.0, alpha=0.8),
+            Line(time, trial.compliance[0, row, samples, corner, k], "(14) on estimated forces", ORANGE, width=0.9),
+        ]
+        x = _time_axis(corner == test.corners[-1])
+        residual = Axis(f"$\\Delta f_{{n{axis}}}$ [1]", -limit, limit)
+        rows.append([Panel([*left, ZERO], x, residual, CORNERS[corner]), Panel(right, x, f"$\\dot\\psi_{axis}$ [m/s]")])
+    direction = DIRECTIONS[k]
+    return Figure(
+        name,
+        f"{test.title}: {direction} force of the wheels, measured minus calculated, over the vertical load (left), "
+        "with and without the suspension compliance, and the velocity of the wheel against the body (right). First sensor draw.",
+        f"Rows of two panels over time, one for each corner: the difference of the {direction} forces for three ways of "
+        "treating the compliance, and the wheel's velocity against the body with its estimate.",
+        rows,
+        size=(9.4, 1.2 + 1.55 * len(test.corners)),
+        legend="below",
+        columns=5,
+        share_x="all",
+    )
 
 
-def _rms(error: Array) -> Array:
-    return np.asarray(np.sqrt(np.mean(error**2, axis=-1)))
+def wheel_history(name: str, trial: ComplianceTrial, test: Shown) -> Figure:
+    """Fig. 9: surface speed of each wheel, velocity of its centre, and what the observers without compliance make of it."""
+    truth = trial.drawn.truth
+    row, samples = run_of(truth, test.manoeuvre)
+    time, radius = truth.time[samples], believed(trial.drawn).radius
+    panels = []
+    for corner in range(4):
+        surface = radius[corner] * trial.drawn.signals["wheel_speed"][:, row, samples, corner]
+        centre = surface - trial.slip[:, row, samples, corner, 0]
+        low, high = np.percentile(centre, BAND, axis=0)
+        marks: list[Mark] = [
+            Line(time, truth["wheel_vx"][row, samples, corner], "truth", TRUTH, width=2.0, alpha=0.8),
+            Line(time, surface[0], "$R_e\\omega$", GREY, width=0.8),
+            Band(time, low, high, color=RED, alpha=0.18),
+            Line(time, centre[0], "$R_e\\omega-\\hat V_{rx}$", RED, width=0.9),
+        ]
+        panels.append(Panel(marks, _time_axis(corner > 1), "speed [m/s]" if corner % 2 == 0 else "", CORNERS[corner]))
+    return Figure(
+        name,
+        f"{test.title.replace('10', '9')}: surface speed of the wheels, velocity of their centres along the car, and the corner "
+        "observers' estimate of it, as Fig. 9 of P3. Lines: first sensor draw; band: 95 % of all draws. On ice the wheels spin "
+        "and their observers follow them: what friction hides of the slip, no gain brings back.",
+        "Four panels of speed over time: on the right side all lines agree, on the left the wheel's surface and its estimate "
+        "run away from the car.",
+        [panels[:2], panels[2:]],
+        size=(9.4, 5.4),
+        legend="below",
+        share_x="all",
+    )
+
+
+def _time_axis(last: bool) -> Axis:
+    return Axis("time [s]" if last else "", margin=0.01)

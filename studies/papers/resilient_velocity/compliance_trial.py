@@ -1,37 +1,125 @@
-"""Slips, model forces and velocities with and without the suspension compliance, on truth vehicles whose suspensions give."""
+"""The corner observers with and without the suspension compliance (14), (15), on truth vehicles with compliant suspensions.
+
+psi' is the velocity of the wheel against the body: V_xt of the wheel centre is that of the body plus psi'. P3 notes 3, 9 item 11.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.velocity import SlipWeights, side_slip_angle, slip_ratio
-from estimators.velocity.corners import CornerVectors, tire_frame
+from estimators.forces import VerticalLoads
+from estimators.pipeline import CornerObservers, CornerSample, CornerStep, ScheduledCorners
+from estimators.schedule import GainSchedule
+from estimators.vehicle import VehicleParameters
+from estimators.velocity import SlipWeights, SuspensionCompliance, side_slip_angle, slip_ratio
+from estimators.velocity.corners import CornerVectors, tire_frame, vehicle_frame
 from studies.experiments.play import Reading, believed, play
-from studies.papers.resilient_velocity.compliant_corners import compliant_parts
-from studies.papers.resilient_velocity.friction import stribeck
-from studies.papers.resilient_velocity.setting import DIRECTIONS, PRINTED
+from studies.papers.resilient_velocity.inputs import DIRECTIONS, PRINTED
+from studies.papers.resilient_velocity.tire import stribeck
+from studies.papers.resilient_velocity.vehicle import table_of_estimator
 from studies.truth import Measured
 from studies.truth.bristle import held
 
 Array = npt.NDArray[np.float64]
-
-
-def _corner(name: str) -> Reading:
-    return lambda step: getattr(step.corners, name)
-
-
 WITHOUT, PRINTED_WAY, INSIDE = "without", "as (15) is printed", "in the observer's input"
 WAYS = (WITHOUT, PRINTED_WAY, INSIDE)
-_OWN = ("relative", "relative_inside", "seen", "seen_inside", "give")
-READINGS: dict[str, Reading] = {name: _corner(name) for name in _OWN} | {
-    "force_x": lambda step: step.force_x,
-    "force_y": lambda step: step.force_y,
-    "force_z": lambda step: step.force_z,
-}
+
+
+class CompliantStep(NamedTuple):
+    """Per corner (..., 4, 2), x and y on the last axis, m/s."""
+
+    vx: Array  # (...) of the observers without compliance; what the pipeline compares with its own
+    relative: Array  # V_r in the tire frame, without compliance
+    relative_inside: Array  # the same of the observers whose input knows how the wheel accelerates against the body
+    centre: Array  # velocity of the centre of gravity by each corner, without compliance
+    centre_inside: Array  # the same from `relative_inside`: psi' is still in it
+    compliance: Array  # psi' of (14), body frame
+
+
+class RecordedLoads:
+    """Wheel loads whose last step can be read: the compliance needs forces in N, the corner observers get F/F_z."""
+
+    def __init__(self, loads: VerticalLoads) -> None:
+        self.loads, self.load = loads, loads.vehicle.static_loads
+
+    def step(self, *signals: Any) -> Any:
+        """As `VerticalLoads.step`."""
+        found = self.loads.step(*signals)
+        self.load = found.load
+        return found
+
+
+class WithWheelMotion(ScheduledCorners):
+    """Corner observers whose input also has the acceleration of the wheel against the body: u_q - psi_q''."""
+
+    def __init__(self, schedule: GainSchedule, batch_shape: tuple[int, ...]) -> None:
+        super().__init__(schedule, batch_shape)
+        self.acceleration = np.zeros(batch_shape)
+
+    def step(self, sample: CornerSample) -> CornerStep:
+        """As `ScheduledCorners.step`."""
+        return super().step(sample._replace(relative_acceleration=sample.relative_acceleration - self.acceleration))
+
+
+class CompliantCorners:
+    """Two sets of corner observers and one compliance model at every wheel.
+
+    The model runs on the estimated forces, turned into the body frame as (15) needs them (the paper leaves the frame
+    open).
+    """
+
+    def __init__(
+        self,
+        vehicle: VehicleParameters,
+        schedules: tuple[GainSchedule, GainSchedule],
+        sample_time: float,
+        batch_shape: tuple[int, ...],
+        loads: RecordedLoads,
+    ) -> None:
+        self.batch_shape, self.sample_time, self.loads = batch_shape, sample_time, loads
+        four = (*batch_shape, 4)
+        self.usual = [ScheduledCorners(schedule, four) for schedule in schedules]
+        self.shifted = [WithWheelMotion(schedule, four) for schedule in schedules]
+        self.plain, self.inside = (
+            CornerObservers(vehicle, along, across, batch_shape, SlipWeights())
+            for along, across in (self.usual, self.shifted)
+        )
+        self.compliance = SuspensionCompliance(table_of_estimator(PRINTED), sample_time, batch_shape)
+
+    def step(
+        self, wheel_speed: Any, steer: Any, ax: Any, ay: Any, yaw_rate: Any, use_x: Array, use_y: Array, vy: Any
+    ) -> CompliantStep:
+        """One sample, as `CornerObservers.step`."""
+        load, total = self.loads.load, self.loads.load.sum(axis=-1, keepdims=True)
+        shared = self.plain.vehicle.mass * np.asarray(ax)[..., None] / total  # as the pipeline does for a stopped wheel
+        use_all = np.where(np.isfinite(use_x), use_x, shared)
+        force = vehicle_frame(CornerVectors(use_all * load, use_y * load), steer)
+        before = self.compliance.state[..., 1]
+        rate = self.compliance.step(force.x, force.y).velocity
+        acceleration = (rate - before) / self.sample_time
+        turned = tire_frame(CornerVectors(acceleration[..., 0], acceleration[..., 1]), steer)
+        for observer, value in zip(self.shifted, turned, strict=True):
+            observer.acceleration = value
+        signals = wheel_speed, steer, ax, ay, yaw_rate, use_x, use_y, vy
+        plain, inside = self.plain.step(*signals), self.inside.step(*signals)
+        relative, relative_inside = (
+            np.stack([kind.observer.state[..., 1] for kind in kinds], axis=-1) for kinds in (self.usual, self.shifted)
+        )
+        centre, centre_inside = (np.stack([step.corner_vx, step.corner_vy], axis=-1) for step in (plain, inside))
+        return CompliantStep(plain.vx, relative, relative_inside, centre, centre_inside, rate)
+
+
+def compliant_parts(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) -> Mapping[str, Any]:
+    """Parts of the pipeline: the shipped schedules of P3's tire in both sets of observers."""
+    along, across = (GainSchedule.shipped(f"resilient-velocity-{d}") for d in DIRECTIONS)
+    loads = RecordedLoads(VerticalLoads(car, sample_time, shape))
+    return {"loads": loads, "corner_observers": CompliantCorners(car, (along, across), sample_time, shape, loads)}
 
 
 @dataclass(frozen=True)
@@ -39,37 +127,38 @@ class ComplianceTrial:
     """S sensor draws x B runs over n samples; x and y of the tire frame on the last axis of what is per corner."""
 
     drawn: Measured
-    slip: Mapping[str, Array]  # by way: V_r (S, B, n, 4, 2), m/s
+    slip: Array  # V_r without compliance (S, B, n, 4, 2), m/s
     residual: Mapping[str, Array]  # by way: measured minus calculated F/F_z (S, B, n, 4, 2)
     centre: Mapping[str, Array]  # by way: V_x, V_y (S, B, n, 2), m/s
-    give: Array  # estimated psi' (S, B, n, 4, 2), m/s
-    true_slip: Array  # (B, n, 4, 2) m/s
-    true_give: Array  # (B, n, 4, 2) m/s, tire frame
+    compliance: Array  # estimated psi' (S, B, n, 4, 2), m/s
+    true_compliance: Array  # (B, n, 4, 2) m/s
 
 
 def run_trial(drawn: Measured) -> ComplianceTrial:
-    """Play all runs of ``drawn`` and calculate the forces of every way.
-
-    With compliance, the wheel centre moves with the body's velocity plus psi': V_r = R_e w - V_xt - psi'.
-    """
-    found = play(drawn, READINGS, compliant_parts)
-    relative, give, steer = found["relative"], found["give"], drawn.signals["steer"]
-    give_tire = np.stack(tire_frame(CornerVectors(give[..., 0], give[..., 1]), steer), axis=-1)
-    slip = {WITHOUT: relative, PRINTED_WAY: relative - give_tire, INSIDE: found["relative_inside"]}
-    seen = {WITHOUT: found["seen"], PRINTED_WAY: found["seen"] + give, INSIDE: found["seen_inside"] - give}
-    use = np.stack([found["force_x"], found["force_y"]], axis=-1) / np.maximum(found["force_z"], 1.0)[..., None]
+    """Estimate all runs of ``drawn`` and calculate the forces of every way: V_r = R_e w - V_xt - psi' with compliance."""
+    forces = ("force_x", "force_y", "force_z")
+    readings: dict[str, Reading] = {name: attrgetter(f"corners.{name}") for name in CompliantStep._fields[1:]}
+    found = play(drawn, readings | {name: attrgetter(name) for name in forces}, compliant_parts)
+    relative, rate, truth = found["relative"], found["compliance"], drawn.truth
+    rate_tire, true_rate = (
+        np.stack(tire_frame(CornerVectors(x, y), steer), axis=-1)
+        for x, y, steer in (
+            (rate[..., 0], rate[..., 1], drawn.signals["steer"]),
+            (truth["compliance_x_rate"], truth["compliance_y_rate"], truth["steer"]),
+        )
+    )
+    slip = {WITHOUT: relative, PRINTED_WAY: relative - rate_tire, INSIDE: found["relative_inside"]}
+    centre = {WITHOUT: found["centre"], PRINTED_WAY: found["centre"] + rate, INSIDE: found["centre_inside"] - rate}
+    measured = np.stack([found["force_x"], found["force_y"]], axis=-1) / np.maximum(found["force_z"], 1.0)[..., None]
     calculated = model_force(drawn, np.stack([slip[way] for way in WAYS]))
-    truth = drawn.truth
-    body = CornerVectors(truth["compliance_x_rate"], truth["compliance_y_rate"])
     shares = _shares(believed(drawn).radius * drawn.signals["wheel_speed"], relative)
     return ComplianceTrial(
         drawn,
-        slip,
-        {way: use - force for way, force in zip(WAYS, calculated, strict=True)},
-        {way: np.einsum("...cd,...cd->...d", shares, value) for way, value in seen.items()},
-        give_tire,
-        np.stack([truth["slip_velocity_x"], truth["slip_velocity_y"]], axis=-1),
-        np.stack(tire_frame(body, truth["steer"]), axis=-1),
+        relative,
+        {way: measured - force for way, force in zip(WAYS, calculated, strict=True)},
+        {way: np.einsum("...cd,...cd->...d", shares, value) for way, value in centre.items()},
+        rate_tire,
+        true_rate,
     )
 
 
@@ -84,15 +173,15 @@ def _shares(surface: Array, relative: Array) -> Array:
 def model_force(drawn: Measured, slip: Array) -> Array:
     """F/F_z of the LuGre tire (1), (2) with Table I at slip velocities (..., S, B, n, 4, 2), m/s, each direction by itself.
 
-    The road parameter is that of the truth: what the paper's tire was told of ice and dry is not said. Bristles are
-    stepped exactly for slips held over a sample.
+    The road parameter is that of the truth: the paper does not say which one its tire model gets on ice and on dry road.
+    Bristles are stepped exactly for slips held over a sample.
     """
     tires = [PRINTED.parameters.tire[d] for d in DIRECTIONS]
     sigma0, sigma1, sigma2, kappa = (
         np.array([getattr(tire, name).value for tire in tires]) for name in ("sigma0", "sigma1", "sigma2", "kappa")
     )
     road = drawn.truth["friction"][..., None]
-    rolling = PRINTED.parameters.vehicle["effective_radius"].value * np.abs(drawn.signals["wheel_speed"])[..., None]
+    rolling = PRINTED.vehicle["effective_radius"] * np.abs(drawn.signals["wheel_speed"])[..., None]
     rate = kappa * rolling + sigma0 * np.abs(slip) / (road * stribeck(PRINTED, slip))
     out, z = np.empty_like(slip), np.zeros_like(slip[..., 0, :, :])
     for k in range(slip.shape[-3]):

@@ -1,4 +1,4 @@
-"""Lost force measurements (24), (25): the pair of updates, the critical drop probability, and where it reaches 1."""
+"""Lost force measurements (24), (25): Figs 7 and 8, Remark 4, and the radius as a map over wheel speed and drop probability."""
 
 from __future__ import annotations
 
@@ -6,10 +6,43 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from analysis.dropout import critical_drop_probability, drop_radius
-from studies.papers.resilient_velocity.setting import HIGHEST_SPEED, Setting
+from analysis.dropout import critical_drop_probability, drop_radius, mean_square_stable_intervals
+from analysis.markov import MarkovJumpSystem
+from studies.claim import Finding, JsonValue, agrees, judged
+from studies.papers.plain import by_speed
+from studies.papers.published import printed
+from studies.papers.resilient_velocity.inputs import (
+    COLOUR,
+    DIRECTIONS,
+    FINE,
+    PACKAGE,
+    PRINTED,
+    SPEED_AXIS,
+    SPEEDS,
+    UPDATE_NOTE,
+    Setting,
+    crossing,
+)
+from studies.papers.topic import Topic
+from studies.papers.verdicts import derived, open_choice
+from studies.plots import DASHES, Axis, Contours, Figure, Level, Line, Map, Mark, Panel, Words, dots
+from studies.plots.colours import CURVES, GREY, ORANGE
+from studies.study import PartResult, Scope, Table
 from synthesis.models.catalogue.corner import Direction
 from synthesis.polynomials.matrix import FloatArray
+
+TOPIC = Topic(PACKAGE)
+SLOW = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 25.0, 28.0)
+SHOWN, TABLE_SPEEDS = np.array([*SLOW, 60.0, 140.0]), np.array([*SLOW, 40.0, 80.0, 140.0])
+FIG8_SPEEDS = np.array([0.0, 40.0, 140.0])
+FIG8_DROPS = (0.2, 0.5, 0.8)
+PRINTED_RADIUS = printed(PACKAGE, "P3-ex3")
+REMARK_SPEED, REMARK_DROP = 10.0, 0.6  # inside the stable range: p_cr = 0.706 there
+STEPS = 400
+LEVELS = {
+    "longitudinal": (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.1),
+    "lateral": (0.86, 0.88, 0.9, 0.92, 0.94, 0.96, 0.98),
+}
 
 
 def updates(setting: Setting, direction: Direction, speeds: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -27,7 +60,7 @@ def radius(setting: Setting, direction: Direction, speeds: ArrayLike, probabilit
     return drop_radius(*updates(setting, direction, speeds), probability)
 
 
-def kept(setting: Setting, direction: Direction, speeds: ArrayLike) -> FloatArray:
+def persistent(setting: Setting, direction: Direction, speeds: ArrayLike) -> FloatArray:
     """e_2' A_1 [1/a, 1]' (g,): what one received sample makes of the only error that the open loop keeps.
 
     After many dropped samples the error is a multiple of [1/a, 1]', the eigenvector of A_0 to its eigenvalue 1; a received
@@ -41,17 +74,222 @@ def kept(setting: Setting, direction: Direction, speeds: ArrayLike) -> FloatArra
 def harmless_from(setting: Setting, direction: Direction) -> float | None:
     """The wheel speed in rad/s from which every drop probability below 1 is mean-square stable; None if there is none.
 
-    Raises ValueError if |kept| crosses 1 more than once on 0..140 rad/s.
+    Raises ValueError if |persistent| crosses 1 more than once on 0..140 rad/s.
     """
-
-    def excess(speed: float) -> float:
-        return abs(float(kept(setting, direction, speed)[0])) - 1.0
-
-    grid = np.linspace(1e-3, HIGHEST_SPEED, 2001)
-    above = np.abs(kept(setting, direction, grid)) > 1.0
+    grid = np.linspace(1e-3, SPEEDS[-1], 2001)
+    above = np.abs(persistent(setting, direction, grid)) > 1.0
     changes = np.flatnonzero(above[1:] != above[:-1])
     if len(changes) > 1:
         raise ValueError(f"{direction}: |e2' A1 [1/a, 1]'| crosses 1 more than once; no single speed separates")
     if not len(changes):
         return None
-    return float(brentq(excess, grid[changes[0]], grid[changes[0] + 1], xtol=1e-12))
+    low, high = grid[changes[0]], grid[changes[0] + 1]
+    return float(brentq(lambda w: abs(float(persistent(setting, direction, w)[0])) - 1.0, low, high, xtol=1e-12))
+
+
+def met_at(setting: Setting, direction: Direction, probability: float) -> float | None:
+    """A wheel speed in rad/s at which the radius is what Example 3 prints."""
+    return crossing(lambda w: float(radius(setting, direction, w, probability)[0]), PRINTED_RADIUS, SPEEDS[::5])
+
+
+def separates(open_loop: FloatArray, closed_loop: FloatArray, p: float) -> bool:
+    """Whether the drop probabilities with radius below 1 are exactly those below p."""
+    pieces = mean_square_stable_intervals(open_loop, closed_loop)
+    return len(pieces) == 1 and pieces[0][0] == 0.0 and agrees(pieces[0][1], p, 1e-9)
+
+
+@TOPIC.claim("P3-pcr")
+def critical_probability(setting: Setting = PRINTED) -> Finding:
+    """One probability separates stable from unstable at every wheel speed, and Example 3 lies below it."""
+    computed: dict[str, JsonValue] = {}
+    holds, lowest, words = True, {}, []
+    for direction in DIRECTIONS:
+        found, start = critical(setting, direction, SPEEDS), harmless_from(setting, direction)
+        A0, A1 = updates(setting, direction, SPEEDS)
+        holds &= all(separates(a, b, float(p)) for a, b, p in zip(A0[::10], A1[::10], found[::10], strict=True))
+        lowest[direction] = float(found.min())
+        computed[direction] = by_speed(SHOWN, critical(setting, direction, SHOWN))
+        computed[f"{direction}_is_1_from_rad_per_s"] = start
+        rest = "" if start is None else f", 1 from {start:.2f} rad/s on"
+        words.append(f"{direction} {found[0]:.3f} at standstill{rest}")
+    below = all(value > setting.example_drop for value in lowest.values())
+    reading = (
+        "Fig. 7 prints no numbers; what it says is checked, for exp(A T) while dropped and exp(A_e T) otherwise, T = 5 ms: "
+        + ("one critical probability separates stable from unstable at every wheel speed" if holds else
+           "no single probability separates")
+        + f" ({'; '.join(words)}), and p = {setting.example_drop:g} of Example 3 lies "
+        + ("below it everywhere." if below else "above it somewhere.")
+    )  # fmt: skip
+    return Finding({**computed, "smallest": lowest}, judged(holds and below), reading)
+
+
+@TOPIC.claim("P3-pcr-exact")
+def exact_critical_probability(setting: Setting = PRINTED) -> Finding:
+    """The closed form against bisection of the radius, and against the condition for p_cr = 1."""
+    computed: dict[str, float] = {}
+    holds = True
+    for direction in DIRECTIONS:
+        speeds = np.concatenate([[0.0, 0.25, 0.5, 0.75], SPEEDS[1:]])
+        found = critical(setting, direction, speeds)
+        apart = float(np.abs(found - bisected(*updates(setting, direction, speeds))).max())
+        one = np.abs(persistent(setting, direction, speeds[1:])) <= 1.0
+        computed[f"{direction}_largest_difference_from_bisection"] = apart
+        computed[f"{direction}_speeds_with_p_cr_1"] = int(one.sum())
+        holds &= apart <= 1e-10 and bool(np.array_equal(found[1:] == 1.0, one))
+    return Finding(
+        computed,
+        derived(holds),
+        "p_cr = 1/mu with mu the largest real eigenvalue of (I - S(A1))^-1 (S(A0) - S(A1)) on the 3 x 3 symmetric "
+        "square; the integrator of A0 puts an exact root at p = 1, which is divided out, so a quadratic remains. "
+        "p_cr = 1 if and only if |e2' A1 [1/a, 1]'| <= 1, a = kappa R_e |omega|.",
+    )
+
+
+def bisected(A0: FloatArray, A1: FloatArray, steps: int = 50) -> FloatArray:
+    """The drop probability (g,) at which the radius reaches 1, by bisection between 0 and just below 1; 1 if it does not."""
+    low, high = np.zeros(len(A0)), np.full(len(A0), 1.0 - 1e-7)
+    unstable = drop_radius(A0, A1, high) > 1.0
+    for _ in range(steps):
+        middle = 0.5 * (low + high)
+        above = drop_radius(A0, A1, middle) >= 1.0
+        low, high = np.where(above, low, middle), np.where(above, middle, high)
+    return np.where(unstable, 0.5 * (low + high), 1.0)
+
+
+@TOPIC.claim("P3-fig8")
+def radius_under_drops(setting: Setting = PRINTED) -> Finding:
+    """The drop probability of the figure is not stated."""
+    readings = {p: {d: radius(setting, d, FIG8_SPEEDS, p) for d in DIRECTIONS} for p in FIG8_DROPS}
+    return Finding(
+        {f"{d}_p_{p:g}": by_speed(FIG8_SPEEDS, readings[p][d]) for d in DIRECTIONS for p in FIG8_DROPS},
+        open_choice([np.concatenate(list(readings[p].values())) for p in FIG8_DROPS], 1e-3),
+        "The drop probability of the figure is not stated: p = 0.2, 0.5 and 0.8 give different curves, at standstill "
+        + ", ".join(f"{readings[p]['longitudinal'][0]:.3f}" for p in FIG8_DROPS)
+        + " longitudinally. The curve of any p follows from (22) with (25).",
+    )
+
+
+@TOPIC.claim("P3-rem4")
+def detectable_mixture(setting: Setting = PRINTED) -> Finding:
+    """The dropped update alone is marginal, the mixture below p_cr is mean-square stable."""
+    A0, A1 = (stack[0] for stack in updates(setting, "longitudinal", REMARK_SPEED))
+    alone = float(np.abs(np.linalg.eigvals(A0)).max())
+    integrator = bool(A0[1, 1] == 1.0 and A0[1, 0] == 0.0)
+    p_cr = float(critical(setting, "longitudinal", REMARK_SPEED)[0])
+    mixed = float(drop_radius(A0, A1, REMARK_DROP))
+    chance = [1.0 - REMARK_DROP, REMARK_DROP]
+    system = MarkovJumpSystem(np.stack([A1, A0]), np.array([chance, chance]))
+    moment = np.trace(system.propagate_second_moment(np.eye(2), chance, STEPS), axis1=-2, axis2=-1).sum(-1)
+    growth = float((moment[STEPS] / moment[STEPS - 50]) ** (1.0 / 50.0))
+    everywhere = all(bool((critical(setting, d, SPEEDS) <= 1.0).all()) for d in DIRECTIONS)
+    stable = p_cr > REMARK_DROP and mixed < 1.0 and agrees(growth, mixed, 1e-9)
+    computed = {
+        "radius_without_force": alone, "growth_of_second_moment_at_p_0.6_and_10_rad_per_s": growth,
+        "second_moment_radius": mixed, "p_cr_at_10_rad_per_s": p_cr,
+    }  # fmt: skip
+    return Finding(
+        computed,
+        derived(integrator and alone == 1.0 and stable and everywhere),
+        "Without the force the velocity error is an exact integrator, eigenvalue 1, and does not decay by itself; "
+        f"the mixture does: at {REMARK_SPEED:g} rad/s and p = {REMARK_DROP:g} the second moment falls by the factor "
+        f"{growth:.6f} a sample, which is the radius of (22).",
+    )
+
+
+@TOPIC.part("drops", "Lost force measurements (Figs 7 and 8)", 1.4)
+def figs_7_and_8(_: Scope) -> PartResult:
+    """Lost measurements: Figs 7 and 8, drawn and in numbers, and Remark 4."""
+    columns, names, p = [TABLE_SPEEDS], [], PRINTED.example_drop
+    for d in DIRECTIONS:
+        columns += [critical(PRINTED, d, TABLE_SPEEDS), radius(PRINTED, d, TABLE_SPEEDS, p)]
+        names += [f"{d}, critical drop probability [1]", f"{d}, radius at p = {p:g} [1]"]
+    table = Table(
+        "drops",
+        "Critical drop probability of the force measurement and second-moment radius at the drop probability of "
+        "Example 3, exact update at 200 Hz, printed gains.",
+        ("wheel speed [rad/s]", *names),
+        np.stack(columns, axis=1).tolist(),
+    )
+    return PartResult(TOPIC.found(), [table], [critical_figure(), radius_figure(), map_figure()], [UPDATE_NOTE])
+
+
+def critical_figure(setting: Setting = PRINTED) -> Figure:
+    """Fig. 7, whole range and near standstill."""
+    near = np.linspace(0.0, 2.0, 201)
+    panels: list[list[Mark]] = [[], []]
+    for direction, dash in zip(DIRECTIONS, DASHES, strict=False):
+        colour, start = COLOUR[direction], harmless_from(setting, direction)
+        for marks, speeds in zip(panels, (FINE, near), strict=True):
+            marks.append(Line(speeds, critical(setting, direction, speeds), direction, colour, dash, 1.9))
+        if start is not None:
+            words = Words(start, 1.0, f"1 from {start:.2f} rad/s", colour, offset=(5, -13))
+            panels[int(start <= near[-1])] += [dots(start, 1.0, color=colour, size=6, hollow=True), words]
+    p = setting.example_drop
+    panels[0].append(Level(y=p, label=f"p = {p:g} of Example 3", color=GREY, dash="dotted", width=1.0))
+    y = Axis("critical drop probability [1]", 0.0, 1.05)
+    return Figure(
+        "fig-7-critical-drop-probability",
+        "Fig. 7 regenerated: critical drop probability of the force measurement over the wheel speed, printed "
+        "gains, exact update at 200 Hz. Below a curve the error is mean-square stable. It is 1, every loss below "
+        "100 % is survived, from the circles on. Right: near standstill the lateral value is below 1 as well.",
+        "Longitudinal curve rising from 0.577 at standstill to 1 at 28 rad/s, lateral curve rising from 0.957 to 1 "
+        "within the first 0.84 rad/s.",
+        [
+            Panel(panels[0], SPEED_AXIS, y, "whole range", legend="center right"),
+            Panel(panels[1], Axis(SPEED_AXIS.label, 0.0, near[-1]), y, "near standstill"),
+        ],
+        size=(9.2, 3.7),
+    )
+
+
+def radius_figure(setting: Setting = PRINTED) -> Figure:
+    """Fig. 8 for several drop probabilities, with the printed number of Example 3."""
+    panels, label, p = [], f"{PRINTED_RADIUS} of Example 3", setting.example_drop
+    for d, low, high, other in zip(DIRECTIONS, (0.0, 0.82), (1.25, 1.01), (1.0 - p, p), strict=True):
+        marks: list[Mark] = [
+            Line(FINE, radius(setting, d, FINE, q), f"p = {q:g}", colour, dash)
+            for q, colour, dash in zip((0.2, 0.4, 0.5, 0.6, 0.8), CURVES, DASHES, strict=False)
+        ]
+        marks += [Level(y=1.0), Level(y=PRINTED_RADIUS, label=label, color=GREY, dash="dotted", width=1.0)]
+        met = met_at(setting, d, other)
+        if met is not None:
+            marks.append(dots(met, PRINTED_RADIUS, color="0.1", size=6, hollow=True))
+        panels.append(Panel(marks, SPEED_AXIS, Axis("second-moment radius ρ [1]", low, high), d))
+    return Figure(
+        "fig-8-radius-under-drops",
+        "Fig. 8 regenerated for five drop probabilities, as the paper does not state its own: spectral radius of the second "
+        "moment of the error over the wheel speed, printed gains, exact update at 200 Hz. Above 1 the mean square grows. "
+        "Dotted: the 0.9026 that Example 3 prints for the longitudinal observer at p = 0.2; the blue curve of the left panel "
+        "never comes near it. Circles: where other readings meet it, p = 0.8 longitudinally and p = 0.2 laterally.",
+        "Two panels of radius over wheel speed: longitudinal curves fall from up to 1.2 towards their drop "
+        "probability, lateral curves, on a finer scale, rise slowly towards 1.",
+        panels,
+        size=(9.2, 3.9),
+        legend="below",
+        columns=6,
+    )
+
+
+def map_figure(setting: Setting = PRINTED) -> Figure:
+    """Radius over wheel speed and drop probability."""
+    probabilities = np.linspace(0.0, 1.0, 101)
+    panels = []
+    for d, label in zip(DIRECTIONS, ("", "second-moment radius ρ [1]"), strict=True):
+        found, border = radius(setting, d, SPEEDS, probabilities[:, None]), critical(setting, d, FINE)
+        marks: list[Mark] = [
+            Map(SPEEDS, probabilities, found, label, low=0.2, high=1.2),
+            Contours(SPEEDS, probabilities, found, LEVELS[d], "white", width=0.7),
+            Line(FINE, np.where(border < 1.0, border, np.nan), color=ORANGE, width=2.0),
+        ]
+        panels.append(Panel(marks, SPEED_AXIS, "drop probability p [1]", d, grid=False))
+    return Figure(
+        "radius-map",
+        "Second-moment radius of the error over wheel speed and drop probability, printed gains, exact update at "
+        "200 Hz. Orange: the critical drop probability, radius 1; unstable above it. At p = 1 the radius is 1 "
+        "everywhere, the integrator of the velocity error.",
+        "Two maps; the longitudinal one has an unstable region in the upper left corner, below 28 rad/s and above "
+        "58 to 100 per cent drops; the lateral one practically none.",
+        panels,
+        size=(9.2, 4.0),
+        share_y="all",
+    )

@@ -1,0 +1,198 @@
+"""Figs 3 to 5: stability margin and H-infinity norm with a tire constant off by 20 %; (9), Remark 2: the observability rank."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.labelled import Axis as LabelledAxis
+from analysis.norms import hinf_norm, stability_margin
+from analysis.observability import observability_matrix
+from analysis.observability_modes import frozen_modes, hautus_test
+from analysis.perturbed import PerturbedModel, error_measure
+from analysis.rank_loss import rank_loss
+from analysis.sensitivity import OneAtATime, one_at_a_time
+from studies.claim import Finding, JsonValue, Verdict, judged
+from studies.papers.resilient_velocity.inputs import DIRECTIONS, FINE, PACKAGE, PRINTED, SPEED_AXIS, SPEEDS, Setting
+from studies.papers.topic import Topic
+from studies.plots import DASHES, Figure, Level, Line, Mark, Panel
+from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, RED
+from studies.study import Cell, PartResult, Scope, Table
+from synthesis.models.catalogue.corner import Direction
+from synthesis.polynomials.matrix import FloatArray
+
+TOPIC = Topic(PACKAGE)
+CONSTANTS = ("sigma0", "sigma1", "sigma2", "kappa")
+FACTORS = (0.8, 1.2)
+CHANGE = 0.2
+SPEED = 40.0  # rad/s, of single values
+SEARCH = (0, 400)  # rad/s: rank loss is looked for beyond the range as well
+LOOK = {"sigma0": ("σ₀", BLUE), "sigma1": ("σ₁", RED), "sigma2": ("σ₂", GREEN), "kappa": ("κ", ORANGE)}
+MEASURES: Mapping[str, tuple[str, Callable[[FloatArray, FloatArray], FloatArray]]] = {
+    "stability margin": ("1/s", lambda A_e, _: stability_margin(A_e)),
+    "H-infinity norm": ("1", lambda A_e, B_e: hinf_norm(A_e, B_e[..., :2], np.eye(2)).norm),
+}
+"""Unit, and function of A_e and B_e: max Re lambda(A_e); from both disturbances to both errors."""
+
+
+def deviations(setting: Setting, direction: Direction, speeds: FloatArray, name: str) -> OneAtATime:
+    """One of `MEASURES`, and what moves it: axes (parameter, factor, wheel_speed)."""
+    unit, measure = MEASURES[name]
+    family = PerturbedModel(setting.models[direction])
+    return one_at_a_time(
+        error_measure(family, setting.gains[direction], measure, wheel_speed=speeds),
+        {key: family.nominal[key] for key in CONSTANTS},
+        FACTORS,
+        axes=(LabelledAxis("wheel_speed", speeds, "rad/s"),),
+        name=name,
+        unit=unit,
+    )
+
+
+def largest_relative(found: OneAtATime) -> dict[str, float]:
+    """By constant: the largest |deviation| / |nominal value|."""
+    relative = np.abs(found.deviations.values) / np.abs(found.nominal.values)
+    return dict(zip(CONSTANTS, relative.max(axis=(1, 2)).tolist(), strict=True))
+
+
+@TOPIC.claim("P3-fig345")
+def small_deviations(setting: Setting = PRINTED) -> Finding:
+    """`small` is read as: no larger in proportion than the 20 % that caused it, and stable throughout."""
+    computed: dict[str, JsonValue] = {}
+    worst: dict[str, float] = {}
+    stable, lost = True, 0.0
+    for direction in DIRECTIONS:
+        margin, norm = (deviations(setting, direction, SPEEDS, name) for name in MEASURES)
+        stable &= bool((margin.values.values < 0.0).all())
+        lost = float((margin.deviations.values / np.abs(margin.nominal.values)).max())  # of the last, the lateral one
+        large_margin, large_norm = largest_relative(margin), largest_relative(norm)
+        computed[direction] = {
+            "margin_per_s": margin.nominal.at(wheel_speed=SPEED).item(),
+            "margin_deviation_at_40_per_s": {
+                name: [margin.deviations.at(parameter=name, factor=f, wheel_speed=SPEED).item() for f in FACTORS]
+                for name in CONSTANTS
+            },
+            "largest_relative_margin_deviation": large_margin,
+            "largest_relative_norm_deviation": large_norm,
+            "least_stable_margin_per_s": float(margin.values.values.max()),
+            "largest_relative_margin_loss": lost,
+        }
+        for kind, sizes in (("margin", large_margin), ("norm", large_norm)):
+            worst |= {f"{direction} {kind}, {constant}": size for constant, size in sizes.items()}
+    large = {name: value for name, value in worst.items() if value > CHANGE}
+    rest = max(value for name, value in worst.items() if not name.endswith("sigma1"))
+    verdict = judged(stable and not large, Verdict.PARTLY if stable else Verdict.NOT_REPRODUCED)
+    return Finding(
+        computed,
+        verdict,
+        f"No number is printed; small is read as at most the {CHANGE:.0%} that caused it. "
+        + ("Every perturbed observer stays stable" if stable else "A perturbed observer is unstable")
+        + f", and sigma_0, sigma_2 and kappa move margin and norm by {rest:.1%} at most; but "
+        + (", ".join(f"{name}: {value:.0%}" for name, value in large.items()) or "nothing moves by more")
+        + f" of the nominal value. Most of it is gained; the most that is lost is {lost:.0%} of the lateral margin. "
+        "Only sigma_1 matters.",
+    )
+
+
+@TOPIC.part("sensitivity", "Tire constants off by 20 % (Figs 3 to 5)", 0.5)
+def figs_3_to_5(_: Scope) -> PartResult:
+    """The claim, the deviations at one wheel speed, and the curves."""
+    rows: list[tuple[Cell, ...]] = []
+    for direction in DIRECTIONS:
+        found = [deviations(PRINTED, direction, np.array([SPEED]), name).deviations for name in MEASURES]
+        for constant in CONSTANTS:
+            values = [d.at(parameter=constant, factor=f, wheel_speed=SPEED).item() for d in found for f in FACTORS]
+            rows.append((f"{direction}, {constant}", *values))
+    table = Table(
+        "deviations",
+        "What a tire constant that is 20 % too low or too high does to the stability margin (largest real part of "
+        f"the eigenvalues; positive deviations are towards instability) and to the H-infinity norm, at {SPEED:g} "
+        "rad/s with the printed gains.",
+        ("constant", "margin, -20 % [1/s]", "margin, +20 % [1/s]", "norm, -20 % [1]", "norm, +20 % [1]"),
+        rows,
+    )
+    return PartResult(TOPIC.found("P3-fig345"), [table], [deviation_figure(measure) for measure in MEASURES])
+
+
+WORDS = {
+    "stability margin": (
+        "figs-3-4-margin-deviation",
+        "Figs 3 and 4 regenerated: how far the stability margin, the largest real part of the eigenvalues of the "
+        "error dynamics (about -327 1/s longitudinally, -13.8 1/s laterally), moves when one tire constant is 20 % "
+        "lower (dashed) or higher (solid) than in the design. Positive is towards instability. Only σ₁ matters; "
+        "the kink of the lateral curve is where two real eigenvalues meet and become a pair. Mind the scales.",
+        "Four panels; sigma 1 moves the margin by up to 73 per second longitudinally and 33 laterally, the other "
+        "constants by less than 0.7.",
+    ),
+    "H-infinity norm": (
+        "fig-5-norm-deviation",
+        "Fig. 5 regenerated: how far the H∞ norm from both disturbances to both errors (near 1) moves when one "
+        "tire constant is 20 % lower (dashed) or higher (solid) than in the design. All deviations stay below "
+        "0.006, with one exception that a static analysis misses: with σ₁ 20 % higher the lateral error dynamics "
+        "resonate above 126 rad/s and the norm rises by up to 0.048. Curves of σ₂ and κ coincide. Mind the scales.",
+        "Four panels of small, nearly straight deviations; in the lateral panel of sigma 1 the curve for plus 20 "
+        "per cent turns up steeply above 126 rad/s.",
+    ),
+}
+"""Of the figures: name, caption, alternative."""
+
+
+def deviation_figure(measure: str, setting: Setting = PRINTED) -> Figure:
+    """Rows: direction; columns: sigma_1, which outweighs the rest, and the other constants on a scale of their own."""
+    rows = []
+    for direction in DIRECTIONS:
+        found = deviations(setting, direction, FINE, measure)
+        row, x = [], SPEED_AXIS if direction == DIRECTIONS[-1] else replace(SPEED_AXIS, label="")
+        for title, constants in (("σ₁", ("sigma1",)), ("the other constants", ("sigma0", "sigma2", "kappa"))):
+            marks: list[Mark] = [Level(y=0.0, color=GREY)]
+            for constant in constants:
+                symbol, colour = LOOK[constant]
+                for factor, dash in zip(FACTORS, (DASHES[1], DASHES[0]), strict=True):
+                    curve = found.deviations.at(parameter=constant, factor=factor).values
+                    marks.append(Line(FINE, curve, f"{symbol} {factor - 1:+.0%}", colour, dash, 1.7))
+            row.append(Panel(marks, x, f"deviation [{MEASURES[measure][0]}]", f"{direction}, {title}"))
+        rows.append(row)
+    return Figure(*WORDS[measure], rows, size=(9.2, 5.8), legend="below", share_x="all")
+
+
+@TOPIC.claim("P3-obs")
+def rank_of_observability(setting: Setting = PRINTED) -> Finding:
+    """The exact set on which the time-varying observability matrix (9) loses rank."""
+    computed: dict[str, dict[str, object]] = {}
+    lost_inside, detectable = [], True
+    for direction in DIRECTIONS:
+        model = setting.models[direction]
+        loss = rank_loss(observability_matrix(model))
+        roots = [r for r in loss.roots("wheel_speed") if r > 0]
+        intervals = loss.interval_over_rates("wheel_speed", search=SEARCH)
+        lost_inside += [f"{direction} {float(r):.2f} rad/s" for r in loss.roots_inside("wheel_speed")]
+        numeric = model.on(np.union1d(SPEEDS, [float(r) for r in roots if r <= SPEEDS[-1]]))
+        detectable &= bool(hautus_test(numeric.A, numeric.C).frozen_detectable.all())
+        computed[direction] = {
+            "determinant": str(loss.condition),
+            "root_at_constant_speed_rad_per_s": [float(r) for r in roots],
+            "root_exact": [str(r) for r in roots],
+            "over_wheel_accelerations_of_800_rad_per_s2": [[float(a), float(b)] for a, b in intervals],
+            "hidden_mode": [str(m.eigenvalue) for m in frozen_modes(model.A, model.C) if m.eigenvalue != 0],
+        }
+    where = ", ".join(lost_inside)
+    return Finding(
+        computed,
+        judged(not lost_inside),
+        (f"Rank 2 is lost inside 0..140 rad/s: {where} at constant speed. " if lost_inside else "Rank 2 everywhere. ")
+        + "det O_2 = (sigma_0 - sigma_1 a)(sigma_0 + sigma_2 a) + sigma_1 (sigma_1 + sigma_2) da/dt with a = kappa "
+        "R_e omega vanishes on a curve in wheel speed and acceleration. "
+        + (
+            "What is lost is the bristle deflection, which decays, so the pair stays detectable."
+            if detectable
+            else "The pair is not detectable."
+        ),
+    )
+
+
+@TOPIC.part("observability", "The observability rank", 1.1)
+def rank(_: Scope) -> PartResult:
+    """The rank condition (9)."""
+    return PartResult(TOPIC.found("P3-obs"))
