@@ -12,16 +12,12 @@ import pytest
 
 from analysis.norms import hinf_norm
 from studies.claim import Verdict
-from studies.papers.corner_estimation.claims_solve_size import (
-    expressions,
-    one_by_one,
-    relaxed_problem,
-    solve_size,
-)
-from studies.papers.corner_estimation.hinf import optima, signed_model, velocity_floor
-from studies.papers.corner_estimation.inputs import corner_model, printed_gains, printed_numbers
-from studies.papers.corner_estimation.kalman import fitted, schedule
-from studies.papers.corner_estimation.tables_forces import filter_lag
+from studies.papers.corner_estimation.gain_curves import fitted, schedule
+from studies.papers.corner_estimation.hinf_optimum import optima, signed_model, velocity_floor
+from studies.papers.corner_estimation.inputs import PACKAGE, corner_model, printed_gains
+from studies.papers.corner_estimation.sigma_points import filter_lag
+from studies.papers.corner_estimation.solve_size import expressions, one_by_one, relaxed_problem, solve_size
+from studies.papers.published import printed_numbers
 from synthesis.lmi.relaxation import RelaxedProblem
 from tests.unit.p1_findings import PRINT, RADIUS, finding
 
@@ -134,7 +130,7 @@ def test_no_clock_decides_what_a_solve_costs(monkeypatch: pytest.MonkeyPatch) ->
     for module in (
         "time.perf_counter",
         "time.monotonic",
-        "studies.papers.corner_estimation.claims_solve_size.perf_counter",
+        "studies.papers.corner_estimation.solve_size.perf_counter",
     ):
         monkeypatch.setattr(module, stopped)
     assert solve_size(10) == solve_size(10)
@@ -173,7 +169,7 @@ def test_loads_in_fractions() -> None:
 def test_force_filter_lags_by_its_own_covariances() -> None:
     """Sheet section 11 item 8: 1 s and 3.5 s in newtons, 1.5 ms and up to 3.8 ms in kilonewtons."""
     for entry, newtons, kilo in zip(
-        printed_numbers()["force_filter"]["readings"], (3.5, 1.06), (3.8e-3, 1.57e-3), strict=True
+        printed_numbers(PACKAGE)["force_filter"]["readings"], (3.5, 1.06), (3.8e-3, 1.57e-3), strict=True
     ):
         assert filter_lag(entry["process"], entry["measurement"], 1.0) == pytest.approx(newtons, rel=0.01)
         assert filter_lag(entry["process"], entry["measurement"], 1e3) == pytest.approx(kilo, rel=0.01)

@@ -12,7 +12,7 @@ import sympy as sp
 from scipy.optimize import minimize
 
 from studies.claim import Verdict
-from studies.papers.corner_estimation.quadratic import diagonal_proof
+from studies.papers.corner_estimation.quadratic_stability import diagonal_proof
 from tests.unit.p1_findings import PRINT, RADIUS, finding
 
 PRINTED_29 = (("1.2176", "115.35", "80379.0"), ("-0.0011", "-0.2227", "-67.969"))

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from studies.papers.corner_estimation.lyapunov import Certificate, Reading, certificate, convexity
+from studies.papers.corner_estimation.printed_lyapunov import Certificate, Reading, certificate, convexity
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.models.catalogue.corner import Direction

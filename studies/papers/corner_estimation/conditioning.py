@@ -1,4 +1,7 @@
-"""How the units of the bristle deflection decide whether a solver finds a Lyapunov matrix of (28)."""
+"""P1-aqs-scale: the units of the bristle deflection decide whether a solver finds a Lyapunov matrix of (28).
+
+Without scaling it misses certificates that exist and accepts false ones.
+"""
 
 from __future__ import annotations
 
@@ -6,24 +9,39 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.papers.corner_estimation.inputs import STATED_SPEED, corner_model, printed_gains
+from studies.claim import Finding, JsonValue
+from studies.papers.corner_estimation.inputs import (
+    DESIGNS,
+    PACKAGE,
+    PAPER,
+    SPEED,
+    STATED_SPEED,
+    corner_model,
+    error_matrices,
+    printed_gains,
+)
+from studies.papers.topic import Topic
+from studies.papers.verdicts import derived
+from studies.plots import ZERO, Axis, Dash, Figure, Line, Mark, Panel
+from studies.plots.colours import CURVES, GREY
+from studies.study import PartResult, Scope, Table
 from synthesis.lmi.problem import LmiProblem
-from synthesis.lmi.result import LmiResult, Verdict
+from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
 from synthesis.models.catalogue.corner import Direction
 from synthesis.polynomials.matrix import FloatArray
 from synthesis.stability import physical
 
-UNSCALED = np.ones(2)
+TOPIC = Topic(PACKAGE)
+CAPS = (1e3, 1e4)  # condition numbers that a general-purpose scaling might allow
+BALANCED = 2.0
 
 
 def natural_scale(name: str, direction: Direction) -> float:
     """g = sqrt|c/b| of A_e = [[a, b], [c, d]] at mid-range: z multiplied by g balances the two couplings, 1/s."""
-    A_e = (
-        corner_model(direction, STATED_SPEED, name).on([STATED_SPEED / 2]).error_dynamics(_gain(name, direction))[0][0]
-    )
-    return float(np.sqrt(abs(A_e[1, 0] / A_e[0, 1])))
+    ((_, b), (c, _)) = error_matrices(direction, [STATED_SPEED / 2], name)[0]
+    return float(np.sqrt(abs(c / b)))
 
 
 def best_margin(name: str, direction: Direction, scale: float, condition: float) -> float:
@@ -55,15 +73,14 @@ class VertexSolve:
 
 def vertices_only(name: str, direction: Direction, points: int = 361) -> VertexSolve:
     """Ask a solver for (28) at the four vertices of (omega, rate) alone, then look between them."""
-    problem = _problem(name, direction, UNSCALED, degree=1, margin=False)
+    problem = _problem(name, direction, np.ones(2), degree=1, margin=False)
     problem.require("P > 0", problem.unknowns["P"])
-    found: LmiResult = solve(problem, LmiSettings(relaxation="grid", points=2))
-    model = corner_model(direction, STATED_SPEED, name)
-    constant, slope = physical(model, found, "P")
+    found = solve(problem, LmiSettings(relaxation="grid", points=2))
+    constant, slope = physical(corner_model(direction, STATED_SPEED, name), found, "P")
     omega = np.linspace(0.0, STATED_SPEED, points)
     P = constant + omega[:, None, None] * slope
-    A_e = model.on(omega).error_dynamics(_gain(name, direction))[0]
-    total = P @ A_e + np.swapaxes(P @ A_e, 1, 2)
+    product = P @ error_matrices(direction, omega, name)
+    total = product + np.swapaxes(product, 1, 2)
     relative = [
         np.linalg.eigvals(np.linalg.solve(P, total + rate * slope)).real.max(axis=1) for rate in (-800.0, 800.0)
     ]
@@ -72,15 +89,103 @@ def vertices_only(name: str, direction: Direction, points: int = 361) -> VertexS
 
 def _problem(name: str, direction: Direction, scale: FloatArray, degree: int, margin: bool) -> LmiProblem:
     """V' < 0 for the printed gains, with the unknown P of this degree."""
-    model = corner_model(direction, STATED_SPEED, name)
+    model, gain = corner_model(direction, STATED_SPEED, name), np.array(printed_gains(direction, name))[:, None]
     problem = LmiProblem(model.parameters, maximise_margin=margin)
     scaled = model.polynomial.with_states_scaled(scale)
     A, C = problem.scaled(scaled.A), problem.scaled(scaled.C)
     P = problem.symmetric("P", 2, degree)
-    product = P @ (A - problem.constant(scale[:, None] * _gain(name, direction)) @ C)
+    product = P @ (A - problem.constant(scale[:, None] * gain) @ C)
     problem.require("dV/dt < 0", -(product + product.T + problem.time_derivative(P)))
     return problem
 
 
-def _gain(name: str, direction: Direction) -> FloatArray:
-    return np.array(printed_gains(direction, name))[:, None]
+@TOPIC.claim("P1-aqs-scale")
+def scaling(scaled: bool = True) -> Finding:
+    """Margins with a cap on cond(P), in the units of the model and with z scaled; and what vertices alone prove."""
+    computed: dict[str, JsonValue] = {}
+    for name, direction in DESIGNS:
+        g, loose = natural_scale(name, direction), vertices_only(name, direction)
+        computed[f"{PAPER[name]} {direction}"] = {
+            "scale_of_z": g,
+            "natural_condition_number": g * g,
+            "margin_unscaled": {f"{cap:g}": best_margin(name, direction, 1.0, cap) for cap in CAPS},
+            f"margin_scaled_condition_{BALANCED:g}": best_margin(name, direction, g if scaled else 1.0, BALANCED),
+            "vertices_only": {
+                "solver": loose.status, "verdict": str(loose.verdict), "largest_growth_1_s": float(np.max(loose.growth)),
+                "at_rad_s": float(loose.omega[np.argmax(loose.growth)]), "certified": loose.verdict is Verdict.CERTIFIED,
+            },
+        }  # fmt: skip
+    rows = list(computed.values())
+    missed = sum(row["margin_unscaled"][f"{CAPS[0]:g}"] < 0.0 for row in rows)
+    helped = sum(row[f"margin_scaled_condition_{BALANCED:g}"] > 0.0 for row in rows)
+    false = sum(row["vertices_only"]["largest_growth_1_s"] > 0.0 for row in rows)
+    low, high = (pick(row["natural_condition_number"] for row in rows) for pick in (min, max))
+    reading = (
+        f"In metres and metres per second the natural condition number of P is g^2 = |c/b|, {low:.2g} to "
+        f"{high:.2g}. Capped at {CAPS[0]:g}, {missed} of {len(rows)} printed designs have no constant P at all; "
+        f"with z multiplied by g, {helped} of {len(rows)} have one with condition number {BALANCED:g}. Asked at the "
+        f"vertices alone the solver says '{rows[0]['vertices_only']['solver']}', and {false} of {len(rows)} answers "
+        "let V grow between the vertices. Scale, then re-evaluate on the whole range."
+    )
+    return Finding(computed, derived(missed == helped == false == len(rows)), reading)
+
+
+@TOPIC.part("conditioning", "Units decide whether a certificate is found", 2.0)
+def conditioning(scope: Scope) -> PartResult:
+    """Scaling of the Lyapunov search."""
+    claims = TOPIC.found()
+    return PartResult(claims, [conditioning_table(claims[0].finding)], [conditioning_figure(7 if scope.quick else 13)])
+
+
+def conditioning_table(finding: Finding) -> Table:
+    """Natural scale, margins with and without it, and what vertices alone prove."""
+    rows = []
+    for name, entry in finding.computed.items():
+        loose = entry["vertices_only"]
+        rows.append([name, entry["scale_of_z"], entry["natural_condition_number"], *entry["margin_unscaled"].values(),
+                     entry[f"margin_scaled_condition_{BALANCED:g}"], loose["solver"], loose["largest_growth_1_s"],
+                     loose["at_rad_s"]])  # fmt: skip
+    caption = (
+        "Search for a constant P with I <= P <= kappa I (margin: largest t with A_e'P + P A_e < -t I), with z in "
+        "metres and with z multiplied by g; and an affine P from the vertices alone: what the solver says, and how "
+        "fast V really grows in between."
+    )
+    columns = ["design", "g [1/s]", "g^2 [1/s^2]", "margin, kappa 1e3", "margin, kappa 1e4", "margin with g, kappa 2",
+               "solver at the vertices", "largest growth rate [1/s]", "at [rad/s]"]  # fmt: skip
+    return Table("conditioning", caption, columns, rows)
+
+
+def conditioning_figure(caps: int = 13) -> Figure:
+    """Best Lyapunov margin over the allowed condition number, and false certificates between the vertices."""
+    conditions = np.geomspace(1.0, 1e6, caps)
+    margins: list[Mark] = [ZERO, Line([], [], "z scaled by g", GREY), Line([], [], "z in metres", GREY, "dashed")]
+    growth: list[Mark] = [ZERO]
+    for (name, direction), colour in zip(DESIGNS, CURVES, strict=False):
+        loose = vertices_only(name, direction)
+        growth.append(Line(loose.omega, loose.growth, f"{PAPER[name]} {direction}", colour))
+        dashes: dict[Dash, float] = {"dashed": 1.0, "solid": natural_scale(name, direction)}
+        for dash, scale in dashes.items():
+            # Relative to the trivial growth of the margin with P itself, so that the sign is what one sees.
+            margin = [best_margin(name, direction, scale, cap) / cap for cap in conditions]
+            margins.append(Line(conditions, margin, color=colour, dash=dash, marker="."))
+    ticks = {-1e4: "−10⁴", -1e2: "−10²", -1.0: "−1", 0.0: "0", 1.0: "1", 1e2: "10²"}
+    left = Panel(
+        margins,
+        Axis("allowed condition number κ of P [1]", scale="log"),
+        Axis("best margin / κ [1/s]", scale="symlog", ticks=ticks, linear=1e-3),
+        "constant P",
+    )
+    between = "affine P, vertices only, z in metres"
+    return Figure(
+        "conditioning",
+        "Left: the largest margin of the Lyapunov inequality that a constant P with I ≤ P ≤ κ I reaches, over the "
+        "allowed condition number κ, with the bristle deflection in metres (dashed) and multiplied by its natural "
+        "scale g (solid); below zero there is no certificate (logarithmic beyond ±0.001). Right: an affine P(ω) "
+        "that a solver accepts at the four vertices of wheel speed and acceleration lets V grow between them. "
+        "Printed gains of P1 and P3.",
+        "Left: unscaled margins become positive only at condition numbers of 1e4 to 1e5, scaled ones at once. "
+        "Right: growth rates below zero at both ends and up to 280 per second in between.",
+        [left, Panel(growth, Axis(SPEED, 0.0, STATED_SPEED), "growth rate of V [1/s]", between)],
+        size=(7.2, 3.6),
+        legend="below",
+    )

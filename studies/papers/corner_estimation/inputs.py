@@ -1,25 +1,27 @@
-"""What the claims of P1 start from: models, printed gains and matrices, and numbers that no parameter set holds."""
+"""What the claims of P1 start from: models, printed gains and matrices, and values that no parameter set holds."""
 
 from __future__ import annotations
 
-import tomllib
 from functools import cache
-from importlib import resources
-from typing import Any
+from typing import TypeVar
 
-from studies.claim import JsonValue
-from studies.papers.published import published_claims
+import numpy as np
+import sympy as sp
+from numpy.typing import ArrayLike
+
 from synthesis.errors import SpecError
 from synthesis.models.catalogue.corner import Direction, corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import ParameterSet, Published, load_parameter_set
+from synthesis.polynomials.matrix import FloatArray
 
+T = TypeVar("T")
 PACKAGE = "studies.papers.corner_estimation"
 PARAMETERS = "corner-estimation"
 DIRECTIONS: tuple[Direction, ...] = ("longitudinal", "lateral")
-STATED_SPEED = 180.0  # rad/s, P1 section 6: the range that the stability claims name
-DESIGN_SPEED = 140.0  # rad/s, P1 section 6.2: the range that the gains are designed on
-FORCE_GAINS = (1.8, 11.4, 50.6)  # eta_1 [N s], eta_2 [N m], eta_3 [1/s], P1 section 2
+STATED_SPEED = 180.0  # rad/s: the range that the stability claims name, text before (29)
+DESIGN_SPEED = 140.0  # rad/s: the range that the gains are designed on, text after (32)
+SPEED = "wheel speed [rad/s]"  # the axis of most figures
 
 # The parameter sets with printed gains that the stability claims are about: (name, direction).
 DESIGNS: tuple[tuple[str, Direction], ...] = (
@@ -31,7 +33,7 @@ PAPER = {PARAMETERS: "P1", "resilient-velocity": "P3"}  # whose gains they are
 
 @cache
 def parameters(name: str = PARAMETERS) -> ParameterSet:
-    """A shipped parameter set; the values of P1 unless told otherwise."""
+    """A shipped parameter set; the values of P1 unless another one is named."""
     return load_parameter_set(name)
 
 
@@ -41,37 +43,44 @@ def corner_model(direction: Direction, maximum: float = STATED_SPEED, name: str 
     return corner_velocity_model(parameters(name), direction, maximum)
 
 
-def published(direction: Direction, name: str = PARAMETERS) -> Published:
-    """Gains, gain box and Lyapunov matrix as printed. Raises SpecError for a set that prints nothing."""
-    found = parameters(name).tire[direction].published
-    if found is None:
-        raise SpecError(f"parameter set '{name}' prints nothing for the {direction} tire")
-    return found
+def constants(direction: Direction) -> dict[str, float]:
+    """sigma0, sigma1, sigma2, kappa and effective_radius of the corner model, in its units."""
+    return {name: constant.value for name, constant in corner_model(direction).constants.items()}
+
+
+def exact_constants(direction: Direction, name: str = PARAMETERS) -> dict[str, sp.Rational]:
+    """The constants of the corner model as the rational numbers of their printed decimals."""
+    model = corner_model(direction, STATED_SPEED, name)
+    return {key: sp.Rational(str(constant.value)) for key, constant in model.constants.items()}
+
+
+def error_matrices(direction: Direction, omega: ArrayLike, name: str = PARAMETERS) -> FloatArray:
+    """A_e = A - L C of (25), (39) with the printed gains at wheel speeds (g,) in rad/s: (g, 2, 2) in 1/s, m and s."""
+    gain = np.array(printed_gains(direction, name))[:, None]
+    return corner_model(direction, STATED_SPEED, name).on(np.asarray(omega)).error_dynamics(gain)[0]
 
 
 def printed_gains(direction: Direction, name: str = PARAMETERS) -> tuple[float, ...]:
-    """[L1 in m/s, L2 in m/s^2] that the stability claims are about."""
-    gains = published(direction, name).gains
-    if gains is None:
-        raise SpecError(f"parameter set '{name}' prints no {direction} gains")
-    return gains
+    """[L1 in m/s, L2 in m/s^2] that the stability claims are about. Raises SpecError where none are printed."""
+    return _given(_published(direction, name).gains, f"{direction} gains in '{name}'")
 
 
 def printed_box(direction: Direction) -> tuple[tuple[float, float], ...]:
     """The printed box of gains: (lowest, highest) of L1 and of L2."""
-    box = published(direction).gain_box
-    if box is None:
-        raise SpecError(f"parameter set '{PARAMETERS}' prints no {direction} gain box")
-    return box
+    return _given(_published(direction).gain_box, f"{direction} gain box")
 
 
-def printed_value(claim_id: str, package: str = PACKAGE) -> JsonValue:
-    """What the paper prints for a claim, from ``claims.toml``."""
-    return published_claims(package)[claim_id].published
+def printed_matrix(direction: Direction) -> list[list[list[str]]]:
+    """[P0, P1] of (29) or (41) as printed decimals."""
+    matrix = _given(_published(direction).lyapunov, f"{direction} Lyapunov matrix")
+    return [[list(row) for row in coefficient] for coefficient in matrix]
 
 
-@cache
-def printed_numbers() -> dict[str, Any]:
-    """Printed tables and values by name, from ``printed.toml``."""
-    text = (resources.files(PACKAGE) / "printed.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
+def _published(direction: Direction, name: str = PARAMETERS) -> Published:
+    return _given(parameters(name).tire[direction].published, f"{direction} design in '{name}'")
+
+
+def _given(value: T | None, what: str) -> T:
+    if value is None:
+        raise SpecError(f"no {what} is printed")
+    return value

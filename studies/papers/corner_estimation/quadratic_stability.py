@@ -23,6 +23,7 @@ from studies.papers.corner_estimation.inputs import (
     PARAMETERS,
     STATED_SPEED,
     corner_model,
+    exact_constants,
     printed_box,
     printed_gains,
 )
@@ -39,7 +40,7 @@ from synthesis.stability import affine_quadratic_stability
 
 TOPIC = Topic(PACKAGE)
 # Affine P with multi-convexity at the vertices, affine P on the continuum, constant P: (name, relaxation, degree).
-ROADS: tuple[tuple[str, Relaxation, int], ...] = (
+LMI_FORMS: tuple[tuple[str, Relaxation, int], ...] = (
     ("with multi-convexity", "vertex", 1), ("without", "exact", 1), ("constant P", "exact", 0),
 )  # fmt: skip
 Span = tuple[float, float]
@@ -82,8 +83,7 @@ def diagonal_proof(
 def exact_matrices(direction: Direction, box: Box, name: str, speeds: Span) -> list[sp.Matrix]:
     """A_e at every vertex of wheel speed and gains, in rational numbers read from the printed decimals."""
     model = corner_model(direction, STATED_SPEED, name)
-    values = {key: sp.Rational(str(constant.value)) for key, constant in model.constants.items()}
-    A, C = (sp.Matrix(matrix.subs(values)) for matrix in (model.A, model.C))
+    A, C = (sp.Matrix(matrix.subs(exact_constants(direction, name))) for matrix in (model.A, model.C))
     ends = [sorted({sp.Rational(str(end)) for end in span}) for span in (speeds, *box)]
     return [(A - sp.Matrix([first, second]) * C).subs("wheel_speed", w) for w, first, second in product(*ends)]
 
@@ -118,7 +118,7 @@ def _round(value: float, digits: int = 2) -> int:
 
 @TOPIC.claim("P1-aqs-feas")
 def printed_gains_are_stable(gains: dict[tuple[str, Direction], tuple[float, ...]] | None = None) -> Finding:
-    """(28), (40) by LMI on three roads, and a constant diagonal P in exact arithmetic, for the gains of P1 and of P3."""
+    """(28), (40) by three LMIs, and a constant diagonal P in exact arithmetic, for the gains of P1 and of P3."""
     computed: dict[str, JsonValue] = {}
     holds = []
     for key in DESIGNS:
@@ -126,13 +126,13 @@ def printed_gains_are_stable(gains: dict[tuple[str, Direction], tuple[float, ...
         given = printed_gains(direction, name) if gains is None else gains[key]
         model, column = corner_model(direction, STATED_SPEED, name), np.array(given)[:, None]
         verdicts = {
-            road: affine_quadratic_stability(model, column, degree, settings=LmiSettings(relaxation=relaxation)).verdict
-            for road, relaxation, degree in ROADS
+            form: affine_quadratic_stability(model, column, degree, settings=LmiSettings(relaxation=relaxation)).verdict
+            for form, relaxation, degree in LMI_FORMS
         }
         proof = diagonal_proof(direction, tuple((gain, gain) for gain in given), name)
         holds.append(proof.proved and all(verdict is Proof.CERTIFIED for verdict in verdicts.values()))
         computed[f"{PAPER[name]} {direction}"] = {
-            "gains": list(given), "lmi": {road: str(verdict) for road, verdict in verdicts.items()},
+            "gains": list(given), "lmi": {form: str(verdict) for form, verdict in verdicts.items()},
             "weights_of_diag_w_1": [proof.low, proof.high], "weight": proof.chosen, "proved_exactly": proof.proved,
         }  # fmt: skip
     weights = ", ".join(f"{entry['weight']:,}" for entry in computed.values())

@@ -6,17 +6,19 @@ Seconds belong to a machine and to its load, so they decide nothing: `solve_seco
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from studies.claim import ClaimFunction, Finding, JsonValue
-from studies.papers.corner_estimation.hinf import POINTS, literal_design
-from studies.papers.corner_estimation.inputs import DESIGN_SPEED, corner_model
+from studies.claim import Finding, JsonValue
+from studies.papers.corner_estimation.hinf_optimum import POINTS, literal_design
+from studies.papers.corner_estimation.inputs import DESIGN_SPEED, PACKAGE, corner_model
+from studies.papers.topic import Topic
 from studies.papers.verdicts import derived
+from studies.study import Cell, PartResult, Scope, Table
 from synthesis.hinf_observer import observer_problem
 from synthesis.lmi.conic import ConicData, assemble
 from synthesis.lmi.problem import LmiProblem
@@ -25,6 +27,7 @@ from synthesis.lmi.scaling import observer_scale
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import solve
 
+TOPIC = Topic(PACKAGE)
 ROUNDING = 1e-12  # relative: all that two assemblies of the same numbers may differ by
 
 
@@ -63,13 +66,14 @@ def expressions(problem: Any) -> int:
     return sum(nodes(constraint) for constraint in problem.constraints)
 
 
+@TOPIC.claim("P1-hinf-time")
 def solve_size(
     points: int = POINTS,
     degree: int = 1,
     layer: Callable[[RelaxedProblem], Any] = one_by_one,
     walked: Callable[[Any], int] = expressions,
 ) -> Finding:
-    """Count (30) on both roads and in its exact form, on `points` wheel speeds and on twice as many."""
+    """Count (30) in both assemblies and in its exact form, on `points` wheel speeds and on twice as many."""
     grid, finer = (relaxed_problem(number, degree, "grid") for number in (points, 2 * points))
     exact, again = (assemble(relaxed_problem(number, degree, "exact")) for number in (points, 2 * points))
     direct, modelled = assemble(grid), layer(grid)
@@ -77,15 +81,12 @@ def solve_size(
     arrays = {"points": len(grid.sampled), "twice_the_points": len(finer.sampled)}
     same = _hands_over(modelled, direct)
     computed: dict[str, JsonValue] = {
-        "points": points,
-        "degree": degree,
-        "conic_problem": _size(direct),
+        "points": points, "degree": degree, "conic_problem": _size(direct),
         "layer_hands_over_the_same_problem": same,
         "expressions_walked_by_the_layer": work,
         "arrays_stacked_by_direct_assembly": arrays,
-        "exact_relaxation": _size(exact),
-        "exact_relaxation_with_twice_the_points": _size(again),
-    }
+        "exact_relaxation": _size(exact), "exact_relaxation_with_twice_the_points": _size(again),
+    }  # fmt: skip
     grows = work["twice_the_points"] - work["points"] >= points and arrays["twice_the_points"] == arrays["points"]
     smaller = _size(exact) == _size(again) and exact.A.shape[0] < direct.A.shape[0]
     reading = (
@@ -104,7 +105,7 @@ def solve_size(
 
 
 def solve_seconds(points: int = POINTS, degree: int = 1) -> dict[str, dict[str, float]]:
-    """Seconds of one solve of (30) on both roads, on this machine as busy as it is: for the report, not for a verdict."""
+    """Seconds of one solve of (30) by both assemblies, on this machine as busy as it is: for the report, not for a verdict."""
     problem, settings = conic_problem(points, degree)
     measured: dict[str, dict[str, float]] = {}
     for name, solver in (("cvxpy", "cvxpy:CLARABEL"), ("direct", "CLARABEL")):
@@ -132,4 +133,39 @@ def _hands_over(problem: Any, direct: ConicData) -> bool:
     return all(float(np.abs(a - b).max()) <= ROUNDING * float(np.abs(b).max()) for a, b in pairs)
 
 
-CLAIMS: dict[str, ClaimFunction] = {"P1-hinf-time": solve_size}
+@TOPIC.part("solve-time", "Preparing and solving the H-infinity problem", 8.0)
+def solve_time(scope: Scope) -> PartResult:
+    """How large (30) is for a solver, counted; and the seconds of this run, for information."""
+    claims = TOPIC.found()
+    points = 40 if scope.quick else POINTS
+    return PartResult(claims, [size_table(claims[0].finding), time_table(points, solve_seconds(points))])
+
+
+def size_table(finding: Finding) -> Table:
+    """Unknowns, rows and cones of (30) point by point and in its exact form."""
+    found = finding.computed
+    rows: list[list[Cell]] = []
+    for name, size in (
+        (f"{found['points']} points, one by one", found["conic_problem"]),
+        ("exact relaxation", found["exact_relaxation"]),
+    ):
+        cones = ", ".join(f"{number} of {shape}" for shape, number in size["cones"].items())
+        rows.append([name, size["unknowns"], size["rows"], sum(size["cones"].values()), cones])
+    caption = (
+        f"(30) as the solver sees it, degree {found['degree']}, longitudinal: unknowns, rows and positive semidefinite "
+        "cones. The exact relaxation holds between the points, too, and does not grow with their number."
+    )
+    return Table("solve-size", caption, ["form", "unknowns [1]", "rows [1]", "cones [1]", "their sizes"], rows)
+
+
+def time_table(points: int, measured: Mapping[str, Mapping[str, float]]) -> Table:
+    """Preparation and solver time of both assemblies."""
+    names = {"cvxpy": "cvxpy, then Clarabel", "direct": "conic data assembled directly, Clarabel"}
+    rows: list[list[Cell]] = [
+        [name, measured[key]["preparation_s"], measured[key]["solver_s"]] for key, name in names.items()
+    ]
+    caption = (
+        f"Seconds of one solve of (30), {points} points, degree 1, longitudinal, measured in this run on this machine, "
+        "which may be doing other things: information, and no part of any claim."
+    )
+    return Table("solve-time", caption, ["road", "preparation [s]", "solver [s]"], rows)
