@@ -12,8 +12,7 @@ import pytest
 
 from analysis.norms import hinf_norm
 from studies.claim import Verdict
-from studies.papers.corner_estimation.gain_curves import fitted, schedule
-from studies.papers.corner_estimation.hinf_optimum import optima, signed_model, velocity_floor
+from studies.papers.corner_estimation.hinf_design import OMEGA, fitted, optima, schedule, signed_model, velocity_floor
 from studies.papers.corner_estimation.inputs import PACKAGE, corner_model, printed_gains
 from studies.papers.corner_estimation.sigma_points import filter_lag
 from studies.papers.corner_estimation.solve_size import expressions, one_by_one, relaxed_problem, solve_size
@@ -32,9 +31,9 @@ def test_gamma_lies_between_the_floor_and_the_frozen_norms() -> None:
     for direction in PRINT:
         for found in optima(direction):
             model = corner_model(direction, 140.0)
-            A_e, B_e = model.on(found.omega).error_dynamics(found.gains[..., None])
+            A_e, B_e = model.on(OMEGA).error_dynamics(found.gain(OMEGA))
             norm = hinf_norm(A_e, B_e[..., :2], np.eye(2)).norm
-            floor = velocity_floor(direction, "corrected", found.omega)
+            floor = velocity_floor(direction, "corrected", OMEGA)
             assert (norm >= floor * (1 - 1e-9)).all()
             assert norm.max() <= found.gamma * (1 + 1e-7)
             assert floor.max() == 1.0

@@ -62,11 +62,10 @@ def weight_readings(names_axle: bool = False) -> Finding:
         "example": {str(key): float(value) for key, value in example.items()},
     }  # fmt: skip
     reading = (
-        f"(34) runs from {ends[0]} to {ends[1]} and is {at_threshold} at the threshold: both axles stay within "
-        f"[W_lb, W_ub] and are equal there only if W_s = {needed[mean]} and W_lb = {needed[low]}. lambda_am is the "
-        "same for both axles, so the formula does not say which of them gets W and which 1 - W: with W_lb = "
-        f"{shipped.lower:g}, W_ub = {shipped.upper:g} the two readings differ by up to {spread:.2g}. No "
-        "values are printed."
+        f"(34) runs from {ends[0]} to {ends[1]} and is {at_threshold} at the threshold: both axles stay within [W_lb, "
+        f"W_ub] and are equal there only if W_s = {needed[mean]} and W_lb = {needed[low]}. lambda_am is the same for "
+        f"both axles, so the formula does not say which of them gets W and which 1 - W: with W_lb = {shipped.lower:g}, "
+        f"W_ub = {shipped.upper:g} the two readings differ by up to {spread:.2g}. No values are printed."
     )
     return Finding(computed, under_specified(spread, 1e-9, needed[mean] == sp.Rational(1, 2)), reading)
 
@@ -98,7 +97,6 @@ def table_figure(rows: Sequence[Sequence[Any]]) -> Figure:
         "limit that its text states for all of them. Two lateral values of the rear-driven car exceed it.",
         "Bars per drive; two lateral bars, 7.6 and 7.15 percent, pass the line at 6.3 percent.",
         Panel(marks, "normalised error as printed [%]", Axis("drive [as in Table III]", ticks=names)),
-        size=(7.2, 3.8),
         legend="below",
     )
 

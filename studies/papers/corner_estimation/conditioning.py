@@ -5,8 +5,6 @@ Without scaling it misses certificates that exist and accepts false ones.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from studies.claim import Finding, JsonValue
@@ -26,7 +24,7 @@ from studies.plots import ZERO, Axis, Dash, Figure, Line, Mark, Panel
 from studies.plots.colours import CURVES, GREY
 from studies.study import PartResult, Scope, Table
 from synthesis.lmi.problem import LmiProblem
-from synthesis.lmi.result import Verdict
+from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
 from synthesis.models.catalogue.corner import Direction
@@ -57,34 +55,24 @@ def best_margin(name: str, direction: Direction, scale: float, condition: float)
     return float("nan") if found.objective is None else found.objective
 
 
-@dataclass(frozen=True)
-class VertexSolve:
-    """An affine P that satisfies (28) at both ends of range and rate, without multi-convexity and without scaling.
+def vertices_only(name: str, direction: Direction) -> tuple[LmiResult, FloatArray, FloatArray]:
+    """An affine P, asked of a solver at the four vertices of (omega, rate) alone, without multi-convexity and scaling.
 
-    `growth` (g,) is the largest growth rate of V in 1/s at the wheel speeds `omega` (g,): above zero the certificate is
+    Returns its answer and, at wheel speeds (g,), the largest growth rate of V in 1/s (g,): above zero the certificate is
     false, whatever the solver said.
     """
-
-    status: str
-    verdict: Verdict
-    omega: FloatArray
-    growth: FloatArray
-
-
-def vertices_only(name: str, direction: Direction, points: int = 361) -> VertexSolve:
-    """Ask a solver for (28) at the four vertices of (omega, rate) alone, then look between them."""
     problem = _problem(name, direction, np.ones(2), degree=1, margin=False)
     problem.require("P > 0", problem.unknowns["P"])
     found = solve(problem, LmiSettings(relaxation="grid", points=2))
     constant, slope = physical(corner_model(direction, STATED_SPEED, name), found, "P")
-    omega = np.linspace(0.0, STATED_SPEED, points)
+    omega = np.linspace(0.0, STATED_SPEED, 361)
     P = constant + omega[:, None, None] * slope
     product = P @ error_matrices(direction, omega, name)
     total = product + np.swapaxes(product, 1, 2)
     relative = [
         np.linalg.eigvals(np.linalg.solve(P, total + rate * slope)).real.max(axis=1) for rate in (-800.0, 800.0)
     ]
-    return VertexSolve(found.report.status, found.verdict, omega, np.maximum(*relative))
+    return found, omega, np.maximum(*relative)
 
 
 def _problem(name: str, direction: Direction, scale: FloatArray, degree: int, margin: bool) -> LmiProblem:
@@ -104,15 +92,16 @@ def scaling(scaled: bool = True) -> Finding:
     """Margins with a cap on cond(P), in the units of the model and with z scaled; and what vertices alone prove."""
     computed: dict[str, JsonValue] = {}
     for name, direction in DESIGNS:
-        g, loose = natural_scale(name, direction), vertices_only(name, direction)
+        g = natural_scale(name, direction)
+        loose, omega, growth = vertices_only(name, direction)
         computed[f"{PAPER[name]} {direction}"] = {
             "scale_of_z": g,
             "natural_condition_number": g * g,
             "margin_unscaled": {f"{cap:g}": best_margin(name, direction, 1.0, cap) for cap in CAPS},
             f"margin_scaled_condition_{BALANCED:g}": best_margin(name, direction, g if scaled else 1.0, BALANCED),
             "vertices_only": {
-                "solver": loose.status, "verdict": str(loose.verdict), "largest_growth_1_s": float(np.max(loose.growth)),
-                "at_rad_s": float(loose.omega[np.argmax(loose.growth)]), "certified": loose.verdict is Verdict.CERTIFIED,
+                "solver": loose.report.status, "verdict": str(loose.verdict), "largest_growth_1_s": float(growth.max()),
+                "at_rad_s": float(omega[growth.argmax()]), "certified": loose.verdict is Verdict.CERTIFIED,
             },
         }  # fmt: skip
     rows = list(computed.values())
@@ -132,15 +121,10 @@ def scaling(scaled: bool = True) -> Finding:
 
 @TOPIC.part("conditioning", "Units decide whether a certificate is found", 2.0)
 def conditioning(scope: Scope) -> PartResult:
-    """Scaling of the Lyapunov search."""
-    claims = TOPIC.found()
-    return PartResult(claims, [conditioning_table(claims[0].finding)], [conditioning_figure(7 if scope.quick else 13)])
-
-
-def conditioning_table(finding: Finding) -> Table:
     """Natural scale, margins with and without it, and what vertices alone prove."""
+    claims = TOPIC.found()
     rows = []
-    for name, entry in finding.computed.items():
+    for name, entry in claims[0].finding.computed.items():
         loose = entry["vertices_only"]
         rows.append([name, entry["scale_of_z"], entry["natural_condition_number"], *entry["margin_unscaled"].values(),
                      entry[f"margin_scaled_condition_{BALANCED:g}"], loose["solver"], loose["largest_growth_1_s"],
@@ -152,7 +136,8 @@ def conditioning_table(finding: Finding) -> Table:
     )
     columns = ["design", "g [1/s]", "g^2 [1/s^2]", "margin, kappa 1e3", "margin, kappa 1e4", "margin with g, kappa 2",
                "solver at the vertices", "largest growth rate [1/s]", "at [rad/s]"]  # fmt: skip
-    return Table("conditioning", caption, columns, rows)
+    figure = conditioning_figure(7 if scope.quick else 13)
+    return PartResult(claims, [Table("conditioning", caption, columns, rows)], [figure])
 
 
 def conditioning_figure(caps: int = 13) -> Figure:
@@ -161,19 +146,17 @@ def conditioning_figure(caps: int = 13) -> Figure:
     margins: list[Mark] = [ZERO, Line([], [], "z scaled by g", GREY), Line([], [], "z in metres", GREY, "dashed")]
     growth: list[Mark] = [ZERO]
     for (name, direction), colour in zip(DESIGNS, CURVES, strict=False):
-        loose = vertices_only(name, direction)
-        growth.append(Line(loose.omega, loose.growth, f"{PAPER[name]} {direction}", colour))
+        _, *curve = vertices_only(name, direction)
+        growth.append(Line(*curve, f"{PAPER[name]} {direction}", colour))
         dashes: dict[Dash, float] = {"dashed": 1.0, "solid": natural_scale(name, direction)}
         for dash, scale in dashes.items():
             # Relative to the trivial growth of the margin with P itself, so that the sign is what one sees.
             margin = [best_margin(name, direction, scale, cap) / cap for cap in conditions]
             margins.append(Line(conditions, margin, color=colour, dash=dash, marker="."))
     ticks = {-1e4: "−10⁴", -1e2: "−10²", -1.0: "−1", 0.0: "0", 1.0: "1", 1e2: "10²"}
-    left = Panel(
-        margins,
+    x, y = (
         Axis("allowed condition number κ of P [1]", scale="log"),
         Axis("best margin / κ [1/s]", scale="symlog", ticks=ticks, linear=1e-3),
-        "constant P",
     )
     between = "affine P, vertices only, z in metres"
     return Figure(
@@ -185,7 +168,9 @@ def conditioning_figure(caps: int = 13) -> Figure:
         "Printed gains of P1 and P3.",
         "Left: unscaled margins become positive only at condition numbers of 1e4 to 1e5, scaled ones at once. "
         "Right: growth rates below zero at both ends and up to 280 per second in between.",
-        [left, Panel(growth, Axis(SPEED, 0.0, STATED_SPEED), "growth rate of V [1/s]", between)],
-        size=(7.2, 3.6),
+        [
+            Panel(margins, x, y, "constant P"),
+            Panel(growth, Axis(SPEED, 0.0, STATED_SPEED), "growth rate of V [1/s]", between),
+        ],
         legend="below",
     )

@@ -88,31 +88,24 @@ def absolute_value(signed: bool = True) -> Finding:
     }  # fmt: skip
     reading = (
         f"The output follows from (20), which has |omega|. At {-BACKWARD:g} rad/s the printed form agrees; at "
-        f"{BACKWARD:g} rad/s its first entry is off by {backward:.4g} 1/m, {100 * share:.0f} % of its value. "
-        f"Signs in A as well would let the bristle grow at {decay:.4g} 1/s. |omega| must stand in all of them, as "
-        "P3 (6) has it."
+        f"{BACKWARD:g} rad/s its first entry is off by {backward:.4g} 1/m, {100 * share:.0f} % of its value. Signs in "
+        f"A as well would let the bristle grow at {decay:.4g} 1/s. |omega| must stand in all of them, as P3 (6) has it."
     )
     return Finding(computed, erratum(sp.simplify(printed - derived) == 0, forward == 0.0), reading)
 
 
 @TOPIC.part("error-matrix", "Error dynamics of the velocity observer", 2.0)
 def error_matrix(scope: Scope) -> PartResult:
-    """Poles of the velocity observer, and the misprints of (26) and (23)."""
-    return PartResult(TOPIC.found(), [pole_table()], [pole_figure()])
-
-
-def pole_table() -> Table:
-    """Both frozen error poles with the printed gains at five wheel speeds."""
+    """The misprints of (26) and (23), and both poles of the velocity observer at five wheel speeds."""
     rows, columns = [[omega] for omega in SPEEDS], [SPEED]
     for direction in DIRECTIONS:
         for row, poles in zip(rows, np.linalg.eigvals(error_matrices(direction, SPEEDS)), strict=True):
             first, second = sorted(poles, key=lambda pole: (pole.real, -pole.imag))
             row.extend([float(first.real), float(second.real), float(abs(first.imag))])
-        parts = ("faster real part", "slower real part", "imaginary part +-")
-        columns += [f"{direction}, {part} [1/s]" for part in parts]
+        columns += [f"{direction}, {p} [1/s]" for p in ("faster real part", "slower real part", "imaginary part +-")]
     gains = " and ".join(str(list(printed_gains(direction))) for direction in DIRECTIONS)
     caption = f"Poles of the velocity observer error A - L C with the printed gains {gains} at constant wheel speed."
-    return Table("poles", caption, columns, rows)
+    return PartResult(TOPIC.found(), [Table("poles", caption, columns, rows)], [pole_figure()])
 
 
 def pole_figure() -> Figure:
@@ -122,11 +115,9 @@ def pole_figure() -> Figure:
     for direction in DIRECTIONS:
         right, wrong = (poles_with(entry, direction, omega) for entry in (derived_entry(), PRINTED_ENTRY))
         marks: list[Mark] = [
-            Line(omega, right, "A − L C (corrected entry)"),
-            Line(omega, wrong, "A₀ as printed in (26)", RED, "dashed"),
-            ZERO,
-            dots([0.0], [wrong[0, 1]], color=RED),
-        ]
+            Line(omega, right, "A − L C (corrected entry)"), Line(omega, wrong, "A₀ as printed in (26)", RED, "dashed"),
+            ZERO, dots([0.0], [wrong[0, 1]], color=RED),
+        ]  # fmt: skip
         first, second = printed_gains(direction)
         title = f"{direction}, L = [{first:g}, {second:g}]"
         panels.append(Panel(marks, Axis(SPEED, 0.0, STATED_SPEED), "real part of the poles [1/s]", title))
@@ -138,6 +129,5 @@ def pole_figure() -> Figure:
         "Two panels, longitudinal and lateral. Corrected poles stay below zero; the printed ones reach zero at "
         "standstill.",
         panels,
-        size=(7.2, 3.4),
         legend="below",
     )

@@ -10,6 +10,8 @@ import sympy as sp
 from numpy.typing import ArrayLike
 
 from synthesis.errors import SpecError
+from synthesis.hinf_observer import Channel, ObserverDesign
+from synthesis.lmi.settings import LmiSettings
 from synthesis.models.catalogue.corner import Direction, corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import ParameterSet, Published, load_parameter_set
@@ -28,6 +30,8 @@ DESIGNS: tuple[tuple[str, Direction], ...] = (
     (PARAMETERS, "longitudinal"), (PARAMETERS, "lateral"),
     ("resilient-velocity", "longitudinal"), ("resilient-velocity", "lateral"),
 )  # fmt: skip
+POINTS = 140  # wheel speeds on the design range, text after (32)
+STATES = ("bristle_deflection", "relative_velocity")  # of the corner model
 PAPER = {PARAMETERS: "P1", "resilient-velocity": "P3"}  # whose gains they are
 
 
@@ -58,6 +62,12 @@ def error_matrices(direction: Direction, omega: ArrayLike, name: str = PARAMETER
     """A_e = A - L C of (25), (39) with the printed gains at wheel speeds (g,) in rad/s: (g, 2, 2) in 1/s, m and s."""
     gain = np.array(printed_gains(direction, name))[:, None]
     return corner_model(direction, STATED_SPEED, name).on(np.asarray(omega)).error_dynamics(gain)[0]
+
+
+def literal_design(degree: int, errors: tuple[str, ...] = STATES, points: int = POINTS) -> ObserverDesign:
+    """(30)-(32) and nothing else: one channel from both disturbances to the errors C_e, minimised."""
+    channel = Channel(("friction", "acceleration_error"), errors)
+    return ObserverDesign((channel,), degree, settings=LmiSettings(relaxation="grid", points=points))
 
 
 def printed_gains(direction: Direction, name: str = PARAMETERS) -> tuple[float, ...]:

@@ -84,20 +84,17 @@ def _corners(loads: Loads) -> dict[str, float]:
 
 @TOPIC.part("loads", "Vertical loads")
 def loads(scope: Scope) -> PartResult:
-    """Vertical loads."""
+    """Static loads of the corners and their transfer per unit of acceleration."""
     claims = TOPIC.found()
-    return PartResult(claims, [load_table(claims[0].finding)], [load_figure()])
-
-
-def load_table(finding: Finding) -> Table:
-    """Static loads and transfer per unit of acceleration."""
-    static, along, across = (finding.computed[key] for key in ("static_N", "per_unit_a_x_N", "per_unit_a_y_N"))
+    static, along, across = (
+        claims[0].finding.computed[key] for key in ("static_N", "per_unit_a_x_N", "per_unit_a_y_N")
+    )
     rows = [
         [name.replace("_", " "), static[name], along[name.partition("_")[0]] / 2.0, across[name]] for name in CORNERS
     ]
     columns = ["corner", "static load [N]", "per m/s^2 of a_x [N]", "per m/s^2 of a_y [N]"]
     caption = "Corner loads of the level car of Table I by (15), (17), g = 9.81 m/s^2."
-    return Table("vertical-loads", caption, columns, rows)
+    return PartResult(claims, [Table("vertical-loads", caption, columns, rows)], [load_figure()])
 
 
 def load_figure() -> Figure:
@@ -120,7 +117,6 @@ def load_figure() -> Figure:
         "Loads change linearly: 518 newtons per axle and metre per second squared longitudinally, 457 and 471 per "
         "side laterally.",
         panels,
-        size=(7.2, 3.4),
         legend="below",
         share_y="all",
     )

@@ -59,10 +59,9 @@ def lateral_force_rank(third_output: str = "yaw_acceleration") -> Finding:
     computed = {"determinant": determinant, "ranks": found, "ranks_with_r_as_third_output": without}
     reading = (
         f"With (a_x, a_y, dr/dt) as outputs the determinant at a constant angle is {determinant}: rank "
-        f"{found['steering']} while steering and {found['straight']} at delta = k pi, where the right-left "
-        "difference of the front forces is hidden. Steering through straight ahead shows it (rank "
-        f"{found['through_straight']}). With r itself as third output, as printed, the yaw row is missing and the "
-        f"rank is {without['steering']}."
+        f"{found['steering']} while steering and {found['straight']} at delta = k pi, where the right-left difference "
+        f"of the front forces is hidden. Steering through straight ahead shows it (rank {found['through_straight']}). "
+        f"With r itself as third output, as printed, the yaw row is missing and the rank is {without['steering']}."
     )
     return Finding(computed, judged(only_sine and found["steering"] == 3 and found["straight"] == 2), reading)
 
@@ -88,21 +87,16 @@ def force_figure() -> Figure:
     marks: list[Mark] = [Line(degrees, np.abs(function(np.deg2rad(degrees))) / full)]
     for angle in (0.02, 0.08):
         share, place = abs(float(function(angle))) / full, np.rad2deg(angle)
-        marks += [
-            dots([place], [share], color=RED, size=4.0),
-            Words(place, share, f"{angle:g} rad: {share:.1e}", offset=(8, -10)),
-        ]
+        text = Words(place, share, f"{angle:g} rad: {share:.1e}", offset=(8, -10))
+        marks += [dots([place], [share], color=RED), text]
+    y = Axis("determinant, share of its value at 90° [1]", scale="log")
     return Figure(
         "force-observability",
         "Determinant of the output matrix of the lateral force model (outputs a_x, a_y and yaw acceleration) over "
         "the steering angle: it falls with the square of the sine and is zero straight ahead, where the right-left "
         "difference of the front forces cannot be seen. P1 (10), (12).",
         "A straight line of slope two on logarithmic axes: four ten-thousandths of its largest value at 0.02 radians.",
-        Panel(
-            marks,
-            Axis("steering angle [deg]", scale="log"),
-            Axis("determinant, share of its value at 90° [1]", scale="log"),
-        ),
+        Panel(marks, Axis("steering angle [deg]", scale="log"), y),
         size=(4.8, 3.2),
     )
 
@@ -142,7 +136,6 @@ def velocity_figure() -> Figure:
         "hidden there, and decays by itself. Derived from P1 (22), (23), (36), (37).",
         "Longitudinally the determinant stays positive; laterally it crosses zero near 53 radians per second.",
         panels,
-        size=(7.2, 3.4),
         legend="below",
         share_y="all",
     )

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 import sympy as sp
+from numpy.typing import ArrayLike
 
 from studies.claim import Finding, JsonValue, judged
 from studies.papers.corner_estimation.inputs import (
@@ -103,22 +104,13 @@ def _negated(decimal: str) -> str:
     return decimal[1:] if decimal.startswith("-") else f"-{decimal}"
 
 
-def convexity(model: LpvModel, gain: FloatArray, slope: FloatArray, form: Form = "primal") -> FloatArray:
+def convexity(model: LpvModel, gain: ArrayLike, slope: ArrayLike, form: Form = "primal") -> FloatArray:
     """A1'P1 + P1 A1 (primal) or A1 Q1 + Q1 A1' (dual), with A1 the part of A_e linear in the wheel speed, (2, 2)."""
-    A_e = model.on([0.0, 1.0]).error_dynamics(gain)[0]
+    A_e = model.on([0.0, 1.0]).error_dynamics(np.asarray(gain, float))[0]
     A1 = A_e[1] - A_e[0]
     A1[:, 1] = 0.0  # exactly, as (26) has it; the difference above leaves rounding
-    product = A1.T @ slope if form == "primal" else A1 @ slope
+    product = (A1.T if form == "primal" else A1) @ np.asarray(slope, float)
     return np.asarray(product + product.T)
-
-
-def exact_convexity(direction: Direction, slope: list[list[str]]) -> sp.Matrix:
-    """A1'P1 + P1 A1 in rational numbers, from the printed decimals."""
-    model = corner_model(direction)
-    gain = sp.Matrix([sp.Rational(str(g)) for g in printed_gains(direction)])
-    A1 = (model.A - gain * model.C).diff("wheel_speed").subs(exact_constants(direction))
-    P1 = sp.Matrix([[sp.Rational(entry) for entry in row] for row in slope])
-    return A1.T * P1 + P1 * A1
 
 
 def primal(direction: Direction, matrix: Coefficients | None = None) -> Finding:
@@ -127,12 +119,10 @@ def primal(direction: Direction, matrix: Coefficients | None = None) -> Finding:
     inside, wide = offered.validity(), offered.validity(BEYOND)
     ends = offered.eigenvalues(np.array([0.0, STATED_SPEED])).max(axis=1)
     computed = {
-        "holds_everywhere": inside.everywhere,
-        "holds_on_rad_s": _listed(inside),
+        "holds_everywhere": inside.everywhere, "holds_on_rad_s": _listed(inside),
         f"holds_on_up_to_{BEYOND:g}_rad_s": _listed(wide),
-        "largest_eigenvalue_at_0_rad_s": float(ends[0]),
-        "largest_eigenvalue_at_180_rad_s": float(ends[1]),
-    }
+        "largest_eigenvalue_at_0_rad_s": float(ends[0]), "largest_eigenvalue_at_180_rad_s": float(ends[1]),
+    }  # fmt: skip
     reading = (
         f"As P of V = e'Pe the printed {NUMBERS[direction]} satisfies its inequality on {_words(wide)} "
         f"rad/s (searched up to {BEYOND:g} rad/s). The largest eigenvalue, to be negative, is {ends[0]:.4g} at "
@@ -152,12 +142,10 @@ def dual(direction: Direction, matrix: Coefficients | None = None) -> Finding:
     omega = np.linspace(0.0, STATED_SPEED, 1801)
     growth = offered.growth(omega)
     computed = {
-        "holds_everywhere": found.everywhere,
-        "holds_on_design_range": designed,
-        "holds_on_rad_s": _listed(found),
+        "holds_everywhere": found.everywhere, "holds_on_design_range": designed, "holds_on_rad_s": _listed(found),
         "largest_relative_eigenvalue_1_s": float(growth.max()),
         "at_wheel_speed_rad_s": float(omega[growth.argmax()]),
-    }
+    }  # fmt: skip
     reading = (
         f"Read as Q of V = e'Q^-1 e, {NUMBERS[direction]} proves stability on {_words(found)} of the "
         f"stated 0 to {STATED_SPEED:g} rad/s, at both bounds of the rate; relative to Q the largest eigenvalue is "
@@ -189,13 +177,14 @@ def printed_slopes_are_multi_convex(slopes: dict[Direction, list[list[str]]] | N
     for direction in DIRECTIONS:
         constant, slope = printed_matrix(direction)
         matrix = [constant, slopes[direction] if slopes else slope]
-        exact = exact_convexity(direction, matrix[1])
+        gain = sp.Matrix([sp.Rational(str(g)) for g in printed_gains(direction)])
+        model, P1 = corner_model(direction), sp.Matrix([[sp.Rational(entry) for entry in row] for row in matrix[1]])
+        A1 = (model.A - gain * model.C).diff("wheel_speed").subs(exact_constants(direction))
+        exact = A1.T * P1 + P1 * A1
         holds.append(bool(exact[0, 0] >= 0 and exact[1, 1] >= 0 and exact.det() >= 0))
         offered = {reading: certificate(direction, reading, matrix) for reading in READINGS}
         spread = {
-            reading: np.linalg.eigvalsh(
-                convexity(o.model, np.array(o.gains, float), np.array(o.matrix[1], float), o.form)
-            ).tolist()
+            reading: np.linalg.eigvalsh(convexity(o.model, o.gains, o.matrix[1], o.form)).tolist()
             for reading, o in offered.items()
         }
         computed[direction] = {"eigenvalues": spread, "determinant_as_printed": float(exact.det())}
@@ -212,12 +201,7 @@ def printed_slopes_are_multi_convex(slopes: dict[Direction, list[list[str]]] | N
 
 @TOPIC.part("printed-lyapunov", "What the printed Lyapunov matrices prove", 2.0)
 def printed_lyapunov(scope: Scope) -> PartResult:
-    """All claims about (29) and (41), and every reading in a table and a figure."""
-    return PartResult(TOPIC.found(), [reading_table()], [growth_figure()])
-
-
-def reading_table() -> Table:
-    """Every reading of both matrices: where it holds, and its largest growth rate on the stated range."""
+    """All claims about (29) and (41), and where each reading holds and how fast V grows at most."""
     rows: list[list[Cell]] = []
     for direction in DIRECTIONS:
         for reading, (name, *_) in READINGS.items():
@@ -233,23 +217,14 @@ def reading_table() -> Table:
     )
     columns = ["matrix", "direction", "reading", "holds on the whole range", "holds on [rad/s]",
                "largest growth rate [1/s]"]  # fmt: skip
-    return Table("lyapunov-readings", caption, columns, rows)
+    return PartResult(TOPIC.found(), [Table("lyapunov-readings", caption, columns, rows)], [growth_figure()])
 
 
 def growth_figure() -> Figure:
     """Growth rate of V over wheel speed in four readings of (29), (41)."""
     omega = np.linspace(0.0, STATED_SPEED, 721)
-    ticks = {
-        -1e3: "−10³",
-        -1e2: "−10²",
-        -10.0: "−10",
-        0.0: "0",
-        10.0: "10",
-        1e2: "10²",
-        1e3: "10³",
-        1e5: "10⁵",
-        1e7: "10⁷",
-    }
+    ticks = {-1e3: "−10³", -1e2: "−10²", -10.0: "−10", 0.0: "0", 10.0: "10", 1e2: "10²", 1e3: "10³",
+             1e5: "10⁵", 1e7: "10⁷"}  # fmt: skip
     y = Axis("largest growth rate of V [1/s]", -2e3, 5e7, "symlog", ticks, linear=10.0)
     panels = []
     for direction in DIRECTIONS:
@@ -259,10 +234,8 @@ def growth_figure() -> Figure:
             marks.append(Line(omega, offered.growth(omega), name, colour, dash, width))
             if reading == "dual":
                 for end in (w for span in offered.validity().intervals for w in span if 0.0 < w < STATED_SPEED):
-                    marks += [
-                        dots([end], [0.0], color=colour),
-                        Words(end, 0.0, f"{end:.1f}", offset=(-6, 6), horizontal="right"),
-                    ]
+                    text = Words(end, 0.0, f"{end:.1f}", offset=(-6, 6), horizontal="right")
+                    marks += [dots([end], [0.0], color=colour), text]
         panels.append(Panel(marks, Axis(SPEED, 0.0, STATED_SPEED), y, f"{direction}, {NUMBERS[direction]}"))
     return Figure(
         "printed-lyapunov",
@@ -274,6 +247,5 @@ def growth_figure() -> Figure:
         "As printed both matrices give growth rates of 1e5 to 1e7 per second; the dual reading is negative over "
         "the whole range longitudinally, and up to 162 rad/s laterally.",
         panels,
-        size=(7.2, 3.6),
         legend="below",
     )

@@ -191,13 +191,9 @@ def slowest_poles(direction: Direction, L1: FloatArray, L2: FloatArray, speeds: 
 def quadratic_stability(scope: Scope) -> PartResult:
     """Both claims, every proof in a table, and the boxes over the plane of gains."""
     claims = TOPIC.found()
-    return PartResult(claims, [proof_table(*(c.finding for c in claims))], [box_figure(41 if scope.quick else 81)])
-
-
-def proof_table(gains: Finding, boxes: Finding) -> Table:
-    """Constant diagonal P for the printed gains and for the printed boxes."""
+    gains, boxes = (claim.finding.computed for claim in claims)
     rows = []
-    for name, entry in (*gains.computed.items(), *((f"box of P1, {d}", e) for d, e in boxes.computed.items())):
+    for name, entry in (*gains.items(), *((f"box of P1, {d}", e) for d, e in boxes.items())):
         low, high = entry["weights_of_diag_w_1"]
         rows.append([name, float(low), float(high), entry["weight"], entry["proved_exactly"]])
     caption = (
@@ -206,7 +202,8 @@ def proof_table(gains: Finding, boxes: Finding) -> Table:
         "rational numbers."
     )
     columns = ["gains", "least w [1/s^2]", "greatest w [1/s^2]", "w checked [1/s^2]", "proved exactly"]
-    return Table("diagonal-proofs", caption, columns, rows)
+    table = Table("diagonal-proofs", caption, columns, rows)
+    return PartResult(claims, [table], [box_figure(41 if scope.quick else 81)])
 
 
 def box_figure(points: int = 81) -> Figure:
@@ -232,6 +229,5 @@ def box_figure(points: int = 81) -> Figure:
         "region; one constant Lyapunov matrix proves each of them, exactly. P1, text after (28) and (40).",
         "Contour maps of the slowest pole with the printed gain boxes inside the stable region.",
         panels,
-        size=(7.2, 3.6),
         legend="below",
     )

@@ -100,12 +100,7 @@ def filter_lag(process: float, measurement: float, newtons: float) -> float:
 
 @TOPIC.part("sigma-weights", "Sigma points and covariances of the lateral force filter", 1.0)
 def sigma_weights(scope: Scope) -> PartResult:
-    """Sigma point weights and covariances of the lateral force filter."""
-    return PartResult(TOPIC.found(), [weight_table(), filter_table()], [weight_figure()])
-
-
-def weight_table() -> Table:
-    """Sigma point weights of both papers, printed and corrected."""
+    """Weights of both papers in both forms, and the lag of the filter in every reading of its covariances."""
     rows = [
         [f"N = {n}", form, *map(str, (w.centre_mean, w.centre_spread, w.outer, w.total, w.second_moment))]
         for n in SIZES
@@ -117,11 +112,7 @@ def weight_table() -> Table:
     )
     columns = ["states", "form", "W0 of the mean", "W0 of the covariance", "W_i", "sum of the mean weights",
                "second moment"]  # fmt: skip
-    return Table("sigma-weights", caption, columns, rows)
-
-
-def filter_table() -> Table:
-    """Lag of the lateral force filter in every reading of its covariances."""
+    weight_table = Table("sigma-weights", caption, columns, rows)
     rows = [
         [entry["name"], unit, Q, R, filter_lag(Q, R, newtons)]
         for entry in printed_numbers(PACKAGE)["force_filter"]["readings"]
@@ -133,7 +124,8 @@ def filter_table() -> Table:
         "printed covariances Q I and R I: with forces in newtons it cannot follow a lane change, with kilonewtons "
         "it can. The unit is not printed."
     )
-    return Table("filter-lag", caption, ["covariances", "unit of force", "Q", "R", "time constant [s]"], rows)
+    columns = ["covariances", "unit of force", "Q", "R", "time constant [s]"]
+    return PartResult(TOPIC.found(), [weight_table, Table("filter-lag", caption, columns, rows)], [weight_figure()])
 
 
 def weight_figure() -> Figure:

@@ -80,10 +80,9 @@ def force_bound(eta3: float = ETA3, rate: float = DISTURBANCE_RATE) -> Finding:
     attained = abs(ramp / bound - 1.0) <= 1e-3
     printed = float(TOPIC.printed("P1-prop1"))
     reading = (
-        f"The bound is {bound:.8f} N, printed as about {printed:g} N. From {LATE:g} s on, when the wheel speed "
-        f"error has died out, the full error equation leaves {ramp:.5f} N under a ramp, which attains it, and at "
-        f"most {max(late.values()):.5f} N otherwise. The bound is asymptotic: before that e_omega drives the force "
-        "error."
+        f"The bound is {bound:.8f} N, printed as about {printed:g} N. From {LATE:g} s on, when the wheel speed error "
+        f"has died out, the full error equation leaves {ramp:.5f} N under a ramp, which attains it, and at most "
+        f"{max(late.values()):.5f} N otherwise. The bound is asymptotic: before that e_omega drives the force error."
     )
     return Finding(computed, judged(agrees(bound, printed, 0.5) and respected and attained), reading)
 
@@ -100,9 +99,8 @@ def error_figure() -> Figure:
     bound = force_observer_bound(ETA3, DISTURBANCE_RATE).ultimate
     marks: list[Mark] = [Line(time, force[:, k], name, CURVES[k], DASHES[k], 1.4) for k, name in enumerate(RUNS)]
     marks.append(Shade(-bound, bound, label=f"±{bound:.3f} N, the bound", alpha=0.18))
-    speed = Panel(
-        [Line(time, wheel_speed, width=1.0)], Axis("time [s]", 0.0, 40.0), "virtual wheel speed error [rad/s]"
-    )
+    right = Line(time, wheel_speed, width=1.0)
+    speed = Panel([right], Axis("time [s]", 0.0, 40.0), "virtual wheel speed error [rad/s]")
     return Figure(
         "force-observer-error",
         "Left: first seconds of the error of the longitudinal force observer with the printed gains, started 1 "
@@ -112,7 +110,6 @@ def error_figure() -> Figure:
         "Left: force errors fall within 0.1 s to about two newtons and follow the disturbance. Right: an "
         "oscillation of 2.6 rad/s that takes 30 seconds to decay.",
         [Panel(marks, Axis("time [s]", 0.0, 6.0), Axis("force error [N]", -4.0, 6.0)), speed],
-        size=(7.2, 3.6),
         legend="below",
     )
 
@@ -124,21 +121,14 @@ def noise_figure() -> Figure:
     z = np.exp(2j * np.pi * frequency * STEP)
     gain = np.abs((1.0 + a - 1.0 / z) / (1.0 - (1.0 - a) / z))
     limit = (2 + a) / (2 - a)
-    panel = Panel(
-        [
-            Line(frequency, gain),
-            Level(limit, label=f"(2 + a)/(2 − a) = {limit:.3f}", color=GREY, dash="dashed", width=1.5),
-        ],
-        Axis("frequency [Hz]", scale="log"),
-        Axis("gain from (T − I dω/dt)/R to the force [1]", 0.9, 1.4),
-        legend="upper left",
-    )
+    level = Level(limit, label=f"(2 + a)/(2 − a) = {limit:.3f}", color=GREY, dash="dashed", width=1.5)
+    y = Axis("gain from (T − I dω/dt)/R to the force [1]", 0.9, 1.4)
+    panel = Panel([Line(frequency, gain), level], Axis("frequency [Hz]", scale="log"), y, legend="upper left")
     return Figure(
         "force-observer-noise",
         "Gain of the force observer as the paper implements it (200 Hz, integral of the equation's force minus the "
-        f"last estimate, a = η₃ Ts = {a:.3f}), started at the measured wheel speed: it smooths nothing and "
-        "amplifies the fastest noise, so the wheel acceleration must come filtered. P1 (2) and its implementation "
-        "note.",
+        f"last estimate, a = η₃ Ts = {a:.3f}), started at the measured wheel speed: it smooths nothing and amplifies "
+        "the fastest noise, so the wheel acceleration must come filtered. P1 (2) and its implementation note.",
         "The gain is one at low frequency and rises to 1.29 at 100 hertz.",
         panel,
         size=(4.8, 3.2),
