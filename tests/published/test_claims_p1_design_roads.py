@@ -166,7 +166,7 @@ def test_loads_in_fractions() -> None:
 
 
 def test_force_filter_lags_by_its_own_covariances() -> None:
-    """Sheet section 11 item 8: 1 s and 3.5 s in newtons, 1.5 ms and up to 3.8 ms in kilonewtons."""
+    """P1 notes 11 item 8: 1 s and 3.5 s in newtons, 1.5 ms and up to 3.8 ms in kilonewtons."""
     for entry, newtons, kilo in zip(
         printed_numbers(PACKAGE)["force_filter"]["readings"], (3.5, 1.06), (3.8e-3, 1.57e-3), strict=True
     ):

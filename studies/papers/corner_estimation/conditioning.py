@@ -146,19 +146,19 @@ def conditioning_figure(caps: int = 13) -> Figure:
     margins: list[Mark] = [ZERO, Line([], [], "z scaled by g", GREY), Line([], [], "z in metres", GREY, "dashed")]
     growth: list[Mark] = [ZERO]
     for (name, direction), colour in zip(DESIGNS, CURVES, strict=False):
-        _, *curve = vertices_only(name, direction)
-        growth.append(Line(*curve, f"{PAPER[name]} {direction}", colour))
+        _, omega, rate = vertices_only(name, direction)
+        growth.append(Line(omega, rate, f"{PAPER[name]} {direction}", colour))
         dashes: dict[Dash, float] = {"dashed": 1.0, "solid": natural_scale(name, direction)}
         for dash, scale in dashes.items():
             # Relative to the trivial growth of the margin with P itself, so that the sign is what one sees.
             margin = [best_margin(name, direction, scale, cap) / cap for cap in conditions]
             margins.append(Line(conditions, margin, color=colour, dash=dash, marker="."))
     ticks = {-1e4: "−10⁴", -1e2: "−10²", -1.0: "−1", 0.0: "0", 1.0: "1", 1e2: "10²"}
-    x, y = (
-        Axis("allowed condition number κ of P [1]", scale="log"),
-        Axis("best margin / κ [1/s]", scale="symlog", ticks=ticks, linear=1e-3),
-    )
-    between = "affine P, vertices only, z in metres"
+    x = Axis("allowed condition number κ of P [1]", scale="log")
+    y = Axis("best margin / κ [1/s]", scale="symlog", ticks=ticks, linear=1e-3)
+    left = Panel(margins, x, y, "constant P")
+    title = "affine P, vertices only, z in metres"
+    right = Panel(growth, Axis(SPEED, 0.0, STATED_SPEED), "growth rate of V [1/s]", title)
     return Figure(
         "conditioning",
         "Left: the largest margin of the Lyapunov inequality that a constant P with I ≤ P ≤ κ I reaches, over the "
@@ -168,9 +168,6 @@ def conditioning_figure(caps: int = 13) -> Figure:
         "Printed gains of P1 and P3.",
         "Left: unscaled margins become positive only at condition numbers of 1e4 to 1e5, scaled ones at once. "
         "Right: growth rates below zero at both ends and up to 280 per second in between.",
-        [
-            Panel(margins, x, y, "constant P"),
-            Panel(growth, Axis(SPEED, 0.0, STATED_SPEED), "growth rate of V [1/s]", between),
-        ],
+        [left, right],
         legend="below",
     )

@@ -18,7 +18,7 @@ from studies.papers.topic import Topic
 from studies.papers.verdicts import erratum
 from studies.plots import Axis, Bars, Figure, Level, Mark, Panel, Words
 from studies.plots.colours import BLUE, RED
-from studies.study import PartResult, Scope, Table
+from studies.study import Cell, PartResult, Scope, Table
 
 TOPIC = Topic(PACKAGE)
 BETA = 2  # of P1 and P2
@@ -101,7 +101,7 @@ def filter_lag(process: float, measurement: float, newtons: float) -> float:
 @TOPIC.part("sigma-weights", "Sigma points and covariances of the lateral force filter", 1.0)
 def sigma_weights(scope: Scope) -> PartResult:
     """Weights of both papers in both forms, and the lag of the filter in every reading of its covariances."""
-    rows = [
+    rows: list[list[Cell]] = [
         [f"N = {n}", form, *map(str, (w.centre_mean, w.centre_spread, w.outer, w.total, w.second_moment))]
         for n in SIZES
         for form in FORMS

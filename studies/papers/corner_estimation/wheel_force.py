@@ -15,7 +15,7 @@ from synthesis.models.discretise import zero_order_hold
 from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
-ETA1, ETA2, ETA3 = 1.8, 11.4, 50.6  # N s, N m, 1/s: P1 notes 2
+ETA1, ETA2, ETA3 = 1.8, 11.4, 50.6  # N s, N m, 1/s: P1 notes 1
 DISTURBANCE_RATE = 100.0  # N/s, what the paper takes as the order of magnitude of dOmega_f/dt
 STEP = 0.005  # s
 SECONDS = 60.0  # well beyond the transient of the wheel speed, which takes 1/0.177 s for a factor e
