@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 
@@ -21,7 +20,7 @@ from studies.papers.corner_estimation import (
     solve_size,
     wheel_force,
 )
-from studies.papers.corner_estimation.inputs import DESIGNS, PACKAGE, parameters, printed_gains
+from studies.papers.corner_estimation.inputs import DESIGNS, PACKAGE, parameters
 from studies.papers.corner_estimation.study import CLAIMS
 from studies.papers.published import printed_numbers
 from tests.unit.p1_findings import finding
@@ -72,7 +71,7 @@ CONTROLS: dict[str, tuple[Callable[[], Finding], Verdict]] = {
     ),
     "P1-aqs-feas": (
         lambda: quadratic_stability.printed_gains_are_stable(
-            {key: (gains[0], -0.1) if key[1] == "lateral" else gains for key, gains in all_gains().items()}
+            {c: (c.gains[0], -0.1) if c.direction == "lateral" else c.gains for c in DESIGNS}
         ),
         Verdict.NOT_REPRODUCED,
     ),
@@ -99,10 +98,6 @@ CONTROLS: dict[str, tuple[Callable[[], Finding], Verdict]] = {
     ),
     "P1-34": (lambda: accuracy.weight_readings(names_axle=True), Verdict.REPRODUCED),
 }
-
-
-def all_gains() -> dict[Any, tuple[float, ...]]:
-    return {(name, direction): printed_gains(direction, name) for name, direction in DESIGNS}
 
 
 @pytest.mark.parametrize("name", CONTROLS)

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from studies.papers.corner_estimation.inputs import CORNERS
 from studies.papers.corner_estimation.printed_lyapunov import Certificate, Reading, certificate, convexity
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
@@ -161,12 +162,12 @@ def gain_box(direction: Direction) -> tuple[LpvModel, GainBox]:
 
 def printed(direction: Direction, reading: Reading) -> tuple[LpvModel, list[list[str]], Printed, Form]:
     """Model, gains and the printed matrix in one of four readings (P1 notes 11 item 2)."""
-    offered = certificate(direction, reading)
+    offered = certificate(CORNERS[direction], reading)
     return offered.model, offered.gains, offered.matrix, offered.form
 
 
 WHOLE = (0.0, 180.0)
-JUDGED: dict[tuple[Direction, Reading], tuple[tuple[float, float], ...]] = {
+VALID: dict[tuple[Direction, Reading], tuple[tuple[float, float], ...]] = {
     # reading: intervals on [0, 180] for (29) and (41); P1 notes 11 item 2, claims P1-29-*, P1-41-*
     ("longitudinal", "primal"): (),
     ("lateral", "primal"): ((52.8760, 52.9042),),
@@ -179,11 +180,11 @@ JUDGED: dict[tuple[Direction, Reading], tuple[tuple[float, float], ...]] = {
 }
 
 
-@pytest.mark.parametrize(("direction", "reading"), list(JUDGED))
+@pytest.mark.parametrize(("direction", "reading"), list(VALID))
 def test_printed_matrices_hold_exactly_where_the_notes_say(direction: Direction, reading: Reading) -> None:
     model, gains, matrix, form = printed(direction, reading)
     found = judge(model, gains, matrix, form)
-    expected = JUDGED[direction, reading]
+    expected = VALID[direction, reading]
     assert len(found.intervals) == len(expected)
     for (low, high), ends in zip(found.intervals, expected, strict=True):
         for value, end in zip((low, high), ends, strict=True):
@@ -219,9 +220,9 @@ def test_by_how_much_the_primal_reading_fails(direction: Direction, omega: float
 
 
 @settings(deadline=None, max_examples=30)
-@given(st.sampled_from(list(JUDGED)), st.floats(0.0, 180.0))
-def test_judgements_agree_with_dense_eigenvalues(case: tuple[Direction, Reading], omega: float) -> None:
-    """Second road: numpy eigenvalues at any wheel speed that is not right at an end of an interval."""
+@given(st.sampled_from(list(VALID)), st.floats(0.0, 180.0))
+def test_validity_agrees_with_dense_eigenvalues(case: tuple[Direction, Reading], omega: float) -> None:
+    """Independently: numpy eigenvalues at any wheel speed that is not right at an end of an interval."""
     model, gains, matrix, form = printed(*case)
     intervals = judge(model, gains, matrix, form).intervals
     if any(abs(omega - end) < 1e-3 for interval in intervals for end in interval):

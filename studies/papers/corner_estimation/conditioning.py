@@ -8,16 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from studies.claim import Finding, JsonValue
-from studies.papers.corner_estimation.inputs import (
-    DESIGNS,
-    PACKAGE,
-    PAPER,
-    SPEED,
-    STATED_SPEED,
-    corner_model,
-    error_matrices,
-    printed_gains,
-)
+from studies.papers.corner_estimation.inputs import DESIGNS, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner
 from studies.papers.topic import Topic
 from studies.papers.verdicts import derived
 from studies.plots import ZERO, Axis, Dash, Figure, Line, Mark, Panel
@@ -27,7 +18,6 @@ from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
-from synthesis.models.catalogue.corner import Direction
 from synthesis.polynomials.matrix import FloatArray
 from synthesis.stability import physical
 
@@ -36,18 +26,18 @@ CAPS = (1e3, 1e4)  # condition numbers that a general-purpose scaling might allo
 BALANCED = 2.0
 
 
-def natural_scale(name: str, direction: Direction) -> float:
+def natural_scale(corner: Corner) -> float:
     """g = sqrt|c/b| of A_e = [[a, b], [c, d]] at mid-range: z multiplied by g balances the two couplings, 1/s."""
-    ((_, b), (c, _)) = error_matrices(direction, [STATED_SPEED / 2], name)[0]
+    ((_, b), (c, _)) = corner.error_matrices([STATED_SPEED / 2])[0]
     return float(np.sqrt(abs(c / b)))
 
 
-def best_margin(name: str, direction: Direction, scale: float, condition: float) -> float:
+def best_margin(corner: Corner, scale: float, condition: float) -> float:
     """Largest t with A_e'P + P A_e < -t I for a constant P, I <= P <= condition I, in the states (scale z, v_r).
 
     Affine in the wheel speed, so both ends of the range decide; t < 0: no such P proves stability.
     """
-    problem = _problem(name, direction, np.array([scale, 1.0]), degree=0, margin=True)
+    problem = _problem(corner, np.array([scale, 1.0]), degree=0, margin=True)
     P = problem.unknowns["P"]
     problem.require("P >= I", P - problem.constant(np.eye(2)), strict=False)
     problem.require("P <= condition I", problem.constant(condition * np.eye(2)) - P, strict=False)
@@ -55,19 +45,19 @@ def best_margin(name: str, direction: Direction, scale: float, condition: float)
     return float("nan") if found.objective is None else found.objective
 
 
-def vertices_only(name: str, direction: Direction) -> tuple[LmiResult, FloatArray, FloatArray]:
+def vertices_only(corner: Corner) -> tuple[LmiResult, FloatArray, FloatArray]:
     """An affine P, asked of a solver at the four vertices of (omega, rate) alone, without multi-convexity and scaling.
 
     Returns its answer and, at wheel speeds (g,), the largest growth rate of V in 1/s (g,): above zero the certificate is
     false, whatever the solver said.
     """
-    problem = _problem(name, direction, np.ones(2), degree=1, margin=False)
+    problem = _problem(corner, np.ones(2), degree=1, margin=False)
     problem.require("P > 0", problem.unknowns["P"])
     found = solve(problem, LmiSettings(relaxation="grid", points=2))
-    constant, slope = physical(corner_model(direction, STATED_SPEED, name), found, "P")
+    constant, slope = physical(corner.model(), found, "P")
     omega = np.linspace(0.0, STATED_SPEED, 361)
     P = constant + omega[:, None, None] * slope
-    product = P @ error_matrices(direction, omega, name)
+    product = P @ corner.error_matrices(omega)
     total = product + np.swapaxes(product, 1, 2)
     relative = [
         np.linalg.eigvals(np.linalg.solve(P, total + rate * slope)).real.max(axis=1) for rate in (-800.0, 800.0)
@@ -75,9 +65,9 @@ def vertices_only(name: str, direction: Direction) -> tuple[LmiResult, FloatArra
     return found, omega, np.maximum(*relative)
 
 
-def _problem(name: str, direction: Direction, scale: FloatArray, degree: int, margin: bool) -> LmiProblem:
+def _problem(corner: Corner, scale: FloatArray, degree: int, margin: bool) -> LmiProblem:
     """V' < 0 for the printed gains, with the unknown P of this degree."""
-    model, gain = corner_model(direction, STATED_SPEED, name), np.array(printed_gains(direction, name))[:, None]
+    model, gain = corner.model(), np.array(corner.gains)[:, None]
     problem = LmiProblem(model.parameters, maximise_margin=margin)
     scaled = model.polynomial.with_states_scaled(scale)
     A, C = problem.scaled(scaled.A), problem.scaled(scaled.C)
@@ -91,14 +81,14 @@ def _problem(name: str, direction: Direction, scale: FloatArray, degree: int, ma
 def scaling(scaled: bool = True) -> Finding:
     """Margins with a cap on cond(P), in the units of the model and with z scaled; and what vertices alone prove."""
     computed: dict[str, JsonValue] = {}
-    for name, direction in DESIGNS:
-        g = natural_scale(name, direction)
-        loose, omega, growth = vertices_only(name, direction)
-        computed[f"{PAPER[name]} {direction}"] = {
+    for corner in DESIGNS:
+        g = natural_scale(corner)
+        loose, omega, growth = vertices_only(corner)
+        computed[str(corner)] = {
             "scale_of_z": g,
             "natural_condition_number": g * g,
-            "margin_unscaled": {f"{cap:g}": best_margin(name, direction, 1.0, cap) for cap in CAPS},
-            f"margin_scaled_condition_{BALANCED:g}": best_margin(name, direction, g if scaled else 1.0, BALANCED),
+            "margin_unscaled": {f"{cap:g}": best_margin(corner, 1.0, cap) for cap in CAPS},
+            f"margin_scaled_condition_{BALANCED:g}": best_margin(corner, g if scaled else 1.0, BALANCED),
             "vertices_only": {
                 "solver": loose.report.status, "verdict": str(loose.verdict), "largest_growth_1_s": float(growth.max()),
                 "at_rad_s": float(omega[growth.argmax()]), "certified": loose.verdict is Verdict.CERTIFIED,
@@ -145,20 +135,20 @@ def conditioning_figure(caps: int = 13) -> Figure:
     conditions = np.geomspace(1.0, 1e6, caps)
     margins: list[Mark] = [ZERO, Line([], [], "z scaled by g", GREY), Line([], [], "z in metres", GREY, "dashed")]
     growth: list[Mark] = [ZERO]
-    for (name, direction), colour in zip(DESIGNS, CURVES, strict=False):
-        _, omega, rate = vertices_only(name, direction)
-        growth.append(Line(omega, rate, f"{PAPER[name]} {direction}", colour))
-        dashes: dict[Dash, float] = {"dashed": 1.0, "solid": natural_scale(name, direction)}
+    for corner, colour in zip(DESIGNS, CURVES, strict=False):
+        _, omega, rate = vertices_only(corner)
+        growth.append(Line(omega, rate, str(corner), colour))
+        dashes: dict[Dash, float] = {"dashed": 1.0, "solid": natural_scale(corner)}
         for dash, scale in dashes.items():
             # Relative to the trivial growth of the margin with P itself, so that the sign is what one sees.
-            margin = [best_margin(name, direction, scale, cap) / cap for cap in conditions]
+            margin = [best_margin(corner, scale, cap) / cap for cap in conditions]
             margins.append(Line(conditions, margin, color=colour, dash=dash, marker="."))
     ticks = {-1e4: "−10⁴", -1e2: "−10²", -1.0: "−1", 0.0: "0", 1.0: "1", 1e2: "10²"}
     x = Axis("allowed condition number κ of P [1]", scale="log")
     y = Axis("best margin / κ [1/s]", scale="symlog", ticks=ticks, linear=1e-3)
     left = Panel(margins, x, y, "constant P")
     title = "affine P, vertices only, z in metres"
-    right = Panel(growth, Axis(SPEED, 0.0, STATED_SPEED), "growth rate of V [1/s]", title)
+    right = Panel(growth, SPEED_AXIS, "growth rate of V [1/s]", title)
     return Figure(
         "conditioning",
         "Left: the largest margin of the Lyapunov inequality that a constant P with I ≤ P ≤ κ I reaches, over the "

@@ -7,23 +7,12 @@ import sympy as sp
 from numpy.typing import ArrayLike
 
 from studies.claim import Finding
-from studies.papers.corner_estimation.inputs import (
-    DIRECTIONS,
-    PACKAGE,
-    SPEED,
-    STATED_SPEED,
-    constants,
-    corner_model,
-    error_matrices,
-    exact_constants,
-    printed_gains,
-)
+from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner
 from studies.papers.topic import Topic
 from studies.papers.verdicts import erratum
-from studies.plots import ZERO, Axis, Figure, Line, Mark, Panel, dots
+from studies.plots import ZERO, Figure, Line, Mark, Panel, dots
 from studies.plots.colours import RED
 from studies.study import PartResult, Scope, Table
-from synthesis.models.catalogue.corner import Direction
 from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
@@ -35,15 +24,15 @@ SPEEDS = (0.0, 40.0, 90.0, 140.0, 180.0)  # rad/s, of the table
 
 def derived_entry() -> sp.Expr:
     """Entry (1,2) of A - L C at standstill, with p1 = sigma1 + sigma2."""
-    model = corner_model("longitudinal")
+    model = CORNERS["longitudinal"].model()
     entry = (model.A - sp.Matrix([L1, L2]) * model.C)[0, 1].subs("wheel_speed", 0)
     return sp.expand(entry.subs("sigma2", P1 - sp.Symbol("sigma1")))
 
 
-def poles_with(entry: sp.Expr, direction: Direction, omega: ArrayLike) -> FloatArray:
+def poles_with(entry: sp.Expr, corner: Corner, omega: ArrayLike) -> FloatArray:
     """Real parts of both frozen error poles in 1/s, (g, 2) ascending, with this entry (1,2) and the printed gains."""
-    first, second = printed_gains(direction)
-    A_e, values = error_matrices(direction, omega).copy(), constants(direction)
+    (first, second), values = corner.gains, corner.constants
+    A_e = corner.error_matrices(omega).copy()
     A_e[:, 0, 1] = float(entry.subs({L1: first, L2: second, P1: values["sigma1"] + values["sigma2"]}))
     return np.sort(np.linalg.eigvals(A_e).real, axis=1)
 
@@ -53,7 +42,7 @@ def entry_of_the_error_matrix(printed: sp.Expr = PRINTED_ENTRY) -> Finding:
     """The printed entry of (26) against A - L C, and what each makes of the poles at standstill."""
     derived = derived_entry()
     slowest = {
-        form: {direction: float(poles_with(entry, direction, [0.0]).max()) for direction in DIRECTIONS}
+        form: {direction: float(poles_with(entry, corner, [0.0]).max()) for direction, corner in CORNERS.items()}
         for form, entry in (("printed", printed), ("corrected", derived))
     }
     determinant = sp.expand(sp.Symbol("sigma0") * (L1 * L2 * P1 + printed * L2))
@@ -74,7 +63,7 @@ def entry_of_the_error_matrix(printed: sp.Expr = PRINTED_ENTRY) -> Finding:
 def absolute_value(signed: bool = True) -> Finding:
     """The output matrix that follows from the bristle equation with |omega|, against the printed one in omega."""
     omega = sp.Symbol("omega", real=True)
-    values = exact_constants("longitudinal")
+    values = CORNERS["longitudinal"].exact_constants
     # mu = sigma0 z + sigma1 z' + sigma2 v_r with z' = v_r - kappa R_e |omega| z of (20)
     s0, s1, kappa, radius = sp.symbols("sigma0 sigma1 kappa effective_radius")
     derived = s0 - s1 * kappa * radius * sp.Abs(omega)
@@ -97,13 +86,13 @@ def absolute_value(signed: bool = True) -> Finding:
 @TOPIC.part("error-matrix", "Error dynamics of the velocity observer", 2.0)
 def error_matrix(scope: Scope) -> PartResult:
     """The misprints of (26) and (23), and both poles of the velocity observer at five wheel speeds."""
-    rows, columns = [[omega] for omega in SPEEDS], [SPEED]
-    for direction in DIRECTIONS:
-        for row, poles in zip(rows, np.linalg.eigvals(error_matrices(direction, SPEEDS)), strict=True):
+    rows, columns = [[omega] for omega in SPEEDS], [SPEED_AXIS.label]
+    for direction, corner in CORNERS.items():
+        for row, poles in zip(rows, np.linalg.eigvals(corner.error_matrices(SPEEDS)), strict=True):
             first, second = sorted(poles, key=lambda pole: (pole.real, -pole.imag))
             row.extend([float(first.real), float(second.real), float(abs(first.imag))])
         columns += [f"{direction}, {p} [1/s]" for p in ("faster real part", "slower real part", "imaginary part +-")]
-    gains = " and ".join(str(list(printed_gains(direction))) for direction in DIRECTIONS)
+    gains = " and ".join(str(list(corner.gains)) for corner in CORNERS.values())
     caption = f"Poles of the velocity observer error A - L C with the printed gains {gains} at constant wheel speed."
     return PartResult(TOPIC.found(), [Table("poles", caption, columns, rows)], [pole_figure()])
 
@@ -112,15 +101,14 @@ def pole_figure() -> Figure:
     """Real parts of the error poles over wheel speed, corrected and printed A0."""
     omega = np.linspace(0.0, STATED_SPEED, 361)
     panels = []
-    for direction in DIRECTIONS:
-        right, wrong = (poles_with(entry, direction, omega) for entry in (derived_entry(), PRINTED_ENTRY))
+    for direction, corner in CORNERS.items():
+        right, wrong = (poles_with(entry, corner, omega) for entry in (derived_entry(), PRINTED_ENTRY))
         marks: list[Mark] = [
             Line(omega, right, "A − L C (corrected entry)"), Line(omega, wrong, "A₀ as printed in (26)", RED, "dashed"),
             ZERO, dots([0.0], [wrong[0, 1]], color=RED),
         ]  # fmt: skip
-        first, second = printed_gains(direction)
-        title = f"{direction}, L = [{first:g}, {second:g}]"
-        panels.append(Panel(marks, Axis(SPEED, 0.0, STATED_SPEED), "real part of the poles [1/s]", title))
+        title = "{}, L = [{:g}, {:g}]".format(direction, *corner.gains)
+        panels.append(Panel(marks, SPEED_AXIS, "real part of the poles [1/s]", title))
     return Figure(
         "poles",
         "Real parts of the two poles of the velocity observer error over wheel speed, with the printed gains. With "

@@ -25,16 +25,14 @@ from scipy.linalg import solve_continuous_are
 from estimators.schedule import GainSchedule
 from studies.claim import Finding, JsonValue
 from studies.papers.corner_estimation.inputs import (
+    CORNERS,
     DESIGN_SPEED,
-    DIRECTIONS,
     PACKAGE,
     POINTS,
-    SPEED,
+    SPEED_AXIS,
     STATES,
-    constants,
-    corner_model,
+    Corner,
     literal_design,
-    printed_gains,
 )
 from studies.papers.topic import Topic
 from studies.papers.verdicts import derived, erratum, under_specified
@@ -64,9 +62,9 @@ OMEGA = np.linspace(0.0, DESIGN_SPEED, 71)  # rad/s, where the gains are looked 
 LETTER = {"longitudinal": "x", "lateral": "y"}
 
 
-def signed_model(direction: Direction, sign: Sign) -> LpvModel:
+def signed_model(corner: Corner, sign: Sign) -> LpvModel:
     """The corner model; `printed` reverses sigma1 of the friction column, so that the error sees I + L [sigma1 0]."""
-    model = corner_model(direction, DESIGN_SPEED)
+    model = corner.model(DESIGN_SPEED)
     if sign == "corrected":
         return model
     F = sp.Matrix(model.F)
@@ -75,12 +73,12 @@ def signed_model(direction: Direction, sign: Sign) -> LpvModel:
 
 
 @cache
-def least_gamma(direction: Direction, degree: int, sign: Sign, errors: tuple[str, ...], points: int) -> ObserverGains:
+def least_gamma(corner: Corner, degree: int, sign: Sign, errors: tuple[str, ...], points: int) -> ObserverGains:
     """Minimise gamma over P and chi of this degree, with the gains that the solver happens to return.
 
     Raises ProblemError if it finds nothing.
     """
-    model, design = signed_model(direction, sign), literal_design(degree, errors, points)
+    model, design = signed_model(corner, sign), literal_design(degree, errors, points)
     scale = observer_scale(model.polynomial, model.parameters)
     found = solve(observer_problem(model, design, scale), design.settings)
     if found.objective is None or not found.margins:
@@ -89,18 +87,18 @@ def least_gamma(direction: Direction, degree: int, sign: Sign, errors: tuple[str
     return ObserverGains(design, model, None, gamma, found, found, scale)
 
 
-def optima(direction: Direction, points: int = POINTS) -> tuple[ObserverGains, ...]:
+def optima(corner: Corner, points: int = POINTS) -> tuple[ObserverGains, ...]:
     """The least gamma for every degree, correct sign, C_e = I."""
-    return tuple(least_gamma(direction, degree, "corrected", STATES, points) for degree in DEGREES)
+    return tuple(least_gamma(corner, degree, "corrected", STATES, points) for degree in DEGREES)
 
 
-def velocity_floor(direction: Direction, sign: Sign, omega: FloatArray) -> FloatArray:
+def velocity_floor(corner: Corner, sign: Sign, omega: FloatArray) -> FloatArray:
     r"""|static gain| from friction to the velocity error, the same for every L with L2 != 0, at wheel speeds (g,).
 
     The second row of the error at rest says C e = -sigma1 d (correct sign) or + sigma1 d (printed one), the first
     e_v = a e_z - d. Hence sigma0/(sigma0 + sigma2 a), and |(2 sigma1 + sigma2) a/(sigma0 + sigma2 a) - 1| as printed.
     """
-    values = constants(direction)
+    values = corner.constants
     a = values["kappa"] * values["effective_radius"] * np.abs(omega)
     below = values["sigma0"] + values["sigma2"] * a
     if sign == "corrected":
@@ -110,7 +108,7 @@ def velocity_floor(direction: Direction, sign: Sign, omega: FloatArray) -> Float
 
 def disturbance_matrix_error(sign: int) -> sp.Matrix:
     """I + sign L [sigma1 0] minus the disturbance matrix E - L F that follows from (22)-(24), symbolic."""
-    model = corner_model("longitudinal")
+    model = CORNERS["longitudinal"].model()
     L = sp.Matrix(sp.symbols("L1 L2"))
     derived_matrix = (model.E - L * model.F)[:, :2]
     return sp.Matrix(sp.expand(sp.eye(2) + sign * L * sp.Matrix([[sp.Symbol("sigma1"), 0]]) - derived_matrix))
@@ -121,15 +119,15 @@ def sign_of_the_disturbance(printed_sign: int = 1) -> Finding:
     """(25) against the matrix in (30), and what the wrong sign does to gamma."""
     wrong, right = disturbance_matrix_error(printed_sign), disturbance_matrix_error(-1)
     omega = np.linspace(0.0, DESIGN_SPEED, POINTS)
-    gamma = {s: {d: least_gamma(d, 1, s, STATES, POINTS).gamma for d in DIRECTIONS} for s in SIGNS}
-    floor = {s: {d: float(velocity_floor(d, s, omega).max()) for d in DIRECTIONS} for s in SIGNS}
-    attained = all(abs(gamma[s][d] - floor[s][d]) <= SIGN_TOLERANCE for s in SIGNS for d in DIRECTIONS)
+    gamma = {s: {d: least_gamma(c, 1, s, STATES, POINTS).gamma for d, c in CORNERS.items()} for s in SIGNS}
+    floor = {s: {d: float(velocity_floor(c, s, omega).max()) for d, c in CORNERS.items()} for s in SIGNS}
+    attained = all(abs(gamma[s][d] - floor[s][d]) <= SIGN_TOLERANCE for s in SIGNS for d in CORNERS)
     computed = {
         "printed_minus_derived": [str(entry) for entry in wrong],
         "corrected_minus_derived": [str(entry) for entry in right],
         "gamma": gamma, "static_floor": floor,
     }  # fmt: skip
-    shown = ", ".join(f"{d} {gamma['printed'][d]:.4f} against {gamma['corrected'][d]:.4f}" for d in DIRECTIONS)
+    shown = ", ".join(f"{d} {gamma['printed'][d]:.4f} against {gamma['corrected'][d]:.4f}" for d in CORNERS)
     reading = (
         "By (25) the disturbance enters the error through I - L [sigma1 0], so block (1,2) of (30) is P - chi [sigma1 "
         f"0]. Least gamma with the printed and with the corrected sign: {shown}. The printed one is the static gain (2 "
@@ -141,12 +139,12 @@ def sign_of_the_disturbance(printed_sign: int = 1) -> Finding:
 @TOPIC.claim("P1-hinf-gamma")
 def least_gamma_by_degree(points: int = POINTS, tolerance: float = GAMMA_TOLERANCE) -> Finding:
     """gamma for f = 0..3 and both directions, against the static gain that no observer can lower."""
-    found = {d: optima(d, points) for d in DIRECTIONS}
-    floor = {d: float(velocity_floor(d, "corrected", np.array([0.0]))[0]) for d in DIRECTIONS}
-    gamma = {d: [o.gamma for o in found[d]] for d in DIRECTIONS}
-    largest = {d: [float(np.abs(o.gain(OMEGA)[:, 1]).max()) for o in found[d]] for d in DIRECTIONS}
-    distance = max(abs(g - floor[d]) for d in DIRECTIONS for g in gamma[d])
-    proved = all(o.verdict is Verdict.CERTIFIED for d in DIRECTIONS for o in found[d])
+    found = {d: optima(c, points) for d, c in CORNERS.items()}
+    floor = {d: float(velocity_floor(c, "corrected", np.array([0.0]))[0]) for d, c in CORNERS.items()}
+    gamma = {d: [o.gamma for o in found[d]] for d in CORNERS}
+    largest = {d: [float(np.abs(o.gain(OMEGA)[:, 1]).max()) for o in found[d]] for d in CORNERS}
+    distance = max(abs(g - floor[d]) for d in CORNERS for g in gamma[d])
+    proved = all(o.verdict is Verdict.CERTIFIED for d in CORNERS for o in found[d])
     computed = {
         "degrees": list(DEGREES), "gamma": gamma, "exact_infimum": floor, "largest_distance": distance,
         "proved_on_the_whole_range": proved, "largest_L2_returned": largest,
@@ -173,10 +171,10 @@ def hinf_optimum(scope: Scope) -> PartResult:
     claims = TOPIC.found("P1-hinf-gamma")
     found = claims[0].finding.computed
     rows = [
-        [degree, *(found[key][d][k] for d in DIRECTIONS for key in ("gamma", "largest_L2_returned"))]
+        [degree, *(found[key][d][k] for d in CORNERS for key in ("gamma", "largest_L2_returned"))]
         for k, degree in enumerate(found["degrees"])
     ]
-    columns = [f"{d} {what}" for d in DIRECTIONS for what in ("gamma [1]", "largest L2 returned [m/s^2]")]
+    columns = [f"{d} {what}" for d in CORNERS for what in ("gamma [1]", "largest L2 returned [m/s^2]")]
     caption = (
         "Least gamma of (30) (sign corrected, C_e = I, both disturbances) on 140 wheel speeds in [0, 140] rad/s at "
         "wheel accelerations of +-800 rad/s^2. The exact infimum is 1; the returned gains are the solver's, not "
@@ -191,9 +189,9 @@ def optimum_figure(quick: bool = False) -> Figure:
     design = literal_design(1, points=TREND_POINTS)
     backoffs = (1.0, 1e-1, 1e-2, 1e-3) if quick else (1.0, 3e-1, 1e-1, 3e-2, 1e-2, 3e-3, 1e-3)
     lines = []
-    for direction, colour, marker in zip(DIRECTIONS, (BLUE, RED), "os", strict=True):
-        energy = well_posedness(corner_model(direction, DESIGN_SPEED), design, backoffs).energy
-        lines.append(Line(backoffs, energy, direction, colour, marker=marker))
+    for corner, colour, marker in zip(CORNERS.values(), (BLUE, RED), "os", strict=True):
+        energy = well_posedness(corner.model(DESIGN_SPEED), design, backoffs).energy
+        lines.append(Line(backoffs, energy, corner.direction, colour, marker=marker))
     x = Axis("γ above its infimum, relative [1]", 1.4, 7e-4, "log")  # towards the optimum
     panel = Panel(lines, x, Axis("least gain energy, max over ω of LᵀPL [1]", scale="log"), legend="upper left")
     return Figure(
@@ -215,9 +213,9 @@ class Intensities:
     acceleration: float
 
 
-def fitted(direction: Direction, gains: tuple[float, ...], omega: float) -> Intensities:
+def fitted(corner: Corner, gains: tuple[float, ...], omega: float) -> Intensities:
     """The intensities whose steady filter has these gains at this wheel speed. Raises ProblemError if none does."""
-    values = constants(direction)
+    values = corner.constants
     s0, s1, s2 = (values[f"sigma{i}"] for i in range(3))
     a = values["kappa"] * values["effective_radius"] * omega
     L1, L2 = gains
@@ -226,13 +224,15 @@ def fitted(direction: Direction, gains: tuple[float, ...], omega: float) -> Inte
     rest = p1 * p1 - 2.0 * p0 - (L2 * (s1 + s2)) ** 2
     friction = (rest - a * a) / (s0 * s0 - s1 * s1 * rest)
     if not friction > 0.0:
-        raise ProblemError(f"no steady filter of the {direction} model has the gains {list(gains)} at {omega:g} rad/s")
+        raise ProblemError(
+            f"no steady filter of the {corner.direction} model has the gains {list(gains)} at {omega:g} rad/s"
+        )
     return Intensities(friction, L2 * L2 * (1.0 + s1 * s1 * friction))
 
 
-def schedule(direction: Direction, noise: Intensities, omega: FloatArray) -> FloatArray:
+def schedule(corner: Corner, noise: Intensities, omega: FloatArray) -> FloatArray:
     """Steady gains (g, 2) of the frozen filters at wheel speeds (g,), by the algebraic Riccati equation."""
-    model = corner_model(direction, DESIGN_SPEED).on(omega)
+    model = corner.model(DESIGN_SPEED).on(omega)
     weights = np.diag([noise.friction, noise.acceleration, 1.0])
     out = np.empty((len(omega), 2))
     for k, (A, C, E, F) in enumerate(zip(model.A, model.C, model.E, model.F, strict=True)):
@@ -262,16 +262,16 @@ def plotted_gains(degree: int = 1, outputs: Mapping[str, tuple[str, ...]] = OUTP
     """Gains of the readings of C_e, how they grow towards the optimum, and a Kalman filter through the printed gains."""
     computed: dict[str, JsonValue] = {}
     spread, open_gains = 0.0, []
-    for direction in DIRECTIONS:
+    for direction, corner in CORNERS.items():
         readings = {
-            name: least_gamma(direction, degree, "corrected", errors, POINTS).gain(OMEGA)[..., 0]
+            name: least_gamma(corner, degree, "corrected", errors, POINTS).gain(OMEGA)[..., 0]
             for name, errors in outputs.items()
         }
         largest = [float(np.abs(gains[:, 1]).max()) for gains in readings.values()]
         spread = max(spread, max(largest) / min(largest) - 1.0)
-        noise = fitted(direction, printed_gains(direction), FIT_SPEED)
-        readings["Kalman filter"] = schedule(direction, noise, OMEGA)
-        posed = well_posedness(corner_model(direction, DESIGN_SPEED), literal_design(degree, points=TREND_POINTS))
+        noise = fitted(corner, corner.gains, FIT_SPEED)
+        readings["Kalman filter"] = schedule(corner, noise, OMEGA)
+        posed = well_posedness(corner.model(DESIGN_SPEED), literal_design(degree, points=TREND_POINTS))
         open_gains.append(posed.ill_posed)
         computed[direction] = {
             "intensities_of_friction_and_acceleration": [noise.friction, noise.acceleration],
@@ -279,8 +279,8 @@ def plotted_gains(degree: int = 1, outputs: Mapping[str, tuple[str, ...]] = OUTP
             "gains_unbounded_towards_optimum": posed.ill_posed,
             **{name: _summary(gains, direction) for name, gains in readings.items()},
         }
-    printed_problem = all(all(computed[direction]["C_e = I"]["on_the_axes"]) for direction in DIRECTIONS)
-    x, y = (computed[direction]["Kalman filter"] for direction in DIRECTIONS)
+    printed_problem = all(all(computed[direction]["C_e = I"]["on_the_axes"]) for direction in CORNERS)
+    x, y = (computed[direction]["Kalman filter"] for direction in CORNERS)
     reading = (
         f"C_e is not printed: the L2 that minimising gamma returns for {', '.join(outputs)} differ by a factor of "
         f"up to {1.0 + spread:.2g}; for C_e = I the least gain energy grows without bound towards the optimum in "
@@ -299,7 +299,7 @@ def gain_curves(scope: Scope) -> PartResult:
     claims = TOPIC.found("P1-hinf-figs")
     rows = [
         [direction, name, *entry["L1"], *entry["L2"], all(entry["on_the_axes"])]
-        for direction in DIRECTIONS
+        for direction in CORNERS
         for name, entry in claims[0].finding.computed[direction].items()
         if name in (*OUTPUTS, "Kalman filter")
     ]
@@ -317,9 +317,9 @@ def gain_figure() -> Figure:
     """Figs 3 and 4: gains over wheel speed against the printed axes."""
     omega = np.linspace(0.0, DESIGN_SPEED, 141)
     rows: list[list[Panel]] = []
-    for direction in DIRECTIONS:
-        gains = printed_gains(direction)
-        filtered = schedule(direction, fitted(direction, gains, FIT_SPEED), omega)
+    for direction, corner in CORNERS.items():
+        gains = corner.gains
+        filtered = schedule(corner, fitted(corner, gains, FIT_SPEED), omega)
         shipped = GainSchedule.shipped(f"corner-estimation-{direction}").gain(omega)[..., 0]
         rows.append([])
         for i, (low, high) in enumerate(printed_axes(direction)):
@@ -330,7 +330,7 @@ def gain_figure() -> Figure:
                 Line(omega, shipped[:, i], "our proved schedule", GREEN),
                 dots([FIT_SPEED], [gains[i]], color=RED, size=4.0),
             ]
-            x = Axis(SPEED if direction == DIRECTIONS[-1] else "", 0.0, DESIGN_SPEED)
+            x = Axis(SPEED_AXIS.label if direction == "lateral" else "", 0.0, DESIGN_SPEED)
             y = Axis(f"L{'₁₂'[i]}{LETTER[direction]} [{('m/s', 'm/s²')[i]}]", 0.0)
             rows[-1].append(Panel(marks, x, y))
     return Figure(

@@ -1,7 +1,8 @@
-"""What the claims of P1 start from: models, printed gains and matrices, and values that no parameter set holds."""
+"""What the claims of P1 start from: the corner models, what is printed for them, and the problem (30)."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 from typing import TypeVar
 
@@ -9,6 +10,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
 
+from studies.plots import Axis
 from synthesis.errors import SpecError
 from synthesis.hinf_observer import Channel, ObserverDesign
 from synthesis.lmi.settings import LmiSettings
@@ -20,19 +22,12 @@ from synthesis.polynomials.matrix import FloatArray
 T = TypeVar("T")
 PACKAGE = "studies.papers.corner_estimation"
 PARAMETERS = "corner-estimation"
-DIRECTIONS: tuple[Direction, ...] = ("longitudinal", "lateral")
+PAPER = {PARAMETERS: "P1", "resilient-velocity": "P3"}  # that prints a parameter set
 STATED_SPEED = 180.0  # rad/s: the range that the stability claims name, text before (29)
 DESIGN_SPEED = 140.0  # rad/s: the range that the gains are designed on, text after (32)
-SPEED = "wheel speed [rad/s]"  # the axis of most figures
-
-# The parameter sets with printed gains that the stability claims are about: (name, direction).
-DESIGNS: tuple[tuple[str, Direction], ...] = (
-    (PARAMETERS, "longitudinal"), (PARAMETERS, "lateral"),
-    ("resilient-velocity", "longitudinal"), ("resilient-velocity", "lateral"),
-)  # fmt: skip
 POINTS = 140  # wheel speeds on the design range, text after (32)
-STATES = ("bristle_deflection", "relative_velocity")  # of the corner model
-PAPER = {PARAMETERS: "P1", "resilient-velocity": "P3"}  # whose gains they are
+STATES = ("bristle_deflection", "relative_velocity")  # of the corner models
+SPEED_AXIS = Axis("wheel speed [rad/s]", 0.0, STATED_SPEED)
 
 
 @cache
@@ -42,55 +37,77 @@ def parameters(name: str = PARAMETERS) -> ParameterSet:
 
 
 @cache
-def corner_model(direction: Direction, maximum: float = STATED_SPEED, name: str = PARAMETERS) -> LpvModel:
-    """The corner velocity model of P1 (22), (37) over 0..`maximum` rad/s and +-800 rad/s^2."""
+def _model(direction: Direction, maximum: float, name: str) -> LpvModel:
     return corner_velocity_model(parameters(name), direction, maximum)
 
 
-def constants(direction: Direction) -> dict[str, float]:
-    """sigma0, sigma1, sigma2, kappa and effective_radius of the corner model, in its units."""
-    return {name: constant.value for name, constant in corner_model(direction).constants.items()}
+@dataclass(frozen=True)
+class Corner:
+    """The velocity model of one direction with a parameter set, and what is printed for it. Gains: [L1 in m/s, L2 in m/s^2].
 
+    Raises SpecError where something is asked for that is not printed.
+    """
 
-def exact_constants(direction: Direction, name: str = PARAMETERS) -> dict[str, sp.Rational]:
-    """The constants of the corner model as the rational numbers of their printed decimals."""
-    model = corner_model(direction, STATED_SPEED, name)
-    return {key: sp.Rational(str(constant.value)) for key, constant in model.constants.items()}
+    direction: Direction
+    name: str = PARAMETERS
 
+    def __str__(self) -> str:
+        return f"{PAPER[self.name]} {self.direction}"
 
-def error_matrices(direction: Direction, omega: ArrayLike, name: str = PARAMETERS) -> FloatArray:
-    """A_e = A - L C of (25), (39) with the printed gains at wheel speeds (g,) in rad/s: (g, 2, 2) in 1/s, m and s."""
-    gain = np.array(printed_gains(direction, name))[:, None]
-    return corner_model(direction, STATED_SPEED, name).on(np.asarray(omega)).error_dynamics(gain)[0]
+    def model(self, maximum: float = STATED_SPEED) -> LpvModel:
+        """P1 (22), (37) over 0..`maximum` rad/s and +-800 rad/s^2."""
+        return _model(self.direction, maximum, self.name)
 
+    @property
+    def constants(self) -> dict[str, float]:
+        """sigma0, sigma1, sigma2, kappa and effective_radius in the units of the model."""
+        return {name: constant.value for name, constant in self.model().constants.items()}
 
-def literal_design(degree: int, errors: tuple[str, ...] = STATES, points: int = POINTS) -> ObserverDesign:
-    """(30)-(32) and nothing else: one channel from both disturbances to the errors C_e, minimised."""
-    channel = Channel(("friction", "acceleration_error"), errors)
-    return ObserverDesign((channel,), degree, settings=LmiSettings(relaxation="grid", points=points))
+    @property
+    def exact_constants(self) -> dict[str, sp.Rational]:
+        """The constants as the rational numbers of their printed decimals."""
+        return {name: sp.Rational(str(value)) for name, value in self.constants.items()}
 
+    @property
+    def gains(self) -> tuple[float, ...]:
+        """The gains that the stability claims are about."""
+        return _given(self._published.gains, f"{self.direction} gains in '{self.name}'")
 
-def printed_gains(direction: Direction, name: str = PARAMETERS) -> tuple[float, ...]:
-    """[L1 in m/s, L2 in m/s^2] that the stability claims are about. Raises SpecError where none are printed."""
-    return _given(_published(direction, name).gains, f"{direction} gains in '{name}'")
+    @property
+    def box(self) -> tuple[tuple[float, float], ...]:
+        """The box of gains: (lowest, highest) of L1 and of L2."""
+        return _given(self._published.gain_box, f"{self.direction} gain box in '{self.name}'")
 
+    @property
+    def lyapunov(self) -> list[list[list[str]]]:
+        """[P0, P1] of (29) or (41) as printed decimals."""
+        matrix = _given(self._published.lyapunov, f"{self.direction} Lyapunov matrix in '{self.name}'")
+        return [[list(row) for row in coefficient] for coefficient in matrix]
 
-def printed_box(direction: Direction) -> tuple[tuple[float, float], ...]:
-    """The printed box of gains: (lowest, highest) of L1 and of L2."""
-    return _given(_published(direction).gain_box, f"{direction} gain box")
+    def error_matrices(self, omega: ArrayLike) -> FloatArray:
+        """A_e = A - L C of (25), (39) with the printed gains at wheel speeds (g,) in rad/s: (g, 2, 2), states in m and m/s."""
+        return self.model().on(np.asarray(omega)).error_dynamics(np.array(self.gains)[:, None])[0]
 
-
-def printed_matrix(direction: Direction) -> list[list[list[str]]]:
-    """[P0, P1] of (29) or (41) as printed decimals."""
-    matrix = _given(_published(direction).lyapunov, f"{direction} Lyapunov matrix")
-    return [[list(row) for row in coefficient] for coefficient in matrix]
-
-
-def _published(direction: Direction, name: str = PARAMETERS) -> Published:
-    return _given(parameters(name).tire[direction].published, f"{direction} design in '{name}'")
+    @property
+    def _published(self) -> Published:
+        return _given(parameters(self.name).tire[self.direction].published, f"{self.direction} design in '{self.name}'")
 
 
 def _given(value: T | None, what: str) -> T:
     if value is None:
         raise SpecError(f"no {what} is printed")
     return value
+
+
+# The printed gains that the stability claims are about: of P1 and of P3.
+DESIGNS = (
+    Corner("longitudinal"), Corner("lateral"),
+    Corner("longitudinal", "resilient-velocity"), Corner("lateral", "resilient-velocity"),
+)  # fmt: skip
+CORNERS: dict[Direction, Corner] = {corner.direction: corner for corner in DESIGNS[:2]}
+
+
+def literal_design(degree: int, errors: tuple[str, ...] = STATES, points: int = POINTS) -> ObserverDesign:
+    """(30)-(32) and nothing else: one channel from both disturbances to the errors C_e, minimised."""
+    channel = Channel(("friction", "acceleration_error"), errors)
+    return ObserverDesign((channel,), degree, settings=LmiSettings(relaxation="grid", points=points))

@@ -15,7 +15,7 @@ from studies.study import PartResult, Scope, Table
 from synthesis.models.parameter_set import ParameterSet
 
 TOPIC = Topic(PACKAGE)
-CORNERS = ("front_left", "front_right", "rear_left", "rear_right")
+WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
 TOLERANCE = 1e-4  # N
 BANK = np.deg2rad(3.0)  # a roll angle of everyday cornering
 
@@ -79,7 +79,7 @@ def load_formulas(assumed: ParameterSet | None = None) -> Finding:
 
 def _corners(loads: Loads) -> dict[str, float]:
     """Corner loads by name, N, of one motion."""
-    return {name: float(getattr(loads, name)) for name in CORNERS}
+    return {name: float(getattr(loads, name)) for name in WHEELS}
 
 
 @TOPIC.part("loads", "Vertical loads")
@@ -90,7 +90,7 @@ def loads(scope: Scope) -> PartResult:
         claims[0].finding.computed[key] for key in ("static_N", "per_unit_a_x_N", "per_unit_a_y_N")
     )
     rows = [
-        [name.replace("_", " "), static[name], along[name.partition("_")[0]] / 2.0, across[name]] for name in CORNERS
+        [name.replace("_", " "), static[name], along[name.partition("_")[0]] / 2.0, across[name]] for name in WHEELS
     ]
     columns = ["corner", "static load [N]", "per m/s^2 of a_x [N]", "per m/s^2 of a_y [N]"]
     caption = "Corner loads of the level car of Table I by (15), (17), g = 9.81 m/s^2."
@@ -106,7 +106,7 @@ def load_figure() -> Figure:
         found = vertical_loads(parameters(), *motion)
         lines = [
             Line(acceleration, getattr(found, name) / 1e3, name.replace("_", " "), colour, dash)
-            for name, colour, dash in zip(CORNERS, CURVES, DASHES, strict=False)
+            for name, colour, dash in zip(WHEELS, CURVES, DASHES, strict=False)
         ]
         panels.append(Panel([ZERO, *lines], f"a{axis} [m/s²]", "vertical load [kN]", f"{title} acceleration"))
     return Figure(

@@ -10,12 +10,11 @@ import sympy as sp
 from analysis.observability import ObservabilityMatrix, observability_matrix, observability_of, rate_symbol
 from analysis.rank_loss import rank_loss
 from studies.claim import Finding, judged
-from studies.papers.corner_estimation.inputs import DIRECTIONS, PACKAGE, SPEED, STATED_SPEED, corner_model, parameters
+from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner, parameters
 from studies.papers.topic import Topic
 from studies.plots import ZERO, Axis, Band, Figure, Line, Mark, Panel, Words, dots
 from studies.plots.colours import RED
 from studies.study import PartResult, Scope
-from synthesis.models.catalogue.corner import Direction
 from synthesis.models.catalogue.planar_force import planar_force_model
 from synthesis.polynomials.matrix import FloatArray
 
@@ -69,7 +68,7 @@ def lateral_force_rank(third_output: str = "yaw_acceleration") -> Finding:
 @TOPIC.part("observability", "Observability of forces and velocities", 3.0)
 def observability(scope: Scope) -> PartResult:
     """Observability of the lateral forces and of the velocities."""
-    lost = lost_speeds("lateral")[0]
+    lost = lost_speeds(CORNERS["lateral"])[0]
     note = (
         f"The lateral velocity model loses rank at a constant wheel speed of {lost:.4f} rad/s "
         f"({lost * 0.33:.1f} m/s), inside the operating range; what is hidden there is the bristle deflection, "
@@ -101,16 +100,16 @@ def force_figure() -> Figure:
     )
 
 
-def velocity_determinant(direction: Direction, omega: FloatArray, rate: float) -> FloatArray:
+def velocity_determinant(corner: Corner, omega: FloatArray, rate: float) -> FloatArray:
     """det O_2 of the time-varying observability matrix over its value at rest, (g,)."""
-    (determinant,) = observability_matrix(corner_model(direction)).minors()
+    (determinant,) = observability_matrix(corner.model()).minors()
     function = sp.lambdify(sp.symbols("wheel_speed wheel_speed_rate"), determinant, "numpy")
     return np.asarray(function(omega, rate) / function(0.0, 0.0) * np.ones_like(omega))
 
 
-def lost_speeds(direction: Direction) -> list[float]:
+def lost_speeds(corner: Corner) -> list[float]:
     """Constant wheel speeds in the stated range at which rank is lost, rad/s; exact roots, rounded to floats."""
-    roots = rank_loss(observability_matrix(corner_model(direction))).roots_inside("wheel_speed")
+    roots = rank_loss(observability_matrix(corner.model())).roots_inside("wheel_speed")
     return [float(root) for root in roots]
 
 
@@ -118,17 +117,16 @@ def velocity_figure() -> Figure:
     """Where the measured force says nothing of the bristle deflection."""
     omega = np.linspace(0.0, STATED_SPEED, 361)
     panels = []
-    for direction in DIRECTIONS:
-        slow, still, fast = (velocity_determinant(direction, omega, rate) for rate in (-WHEEL_RATE, 0.0, WHEEL_RATE))
+    for direction, corner in CORNERS.items():
+        slow, still, fast = (velocity_determinant(corner, omega, rate) for rate in (-WHEEL_RATE, 0.0, WHEEL_RATE))
         marks: list[Mark] = [
             Band(omega, slow, fast, f"wheel acceleration within ±{WHEEL_RATE:g} rad/s²"),
             Line(omega, still, "constant wheel speed"),
             ZERO,
         ]
-        for root in lost_speeds(direction):
+        for root in lost_speeds(corner):
             marks += [dots([root], [0.0], color=RED), Words(root, 0.0, f"{root:.1f} rad/s", offset=(6, 8))]
-        x = Axis(SPEED, 0.0, STATED_SPEED, ticks=(0, 45, 90, 135, 180))
-        panels.append(Panel(marks, x, "determinant over its value at rest [1]", direction))
+        panels.append(Panel(marks, SPEED_AXIS, "determinant over its value at rest [1]", direction))
     return Figure(
         "velocity-observability",
         "Determinant of the time-varying observability matrix of the velocity models, over its value at rest. "

@@ -11,17 +11,7 @@ import sympy as sp
 from numpy.typing import ArrayLike
 
 from studies.claim import Finding, JsonValue, judged
-from studies.papers.corner_estimation.inputs import (
-    DESIGN_SPEED,
-    DIRECTIONS,
-    PACKAGE,
-    SPEED,
-    STATED_SPEED,
-    corner_model,
-    exact_constants,
-    printed_gains,
-    printed_matrix,
-)
+from studies.papers.corner_estimation.inputs import CORNERS, DESIGN_SPEED, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner
 from studies.papers.topic import Topic
 from studies.papers.verdicts import partly
 from studies.plots import ZERO, Axis, Dash, Figure, Level, Line, Mark, Panel, Words, dots
@@ -89,15 +79,15 @@ class Certificate:
         return np.where(definite, largest, np.nan)
 
 
-def certificate(direction: Direction, reading: Reading, matrix: Coefficients | None = None) -> Certificate:
+def certificate(corner: Corner, reading: Reading, matrix: Coefficients | None = None) -> Certificate:
     """The printed matrix (or `matrix`) as printed, with the states exchanged, as a dual matrix, or as an adjugate."""
-    found = printed_matrix(direction) if matrix is None else matrix
+    found = corner.lyapunov if matrix is None else matrix
     if reading in ("swapped", "adjugate"):
         found = [[row[::-1] for row in coefficient[::-1]] for coefficient in found]
     if reading == "adjugate":
         found = [[[a, _negated(b)], [_negated(c), d]] for ((a, b), (c, d)) in found]
-    gains = [[str(gain)] for gain in printed_gains(direction)]
-    return Certificate(corner_model(direction), gains, found, "dual" if reading == "dual" else "primal")
+    gains = [[str(gain)] for gain in corner.gains]
+    return Certificate(corner.model(), gains, found, "dual" if reading == "dual" else "primal")
 
 
 def _negated(decimal: str) -> str:
@@ -115,7 +105,7 @@ def convexity(model: LpvModel, gain: ArrayLike, slope: ArrayLike, form: Form = "
 
 def primal(direction: Direction, matrix: Coefficients | None = None) -> Finding:
     """The matrix as printed, P of V = e'Pe: does (28) or (40) hold on 0..180 rad/s?"""
-    offered = certificate(direction, "primal", matrix)
+    offered = certificate(CORNERS[direction], "primal", matrix)
     inside, wide = offered.validity(), offered.validity(BEYOND)
     ends = offered.eigenvalues(np.array([0.0, STATED_SPEED])).max(axis=1)
     computed = {
@@ -137,7 +127,7 @@ def primal(direction: Direction, matrix: Coefficients | None = None) -> Finding:
 
 def dual(direction: Direction, matrix: Coefficients | None = None) -> Finding:
     """The printed matrix as Q of V = e'Q^-1 e on the stated range, or on the range that the gains are designed for."""
-    offered = certificate(direction, "dual", matrix)
+    offered = certificate(CORNERS[direction], "dual", matrix)
     found, designed = offered.validity(), offered.validity(DESIGN_SPEED).everywhere
     omega = np.linspace(0.0, STATED_SPEED, 1801)
     growth = offered.growth(omega)
@@ -174,22 +164,22 @@ def printed_slopes_are_multi_convex(slopes: dict[Direction, list[list[str]]] | N
     """Sign of A1'P1 + P1 A1 in exact arithmetic, and its eigenvalues in every reading of the matrices."""
     holds = []
     computed: dict[str, JsonValue] = {}
-    for direction in DIRECTIONS:
-        constant, slope = printed_matrix(direction)
+    for direction, corner in CORNERS.items():
+        constant, slope = corner.lyapunov
         matrix = [constant, slopes[direction] if slopes else slope]
-        gain = sp.Matrix([sp.Rational(str(g)) for g in printed_gains(direction)])
-        model, P1 = corner_model(direction), sp.Matrix([[sp.Rational(entry) for entry in row] for row in matrix[1]])
-        A1 = (model.A - gain * model.C).diff("wheel_speed").subs(exact_constants(direction))
+        gain = sp.Matrix([sp.Rational(str(g)) for g in corner.gains])
+        model, P1 = corner.model(), sp.Matrix([[sp.Rational(entry) for entry in row] for row in matrix[1]])
+        A1 = (model.A - gain * model.C).diff("wheel_speed").subs(corner.exact_constants)
         exact = A1.T * P1 + P1 * A1
         holds.append(bool(exact[0, 0] >= 0 and exact[1, 1] >= 0 and exact.det() >= 0))
-        offered = {reading: certificate(direction, reading, matrix) for reading in READINGS}
+        offered = {reading: certificate(corner, reading, matrix) for reading in READINGS}
         spread = {
             reading: np.linalg.eigvalsh(convexity(o.model, o.gains, o.matrix[1], o.form)).tolist()
             for reading, o in offered.items()
         }
         computed[direction] = {"eigenvalues": spread, "determinant_as_printed": float(exact.det())}
-    lowest = [low for d in DIRECTIONS for low, _ in computed[d]["eigenvalues"].values()]
-    shown = "; ".join("{} {:.3g}, {:.3g}".format(d, *computed[d]["eigenvalues"]["primal"]) for d in DIRECTIONS)
+    lowest = [low for d in CORNERS for low, _ in computed[d]["eigenvalues"].values()]
+    shown = "; ".join("{} {:.3g}, {:.3g}".format(d, *computed[d]["eigenvalues"]["primal"]) for d in CORNERS)
     reading = (
         "Column 2 of A1 is zero, so entry (2,2) of the condition is zero and its determinant is minus the square "
         "of entry (1,2): it can hold only if that entry vanishes. Eigenvalues of the condition as printed: "
@@ -203,9 +193,9 @@ def printed_slopes_are_multi_convex(slopes: dict[Direction, list[list[str]]] | N
 def printed_lyapunov(scope: Scope) -> PartResult:
     """All claims about (29) and (41), and where each reading holds and how fast V grows at most."""
     rows: list[list[Cell]] = []
-    for direction in DIRECTIONS:
+    for direction, corner in CORNERS.items():
         for reading, (name, *_) in READINGS.items():
-            offered = certificate(direction, reading)
+            offered = certificate(corner, reading)
             found = offered.validity()
             where = "; ".join(f"{low:.2f} to {high:.2f}" for low, high in found.intervals) or "nowhere"
             worst = float(np.nanmax(offered.growth(np.linspace(0.0, STATED_SPEED, 361))))
@@ -227,16 +217,16 @@ def growth_figure() -> Figure:
              1e5: "10⁵", 1e7: "10⁷"}  # fmt: skip
     y = Axis("largest growth rate of V [1/s]", -2e3, 5e7, "symlog", ticks, linear=10.0)
     panels = []
-    for direction in DIRECTIONS:
+    for direction, corner in CORNERS.items():
         marks: list[Mark] = [ZERO, Level(x=DESIGN_SPEED, color=GREY, dash="dotted")]
         for reading, (_, name, colour, dash, width) in READINGS.items():
-            offered = certificate(direction, reading)
+            offered = certificate(corner, reading)
             marks.append(Line(omega, offered.growth(omega), name, colour, dash, width))
             if reading == "dual":
                 for end in (w for span in offered.validity().intervals for w in span if 0.0 < w < STATED_SPEED):
                     text = Words(end, 0.0, f"{end:.1f}", offset=(-6, 6), horizontal="right")
                     marks += [dots([end], [0.0], color=colour), text]
-        panels.append(Panel(marks, Axis(SPEED, 0.0, STATED_SPEED), y, f"{direction}, {NUMBERS[direction]}"))
+        panels.append(Panel(marks, SPEED_AXIS, y, f"{direction}, {NUMBERS[direction]}"))
     return Figure(
         "printed-lyapunov",
         "Largest growth rate of V along the error dynamics, over both bounds of the wheel acceleration (±800 "
