@@ -27,7 +27,7 @@ def test_gamma_lies_between_the_floor_and_the_frozen_norms() -> None:
     """Every gamma is at least the static gain, and the frozen loops with the returned gains reach no more than gamma."""
     for corner in CORNERS.values():
         for found in optima(corner):
-            model = corner.model(140.0)
+            model = corner.design_model
             A_e, B_e = model.on(OMEGA).error_dynamics(found.gain(OMEGA))
             norm = hinf_norm(A_e, B_e[..., :2], np.eye(2)).norm
             floor = velocity_floor(corner, "corrected", OMEGA)

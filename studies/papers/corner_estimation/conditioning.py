@@ -54,7 +54,7 @@ def vertices_only(corner: Corner) -> tuple[LmiResult, FloatArray, FloatArray]:
     problem = _problem(corner, np.ones(2), degree=1, margin=False)
     problem.require("P > 0", problem.unknowns["P"])
     found = solve(problem, LmiSettings(relaxation="grid", points=2))
-    constant, slope = physical(corner.model(), found, "P")
+    constant, slope = physical(corner.model, found, "P")
     omega = np.linspace(0.0, STATED_SPEED, 361)
     P = constant + omega[:, None, None] * slope
     product = P @ corner.error_matrices(omega)
@@ -67,7 +67,7 @@ def vertices_only(corner: Corner) -> tuple[LmiResult, FloatArray, FloatArray]:
 
 def _problem(corner: Corner, scale: FloatArray, degree: int, margin: bool) -> LmiProblem:
     """V' < 0 for the printed gains, with the unknown P of this degree."""
-    model, gain = corner.model(), np.array(corner.gains)[:, None]
+    model, gain = corner.model, np.array(corner.gains)[:, None]
     problem = LmiProblem(model.parameters, maximise_margin=margin)
     scaled = model.polynomial.with_states_scaled(scale)
     A, C = problem.scaled(scaled.A), problem.scaled(scaled.C)

@@ -24,7 +24,7 @@ SPEEDS = (0.0, 40.0, 90.0, 140.0, 180.0)  # rad/s, of the table
 
 def derived_entry() -> sp.Expr:
     """Entry (1,2) of A - L C at standstill, with p1 = sigma1 + sigma2."""
-    model = CORNERS["longitudinal"].model()
+    model = CORNERS["longitudinal"].model
     entry = (model.A - sp.Matrix([L1, L2]) * model.C)[0, 1].subs("wheel_speed", 0)
     return sp.expand(entry.subs("sigma2", P1 - sp.Symbol("sigma1")))
 

@@ -64,7 +64,7 @@ LETTER = {"longitudinal": "x", "lateral": "y"}
 
 def signed_model(corner: Corner, sign: Sign) -> LpvModel:
     """The corner model; `printed` reverses sigma1 of the friction column, so that the error sees I + L [sigma1 0]."""
-    model = corner.model(DESIGN_SPEED)
+    model = corner.design_model
     if sign == "corrected":
         return model
     F = sp.Matrix(model.F)
@@ -108,7 +108,7 @@ def velocity_floor(corner: Corner, sign: Sign, omega: FloatArray) -> FloatArray:
 
 def disturbance_matrix_error(sign: int) -> sp.Matrix:
     """I + sign L [sigma1 0] minus the disturbance matrix E - L F that follows from (22)-(24), symbolic."""
-    model = CORNERS["longitudinal"].model()
+    model = CORNERS["longitudinal"].model
     L = sp.Matrix(sp.symbols("L1 L2"))
     derived_matrix = (model.E - L * model.F)[:, :2]
     return sp.Matrix(sp.expand(sp.eye(2) + sign * L * sp.Matrix([[sp.Symbol("sigma1"), 0]]) - derived_matrix))
@@ -190,7 +190,7 @@ def optimum_figure(quick: bool = False) -> Figure:
     backoffs = (1.0, 1e-1, 1e-2, 1e-3) if quick else (1.0, 3e-1, 1e-1, 3e-2, 1e-2, 3e-3, 1e-3)
     lines = []
     for corner, colour, marker in zip(CORNERS.values(), (BLUE, RED), "os", strict=True):
-        energy = well_posedness(corner.model(DESIGN_SPEED), design, backoffs).energy
+        energy = well_posedness(corner.design_model, design, backoffs).energy
         lines.append(Line(backoffs, energy, corner.direction, colour, marker=marker))
     x = Axis("γ above its infimum, relative [1]", 1.4, 7e-4, "log")  # towards the optimum
     panel = Panel(lines, x, Axis("least gain energy, max over ω of LᵀPL [1]", scale="log"), legend="upper left")
@@ -232,7 +232,7 @@ def fitted(corner: Corner, gains: tuple[float, ...], omega: float) -> Intensitie
 
 def schedule(corner: Corner, noise: Intensities, omega: FloatArray) -> FloatArray:
     """Steady gains (g, 2) of the frozen filters at wheel speeds (g,), by the algebraic Riccati equation."""
-    model = corner.model(DESIGN_SPEED).on(omega)
+    model = corner.design_model.on(omega)
     weights = np.diag([noise.friction, noise.acceleration, 1.0])
     out = np.empty((len(omega), 2))
     for k, (A, C, E, F) in enumerate(zip(model.A, model.C, model.E, model.F, strict=True)):
@@ -271,7 +271,7 @@ def plotted_gains(degree: int = 1, outputs: Mapping[str, tuple[str, ...]] = OUTP
         spread = max(spread, max(largest) / min(largest) - 1.0)
         noise = fitted(corner, corner.gains, FIT_SPEED)
         readings["Kalman filter"] = schedule(corner, noise, OMEGA)
-        posed = well_posedness(corner.model(DESIGN_SPEED), literal_design(degree, points=TREND_POINTS))
+        posed = well_posedness(corner.design_model, literal_design(degree, points=TREND_POINTS))
         open_gains.append(posed.ill_posed)
         computed[direction] = {
             "intensities_of_friction_and_acceleration": [noise.friction, noise.acceleration],

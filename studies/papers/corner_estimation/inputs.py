@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -36,11 +36,6 @@ def parameters(name: str = PARAMETERS) -> ParameterSet:
     return load_parameter_set(name)
 
 
-@cache
-def _model(direction: Direction, maximum: float, name: str) -> LpvModel:
-    return corner_velocity_model(parameters(name), direction, maximum)
-
-
 @dataclass(frozen=True)
 class Corner:
     """The velocity model of one direction with a parameter set, and what is printed for it. Gains: [L1 in m/s, L2 in m/s^2].
@@ -54,14 +49,20 @@ class Corner:
     def __str__(self) -> str:
         return f"{PAPER[self.name]} {self.direction}"
 
-    def model(self, maximum: float = STATED_SPEED) -> LpvModel:
-        """P1 (22), (37) over 0..`maximum` rad/s and +-800 rad/s^2."""
-        return _model(self.direction, maximum, self.name)
+    @cached_property
+    def model(self) -> LpvModel:
+        """P1 (22), (37) over the stated 0..180 rad/s and +-800 rad/s^2."""
+        return corner_velocity_model(parameters(self.name), self.direction, STATED_SPEED)
+
+    @cached_property
+    def design_model(self) -> LpvModel:
+        """The same over the range that the gains are designed on, 0..140 rad/s."""
+        return corner_velocity_model(parameters(self.name), self.direction, DESIGN_SPEED)
 
     @property
     def constants(self) -> dict[str, float]:
         """sigma0, sigma1, sigma2, kappa and effective_radius in the units of the model."""
-        return {name: constant.value for name, constant in self.model().constants.items()}
+        return {name: constant.value for name, constant in self.model.constants.items()}
 
     @property
     def exact_constants(self) -> dict[str, sp.Rational]:
@@ -86,7 +87,7 @@ class Corner:
 
     def error_matrices(self, omega: ArrayLike) -> FloatArray:
         """A_e = A - L C of (25), (39) with the printed gains at wheel speeds (g,) in rad/s: (g, 2, 2), states in m and m/s."""
-        return self.model().on(np.asarray(omega)).error_dynamics(np.array(self.gains)[:, None])[0]
+        return self.model.on(np.asarray(omega)).error_dynamics(np.array(self.gains)[:, None])[0]
 
     @property
     def _published(self) -> Published:

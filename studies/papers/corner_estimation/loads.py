@@ -61,9 +61,8 @@ def load_formulas(assumed: ParameterSet | None = None) -> Finding:
         "static_N": {"front": float(rest.front), "rear": float(rest.rear), **_corners(rest)},
         "per_unit_a_x_N": {"front": float(driving.front - rest.front), "rear": float(driving.rear - rest.rear)},
         "per_unit_a_y_N": {name: value - _corners(rest)[name] for name, value in _corners(turning).items()},
-        "largest_residual": residual,
-        "at_rest_on_3_deg_bank": conflict,
-    }
+        "largest_residual": residual, "at_rest_on_3_deg_bank": conflict,
+    }  # fmt: skip
     worst = max(residual.values())
     reading = (
         f"Level car: static axle loads {float(rest.front):.1f} and {float(rest.rear):.1f} N, "

@@ -102,14 +102,14 @@ def force_figure() -> Figure:
 
 def velocity_determinant(corner: Corner, omega: FloatArray, rate: float) -> FloatArray:
     """det O_2 of the time-varying observability matrix over its value at rest, (g,)."""
-    (determinant,) = observability_matrix(corner.model()).minors()
+    (determinant,) = observability_matrix(corner.model).minors()
     function = sp.lambdify(sp.symbols("wheel_speed wheel_speed_rate"), determinant, "numpy")
     return np.asarray(function(omega, rate) / function(0.0, 0.0) * np.ones_like(omega))
 
 
 def lost_speeds(corner: Corner) -> list[float]:
     """Constant wheel speeds in the stated range at which rank is lost, rad/s; exact roots, rounded to floats."""
-    roots = rank_loss(observability_matrix(corner.model())).roots_inside("wheel_speed")
+    roots = rank_loss(observability_matrix(corner.model)).roots_inside("wheel_speed")
     return [float(root) for root in roots]
 
 

@@ -87,7 +87,7 @@ def certificate(corner: Corner, reading: Reading, matrix: Coefficients | None = 
     if reading == "adjugate":
         found = [[[a, _negated(b)], [_negated(c), d]] for ((a, b), (c, d)) in found]
     gains = [[str(gain)] for gain in corner.gains]
-    return Certificate(corner.model(), gains, found, "dual" if reading == "dual" else "primal")
+    return Certificate(corner.model, gains, found, "dual" if reading == "dual" else "primal")
 
 
 def _negated(decimal: str) -> str:
@@ -168,7 +168,7 @@ def printed_slopes_are_multi_convex(slopes: dict[Direction, list[list[str]]] | N
         constant, slope = corner.lyapunov
         matrix = [constant, slopes[direction] if slopes else slope]
         gain = sp.Matrix([sp.Rational(str(g)) for g in corner.gains])
-        model, P1 = corner.model(), sp.Matrix([[sp.Rational(entry) for entry in row] for row in matrix[1]])
+        model, P1 = corner.model, sp.Matrix([[sp.Rational(entry) for entry in row] for row in matrix[1]])
         A1 = (model.A - gain * model.C).diff("wheel_speed").subs(corner.exact_constants)
         exact = A1.T * P1 + P1 * A1
         holds.append(bool(exact[0, 0] >= 0 and exact[1, 1] >= 0 and exact.det() >= 0))

@@ -65,7 +65,7 @@ def diagonal_proof(corner: Corner, box: Box, weight: int | None = None) -> Diago
 
 def exact_matrices(corner: Corner, box: Box) -> list[sp.Matrix]:
     """A_e at every vertex of wheel speed and gains, in rational numbers read from the printed decimals."""
-    model, values = corner.model(), corner.exact_constants
+    model, values = corner.model, corner.exact_constants
     A, C = (sp.Matrix(matrix.subs(values)) for matrix in (model.A, model.C))
     ends = [sorted({sp.Rational(str(end)) for end in span}) for span in ((0.0, STATED_SPEED), *box)]
     return [(A - sp.Matrix([first, second]) * C).subs("wheel_speed", w) for w, first, second in product(*ends)]
@@ -106,7 +106,7 @@ def printed_gains_are_stable(gains: dict[Corner, tuple[float, ...]] | None = Non
     holds = []
     for corner in DESIGNS:
         given = corner.gains if gains is None else gains[corner]
-        model, column = corner.model(), np.array(given)[:, None]
+        model, column = corner.model, np.array(given)[:, None]
         verdicts = {
             form: affine_quadratic_stability(model, column, degree, settings=LmiSettings(relaxation=relaxation)).verdict
             for form, relaxation, degree in LMI_FORMS
@@ -164,7 +164,7 @@ def gain_grid(box: Box, points: int) -> tuple[FloatArray, FloatArray]:
 
 def slowest_poles(corner: Corner, L1: FloatArray, L2: FloatArray, speeds: int = 91) -> FloatArray:
     """Largest real part of the frozen poles in 1/s over all wheel speeds, for each pair of gains."""
-    numeric = corner.model().on(np.linspace(0.0, STATED_SPEED, speeds))
+    numeric = corner.model.on(np.linspace(0.0, STATED_SPEED, speeds))
     gains = np.stack([L1, L2], axis=-1)[..., None, :, None]
     return np.asarray(np.linalg.eigvals(numeric.A - gains @ numeric.C).real.max(axis=(-2, -1)))
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from studies.claim import Finding, JsonValue
-from studies.papers.corner_estimation.inputs import CORNERS, DESIGN_SPEED, PACKAGE, POINTS, literal_design
+from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, POINTS, literal_design
 from studies.papers.topic import Topic
 from studies.papers.verdicts import derived
 from studies.study import Cell, PartResult, Scope, Table
@@ -32,7 +32,7 @@ ROUNDING = 1e-12  # relative: all that two assemblies of the same numbers may di
 
 def conic_problem(points: int, degree: int) -> tuple[LmiProblem, LmiSettings]:
     """(30) for the longitudinal corner, with the settings that put it on a grid of wheel speeds."""
-    model, design = CORNERS["longitudinal"].model(DESIGN_SPEED), literal_design(degree, points=points)
+    model, design = CORNERS["longitudinal"].design_model, literal_design(degree, points=points)
     return observer_problem(model, design, observer_scale(model.polynomial, model.parameters)), design.settings
 
 
