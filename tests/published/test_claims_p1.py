@@ -10,7 +10,6 @@ import pytest
 from studies.papers.corner_estimation.inputs import PACKAGE
 from studies.papers.corner_estimation.study import CLAIMS, STUDY
 from studies.papers.published import published_claims
-from studies.plots.draw import look
 from studies.study import QUICK, PartResult
 from tests.unit.p1_findings import PRINT, finding
 from tests.unit.study_checks import check_result, check_study, desk_parts
@@ -20,8 +19,7 @@ from tests.unit.study_reference import numbers, reference_claims
 @cache
 def part(name: str) -> PartResult:
     (found,) = (p for p in desk_parts(STUDY) if p.name == name)
-    with look():
-        return found.run(QUICK)
+    return found.run(QUICK)
 
 
 def close(value: float, printed: str) -> bool:

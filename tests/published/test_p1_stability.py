@@ -1,6 +1,6 @@
 """P1 (26)-(29), (40), (41): what the paper claims of its gains and matrices, recomputed.
 
-Numbers "of the sheet" are those of an independent recomputation in exact arithmetic (Sturm sequences).
+Numbers "of the notes" (P1 notes 9 and 11) are those of an independent recomputation in exact arithmetic (Sturm sequences).
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from studies.papers.corner_estimation.lyapunov import Certificate, Reading, certificate, convexity
+from studies.papers.corner_estimation.inputs import CORNERS
+from studies.papers.corner_estimation.printed_lyapunov import Certificate, Reading, certificate, convexity
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.models.catalogue.corner import Direction
@@ -33,7 +34,7 @@ def half_digit(printed: float) -> float:
 
 # ---- (26): poles ------------------------------------------------------------------------------------------------------
 
-# P1 sheet section 9: eigenvalues of A_e [1/s] with the printed gains, (real, imaginary) or the two real ones.
+# P1 notes 9: eigenvalues of A_e [1/s] with the printed gains, (real, imaginary) or the two real ones.
 POLES: dict[Direction, dict[int, tuple[complex, ...]]] = {
     "longitudinal": {
         0: (-284.6 + 186.3j,), 40: (-311.2 + 137.6j,), 90: (-396.9, -291.8), 140: (-540.8, -214.2), 180: (-621.7, -186.4)
@@ -127,7 +128,7 @@ def test_whole_boxes_of_gains_are_stable(direction: Direction, form: Form) -> No
 
 @pytest.mark.parametrize(("direction", "slowest"), [("longitudinal", -52.9), ("lateral", -2.63)])
 def test_slowest_pole_over_the_boxes(direction: Direction, slowest: float) -> None:
-    """P1 sheet section 9. Decay rates up to it are consistent with the certificate, one beyond it is refused."""
+    """P1 notes 9. Decay rates up to it are consistent with the certificate, one beyond it is refused."""
     model, box = gain_box(direction)
     numeric = model.on(np.linspace(0.0, 180.0, 181))
     axes = [np.linspace(low, high, 21) for low, high in zip(box.lower.ravel(), box.upper.ravel(), strict=True)]
@@ -160,14 +161,14 @@ def gain_box(direction: Direction) -> tuple[LpvModel, GainBox]:
 
 
 def printed(direction: Direction, reading: Reading) -> tuple[LpvModel, list[list[str]], Printed, Form]:
-    """Model, gains and the printed matrix in one of four readings (P1 sheet section 11, item 2)."""
-    offered = certificate(direction, reading)
+    """Model, gains and the printed matrix in one of four readings (P1 notes 11 item 2)."""
+    offered = certificate(CORNERS[direction], reading)
     return offered.model, offered.gains, offered.matrix, offered.form
 
 
 WHOLE = (0.0, 180.0)
-JUDGED: dict[tuple[Direction, Reading], tuple[tuple[float, float], ...]] = {
-    # reading: intervals on [0, 180] for (29) and (41); sheet section 11 item 2, claims P1-29-*, P1-41-*
+VALID: dict[tuple[Direction, Reading], tuple[tuple[float, float], ...]] = {
+    # reading: intervals on [0, 180] for (29) and (41); P1 notes 11 item 2, claims P1-29-*, P1-41-*
     ("longitudinal", "primal"): (),
     ("lateral", "primal"): ((52.8760, 52.9042),),
     ("longitudinal", "swapped"): ((39.4, 180.0),),
@@ -179,11 +180,11 @@ JUDGED: dict[tuple[Direction, Reading], tuple[tuple[float, float], ...]] = {
 }
 
 
-@pytest.mark.parametrize(("direction", "reading"), list(JUDGED))
-def test_printed_matrices_hold_exactly_where_the_sheet_says(direction: Direction, reading: Reading) -> None:
+@pytest.mark.parametrize(("direction", "reading"), list(VALID))
+def test_printed_matrices_hold_exactly_where_the_notes_say(direction: Direction, reading: Reading) -> None:
     model, gains, matrix, form = printed(direction, reading)
     found = judge(model, gains, matrix, form)
-    expected = JUDGED[direction, reading]
+    expected = VALID[direction, reading]
     assert len(found.intervals) == len(expected)
     for (low, high), ends in zip(found.intervals, expected, strict=True):
         for value, end in zip((low, high), ends, strict=True):
@@ -200,7 +201,7 @@ def test_printed_longitudinal_matrix_in_the_primal_reading_far_outside() -> None
 
 
 def test_the_absolute_value_must_be_kept() -> None:
-    """P1 sheet section 11 item 2: without |omega| the longitudinal dual test fails below -81 rad/s."""
+    """P1 notes 11 item 2: without |omega| the longitudinal dual test fails below -81 rad/s."""
     model, gains, matrix, form = printed("longitudinal", "dual")
     ((low, high),) = judge(model, gains, matrix, form, search=(-180.0, 0.0)).intervals
     assert high == 0.0
@@ -219,9 +220,9 @@ def test_by_how_much_the_primal_reading_fails(direction: Direction, omega: float
 
 
 @settings(deadline=None, max_examples=30)
-@given(st.sampled_from(list(JUDGED)), st.floats(0.0, 180.0))
-def test_judgements_agree_with_dense_eigenvalues(case: tuple[Direction, Reading], omega: float) -> None:
-    """Second road: numpy eigenvalues at any wheel speed that is not right at an end of an interval."""
+@given(st.sampled_from(list(VALID)), st.floats(0.0, 180.0))
+def test_validity_agrees_with_dense_eigenvalues(case: tuple[Direction, Reading], omega: float) -> None:
+    """Independently: numpy eigenvalues at any wheel speed that is not right at an end of an interval."""
     model, gains, matrix, form = printed(*case)
     intervals = judge(model, gains, matrix, form).intervals
     if any(abs(omega - end) < 1e-3 for interval in intervals for end in interval):
@@ -262,7 +263,7 @@ def test_printed_matrices_are_not_multi_convex(direction: Direction, reading: Re
 
 
 def test_size_of_the_violation_in_the_adjugate_reading() -> None:
-    """P1 sheet section 11 item 3: -1.5e-3 and +350 longitudinally."""
+    """P1 notes 11 item 3: -1.5e-3 and +350 longitudinally."""
     model, gains, matrix, _ = printed("longitudinal", "adjugate")
     spread = np.linalg.eigvalsh(convexity(model, np.array(gains, float), np.array(matrix[1], float)))
     assert spread[0] == pytest.approx(-1.5e-3, abs=0.05e-3)

@@ -1,37 +1,43 @@
-"""How the units of the bristle deflection decide whether a solver finds a Lyapunov matrix of (28)."""
+"""P1-aqs-scale: the units of the bristle deflection decide whether a solver finds a Lyapunov matrix of (28).
+
+Without scaling it misses certificates that exist and accepts false ones.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from studies.papers.corner_estimation.inputs import STATED_SPEED, corner_model, printed_gains
+from studies.claim import Finding, JsonValue
+from studies.papers.corner_estimation.inputs import DESIGNS, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner
+from studies.papers.topic import Topic
+from studies.papers.verdicts import derived
+from studies.plots import ZERO, Axis, Dash, Figure, Line, Mark, Panel
+from studies.plots.colours import CURVES, GREY
+from studies.study import PartResult, Scope, Table
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
-from synthesis.models.catalogue.corner import Direction
 from synthesis.polynomials.matrix import FloatArray
 from synthesis.stability import physical
 
-UNSCALED = np.ones(2)
+TOPIC = Topic(PACKAGE)
+CAPS = (1e3, 1e4)  # condition numbers that a general-purpose scaling might allow
+BALANCED = 2.0
 
 
-def natural_scale(name: str, direction: Direction) -> float:
+def natural_scale(corner: Corner) -> float:
     """g = sqrt|c/b| of A_e = [[a, b], [c, d]] at mid-range: z multiplied by g balances the two couplings, 1/s."""
-    A_e = (
-        corner_model(direction, STATED_SPEED, name).on([STATED_SPEED / 2]).error_dynamics(_gain(name, direction))[0][0]
-    )
-    return float(np.sqrt(abs(A_e[1, 0] / A_e[0, 1])))
+    ((_, b), (c, _)) = corner.error_matrices([STATED_SPEED / 2])[0]
+    return float(np.sqrt(abs(c / b)))
 
 
-def best_margin(name: str, direction: Direction, scale: float, condition: float) -> float:
+def best_margin(corner: Corner, scale: float, condition: float) -> float:
     """Largest t with A_e'P + P A_e < -t I for a constant P, I <= P <= condition I, in the states (scale z, v_r).
 
     Affine in the wheel speed, so both ends of the range decide; t < 0: no such P proves stability.
     """
-    problem = _problem(name, direction, np.array([scale, 1.0]), degree=0, margin=True)
+    problem = _problem(corner, np.array([scale, 1.0]), degree=0, margin=True)
     P = problem.unknowns["P"]
     problem.require("P >= I", P - problem.constant(np.eye(2)), strict=False)
     problem.require("P <= condition I", problem.constant(condition * np.eye(2)) - P, strict=False)
@@ -39,48 +45,119 @@ def best_margin(name: str, direction: Direction, scale: float, condition: float)
     return float("nan") if found.objective is None else found.objective
 
 
-@dataclass(frozen=True)
-class VertexSolve:
-    """An affine P that satisfies (28) at both ends of range and rate, without multi-convexity and without scaling.
+def vertices_only(corner: Corner) -> tuple[LmiResult, FloatArray, FloatArray]:
+    """An affine P, asked of a solver at the four vertices of (omega, rate) alone, without multi-convexity and scaling.
 
-    `growth` (g,) is the largest growth rate of V in 1/s at the wheel speeds `omega` (g,): above zero the certificate is
+    Returns its answer and, at wheel speeds (g,), the largest growth rate of V in 1/s (g,): above zero the certificate is
     false, whatever the solver said.
     """
-
-    status: str
-    verdict: Verdict
-    omega: FloatArray
-    growth: FloatArray
-
-
-def vertices_only(name: str, direction: Direction, points: int = 361) -> VertexSolve:
-    """Ask a solver for (28) at the four vertices of (omega, rate) alone, then look between them."""
-    problem = _problem(name, direction, UNSCALED, degree=1, margin=False)
+    problem = _problem(corner, np.ones(2), degree=1, margin=False)
     problem.require("P > 0", problem.unknowns["P"])
-    found: LmiResult = solve(problem, LmiSettings(relaxation="grid", points=2))
-    model = corner_model(direction, STATED_SPEED, name)
-    constant, slope = physical(model, found, "P")
-    omega = np.linspace(0.0, STATED_SPEED, points)
+    found = solve(problem, LmiSettings(relaxation="grid", points=2))
+    constant, slope = physical(corner.model, found, "P")
+    omega = np.linspace(0.0, STATED_SPEED, 361)
     P = constant + omega[:, None, None] * slope
-    A_e = model.on(omega).error_dynamics(_gain(name, direction))[0]
-    total = P @ A_e + np.swapaxes(P @ A_e, 1, 2)
+    product = P @ corner.error_matrices(omega)
+    total = product + np.swapaxes(product, 1, 2)
     relative = [
         np.linalg.eigvals(np.linalg.solve(P, total + rate * slope)).real.max(axis=1) for rate in (-800.0, 800.0)
     ]
-    return VertexSolve(found.report.status, found.verdict, omega, np.maximum(*relative))
+    return found, omega, np.maximum(*relative)
 
 
-def _problem(name: str, direction: Direction, scale: FloatArray, degree: int, margin: bool) -> LmiProblem:
+def _problem(corner: Corner, scale: FloatArray, degree: int, margin: bool) -> LmiProblem:
     """V' < 0 for the printed gains, with the unknown P of this degree."""
-    model = corner_model(direction, STATED_SPEED, name)
+    model, gain = corner.model, np.array(corner.gains)[:, None]
     problem = LmiProblem(model.parameters, maximise_margin=margin)
     scaled = model.polynomial.with_states_scaled(scale)
     A, C = problem.scaled(scaled.A), problem.scaled(scaled.C)
     P = problem.symmetric("P", 2, degree)
-    product = P @ (A - problem.constant(scale[:, None] * _gain(name, direction)) @ C)
+    product = P @ (A - problem.constant(scale[:, None] * gain) @ C)
     problem.require("dV/dt < 0", -(product + product.T + problem.time_derivative(P)))
     return problem
 
 
-def _gain(name: str, direction: Direction) -> FloatArray:
-    return np.array(printed_gains(direction, name))[:, None]
+@TOPIC.claim("P1-aqs-scale")
+def scaling(scaled: bool = True) -> Finding:
+    """Margins with a cap on cond(P), in the units of the model and with z scaled; and what vertices alone prove."""
+    computed: dict[str, JsonValue] = {}
+    for corner in DESIGNS:
+        g = natural_scale(corner)
+        loose, omega, growth = vertices_only(corner)
+        computed[str(corner)] = {
+            "scale_of_z": g,
+            "natural_condition_number": g * g,
+            "margin_unscaled": {f"{cap:g}": best_margin(corner, 1.0, cap) for cap in CAPS},
+            f"margin_scaled_condition_{BALANCED:g}": best_margin(corner, g if scaled else 1.0, BALANCED),
+            "vertices_only": {
+                "solver": loose.report.status, "verdict": str(loose.verdict), "largest_growth_1_s": float(growth.max()),
+                "at_rad_s": float(omega[growth.argmax()]), "certified": loose.verdict is Verdict.CERTIFIED,
+            },
+        }  # fmt: skip
+    rows = list(computed.values())
+    missed = sum(row["margin_unscaled"][f"{CAPS[0]:g}"] < 0.0 for row in rows)
+    helped = sum(row[f"margin_scaled_condition_{BALANCED:g}"] > 0.0 for row in rows)
+    false = sum(row["vertices_only"]["largest_growth_1_s"] > 0.0 for row in rows)
+    low, high = (pick(row["natural_condition_number"] for row in rows) for pick in (min, max))
+    reading = (
+        f"In metres and metres per second the natural condition number of P is g^2 = |c/b|, {low:.2g} to "
+        f"{high:.2g}. Capped at {CAPS[0]:g}, {missed} of {len(rows)} printed designs have no constant P at all; "
+        f"with z multiplied by g, {helped} of {len(rows)} have one with condition number {BALANCED:g}. Asked at the "
+        f"vertices alone the solver says '{rows[0]['vertices_only']['solver']}', and {false} of {len(rows)} answers "
+        "let V grow between the vertices. Scale, then re-evaluate on the whole range."
+    )
+    return Finding(computed, derived(missed == helped == false == len(rows)), reading)
+
+
+@TOPIC.part("conditioning", "Units decide whether a certificate is found", 2.0)
+def conditioning(scope: Scope) -> PartResult:
+    """Natural scale, margins with and without it, and what vertices alone prove."""
+    claims = TOPIC.found()
+    rows = []
+    for name, entry in claims[0].finding.computed.items():
+        loose = entry["vertices_only"]
+        rows.append([name, entry["scale_of_z"], entry["natural_condition_number"], *entry["margin_unscaled"].values(),
+                     entry[f"margin_scaled_condition_{BALANCED:g}"], loose["solver"], loose["largest_growth_1_s"],
+                     loose["at_rad_s"]])  # fmt: skip
+    caption = (
+        "Search for a constant P with I <= P <= kappa I (margin: largest t with A_e'P + P A_e < -t I), with z in "
+        "metres and with z multiplied by g; and an affine P from the vertices alone: what the solver says, and how "
+        "fast V really grows in between."
+    )
+    columns = ["design", "g [1/s]", "g^2 [1/s^2]", "margin, kappa 1e3", "margin, kappa 1e4", "margin with g, kappa 2",
+               "solver at the vertices", "largest growth rate [1/s]", "at [rad/s]"]  # fmt: skip
+    figure = conditioning_figure(7 if scope.quick else 13)
+    return PartResult(claims, [Table("conditioning", caption, columns, rows)], [figure])
+
+
+def conditioning_figure(caps: int = 13) -> Figure:
+    """Best Lyapunov margin over the allowed condition number, and false certificates between the vertices."""
+    conditions = np.geomspace(1.0, 1e6, caps)
+    margins: list[Mark] = [ZERO, Line([], [], "z scaled by g", GREY), Line([], [], "z in metres", GREY, "dashed")]
+    growth: list[Mark] = [ZERO]
+    for corner, colour in zip(DESIGNS, CURVES, strict=False):
+        _, omega, rate = vertices_only(corner)
+        growth.append(Line(omega, rate, str(corner), colour))
+        dashes: dict[Dash, float] = {"dashed": 1.0, "solid": natural_scale(corner)}
+        for dash, scale in dashes.items():
+            # Relative to the trivial growth of the margin with P itself, so that the sign is what one sees.
+            margin = [best_margin(corner, scale, cap) / cap for cap in conditions]
+            margins.append(Line(conditions, margin, color=colour, dash=dash, marker="."))
+    ticks = {-1e4: "−10⁴", -1e2: "−10²", -1.0: "−1", 0.0: "0", 1.0: "1", 1e2: "10²"}
+    x = Axis("allowed condition number κ of P [1]", scale="log")
+    y = Axis("best margin / κ [1/s]", scale="symlog", ticks=ticks, linear=1e-3)
+    left = Panel(margins, x, y, "constant P")
+    title = "affine P, vertices only, z in metres"
+    right = Panel(growth, SPEED_AXIS, "growth rate of V [1/s]", title)
+    return Figure(
+        "conditioning",
+        "Left: the largest margin of the Lyapunov inequality that a constant P with I ≤ P ≤ κ I reaches, over the "
+        "allowed condition number κ, with the bristle deflection in metres (dashed) and multiplied by its natural "
+        "scale g (solid); below zero there is no certificate (logarithmic beyond ±0.001). Right: an affine P(ω) "
+        "that a solver accepts at the four vertices of wheel speed and acceleration lets V grow between them. "
+        "Printed gains of P1 and P3.",
+        "Left: unscaled margins become positive only at condition numbers of 1e4 to 1e5, scaled ones at once. "
+        "Right: growth rates below zero at both ends and up to 280 per second in between.",
+        [left, right],
+        legend="below",
+    )

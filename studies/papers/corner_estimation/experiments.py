@@ -1,4 +1,4 @@
-"""The manoeuvres of Table III and of Figs. 6 to 8, driven on the truth vehicle."""
+"""The manoeuvres of Table III and of Figs. 6 to 8, simulated on the truth vehicle."""
 
 from __future__ import annotations
 
@@ -30,8 +30,6 @@ FORCES = (
     Driven("p1-steering-ice-snow", "steering, ice to snow (Fig. 8)"),
 )
 """Table II is lost; the text gives 7.4 % for F_x, 7.1 % for F_y, 4 % for F_z at most."""
-
-
 MOTION = (
     Moved("p1-lane-change-dry", "Lane change, dry (Fig. 7)"),
     Moved("p1-launch-split", "Launch, ice and dry (Fig. 9)"),
@@ -42,42 +40,16 @@ MOTION = (
 )
 
 PARTS = (
-    driven_part(
-        "table-3-all-wheel-drive",
-        "Table III on the truth vehicle: all-wheel drive",
-        partial(velocity_part, "all-wheel-drive", ALL_WHEEL, OBSERVERS),
-        cost=55.0,
-        quick=True,
-    ),
-    driven_part(
-        "table-3-rear-wheel-drive",
-        "Table III on the truth vehicle: rear-wheel drive",
-        partial(velocity_part, "rear-wheel-drive", REAR_WHEEL, OBSERVERS),
-        cost=70.0,
-    ),
-    driven_part(
-        "table-3-oval",
-        "Table III on the truth vehicle: oval",
-        partial(velocity_part, "oval", OVAL, OBSERVERS),
-        cost=50.0,
-    ),
-    driven_part(
-        "table-3-other-tire",
-        "Table III on a tire that no estimator knows: Magic Formula with slip lag",
-        partial(velocity_part, "other-tire", ALL_WHEEL, OBSERVERS),
-        cost=58.0,
-        tire=MAGIC_FORMULA,
-    ),
-    driven_part(
-        "forces",
-        "Figs. 6 to 8 on the truth vehicle: forces",
-        partial(force_part, "forces", FORCES, {"PID": differentiated_pid}),
-        cost=58.0,
-    ),
-    driven_part(
-        "motion",
-        "Figs. 7 and 9 to 13 on the truth vehicle: accelerations and yaw rate",
-        partial(motion_part, "motion", MOTION),
-        cost=5.0,
-    ),
-)
+    driven_part("table-3-all-wheel-drive", "Table III on the truth vehicle: all-wheel drive",
+                partial(velocity_part, "all-wheel-drive", ALL_WHEEL, OBSERVERS), cost=55.0, quick=True),
+    driven_part("table-3-rear-wheel-drive", "Table III on the truth vehicle: rear-wheel drive",
+                partial(velocity_part, "rear-wheel-drive", REAR_WHEEL, OBSERVERS), cost=70.0),
+    driven_part("table-3-oval", "Table III on the truth vehicle: oval",
+                partial(velocity_part, "oval", OVAL, OBSERVERS), cost=50.0),
+    driven_part("table-3-other-tire", "Table III on a tire that no estimator knows: Magic Formula with slip lag",
+                partial(velocity_part, "other-tire", ALL_WHEEL, OBSERVERS), cost=58.0, tire=MAGIC_FORMULA),
+    driven_part("forces", "Figs. 6 to 8 on the truth vehicle: forces",
+                partial(force_part, "forces", FORCES, {"PID": differentiated_pid}), cost=58.0),
+    driven_part("motion", "Figs. 7 and 9 to 13 on the truth vehicle: accelerations and yaw rate",
+                partial(motion_part, "motion", MOTION), cost=5.0),
+)  # fmt: skip

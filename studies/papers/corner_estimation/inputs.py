@@ -1,77 +1,114 @@
-"""What the claims of P1 start from: models, printed gains and matrices, and numbers that no parameter set holds."""
+"""What the claims of P1 start from: the corner models, what is printed for them, and the problem (30)."""
 
 from __future__ import annotations
 
-import tomllib
-from functools import cache
-from importlib import resources
-from typing import Any
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import TypeVar
 
-from studies.claim import JsonValue
-from studies.papers.published import published_claims
+import numpy as np
+import sympy as sp
+from numpy.typing import ArrayLike
+
+from studies.plots import Axis
 from synthesis.errors import SpecError
+from synthesis.hinf_observer import Channel, ObserverDesign
+from synthesis.lmi.settings import LmiSettings
 from synthesis.models.catalogue.corner import Direction, corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import ParameterSet, Published, load_parameter_set
+from synthesis.polynomials.matrix import FloatArray
 
+T = TypeVar("T")
 PACKAGE = "studies.papers.corner_estimation"
 PARAMETERS = "corner-estimation"
-DIRECTIONS: tuple[Direction, ...] = ("longitudinal", "lateral")
-STATED_SPEED = 180.0  # rad/s, P1 section 6: the range that the stability claims name
-DESIGN_SPEED = 140.0  # rad/s, P1 section 6.2: the range that the gains are designed on
-FORCE_GAINS = (1.8, 11.4, 50.6)  # eta_1 [N s], eta_2 [N m], eta_3 [1/s], P1 section 2
-
-# The parameter sets with printed gains that the stability claims are about: (name, direction).
-DESIGNS: tuple[tuple[str, Direction], ...] = (
-    (PARAMETERS, "longitudinal"), (PARAMETERS, "lateral"),
-    ("resilient-velocity", "longitudinal"), ("resilient-velocity", "lateral"),
-)  # fmt: skip
-PAPER = {PARAMETERS: "P1", "resilient-velocity": "P3"}  # whose gains they are
+PAPER = {PARAMETERS: "P1", "resilient-velocity": "P3"}  # that prints a parameter set
+STATED_SPEED = 180.0  # rad/s: the range that the stability claims name, text before (29)
+DESIGN_SPEED = 140.0  # rad/s: the range that the gains are designed on, text after (32)
+POINTS = 140  # wheel speeds on the design range, text after (32)
+STATES = ("bristle_deflection", "relative_velocity")  # of the corner models
+SPEED_AXIS = Axis("wheel speed [rad/s]", 0.0, STATED_SPEED)
 
 
 @cache
 def parameters(name: str = PARAMETERS) -> ParameterSet:
-    """A shipped parameter set; the values of P1 unless told otherwise."""
+    """A shipped parameter set; the values of P1 unless another one is named."""
     return load_parameter_set(name)
 
 
-@cache
-def corner_model(direction: Direction, maximum: float = STATED_SPEED, name: str = PARAMETERS) -> LpvModel:
-    """The corner velocity model of P1 (22), (37) over 0..`maximum` rad/s and +-800 rad/s^2."""
-    return corner_velocity_model(parameters(name), direction, maximum)
+@dataclass(frozen=True)
+class Corner:
+    """The velocity model of one direction with a parameter set, and what is printed for it. Gains: [L1 in m/s, L2 in m/s^2].
+
+    Raises SpecError where something is asked for that is not printed.
+    """
+
+    direction: Direction
+    name: str = PARAMETERS
+
+    def __str__(self) -> str:
+        return f"{PAPER[self.name]} {self.direction}"
+
+    @cached_property
+    def model(self) -> LpvModel:
+        """P1 (22), (37) over the stated 0..180 rad/s and +-800 rad/s^2."""
+        return corner_velocity_model(parameters(self.name), self.direction, STATED_SPEED)
+
+    @cached_property
+    def design_model(self) -> LpvModel:
+        """The same over the range that the gains are designed on, 0..140 rad/s."""
+        return corner_velocity_model(parameters(self.name), self.direction, DESIGN_SPEED)
+
+    @property
+    def constants(self) -> dict[str, float]:
+        """sigma0, sigma1, sigma2, kappa and effective_radius in the units of the model."""
+        return {name: constant.value for name, constant in self.model.constants.items()}
+
+    @property
+    def exact_constants(self) -> dict[str, sp.Rational]:
+        """The constants as the rational numbers of their printed decimals."""
+        return {name: sp.Rational(str(value)) for name, value in self.constants.items()}
+
+    @property
+    def gains(self) -> tuple[float, ...]:
+        """The gains that the stability claims are about."""
+        return _given(self._published.gains, f"{self.direction} gains in '{self.name}'")
+
+    @property
+    def box(self) -> tuple[tuple[float, float], ...]:
+        """The box of gains: (lowest, highest) of L1 and of L2."""
+        return _given(self._published.gain_box, f"{self.direction} gain box in '{self.name}'")
+
+    @property
+    def lyapunov(self) -> list[list[list[str]]]:
+        """[P0, P1] of (29) or (41) as printed decimals."""
+        matrix = _given(self._published.lyapunov, f"{self.direction} Lyapunov matrix in '{self.name}'")
+        return [[list(row) for row in coefficient] for coefficient in matrix]
+
+    def error_matrices(self, omega: ArrayLike) -> FloatArray:
+        """A_e = A - L C of (25), (39) with the printed gains at wheel speeds (g,) in rad/s: (g, 2, 2), states in m and m/s."""
+        return self.model.on(np.asarray(omega)).error_dynamics(np.array(self.gains)[:, None])[0]
+
+    @property
+    def _published(self) -> Published:
+        return _given(parameters(self.name).tire[self.direction].published, f"{self.direction} design in '{self.name}'")
 
 
-def published(direction: Direction, name: str = PARAMETERS) -> Published:
-    """Gains, gain box and Lyapunov matrix as printed. Raises SpecError for a set that prints nothing."""
-    found = parameters(name).tire[direction].published
-    if found is None:
-        raise SpecError(f"parameter set '{name}' prints nothing for the {direction} tire")
-    return found
+def _given(value: T | None, what: str) -> T:
+    if value is None:
+        raise SpecError(f"no {what} is printed")
+    return value
 
 
-def printed_gains(direction: Direction, name: str = PARAMETERS) -> tuple[float, ...]:
-    """[L1 in m/s, L2 in m/s^2] that the stability claims are about."""
-    gains = published(direction, name).gains
-    if gains is None:
-        raise SpecError(f"parameter set '{name}' prints no {direction} gains")
-    return gains
+# The printed gains that the stability claims are about: of P1 and of P3.
+DESIGNS = (
+    Corner("longitudinal"), Corner("lateral"),
+    Corner("longitudinal", "resilient-velocity"), Corner("lateral", "resilient-velocity"),
+)  # fmt: skip
+CORNERS: dict[Direction, Corner] = {corner.direction: corner for corner in DESIGNS[:2]}
 
 
-def printed_box(direction: Direction) -> tuple[tuple[float, float], ...]:
-    """The printed box of gains: (lowest, highest) of L1 and of L2."""
-    box = published(direction).gain_box
-    if box is None:
-        raise SpecError(f"parameter set '{PARAMETERS}' prints no {direction} gain box")
-    return box
-
-
-def printed_value(claim_id: str, package: str = PACKAGE) -> JsonValue:
-    """What the paper prints for a claim, from ``claims.toml``."""
-    return published_claims(package)[claim_id].published
-
-
-@cache
-def printed_numbers() -> dict[str, Any]:
-    """Printed tables and values by name, from ``printed.toml``."""
-    text = (resources.files(PACKAGE) / "printed.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
+def literal_design(degree: int, errors: tuple[str, ...] = STATES, points: int = POINTS) -> ObserverDesign:
+    """(30)-(32) and nothing else: one channel from both disturbances to the errors C_e, minimised."""
+    channel = Channel(("friction", "acceleration_error"), errors)
+    return ObserverDesign((channel,), degree, settings=LmiSettings(relaxation="grid", points=points))

@@ -15,17 +15,7 @@ import numpy as np
 import sympy as sp
 
 from studies.claim import Finding, JsonValue, judged
-from studies.papers.corner_estimation.inputs import (
-    DESIGNS,
-    DIRECTIONS,
-    PACKAGE,
-    PAPER,
-    PARAMETERS,
-    STATED_SPEED,
-    corner_model,
-    printed_box,
-    printed_gains,
-)
+from studies.papers.corner_estimation.inputs import CORNERS, DESIGNS, PACKAGE, STATED_SPEED, Corner
 from studies.papers.topic import Topic
 from studies.plots import Box as Outline
 from studies.plots import Contours, Figure, Mark, Panel, dots
@@ -39,7 +29,7 @@ from synthesis.stability import affine_quadratic_stability
 
 TOPIC = Topic(PACKAGE)
 # Affine P with multi-convexity at the vertices, affine P on the continuum, constant P: (name, relaxation, degree).
-ROADS: tuple[tuple[str, Relaxation, int], ...] = (
+LMI_FORMS: tuple[tuple[str, Relaxation, int], ...] = (
     ("with multi-convexity", "vertex", 1), ("without", "exact", 1), ("constant P", "exact", 0),
 )  # fmt: skip
 Span = tuple[float, float]
@@ -60,18 +50,12 @@ class DiagonalProof:
     vertices: int
 
 
-def diagonal_proof(
-    direction: Direction,
-    box: Box,
-    name: str = PARAMETERS,
-    speeds: Span = (0.0, STATED_SPEED),
-    weight: int | None = None,
-) -> DiagonalProof:
-    """Stability of all gains of `box` ((low, high) of L1 and of L2) at all wheel speeds of `speeds` and any rate.
+def diagonal_proof(corner: Corner, box: Box, weight: int | None = None) -> DiagonalProof:
+    """Stability of all gains of `box` ((low, high) of L1 and of L2) at all wheel speeds that are stated and any rate.
 
     `weight` tries a certain w instead of one from the middle.
     """
-    matrices = exact_matrices(direction, box, name, speeds)
+    matrices = exact_matrices(corner, box)
     spans = [admissible(matrix) for matrix in matrices]
     low, high = max(span[0] for span in spans), min(span[1] for span in spans)
     if weight is None:
@@ -79,12 +63,11 @@ def diagonal_proof(
     return DiagonalProof(low, high, weight, all(decreases(matrix, weight) for matrix in matrices), len(matrices))
 
 
-def exact_matrices(direction: Direction, box: Box, name: str, speeds: Span) -> list[sp.Matrix]:
+def exact_matrices(corner: Corner, box: Box) -> list[sp.Matrix]:
     """A_e at every vertex of wheel speed and gains, in rational numbers read from the printed decimals."""
-    model = corner_model(direction, STATED_SPEED, name)
-    values = {key: sp.Rational(str(constant.value)) for key, constant in model.constants.items()}
+    model, values = corner.model, corner.exact_constants
     A, C = (sp.Matrix(matrix.subs(values)) for matrix in (model.A, model.C))
-    ends = [sorted({sp.Rational(str(end)) for end in span}) for span in (speeds, *box)]
+    ends = [sorted({sp.Rational(str(end)) for end in span}) for span in ((0.0, STATED_SPEED), *box)]
     return [(A - sp.Matrix([first, second]) * C).subs("wheel_speed", w) for w, first, second in product(*ends)]
 
 
@@ -117,22 +100,21 @@ def _round(value: float, digits: int = 2) -> int:
 
 
 @TOPIC.claim("P1-aqs-feas")
-def printed_gains_are_stable(gains: dict[tuple[str, Direction], tuple[float, ...]] | None = None) -> Finding:
-    """(28), (40) by LMI on three roads, and a constant diagonal P in exact arithmetic, for the gains of P1 and of P3."""
+def printed_gains_are_stable(gains: dict[Corner, tuple[float, ...]] | None = None) -> Finding:
+    """(28), (40) by three LMIs, and a constant diagonal P in exact arithmetic, for the gains of P1 and of P3."""
     computed: dict[str, JsonValue] = {}
     holds = []
-    for key in DESIGNS:
-        name, direction = key
-        given = printed_gains(direction, name) if gains is None else gains[key]
-        model, column = corner_model(direction, STATED_SPEED, name), np.array(given)[:, None]
+    for corner in DESIGNS:
+        given = corner.gains if gains is None else gains[corner]
+        model, column = corner.model, np.array(given)[:, None]
         verdicts = {
-            road: affine_quadratic_stability(model, column, degree, settings=LmiSettings(relaxation=relaxation)).verdict
-            for road, relaxation, degree in ROADS
+            form: affine_quadratic_stability(model, column, degree, settings=LmiSettings(relaxation=relaxation)).verdict
+            for form, relaxation, degree in LMI_FORMS
         }
-        proof = diagonal_proof(direction, tuple((gain, gain) for gain in given), name)
+        proof = diagonal_proof(corner, tuple((gain, gain) for gain in given))
         holds.append(proof.proved and all(verdict is Proof.CERTIFIED for verdict in verdicts.values()))
-        computed[f"{PAPER[name]} {direction}"] = {
-            "gains": list(given), "lmi": {road: str(verdict) for road, verdict in verdicts.items()},
+        computed[str(corner)] = {
+            "gains": list(given), "lmi": {form: str(verdict) for form, verdict in verdicts.items()},
             "weights_of_diag_w_1": [proof.low, proof.high], "weight": proof.chosen, "proved_exactly": proof.proved,
         }  # fmt: skip
     weights = ", ".join(f"{entry['weight']:,}" for entry in computed.values())
@@ -149,16 +131,16 @@ def printed_gains_are_stable(gains: dict[tuple[str, Direction], tuple[float, ...
 def printed_boxes_are_stable(boxes: dict[Direction, Box] | None = None) -> Finding:
     """One constant P for all gains of each printed box, exact at the eight vertices of (omega, L1, L2)."""
     computed: dict[str, JsonValue] = {}
-    for direction in DIRECTIONS:
-        box = printed_box(direction) if boxes is None else boxes[direction]
-        proof = diagonal_proof(direction, box)
-        slowest = slowest_poles(direction, *gain_grid(box, 21))
+    for direction, corner in CORNERS.items():
+        box = corner.box if boxes is None else boxes[direction]
+        proof = diagonal_proof(corner, box)
+        slowest = slowest_poles(corner, *gain_grid(box, 21))
         computed[direction] = {
             "L1": list(box[0]), "L2": list(box[1]), "vertices": proof.vertices,
             "weights_of_diag_w_1": [proof.low, proof.high], "weight": proof.chosen, "proved_exactly": proof.proved,
             "slowest_pole_1_s": float(slowest.max()),
         }  # fmt: skip
-    x, y = (computed[direction] for direction in DIRECTIONS)
+    x, y = computed.values()
     proved = bool(x["proved_exactly"] and y["proved_exactly"])
     reading = (
         "A_e is affine in omega, L1 and L2 one at a time, so a constant P decides at the eight vertices. "
@@ -180,9 +162,9 @@ def gain_grid(box: Box, points: int) -> tuple[FloatArray, FloatArray]:
     return L1, L2
 
 
-def slowest_poles(direction: Direction, L1: FloatArray, L2: FloatArray, speeds: int = 91) -> FloatArray:
+def slowest_poles(corner: Corner, L1: FloatArray, L2: FloatArray, speeds: int = 91) -> FloatArray:
     """Largest real part of the frozen poles in 1/s over all wheel speeds, for each pair of gains."""
-    numeric = corner_model(direction).on(np.linspace(0.0, STATED_SPEED, speeds))
+    numeric = corner.model.on(np.linspace(0.0, STATED_SPEED, speeds))
     gains = np.stack([L1, L2], axis=-1)[..., None, :, None]
     return np.asarray(np.linalg.eigvals(numeric.A - gains @ numeric.C).real.max(axis=(-2, -1)))
 
@@ -191,13 +173,9 @@ def slowest_poles(direction: Direction, L1: FloatArray, L2: FloatArray, speeds: 
 def quadratic_stability(scope: Scope) -> PartResult:
     """Both claims, every proof in a table, and the boxes over the plane of gains."""
     claims = TOPIC.found()
-    return PartResult(claims, [proof_table(*(c.finding for c in claims))], [box_figure(41 if scope.quick else 81)])
-
-
-def proof_table(gains: Finding, boxes: Finding) -> Table:
-    """Constant diagonal P for the printed gains and for the printed boxes."""
+    gains, boxes = (claim.finding.computed for claim in claims)
     rows = []
-    for name, entry in (*gains.computed.items(), *((f"box of P1, {d}", e) for d, e in boxes.computed.items())):
+    for name, entry in (*gains.items(), *((f"box of P1, {d}", e) for d, e in boxes.items())):
         low, high = entry["weights_of_diag_w_1"]
         rows.append([name, float(low), float(high), entry["weight"], entry["proved_exactly"]])
     caption = (
@@ -206,17 +184,18 @@ def proof_table(gains: Finding, boxes: Finding) -> Table:
         "rational numbers."
     )
     columns = ["gains", "least w [1/s^2]", "greatest w [1/s^2]", "w checked [1/s^2]", "proved exactly"]
-    return Table("diagonal-proofs", caption, columns, rows)
+    table = Table("diagonal-proofs", caption, columns, rows)
+    return PartResult(claims, [table], [box_figure(41 if scope.quick else 81)])
 
 
 def box_figure(points: int = 81) -> Figure:
     """Slowest frozen pole over the plane of gains, with the printed boxes."""
     panels = []
-    for direction in DIRECTIONS:
-        box, (L1, L2) = printed_box(direction), printed_gains(direction)
+    for direction, corner in CORNERS.items():
+        box, (L1, L2) = corner.box, corner.gains
         wide = tuple((low - 0.6 * (high - low), high + 0.6 * (high - low)) for low, high in box)
         first, second = gain_grid(wide, points)
-        slowest = slowest_poles(direction, first, second, speeds=46)
+        slowest = slowest_poles(corner, first, second, speeds=46)
         steps = [-200.0, -100.0, -50.0, -25.0, 0.0] if direction == "longitudinal" else [-10.0, -5.0, -2.5, -1.0, 0.0]
         marks: list[Mark] = [
             Contours(first, second, slowest, [0.0, max(1.0, slowest.max())], FORBIDDEN, filled=True),
@@ -232,6 +211,5 @@ def box_figure(points: int = 81) -> Figure:
         "region; one constant Lyapunov matrix proves each of them, exactly. P1, text after (28) and (40).",
         "Contour maps of the slowest pole with the printed gain boxes inside the stable region.",
         panels,
-        size=(7.2, 3.6),
         legend="below",
     )

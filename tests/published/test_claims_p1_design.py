@@ -1,4 +1,4 @@
-"""Second roads to what the study of P1 says of the H-infinity design, the Kalman gains, forces and loads."""
+"""Independent computations of what the study of P1 says of the H-infinity design, the Kalman gains, forces and loads."""
 
 from __future__ import annotations
 
@@ -12,33 +12,25 @@ import pytest
 
 from analysis.norms import hinf_norm
 from studies.claim import Verdict
-from studies.papers.corner_estimation.claims_solve_size import (
-    expressions,
-    one_by_one,
-    relaxed_problem,
-    solve_size,
-)
-from studies.papers.corner_estimation.hinf import optima, signed_model, velocity_floor
-from studies.papers.corner_estimation.inputs import corner_model, printed_gains, printed_numbers
-from studies.papers.corner_estimation.kalman import fitted, schedule
-from studies.papers.corner_estimation.tables_forces import filter_lag
+from studies.papers.corner_estimation.hinf_design import OMEGA, fitted, optima, schedule, signed_model, velocity_floor
+from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, Corner
+from studies.papers.corner_estimation.sigma_points import filter_lag
+from studies.papers.corner_estimation.solve_size import expressions, one_by_one, relaxed_problem, solve_size
+from studies.papers.published import printed_numbers
 from synthesis.lmi.relaxation import RelaxedProblem
 from tests.unit.p1_findings import PRINT, RADIUS, finding
-
-Direction = Any
-
 
 # ---- (30): H-infinity -----------------------------------------------------------------------------------------------------
 
 
 def test_gamma_lies_between_the_floor_and_the_frozen_norms() -> None:
     """Every gamma is at least the static gain, and the frozen loops with the returned gains reach no more than gamma."""
-    for direction in PRINT:
-        for found in optima(direction):
-            model = corner_model(direction, 140.0)
-            A_e, B_e = model.on(found.omega).error_dynamics(found.gains[..., None])
+    for corner in CORNERS.values():
+        for found in optima(corner):
+            model = corner.design_model
+            A_e, B_e = model.on(OMEGA).error_dynamics(found.gain(OMEGA))
             norm = hinf_norm(A_e, B_e[..., :2], np.eye(2)).norm
-            floor = velocity_floor(direction, "corrected", found.omega)
+            floor = velocity_floor(corner, "corrected", OMEGA)
             assert (norm >= floor * (1 - 1e-9)).all()
             assert norm.max() <= found.gamma * (1 + 1e-7)
             assert floor.max() == 1.0
@@ -47,20 +39,20 @@ def test_gamma_lies_between_the_floor_and_the_frozen_norms() -> None:
 def test_static_gain_for_both_signs_by_solving_the_error_at_rest() -> None:
     """-A_e^-1 B_e with arbitrary gains, for the printed and the corrected sign."""
     omega = np.array([0.0, 40.0, 140.0])
-    for direction, sign in product(PRINT, ("printed", "corrected")):
-        numeric = signed_model(direction, sign).on(omega)  # type: ignore[arg-type]
+    for corner, sign in product(CORNERS.values(), ("printed", "corrected")):
+        numeric = signed_model(corner, sign).on(omega)  # type: ignore[arg-type]
         A_e, B_e = numeric.error_dynamics(np.array([[0.9], [33.0]]))
         gain = np.abs(-np.linalg.solve(A_e, B_e)[:, 1, 0])
-        np.testing.assert_allclose(gain, velocity_floor(direction, sign, omega), rtol=1e-9)  # type: ignore[arg-type]
+        np.testing.assert_allclose(gain, velocity_floor(corner, sign, omega), rtol=1e-9)  # type: ignore[arg-type]
     a = 12.84 * 0.33 * 140.0
     assert abs(1.621 * a / (181.5 + 0.001 * a) - 1.0 - 4.2808) < 5e-5
 
 
-@pytest.mark.parametrize("direction", PRINT)
-def test_kalman_gains_by_spectral_factorisation(direction: Direction) -> None:
-    """L2 is constant and L1 has the closed form of the module; the Riccati road must agree, also near sigma0 = sigma1 a."""
-    s0, s1, s2, kappa, *_ = (float(value) for value in PRINT[direction])
-    noise = fitted(direction, printed_gains(direction), 70.0)
+@pytest.mark.parametrize("corner", CORNERS.values(), ids=CORNERS)
+def test_kalman_gains_by_spectral_factorisation(corner: Corner) -> None:
+    """L2 is constant and L1 has the closed form of the module; the Riccati equation must agree, also near sigma0 = sigma1 a."""
+    s0, s1, s2, kappa, *_ = (float(value) for value in PRINT[corner.direction])
+    noise = fitted(corner, corner.gains, 70.0)
     omega = np.array([0.0, 20.0, 50.0, 52.8, 60.0, 140.0])
     a = kappa * float(RADIUS) * omega
     sensor = 1.0 + s1 * s1 * noise.friction
@@ -68,7 +60,7 @@ def test_kalman_gains_by_spectral_factorisation(direction: Direction) -> None:
     p0 = L2 * (s0 + s2 * a)
     p1 = np.sqrt(2 * p0 + (noise.friction * s0**2 + noise.acceleration * (s1 + s2) ** 2 + a * a) / sensor)
     L1 = (p1 - a - L2 * (s1 + s2)) / (s0 - s1 * a)
-    np.testing.assert_allclose(schedule(direction, noise, omega), np.stack([L1, np.full(6, L2)], axis=1), rtol=1e-7)
+    np.testing.assert_allclose(schedule(corner, noise, omega), np.stack([L1, np.full(6, L2)], axis=1), rtol=1e-7)
 
 
 # ---- (30): its size ---------------------------------------------------------------------------------------------------------
@@ -134,7 +126,7 @@ def test_no_clock_decides_what_a_solve_costs(monkeypatch: pytest.MonkeyPatch) ->
     for module in (
         "time.perf_counter",
         "time.monotonic",
-        "studies.papers.corner_estimation.claims_solve_size.perf_counter",
+        "studies.papers.corner_estimation.solve_size.perf_counter",
     ):
         monkeypatch.setattr(module, stopped)
     assert solve_size(10) == solve_size(10)
@@ -171,9 +163,9 @@ def test_loads_in_fractions() -> None:
 
 
 def test_force_filter_lags_by_its_own_covariances() -> None:
-    """Sheet section 11 item 8: 1 s and 3.5 s in newtons, 1.5 ms and up to 3.8 ms in kilonewtons."""
+    """P1 notes 11 item 8: 1 s and 3.5 s in newtons, 1.5 ms and up to 3.8 ms in kilonewtons."""
     for entry, newtons, kilo in zip(
-        printed_numbers()["force_filter"]["readings"], (3.5, 1.06), (3.8e-3, 1.57e-3), strict=True
+        printed_numbers(PACKAGE)["force_filter"]["readings"], (3.5, 1.06), (3.8e-3, 1.57e-3), strict=True
     ):
         assert filter_lag(entry["process"], entry["measurement"], 1.0) == pytest.approx(newtons, rel=0.01)
         assert filter_lag(entry["process"], entry["measurement"], 1e3) == pytest.approx(kilo, rel=0.01)

@@ -1,6 +1,6 @@
 """P1-hinf-time: what (30) costs, counted: what a modelling layer walks, what the solver gets, what the exact form needs.
 
-Seconds belong to a machine and to its load, so they decide nothing: `solve_seconds` measures them for the report alone.
+Seconds belong to a machine and to its load, so they decide nothing: `time_table` measures them for the report alone.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from studies.claim import ClaimFunction, Finding, JsonValue
-from studies.papers.corner_estimation.hinf import POINTS, literal_design
-from studies.papers.corner_estimation.inputs import DESIGN_SPEED, corner_model
+from studies.claim import Finding, JsonValue
+from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, POINTS, literal_design
+from studies.papers.topic import Topic
 from studies.papers.verdicts import derived
+from studies.study import Cell, PartResult, Scope, Table
 from synthesis.hinf_observer import observer_problem
 from synthesis.lmi.conic import ConicData, assemble
 from synthesis.lmi.problem import LmiProblem
@@ -25,12 +26,13 @@ from synthesis.lmi.scaling import observer_scale
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import solve
 
+TOPIC = Topic(PACKAGE)
 ROUNDING = 1e-12  # relative: all that two assemblies of the same numbers may differ by
 
 
 def conic_problem(points: int, degree: int) -> tuple[LmiProblem, LmiSettings]:
     """(30) for the longitudinal corner, with the settings that put it on a grid of wheel speeds."""
-    model, design = corner_model("longitudinal", DESIGN_SPEED), literal_design(degree, points=points)
+    model, design = CORNERS["longitudinal"].design_model, literal_design(degree, points=points)
     return observer_problem(model, design, observer_scale(model.polynomial, model.parameters)), design.settings
 
 
@@ -63,13 +65,14 @@ def expressions(problem: Any) -> int:
     return sum(nodes(constraint) for constraint in problem.constraints)
 
 
+@TOPIC.claim("P1-hinf-time")
 def solve_size(
     points: int = POINTS,
     degree: int = 1,
     layer: Callable[[RelaxedProblem], Any] = one_by_one,
     walked: Callable[[Any], int] = expressions,
 ) -> Finding:
-    """Count (30) on both roads and in its exact form, on `points` wheel speeds and on twice as many."""
+    """Count (30) in both assemblies and in its exact form, on `points` wheel speeds and on twice as many."""
     grid, finer = (relaxed_problem(number, degree, "grid") for number in (points, 2 * points))
     exact, again = (assemble(relaxed_problem(number, degree, "exact")) for number in (points, 2 * points))
     direct, modelled = assemble(grid), layer(grid)
@@ -77,43 +80,25 @@ def solve_size(
     arrays = {"points": len(grid.sampled), "twice_the_points": len(finer.sampled)}
     same = _hands_over(modelled, direct)
     computed: dict[str, JsonValue] = {
-        "points": points,
-        "degree": degree,
-        "conic_problem": _size(direct),
-        "layer_hands_over_the_same_problem": same,
-        "expressions_walked_by_the_layer": work,
+        "points": points, "degree": degree, "conic_problem": _size(direct),
+        "layer_hands_over_the_same_problem": same, "expressions_walked_by_the_layer": work,
         "arrays_stacked_by_direct_assembly": arrays,
-        "exact_relaxation": _size(exact),
-        "exact_relaxation_with_twice_the_points": _size(again),
-    }
+        "exact_relaxation": _size(exact), "exact_relaxation_with_twice_the_points": _size(again),
+    }  # fmt: skip
     grows = work["twice_the_points"] - work["points"] >= points and arrays["twice_the_points"] == arrays["points"]
     smaller = _size(exact) == _size(again) and exact.A.shape[0] < direct.A.shape[0]
     reading = (
         f"Counted, not timed: with {points} points and degree {degree}, (30) is {len(direct.semidefinite)} matrix "
         f"inequalities in {direct.A.shape[1]} unknowns, {direct.A.shape[0]} rows for the solver. Written in cvxpy, one "
         f"inequality for each point and rate, it is {work['points']} expressions for the layer to walk, and "
-        f"{work['twice_the_points']} for twice the points, before it hands over "
-        f"{'the very same' if same else 'other'} rows, which direct assembly stacks from {arrays['points']} arrays "
-        "whatever the number of points: what the layer adds is preparation alone. The exact relaxation, which also "
-        f"holds between the points, has {exact.A.shape[0]} rows, {exact.A.shape[1]} unknowns and "
-        f"{len(exact.semidefinite)} cones for any number of points. It holds as derived if the rows are the same, only "
-        "the layer's work grows with the points, and the exact relaxation has fewer rows. Seconds are printed beside "
-        "the claim and decide nothing."
+        f"{work['twice_the_points']} for twice the points, before it hands over {'the very same' if same else 'other'} "
+        f"rows, which direct assembly stacks from {arrays['points']} arrays whatever the number of points: what the "
+        "layer adds is preparation alone. The exact relaxation, which also holds between the points, has "
+        f"{exact.A.shape[0]} rows, {exact.A.shape[1]} unknowns and {len(exact.semidefinite)} cones for any number of "
+        "points. It holds as derived if the rows are the same, only the layer's work grows with the points, and the "
+        "exact relaxation has fewer rows. Seconds are printed beside the claim and decide nothing."
     )
     return Finding(computed, derived(same and grows and smaller), reading)
-
-
-def solve_seconds(points: int = POINTS, degree: int = 1) -> dict[str, dict[str, float]]:
-    """Seconds of one solve of (30) on both roads, on this machine as busy as it is: for the report, not for a verdict."""
-    problem, settings = conic_problem(points, degree)
-    measured: dict[str, dict[str, float]] = {}
-    for name, solver in (("cvxpy", "cvxpy:CLARABEL"), ("direct", "CLARABEL")):
-        solve(problem, replace(settings, solver=solver, points=2))  # imports and first calls are not counted
-        start = perf_counter()
-        report = solve(problem, replace(settings, solver=solver)).report
-        around = perf_counter() - start - report.seconds - report.verification_seconds
-        measured[name] = {"preparation_s": around, "solver_s": report.seconds}
-    return measured
 
 
 def _size(data: ConicData) -> dict[str, JsonValue]:
@@ -132,4 +117,38 @@ def _hands_over(problem: Any, direct: ConicData) -> bool:
     return all(float(np.abs(a - b).max()) <= ROUNDING * float(np.abs(b).max()) for a, b in pairs)
 
 
-CLAIMS: dict[str, ClaimFunction] = {"P1-hinf-time": solve_size}
+@TOPIC.part("solve-time", "Preparing and solving the H-infinity problem", 8.0)
+def solve_time(scope: Scope) -> PartResult:
+    """How large (30) is for a solver, counted; and the seconds of this run, for information."""
+    claims = TOPIC.found()
+    found = claims[0].finding.computed
+    rows: list[list[Cell]] = []
+    sizes = {f"{found['points']} points, one by one": "conic_problem", "exact relaxation": "exact_relaxation"}
+    for name, size in ((name, found[key]) for name, key in sizes.items()):
+        cones = ", ".join(f"{number} of {shape}" for shape, number in size["cones"].items())
+        rows.append([name, size["unknowns"], size["rows"], sum(size["cones"].values()), cones])
+    caption = (
+        f"(30) as the solver sees it, degree {found['degree']}, longitudinal: unknowns, rows and positive semidefinite "
+        "cones. The exact relaxation holds between the points, too, and does not grow with their number."
+    )
+    columns = ["form", "unknowns [1]", "rows [1]", "cones [1]", "their sizes"]
+    return PartResult(claims, [Table("solve-size", caption, columns, rows), time_table(40 if scope.quick else POINTS)])
+
+
+def time_table(points: int) -> Table:
+    """Seconds of one solve of (30) by both assemblies, on this machine as busy as it is: no part of any verdict."""
+    problem, settings = conic_problem(points, 1)
+    rows: list[list[Cell]] = []
+    for name, solver in (
+        ("cvxpy, then Clarabel", "cvxpy:CLARABEL"), ("conic data assembled directly, Clarabel", "CLARABEL"),
+    ):  # fmt: skip
+        solve(problem, replace(settings, solver=solver, points=2))  # imports and first calls are not counted
+        start = perf_counter()
+        report = solve(problem, replace(settings, solver=solver)).report
+        preparation = perf_counter() - start - report.seconds - report.verification_seconds
+        rows.append([name, preparation, report.seconds])
+    caption = (
+        f"Seconds of one solve of (30), {points} points, degree 1, longitudinal, measured in this run on this machine, "
+        "which may be doing other things: information, and no part of any claim."
+    )
+    return Table("solve-time", caption, ["road", "preparation [s]", "solver [s]"], rows)

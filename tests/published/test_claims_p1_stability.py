@@ -1,4 +1,4 @@
-"""Second roads to what the study of P1 says of Lyapunov matrices, gains and boxes, from the printed decimals."""
+"""Independent computations of what the study of P1 says of Lyapunov matrices, gains and boxes, from the printed decimals."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import sympy as sp
 from scipy.optimize import minimize
 
 from studies.claim import Verdict
-from studies.papers.corner_estimation.quadratic import diagonal_proof
+from studies.papers.corner_estimation.inputs import CORNERS
+from studies.papers.corner_estimation.quadratic_stability import diagonal_proof
 from tests.unit.p1_findings import PRINT, RADIUS, finding
 
 PRINTED_29 = (("1.2176", "115.35", "80379.0"), ("-0.0011", "-0.2227", "-67.969"))
@@ -113,7 +114,7 @@ def test_the_box_by_random_gains_and_moving_wheels(direction: Direction) -> None
     low, high = entry["weights_of_diag_w_1"]
     box = (tuple(entry["L1"]), tuple(entry["L2"]))
     for weight, good in ((low * 1.001, True), (high * 0.999, True), (low * 0.999, False), (high * 1.001, False)):
-        assert diagonal_proof(direction, box, weight=round(weight)).proved is good
+        assert diagonal_proof(CORNERS[direction], box, weight=round(weight)).proved is good
 
 
 @pytest.mark.parametrize("direction", PRINT)

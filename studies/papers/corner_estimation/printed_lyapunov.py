@@ -1,0 +1,241 @@
+"""P1-29-*, P1-41-*, P1-mc: what the printed Lyapunov matrices prove in four readings, decided in exact arithmetic."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal
+
+import numpy as np
+import sympy as sp
+from numpy.typing import ArrayLike
+
+from studies.claim import Finding, JsonValue, judged
+from studies.papers.corner_estimation.inputs import CORNERS, DESIGN_SPEED, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner
+from studies.papers.topic import Topic
+from studies.papers.verdicts import partly
+from studies.plots import ZERO, Axis, Dash, Figure, Level, Line, Mark, Panel, Words, dots
+from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, RED
+from studies.study import Cell, PartResult, Scope, Table
+from synthesis.models.catalogue.corner import Direction
+from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.matrix import FloatArray
+from synthesis.printed import Judgement, judge
+from synthesis.stability import Form
+
+TOPIC = Topic(PACKAGE)
+Reading = Literal["primal", "swapped", "dual", "adjugate"]
+# Each reading: its name in tables and in figures; colour, dash and width of its line.
+READINGS: dict[Reading, tuple[str, str, str, Dash, float]] = {
+    "primal": ("as printed, V = e'P e", "as printed, V = e'Pe", RED, "dotted", 1.5),
+    "swapped": ("states exchanged", "states exchanged", ORANGE, "dash-dot", 1.5),
+    "dual": ("V = e'Q^-1 e", "dual, V = e'Q⁻¹e", BLUE, "solid", 2.6),
+    "adjugate": ("adjugate", "adjugate", GREEN, "dashed", 1.5),
+}
+NUMBERS = {"longitudinal": "(29)", "lateral": "(41)"}
+RATES = (-800.0, 800.0)  # rad/s^2
+BEYOND = 400.0  # rad/s, to see where a matrix that fails in the stated range would hold
+Coefficients = list[list[list[str]]]
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """M(omega) = matrix[0] + omega matrix[1] with printed decimals, offered for a model with these gains."""
+
+    model: LpvModel
+    gains: list[list[str]]
+    matrix: Coefficients
+    form: Form
+
+    def validity(self, end: float = STATED_SPEED) -> Judgement:
+        """Where on 0..`end` rad/s it proves stability, in exact arithmetic."""
+        return judge(self.model, self.gains, self.matrix, self.form, (0.0, end))
+
+    def at(self, omega: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """M (g, 2, 2) and its inequality at both rate bounds (2, g, 2, 2), to be negative: (28), (40) or the dual."""
+        constant, slope = (np.array(part, float) for part in self.matrix)
+        M = constant + omega[:, None, None] * slope
+        A_e = self.model.on(omega).error_dynamics(np.array(self.gains, float))[0]
+        product = M @ A_e if self.form == "primal" else A_e @ M
+        total = product + np.swapaxes(product, 1, 2)
+        sign = 1.0 if self.form == "primal" else -1.0
+        return M, np.stack([total + sign * rate * slope for rate in RATES])
+
+    def eigenvalues(self, omega: FloatArray) -> FloatArray:
+        """Eigenvalues of the inequality at both rate bounds, (g, 4)."""
+        return np.concatenate(list(np.linalg.eigvalsh(self.at(omega)[1])), axis=1)
+
+    def growth(self, omega: FloatArray) -> FloatArray:
+        """Largest growth rate of V in 1/s at each wheel speed, (g,): eigenvalue of the inequality relative to M.
+
+        NaN where M is not positive definite; then V measures nothing.
+        """
+        M, total = self.at(omega)
+        definite = np.linalg.eigvalsh(M)[:, 0] > 0.0
+        root = np.linalg.cholesky(np.where(definite[:, None, None], M, np.eye(2)))
+        inner = np.linalg.solve(root, total)
+        relative = np.linalg.solve(root, np.swapaxes(inner, -1, -2))
+        largest = np.linalg.eigvalsh(0.5 * (relative + np.swapaxes(relative, -1, -2)))[..., -1].max(axis=0)
+        return np.where(definite, largest, np.nan)
+
+
+def certificate(corner: Corner, reading: Reading, matrix: Coefficients | None = None) -> Certificate:
+    """The printed matrix (or `matrix`) as printed, with the states exchanged, as a dual matrix, or as an adjugate."""
+    found = corner.lyapunov if matrix is None else matrix
+    if reading in ("swapped", "adjugate"):
+        found = [[row[::-1] for row in coefficient[::-1]] for coefficient in found]
+    if reading == "adjugate":
+        found = [[[a, _negated(b)], [_negated(c), d]] for ((a, b), (c, d)) in found]
+    gains = [[str(gain)] for gain in corner.gains]
+    return Certificate(corner.model, gains, found, "dual" if reading == "dual" else "primal")
+
+
+def _negated(decimal: str) -> str:
+    return decimal[1:] if decimal.startswith("-") else f"-{decimal}"
+
+
+def convexity(model: LpvModel, gain: ArrayLike, slope: ArrayLike, form: Form = "primal") -> FloatArray:
+    """A1'P1 + P1 A1 (primal) or A1 Q1 + Q1 A1' (dual), with A1 the part of A_e linear in the wheel speed, (2, 2)."""
+    A_e = model.on([0.0, 1.0]).error_dynamics(np.asarray(gain, float))[0]
+    A1 = A_e[1] - A_e[0]
+    A1[:, 1] = 0.0  # exactly, as (26) has it; the difference above leaves rounding
+    product = (A1.T if form == "primal" else A1) @ np.asarray(slope, float)
+    return np.asarray(product + product.T)
+
+
+def primal(direction: Direction, matrix: Coefficients | None = None) -> Finding:
+    """The matrix as printed, P of V = e'Pe: does (28) or (40) hold on 0..180 rad/s?"""
+    offered = certificate(CORNERS[direction], "primal", matrix)
+    inside, wide = offered.validity(), offered.validity(BEYOND)
+    ends = offered.eigenvalues(np.array([0.0, STATED_SPEED])).max(axis=1)
+    computed = {
+        "holds_everywhere": inside.everywhere, "holds_on_rad_s": _listed(inside),
+        f"holds_on_up_to_{BEYOND:g}_rad_s": _listed(wide),
+        "largest_eigenvalue_at_0_rad_s": float(ends[0]), "largest_eigenvalue_at_180_rad_s": float(ends[1]),
+    }  # fmt: skip
+    reading = (
+        f"As P of V = e'Pe the printed {NUMBERS[direction]} satisfies its inequality on {_words(wide)} "
+        f"rad/s (searched up to {BEYOND:g} rad/s). The largest eigenvalue, to be negative, is {ends[0]:.4g} at "
+        f"standstill and {ends[1]:.4g} at {STATED_SPEED:g} rad/s."
+    )
+    if not inside.everywhere:
+        reading += (
+            " The large entry weighs the velocity, where a P of these dynamics must weigh the bristle deflection."
+        )
+    return Finding(computed, judged(inside.everywhere), reading)
+
+
+def dual(direction: Direction, matrix: Coefficients | None = None) -> Finding:
+    """The printed matrix as Q of V = e'Q^-1 e on the stated range, or on the range that the gains are designed for."""
+    offered = certificate(CORNERS[direction], "dual", matrix)
+    found, designed = offered.validity(), offered.validity(DESIGN_SPEED).everywhere
+    omega = np.linspace(0.0, STATED_SPEED, 1801)
+    growth = offered.growth(omega)
+    computed = {
+        "holds_everywhere": found.everywhere, "holds_on_design_range": designed, "holds_on_rad_s": _listed(found),
+        "largest_relative_eigenvalue_1_s": float(growth.max()),
+        "at_wheel_speed_rad_s": float(omega[growth.argmax()]),
+    }  # fmt: skip
+    reading = (
+        f"Read as Q of V = e'Q^-1 e, {NUMBERS[direction]} proves stability on {_words(found)} of the "
+        f"stated 0 to {STATED_SPEED:g} rad/s, at both bounds of the rate; relative to Q the largest eigenvalue is "
+        f"{growth.max():.4g} 1/s. The design range of the gains, 0 to {DESIGN_SPEED:g} rad/s, is "
+        f"{'covered' if designed else 'not covered'}."
+    )
+    return Finding(computed, partly(found.everywhere, designed), reading)
+
+
+TOPIC.claim("P1-29-primal")(partial(primal, "longitudinal"))
+TOPIC.claim("P1-29-dual")(partial(dual, "longitudinal"))
+TOPIC.claim("P1-41-primal")(partial(primal, "lateral"))
+TOPIC.claim("P1-41-dual")(partial(dual, "lateral"))
+
+
+def _words(found: Judgement) -> str:
+    return " and ".join(f"({low:.7g}, {high:.7g})" for low, high in found.intervals) or "no part"
+
+
+def _listed(found: Judgement) -> list[list[float]]:
+    return [list(interval) for interval in found.intervals]
+
+
+@TOPIC.claim("P1-mc")
+def printed_slopes_are_multi_convex(slopes: dict[Direction, list[list[str]]] | None = None) -> Finding:
+    """Sign of A1'P1 + P1 A1 in exact arithmetic, and its eigenvalues in every reading of the matrices."""
+    holds = []
+    computed: dict[str, JsonValue] = {}
+    for direction, corner in CORNERS.items():
+        constant, slope = corner.lyapunov
+        matrix = [constant, slopes[direction] if slopes else slope]
+        gain = sp.Matrix([sp.Rational(str(g)) for g in corner.gains])
+        model, P1 = corner.model, sp.Matrix([[sp.Rational(entry) for entry in row] for row in matrix[1]])
+        A1 = (model.A - gain * model.C).diff("wheel_speed").subs(corner.exact_constants)
+        exact = A1.T * P1 + P1 * A1
+        holds.append(bool(exact[0, 0] >= 0 and exact[1, 1] >= 0 and exact.det() >= 0))
+        offered = {reading: certificate(corner, reading, matrix) for reading in READINGS}
+        spread = {
+            reading: np.linalg.eigvalsh(convexity(o.model, o.gains, o.matrix[1], o.form)).tolist()
+            for reading, o in offered.items()
+        }
+        computed[direction] = {"eigenvalues": spread, "determinant_as_printed": float(exact.det())}
+    lowest = [low for d in CORNERS for low, _ in computed[d]["eigenvalues"].values()]
+    shown = "; ".join("{} {:.3g}, {:.3g}".format(d, *computed[d]["eigenvalues"]["primal"]) for d in CORNERS)
+    reading = (
+        "Column 2 of A1 is zero, so entry (2,2) of the condition is zero and its determinant is minus the square "
+        "of entry (1,2): it can hold only if that entry vanishes. Eigenvalues of the condition as printed: "
+        f"{shown}. Of {len(lowest)} readings (two matrices, as printed, exchanged, dual, adjugate) "
+        f"{sum(low >= 0.0 for low in lowest)} meet it."
+    )
+    return Finding(computed, judged(all(holds)), reading)
+
+
+@TOPIC.part("printed-lyapunov", "What the printed Lyapunov matrices prove", 2.0)
+def printed_lyapunov(scope: Scope) -> PartResult:
+    """All claims about (29) and (41), and where each reading holds and how fast V grows at most."""
+    rows: list[list[Cell]] = []
+    for direction, corner in CORNERS.items():
+        for reading, (name, *_) in READINGS.items():
+            offered = certificate(corner, reading)
+            found = offered.validity()
+            where = "; ".join(f"{low:.2f} to {high:.2f}" for low, high in found.intervals) or "nowhere"
+            worst = float(np.nanmax(offered.growth(np.linspace(0.0, STATED_SPEED, 361))))
+            rows.append([NUMBERS[direction], direction, name, found.everywhere, where, worst])
+    caption = (
+        f"The printed Lyapunov matrices in four readings, judged exactly on 0 to {STATED_SPEED:g} rad/s at wheel "
+        "accelerations of +-800 rad/s^2: where all inequalities hold, and the largest growth rate of V on a grid "
+        "of 0.5 rad/s."
+    )
+    columns = ["matrix", "direction", "reading", "holds on the whole range", "holds on [rad/s]",
+               "largest growth rate [1/s]"]  # fmt: skip
+    return PartResult(TOPIC.found(), [Table("lyapunov-readings", caption, columns, rows)], [growth_figure()])
+
+
+def growth_figure() -> Figure:
+    """Growth rate of V over wheel speed in four readings of (29), (41)."""
+    omega = np.linspace(0.0, STATED_SPEED, 721)
+    ticks = {-1e3: "−10³", -1e2: "−10²", -10.0: "−10", 0.0: "0", 10.0: "10", 1e2: "10²", 1e3: "10³",
+             1e5: "10⁵", 1e7: "10⁷"}  # fmt: skip
+    y = Axis("largest growth rate of V [1/s]", -2e3, 5e7, "symlog", ticks, linear=10.0)
+    panels = []
+    for direction, corner in CORNERS.items():
+        marks: list[Mark] = [ZERO, Level(x=DESIGN_SPEED, color=GREY, dash="dotted")]
+        for reading, (_, name, colour, dash, width) in READINGS.items():
+            offered = certificate(corner, reading)
+            marks.append(Line(omega, offered.growth(omega), name, colour, dash, width))
+            if reading == "dual":
+                for end in (w for span in offered.validity().intervals for w in span if 0.0 < w < STATED_SPEED):
+                    text = Words(end, 0.0, f"{end:.1f}", offset=(-6, 6), horizontal="right")
+                    marks += [dots([end], [0.0], color=colour), text]
+        panels.append(Panel(marks, SPEED_AXIS, y, f"{direction}, {NUMBERS[direction]}"))
+    return Figure(
+        "printed-lyapunov",
+        "Largest growth rate of V along the error dynamics, over both bounds of the wheel acceleration (±800 "
+        "rad/s²), for the printed Lyapunov matrices in four readings; below zero the matrix proves stability at "
+        "that wheel speed. Logarithmic beyond ±10 1/s. Dots: exact ends of the dual reading. Dotted line: "
+        f"{DESIGN_SPEED:g} rad/s, the end of the design range. As printed (41) holds on 0.03 rad/s, too little to "
+        "see. P1 (28), (29), (40), (41).",
+        "As printed both matrices give growth rates of 1e5 to 1e7 per second; the dual reading is negative over "
+        "the whole range longitudinally, and up to 162 rad/s laterally.",
+        panels,
+        legend="below",
+    )
