@@ -10,6 +10,7 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure as Sheet
 from matplotlib.patches import Rectangle
 
@@ -57,6 +58,9 @@ def draw(figure: Figure) -> Sheet:
                 grid[i, j].set_visible(False)
             else:
                 _draw_panel(grid[i, j], panel)
+        if figure.bar:
+            meshes = [mesh for axes in sheet.axes for mesh in axes.collections if isinstance(mesh, QuadMesh)]
+            sheet.colorbar(meshes[0], ax=sheet.axes, label=figure.bar, shrink=0.6, aspect=40)
         if figure.title:
             sheet.suptitle(figure.title, x=0.01, ha="left", fontsize=10)
         if figure.legend:

@@ -61,6 +61,7 @@ class Figure:
     title: str = ""
     widths: Sequence[float] | None = None
     heights: Sequence[float] | None = None
+    bar: str = ""  # label of one colour bar for the maps of all panels, which then share their limits
 
     @property
     def rows(self) -> list[list[Panel | None]]:
