@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from estimators.schedule import GainSchedule
 from studies.beyond.well_posed_design.achieved import COLUMNS, Achieved, achieved, printed_achieved, short
 from studies.beyond.well_posed_design.cases import PACKAGE, Case, all_cases
 from studies.papers.topic import Topic
-from studies.plots import Axis, Box, Contours, Dash, Figure, Line, Map, Mark, Panel, dots
+from studies.plots import Axis, Box, Contours, Figure, Line, Map, Mark, Panel, dots
 from studies.plots.colours import BLUE, GREEN, ORANGE, RED
 from studies.study import Cell, PartResult, Scope, Table
 from synthesis.polynomials.matrix import FloatArray
@@ -74,12 +75,12 @@ def plane_figure(cases: Sequence[Case], points: int = 61) -> Figure:
         darkest = 3.0 * float(printed_achieved(case).noise_density)
         decay, fastest = case.design.decay_rate, float(case.design.fastest_pole or 0.0)
         marks: list[Mark] = [Map(x, y, fields.noise_density.T, "H₂ gain, force noise [m/s·√Hz]", "Greys", 0.0, darkest)]
-        contours: list[tuple[FloatArray, list[float], str, Dash]] = [
+        contours: list[tuple[FloatArray, list[float], str, Literal["solid", "dashed", "dotted"]]] = [
             (fields.slowest, [decay * f for f in (0.25, 0.5, 1.0, 2.0, 4.0)], BLUE, "solid"),
             (fields.fastest, [fastest * f for f in (0.5, 1.0, 2.0)], ORANGE, "dashed"),
             (fields.friction, [1.001, 1.1], GREEN, "dotted"),
         ]
-        marks += [Contours(x, y, field.T, levels, *look, 1.2) for field, levels, *look in contours]
+        marks += [Contours(x, y, field.T, levels, colour, dash, 1.2) for field, levels, colour, dash in contours]
         table = GainSchedule.shipped(case.name).table[:, :, 0].T
         marks += [
             Box(*case.printed_range, "printed range", RED, 1.2),
