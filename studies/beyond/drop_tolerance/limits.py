@@ -16,7 +16,7 @@ from studies.beyond.observers import SHIPPED
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Line, Panel
 from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, RED
-from studies.study import PartResult, Scope, Table
+from studies.study import Cell, PartResult, Scope, Table
 from synthesis.lmi.result import Verdict
 from synthesis.polynomials.matrix import FloatArray
 
@@ -31,7 +31,7 @@ QUANTILES = (0.5, 0.9, 0.99, 0.999)
 @TOPIC.part("any-gain", "The plant sets no limit", 0.2)
 def any_gain(_: Scope) -> PartResult:
     """Whether some constant gain survives 95 % drops, by plant and wheel speed."""
-    rows = []
+    rows: list[list[Cell]] = []
     proved = 0
     for tested, speed in product([observer(name) for name in SHIPPED], SPEEDS):
         plant = tested.schedule.plant_at(np.array(speed))

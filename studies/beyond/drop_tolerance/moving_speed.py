@@ -17,7 +17,7 @@ from studies.beyond.drop_tolerance.comparison import MISS
 from studies.beyond.drop_tolerance.observers import NAMES, PACKAGE, QUICK, Observer, observer
 from studies.beyond.drop_tolerance.population import START, evolve
 from studies.papers.topic import Topic
-from studies.plots import Axis, ErrorBars, Figure, Line, Panel
+from studies.plots import Axis, ErrorBars, Figure, Line, Mark, Panel
 from studies.plots.colours import BLUE, GREY, RED
 from studies.study import PartResult, Scope, Table
 from synthesis.lmi.result import Verdict
@@ -145,7 +145,7 @@ def _table(tested: Observer, sweep: Sweep) -> Table:
 def _figure(tested: Observer, proof: MeanSquareSchedule, sweep: Sweep, scope: Scope) -> Figure:
     time = tested.step * np.arange(len(sweep.speed))
     lower = np.minimum(sweep.half, 0.99 * sweep.seen)  # a bar below zero has no place on a logarithmic axis
-    energy = [
+    energy: list[Mark] = [
         Line(time, sweep.exact, "predicted", BLUE, width=1.8),
         ErrorBars(time[sweep.at], sweep.seen, lower, sweep.half, "runtime observer", RED),
     ]

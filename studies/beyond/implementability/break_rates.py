@@ -12,9 +12,9 @@ from analysis.errors import AnalysisError
 from studies.beyond.implementability.designs import PAPER_RATE, WHEEL_SPEED, Design, printed_designs, shipped_designs
 from studies.beyond.implementability.updates import BREAKABLE, LASTING, UPDATES, Update, jury_margin
 from studies.papers.topic import Topic
-from studies.plots import Axis, Figure, Level, Line, Mark, Panel, Words
+from studies.plots import DASHES, Axis, Figure, Level, Line, Mark, Panel, Words
 from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE, RED
-from studies.study import PartResult, Scope, Table
+from studies.study import Cell, PartResult, Scope, Table
 from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic("studies.beyond.implementability")
@@ -124,7 +124,7 @@ def rates(scope: Scope) -> PartResult:
 
 def rate_table(designs: Sequence[Design], curves: Curves) -> Table:
     """Worst break rate of each design and scheme, and the wheel speed at which it breaks."""
-    rows = []
+    rows: list[list[Cell]] = []
     for design in designs:
         worst = [(c.worst_rate, c.worst_wheel_speed) for c in (curves[design.name, scheme] for scheme in BREAKABLE)]
         rows.append([design.name, *(round(value, 2) for pair in worst for value in pair)])
@@ -146,8 +146,8 @@ def rate_figure(curves: Curves) -> Figure:
         marks: list[Mark] = [Level(PAPER_RATE, color="black", dash="dotted", width=0.9)]
         for designs in (printed_designs(), shipped_designs()):
             for design, colour in zip(designs, (BLUE, RED, ORANGE, GREEN, PURPLE), strict=True):
-                curve, solid = curves[design.name, scheme], design.kind == "printed"
-                dash, width = ("solid", 1.8) if solid else ("dashed", 1.1)
+                curve, own = curves[design.name, scheme], design.kind == "shipped"
+                dash, width = DASHES[own], 1.1 if own else 1.8
                 marks.append(Line(curve.wheel_speed, curve.rate, design.name, colour, dash, width))
         if k == 1:
             marks.append(Words(2.0, PAPER_RATE * 1.02, "200 Hz"))

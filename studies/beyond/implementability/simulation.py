@@ -21,7 +21,7 @@ from studies.beyond.implementability.updates import BREAKABLE, held
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel
 from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE, RED
-from studies.study import PartResult, Scope, Table
+from studies.study import Cell, PartResult, Scope, Table
 from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic("studies.beyond.implementability")
@@ -167,7 +167,7 @@ def acceleration(scope: Scope) -> PartResult:
 
 def confirmation_table(designs: Sequence[Design], curves: Curves, samples: int = 400) -> Table:
     """Simulated growth on both sides of every break, and of the runtime at the lower rate."""
-    rows = []
+    rows: list[list[Cell]] = []
     for design in designs:
         for scheme in BREAKABLE:
             curve = curves[design.name, scheme]

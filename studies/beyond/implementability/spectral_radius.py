@@ -19,7 +19,7 @@ from studies.beyond.implementability.updates import (
 from studies.papers.topic import Topic
 from studies.plots import Axis, Contours, Figure, Level, Line, Map, Mark, Panel
 from studies.plots.colours import BLUE, ORANGE, RED
-from studies.study import PartResult, Scope, Table
+from studies.study import Cell, PartResult, Scope, Table
 
 TOPIC = Topic("studies.beyond.implementability")
 RATES = (50.0, 100.0, 200.0, 500.0, 1000.0)  # Hz
@@ -74,7 +74,7 @@ def lasting(scope: Scope) -> PartResult:
 
 def radius_table(name: str, designs: Sequence[Design]) -> Table:
     """Largest spectral radius over the wheel speeds, and the unstable wheel speeds at 200 Hz."""
-    rows = []
+    rows: list[list[Cell]] = []
     for design in designs:
         A, L, C = design.matrices(design.grid())
         for scheme, update in UPDATES.items():

@@ -81,12 +81,12 @@ def plane_figure(cases: Sequence[Case], points: int = 61) -> Figure:
             (fields.friction, [1.001, 1.1], GREEN, "dotted"),
         ]
         marks += [Contours(x, y, field.T, levels, colour, dash, 1.2) for field, levels, colour, dash in contours]
-        table = GainSchedule.shipped(case.name).table[:, :, 0].T
+        first, second = GainSchedule.shipped(case.name).table[:, :, 0].T
         marks += [
             Box(*case.printed_range, "printed range", RED, 1.2),
             dots(*case.printed, "printed gains", RED, "*", 12, edge="white"),
-            Line(*table, "shipped schedule", "black", marker="o", size=3, width=1.3),
-            dots(*table[:, 0], "shipped, at standstill", "black", size=6, hollow=True),
+            Line(first, second, "shipped schedule", "black", marker="o", size=3, width=1.3),
+            dots(first[:1], second[:1], "shipped, at standstill", "black", size=6, hollow=True),
         ]
         panels.append(Panel(marks, "$L_1$ [m/s]", Axis("$L_2$ [m/s²]", scale="log"), case.title, grid=False))
     return Figure(
