@@ -39,6 +39,7 @@ class Panel:
     legend: str = ""
     grid: bool = True
     columns: int = 1  # of the legend
+    heading: str = ""  # of the legend
 
 
 @dataclass(frozen=True)

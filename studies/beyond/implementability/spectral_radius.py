@@ -18,7 +18,7 @@ from studies.beyond.implementability.updates import (
 )
 from studies.papers.topic import Topic
 from studies.plots import Axis, Contours, Figure, Level, Line, Map, Mark, Panel
-from studies.plots.colours import BLUE, ORANGE, RED
+from studies.plots.colours import BLUE, DIVERGING, ORANGE, RED
 from studies.study import Cell, PartResult, Scope, Table
 
 TOPIC = Topic("studies.beyond.implementability")
@@ -102,7 +102,7 @@ def map_figure(designs: Sequence[Design], name: str, points: int = 141) -> Figur
         for k, (scheme, update) in enumerate(BREAKABLE.items()):
             radius = spectral_radius(update(A[:, None], L[:, None], C[:, None], 1.0 / rate)).T
             marks: list[Mark] = [
-                Map(speed, rate, np.log10(np.clip(radius, 0.1, 10.0)), colors="RdBu_r", low=-1.0, high=1.0),
+                Map(speed, rate, np.log10(np.clip(radius, 0.1, 10.0)), colors=DIVERGING, low=-1.0, high=1.0),
                 Contours(speed, rate, radius, [1.0], "black", width=1.3, numbers=""),
                 Level(PAPER_RATE, color="black", dash="dotted", width=0.9),
             ]
