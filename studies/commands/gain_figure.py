@@ -32,6 +32,5 @@ def gain_figure(run: ScheduleRun) -> Figure:
         title,
         "Each gain as straight lines between its breakpoints, over the published range.",
         panels,
-        size=(4.4 * len(panels), 3.4),
-        title=title,
-    )
+        size=(4.4 * len(panels), 3.4), title=title,
+    )  # fmt: skip

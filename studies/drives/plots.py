@@ -171,10 +171,6 @@ def _figure(data: DriveData, name: str, what: str, rows: list[list[Panel]], shar
         title,
         f"Time histories of the {what}: {', '.join(sorted(labels))}.",
         rows,
-        size=(9.0, 5.6 if len(rows) > 1 else 3.6),
-        legend="below",
-        columns=len(labels),
-        share_x="all",
-        share_y="all" if share_y else "",
-        title=title,
-    )
+        size=(9.0, 5.6 if len(rows) > 1 else 3.6), legend="below", columns=len(labels), share_x="all",
+        share_y="all" if share_y else "", title=title,
+    )  # fmt: skip

@@ -51,9 +51,8 @@ def residual(found: Identification, direction: str, limited: LimitedFit) -> Figu
                 Panel(_correlation(limited, found.drive.sample_time), "lag (s)", counted),
             ],
         ],
-        size=(9.0, 6.4),
-        title=title,
-    )
+        size=(9.0, 6.4), title=title,
+    )  # fmt: skip
 
 
 def _force(limited: LimitedFit) -> list[Mark]:
@@ -67,10 +66,10 @@ def _force(limited: LimitedFit) -> list[Mark]:
     left = 1 - values["saturation"] * np.abs(force) - values["bend"] * force**2
     steady = force / (values["slip_stiffness"] * np.maximum(left, 0.1))
     shown = np.abs(steady) <= limited.limit
-    return [
+    return [  # dots of the legend are larger than those of the samples
         dots(slip[near & ~used], mu[near & ~used], "", LEFT_OUT, ".", 2.0),
         dots(slip[used], mu[used], "", BLUE, ".", 2.0),
-        *(dots([], [], name, colour) for name, colour in (("left out", LEFT_OUT), ("used", BLUE))),  # seen in the legend
+        *(dots([], [], name, colour) for name, colour in (("left out", LEFT_OUT), ("used", BLUE))),
         Line(steady[shown], force[shown], "fit, steady", FITTED),
     ]
 

@@ -118,11 +118,9 @@ def map_figure(result: SweepResult, rows: Rows, maps: Sequence[tuple[Measure, Wo
         title,
         "Curves of the worst, best and nominal design, above a strip of colours for the place of each parameter.",
         grid,
-        size=(4.7 * across, heights * len(grid) / 2 + 0.6),
-        legend="below",
-        heights=(2.2, 0.24 * d) * (len(grid) // 2),
+        size=(4.7 * across, heights * len(grid) / 2 + 0.6), legend="below", heights=(2.2, 0.24 * d) * (len(grid) // 2),
         title=title,
-    )
+    )  # fmt: skip
 
 
 def _envelope(measure: Measure, found: WorstMap) -> Panel:

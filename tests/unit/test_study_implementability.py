@@ -9,7 +9,7 @@ from scipy.signal import cont2discrete
 
 from analysis.errors import AnalysisError
 from estimators.schedule import GainSchedule
-from studies.beyond.implementability.break_rates import break_curve, first_breaks
+from studies.beyond.implementability.break_rates import break_curve, first_breaks, unstable_wheel_speeds
 from studies.beyond.implementability.designs import Design, printed_designs, shipped_designs, with_sample_time
 from studies.beyond.implementability.simulation import (
     RUNTIME,
@@ -25,7 +25,6 @@ from studies.beyond.implementability.spectral_radius import (
     lasting_figure,
     map_figure,
     radius_table,
-    unstable_wheel_speeds,
 )
 from studies.beyond.implementability.study import STUDY
 from studies.beyond.implementability.updates import BREAKABLE, LASTING, UPDATES, jury_margin, spectral_radius

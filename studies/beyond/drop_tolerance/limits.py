@@ -102,10 +102,8 @@ def typical(scope: Scope) -> PartResult:
         "below it in the end.",
         "Quantile lines falling one after the other on a logarithmic scale, while the exact root mean square rises.",
         Panel(marks, Axis("time [ms]", 0.0, time[-1]), y),
-        size=(7.2, 4.2),
-        legend="below",
-        columns=3,
-    )
+        size=(7.2, 4.2), legend="below", columns=3,
+    )  # fmt: skip
     note = (
         f"Beyond the critical probability the mean square grows but a typical run does not: with {p:.0%} lost the "
         f"median error has fallen to {last:.1e} of its start after {time[-1] / 1e3:g} s, while {share:.1%} of the "

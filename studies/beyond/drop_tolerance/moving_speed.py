@@ -58,11 +58,10 @@ def moving(name: str, scope: Scope) -> PartResult:
     sweep = run_sweep(tested.schedule, proof, scope, NAMES.index(name))
     hold, falls = sweep.holds, bool((np.diff(sweep.exact) < 0.0).all())
     note = (
-        f"{tested.title}: a drop probability of {proof.drop_probability:.3f} is {proof.verdict!s} for every "
-        f"motion of the wheel speed within its rates (held at one speed: {frozen.smallest:.3f}). On the sweep "
-        f"the energy {'falls at every sample' if falls else 'DOES NOT FALL at every sample'}, and "
-        f"{int(hold.sum())} of {len(hold)} intervals of the runtime observer hold it ({1.0 - MISS:.1%} "
-        "simultaneous confidence)."
+        f"{tested.title}: a drop probability of {proof.drop_probability:.3f} is {proof.verdict!s} for every motion of "
+        f"the wheel speed within its rates (held at one speed: {frozen.smallest:.3f}). On the sweep the energy "
+        f"{'falls at every sample' if falls else 'DOES NOT FALL at every sample'}, and {int(hold.sum())} of "
+        f"{len(hold)} intervals of the runtime observer hold it ({1.0 - MISS:.1%} simultaneous confidence)."
     )
     measures = {
         "certified_drop_probability": proof.drop_probability, "frozen_drop_probability": frozen.smallest,
@@ -161,7 +160,5 @@ def _figure(tested: Observer, proof: MeanSquareSchedule, sweep: Sweep, scope: Sc
             [Panel(energy, y=y, legend="upper right")],
             [Panel([Line(time, sweep.speed, color=GREY)], "time [ms]", "|ω| [rad/s]")],
         ],
-        size=(7.2, 4.4),
-        share_x="all",
-        heights=(3, 1),
-    )
+        size=(7.2, 4.4), share_x="all", heights=(3, 1),
+    )  # fmt: skip

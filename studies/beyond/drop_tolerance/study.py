@@ -12,8 +12,7 @@ STUDY = Study(
     summary=(
         "Critical drop probability and Gilbert-Elliott region (length of loss bursts against loss rate) over the "
         "operating range for the five shipped schedules and the gains that P3 prints: predicted by second-moment "
-        "analysis, and measured on the runtime observer itself in Monte Carlo populations with simultaneous "
-        "intervals."
+        "analysis, and measured on the runtime observer itself in Monte Carlo populations with simultaneous intervals."
     ),
     parts=(*overview.TOPIC.parts, *comparison.TOPIC.parts, *moving_speed.TOPIC.parts, *limits.TOPIC.parts),
 )

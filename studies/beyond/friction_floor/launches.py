@@ -157,9 +157,8 @@ def time_figure(found: Sequence[Launch]) -> Figure:
             [Panel(slips, y="mean wheel slip [%]", legend="upper left", columns=3)],
             [Panel(shares, "time [s]", Axis("slip velocity missed [%]", 0, 110))],
         ],
-        size=(8.0, 5.2),
-        share_x="all",
-    )
+        size=(8.0, 5.2), share_x="all",
+    )  # fmt: skip
 
 
 def error_figure(found: Sequence[Launch]) -> Figure:

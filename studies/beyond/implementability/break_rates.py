@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
@@ -65,13 +66,14 @@ def first_breaks(design: Design, update: Update, wheel_speed: FloatArray) -> tup
     return np.where(lasting, np.inf, high), connected
 
 
+def _margin(design: Design, update: Update, wheel_speed: float, sample_time: float) -> float:
+    A, L, C = design.matrices(np.array([wheel_speed]))
+    return float(jury_margin(update(A, L, C, np.array([sample_time])))[0])
+
+
 def _break_nearby(design: Design, update: Update, wheel_speed: float, near: float) -> float:
     """The break at one wheel speed, given that at a neighbour [s]: a bracket by steps of 2 %, then Brent's method."""
-    A, L, C = design.matrices(np.array([wheel_speed]))
-
-    def margin(sample_time: float) -> float:
-        return float(jury_margin(update(A, L, C, np.array([sample_time])))[0])
-
+    margin = partial(_margin, design, update, wheel_speed)
     low = high = near
     while margin(low) <= 0.0:
         low *= 0.98
@@ -100,6 +102,21 @@ def break_curve(design: Design, scheme: str, points: int = 141) -> BreakCurve:
             if inner.fun < best:
                 best, place = float(inner.fun), float(inner.x)
     return BreakCurve(grid, times, 1.0 / best, place, connected)
+
+
+def unstable_wheel_speeds(
+    design: Design, scheme: str, sample_time: float, points: int = 561
+) -> tuple[tuple[float, float], ...]:
+    """Intervals of the wheel speed in rad/s on which the update is unstable at one sample time, edges by root finding."""
+    update, grid = UPDATES[scheme], design.grid(points)
+    A, L, C = design.matrices(grid)
+    bad = jury_margin(update(A, L, C, np.full(len(grid), sample_time))) <= 0.0
+    roots = [
+        float(brentq(lambda speed: _margin(design, update, speed, sample_time), grid[k], grid[k + 1], xtol=1e-12))
+        for k in np.flatnonzero(np.diff(bad.astype(int)))
+    ]
+    bounds = ([float(grid[0])] if bad[0] else []) + roots + ([float(grid[-1])] if bad[-1] else [])
+    return tuple(zip(bounds[::2], bounds[1::2], strict=True))
 
 
 Curves = Mapping[tuple[str, str], BreakCurve]
@@ -164,7 +181,5 @@ def rate_figure(curves: Curves) -> Figure:
         "Three panels of break rate over wheel speed on a logarithmic scale; longitudinal gains lie between 100 and "
         "900 Hz, lateral ones mostly below 200 Hz except for the third scheme.",
         panels,
-        size=(10.0, 5.0),
-        legend="below",
-        share_y="all",
-    )
+        size=(10.0, 5.0), legend="below", share_y="all",
+    )  # fmt: skip

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from estimators.velocity import LpvVelocityObserver
 from studies.beyond.implementability.break_rates import Curves, break_curve
@@ -28,43 +29,20 @@ TOPIC = Topic("studies.beyond.implementability")
 STEP_AWAY = 0.03  # of the break rate, to either side
 LARGEST = 1e12  # a diverging estimate is followed up to here
 SUBSTEPS = 20  # of the true motion in one sample
-Step = Callable[[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, float], FloatArray]
 B = np.array([0.0, 1.0])
-
-
-def _euler(x: FloatArray, A: FloatArray, L: FloatArray, C: FloatArray, uy: FloatArray, T: float) -> FloatArray:
-    """x + T (A x + B u + L (y - C x))."""
-    return np.asarray(x + T * (A @ x + B * uy[0] + L * (uy[1] - C @ x)))
-
-
-def _sampled(x: FloatArray, A: FloatArray, L: FloatArray, C: FloatArray, uy: FloatArray, T: float) -> FloatArray:
-    """The open loop over a sample, driven by B u and the held correction L (y - C x)."""
-    return np.asarray(x + T * held(T * A) @ (A @ x + B * uy[0] + L * (uy[1] - C @ x)))
-
-
-def _predict(x: FloatArray, A: FloatArray, L: FloatArray, C: FloatArray, uy: FloatArray, T: float) -> FloatArray:
-    """The open loop over a sample, then T L (y - C x)."""
-    return np.asarray(x + T * held(T * A) @ (A @ x + B * uy[0]) + T * L * (uy[1] - C @ x))
-
-
-def _tustin(x: FloatArray, A: FloatArray, L: FloatArray, C: FloatArray, uy: FloatArray, T: float) -> FloatArray:
-    """The trapezoidal rule, u and y held."""
-    closed = 0.5 * T * (A - np.outer(L, C))
-    return np.linalg.solve(np.eye(2) - closed, x + closed @ x + T * (B * uy[0] + L * uy[1]))
-
-
-def _backward(x: FloatArray, A: FloatArray, L: FloatArray, C: FloatArray, uy: FloatArray, T: float) -> FloatArray:
-    """The implicit Euler rule, u and y held."""
-    return np.linalg.solve(np.eye(2) - T * (A - np.outer(L, C)), x + T * (B * uy[0] + L * uy[1]))
-
-
+Step = Callable[[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, float, float], ArrayLike]
 STEPS: dict[str, Step] = {
-    "forward Euler": _euler,
-    "sampled innovation": _sampled,
-    "predict, then T·L": _predict,
-    "Tustin": _tustin,
-    "backward Euler": _backward,
+    "forward Euler": lambda x, A, L, C, u, y, T: x + T * (A @ x + u + L * (y - C @ x)),
+    "sampled innovation": lambda x, A, L, C, u, y, T: x + T * held(T * A) @ (A @ x + u + L * (y - C @ x)),
+    "predict, then T·L": lambda x, A, L, C, u, y, T: x + T * held(T * A) @ (A @ x + u) + T * L * (y - C @ x),
+    "Tustin": lambda x, A, L, C, u, y, T: np.linalg.solve(
+        np.eye(2) - 0.5 * T * (A - np.outer(L, C)), x + 0.5 * T * (A - np.outer(L, C)) @ x + T * (u + L * y)
+    ),
+    "backward Euler": lambda x, A, L, C, u, y, T: np.linalg.solve(
+        np.eye(2) - T * (A - np.outer(L, C)), x + T * (u + L * y)
+    ),
 }
+"""The next estimate from x, A, L, C, the input B u, the measurement y and the sample time T; u and y are held over it."""
 RUNTIME = "exact closed loop"
 
 
@@ -77,11 +55,6 @@ class Motion:
     acceleration: FloatArray
     force: FloatArray
     states: FloatArray
-
-    @property
-    def time(self) -> FloatArray:
-        """Of the samples, s."""
-        return np.asarray(self.sample_time * np.arange(len(self.wheel_speed)), dtype=np.float64)
 
 
 def rolling(design: Design, sample_time: float, samples: int, wheel_speed: float) -> Motion:
@@ -117,11 +90,10 @@ def run(design: Design, scheme: str, motion: Motion, start: FloatArray) -> Float
         return _runtime(design, motion, start)
     A, L, C = design.matrices(motion.wheel_speed)
     step, x, path = STEPS[scheme], np.array(start, float), []
-    uy = np.stack([motion.acceleration, motion.force], axis=1)
-    for k in range(len(uy)):
+    for k, (u, y) in enumerate(zip(motion.acceleration, motion.force, strict=True)):
         path.append(x)
         if np.abs(x).max() < LARGEST:
-            x = step(x, A[k], L[k, :, 0], C[k, 0], uy[k], motion.sample_time)
+            x = np.asarray(step(x, A[k], L[k, :, 0], C[k, 0], B * u, y, motion.sample_time))
     return np.array(path)
 
 
@@ -211,8 +183,5 @@ def launch_figure(designs: Sequence[Design], seconds: float = 8.0) -> Figure:
         "Panels of the estimation error on a logarithmic scale over the rising wheel speed; several curves shoot "
         "up by many decades, the black runtime curve stays low.",
         panels,
-        size=(9.8, 4.2),
-        legend="below",
-        columns=6,
-        share_y="all",
-    )
+        size=(9.8, 4.2), legend="below", columns=6, share_y="all",
+    )  # fmt: skip

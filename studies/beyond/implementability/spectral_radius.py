@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import brentq
 
+from studies.beyond.implementability.break_rates import unstable_wheel_speeds
 from studies.beyond.implementability.designs import PAPER_RATE, WHEEL_SPEED, Design, printed_designs, shipped_designs
 from studies.beyond.implementability.updates import (
     BREAKABLE,
     LASTING,
     UPDATES,
     exact_closed_loop,
-    jury_margin,
     spectral_radius,
 )
 from studies.papers.topic import Topic
@@ -24,24 +23,6 @@ from studies.study import Cell, PartResult, Scope, Table
 TOPIC = Topic("studies.beyond.implementability")
 RATES = (50.0, 100.0, 200.0, 500.0, 1000.0)  # Hz
 RATE_TICKS = (20, 50, 100, 200, 500, 1000, 2000)
-
-
-def unstable_wheel_speeds(
-    design: Design, scheme: str, sample_time: float, points: int = 561
-) -> tuple[tuple[float, float], ...]:
-    """Intervals of the wheel speed in rad/s on which the update is unstable at one sample time, edges by root finding."""
-    update, grid = UPDATES[scheme], design.grid(points)
-
-    def margin(speed: float) -> float:
-        A, L, C = design.matrices(np.array([speed]))
-        return float(jury_margin(update(A, L, C, np.array([sample_time])))[0])
-
-    A, L, C = design.matrices(grid)
-    bad = jury_margin(update(A, L, C, np.full(len(grid), sample_time))) <= 0.0
-    edges = np.flatnonzero(np.diff(bad.astype(int)))
-    roots = [float(brentq(margin, grid[k], grid[k + 1], xtol=1e-12)) for k in edges]
-    bounds = ([float(grid[0])] if bad[0] else []) + roots + ([float(grid[-1])] if bad[-1] else [])
-    return tuple(zip(bounds[::2], bounds[1::2], strict=True))
 
 
 @TOPIC.part("printed", "Spectral radius of the printed gains", 1.5)
@@ -84,9 +65,8 @@ def radius_table(name: str, designs: Sequence[Design]) -> Table:
             rows.append([design.name, scheme, *(round(value, 4) for value in largest), text])
     return Table(
         name,
-        "Largest spectral radius over the wheel speeds 0 to 140 rad/s at five sample rates (above 1 the error "
-        "grows by this factor in every sample), and the wheel speeds that are unstable at the 200 Hz of the "
-        "papers.",
+        "Largest spectral radius over the wheel speeds 0 to 140 rad/s at five sample rates (above 1 the error grows "
+        "by this factor in every sample), and the wheel speeds that are unstable at the 200 Hz of the papers.",
         ("design", "discretisation", *(f"radius at {rate:g} Hz [1]" for rate in RATES), "unstable at 200 Hz [rad/s]"),
         rows,
     )
@@ -120,11 +100,8 @@ def map_figure(designs: Sequence[Design], name: str, points: int = 141) -> Figur
         "Grid of colour maps, red below a black line at low sample rates and blue above it; the line rises or "
         "falls with wheel speed depending on the scheme.",
         rows,
-        size=(9.6, 1.0 + 1.95 * len(designs)),
-        share_x="all",
-        share_y="all",
-        bar="log₁₀ of the spectral radius [1]",
-    )
+        size=(9.6, 1.0 + 1.95 * len(designs)), share_x="all", share_y="all", bar="log₁₀ of the spectral radius [1]",
+    )  # fmt: skip
 
 
 def lasting_figure(designs: Sequence[Design], points: int = 121) -> Figure:
@@ -149,6 +126,5 @@ def lasting_figure(designs: Sequence[Design], points: int = 121) -> Figure:
         "One panel for each design with three curves over the sample rate; the exact one is constant at one, the "
         "others fall towards zero at low rates.",
         panels,
-        size=(9.6, 3.7),
-        share_y="all",
-    )
+        size=(9.6, 3.7), share_y="all",
+    )  # fmt: skip

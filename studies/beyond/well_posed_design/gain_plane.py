@@ -100,6 +100,5 @@ def plane_figure(cases: Sequence[Case], points: int = 61) -> Figure:
         "orange contours of the fastest pole, a red star for the printed gains and a black curve for the shipped "
         "schedule.",
         [panels[k : k + 2] for k in range(0, len(panels), 2)],
-        size=(10.0, 3.9 * ((len(cases) + 1) // 2)),
-        legend="below",
-    )
+        size=(10.0, 3.9 * ((len(cases) + 1) // 2)), legend="below",
+    )  # fmt: skip
