@@ -10,8 +10,7 @@ from scipy.linalg import expm
 
 from analysis.dropout_schedule import frozen_critical_probability
 from estimators.velocity import with_constant_gain
-from studies.beyond.drop_tolerance.comparison import questions, run_trial
-from studies.beyond.drop_tolerance.estimate import Interval, crossing, interval
+from studies.beyond.drop_tolerance.comparison import Interval, crossing, interval, questions, run_trial
 from studies.beyond.drop_tolerance.limits import any_gain, runs_above
 from studies.beyond.drop_tolerance.moving_speed import certificate, run_sweep
 from studies.beyond.drop_tolerance.observers import NAMES, observer
@@ -162,10 +161,10 @@ def test_the_runtime_observer_agrees_with_its_prediction(name: str) -> None:
     trial = run_trial(observer(name).schedule, QUICK, NAMES.index(name))
     assert len(trial.rows) >= 5 and trial.agreeing == len(trial.rows)
     for row in trial.of("drop"):
-        assert row.expected == pytest.approx(row.predicted, abs=2e-4)  # the parabola is no source of error
+        assert row.expected == pytest.approx(row.question.predicted, abs=2e-4)  # the parabola is no source of error
         assert row.found.high - row.found.low < 0.06
     for row in trial.of("burst"):
-        assert row.expected == pytest.approx(row.predicted, rel=5e-3)
+        assert row.expected == pytest.approx(row.question.predicted, rel=5e-3)
 
 
 def test_a_wrong_prediction_is_refuted() -> None:

@@ -160,14 +160,14 @@ class TestAchieved:
         assert float(found.slowest) < 0.0 and np.isinf(float(found.friction)) and np.isinf(float(found.noise_density))
 
     def test_plane_holds_the_printed_gains(self) -> None:
-        field = gain_plane(LATERAL, 15)
+        first, second, fields = gain_plane(LATERAL, 15)
         exact = printed_achieved(LATERAL, 8)
         i, j = (
-            np.abs(field.first - LATERAL.printed[0]).argmin(),
-            np.abs(np.log(field.second / LATERAL.printed[1])).argmin(),
+            np.abs(first - LATERAL.printed[0]).argmin(),
+            np.abs(np.log(second / LATERAL.printed[1])).argmin(),
         )
-        assert field.fields.slowest[i, j] == pytest.approx(float(exact.slowest), rel=0.3)
-        assert field.fields.slowest.shape == (15, 15)
+        assert fields.slowest[i, j] == pytest.approx(float(exact.slowest), rel=0.3)
+        assert fields.slowest.shape == (15, 15)
 
 
 def test_case_without_printed_gains_is_refused() -> None:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
 import numpy as np
+from scipy.stats import t as student
 
 from estimators import GainSchedule
-from studies.beyond.drop_tolerance.estimate import Interval, crossing, interval
 from studies.beyond.drop_tolerance.observers import NAMES, PACKAGE, QUICK, SPEED_LABEL, Observer, observer
 from studies.beyond.drop_tolerance.population import EVERY, START, simulate
 from studies.beyond.drop_tolerance.prediction import (
@@ -47,70 +47,102 @@ THREE = np.array([-1.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
+class Interval:
+    """An estimate with the ends of its interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def holds(self, expected: float) -> bool:
+        """Whether the interval contains `expected` (never for NaN)."""
+        return self.low <= expected <= self.high
+
+
+def crossing(places: FloatArray, growth: FloatArray) -> FloatArray:
+    """Where the parabola through three equally spaced places (3,) with log growths (..., 3) rises through 0; NaN if nowhere."""
+    middle, step = places[1], places[2] - places[1]
+    c = growth[..., 1]
+    b = 0.5 * (growth[..., 2] - growth[..., 0])
+    a = 0.5 * (growth[..., 2] + growth[..., 0]) - c
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rise = np.sqrt(b * b - 4.0 * a * c)
+        return np.asarray(middle + step * np.where(b + rise > 0.0, -2.0 * c / (b + rise), np.nan))
+
+
+def interval(growth: FloatArray, steps: int, measure: Callable[[FloatArray], FloatArray], level: float) -> Interval:
+    """`measure` of the log growths per sample (..., c) as a number, with a Student interval of the jackknife over seeds.
+
+    `growth` (c, seeds) is the log of the growth of E h over `steps` samples, as each seed sees it. The mean over seeds is
+    taken of the growth itself, which the simulation estimates without bias. `level` is the probability that the
+    interval misses.
+    """
+    top = growth.max(axis=-1, keepdims=True)
+    scaled = np.exp(growth - top)
+    n = scaled.shape[-1]
+    total = scaled.sum(axis=-1, keepdims=True)
+    whole, left_out = (np.moveaxis((np.log(m) + top) / steps, 0, -1) for m in (total / n, (total - scaled) / (n - 1)))
+    value = float(measure(whole)[0])
+    parts = measure(left_out)
+    error = float(np.sqrt((n - 1) / n * ((parts - parts.mean()) ** 2).sum()))
+    half = float(student.ppf(1.0 - 0.5 * level, n - 1)) * error
+    return Interval(value, value - half, value + half)
+
+
+@dataclass(frozen=True)
 class Question:
-    """`read` turns the log growths per sample of the cases (..., c) into the number, or its logarithm if `logarithmic`."""
+    """A predicted number and its simulated cases: three values `at` around it, or one case whose growth is read."""
 
     kind: Kind
     place: float  # wheel speed in rad/s, or loss rate
     predicted: float
     channel: Channel
-    read: Callable[[FloatArray], FloatArray]
-    logarithmic: bool
+    at: FloatArray | None = None
     steps: int = SHORT  # simulated samples
+
+    def read(self, growth: FloatArray) -> FloatArray:
+        """The number, or its logarithm for growths and bursts, from the log growths per sample of the cases (..., c)."""
+        return np.asarray(growth[..., 0]) if self.at is None else crossing(self.at, growth)
 
 
 def questions(schedule: GainSchedule, quick: bool) -> list[Question]:
     """Critical drop probabilities at four wheel speeds and critical bursts at the worst of them.
 
+    The wheel speeds: standstill, one and two thirds of the way to harmless speed, half-way from there to the end of the range.
     Where every loss is survived, the growth of the second moment at 95 % drops stands in for a critical probability.
     """
-    speeds = asked_speeds(schedule)
-    p = critical(schedule, speeds)
-    asked = [_about_drops(float(w), float(q)) for w, q in zip(speeds, p, strict=True)]
-    worst = float(speeds[p.argmin()])
+    start, end = harmless_from(schedule), schedule.parameter.max
+    speeds = np.array([schedule.parameter.min, start / 3.0, 2.0 * start / 3.0, 0.5 * (start + end)])
+    limits = critical(schedule, speeds)
+    asked = []
+    for speed, p in zip(speeds.tolist(), limits.tolist(), strict=True):
+        if p > NEAR_ONE:
+            asked.append(Question("growth", speed, 1.0, independent_drops(speed, HIGH_DROP)))
+        else:
+            at = p + min(0.05, 0.4 * (1.0 - p)) * THREE
+            asked.append(Question("drop", speed, p, independent_drops(speed, at), at))
+    worst = float(speeds[limits.argmin()])
     rates = LOSS_RATES[:2] if quick else LOSS_RATES
     for rate, length in zip(rates, critical_bursts(schedule, worst, rates), strict=True):
         if length is not None and length < MOST_BURST and rate / (1.0 - rate) < length * np.exp(-STRETCH):
             at = np.log(length) + STRETCH * THREE
-            read = partial(crossing, at)
             steps = EVERY * round(min(max(4.0 * length, SHORT), LONG) / EVERY)
-            channel = bursts(worst, rate, np.exp(at))
-            asked.append(Question("burst", rate, length, channel, read, logarithmic=True, steps=steps))
+            asked.append(Question("burst", rate, length, bursts(worst, rate, np.exp(at)), at, steps))
     return asked
-
-
-def asked_speeds(schedule: GainSchedule) -> FloatArray:
-    """Standstill, one and two thirds of the way to harmless speed, and half-way from there to the end of the range."""
-    start, end = harmless_from(schedule), schedule.parameter.max
-    return np.array([schedule.parameter.min, start / 3.0, 2.0 * start / 3.0, 0.5 * (start + end)])
-
-
-def _about_drops(speed: float, critical_probability: float) -> Question:
-    if critical_probability > NEAR_ONE:
-        return Question("growth", speed, 1.0, independent_drops(speed, HIGH_DROP), _only, logarithmic=True)
-    at = critical_probability + min(0.05, 0.4 * (1.0 - critical_probability)) * THREE
-    read = partial(crossing, at)
-    return Question("drop", speed, critical_probability, independent_drops(speed, at), read, logarithmic=False)
-
-
-def _only(growth: FloatArray) -> FloatArray:
-    return np.asarray(growth[..., 0])
 
 
 @dataclass(frozen=True)
 class Row:
-    """A compared number; `expected` is its exact value at the simulated time, `predicted` the one that holds for ever."""
+    """A compared number: `expected` is its exact value at the simulated time, the predicted one holds for ever."""
 
-    kind: Kind
-    place: float  # wheel speed in rad/s, or loss rate
-    predicted: float
+    question: Question
     expected: float
     found: Interval
 
     @property
     def agrees(self) -> bool:
         """The interval holds the exact value; a growth must in addition be seen to lie below 1."""
-        return self.found.holds(self.expected) and (self.kind != "growth" or self.found.high < 1.0)
+        return self.found.holds(self.expected) and (self.question.kind != "growth" or self.found.high < 1.0)
 
 
 @dataclass(frozen=True)
@@ -121,7 +153,7 @@ class Trial:
 
     def of(self, kind: Kind) -> tuple[Row, ...]:
         """The comparisons of one kind."""
-        return tuple(row for row in self.rows if row.kind == kind)
+        return tuple(row for row in self.rows if row.question.kind == kind)
 
     @property
     def agreeing(self) -> int:
@@ -134,35 +166,25 @@ def run_trial(schedule: GainSchedule, scope: Scope, seed: int, compared: GainSch
     other = compared or schedule
     asked = questions(other, scope.quick)
     generator = np.random.default_rng(seed)
-    rows = {}
-    for steps in sorted({q.steps for q in asked}):
-        group = [q for q in asked if q.steps == steps]
-        for q, growth, exact in _simulated(schedule, other, group, scope, generator):
-            rows[id(q)] = _row(q, interval(growth, steps, q.read, MISS / len(asked)), float(q.read(exact)))
-    return Trial(tuple(rows[id(q)] for q in asked))
-
-
-def _simulated(
-    schedule: GainSchedule, compared: GainSchedule, asked: list[Question], scope: Scope, generator: np.random.Generator
-) -> Iterator[tuple[Question, FloatArray, FloatArray]]:
-    """Each question with its log growths over all samples (c, seeds), and exactly per sample (c,)."""
-    steps, channel = asked[0].steps, joined([q.channel for q in asked])
-    norm = natural_norm(compared, channel)
-    start, end = log_second_moment(compared, channel, norm, START, steps)
     runs = max(TOTAL_RUNS // (scope.seeds * (4 if scope.quick else 1)), 2)
-    seen = simulate(schedule, channel, norm, steps, scope.seeds, runs, generator) - start[:, None]
-    first = 0
-    for q in asked:
-        part = slice(first, first + len(q.channel.speed))
-        first = part.stop
-        yield q, seen[part], (end - start)[part] / steps
-
-
-def _row(question: Question, found: Interval, expected: float) -> Row:
-    if question.logarithmic:
-        found = Interval(math.exp(found.value), math.exp(found.low), math.exp(found.high))
-        expected = math.exp(expected)
-    return Row(question.kind, question.place, question.predicted, expected, found)
+    rows: dict[int, Row] = {}
+    for steps in sorted({q.steps for q in asked}):
+        group = [k for k, q in enumerate(asked) if q.steps == steps]
+        channel = joined([asked[k].channel for k in group])
+        norm = natural_norm(other, channel)
+        start, end = log_second_moment(other, channel, norm, START, steps)
+        seen = simulate(schedule, channel, norm, steps, scope.seeds, runs, generator) - start[:, None]
+        first = 0
+        for k in group:
+            q, part = asked[k], slice(first, first + len(asked[k].channel.speed))
+            first = part.stop
+            found = interval(seen[part], steps, q.read, MISS / len(asked))
+            expected = float(q.read((end - start)[part] / steps))
+            if q.kind != "drop":
+                found = Interval(math.exp(found.value), math.exp(found.low), math.exp(found.high))
+                expected = math.exp(expected)
+            rows[k] = Row(q, expected, found)
+    return Trial(tuple(rows[k] for k in range(len(asked))))
 
 
 def comparison(name: str, scope: Scope) -> PartResult:
@@ -188,16 +210,16 @@ for each in NAMES:
 def _table(tested: Observer, trial: Trial, scope: Scope) -> Table:
     """All comparisons as rows, with empty cells for ends that no seed could give."""
     rows: list[list[Cell]] = []
-    for kind, what in (
-        ("drop", "critical drop probability at a wheel speed [rad/s]"),
-        ("growth", f"growth of the second moment a sample at {HIGH_DROP:.0%} drops, at a wheel speed [rad/s]"),
-        ("burst", "critical mean burst [samples] at a loss rate [1]"),
-    ):
-        for row in trial.rows:
-            if row.kind == kind:
-                ends = (row.found.value, row.found.low, row.found.high)
-                known = (end if math.isfinite(end) else None for end in ends)
-                rows.append([what, row.place, row.expected, *known, row.agrees])
+    quantities: dict[Kind, str] = {
+        "drop": "critical drop probability at a wheel speed [rad/s]",
+        "growth": f"growth of the second moment a sample at {HIGH_DROP:.0%} drops, at a wheel speed [rad/s]",
+        "burst": "critical mean burst [samples] at a loss rate [1]",
+    }
+    for kind, what in quantities.items():
+        for row in trial.of(kind):
+            ends = (row.found.value, row.found.low, row.found.high)
+            known = (end if math.isfinite(end) else None for end in ends)
+            rows.append([what, row.question.place, row.expected, *known, row.agrees])
     return Table(
         f"comparison-{tested.name}",
         f"{tested.title}: predictions of the analysis against the runtime observer, {scope.seeds} seeds. "
@@ -210,7 +232,9 @@ def _table(tested: Observer, trial: Trial, scope: Scope) -> Table:
 def _figure(tested: Observer, trial: Trial, scope: Scope) -> Figure:
     """Left: critical drop probability over wheel speed. Right: critical burst over loss rate."""
     drops = trial.of("drop")
-    worst = min(drops, key=lambda row: row.predicted).place if drops else tested.schedule.parameter.min
+    worst = (
+        min(drops, key=lambda row: row.question.predicted).question.place if drops else tested.schedule.parameter.min
+    )
     return Figure(
         f"drop-tolerance-{tested.name}",
         f"{tested.title}. Left: critical drop probability of the force over the wheel speed, predicted (line) and "
@@ -229,7 +253,7 @@ def _figure(tested: Observer, trial: Trial, scope: Scope) -> Figure:
 def _measured(rows: Sequence[Row]) -> list[Mark]:
     if not rows:
         return []
-    place, value, low, high = np.array([[r.place, r.found.value, r.found.low, r.found.high] for r in rows]).T
+    place, value, low, high = np.array([[r.question.place, r.found.value, r.found.low, r.found.high] for r in rows]).T
     return [ErrorBars(place, value, value - low, high - value, "runtime observer", RED)]
 
 
@@ -239,7 +263,7 @@ def _drop_panel(schedule: GainSchedule, trial: Trial) -> Panel:
     grid = np.linspace(start, end, 301)
     limit = critical(schedule, grid)
     marks: list[Mark] = [Line(grid, limit, "predicted", BLUE, width=1.8), *_measured(trial.of("drop"))]
-    places = [row.place for row in trial.of("growth") if row.agrees]
+    places = [row.question.place for row in trial.of("growth") if row.agrees]
     far = [place for place in places if place > end]
     if places:
         at = [place for place in places if place <= end] + [0.97 * end] * bool(far)

@@ -79,7 +79,7 @@ class Launch:
 
 
 def launches(scope: Scope) -> list[Launch]:
-    """Play all roads in one batch."""
+    """The estimates on all roads, computed in one batch."""
     truth = launched(scope.quick)
     drawn = measured(truth, range(scope.seeds), TEST_CAR)
     estimates = play(drawn, READINGS, corner_observers("corner-estimation"))

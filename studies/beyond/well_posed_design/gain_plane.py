@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -21,23 +20,17 @@ TOPIC = Topic(PACKAGE)
 WHEEL_SPEEDS = 8
 
 
-@dataclass(frozen=True)
-class GainPlane:
-    """L1 (m,) in m/s, L2 (n,) in m/s^2, and what the pairs do, fields of shape (m, n)."""
+def gain_plane(case: Case, points: int = 61) -> tuple[FloatArray, FloatArray, Achieved]:
+    """L1 (m,) in m/s and L2 (m,) in m/s^2 around the printed gains and ranges, and what the pairs do, fields (m, m).
 
-    first: FloatArray
-    second: FloatArray
-    fields: Achieved
-
-
-def gain_plane(case: Case, points: int = 61) -> GainPlane:
-    """Around the printed gains and ranges, L2 over two decades."""
+    L2 runs over two decades.
+    """
     (_, high), (low, top) = case.printed_range
     first = np.linspace(0.02, 1.35 * max(high, case.printed[0]), points)
     second = np.geomspace(0.2 * low, 4.0 * max(top, case.printed[1]), points)
     pairs = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1)
     gains = np.broadcast_to(pairs[:, :, None, :], (points, points, WHEEL_SPEEDS, 2))
-    return GainPlane(first, second, achieved(case, gains, case.grid(WHEEL_SPEEDS)))
+    return first, second, achieved(case, gains, case.grid(WHEEL_SPEEDS))
 
 
 @TOPIC.part("gain-plane", "Printed and shipped gains on the map", 6.0)
@@ -70,8 +63,7 @@ def plane_figure(cases: Sequence[Case], points: int = 61) -> Figure:
     """Decay, fastest pole and noise of constant gains, with printed and shipped gains."""
     panels = []
     for case in cases:
-        found = gain_plane(case, points)
-        x, y, fields = found.first, found.second, found.fields
+        x, y, fields = gain_plane(case, points)
         darkest = 3.0 * float(printed_achieved(case).noise_density)
         decay, fastest = case.design.decay_rate, float(case.design.fastest_pole or 0.0)
         marks: list[Mark] = [Map(x, y, fields.noise_density.T, "H₂ gain, force noise [m/s·√Hz]", "Greys", 0.0, darkest)]
