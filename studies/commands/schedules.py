@@ -11,7 +11,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from studies.commands.gain_figure import gain_figure
 from studies.commands.progress import progress_bar
+from studies.plots.save import save_figure
 from studies.schedules import ScheduleRun, regenerate
 from studies.spec import load_spec, shipped_specs
 
@@ -30,9 +32,10 @@ def run_schedules(specs: list[str], out: Path | None, check: bool, figures: Path
             runs.append(run)
             progress.advance(task)
     if figures is not None:
-        from studies.report.gain_plots import plot_schedules
-
-        plot_schedules([run for run in runs if run.content], figures)
+        figures.mkdir(parents=True, exist_ok=True)
+        for run in runs:
+            if run.content:
+                save_figure(gain_figure(run), figures)
     if as_json:
         print(json.dumps([_row(run) for run in runs], indent=1))
     else:

@@ -18,6 +18,7 @@ from studies.sweeps.engine import run_sweep as run
 from studies.sweeps.executors import Executor
 from studies.sweeps.figures import number
 from studies.sweeps.gate import Judged, comparable, judge, loss_text
+from studies.sweeps.plots import plot_sweep
 from studies.sweeps.reports import junit as junit_xml
 from studies.sweeps.reports import markdown
 from studies.sweeps.spec import load_sweep
@@ -103,8 +104,6 @@ def _draw(result: SweepResult, before: Baseline | None, judged: list[Judged] | N
     shrunk = {j.before.subject for j in judged or () if not j.good}
     if result.sweep.form != "full" and before is None:
         return []
-    from studies.report.sweep_plots import plot_sweep  # matplotlib costs a second that bad input must not
-
     drawn = plot_sweep(result, folder / "pictures", before, None if result.sweep.form == "full" else shrunk)
     return [str(path.relative_to(folder)) for path in drawn if path.suffix == ".svg"]
 

@@ -15,10 +15,12 @@ from studies.drives.drive_file import read_drive
 from studies.drives.judge import DriveData, judge
 from studies.drives.log import read_log
 from studies.drives.output import check_folder, ready_folder, whole_file, write_csv, write_json
+from studies.drives.plots import figures
 from studies.drives.prepare import corner_inputs_of
 from studies.drives.quantities import CORNERS
 from studies.drives.replay import replay
 from studies.drives.schedules import check_radii, load_schedule
+from studies.plots.save import save_as
 
 Progress = Callable[[float], None]
 
@@ -122,15 +124,12 @@ def chain_columns(chain: Chain) -> dict[str, np.ndarray[Any, Any]]:
 
 
 def _draw(data: DriveData, out: Path, told: Progress) -> list[Path]:
-    from studies.report.drive_plots import figures  # matplotlib costs a second that bad input must not
-
     paths = []
     drawn = figures(data)
-    for k, (name, save) in enumerate(drawn.items()):
-        for suffix in (".svg", ".png"):
-            path = out / f"{name}{suffix}"
-            with whole_file(path) as beside:
-                save(beside)
-            paths.append(path)
+    for k, figure in enumerate(drawn):
+        svg, png = (out / f"{figure.name}{suffix}" for suffix in (".svg", ".png"))
+        with whole_file(svg) as first, whole_file(png) as second:
+            save_as(figure, first, second)
+        paths += [svg, png]
         told(0.4 + 0.6 * (k + 1) / len(drawn))
     return paths

@@ -10,6 +10,7 @@ from studies.plots.marks import (
     Band,
     Bars,
     Box,
+    ColouredDots,
     Contours,
     Dash,
     ErrorBars,
@@ -23,6 +24,6 @@ from studies.plots.marks import (
 )
 
 __all__ = [
-    "DASHES", "ZERO", "Axis", "Band", "Bars", "Box", "Contours", "Dash", "ErrorBars", "Figure", "Level", "Line", "Map",
-    "Mark", "Panel", "Shade", "Words", "dots",
+    "DASHES", "ZERO", "Axis", "Band", "Bars", "Box", "ColouredDots", "Contours", "Dash", "ErrorBars", "Figure", "Level", "Line",
+    "Map", "Mark", "Panel", "Shade", "Words", "dots",
 ]  # fmt: skip

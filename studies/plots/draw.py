@@ -10,11 +10,12 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure as Sheet
 from matplotlib.patches import Rectangle
 
 from studies.plots.figure import Axis, Figure, Panel, axis
-from studies.plots.marks import Band, Bars, Box, Contours, ErrorBars, Level, Line, Map, Mark, Shade, Words
+from studies.plots.marks import Band, Bars, Box, ColouredDots, Contours, ErrorBars, Level, Line, Map, Mark, Shade, Words
 
 PATTERN: Mapping[str, Any] = {
     "solid": "-", "dashed": (0, (5, 2)), "dotted": (0, (1, 1.5)), "dash-dot": (0, (6, 1.5, 1, 1.5)),
@@ -57,6 +58,9 @@ def draw(figure: Figure) -> Sheet:
                 grid[i, j].set_visible(False)
             else:
                 _draw_panel(grid[i, j], panel)
+        if figure.bar:
+            meshes = [mesh for axes in sheet.axes for mesh in axes.collections if isinstance(mesh, QuadMesh)]
+            sheet.colorbar(meshes[0], ax=sheet.axes, label=figure.bar, shrink=0.6, aspect=40)
         if figure.title:
             sheet.suptitle(figure.title, x=0.01, ha="left", fontsize=10)
         if figure.legend:
@@ -85,7 +89,7 @@ def _draw_panel(axes: Any, panel: Panel) -> None:
     if panel.title:
         axes.set_title(panel.title, loc="left")
     if panel.legend:
-        axes.legend(loc=panel.legend, ncols=panel.columns)
+        axes.legend(loc=panel.legend, ncols=panel.columns, title=panel.heading or None)
 
 
 def _run(axes: Any, name: str, given: Axis) -> None:
@@ -181,10 +185,19 @@ def _(mark: ErrorBars, axes: Any) -> None:
 def _(mark: Map, axes: Any) -> None:
     mesh = axes.pcolormesh(
         np.asarray(mark.x), np.asarray(mark.y), np.asarray(mark.z), cmap=mark.colors, vmin=mark.low, vmax=mark.high,
-        shading="gouraud", rasterized=True,
+        shading="gouraud" if mark.smooth else "nearest", rasterized=True,
     )  # fmt: skip
     if mark.label:
         axes.figure.colorbar(mesh, ax=axes, label=mark.label, pad=0.02)
+
+
+@draw_mark.register
+def _(mark: ColouredDots, axes: Any) -> None:
+    shown = axes.scatter(
+        np.asarray(mark.x), np.asarray(mark.y), c=np.asarray(mark.z), s=mark.size**2, linewidths=0, vmin=mark.low,
+        vmax=mark.high, cmap=mark.colors, rasterized=True,
+    )  # fmt: skip
+    axes.figure.colorbar(shown, ax=axes, label=mark.label, extend="both", pad=0.02)
 
 
 @draw_mark.register

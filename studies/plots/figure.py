@@ -39,6 +39,7 @@ class Panel:
     legend: str = ""
     grid: bool = True
     columns: int = 1  # of the legend
+    heading: str = ""  # of the legend
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ class Figure:
     title: str = ""
     widths: Sequence[float] | None = None
     heights: Sequence[float] | None = None
+    bar: str = ""  # label of one colour bar for the maps of all panels, which then share their limits
 
     @property
     def rows(self) -> list[list[Panel | None]]:

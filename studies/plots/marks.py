@@ -148,6 +148,21 @@ class Map:
     colors: str = "cividis"
     low: float | None = None
     high: float | None = None
+    smooth: bool = True  # False: one even cell around each place
+
+
+@dataclass(frozen=True)
+class ColouredDots:
+    """Dots at (x, y) in the colour of z, the later ones on top, with a bar that ``label`` names; z beyond low and high is cut."""
+
+    x: ArrayLike
+    y: ArrayLike
+    z: ArrayLike
+    label: str
+    colors: str = "viridis"
+    low: float | None = None
+    high: float | None = None
+    size: float = 2.6
 
 
 @dataclass(frozen=True)
@@ -176,4 +191,4 @@ class Box:
     width: float = 1.5
 
 
-Mark = Line | Band | Level | Shade | Words | Bars | ErrorBars | Map | Contours | Box
+Mark = Line | Band | Level | Shade | Words | Bars | ErrorBars | Map | ColouredDots | Contours | Box

@@ -15,9 +15,14 @@ PNG_DPI = 150
 
 def save_figure(figure: Figure, folder: Path) -> None:
     """Draw ``<name>.svg`` and ``<name>.png`` into ``folder``."""
+    save_as(figure, folder / f"{figure.name}.svg", folder / f"{figure.name}.png")
+
+
+def save_as(figure: Figure, *paths: Path) -> None:
+    """Draw into every path, in the format of its suffix: svg, png, pdf."""
     from studies.plots.draw import draw
 
-    save_sheet(draw(figure), folder / f"{figure.name}.svg", folder / f"{figure.name}.png")
+    save_sheet(draw(figure), *paths)
 
 
 def save_sheet(sheet: Sheet, *paths: Path) -> None:
@@ -30,6 +35,6 @@ def save_sheet(sheet: Sheet, *paths: Path) -> None:
             layout.execute(sheet)
             sheet.set_layout_engine("none")
         for path in paths:
-            more = {"metadata": {"Date": None}} if path.suffix == ".svg" else {"dpi": PNG_DPI}
-            sheet.savefig(path, **more)
+            dated = {".svg": "Date", ".pdf": "CreationDate"}.get(path.suffix)
+            sheet.savefig(path, dpi=PNG_DPI, metadata={dated: None} if dated else None)
         sheet.clear()

@@ -1,1 +1,1 @@
-"""Figures: the only place that draws."""
+"""The report of the studies as one page, and the scoreboard."""

@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
-from matplotlib.colors import same_color
-from matplotlib.figure import Figure
 
 from estimators.schedule import write_content
+from studies.drives import plots
 from studies.drives.judge import DriveData, judge
 from studies.drives.quantities import CORNERS
 from studies.drives.run import RunResult, estimate_columns, replay_drive, run_drive
 from studies.drives.summary import remarks, summary_rows
-from studies.plots import colours, drive_plots
+from studies.plots import Figure, Line, colours
 from tests.drives.synthetic_drive import DRIVE, FRONT, MASS, REAR, TORQUES, TRACK, columns, write_drive, write_log
 from tests.unit.schedule_content import EFFECTIVE_RADIUS, schedule_content
 
@@ -150,9 +149,10 @@ def test_every_part_that_runs_has_its_columns(
     assert {"pipeline_vy_mps", "pipeline_sideslip_rad"} <= set(without)
 
 
-def lines(figure: Figure, panel: int) -> dict[str, Any]:
-    """What a panel shows: label of a line to its values."""
-    return {str(line.get_label()): np.asarray(line.get_ydata()) for line in figure.axes[panel].lines}
+def lines(figure: Figure, panel: int, field: str = "y") -> dict[str, Any]:
+    """What a panel shows: label of a line to its values, or to its colour."""
+    shown = [panel for row in figure.rows for panel in row if panel is not None][panel]
+    return {mark.label: getattr(mark, field) for mark in shown.marks if isinstance(mark, Line)}
 
 
 def test_pictures_show_estimates_beside_their_references(everything: tuple[DriveData, RunResult, pl.DataFrame]) -> None:
@@ -160,27 +160,27 @@ def test_pictures_show_estimates_beside_their_references(everything: tuple[Drive
     chain = data.chain
     assert chain is not None
     assert {path.stem for path in result.paths} >= {"lateral", "axle_forces", "loads"}
-    motion = drive_plots.lateral(data, chain)
+    motion = plots.lateral(data, chain)
     sideways, angle = lines(motion, 0), lines(motion, 1)
     np.testing.assert_allclose(sideways["reference"], VY)
     np.testing.assert_array_equal(sideways["pipeline"], chain.vy)
     np.testing.assert_array_equal(sideways["corner observers"], chain.corner_vy)
     np.testing.assert_allclose(angle["reference"], np.degrees(np.arctan2(VY, VX)))
     np.testing.assert_allclose(angle["fixed stiffness estimator"], np.degrees(chain.sideslip_part))
-    axle = lines(drive_plots.axle_forces(data, chain), 1)
+    axle = lines(plots.axle_forces(data, chain), 1)
     np.testing.assert_allclose(axle["reference"], 3.2)
     np.testing.assert_allclose(axle["quasi-static"], MASS * TURN * VX * FRONT / (FRONT + REAR) / 1e3)
-    load = lines(drive_plots.loads(data, chain), 3)
+    load = lines(plots.loads(data, chain), 3)
     np.testing.assert_allclose(load["reference"], 3.9)
     np.testing.assert_allclose(load["pipeline"], chain.force_z[:, 3] / 1e3)
-    colour = {str(line.get_label()): line.get_color() for line in motion.axes[0].lines}
-    assert same_color(colour["pipeline"], colours.PIPELINE)
-    assert same_color(colour["corner observers"], colours.OWN_OBSERVERS)
-    assert same_color(colour["reference"], colours.TRUTH)
+    colour = lines(motion, 0, "color")
+    assert colour["pipeline"] == colours.PIPELINE
+    assert colour["corner observers"] == colours.OWN_OBSERVERS
+    assert colour["reference"] == colours.TRUTH
 
 
 def test_pictures_show_nothing_that_is_not_there(tmp_path: Path) -> None:
     data = replayed(tmp_path, TURNING, turn())
     assert data.chain is not None
-    assert set(lines(drive_plots.lateral(data, data.chain), 0)) == {"pipeline"}
-    assert set(lines(drive_plots.loads(data, data.chain), 0)) == {"pipeline", "quasi-static"}
+    assert set(lines(plots.lateral(data, data.chain), 0)) == {"pipeline"}
+    assert set(lines(plots.loads(data, data.chain), 0)) == {"pipeline", "quasi-static"}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.labelled import Axis, LabelledArray
-from studies.report.labelled_plots import plot_labelled
+from studies.plots.labelled import plot_labelled
 from synthesis.errors import GainsmithError
 
 SPEED = Axis("wheel_speed", np.linspace(0.0, 140.0, 15), "rad/s")

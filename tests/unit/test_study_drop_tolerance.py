@@ -10,11 +10,11 @@ from scipy.linalg import expm
 
 from analysis.dropout_schedule import frozen_critical_probability
 from estimators.velocity import with_constant_gain
-from studies.beyond.drop_tolerance import part_moving
-from studies.beyond.drop_tolerance.estimate import Interval, crossing, interval
+from studies.beyond.drop_tolerance.comparison import Interval, crossing, interval, questions, run_trial
+from studies.beyond.drop_tolerance.limits import any_gain, runs_above
+from studies.beyond.drop_tolerance.moving_speed import certificate, run_sweep
 from studies.beyond.drop_tolerance.observers import NAMES, observer
-from studies.beyond.drop_tolerance.part_limits import any_gain, runs_above
-from studies.beyond.drop_tolerance.part_overview import overview
+from studies.beyond.drop_tolerance.overview import overview
 from studies.beyond.drop_tolerance.population import START, resampled, simulate
 from studies.beyond.drop_tolerance.prediction import (
     Norm,
@@ -29,10 +29,7 @@ from studies.beyond.drop_tolerance.prediction import (
     natural_norm,
     radius,
 )
-from studies.beyond.drop_tolerance.questions import questions
 from studies.beyond.drop_tolerance.study import STUDY
-from studies.beyond.drop_tolerance.trial import run_trial
-from studies.plots.draw import look
 from studies.registry import load_study
 from studies.study import QUICK
 from synthesis.lmi.result import Verdict
@@ -164,10 +161,10 @@ def test_the_runtime_observer_agrees_with_its_prediction(name: str) -> None:
     trial = run_trial(observer(name).schedule, QUICK, NAMES.index(name))
     assert len(trial.rows) >= 5 and trial.agreeing == len(trial.rows)
     for row in trial.of("drop"):
-        assert row.expected == pytest.approx(row.predicted, abs=2e-4)  # the parabola is no source of error
+        assert row.expected == pytest.approx(row.question.predicted, abs=2e-4)  # the parabola is no source of error
         assert row.found.high - row.found.low < 0.06
     for row in trial.of("burst"):
-        assert row.expected == pytest.approx(row.predicted, rel=5e-3)
+        assert row.expected == pytest.approx(row.question.predicted, rel=5e-3)
 
 
 def test_a_wrong_prediction_is_refuted() -> None:
@@ -193,17 +190,17 @@ def test_questions_follow_the_prediction() -> None:
 
 def test_the_certified_energy_falls_on_the_sweep_and_the_runtime_follows_it() -> None:
     frozen = frozen_critical_probability(SHIPPED)
-    proof = part_moving.certificate(SHIPPED, frozen, (0.85,))
+    proof = certificate(SHIPPED, frozen, (0.85,))
     assert proof.verdict is Verdict.CERTIFIED
-    sweep = part_moving.run_sweep(SHIPPED, proof, QUICK, 3)
+    sweep = run_sweep(SHIPPED, proof, QUICK, 3)
     assert (np.abs(np.diff(sweep.speed)) <= 800.0 * SHIPPED.sample_time + 1e-9).all()
     assert sweep.speed.min() == 0.0 and sweep.speed[0] == sweep.speed[-1] == 140.0
     assert (np.diff(sweep.exact) < 0.0).all() and sweep.holds.all()
     # negative control: the same energy does not fall with more drops than any speed survives, and the runtime then misses it
-    worse = part_moving.run_sweep(SHIPPED, replace(proof, drop_probability=0.99), QUICK, 3)
+    worse = run_sweep(SHIPPED, replace(proof, drop_probability=0.99), QUICK, 3)
     assert (np.diff(worse.exact) > 0.0).any()
     assert not (np.abs(worse.seen - sweep.exact[worse.at]) <= worse.half).all()
-    assert part_moving.certificate(SHIPPED, frozen, (1.05,)).verdict is Verdict.REFUTED
+    assert certificate(SHIPPED, frozen, (1.05,)).verdict is Verdict.REFUTED
 
 
 def test_beyond_the_critical_probability_the_middle_run_still_falls() -> None:
@@ -218,8 +215,7 @@ def test_parts_and_their_results() -> None:
     assert load_study("drop-tolerance") is STUDY
     names = [part.name for part in STUDY.parts]
     assert len(set(names)) == len(names) == 2 * len(NAMES) + 3
-    with look():
-        table = overview(QUICK).tables[0]
+    table = overview(QUICK).tables[0]
     found = {row[0]: row for row in table.rows}
     assert len(found) == len(NAMES) and all(len(row) == len(table.columns) for row in table.rows)
     printed = found[observer("printed-longitudinal").title]

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from studies.beyond.friction_floor import runtime
-from studies.beyond.friction_floor.launches import FRICTIONS, launches
+from studies.beyond.friction_floor.launches import launches
+from studies.beyond.friction_floor.resting_tire import FRICTIONS, hidden_ratio, missed_by, missed_share, resting_force
 from studies.beyond.friction_floor.study import STUDY
-from studies.beyond.friction_floor.theory import hidden_ratio, missed_share, resting_force
+from studies.beyond.observers import SHIPPED
 from studies.study import Scope
 from synthesis.models.parameter_set import load_parameter_set
 
@@ -38,16 +38,16 @@ def test_resting_force_is_where_the_bristle_equation_ends() -> None:
     assert resting_force(TIRE, RADIUS, speed, slip, friction) == pytest.approx(force, rel=1e-7)
 
 
-@pytest.mark.parametrize("schedule", runtime.SCHEDULES)
+@pytest.mark.parametrize("schedule", SHIPPED)
 def test_every_shipped_observer_misses_just_that(schedule: str) -> None:
-    found = runtime.missed_by(schedule, np.array([0.2, 1.0]), np.array([0.005, 0.05, 0.5]))
+    found = missed_by(schedule, np.array([0.2, 1.0]), np.array([0.005, 0.05, 0.5]))
     assert found.largest_gap < 1e-9
 
 
 def test_another_tire_is_not_what_it_misses(monkeypatch: pytest.MonkeyPatch) -> None:
     """Negative control: the closed form of another tire is refuted."""
-    monkeypatch.setitem(runtime.SCHEDULES, "corner-estimation-longitudinal", ("resilient-velocity", "longitudinal"))
-    assert runtime.missed_by("corner-estimation-longitudinal", np.array([0.5]), np.array([0.02])).largest_gap > 1e-3
+    monkeypatch.setitem(SHIPPED, "corner-estimation-longitudinal", ("resilient-velocity", "longitudinal"))
+    assert missed_by("corner-estimation-longitudinal", np.array([0.5]), np.array([0.02])).largest_gap > 1e-3
 
 
 def test_truth_vehicle_agrees_where_slip_changes_slowly_and_fusion_recovers() -> None:

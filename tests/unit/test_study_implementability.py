@@ -11,10 +11,22 @@ from analysis.errors import AnalysisError
 from estimators.schedule import GainSchedule
 from studies.beyond.implementability.break_rates import break_curve, first_breaks, unstable_wheel_speeds
 from studies.beyond.implementability.designs import Design, printed_designs, shipped_designs, with_sample_time
-from studies.beyond.implementability.figures import lasting_schemes, launches, maps
-from studies.beyond.implementability.simulate import RUNTIME, STEPS, growth, launch, rolling, run
+from studies.beyond.implementability.simulation import (
+    RUNTIME,
+    STEPS,
+    confirmation_table,
+    growth,
+    launch,
+    launch_figure,
+    rolling,
+    run,
+)
+from studies.beyond.implementability.spectral_radius import (
+    lasting_figure,
+    map_figure,
+    radius_table,
+)
 from studies.beyond.implementability.study import STUDY
-from studies.beyond.implementability.tables import confirmation_table, radius_table
 from studies.beyond.implementability.updates import BREAKABLE, LASTING, UPDATES, jury_margin, spectral_radius
 from studies.study import QUICK, PartResult
 from tests.unit.study_checks import check_result, check_study
@@ -214,7 +226,7 @@ def test_figures_and_tables_stand_on_their_own() -> None:
     designs, curves = (P1X, P3X), {(d.name, s): break_curve(d, s, 15) for d in (P1X, P3X) for s in BREAKABLE}
     table = confirmation_table(designs, curves, 150)
     assert all(row[-1] is True for row in table.rows)
-    drawings = [maps(designs, "map-printed", 15), lasting_schemes(designs, 15), launches(designs, 0.5)]
+    drawings = [map_figure(designs, "map-printed", 15), lasting_figure(designs, 15), launch_figure(designs, 0.5)]
     check_result(PartResult((), [radius_table("spectral-radius-printed", designs), table], drawings))
 
 

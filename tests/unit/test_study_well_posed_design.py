@@ -10,12 +10,24 @@ import sympy as sp
 
 from studies.beyond.well_posed_design.achieved import achieved, printed_achieved
 from studies.beyond.well_posed_design.cases import Case, all_cases, case, p1_cases
-from studies.beyond.well_posed_design.figures import demand_figure, ill_posed, plane
-from studies.beyond.well_posed_design.gain_plane import gain_plane
-from studies.beyond.well_posed_design.literal import approach, explicit_family, floor, literal_design
+from studies.beyond.well_posed_design.demands import (
+    DEMANDS,
+    decay_rate,
+    friction_bound,
+    noise_weight,
+    pole_limit,
+    sweep,
+)
+from studies.beyond.well_posed_design.gain_plane import comparison_table, gain_plane, plane_figure
+from studies.beyond.well_posed_design.literal import (
+    approach,
+    explicit_family,
+    floor,
+    literal_design,
+    literal_figure,
+    literal_table,
+)
 from studies.beyond.well_posed_design.study import STUDY
-from studies.beyond.well_posed_design.sweeps import decay_rate, friction_bound, noise_weight, pole_limit, sweep
-from studies.beyond.well_posed_design.tables import comparison_table, literal_table, sweep_table
 from studies.study import PartResult
 from synthesis.errors import SpecError
 from tests.unit.study_checks import check_result, check_study
@@ -114,7 +126,7 @@ class TestSweeps:
         assert found.feasible.tolist() == [False, True]
         assert np.isnan(found.gains[0]).all() and np.isfinite(found.gains[1]).all()
         assert np.isnan(found.achieved.noise[0])
-        row = sweep_table("poles", "limit [1/s]", [found]).rows[0]
+        row = DEMANDS[2].table([found]).rows[0]
         assert row[2] is False and row[-1] is None
 
 
@@ -148,14 +160,14 @@ class TestAchieved:
         assert float(found.slowest) < 0.0 and np.isinf(float(found.friction)) and np.isinf(float(found.noise_density))
 
     def test_plane_holds_the_printed_gains(self) -> None:
-        field = gain_plane(LATERAL, 15)
+        first, second, fields = gain_plane(LATERAL, 15)
         exact = printed_achieved(LATERAL, 8)
         i, j = (
-            np.abs(field.first - LATERAL.printed[0]).argmin(),
-            np.abs(np.log(field.second / LATERAL.printed[1])).argmin(),
+            np.abs(first - LATERAL.printed[0]).argmin(),
+            np.abs(np.log(second / LATERAL.printed[1])).argmin(),
         )
-        assert field.fields.slowest[i, j] == pytest.approx(float(exact.slowest), rel=0.3)
-        assert field.fields.slowest.shape == (15, 15)
+        assert fields.slowest[i, j] == pytest.approx(float(exact.slowest), rel=0.3)
+        assert fields.slowest.shape == (15, 15)
 
 
 def test_case_without_printed_gains_is_refused() -> None:
@@ -170,12 +182,11 @@ def test_study_is_complete() -> None:
 
 def test_figures_and_tables_stand_on_their_own(literal, posed) -> None:  # type: ignore[no-untyped-def]
     sweeps = [sweep(LONG, friction_bound, (1.02, 1.1), points=5), sweep(LATERAL, friction_bound, (1.02, 1.1), points=5)]
-    label = "bound of the friction gain [1]"
-    demand = demand_figure("friction-bound", label, sweeps, "Gains over the bound.", 1.0)
-    drawings = [ill_posed((LONG, LATERAL), literal, posed), demand, plane((LONG, LATERAL), 9)]
+    bound = DEMANDS[0]
+    drawings = [literal_figure((LONG, LATERAL), literal, posed), bound.figure(sweeps), plane_figure((LONG, LATERAL), 9)]
     tables = [
         literal_table((LONG, LATERAL), literal, posed),
-        sweep_table("friction-bound", label, sweeps),
+        bound.table(sweeps),
         comparison_table((LONG,), 5),
     ]
     check_result(PartResult((), tables, drawings))

@@ -2,44 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
 from estimators import GainSchedule
 from estimators.velocity import with_constant_gain
-from studies.papers.resilient_velocity.inputs import PRINTED
-from synthesis.models.catalogue.corner import Direction
+from studies.beyond.observers import PAPERS, SHIPPED, printed
+
+PACKAGE = "studies.beyond.drop_tolerance"
+PRINTED = {"printed-longitudinal": "longitudinal", "printed-lateral": "lateral"}
+NAMES = (*SHIPPED, *PRINTED)
+QUICK = ("corner-estimation-longitudinal",)
+"""Observers of a quick run; the overview has all of them."""
+SPEED_LABEL = "wheel speed |ω| [rad/s]"
 
 
 @dataclass(frozen=True)
 class Observer:
-    """A schedule under a name for tables and figures; `printed` for the gains of P3."""
+    """A schedule under a name for tables and figures; `plant` says whose tires it has."""
 
     name: str
+    plant: str
     title: str
     schedule: GainSchedule
-    printed: bool
 
-
-SHIPPED: Mapping[str, str] = {
-    "corner-estimation-longitudinal": "P1 vehicle, longitudinal",
-    "corner-estimation-lateral": "P1 vehicle, lateral",
-    "longitudinal-speed": "P2 vehicle, longitudinal",
-    "resilient-velocity-longitudinal": "P3 vehicle, longitudinal",
-    "resilient-velocity-lateral": "P3 vehicle, lateral",
-}
-PRINTED_NAMES: Mapping[str, Direction] = {"printed-longitudinal": "longitudinal", "printed-lateral": "lateral"}
-NAMES = (*SHIPPED, *PRINTED_NAMES)
+    @property
+    def step(self) -> float:
+        """Sample time in ms."""
+        return 1e3 * self.schedule.sample_time
 
 
 @cache
 def observer(name: str) -> Observer:
     """The observer of this name, one of `NAMES`. Raises KeyError for another."""
-    if name in SHIPPED:
-        return Observer(name, f"{SHIPPED[name]}: shipped schedule", GainSchedule.shipped(name), printed=False)
-    direction = PRINTED_NAMES[name]
-    gain = PRINTED.gains[direction]
-    plant = GainSchedule.shipped(f"resilient-velocity-{direction}")
-    title = f"P3 vehicle, {direction}: printed gain [{gain[0]:g}, {gain[1]:g}]"
-    return Observer(name, title, with_constant_gain(plant, gain), printed=True)
+    if name in PRINTED:
+        direction, plant = PRINTED[name], f"P3 vehicle, {PRINTED[name]}"
+        gain, _ = printed("resilient-velocity", direction)
+        schedule = with_constant_gain(GainSchedule.shipped(f"resilient-velocity-{direction}"), gain)
+        return Observer(name, plant, f"{plant}: printed gain [{gain[0]:g}, {gain[1]:g}]", schedule)
+    parameters, direction = SHIPPED[name]
+    plant = f"{PAPERS[parameters]} vehicle, {direction}"
+    return Observer(name, plant, f"{plant}: shipped schedule", GainSchedule.shipped(name))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -9,18 +10,21 @@ import numpy as np
 import numpy.typing as npt
 
 from estimators.vehicle import GRAVITY
-from studies.beyond.friction_floor.theory import friction_curve, missed_share
+from studies.beyond.friction_floor.resting_tire import FRICTIONS, friction_curve, missed_share
 from studies.experiments.accuracy import Spread, nrms, spread
 from studies.experiments.play import Reading, baselines, measured, play, run_of
 from studies.experiments.sensors import TEST_CAR
 from studies.experiments.velocities import corner_observers
-from studies.study import Scope
+from studies.papers.topic import Topic
+from studies.plots import Axis, ErrorBars, Figure, Line, Mark, Panel
+from studies.plots.colours import FUSION, INTEGRATED_ACCELERATION, MEAN_WHEEL_SPEED, OWN_OBSERVERS, ROADS
+from studies.study import Cell, PartResult, Scope, Table
 from studies.truth import Truth, drive, load_manoeuvre
 from studies.truth.road_table import Road
 from synthesis.models.parameter_set import load_parameter_set
 
 Array = npt.NDArray[np.float64]
-FRICTIONS = (0.2, 0.35, 0.5, 0.8, 1.0)
+TOPIC = Topic("studies.beyond.friction_floor")
 BEYOND = 1.15
 """Peak torque over what the road holds of sliding wheels: enough to leave static friction, mu_s/mu_c = 1.3, at the front."""
 LEAST_SLIP = 0.01
@@ -31,29 +35,32 @@ READINGS: dict[str, Reading] = {
     "relative": lambda step: step.corners.relative_velocity,
 }
 
+ESTIMATES = {
+    "corner observers": OWN_OBSERVERS, "fusion": FUSION, "mean wheel speed": MEAN_WHEEL_SPEED,
+    "integrated acceleration": INTEGRATED_ACCELERATION,
+}  # fmt: skip
+QUICK_SHARE = 0.5
+"""Durations of a quick run, over those of the manoeuvre: the torque still changes slowly against the bristles."""
+
 
 def name_of(friction: float) -> str:
     """Of the run on a road of this friction."""
     return f"floor-launch-{round(100 * friction)}"
 
 
-QUICK_PACE = 0.5
-"""Durations of a quick run, over those of the manoeuvre: the torque still changes slowly against the bristles."""
-
-
 @cache
 def launched(quick: bool = False) -> Truth:
     """One run for each friction, integrated together."""
-    pace = QUICK_PACE if quick else 1.0
+    share = QUICK_SHARE if quick else 1.0
     base = load_manoeuvre("floor-launch")
     car = base.truth_vehicle()
     grip = car.lugre.sliding * car.parameters.mass * GRAVITY * float(np.mean(car.parameters.radius))
     runs = []
     for friction in FRICTIONS:
-        held, rise, fall = (piece.model_copy(update={"time": pace * (piece.time or 0.0)}) for piece in base.torque)
+        held, rise, fall = (piece.model_copy(update={"time": share * (piece.time or 0.0)}) for piece in base.torque)
         pieces = [held, rise.model_copy(update={"to": f"{BEYOND * friction * grip:.6g} N*m"}), fall]
         changes = {
-            "name": name_of(friction), "road": Road(friction=friction), "torque": pieces, "duration": pace * base.duration,
+            "name": name_of(friction), "road": Road(friction=friction), "torque": pieces, "duration": share * base.duration,
         }  # fmt: skip
         runs.append(base.model_copy(update=changes))
     return drive(runs)
@@ -72,7 +79,7 @@ class Launch:
 
 
 def launches(scope: Scope) -> list[Launch]:
-    """Play all roads in one batch."""
+    """The estimates on all roads, computed in one batch."""
     truth = launched(scope.quick)
     drawn = measured(truth, range(scope.seeds), TEST_CAR)
     estimates = play(drawn, READINGS, corner_observers("corner-estimation"))
@@ -104,3 +111,70 @@ def launches(scope: Scope) -> list[Launch]:
             )
         )
     return found
+
+
+@TOPIC.part("launches", "Launches on five roads", 41.0)
+def simulation(scope: Scope) -> PartResult:
+    """The truth vehicle on five roads."""
+    found = launches(scope)
+    rows: list[list[Cell]] = []
+    for launch in found:
+        known = np.isfinite(launch.predicted) & np.isfinite(launch.missed)
+        own, fused = launch.errors["corner observers"], launch.errors["fusion"]
+        shares = (launch.slip.max(), np.median(launch.predicted[known]), np.median(launch.missed[known]))
+        errors = (launch.errors[name].text() for name in ESTIMATES)
+        recovered = round(100 * (1 - fused.mean / own.mean), 1)
+        rows.append([launch.friction, *(round(100 * float(x), 1) for x in shares), *errors, recovered])
+    columns = [
+        "friction [1]", "largest mean slip [%]", "missed, closed form [%]", "missed, simulated [%]",
+        *(f"{name} NRMS [%]" for name in ESTIMATES), "recovered by the fusion [%]",
+    ]  # fmt: skip
+    caption = (
+        f"Launches of the truth vehicle on LuGre tires, {scope.seeds} sensor draws: median share of the slip velocity "
+        "missed where slip exceeds 1 %, and velocity errors with 95 % interval. The last column is the error of the corner "
+        "observers that the fusion removes."
+    )
+    measures = {f"recovered at friction {row[0]}": float(row[-1] or 0.0) for row in rows}
+    table = Table("launches", caption, columns, rows)
+    return PartResult((), [table], [time_figure(found), error_figure(found)], (), measures)
+
+
+def time_figure(found: Sequence[Launch]) -> Figure:
+    """Slip and shares of every launch."""
+    slips, shares = list[Mark](), list[Mark]()
+    for launch, colour in zip(found, ROADS, strict=True):
+        slips += [Line(launch.time, 100 * launch.slip, f"friction {launch.friction:g}", colour)]
+        shares += [
+            Line(launch.time, 100 * launch.predicted, color=colour, width=2.4, alpha=0.35),
+            Line(launch.time, 100 * launch.missed, color=colour, width=1.0),
+        ]
+    return Figure(
+        "missed-over-time",
+        "Launches on five roads. Below: what the corner observers miss of the slip velocity (thin), and the closed form at the "
+        "slip and friction of the moment (wide), where slip exceeds 1 %.",
+        "Time histories of wheel slip and of the missed share on five roads, measured lines on top of predicted ones.",
+        [
+            [Panel(slips, y="mean wheel slip [%]", legend="upper left", columns=3)],
+            [Panel(shares, "time [s]", Axis("slip velocity missed [%]", 0, 110))],
+        ],
+        size=(8.0, 5.2), share_x="all",
+    )  # fmt: skip
+
+
+def error_figure(found: Sequence[Launch]) -> Figure:
+    """Velocity errors by road."""
+    marks, theta = list[Mark](), [launch.friction for launch in found]
+    for name, colour in ESTIMATES.items():
+        mean, low, high = np.array([[(e := launch.errors[name]).mean, e.low, e.high] for launch in found]).T
+        marks += [
+            Line(theta, mean, name, colour, marker="o"),
+            ErrorBars(theta, mean, mean - low, high - mean, color=colour),
+        ]
+    return Figure(
+        "recovered",
+        "Velocity errors of the same launches, mean over the sensor draws with 95 % interval: the corner observers stay near the "
+        "mean wheel speed, the fusion does not.",
+        "Errors over road friction for corner observers, fusion, mean wheel speed and integrated acceleration.",
+        Panel(marks, "friction of the road [1]", Axis("$V_x$ NRMS [% of the peak]", scale="log"), legend="upper left"),
+        size=(6.4, 4.0),
+    )

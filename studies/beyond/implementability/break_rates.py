@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from analysis.errors import AnalysisError
-from studies.beyond.implementability.designs import Design
-from studies.beyond.implementability.updates import UPDATES, Update, jury_margin
+from studies.beyond.implementability.designs import PAPER_RATE, WHEEL_SPEED, Design, printed_designs, shipped_designs
+from studies.beyond.implementability.updates import BREAKABLE, LASTING, UPDATES, Update, jury_margin
+from studies.papers.topic import Topic
+from studies.plots import DASHES, Axis, Figure, Level, Line, Mark, Panel, Words
+from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE, RED
+from studies.study import Cell, PartResult, Scope, Table
 from synthesis.polynomials.matrix import FloatArray
 
+TOPIC = Topic("studies.beyond.implementability")
 BISECTIONS = 50
 SAMPLE_TIMES = np.geomspace(1e-5, 1.0, 601)  # s, scanned for the first loss of stability
 
@@ -59,13 +66,14 @@ def first_breaks(design: Design, update: Update, wheel_speed: FloatArray) -> tup
     return np.where(lasting, np.inf, high), connected
 
 
+def _margin(design: Design, update: Update, wheel_speed: float, sample_time: float) -> float:
+    A, L, C = design.matrices(np.array([wheel_speed]))
+    return float(jury_margin(update(A, L, C, np.array([sample_time])))[0])
+
+
 def _break_nearby(design: Design, update: Update, wheel_speed: float, near: float) -> float:
     """The break at one wheel speed, given that at a neighbour [s]: a bracket by steps of 2 %, then Brent's method."""
-    A, L, C = design.matrices(np.array([wheel_speed]))
-
-    def margin(sample_time: float) -> float:
-        return float(jury_margin(update(A, L, C, np.array([sample_time])))[0])
-
+    margin = partial(_margin, design, update, wheel_speed)
     low = high = near
     while margin(low) <= 0.0:
         low *= 0.98
@@ -101,14 +109,77 @@ def unstable_wheel_speeds(
 ) -> tuple[tuple[float, float], ...]:
     """Intervals of the wheel speed in rad/s on which the update is unstable at one sample time, edges by root finding."""
     update, grid = UPDATES[scheme], design.grid(points)
-
-    def margin(speed: float) -> float:
-        A, L, C = design.matrices(np.array([speed]))
-        return float(jury_margin(update(A, L, C, np.array([sample_time])))[0])
-
     A, L, C = design.matrices(grid)
     bad = jury_margin(update(A, L, C, np.full(len(grid), sample_time))) <= 0.0
-    edges = np.flatnonzero(np.diff(bad.astype(int)))
-    roots = [float(brentq(margin, grid[k], grid[k + 1], xtol=1e-12)) for k in edges]
+    roots = [
+        float(brentq(lambda speed: _margin(design, update, speed, sample_time), grid[k], grid[k + 1], xtol=1e-12))
+        for k in np.flatnonzero(np.diff(bad.astype(int)))
+    ]
     bounds = ([float(grid[0])] if bad[0] else []) + roots + ([float(grid[-1])] if bad[-1] else [])
     return tuple(zip(bounds[::2], bounds[1::2], strict=True))
+
+
+Curves = Mapping[tuple[str, str], BreakCurve]
+"""By names of design and scheme."""
+
+
+@TOPIC.part("break-rates", "Sample rates at which each discretisation breaks", 6.0)
+def rates(scope: Scope) -> PartResult:
+    """Exact break rates over the wheel speeds."""
+    designs, points = (*printed_designs(), *shipped_designs()), 36 if scope.quick else 141
+    curves = {(d.name, s): break_curve(d, s, points) for s in BREAKABLE for d in designs}
+    measures = {f"break rate {name}, {scheme} [Hz]": curve.worst_rate for (name, scheme), curve in curves.items()}
+    if not all(curve.connected for curve in curves.values()):
+        raise AnalysisError("a discretisation becomes stable again at a lower rate: its break rate says too little")
+    note = (
+        "Each scheme is unstable at every rate below its break rate (down to 1 Hz) and stable at every rate above "
+        "it: no second window was found. The wheel speed is held constant; what a moving wheel speed may do is "
+        "proved for the shipped schedules with the exact update alone."
+    )
+    return PartResult((), [rate_table(designs, curves)], [rate_figure(curves)], [note], measures)
+
+
+def rate_table(designs: Sequence[Design], curves: Curves) -> Table:
+    """Worst break rate of each design and scheme, and the wheel speed at which it breaks."""
+    rows: list[list[Cell]] = []
+    for design in designs:
+        worst = [(c.worst_rate, c.worst_wheel_speed) for c in (curves[design.name, scheme] for scheme in BREAKABLE)]
+        rows.append([design.name, *(round(value, 2) for pair in worst for value in pair)])
+    columns = [text for scheme in BREAKABLE for text in (f"{scheme}: needs [Hz]", f"{scheme}: worst at [rad/s]")]
+    return Table(
+        "break-rates",
+        "Sample rate that each discretisation needs to be stable at every constant wheel speed from 0 to 140 "
+        f"rad/s, and the wheel speed at which it breaks first, by root finding. {', '.join(LASTING)} are stable at "
+        "every rate, as the continuous observers are.",
+        ["design", *columns],
+        rows,
+    )
+
+
+def rate_figure(curves: Curves) -> Figure:
+    """Break rate over the wheel speed, one panel for each scheme."""
+    panels, ticks = [], (20, 50, 100, 200, 500, 1000)
+    for k, scheme in enumerate(BREAKABLE):
+        marks: list[Mark] = [Level(PAPER_RATE, color="black", dash="dotted", width=0.9)]
+        for designs in (printed_designs(), shipped_designs()):
+            for design, colour in zip(designs, (BLUE, RED, ORANGE, GREEN, PURPLE), strict=True):
+                curve, own = curves[design.name, scheme], design.kind == "shipped"
+                dash, width = DASHES[own], 1.1 if own else 1.8
+                marks.append(Line(curve.wheel_speed, curve.rate, design.name, colour, dash, width))
+        if k == 1:
+            marks.append(Words(2.0, PAPER_RATE * 1.02, "200 Hz"))
+        y = Axis("" if k else "sample rate below which it is unstable [Hz]", 20.0, 1200.0, "log", ticks)
+        panels.append(Panel(marks, Axis("wheel speed [rad/s]", *WHEEL_SPEED), y, scheme))
+    return Figure(
+        "break-rates",
+        "Sample rate below which the error of the observer grows, over the wheel speed (held constant), for the "
+        "gains printed by P1 and P3 (solid) and the five shipped schedules (dashed). Forward Euler is limited by "
+        "the fastest pole; a sampled innovation breaks at low speed, where the tire force is stiffest; predicting "
+        "and then adding T·L breaks at high speed. Above the dotted line a curve means unstable at the 200 Hz of "
+        "the papers. Tustin, backward Euler and the exact closed-loop update of the runtime have no curve: they "
+        "never break.",
+        "Three panels of break rate over wheel speed on a logarithmic scale; longitudinal gains lie between 100 and "
+        "900 Hz, lateral ones mostly below 200 Hz except for the third scheme.",
+        panels,
+        size=(10.0, 5.0), legend="below", share_y="all",
+    )  # fmt: skip

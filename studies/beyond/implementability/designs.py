@@ -10,14 +10,16 @@ from typing import Literal
 import numpy as np
 
 from estimators.schedule import GainSchedule
-from synthesis.errors import SpecError
+from studies.beyond.observers import PAPERS, SHIPPED, printed
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import load_parameter_set
 from synthesis.polynomials.matrix import FloatArray
 
 WHEEL_SPEED = (0.0, 140.0)  # rad/s, the range of P1 Figs. 3 and 4
-PAPERS = {"corner-estimation": "P1", "resilient-velocity": "P3", "longitudinal-speed": "P2"}
+PAPER_RATE = 200.0  # Hz, P1 and P3
+PRINTED_BY = ("corner-estimation", "resilient-velocity")
+"""Parameter sets of the papers whose printed gains are examined."""
 
 
 @dataclass(frozen=True)
@@ -45,35 +47,23 @@ class Design:
 def printed_designs() -> tuple[Design, ...]:
     """[0.68, 183.1], [1.11, 16.7] of P1; [1.18, 387], [1.21, 16.8] and, for high slip, [0.22, 0.1] of P3."""
     found = []
-    for parameters in ("corner-estimation", "resilient-velocity"):
-        tires = load_parameter_set(parameters)
-        for direction in ("longitudinal", "lateral"):
-            published = tires.tire[direction].published
-            if published is None or published.gains is None:
-                raise SpecError(
-                    f"parameter set '{parameters}' has no published {direction} gains; add them with their source"
-                )
-            name = f"{PAPERS[parameters]} {direction}"
-            found.append(_constant(name, parameters, direction, published.gains))
+    for name, (parameters, direction) in SHIPPED.items():
+        if parameters in PRINTED_BY:
+            gains, published = printed(parameters, direction)
+            title = f"{PAPERS[parameters]} {direction}"
+            found.append(_constant(title, name, gains))
             if published.gains_high_slip is not None:
-                found.append(_constant(f"{name}, high slip", parameters, direction, published.gains_high_slip))
+                found.append(_constant(f"{title}, high slip", name, published.gains_high_slip))
     return tuple(found)
 
 
 @cache
 def shipped_designs() -> tuple[Design, ...]:
-    """The five schedules that come with the package."""
+    """The five schedules that come with the package, that for one direction alone last."""
     found = []
-    for parameters, direction in (
-        ("corner-estimation", "longitudinal"),
-        ("corner-estimation", "lateral"),
-        ("resilient-velocity", "longitudinal"),
-        ("resilient-velocity", "lateral"),
-        ("longitudinal-speed", "longitudinal"),
-    ):
-        name = parameters if parameters == "longitudinal-speed" else f"{parameters}-{direction}"
+    for name in sorted(SHIPPED, key=lambda name: SHIPPED[name][0] not in PRINTED_BY):
         schedule = GainSchedule.shipped(name)
-        found.append(Design(f"schedule {name}", "shipped", _model(parameters, direction), schedule.gain, schedule))
+        found.append(Design(f"schedule {name}", "shipped", _model(name), schedule.gain, schedule))
     return tuple(found)
 
 
@@ -82,19 +72,13 @@ def with_sample_time(design: Design, sample_time: float) -> GainSchedule:
     return replace(design.schedule, sample_time=sample_time)
 
 
-def _model(parameters: str, direction: str) -> LpvModel:
-    return corner_velocity_model(load_parameter_set(parameters), direction, wheel_speed_maximum=WHEEL_SPEED[1])  # type: ignore[arg-type]
+def _model(name: str) -> LpvModel:
+    parameters, direction = SHIPPED[name]
+    return corner_velocity_model(load_parameter_set(parameters), direction, wheel_speed_maximum=WHEEL_SPEED[1])
 
 
-def _constant(name: str, parameters: str, direction: str, gains: tuple[float, ...]) -> Design:
-    """Printed gains in the shape of a schedule, on the plant of the shipped one with the same tires."""
-    column = np.array(gains)[:, None]
-    shipped = GainSchedule.shipped(f"{parameters}-{direction}")
-    schedule = replace(shipped, name=name, breakpoints=np.array(WHEEL_SPEED), table=np.stack([column, column]))
-    return Design(
-        name,
-        "printed",
-        _model(parameters, direction),
-        lambda points: np.broadcast_to(column, (len(points), 2, 1)),
-        schedule,
-    )
+def _constant(title: str, name: str, gains: tuple[float, ...]) -> Design:
+    """Printed gains in the shape of a schedule, on the plant of the shipped one `name` with the same tires."""
+    column, shipped = np.array(gains)[:, None], GainSchedule.shipped(name)
+    schedule = replace(shipped, name=title, breakpoints=np.array(WHEEL_SPEED), table=np.stack([column, column]))
+    return Design(title, "printed", _model(name), lambda w: np.broadcast_to(column, (len(w), 2, 1)), schedule)

@@ -14,10 +14,8 @@ from estimators.phi import Phi
 from synthesis.polynomials.matrix import FloatArray
 
 Update = Callable[[FloatArray, FloatArray, FloatArray, ArrayLike], FloatArray]
-
-
-def _time(sample_time: ArrayLike) -> FloatArray:
-    return np.asarray(sample_time, float)[..., None, None]
+"""M (..., 2, 2) from A (..., 2, 2), L (..., 2, 1), C (..., 1, 2) and sample times (...) in s."""
+EYE = np.eye(2)
 
 
 def held(M: FloatArray) -> FloatArray:
@@ -31,48 +29,23 @@ def held(M: FloatArray) -> FloatArray:
     return np.asarray((alpha[:, None, None] * np.eye(2) + beta[:, None, None] * N).reshape(M.shape))
 
 
-def forward_euler(A: FloatArray, L: FloatArray, C: FloatArray, sample_time: ArrayLike) -> FloatArray:
-    """I + T (A - L C)."""
-    return np.asarray(np.eye(2) + _time(sample_time) * (A - L @ C))
+def _update(formula: Callable[[FloatArray, FloatArray, FloatArray], ArrayLike]) -> Update:
+    """M from a formula in A, L C and T."""
+    return lambda A, L, C, sample_time: np.asarray(formula(A, L @ C, np.asarray(sample_time, float)[..., None, None]))
 
 
-def sampled_innovation(A: FloatArray, L: FloatArray, C: FloatArray, sample_time: ArrayLike) -> FloatArray:
-    r"""e^{A T} - int_0^T e^{A s} ds L C: the open loop exactly, the innovation computed once and held (P3 (10), literally)."""
-    T = _time(sample_time)
-    return np.asarray(np.eye(2) + T * (held(T * A) @ (A - L @ C)), dtype=np.float64)
-
-
-def predict_then_correct(A: FloatArray, L: FloatArray, C: FloatArray, sample_time: ArrayLike) -> FloatArray:
-    r"""e^{A T} - T L C: the open loop exactly, then the correction T L times the innovation."""
-    T = _time(sample_time)
-    return np.asarray(np.eye(2) + T * (held(T * A) @ A - L @ C), dtype=np.float64)
-
-
-def tustin(A: FloatArray, L: FloatArray, C: FloatArray, sample_time: ArrayLike) -> FloatArray:
-    r"""(I - T/2 (A - L C))^-1 (I + T/2 (A - L C))."""
-    half = 0.5 * _time(sample_time) * (A - L @ C)
-    return np.asarray(np.linalg.solve(np.eye(2) - half, np.eye(2) + half), dtype=np.float64)
-
-
-def backward_euler(A: FloatArray, L: FloatArray, C: FloatArray, sample_time: ArrayLike) -> FloatArray:
-    r"""(I - T (A - L C))^-1."""
-    return np.asarray(np.linalg.inv(np.eye(2) - _time(sample_time) * (A - L @ C)), dtype=np.float64)
-
-
-def exact_closed_loop(A: FloatArray, L: FloatArray, C: FloatArray, sample_time: ArrayLike) -> FloatArray:
-    r"""e^{(A - L C) T}: the observer integrated inside the sample, as the runtime does (P1 section 9)."""
-    M = _time(sample_time) * (A - L @ C)
-    return np.asarray(np.eye(2) + M @ held(M), dtype=np.float64)
-
-
+exact_closed_loop = _update(lambda A, LC, T: EYE + (T * (A - LC)) @ held(T * (A - LC)))
+"""e^{(A - L C) T}: the observer integrated inside the sample, as the runtime does (P1 section 9)."""
 BREAKABLE: dict[str, Update] = {
-    "forward Euler": forward_euler,
-    "sampled innovation": sampled_innovation,
-    "predict, then T·L": predict_then_correct,
+    "forward Euler": _update(lambda A, LC, T: EYE + T * (A - LC)),
+    # e^{A T} - int_0^T e^{A s} ds L C: the open loop exactly, the innovation computed once and held (P3 (10), literally)
+    "sampled innovation": _update(lambda A, LC, T: EYE + T * (held(T * A) @ (A - LC))),
+    # e^{A T} - T L C: the open loop exactly, then the correction T L times the innovation
+    "predict, then T·L": _update(lambda A, LC, T: EYE + T * (held(T * A) @ A - LC)),
 }
 LASTING: dict[str, Update] = {
-    "Tustin": tustin,
-    "backward Euler": backward_euler,
+    "Tustin": _update(lambda A, LC, T: np.linalg.solve(EYE - 0.5 * T * (A - LC), EYE + 0.5 * T * (A - LC))),
+    "backward Euler": _update(lambda A, LC, T: np.linalg.inv(EYE - T * (A - LC))),
     "exact closed loop": exact_closed_loop,
 }
 UPDATES: dict[str, Update] = {**BREAKABLE, **LASTING}

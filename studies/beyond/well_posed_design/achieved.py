@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,14 @@ import numpy as np
 from analysis.error_norms import error_hinf_norm, selection
 from analysis.norms_h2 import h2_norm
 from studies.beyond.well_posed_design.cases import VELOCITY, Case
+from studies.study import Cell
 from synthesis.polynomials.matrix import FloatArray
+
+COLUMNS = (
+    "friction gain [1]", "force noise gain [m/s]", "H2 gain, white force noise [m/s sqrt(Hz)]", "acceleration gain [s]",
+    "slowest pole [1/s]", "fastest pole [1/s]",
+)  # fmt: skip
+"""Of tables, in the order of the fields of `Achieved`."""
 
 
 @dataclass(frozen=True)
@@ -62,3 +70,8 @@ def printed_achieved(case: Case, points: int = 57) -> Achieved:
     """Of the printed gains, the same at every wheel speed."""
     grid = case.grid(points)
     return achieved(case, np.broadcast_to(case.printed, (len(grid), 2)), grid)
+
+
+def short(values: Sequence[float]) -> list[Cell]:
+    """Six digits for a table, empty cells for NaN."""
+    return [None if np.isnan(value) else float(f"{value:.6g}") for value in values]

@@ -7,12 +7,14 @@ from functools import cache
 
 import numpy as np
 
+from studies.beyond.observers import PAPERS, printed
 from studies.spec import load_spec
 from synthesis.errors import SpecError
 from synthesis.hinf_observer import ObserverDesign
 from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.matrix import FloatArray
 
-PAPERS = {"corner-estimation": "P1", "resilient-velocity": "P3"}
+PACKAGE = "studies.beyond.well_posed_design"
 VELOCITY = ("relative_velocity",)
 
 
@@ -27,7 +29,7 @@ class Case:
     printed: tuple[float, float]
     printed_range: tuple[tuple[float, float], tuple[float, float]]
 
-    def grid(self, points: int = 29) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    def grid(self, points: int = 29) -> FloatArray:
         """Wheel speeds over the range, rad/s."""
         (parameter,) = self.model.parameters
         return np.linspace(parameter.minimum, parameter.maximum, points)
@@ -35,16 +37,16 @@ class Case:
 
 @cache
 def case(name: str) -> Case:
-    """By the name of a shipped specification. Raises SpecError if its parameter set prints no gains."""
+    """By the name of a shipped specification. Raises SpecError if its parameter set prints no gains or ranges of them."""
     spec, folder = load_spec(name)
     parameters = spec.parameter_set(folder)
     direction = spec.model.id.removeprefix("corner-velocity-")
-    published = parameters.tire[direction].published
-    if published is None or published.gains is None or published.gain_range is None:
-        raise SpecError(f"specification '{name}': its parameter set has no published gains to compare with")
-    (l1, l2), (first, second) = published.gains, published.gain_range
+    gains, published = printed(parameters, direction)
+    if published.gain_range is None:
+        raise SpecError(f"specification '{name}': its parameter set has no published gains with ranges to compare with")
+    first, second = published.gain_range
     title = f"{PAPERS[parameters.id]} {direction}"
-    return Case(name, title, spec.build_model(parameters), spec.observer_design(), (l1, l2), (first, second))
+    return Case(name, title, spec.build_model(parameters), spec.observer_design(), gains, (first, second))
 
 
 def p1_cases() -> tuple[Case, Case]:

@@ -2,37 +2,95 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
-from studies.beyond.well_posed_design.achieved import Achieved, achieved
-from studies.beyond.well_posed_design.cases import Case
+from estimators.schedule import GainSchedule
+from studies.beyond.well_posed_design.achieved import COLUMNS, Achieved, achieved, printed_achieved, short
+from studies.beyond.well_posed_design.cases import PACKAGE, Case, all_cases
+from studies.papers.topic import Topic
+from studies.plots import Axis, Box, Contours, Figure, Line, Map, Mark, Panel, dots
+from studies.plots.colours import BLUE, GREEN, ORANGE, RED
+from studies.study import Cell, PartResult, Scope, Table
 from synthesis.polynomials.matrix import FloatArray
 
+TOPIC = Topic(PACKAGE)
 WHEEL_SPEEDS = 8
 
 
-@dataclass(frozen=True)
-class GainPlane:
-    """L1 (m,) in m/s, L2 (n,) in m/s^2, and what the pairs do, fields of shape (m, n)."""
+def gain_plane(case: Case, points: int = 61) -> tuple[FloatArray, FloatArray, Achieved]:
+    """L1 (m,) in m/s and L2 (m,) in m/s^2 around the printed gains and ranges, and what the pairs do, fields (m, m).
 
-    first: FloatArray
-    second: FloatArray
-    fields: Achieved
-
-
-def gain_plane(case: Case, points: int = 61) -> GainPlane:
-    """Around the printed gains and ranges, L2 over two decades."""
+    L2 runs over two decades.
+    """
     (_, high), (low, top) = case.printed_range
     first = np.linspace(0.02, 1.35 * max(high, case.printed[0]), points)
     second = np.geomspace(0.2 * low, 4.0 * max(top, case.printed[1]), points)
-    grid = np.linspace(*_range(case), WHEEL_SPEEDS)
     pairs = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1)
     gains = np.broadcast_to(pairs[:, :, None, :], (points, points, WHEEL_SPEEDS, 2))
-    return GainPlane(first, second, achieved(case, gains, grid))
+    return first, second, achieved(case, gains, case.grid(WHEEL_SPEEDS))
 
 
-def _range(case: Case) -> tuple[float, float]:
-    (parameter,) = case.model.parameters
-    return parameter.minimum, parameter.maximum
+@TOPIC.part("gain-plane", "Printed and shipped gains on the map", 6.0)
+def planes(scope: Scope) -> PartResult:
+    """Constant gains, printed gains, shipped schedules."""
+    cases = all_cases()
+    table, figure = comparison_table(cases, 15 if scope.quick else 57), plane_figure(cases, 21 if scope.quick else 61)
+    return PartResult((), [table], [figure])
+
+
+def comparison_table(cases: Sequence[Case], points: int = 57) -> Table:
+    """Printed gains and shipped schedules by the same measures."""
+    rows: list[list[Cell]] = []
+    for case in cases:
+        grid = case.grid(points)
+        shipped = achieved(case, GainSchedule.shipped(case.name).gain(grid)[..., 0], grid)
+        for what, found in (("printed gains", printed_achieved(case, points)), ("shipped schedule", shipped)):
+            rows.append([case.title, what, *short([float(np.asarray(value)) for value in vars(found).values()])])
+    return Table(
+        "comparison",
+        "Printed gains and shipped schedules by the same measures, at the worst constant wheel speed from 0 to 140 "
+        "rad/s. Friction and force noise are at their static floors in nearly all rows; decay, fastest pole and "
+        "broadband noise tell the gains apart.",
+        ("case", "gains", *COLUMNS),
+        rows,
+    )
+
+
+def plane_figure(cases: Sequence[Case], points: int = 61) -> Figure:
+    """Decay, fastest pole and noise of constant gains, with printed and shipped gains."""
+    panels = []
+    for case in cases:
+        x, y, fields = gain_plane(case, points)
+        darkest = 3.0 * float(printed_achieved(case).noise_density)
+        decay, fastest = case.design.decay_rate, float(case.design.fastest_pole or 0.0)
+        marks: list[Mark] = [Map(x, y, fields.noise_density.T, "H₂ gain, force noise [m/s·√Hz]", "Greys", 0.0, darkest)]
+        contours: list[tuple[FloatArray, list[float], str, Literal["solid", "dashed", "dotted"]]] = [
+            (fields.slowest, [decay * f for f in (0.25, 0.5, 1.0, 2.0, 4.0)], BLUE, "solid"),
+            (fields.fastest, [fastest * f for f in (0.5, 1.0, 2.0)], ORANGE, "dashed"),
+            (fields.friction, [1.001, 1.1], GREEN, "dotted"),
+        ]
+        marks += [Contours(x, y, field.T, levels, colour, dash, 1.2) for field, levels, colour, dash in contours]
+        first, second = GainSchedule.shipped(case.name).table[:, :, 0].T
+        marks += [
+            Box(*case.printed_range, "printed range", RED, 1.2),
+            dots(*case.printed, "printed gains", RED, "*", 12, edge="white"),
+            Line(first, second, "shipped schedule", "black", marker="o", size=3, width=1.3),
+            dots(first[:1], second[:1], "shipped, at standstill", "black", size=6, hollow=True),
+        ]
+        panels.append(Panel(marks, "$L_1$ [m/s]", Axis("$L_2$ [m/s²]", scale="log"), case.title, grid=False))
+    return Figure(
+        "gain-plane",
+        "Constant gains and what they do at the worst constant wheel speed between 0 and 140 rad/s. Blue: slowest "
+        "pole, the decay rate [1/s]; orange: fastest pole [1/s]; green: gain from friction to the velocity error, "
+        "which has the floor 1; grey: H₂ gain from white force noise. L₂ sets the decay and the noise, L₁ the fast "
+        "pole, and friction hardly tells gains apart: between the dotted lines it is at its floor. White: "
+        "unstable. Star and box: printed gains and ranges; black: the shipped schedules.",
+        "Four maps over L1 and L2 (logarithmic) with blue contours of the decay rate, nearly horizontal at low L2, "
+        "orange contours of the fastest pole, a red star for the printed gains and a black curve for the shipped "
+        "schedule.",
+        [panels[k : k + 2] for k in range(0, len(panels), 2)],
+        size=(10.0, 3.9 * ((len(cases) + 1) // 2)), legend="below",
+    )  # fmt: skip

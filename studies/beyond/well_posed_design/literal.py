@@ -7,6 +7,7 @@ bristle with sigma2/(sigma0 + sigma2 a), whatever L is. At standstill (a = 0) th
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,11 @@ import sympy as sp
 
 from analysis.dc_floor import static_gain
 from analysis.error_norms import error_hinf_norm
-from studies.beyond.well_posed_design.cases import Case
+from studies.beyond.well_posed_design.cases import PACKAGE, Case, p1_cases
+from studies.papers.topic import Topic
+from studies.plots import Axis, Figure, Level, Line, Mark, Panel, Words
+from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE, RED
+from studies.study import Cell, PartResult, Scope, Table
 from synthesis.errors import ProblemError
 from synthesis.hinf_observer import Channel, ObserverDesign, ObserverGains, observer_problem, to_gamma
 from synthesis.lmi.scaling import observer_scale
@@ -22,6 +27,8 @@ from synthesis.lmi.solve import solve
 from synthesis.polynomials.matrix import FloatArray
 from synthesis.well_posedness import energy_problem
 
+TOPIC = Topic(PACKAGE)
+DEGREES = (0, 1, 2, 3)
 DISTURBANCES = ("friction", "acceleration_error")
 ERRORS = ("bristle_deflection", "relative_velocity")
 GROWTH = 2.0  # for each decade; bounded gains settle
@@ -88,4 +95,86 @@ def explicit_family(case: Case, second_gains: FloatArray) -> FloatArray:
             error_hinf_norm(case.model, [first, second], grid, DISTURBANCES, ERRORS, tolerance=1e-13).norm.max()
             for second in second_gains
         ]
+    )
+
+
+Approaches = Mapping[tuple[str, int], Approach]
+"""By name of the case and degree."""
+
+
+@TOPIC.part("literal", "The literal problem has infimum 1 and unbounded gains", 5.0)
+def literal(scope: Scope) -> PartResult:
+    """Infimum 1, approached with unbounded gains."""
+    cases, degrees = p1_cases(), DEGREES[:2] if scope.quick else DEGREES
+    found = {(case.name, degree): approach(case, literal_design(degree)) for case in cases for degree in degrees}
+    posed = {case.name: approach(case, case.design) for case in cases}
+    note = (
+        "The floor is exact: for every L the static gains from friction are -sigma0/(sigma0 + sigma2 a) to the "
+        "velocity and sigma2/(sigma0 + sigma2 a) to the bristle, at standstill together sqrt(1 + "
+        "(sigma2/sigma0)^2), 1 + 3e-12 for the longitudinal tire of P1."
+    )
+    measures = {f"growth per decade, {name}, degree {k}": value.growth_per_decade for (name, k), value in found.items()}
+    table, figure = literal_table(cases, found, posed), literal_figure(cases, found, posed)
+    return PartResult((), [table], [figure], [note], measures)
+
+
+def literal_table(cases: Sequence[Case], literal: Approaches, posed: Mapping[str, Approach]) -> Table:
+    """Infimum, floor and growth of the gains."""
+    rows: list[list[Cell]] = []
+    for case in cases:
+        exact, free = floor(case)
+        found = [(f"literal, degree {degree}", value) for (name, degree), value in literal.items() if name == case.name]
+        for problem, approach in [*found, ("well-posed, degree 1", posed[case.name])]:
+            least: list[Cell] = [float(exact), free] if problem.startswith("literal") else [None, None]
+            ends: list[Cell] = [round(float(value), 3) for value in approach.gains[[0, -1], 1]]
+            growth = round(approach.growth_per_decade, 2)
+            rows.append([case.title, problem, *least, approach.gamma, *ends, growth, approach.unbounded])
+    return Table(
+        "ill-posed",
+        "The literal problem (minimise the gain from friction and acceleration error to both errors) beside the "
+        "well-posed one. The exact floor follows from static gains that no L changes; gamma is what the solver "
+        "finds; then the largest |L2| needed at a back-off of 10 % and of 0.1 %, and its growth for each decade of "
+        "back-off. More than 2 counts as unbounded.",
+        ("case", "problem", "exact floor of gamma [1]", "floor free of L", "gamma found [1 or m/s]", "|L2| at 10 % [m/s^2]",
+         "|L2| at 0.1 % [m/s^2]", "growth per decade [1]", "unbounded"),
+        rows,
+    )  # fmt: skip
+
+
+def literal_figure(cases: Sequence[Case], literal: Approaches, posed: Mapping[str, Approach]) -> Figure:
+    """Least gains on the way to the infimum, literal and well-posed; and the explicit family."""
+    panels, explicit, second = [], list[Mark](), np.geomspace(1.0, 1e7, 43)
+    for case, colour in zip(cases, (BLUE, RED), strict=True):
+        marks: list[Mark] = [
+            Level(case.printed[1], color=RED, dash="dotted", width=1.0),
+            Words(0.11, case.printed[1] * 1.06, "printed", RED),
+        ]
+        degrees = sorted(degree for name, degree in literal if name == case.name)
+        for degree, shade in zip(degrees, (BLUE, ORANGE, GREEN, PURPLE), strict=False):
+            found = literal[case.name, degree]
+            marks.append(Line(found.backoffs, found.gains[:, 1], f"literal, degree {degree}", shade, marker="o"))
+        well = posed[case.name]
+        marks.append(Line(well.backoffs, well.gains[:, 1], "well-posed, degree 1", "black", "dashed", marker="s"))
+        most = max(approach.gains[:, 1].max() for (name, _), approach in literal.items() if name == case.name)
+        x = Axis("distance from the infimum, γ/γ* − 1 [1]", 0.13, 8e-4, "log")
+        y = Axis("largest $|L_2|$ that is needed [m/s²]", high=18.0 * max(most, case.printed[1]), scale="log")
+        panels.append(Panel(marks, x, y, case.title, "upper left"))
+        ratio = case.model.constants["sigma2"].value / case.model.constants["sigma0"].value
+        explicit += [
+            Line(second, explicit_family(case, second) - 1.0, case.title, colour),
+            Level(0.5 * ratio**2, color=colour, dash="dotted", width=0.9),
+        ]
+    x = Axis("$L_2$ with $L_1 = 1/σ_1$ [m/s²]", scale="log")
+    y = Axis("γ − 1 at constant wheel speed [1]", scale="log")
+    return Figure(
+        "ill-posed",
+        "Minimising the gain of (30) to (32) alone does not determine gains. Left and middle: the least gains that "
+        "come within a given distance of the infimum γ* = 1 grow without bound as the distance shrinks, for every "
+        "degree of P and L; with the pole band and the channel bounds of the shipped design (black, distance from "
+        "its own optimum) they settle. Right: the gains L = [1/σ₁, L₂] come as close to 1 as one likes (dotted: "
+        "the exact floor), so at any γ above 1 all large L₂ are equally good.",
+        "Two panels with rising curves for the literal problem and a flat black curve for the well-posed one; a "
+        "third with two curves falling over ten decades to a floor.",
+        [*panels, Panel(explicit, x, y, "explicit gains", "upper right")],
+        size=(10.0, 3.9),
     )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +13,17 @@ from analysis.dropout_modes import schedule_drop_modes
 from analysis.dropout_schedule import FrozenDropProbability, frozen_critical_probability
 from analysis.mean_square_schedule import MeanSquareSchedule, mean_square_schedule
 from estimators import GainSchedule
-from studies.beyond.drop_tolerance.observers import NAMES, Observer, observer
+from studies.beyond.drop_tolerance.comparison import MISS
+from studies.beyond.drop_tolerance.observers import NAMES, PACKAGE, QUICK, Observer, observer
 from studies.beyond.drop_tolerance.population import START, evolve
-from studies.beyond.drop_tolerance.trial import MISS
-from studies.papers.resilient_velocity.ink import sheet
+from studies.papers.topic import Topic
+from studies.plots import Axis, ErrorBars, Figure, Line, Mark, Panel
 from studies.plots.colours import BLUE, GREY, RED
-from studies.study import Drawing, PartResult, Scope, Table
+from studies.study import PartResult, Scope, Table
 from synthesis.lmi.result import Verdict
 from synthesis.polynomials.matrix import FloatArray
 
+TOPIC = Topic(PACKAGE)
 SHARES = (0.95, 0.85, 0.7)  # of the smallest frozen value, tried in turn
 CHECKS = 8  # samples at which the simulated energy is compared
 RUNS, EVERY = 100, 2  # runs of a seed; samples between two resamplings
@@ -43,36 +45,36 @@ class Sweep:
         return np.asarray(np.abs(self.seen - self.exact[self.at]) <= self.half)
 
 
-def part(name: str) -> Callable[[Scope], PartResult]:
-    """The part of the study for one observer."""
-
-    def run(scope: Scope) -> PartResult:
-        tested = observer(name)
-        frozen = frozen_critical_probability(tested.schedule)
-        proof = certificate(tested.schedule, frozen, SHARES[1:] if scope.quick else SHARES)
-        if proof.verdict is not Verdict.CERTIFIED:
-            words = f"{tested.title}: nothing is proved while the wheel speed moves; {proof.message}."
-            none = {"certified_drop_probability": 0.0, "frozen_drop_probability": frozen.smallest}
-            return PartResult((), (), (), [words], none)
-        sweep = run_sweep(tested.schedule, proof, scope, NAMES.index(name))
-        hold = sweep.holds
-        falls = bool((np.diff(sweep.exact) < 0.0).all())
-        words = (
-            f"{tested.title}: a drop probability of {proof.drop_probability:.3f} is {proof.verdict!s} for every "
-            f"motion of the wheel speed within its rates (held at one speed: {frozen.smallest:.3f}). On the sweep "
-            f"the energy {'falls at every sample' if falls else 'DOES NOT FALL at every sample'}, and "
-            f"{int(hold.sum())} of {len(hold)} intervals of the runtime observer hold it ({1.0 - MISS:.1%} "
-            "simultaneous confidence)."
+def moving(name: str, scope: Scope) -> PartResult:
+    """The certificate of the observer `name`, and a sweep that follows it."""
+    tested = observer(name)
+    frozen = frozen_critical_probability(tested.schedule)
+    proof = certificate(tested.schedule, frozen, SHARES[1:] if scope.quick else SHARES)
+    if proof.verdict is not Verdict.CERTIFIED:
+        note = f"{tested.title}: nothing is proved while the wheel speed moves; {proof.message}."
+        return PartResult(
+            notes=[note], measures={"certified_drop_probability": 0.0, "frozen_drop_probability": frozen.smallest}
         )
-        measures = {
-            "certified_drop_probability": proof.drop_probability,
-            "frozen_drop_probability": frozen.smallest,
-            "comparisons": float(len(hold) + 1),
-            "agreeing": float(int(hold.sum()) + falls),
-        }
-        return PartResult((), [_table(tested, sweep)], [_drawing(tested, proof, sweep, scope)], [words], measures)
+    sweep = run_sweep(tested.schedule, proof, scope, NAMES.index(name))
+    hold, falls = sweep.holds, bool((np.diff(sweep.exact) < 0.0).all())
+    note = (
+        f"{tested.title}: a drop probability of {proof.drop_probability:.3f} is {proof.verdict!s} for every motion of "
+        f"the wheel speed within its rates (held at one speed: {frozen.smallest:.3f}). On the sweep the energy "
+        f"{'falls at every sample' if falls else 'DOES NOT FALL at every sample'}, and {int(hold.sum())} of "
+        f"{len(hold)} intervals of the runtime observer hold it ({1.0 - MISS:.1%} simultaneous confidence)."
+    )
+    measures = {
+        "certified_drop_probability": proof.drop_probability, "frozen_drop_probability": frozen.smallest,
+        "comparisons": float(len(hold) + 1), "agreeing": float(int(hold.sum()) + falls),
+    }  # fmt: skip
+    return PartResult((), [_table(tested, sweep)], [_figure(tested, proof, sweep, scope)], [note], measures)
 
-    return run
+
+for each in NAMES:
+    TOPIC.part(
+        f"moving-{each}", f"Wheel speed in motion: {each.replace('-', ' ')}", 6.0 if each.endswith("lateral") else 1.0,
+        quick=each in QUICK,
+    )(partial(moving, each))  # fmt: skip
 
 
 def certificate(schedule: GainSchedule, frozen: FrozenDropProbability, shares: tuple[float, ...]) -> MeanSquareSchedule:
@@ -128,8 +130,8 @@ def run_sweep(schedule: GainSchedule, proof: MeanSquareSchedule, scope: Scope, s
 
 
 def _table(tested: Observer, sweep: Sweep) -> Table:
-    at, step = sweep.at, 1e3 * tested.schedule.sample_time
-    columns = [at * step, sweep.speed[at], sweep.exact[at], sweep.seen, sweep.half]
+    at = sweep.at
+    columns = [at * tested.step, sweep.speed[at], sweep.exact[at], sweep.seen, sweep.half]
     return Table(
         f"sweep-{tested.name}",
         f"{tested.title}: energy of the certificate on a sweep of the wheel speed through the whole range and back "
@@ -139,26 +141,24 @@ def _table(tested: Observer, sweep: Sweep) -> Table:
     )
 
 
-def _drawing(tested: Observer, proof: MeanSquareSchedule, sweep: Sweep, scope: Scope) -> Drawing:
-    figure = sheet(7.2, 4.4)
-    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-    time = 1e3 * tested.schedule.sample_time * np.arange(len(sweep.speed))
-    top.plot(time, sweep.exact, color=BLUE, lw=1.8, label="predicted")
+def _figure(tested: Observer, proof: MeanSquareSchedule, sweep: Sweep, scope: Scope) -> Figure:
+    time = tested.step * np.arange(len(sweep.speed))
     lower = np.minimum(sweep.half, 0.99 * sweep.seen)  # a bar below zero has no place on a logarithmic axis
-    bars = {"fmt": "o", "ms": 4, "color": RED, "capsize": 3, "lw": 1.2, "label": "runtime observer"}
-    top.errorbar(time[sweep.at], sweep.seen, yerr=[lower, sweep.half], **bars)
-    top.set_yscale("log")
-    top.set_ylabel("mean energy over its start [1]")
-    top.legend(loc="upper right")
-    bottom.plot(time, sweep.speed, color=GREY, lw=1.5)
-    bottom.set_ylabel("|ω| [rad/s]")
-    bottom.set_xlabel("time [ms]")
-    return Drawing(
+    energy: list[Mark] = [
+        Line(time, sweep.exact, "predicted", BLUE, width=1.8),
+        ErrorBars(time[sweep.at], sweep.seen, lower, sweep.half, "runtime observer", RED),
+    ]
+    y = Axis("mean energy over its start [1]", scale="log")
+    return Figure(
         f"sweep-{tested.name}",
         f"{tested.title}, wheel speed sweeping through its range and back at ±800 rad/s² while "
         f"{proof.drop_probability:.0%} of the force samples are lost: mean of the energy e'P(ω)e whose decrease at "
         f"every sample is {proof.verdict!s} for any such motion. Line: exact second moment; points: the runtime "
         f"observer, {scope.seeds} seeds, bars at {1.0 - MISS:.1%} simultaneous confidence. Below: the wheel speed.",
         "A falling line on a logarithmic scale with points on it, above a V-shaped course of the wheel speed.",
-        figure,
-    )
+        [
+            [Panel(energy, y=y, legend="upper right")],
+            [Panel([Line(time, sweep.speed, color=GREY)], "time [ms]", "|ω| [rad/s]")],
+        ],
+        size=(7.2, 4.4), share_x="all", heights=(3, 1),
+    )  # fmt: skip
