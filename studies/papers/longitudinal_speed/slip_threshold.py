@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
 import sympy as sp
 
 from estimators.velocity.high_slip import adaptive_threshold
-from studies.claim import ClaimFunction, Finding
+from studies.claim import Finding
+from studies.papers.longitudinal_speed.inputs import PACKAGE
+from studies.papers.topic import Topic
 from studies.papers.verdicts import erratum
+from studies.plots import Axis, Figure, Level, Line, Mark, Panel, Words
+from studies.plots.colours import BLUE, GREY, RED
+from studies.study import PartResult, Scope
 
+TOPIC = Topic(PACKAGE)
 LOWER, UPPER = sp.Rational(1, 20), sp.Rational(1, 5)  # lambda_l, lambda_u of the example; none are printed
 VARIANCE, RATE = sp.symbols("sigma_e beta_e", positive=True)
 
@@ -22,17 +29,17 @@ def corrected_width(low: sp.Expr, high: sp.Expr) -> sp.Expr:
     return 1 / (sp.sqrt(2 * sp.pi) * (high - low))
 
 
-def threshold(width: sp.Expr, high: sp.Expr) -> sp.Expr:
+def threshold(width: sp.Expr) -> sp.Expr:
     """(29) for a given phi_e, in the variance sigma_e and the rate beta_e."""
-    return high - sp.exp(-RATE * VARIANCE / (2 * width**2)) / (width * sp.sqrt(2 * sp.pi))
+    return UPPER - sp.exp(-RATE * VARIANCE / (2 * width**2)) / (width * sp.sqrt(2 * sp.pi))
 
 
-def limits(width: sp.Expr, high: sp.Expr = UPPER) -> tuple[sp.Expr, sp.Expr]:
+def limits(width: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
     """The threshold without excitation and with strong excitation."""
-    expression = threshold(width, high)
-    return sp.simplify(expression.subs(VARIANCE, 0)), sp.limit(expression, VARIANCE, sp.oo)
+    return sp.simplify(threshold(width).subs(VARIANCE, 0)), sp.limit(threshold(width), VARIANCE, sp.oo)
 
 
+@TOPIC.claim("P2-29")
 def slip_threshold(printed: sp.Expr | None = None) -> Finding:
     """Both limits of (29) for lambda_l = 0.05, lambda_u = 0.2, and the runtime's own threshold."""
     width = printed_width(LOWER, UPPER) if printed is None else printed
@@ -56,4 +63,31 @@ def slip_threshold(printed: sp.Expr | None = None) -> Finding:
     return Finding(computed, erratum(holds, right == (LOWER, UPPER) and runtime_holds), reading)
 
 
-CLAIMS: dict[str, ClaimFunction] = {"P2-29": slip_threshold}
+@TOPIC.part("high-slip", "Adaptive slip threshold")
+def high_slip(scope: Scope) -> PartResult:
+    """The adaptive slip threshold."""
+    return PartResult(TOPIC.found(), drawings=[threshold_figure()])
+
+
+def threshold_figure() -> Figure:
+    """(29) over the variance of the acceleration, as printed and corrected."""
+    rate, low, high = 100.0, float(LOWER), float(UPPER)
+    variance, fine = np.linspace(0.0, 1.5, 301), np.linspace(0.0, 5e-3, 301)
+    function = sp.lambdify(VARIANCE, threshold(printed_width(LOWER, UPPER)).subs(RATE, rate), "numpy")
+    lower, upper = (Level(y=y, color=GREY, dash="dotted", width=1.0) for y in (low, high))
+    names = [Words(1.45, y, name, offset=(0, 3)) for y, name in ((low, "λl"), (high, "λu"))]
+    left: list[Mark] = [Line(variance, adaptive_threshold(variance, low, high, rate), color=BLUE), lower, upper, *names]
+    right = [Line(fine, function(fine), color=RED, dash="dashed"), lower]
+    x, y = "variance of |a| [m²/s⁴]", "slip threshold [1]"
+    return Figure(
+        "slip-threshold",
+        f"Threshold (29) of the high-slip detector over the variance of the measured acceleration, λl = {low:g}, λu "
+        f"= {high:g}, βe = {rate:g} s⁴/m² (the paper prints no values). Corrected it rises from λl to λu; as "
+        "printed it starts at −6.47, so that any slip counts as high.",
+        "Left: a curve from 0.05 to 0.2. Right: a curve that starts at minus 6.5.",
+        [
+            Panel(left, x, Axis(y, 0.0, 0.25), "φe = 1/(√(2π) (λu − λl))"),
+            Panel(right, x, y, "φe as printed (finer axis)"),
+        ],
+        (7.2, 3.2),
+    )  # fmt: skip
