@@ -42,8 +42,7 @@ CONTROLS: dict[str, tuple[Callable[[], Finding], Verdict]] = {
     "P2-A": (lambda: covariance_recursions.appendix(noise_share=0.5), Verdict.NOT_REPRODUCED),
     "P2-uio": (lambda: unknown_input_observer.theorem_1(claimed_gain=1.5), Verdict.NOT_REPRODUCED),
     "P2-29": (
-        lambda: slip_threshold.slip_threshold(slip_threshold.corrected_width(slip_threshold.LOWER, slip_threshold.UPPER)),
-        Verdict.REPRODUCED,
+        lambda: slip_threshold.slip_threshold(slip_threshold.CORRECTED_WIDTH), Verdict.REPRODUCED,
     ),
     "P2-tab2": (without_the_worse_cells, Verdict.REPRODUCED),
 }  # fmt: skip

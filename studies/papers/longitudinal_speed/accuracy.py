@@ -40,11 +40,11 @@ def force_table(forces: Sequence[Sequence[Any]] = FORCES) -> Finding:
     }  # fmt: skip
     shown = ", ".join(f"{corner} in {test} ({a:g} against {b:g} %)" for corner, test, a, b in worse) or "none"
     reading = (
-        f"Largest UKF error {max(ukf):g} % (below {limit['ukf']:g}: "
-        f"{'yes' if statements['ukf_below_limit'] else 'no'}), largest load error {max(loads):g} % (at most "
-        f"{limit['load']:g}: {'yes' if statements['loads_within_limit'] else 'no'}). The unknown-input observer is "
-        f"better in {len(worse)} of {len(cells)} cells: {shown}. On average the UKF has "
-        f"{computed['mean_ukf_percent']:.2f} %, the other {computed['mean_uio_percent']:.2f} %."
+        f"Largest UKF error {max(ukf):g} % (below {limit['ukf']:g}: {'yes' if statements['ukf_below_limit'] else 'no'}), "
+        f"largest load error {max(loads):g} % (at most {limit['load']:g}: "
+        f"{'yes' if statements['loads_within_limit'] else 'no'}). The unknown-input observer is better in {len(worse)} of "
+        f"{len(cells)} cells: {shown}. On average the UKF has {computed['mean_ukf_percent']:.2f} %, the other "
+        f"{computed['mean_uio_percent']:.2f} %."
     )
     return Finding(computed, partly(all(statements.values()), any(statements.values())), reading)
 
@@ -54,8 +54,7 @@ def accuracy(scope: Scope) -> PartResult:
     """Table II against the text."""
     forces = Table(
         "table-2-forces",
-        "Table II of P2 as printed: normalised error (NRMS) of the longitudinal force of each corner, measured on "
-        "the road.",
+        "Table II of P2 as printed: normalised error (NRMS) of the longitudinal force of each corner, measured on the road.",
         ["corner", *(f"{name}: {observer} [%]" for name in MANOEUVRES for observer in ("UKF", "UIO"))],
         FORCES,
     )
@@ -71,7 +70,7 @@ def accuracy(scope: Scope) -> PartResult:
 def table_figure() -> Figure:
     """Table II: force errors of both observers, beside the limit of the text."""
     limit = float(TOPIC.printed("P2-tab2")["ukf"])
-    places, corners = np.arange(len(FORCES)), {k: row[0] for k, row in enumerate(FORCES)}
+    places, corners = np.arange(len(FORCES)), {float(k): row[0] for k, row in enumerate(FORCES)}
     panels = []
     for k, name in enumerate(MANOEUVRES):
         ukf, uio = (np.array([row[i + 2 * k] for row in FORCES]) for i in (1, 2))
@@ -86,9 +85,8 @@ def table_figure() -> Figure:
         panels.append(Panel(marks, Axis(ticks=corners, turned=30), what, name.replace(", ", ",\n", 1)))
     return Figure(
         "table-2",
-        "Longitudinal force errors of Table II as the paper prints them (three drives on the road, four corners), "
-        "with the limit that the text states for the UKF. In the three marked cells of twelve the simpler observer "
-        "is better.",
+        "Longitudinal force errors of Table II as the paper prints them (three drives on the road, four corners), with the "
+        "limit that the text states for the UKF. In the three marked cells of twelve the simpler observer is better.",
         "Grouped bars per corner for three drives; three red marks over pairs whose second bar is lower.",
         panels, (7.2, 3.6), legend="below", share_y="all",
     )  # fmt: skip

@@ -49,17 +49,15 @@ def fixed_gain(s: SteadyFilter, noise_share: float = 1.0, steps: int = 1500) -> 
     And the traces at which both forms of (A4) end.
     """
     closed, measured = s.A - s.K @ s.C, s.K @ s.R @ s.K.T
-    added = (0.0, noise_share * s.Q)
-    printed = corrected = start = 4.0 * s.P
+    added = np.stack([0.0 * s.Q, noise_share * s.Q])
+    P = start = 4.0 * s.P
     powers, total = np.eye(3), np.zeros((3, 3))
     traces = np.empty((3, steps))
     for k in range(steps):
-        printed, corrected = (
-            closed @ P @ closed.T + measured + Q for P, Q in zip((printed, corrected), added, strict=True)
-        )
+        P = closed @ P @ closed.T + measured + added
         total = total + powers @ (measured + s.Q) @ powers.T
         powers = closed @ powers
-        traces[:, k] = [np.trace(m) for m in (printed, corrected, powers @ start @ powers.T + total)]
+        traces[:, k] = [np.trace(m) for m in (*P, powers @ start @ powers.T + total)]
     return traces, [float(np.trace(solve_discrete_lyapunov(closed, measured + Q))) for Q in added]
 
 
@@ -71,11 +69,10 @@ def first_split(s: SteadyFilter) -> dict[str, float]:
     unseen = np.eye(3) - Sigma @ W @ Sigma.T
     M1, N1 = s.A @ unseen @ s.A.T, s.Q + s.A @ Sigma @ W @ W @ Sigma.T @ s.A.T
     return {
-        "M1_of_A6": _distance(M1, found.M[1]),
-        "N1_of_A6": _distance(N1, found.N[1]),
+        "M1_of_A6": _distance(M1, found.M[1]), "N1_of_A6": _distance(N1, found.N[1]),
         "M1_of_A7_as_printed": _distance(unseen, found.M[1]),
         "M1_of_A7_with_later_transition": _distance(M1, found.M[1]),
-    }
+    }  # fmt: skip
 
 
 def remainder(s: SteadyFilter, N: FloatArray, S: FloatArray, sign: float) -> FloatArray:
@@ -118,18 +115,15 @@ def appendix(noise_share: float = 1.0) -> Finding:
     sums_agree = float(np.abs(corrected / summed - 1.0).max())
     split, ((plus,), (minus,)) = first_split(s), remainder_errors(s)
     computed = {
-        "A4_printed_over_filter_covariance": missing,
-        "A4_with_Q_over_filter_covariance": complete,
-        "A4_with_Q_against_A5": sums_agree,
-        **split,
-        "A8_error_with_printed_sign": plus,
+        "A4_printed_over_filter_covariance": missing, "A4_with_Q_over_filter_covariance": complete,
+        "A4_with_Q_against_A5": sums_agree, **split, "A8_error_with_printed_sign": plus,
         "A8_error_with_corrected_sign": minus,
-    }
+    }  # fmt: skip
     reading = (
-        f"(A4) lacks + Q: as printed it ends at {missing:.3g} of the covariance of the very filter that it bounds, "
-        f"with Q at {complete:.6f}, and it then equals (A5). (A6) holds. (A7) "
-        f"needs phi_(k+1,0) in M_(k+1): with phi_(k,0) M_1 is off by {100 * split['M1_of_A7_as_printed']:.0f} %. "
-        f"The first bracket of (A8) needs - T/psi: the printed plus is off by {100 * plus:.0f} %, the minus by {minus:.0e}."
+        f"(A4) lacks + Q: as printed it ends at {missing:.3g} of the covariance of the very filter that it bounds, with Q at "
+        f"{complete:.6f}, and it then equals (A5). (A6) holds. (A7) needs phi_(k+1,0) in M_(k+1): with phi_(k,0) M_1 is off "
+        f"by {100 * split['M1_of_A7_as_printed']:.0f} %. The first bracket of (A8) needs - T/psi: the printed plus is off by "
+        f"{100 * plus:.0f} %, the minus by {minus:.0e}."
     )
     printed_holds = abs(missing - 1.0) <= EXACT and split["M1_of_A7_as_printed"] <= EXACT and plus <= CLOSE
     exact = max(sums_agree, abs(complete - 1.0), split["M1_of_A6"], split["N1_of_A6"]) <= EXACT
@@ -162,11 +156,10 @@ def recursion_figure() -> Figure:
     size = Axis("size of the remainder S over N [1]", scale="log")
     return Figure(
         "appendix",
-        "Left: trace of the fixed-gain covariance at 40 rad/s, started at four times that of the filter. Without + "
-        "Q, (A4) falls below the covariance that it is meant to bound; with it, it is (A5). Right: first-order "
-        "remainder (A8) against the exact difference of two Riccati steps: with the printed sign it does not "
-        "converge.",
-        "Left: two lines end at one, the printed one keeps falling. Right: one error falls with the size, the "
-        "other stays near one.",
+        "Left: trace of the fixed-gain covariance at 40 rad/s, started at four times that of the filter. Without + Q, (A4) "
+        "falls below the covariance that it is meant to bound; with it, it is (A5). Right: first-order remainder (A8) "
+        "against the exact difference of two Riccati steps: with the printed sign it does not converge.",
+        "Left: two lines end at one, the printed one keeps falling. Right: one error falls with the size, the other stays "
+        "near one.",
         [Panel(traces, "time [s]", trace, legend="best"), Panel(errors, size, error, legend="best")], (7.2, 3.4),
     )  # fmt: skip

@@ -31,15 +31,14 @@ def descriptor_form(M: tuple[tuple[int, ...], ...] = PRINTED_M) -> Finding:
     third = (A * sp.Matrix([z, v, z.diff(t)]) + B * v.diff(t))[2].subs(moving)
     mismatch = sp.simplify((v - rate * speed * z).diff(t) - third)
     computed = {
-        "B": [int(entry) for entry in B],
-        "third_row_of_A": [str(entry) for entry in A.row(2)],
+        "B": [int(entry) for entry in B], "third_row_of_A": [str(entry) for entry in A.row(2)],
         "third_row_minus_derivative_of_the_first": str(mismatch),
-    }
+    }  # fmt: skip
     same = sp.Matrix(model.A) == A and sp.Matrix(model.B) == B
     reading = (
-        f"M^-1 gives B = {computed['B']}' and {'leaves' if same else 'does not leave'} A as it is; the third row is "
-        "z'' = V_r' - kappa R_e w' z - kappa R_e w z', which differs from d/dt of the bristle equation by "
-        f"{mismatch} (friction left out)."
+        f"M^-1 gives B = {computed['B']}' and {'leaves' if same else 'does not leave'} A as it is; the third row is z'' = "
+        f"V_r' - kappa R_e w' z - kappa R_e w z', which differs from d/dt of the bristle equation by {mismatch} (friction "
+        "left out)."
     )
     return Finding(computed, judged(mismatch == 0 and same), reading)
 
@@ -59,9 +58,9 @@ def patch_constant(printed: str = "7/6 L") -> Finding:
         "kappa_1_m": float(kappa), "unit_fits": fits, "patch_length_m": {k: float(v) for k, v in lengths.items()},
     }  # fmt: skip
     reading = (
-        "kappa R_e |omega| z must be a velocity, so kappa is in 1/m: 7/(6 L) fits and gives a patch of L = "
-        f"{right} m = {float(right):.4f} m for kappa = {float(kappa):g} 1/m; 7/6 L has "
-        f"the unit of a length and would mean {float(lengths['7/6 L']):.2f} m."
+        f"kappa R_e |omega| z must be a velocity, so kappa is in 1/m: 7/(6 L) fits and gives a patch of L = {right} m = "
+        f"{float(right):.4f} m for kappa = {float(kappa):g} 1/m; 7/6 L has the unit of a length and would mean "
+        f"{float(lengths['7/6 L']):.2f} m."
     )
     plausible = 0.05 < right < 0.3  # m, contact patches of car tires
     return Finding(computed, erratum(fits[printed], fits["7/(6 L)"] and plausible), reading)
@@ -75,9 +74,9 @@ def effective_radius(printed: dict[str, float] | None = None) -> Finding:
     share = values["text"] / values["table"] - 1.0
     computed = {**values, "table_of_P1": sister, "difference_percent": 100.0 * share}
     reading = (
-        f"Table I has {values['table']:g} m, the text {values['text']:g} m: {100 * share:.1f} % apart, and as much "
-        f"in every wheel speed times radius. Table I of P1, the same car, has {sister:g} m. Here the tire constants "
-        "of section IV go with the text's radius."
+        f"Table I has {values['table']:g} m, the text {values['text']:g} m: {100 * share:.1f} % apart, and as much in every "
+        f"wheel speed times radius. Table I of P1, the same car, has {sister:g} m. Here the tire constants of section IV go "
+        "with the text's radius."
     )
     return Finding(computed, erratum(values["table"] == values["text"], values["table"] == sister), reading)
 

@@ -24,7 +24,7 @@ from studies.papers.longitudinal_speed.inputs import (
     speed_model,
 )
 from studies.papers.topic import Topic
-from studies.plots import DASHES, Axis, Figure, Level, Line, Map, Panel, Words
+from studies.plots import DASHES, Axis, Figure, Level, Line, Map, Mark, Panel, Words
 from studies.plots.colours import CURVES, RED
 from studies.study import Cell, PartResult, Scope, Table
 from synthesis.models.catalogue.longitudinal_speed import WHEEL_MOTION
@@ -63,18 +63,16 @@ def rank_over_the_region(accelerations: tuple[object, ...] = (0, 1, "-5")) -> Fi
     changing, lowest_speed = exact_ranks(0, 1), second_piece()
     (determinant,) = speed_observability().minors(symbolic=True)
     computed = {
-        "determinant": str(determinant),
-        "wheel_speeds_rad_s": list(SPEEDS),
-        "ranks": ranks,
+        "determinant": str(determinant), "wheel_speeds_rad_s": list(SPEEDS), "ranks": ranks,
         "ranks_with_changing_acceleration": changing,
         "lost_at_every_constant_speed": rank_loss(speed_observability(), {JERK: 0, ACCELERATION: 0}).always,
         "lost_while_accelerating_below_rad_s": lowest_speed,
-    }
+    }  # fmt: skip
     reading = (
-        "The determinant vanishes with the wheel acceleration and its rate: at any constant wheel speed the rank "
-        f"is {min(exact_ranks())}, because the third state repeats the first two and both modes decay at kappa R_e "
-        f"omega. It is {max(changing)} while the wheel accelerates (apart from speeds below {lowest_speed:.3g} "
-        "rad/s). What is hidden decays while the wheel turns, so the model is detectable, except at standstill."
+        "The determinant vanishes with the wheel acceleration and its rate: at any constant wheel speed the rank is "
+        f"{min(exact_ranks())}, because the third state repeats the first two and both modes decay at kappa R_e omega. It is "
+        f"{max(changing)} while the wheel accelerates (apart from speeds below {lowest_speed:.3g} rad/s). What is hidden "
+        "decays while the wheel turns, so the model is detectable, except at standstill."
     )
     return Finding(computed, judged(min(min(row) for row in ranks.values()) == 3), reading)
 
@@ -111,9 +109,9 @@ def rank_table(ranks: Sequence[Ranks]) -> Table:
     for record, rank in zip(histories(), ranks, strict=True):
         rows.append(["rank of V(0, N)", record.name, f"{len(rank)} samples", int(rank[len(rank) // 4]), int(rank[-1])])
     caption = (
-        "Rank of the time-varying observability matrix (24) in rational numbers (lowest and highest over three "
-        "wheel speeds), and numerical rank of the gramian (A1) along wheel speed histories (after a quarter of the "
-        f"record and at its end, tolerance {RANK_TOLERANCE:g})."
+        "Rank of the time-varying observability matrix (24) in rational numbers (lowest and highest over three wheel "
+        "speeds), and numerical rank of the gramian (A1) along wheel speed histories (after a quarter of the record and at "
+        f"its end, tolerance {RANK_TOLERANCE:g})."
     )
     return Table("ranks", caption, ["what", "motion", "where", "rank, first", "rank, last"], rows)
 
@@ -134,10 +132,10 @@ def rank_figure(ranks: Sequence[Ranks]) -> Figure:
     """Wheel speed and rank of V(0, N) over time."""
     return Figure(
         "gramian-rank",
-        "Wheel speed histories (above) and numerical rank of the observability gramian over all samples so far "
-        f"(below, lines a little apart; tolerance {RANK_TOLERANCE:g} of the largest singular value of its factor, "
-        "states in typical sizes). Full rank comes once the wheel changes its speed: not while it stands, and not "
-        "at constant speed. Fig. 1 and (A1) of P2, on histories of our own.",
+        "Wheel speed histories (above) and numerical rank of the observability gramian over all samples so far (below, lines "
+        f"a little apart; tolerance {RANK_TOLERANCE:g} of the largest singular value of its factor, states in typical sizes). "
+        "Full rank comes once the wheel changes its speed: not while it stands, and not at constant speed. Fig. 1 and (A1) "
+        "of P2, on histories of our own.",
         "The rank is two during the two seconds of standstill and for constant speed, three otherwise.",
         rank_panels(histories(), ranks, Axis("wheel speed [rad/s]")), (7.2, 4.4), legend="below", share_x="col",
     )  # fmt: skip
@@ -150,16 +148,16 @@ def determinant_figure(points: int = 201) -> Figure:
     speed, acceleration = np.linspace(0.0, 140.0, points), np.linspace(-800.0, 800.0, points + 1)
     size = np.abs(function(speed, acceleration[:, None])) / abs(float(function(140.0, 800.0)))
     bar = "log₁₀ of the determinant over its value at the corner [1]"
-    marks = [
+    marks: list[Mark] = [
         Map(speed, acceleration, np.log10(size), bar, "Blues", -5.0, 0.0),
         Level(y=0.0, color=RED, dash="dashed", width=1.4),
         Words(70.0, 0.0, "rank 2", RED, offset=(0, 5), horizontal="center"),
     ]
     return Figure(
         "observability-determinant",
-        "Size of the determinant of the time-varying observability matrix (24) over wheel speed and wheel "
-        "acceleration, at constant acceleration. It vanishes along the dashed line: at any constant wheel speed "
-        "the three-state model is not observable, and near it only weakly.",
+        "Size of the determinant of the time-varying observability matrix (24) over wheel speed and wheel acceleration, at "
+        "constant acceleration. It vanishes along the dashed line: at any constant wheel speed the three-state model is not "
+        "observable, and near it only weakly.",
         "A map that fades to white along zero acceleration and towards low speed.",
         Panel(marks, "wheel speed [rad/s]", "wheel acceleration [rad/s²]", grid=False), (5.6, 4.2),
     )  # fmt: skip

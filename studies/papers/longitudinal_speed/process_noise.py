@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
@@ -19,16 +17,11 @@ SPEED = 40.0  # rad/s
 READINGS = [(structure, mode) for structure in STRUCTURES for mode in ("normal", "high_slip")]
 
 
-@dataclass(frozen=True)
-class Response:
-    """Gain of the velocity (filtered form, m/s per unit of normalised force), slowest time constant in s."""
+def filter_response(speed: float, structure: str, mode: str) -> tuple[float, float]:
+    """Gain of the velocity (filtered form, m/s per unit of normalised force) and slowest time constant in s.
 
-    velocity_gain: float
-    time_constant: float
-
-
-def filter_response(speed: float, structure: str, mode: str) -> Response:
-    """At a constant wheel speed in rad/s, with Q = q S; the redundant mode, which no gain moves, is left out."""
+    At a constant wheel speed in rad/s, with Q = q S; the redundant mode, which no gain moves, is left out.
+    """
     sequence = constant(speed, 1).sequence
     A, C = sequence.A[0], sequence.C[0]
     q, R = noise(mode)
@@ -37,7 +30,7 @@ def filter_response(speed: float, structure: str, mode: str) -> Response:
     poles = np.linalg.eigvals(A - A @ gain @ C)
     fixed = np.abs(poles - np.linalg.eigvals(A).real.min()).argmin()  # the hidden mode exp(-a T) of A itself
     slowest = float(np.abs(np.delete(poles, fixed)).max())
-    return Response(float(gain[1, 0]), -SAMPLE_TIME / float(np.log(slowest)))
+    return float(gain[1, 0]), -SAMPLE_TIME / float(np.log(slowest))
 
 
 @TOPIC.part("covariances", "What the printed covariances can mean", 2.0)
@@ -45,8 +38,7 @@ def covariances(scope: Scope) -> PartResult:
     """Velocity gain and time constant at 40 rad/s as a table, over the wheel speed as a figure."""
     rows: list[list[Cell]] = []
     for structure, mode in READINGS:
-        found = filter_response(SPEED, structure, mode)
-        rows.append([structure, mode.replace("_", " "), found.velocity_gain, found.time_constant])
+        rows.append([structure, mode.replace("_", " "), *filter_response(SPEED, structure, mode)])
     caption = f"Steady Kalman filter at {SPEED:g} rad/s and 200 Hz for the readings of the printed scalar covariances, Q = q S."
     columns = ["S", "mode", "velocity gain [m/s]", "slowest time constant [s]"]
     table = Table("covariance-readings", caption, columns, rows)
@@ -58,20 +50,20 @@ def response_figure(points: int = 28) -> Figure:
     speeds = np.linspace(5.0, 140.0, points)
     gains, constants = [], []
     for k, (structure, mode) in enumerate(READINGS):
-        found = [filter_response(float(w), structure, mode) for w in speeds]
+        found = np.array([filter_response(float(w), structure, mode) for w in speeds])
         name, color, dash = f"S = {structure}, {mode.replace('_', ' ')}", CURVES[k // 2], DASHES[k % 2]
-        gains.append(Line(speeds, [f.velocity_gain for f in found], name, color, dash))
-        constants.append(Line(speeds, [f.time_constant for f in found], name, color, dash))
+        gains.append(Line(speeds, found[:, 0], name, color, dash))
+        constants.append(Line(speeds, found[:, 1], name, color, dash))
     panels = [
         Panel(lines, "wheel speed [rad/s]", Axis(what, scale="log"))
         for lines, what in ((gains, "velocity gain [m/s per unit of μ]"), (constants, "slowest time constant [s]"))
     ]
     return Figure(
         "covariance-readings",
-        "Steady Kalman filter of the three-state model for three readings of the printed scalar Q = q S (normal: q "
-        "= 2.5e-3, R = 1e-3; high slip: q = 3.3e-4, R = 0.21): gain from the innovation to the velocity, and "
-        "slowest time constant without the hidden mode. For S = I both modes coincide. Only S = B B' corrects the "
-        "velocity by the force within milliseconds and can be switched down. P2 (20)-(22).",
+        "Steady Kalman filter of the three-state model for three readings of the printed scalar Q = q S (normal: q = 2.5e-3, "
+        "R = 1e-3; high slip: q = 3.3e-4, R = 0.21): gain from the innovation to the velocity, and slowest time constant "
+        "without the hidden mode. For S = I both modes coincide. Only S = B B' corrects the velocity by the force within "
+        "milliseconds and can be switched down. P2 (20)-(22).",
         "Gains near 1e-3 for the unit matrix, about 0.5 for B B' in the normal mode.",
         panels, (7.2, 3.8), legend="below", columns=3,
     )  # fmt: skip

@@ -89,9 +89,9 @@ def time_of_test_1(readings: Mapping[str, float] | None = None) -> Finding:
     )
     reading = (
         f"M is exactly zero after {shown}. At constant speed it decays with 2 kappa R_e omega and is "
-        f"{steady[SPEEDS[0]][samples]:.2e} at {printed:g} s and {SPEEDS[0]:g} rad/s, "
-        f"{steady[SPEEDS[1]][samples]:.1e} at {SPEEDS[1]:g} rad/s. The printed {printed:g} s fits a decay to some "
-        "unprinted level, or a late start; the theory needs as many samples as states."
+        f"{steady[SPEEDS[0]][samples]:.2e} at {printed:g} s and {SPEEDS[0]:g} rad/s, {steady[SPEEDS[1]][samples]:.1e} at "
+        f"{SPEEDS[1]:g} rad/s. The printed {printed:g} s fits a decay to some unprinted level, or a late start; the theory "
+        "needs as many samples as states."
     )
     values = list(found.values())
     spread = max(values) - min(values) if np.isfinite(values).all() else np.inf
@@ -132,10 +132,10 @@ def bound_of_test_2(records: Mapping[str, WheelRecord] | None = None) -> Finding
     bounded, largest = sum(one["bounded"] for one in cases), max(one["peak"] for one in cases)
     first_record = next(iter(records or standard_records(1)))
     reading = (
-        f"lambda_max(N) ends at the Riccati solution in {bounded} of {len(cases)} cases (records and readings of "
-        f"the scalar Q), so it is bounded there: {cases[0]['last']:.3g} after a peak of {cases[0]['peak']:.3g} for the record "
-        f"'{first_record}' and Q = q I. What is bounded can be useless: the peak reaches {largest:.3g} where "
-        "nearly silent data is taken as seen, so the rank tolerance decides the look of Fig. 3."
+        f"lambda_max(N) ends at the Riccati solution in {bounded} of {len(cases)} cases (records and readings of the scalar "
+        f"Q), so it is bounded there: {cases[0]['last']:.3g} after a peak of {cases[0]['peak']:.3g} for the record "
+        f"'{first_record}' and Q = q I. What is bounded can be useless: the peak reaches {largest:.3g} where nearly silent "
+        "data is taken as seen, so the rank tolerance decides the look of Fig. 3."
     )
     return Finding(computed, judged(bounded == len(cases)), reading)
 
@@ -165,8 +165,8 @@ def second_test(scope: Scope) -> PartResult:
         "record, reading of Q", "peak of lambda_max(N)", "at sample", "at the end", "Riccati solution", "bounded",
     ]  # fmt: skip
     caption = (
-        "Test 2 of P2: largest eigenvalue of N along 8 s at 200 Hz, 40 rad/s constant, or 0.3 s of 100 rad/s^2 "
-        "before, for three readings of the printed scalar Q; rank tolerance 1e-9. State units: m, m/s, m/s."
+        "Test 2 of P2: largest eigenvalue of N along 8 s at 200 Hz, 40 rad/s constant, or 0.3 s of 100 rad/s^2 before, for "
+        "three readings of the printed scalar Q; rank tolerance 1e-9. State units: m, m/s, m/s."
     )
     return PartResult(claims, [Table("test-2", caption, columns, rows)])
 
@@ -218,12 +218,11 @@ def start_figure() -> Figure:
             left.append(dots(last * SAMPLE_TIME, found.largest_unknown[last], color=color, marker="x", size=9))
     return Figure(
         "unknown-start",
-        "Both tests for an initial covariance of which nothing is known (200 Hz, Q = 2.5e-3 I, R = 1e-3). Left: M "
-        "ends at exactly zero (the line stops at a cross) after as many samples as states while the wheel "
-        "accelerates, and decays for ever at constant speed. Right: N stays bounded, but peaks beyond all use "
-        "where nearly silent data is taken as seen; a coarser rank tolerance keeps it small. Figs 2 and 3 of P2, "
-        "on wheel speeds of our own.",
-        "Left: lines that stop after two or three samples, and two straight decays. Right: peaks between 0.1 and "
-        "1e8 that fall off.",
+        "Both tests for an initial covariance of which nothing is known (200 Hz, Q = 2.5e-3 I, R = 1e-3). Left: M ends at "
+        "exactly zero (the line stops at a cross) after as many samples as states while the wheel accelerates, and decays "
+        "for ever at constant speed. Right: N stays bounded, but peaks beyond all use where nearly silent data is taken as "
+        "seen; a coarser rank tolerance keeps it small. Figs 2 and 3 of P2, on wheel speeds of our own.",
+        "Left: lines that stop after two or three samples, and two straight decays. Right: peaks between 0.1 and 1e8 that "
+        "fall off.",
         covariance_panels(left, right, Axis("time [s]", 0.0, 0.1), 1e-9), legend="below", columns=3,
     )  # fmt: skip

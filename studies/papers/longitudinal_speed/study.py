@@ -34,10 +34,9 @@ STUDY = Study(
     PARAMETERS,
     "Longitudinal speed estimation robust to road conditions",
     "P2",
-    "Wheel forces from a simple unknown-input observer or a UKF, normalised and fed to a three-state time-varying "
-    "Kalman filter at each wheel. Recomputed: the model, its observability, what an unknown initial state does to "
-    "the filter, the recursions of the appendix, the bound of the force observer, the slip threshold and the "
-    "accuracy that the text claims.",
+    "Wheel forces from a simple unknown-input observer or a UKF, normalised and fed to a three-state time-varying Kalman "
+    "filter at each wheel. Recomputed: the model, its observability, what an unknown initial state does to the filter, the "
+    "recursions of the appendix, the bound of the force observer, the slip threshold and the accuracy that the text claims.",
     (
         Part("parameters", "Table I: vehicle and tire", partial(parameter_part, PARAMETERS, CONSTANTS), 0.1),
         *(part for topic in TOPICS for part in topic.parts),

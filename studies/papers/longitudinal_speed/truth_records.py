@@ -24,12 +24,10 @@ from studies.study import Cell, PartResult, Scope, Table
 from studies.truth import Truth
 
 SECONDS = 6.0
-STARTS = 40
-"""Samples of Figs. 2 and 3: 0.2 s."""
+STARTS = 40  # samples of Figs. 2 and 3: 0.2 s
 TOLERANCES = (1e-9, 1e-2)
-CHANGES = 1.0
-"""rad/s^2, of the wheel's acceleration, from which on the manoeuvre has begun."""
-GRAMIAN = (
+CHANGES = 1.0  # rad/s^2, of the wheel's acceleration, from which on the manoeuvre has begun
+FIG_1 = (
     Moved("p2-double-lane-change-dry", "double lane change, dry"),
     Moved("p2-double-lane-change-snow", "double lane change, snow"),
     Moved("p2-acceleration-in-turn-dry", "acceleration in a turn, dry"),
@@ -37,14 +35,12 @@ GRAMIAN = (
     Moved("p2-launch-dry", "launch, dry"),
     Moved("p2-launch-ice", "launch, ice"),
 )
-"""Fig. 1."""
-UNKNOWN = (
+FIGS_2_3 = (
     Moved("p2-double-lane-change-dry", "double lane change, dry"),
     Moved("p2-brake-in-turn-snow", "braking in a turn, snow"),
     Moved("p2-sharp-turn", "sharp turn, dry and slippery"),
     Moved("p2-steer-wet-dry", "steering, wet and dry"),
 )
-"""Figs. 2 and 3."""
 
 
 def wheel_record(truth: Truth, row: Moved, wheel: int = 0) -> WheelRecord:
@@ -67,15 +63,13 @@ def begun(record: WheelRecord) -> WheelRecord:
 
 def truth_part(scope: Scope, tire: str = LUGRE) -> PartResult:
     """Both figures and their tables."""
-    names = tuple(dict.fromkeys(row.manoeuvre for row in (*GRAMIAN, *UNKNOWN)))
+    names = tuple(dict.fromkeys(row.manoeuvre for row in (*FIG_1, *FIGS_2_3)))
     truth = driven(names, tire, scope, SECONDS).until(SECONDS)
-    turning = [wheel_record(truth, row) for row in GRAMIAN]
-    starting = [begun(wheel_record(truth, row)) for row in UNKNOWN]
+    turning = [wheel_record(truth, row) for row in FIG_1]
+    starting = [begun(wheel_record(truth, row)) for row in FIGS_2_3]
     ranks = [gramian_rank(record) for record in turning]
-    return PartResult(
-        tables=[rank_table(turning, ranks), start_table(starting)],
-        drawings=[rank_figure(turning, ranks), start_figure(starting)],
-    )
+    figures = [rank_figure(turning, ranks), start_figure(starting)]
+    return PartResult(tables=[rank_table(turning, ranks), start_table(starting)], drawings=figures)
 
 
 def rank_table(records: Sequence[WheelRecord], ranks: Sequence[Ranks]) -> Table:
@@ -113,10 +107,10 @@ def start_table(records: Sequence[WheelRecord]) -> Table:
     )  # fmt: skip
     return Table(
         "unknown-start-driven",
-        "Both tests of Lemma 1 of P2 along the front left wheel of truth drives, from the moment on at which the wheel changes "
-        f"its speed by {CHANGES:g} rad/s^2: time until M is exactly zero (Fig. 2 of the paper: {TOPIC.printed('P2-test1')} s), "
-        f"greatest eigenvalue of N and when, and at the end of {STARTS * SAMPLE_TIME:g} s, by rank tolerance (Q = 2.5e-3 I, "
-        "R = 1e-3).",
+        "Both tests of Lemma 1 of P2 along the front left wheel of truth drives, from the moment on at which the wheel "
+        f"changes its speed by {CHANGES:g} rad/s^2: time until M is exactly zero (Fig. 2 of the paper: "
+        f"{TOPIC.printed('P2-test1')} s), greatest eigenvalue of N and when, and at the end of {STARTS * SAMPLE_TIME:g} s, by "
+        "rank tolerance (Q = 2.5e-3 I, R = 1e-3).",
         columns,
         rows,
     )
@@ -126,8 +120,8 @@ def rank_figure(records: Sequence[WheelRecord], ranks: Sequence[Ranks]) -> Figur
     """Fig. 1: wheel speeds and ranks."""
     return Figure(
         "gramian-driven",
-        "Fig. 1 of P2 on truth drives: speed of the front left wheel (above, logarithmic beyond 20 rad/s), and numerical rank of "
-        "the observability gramian over all samples so far (below, lines a little apart).",
+        "Fig. 1 of P2 on truth drives: speed of the front left wheel (above, logarithmic beyond 20 rad/s), and numerical "
+        "rank of the observability gramian over all samples so far (below, lines a little apart).",
         "Above: six wheel speeds over time. Below: their ranks; those of the launches stay low until the wheel turns.",
         rank_panels(records, ranks, Axis("wheel speed [rad/s]", scale="symlog", linear=20.0)),
         (7.2, 4.6), legend="below", columns=3, share_x="col",
@@ -147,8 +141,8 @@ def start_figure(records: Sequence[WheelRecord]) -> Figure:
     return Figure(
         "unknown-start-driven",
         "Figs. 2 and 3 of P2 on truth drives, from the moment on at which the front left wheel changes its speed: what is "
-        "unknown of the initial state (a line ends where it is exactly zero) and the covariance of what is known, for two rank "
-        "tolerances.",
+        "unknown of the initial state (a line ends where it is exactly zero) and the covariance of what is known, for two "
+        "rank tolerances.",
         "Left: lines that fall and end within some samples. Right: peaks that fall off and settle.",
         covariance_panels(left, right, Axis("time [s]")), (7.2, 3.8), legend="below", columns=2,
     )  # fmt: skip

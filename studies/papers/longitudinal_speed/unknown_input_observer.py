@@ -10,7 +10,7 @@ from analysis.bounds import sharp_unknown_input_bound, unknown_input_bound
 from studies.claim import Finding, judged
 from studies.papers.longitudinal_speed.inputs import PACKAGE
 from studies.papers.topic import Topic
-from studies.plots import Axis, Figure, Level, Line, Panel, dots
+from studies.plots import Axis, Figure, Level, Line, Mark, Panel, dots
 from studies.plots.colours import GREY, RED
 from studies.study import PartResult, Scope
 from synthesis.polynomials.matrix import FloatArray
@@ -36,11 +36,11 @@ def worst_runs(seed: int = 7) -> WorstRuns:
     random = np.random.default_rng(seed)
     K, b = random.uniform(1.0, 50.0, RUNS), random.uniform(0.0, 200.0, RUNS)
     e, xi = 20.0 * random.normal(size=RUNS), random.uniform(0.05, 0.95, RUNS)
-    keep = np.exp(-K * STEP)
+    decay = np.exp(-K * STEP)
     path = np.empty((STEPS + 1, RUNS))
     for k in range(STEPS + 1):
         path[k] = e
-        e = keep * e + (1.0 - keep) / K * b * np.where(e < 0.0, -1.0, 1.0)
+        e = decay * e + (1.0 - decay) / K * b * np.where(e < 0.0, -1.0, 1.0)
     return WorstRuns(np.asarray(STEP * np.arange(STEPS + 1), float), np.abs(path), K, b, xi)
 
 
@@ -66,16 +66,14 @@ def theorem_1(claimed_gain: float = 1.0) -> Finding:
     halves = np.array([unknown_input_bound(K, b).ultimate for K, b in zip(runs.gain, runs.disturbance, strict=True)])
     best = float(np.abs(halves * runs.gain / runs.disturbance - 1.0).max())
     computed = {
-        "runs": RUNS,
-        "largest_excess_rad_s": excess,
+        "runs": RUNS, "largest_excess_rad_s": excess,
         "violations": int((runs.size > bounds(runs, claimed_gain) + TOLERANCE).any(axis=0).sum()),
-        "distance_from_sharp_bound": attained,
-        "ultimate_at_xi_half_over_b_by_K_minus_1": best,
-    }
+        "distance_from_sharp_bound": attained, "ultimate_at_xi_half_over_b_by_K_minus_1": best,
+    }  # fmt: skip
     reading = (
-        f"In {RUNS} random runs whose disturbance always pushes outward {computed['violations']} exceed the bound "
-        f"(largest excess {excess:.1e} rad/s). xi = 1/2 gives the smallest ultimate value b/K, which a constant "
-        f"force attains; the exact worst case is exp(-K t)|e(0)| + (b/K)(1 - exp(-K t)), met to {attained:.0e}."
+        f"In {RUNS} random runs whose disturbance always pushes outward {computed['violations']} exceed the bound (largest "
+        f"excess {excess:.1e} rad/s). xi = 1/2 gives the smallest ultimate value b/K, which a constant force attains; the "
+        f"exact worst case is exp(-K t)|e(0)| + (b/K)(1 - exp(-K t)), met to {attained:.0e}."
     )
     return Finding(computed, judged(excess <= TOLERANCE and attained <= 1e-10 and best <= 1e-12), reading)
 
@@ -90,12 +88,12 @@ def theorem_figure() -> Figure:
     """Worst-sign runs over their bound, and the ultimate bound over xi."""
     runs, xi = worst_runs(), np.linspace(0.02, 0.98, 193)
     share = runs.size / bounds(runs)
-    left = [
+    left: list[Mark] = [
         Line(runs.time, share[:, ::5], width=0.5, alpha=0.35),
         Line(runs.time, share.max(axis=1), "largest of 200 runs", RED),
         Level(y=1.0, width=0.9),
     ]
-    right = [
+    right: list[Mark] = [
         Line(xi, 0.5 / np.sqrt(xi * (1.0 - xi))),
         Level(y=1.0, color=GREY, dash="dotted", width=1.5),
         dots(0.5, 1.0, color=RED),
@@ -106,9 +104,9 @@ def theorem_figure() -> Figure:
     ]
     return Figure(
         "theorem-1",
-        "Left: wheel speed error of the unknown-input observer in 200 random runs (K, b, start, ξ) with the "
-        "disturbance always pushing outward, as a share of Theorem 1's bound (every fifth run thin); none reaches "
-        "one. Right: the ultimate bound over the error b/K that a constant force leaves: ξ = 1/2 is sharp. P2 (9).",
+        "Left: wheel speed error of the unknown-input observer in 200 random runs (K, b, start, ξ) with the disturbance "
+        "always pushing outward, as a share of Theorem 1's bound (every fifth run thin); none reaches one. Right: the "
+        "ultimate bound over the error b/K that a constant force leaves: ξ = 1/2 is sharp. P2 (9).",
         "Left: thin lines below one. Right: a curve with its minimum one at one half.",
         panels, (7.2, 3.4),
     )  # fmt: skip
