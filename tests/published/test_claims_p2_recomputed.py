@@ -125,7 +125,7 @@ def test_limits_by_iterating_from_certainty() -> None:
 
 
 def test_readings_of_the_scalar_covariance() -> None:
-    """P2 notes 9: the unit matrix barely corrects the velocity, B B' within milliseconds."""
+    """P2 notes 10: the unit matrix barely corrects the velocity, B B' within milliseconds."""
     weak, strong, held = (filter_response(40.0, s, "normal") for s in ("I", "B B'", "B_k B_k'"))
     assert weak[0] == pytest.approx(1.6e-3, abs=5e-5) and weak[1] == pytest.approx(1.3, abs=0.05)
     assert strong[0] == pytest.approx(0.47, abs=0.01) and strong[1] == pytest.approx(3.4e-3, abs=1e-4)

@@ -1,7 +1,7 @@
 """P2 Figs 1 to 3 and the appendix: gramian rank along a drive, and the two tests for an unknown initial covariance.
 
 P2 prints "Q = 2.5e-3" for a 3 x 3 matrix: Q I is used where its reading matters, and Q B B' beside it. Numbers named
-`reference` are independent recomputations (entries P2-test1, P2-test2, P2-A of the shared claims; sheet section 10, item 11).
+`reference` are independent recomputations (entries P2-test1, P2-test2, P2-A of the shared claims; P2 notes 6).
 """
 
 from __future__ import annotations

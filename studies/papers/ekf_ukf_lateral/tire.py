@@ -100,7 +100,7 @@ def tire(scope: Scope) -> PartResult:
 def dugoff_figure() -> Figure:
     """Fig. 1 of P4: force over slip angle, for loads and for frictions."""
     slip = np.radians(np.linspace(-20.0, 20.0, 801))
-    panels = []
+    panels: list[Panel] = []
     for title, cases in (
         ("dry road (μ = 1), three loads", [(1.0, load, f"$F_z$ = {load / 1e3:g} kN") for load in (2e3, 4e3, 6e3)]),
         ("4 kN load, three frictions", [(friction, 4e3, f"μ = {friction:g}") for friction in (0.3, 0.6, 1.0)]),

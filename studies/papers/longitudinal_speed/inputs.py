@@ -22,7 +22,7 @@ SAMPLE_TIME = float(printed_numbers(PACKAGE)["filter"]["sample_time"])  # s, 200
 
 @cache
 def parameters(name: str = PARAMETERS) -> ParameterSet:
-    """A shipped parameter set; by default the values of P2 section IV."""
+    """A shipped parameter set; by default the values of P2 notes 1."""
     return load_parameter_set(name)
 
 
@@ -39,7 +39,7 @@ def noise(mode: str = "normal") -> tuple[float, FloatArray]:
 
 
 def structures(sequence: SampledSequence) -> dict[str, FloatArray]:
-    """What may stand for the unprinted 3 x 3 structure S of Q = q S (P2 notes 9): each (K, 3, 3)."""
+    """What may stand for the unprinted 3 x 3 structure S of Q = q S (P2 notes 10): each (K, 3, 3)."""
     shape = (len(sequence.A), 3, 3)
     B = np.array(speed_model().B, float)
     held = sequence.B @ np.swapaxes(sequence.B, 1, 2)
