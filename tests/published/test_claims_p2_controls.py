@@ -9,10 +9,10 @@ import pytest
 from studies.claim import Finding, Verdict
 from studies.papers.longitudinal_speed import (
     accuracy,
-    covariance_recursions,
     model,
     observability,
     slip_threshold,
+    steady_filter,
     stochastic_observability,
     unknown_input_observer,
 )
@@ -39,7 +39,7 @@ CONTROLS: dict[str, tuple[Callable[[], Finding], Verdict]] = {
     "P2-test2": (
         lambda: stochastic_observability.bound_of_test_2({"standing": constant(0.0, 60)}), Verdict.NOT_REPRODUCED,
     ),
-    "P2-A": (lambda: covariance_recursions.appendix(noise_share=0.5), Verdict.NOT_REPRODUCED),
+    "P2-A": (lambda: steady_filter.appendix(noise_share=0.5), Verdict.NOT_REPRODUCED),
     "P2-uio": (lambda: unknown_input_observer.theorem_1(claimed_gain=1.5), Verdict.NOT_REPRODUCED),
     "P2-29": (
         lambda: slip_threshold.slip_threshold(slip_threshold.CORRECTED_WIDTH), Verdict.REPRODUCED,

@@ -22,7 +22,7 @@ from studies.papers.longitudinal_speed.inputs import (
     structures,
 )
 from studies.papers.longitudinal_speed.observability import gramian_rank, histories, speed_observability
-from studies.papers.longitudinal_speed.process_noise import filter_response
+from studies.papers.longitudinal_speed.steady_filter import filter_response
 from studies.papers.longitudinal_speed.stochastic_observability import STRUCTURES, both_tests
 from studies.papers.longitudinal_speed.unknown_input_observer import bounds, worst_runs
 from tests.unit.p2_findings import finding
@@ -137,20 +137,18 @@ def test_readings_of_the_scalar_covariance() -> None:
 
 
 def test_theorem_1_by_the_solution_of_the_scalar_equation() -> None:
-    runs = worst_runs()
-    t = runs.time[:, None]
-    fade = np.exp(-runs.gain * t)
-    np.testing.assert_allclose(runs.size, fade * runs.size[0] + runs.disturbance / runs.gain * (1 - fade), rtol=1e-10)
-    xi = runs.split
-    bound = runs.size[0] * np.exp(-runs.gain * (1 - xi) * t) + runs.disturbance / (
-        2 * runs.gain * np.sqrt(xi * (1 - xi))
-    )
-    np.testing.assert_allclose(bounds(runs), bound, rtol=1e-12)
-    assert (runs.size <= bound + 1e-12).all() and finding("P2-uio").computed["violations"] == 0
-    k = int(np.argmax(runs.size[0]))
-    push = runs.disturbance[k]
-    path = solve_ivp(lambda _, e: -runs.gain[k] * e + push, (0.0, 0.8), [runs.size[0, k]], rtol=1e-10, atol=1e-10)
-    assert runs.size[-1, k] == pytest.approx(path.y[0, -1], rel=1e-8)
+    time, size, runs = worst_runs()
+    gain, push, start, xi = runs.T
+    np.testing.assert_array_equal(start, size[0])
+    t = time[:, None]
+    fade = np.exp(-gain * t)
+    np.testing.assert_allclose(size, fade * start + push / gain * (1 - fade), rtol=1e-10)
+    bound = start * np.exp(-gain * (1 - xi) * t) + push / (2 * gain * np.sqrt(xi * (1 - xi)))
+    np.testing.assert_allclose(bounds(time, runs), bound, rtol=1e-12)
+    assert (size <= bound + 1e-12).all() and finding("P2-uio").computed["violations"] == 0
+    k = int(np.argmax(start))
+    path = solve_ivp(lambda _, e: -gain[k] * e + push[k], (0.0, 0.8), [start[k]], rtol=1e-10, atol=1e-10)
+    assert size[-1, k] == pytest.approx(path.y[0, -1], rel=1e-8)
 
 
 def test_appendix_numbers() -> None:

@@ -24,13 +24,15 @@ from studies.papers.ekf_ukf_lateral.inputs import (
     substitute_car,
 )
 from studies.papers.ekf_ukf_lateral.observability import (
+    SPLIT,
+    STEP,
+    motion_pair,
     rank_figure,
     rank_of_the_model,
     rear_split_is_hidden,
     singular_values,
 )
 from studies.papers.ekf_ukf_lateral.output_equation import lateral_output
-from studies.papers.ekf_ukf_lateral.rear_split import SPLIT, STEP, motion_pair
 from studies.papers.ekf_ukf_lateral.study import CLAIMS, STUDY
 from studies.papers.ekf_ukf_lateral.tire import SPEED, single_track, single_track_poles, straight_poles, tire_sign
 from studies.papers.published import published_claims

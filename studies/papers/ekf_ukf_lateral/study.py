@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from studies.papers.ekf_ukf_lateral import accuracy, experiments, observability, output_equation, rear_split, tire
+from studies.papers.ekf_ukf_lateral import accuracy, experiments, observability, output_equation, tire
 from studies.study import Study
 
-TOPICS = (observability.TOPIC, rear_split.TOPIC, tire.TOPIC, output_equation.TOPIC, accuracy.TOPIC)
+TOPICS = (observability.TOPIC, tire.TOPIC, output_equation.TOPIC, accuracy.TOPIC)
 CLAIMS = {name: compute for topic in TOPICS for name, compute in topic.claims.items()}
 """What computes each claim, by its id."""
 

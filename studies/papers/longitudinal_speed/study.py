@@ -6,12 +6,11 @@ from functools import partial
 
 from studies.papers.longitudinal_speed import (
     accuracy,
-    covariance_recursions,
     experiments,
     model,
     observability,
-    process_noise,
     slip_threshold,
+    steady_filter,
     stochastic_observability,
     unknown_input_observer,
 )
@@ -24,7 +23,7 @@ CONSTANTS = (
     "the text and 0.33 m in Table I, that of the text."
 )
 TOPICS = (
-    model.TOPIC, observability.TOPIC, stochastic_observability.TOPIC, covariance_recursions.TOPIC, process_noise.TOPIC,
+    model.TOPIC, observability.TOPIC, stochastic_observability.TOPIC, steady_filter.TOPIC,
     unknown_input_observer.TOPIC, slip_threshold.TOPIC, accuracy.TOPIC,
 )  # fmt: skip
 CLAIMS = {name: compute for topic in TOPICS for name, compute in topic.claims.items()}

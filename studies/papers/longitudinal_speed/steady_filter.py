@@ -1,4 +1,7 @@
-"""P2-A: the recursions of P2's appendix for one measurement at a time, each shown to fail as printed and to hold corrected."""
+"""The Kalman filter (20)-(22) in steady state: P2-A, the appendix's recursions of its covariance, and readings of its Q.
+
+Each recursion is shown to fail as printed and to hold corrected, for one measurement at a time.
+"""
 
 from __future__ import annotations
 
@@ -8,47 +11,47 @@ import numpy as np
 from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 
 from studies.claim import Finding
-from studies.papers.longitudinal_speed.inputs import PACKAGE, SAMPLE_TIME, constant, noise
-from studies.papers.longitudinal_speed.stochastic_observability import both_tests
+from studies.papers.longitudinal_speed.inputs import PACKAGE, SAMPLE_TIME, constant, noise, structures
+from studies.papers.longitudinal_speed.stochastic_observability import STRUCTURES, both_tests
 from studies.papers.topic import Topic
 from studies.papers.verdicts import erratum
-from studies.plots import Axis, Figure, Line, Panel
-from studies.plots.colours import BLUE, ORANGE, RED
-from studies.study import PartResult, Scope
+from studies.plots import DASHES, Axis, Figure, Line, Panel
+from studies.plots.colours import BLUE, CURVES, ORANGE, RED
+from studies.study import Cell, PartResult, Scope, Table
 from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 SPEED = 40.0  # rad/s
+READINGS = [(structure, mode) for structure in STRUCTURES for mode in ("normal", "high_slip")]
 EXACT = 1e-9  # relative
 CLOSE = 1e-4  # relative, for a first-order formula at a remainder of 1e-6
 
 
 class SteadyFilter(NamedTuple):
-    """The three-state model sampled at SPEED with Q = q I, and its steady filter: covariance P and gain K."""
+    """The three-state model sampled at a constant speed, and the predicted covariance P of its steady filter."""
 
     A: FloatArray
     C: FloatArray
     Q: FloatArray
     R: FloatArray
     P: FloatArray
-    K: FloatArray
 
 
-def steady_filter() -> SteadyFilter:
-    """From the Riccati equation of (21), (22)."""
-    sequence = constant(SPEED, 1).sequence
-    q, R = noise()
-    A, C, Q = sequence.A[0], sequence.C[0], q * np.eye(3)
-    P = solve_discrete_are(A.T, C.T, Q, R)
-    return SteadyFilter(A, C, Q, R, P, A @ P @ C.T / (C @ P @ C.T + R))
+def steady_filter(speed: float = SPEED, structure: str = "I", mode: str = "normal") -> SteadyFilter:
+    """At a wheel speed in rad/s, with Q = q S, from the Riccati equation of (21), (22)."""
+    sequence = constant(speed, 1).sequence
+    q, R = noise(mode)
+    A, C, Q = sequence.A[0], sequence.C[0], q * structures(sequence)[structure][0]
+    return SteadyFilter(A, C, Q, R, solve_discrete_are(A.T, C.T, Q, R))
 
 
 def fixed_gain(s: SteadyFilter, noise_share: float = 1.0, steps: int = 1500) -> tuple[FloatArray, list[float]]:
-    """Traces (3, steps) of (A4) as printed, of (A4) with `noise_share` Q and of the sum (A5), with K* = K from 4 P.
+    """Traces (3, steps) of (A4) as printed, of (A4) with `noise_share` Q and of the sum (A5), and where both (A4) end.
 
-    And the traces at which both forms of (A4) end.
+    K* is the gain of the steady filter, the start four times its covariance.
     """
-    closed, measured = s.A - s.K @ s.C, s.K @ s.R @ s.K.T
+    K = s.A @ s.P @ s.C.T / (s.C @ s.P @ s.C.T + s.R)
+    closed, measured = s.A - K @ s.C, K @ s.R @ K.T
     added = np.stack([0.0 * s.Q, noise_share * s.Q])
     P = start = 4.0 * s.P
     powers, total = np.eye(3), np.zeros((3, 3))
@@ -162,4 +165,53 @@ def recursion_figure() -> Figure:
         "Left: two lines end at one, the printed one keeps falling. Right: one error falls with the size, the other stays "
         "near one.",
         [Panel(traces, "time [s]", trace, legend="best"), Panel(errors, size, error, legend="best")], (7.2, 3.4),
+    )  # fmt: skip
+
+
+def filter_response(speed: float, structure: str, mode: str) -> tuple[float, float]:
+    """Gain of the velocity (filtered form, m/s per unit of normalised force) and slowest time constant in s.
+
+    At a constant wheel speed in rad/s, with Q = q S; the redundant mode, which no gain moves, is left out.
+    """
+    A, C, _, R, P = steady_filter(speed, structure, mode)
+    gain = P @ C.T / (C @ P @ C.T + R)
+    poles = np.linalg.eigvals(A - A @ gain @ C)
+    fixed = np.abs(poles - np.linalg.eigvals(A).real.min()).argmin()  # the hidden mode exp(-a T) of A itself
+    slowest = float(np.abs(np.delete(poles, fixed)).max())
+    return float(gain[1, 0]), -SAMPLE_TIME / float(np.log(slowest))
+
+
+@TOPIC.part("covariances", "What the printed covariances can mean", 2.0)
+def covariances(scope: Scope) -> PartResult:
+    """Velocity gain and time constant at 40 rad/s as a table, over the wheel speed as a figure."""
+    rows: list[list[Cell]] = []
+    for structure, mode in READINGS:
+        rows.append([structure, mode.replace("_", " "), *filter_response(SPEED, structure, mode)])
+    caption = f"Steady Kalman filter at {SPEED:g} rad/s and 200 Hz for the readings of the printed scalar covariances, Q = q S."
+    columns = ["S", "mode", "velocity gain [m/s]", "slowest time constant [s]"]
+    table = Table("covariance-readings", caption, columns, rows)
+    return PartResult(tables=[table], drawings=[response_figure(10 if scope.quick else 28)])
+
+
+def response_figure(points: int = 28) -> Figure:
+    """Velocity gain and slowest time constant over wheel speed for each reading of Q, both modes."""
+    speeds = np.linspace(5.0, 140.0, points)
+    gains, constants = [], []
+    for k, (structure, mode) in enumerate(READINGS):
+        found = np.array([filter_response(float(w), structure, mode) for w in speeds])
+        name, color, dash = f"S = {structure}, {mode.replace('_', ' ')}", CURVES[k // 2], DASHES[k % 2]
+        gains.append(Line(speeds, found[:, 0], name, color, dash))
+        constants.append(Line(speeds, found[:, 1], name, color, dash))
+    panels = [
+        Panel(lines, "wheel speed [rad/s]", Axis(what, scale="log"))
+        for lines, what in ((gains, "velocity gain [m/s per unit of μ]"), (constants, "slowest time constant [s]"))
+    ]
+    return Figure(
+        "covariance-readings",
+        "Steady Kalman filter of the three-state model for three readings of the printed scalar Q = q S (normal: q = 2.5e-3, "
+        "R = 1e-3; high slip: q = 3.3e-4, R = 0.21): gain from the innovation to the velocity, and slowest time constant "
+        "without the hidden mode. For S = I both modes coincide. Only S = B B' corrects the velocity by the force within "
+        "milliseconds and can be switched down. P2 (20)-(22).",
+        "Gains near 1e-3 for the unit matrix, about 0.5 for B B' in the normal mode.",
+        panels, (7.2, 3.8), legend="below", columns=3,
     )  # fmt: skip
