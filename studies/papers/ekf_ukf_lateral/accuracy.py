@@ -88,17 +88,10 @@ def error_figure() -> Figure:
     names = {float(k): row.quantity.replace(" ", "\n", 1) for k, row in enumerate(TABLE_1)}
 
     def bars(values: Sequence[dict[str, float]]) -> list[Mark]:
-        kinds = (("ekf", EXTENDED, "extended"), ("ukf", UNSCENTED, "unscented"))
+        kinds = (("ekf", EXTENDED, "extended", -0.2), ("ukf", UNSCENTED, "unscented", 0.2))
         return [
-            Bars(
-                places + (k - 0.5) * 0.4,
-                [v[kind] for v in values],
-                f"{label} Kalman filter",
-                color,
-                0.38,
-                numbers="%.4g",
-            )
-            for k, (kind, color, label) in enumerate(kinds)
+            Bars(places + aside, [v[kind] for v in values], f"{label} Kalman filter", color, 0.38, numbers="%.4g")
+            for kind, color, label, aside in kinds
         ]
 
     average = float(np.mean([row.mean["ukf"] for row in TABLE_1]))

@@ -19,9 +19,8 @@ LOWER, UPPER = sp.Rational(1, 20), sp.Rational(1, 5)  # lambda_l, lambda_u of th
 VARIANCE, RATE = sp.symbols("sigma_e beta_e", positive=True)
 ROOT = sp.sqrt(2 * sp.pi)
 PRINTED_WIDTH = (UPPER - LOWER) / ROOT  # phi_e
-CORRECTED_WIDTH = 1 / (
-    ROOT * (UPPER - LOWER)
-)  # the reciprocal: the factor before the exponential is lambda_u - lambda_l
+# The reciprocal: the factor before the exponential is lambda_u - lambda_l.
+CORRECTED_WIDTH = 1 / (ROOT * (UPPER - LOWER))
 
 
 def threshold(width: sp.Expr) -> sp.Expr:

@@ -5,7 +5,7 @@ Both tests run along wheel speed histories, in every reading that P2 leaves open
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,8 @@ from synthesis.models.catalogue.corner import corner_velocity_model
 TOPIC = Topic(PACKAGE)
 SPEEDS = (40.0, 100.0)  # rad/s, 13 and 33 m/s
 STRUCTURES = {"I": 1600, "B B'": 600, "B_k B_k'": 600}  # samples until N has settled to 1e-3; the first is slow
-RAMP = 100.0  # rad/s^2, a wheel that spins up on a slippery road
+RAMP = 100.0  # rad/s^2, a wheel that spins up on slippery ground
+Curve = tuple[str, StochasticObservability, str, Dash]  # label, tests, colour, dash
 
 
 def both_tests(record: WheelRecord, structure: str = "I", tolerance: float = RANK_TOLERANCE) -> StochasticObservability:
@@ -171,35 +172,33 @@ def second_test(scope: Scope) -> PartResult:
     return PartResult(claims, [Table("test-2", caption, columns, rows)])
 
 
-def covariance_lines(
-    found: StochasticObservability, label: str, color: str, dash: Dash, end: int | None = None
-) -> tuple[Line, Line]:
-    """lambda_max(M) and lambda_max(N) over time. Exact zeros are left out: a logarithmic axis has no place for them."""
-    time = SAMPLE_TIME * np.arange(len(found.M))[:end]
-    unknown, known = found.largest_unknown[:end], found.largest_known[:end]
-    left = np.where(unknown > 0.0, unknown, np.nan)
-    return (
-        Line(time, left, label, color, dash, marker=".", size=4),
-        Line(time[1:], known[1:], "", color, dash, marker=".", size=4),
-    )
-
-
-def covariance_panels(left: list[Mark], right: list[Mark], time: Axis, lowest: float | None = None) -> list[Panel]:
-    """Both tests side by side, with what Fig. 2 reads."""
+def covariance_panels(
+    curves: Iterable[Curve], time: Axis, end: int | None = None, low: float | None = None
+) -> list[Panel]:
+    """Both tests over the first ``end`` samples, with what Fig. 2 reads; a cross ends the line where M is exactly zero."""
+    left: list[Mark] = []
+    right: list[Mark] = []
+    for name, found, color, dash in curves:
+        seconds = SAMPLE_TIME * np.arange(len(found.M))[:end]
+        unknown, known, zero = found.largest_unknown[:end], found.largest_known[:end], found.samples_needed
+        left.append(Line(seconds[:zero], unknown[:zero], name, color, dash, marker="."))
+        right.append(Line(seconds[1:], known[1:], "", color, dash, marker="."))
+        if zero:
+            left.append(dots(seconds[zero - 1 : zero], unknown[zero - 1 : zero], "", color, "x", 9))
     printed = float(TOPIC.printed("P2-test1"))
-    read = Level(x=printed, label=f"{printed:g} s, Fig. 2", dash="dotted", width=0.9)
-    unknown = Axis("λmax(M), 1 at the start [1]", lowest, None if lowest is None else 2.0, "log")
-    known = Axis("λmax(N) [1, states in m and m/s]", scale="log")
+    left.append(Level(x=printed, label=f"{printed:g} s, Fig. 2", dash="dotted", width=0.9))
+    unknown_axis = Axis("λmax(M), 1 at the start [1]", low, None if low is None else 2.0, "log")
+    known_axis = Axis("λmax(N) [1, states in m and m/s]", scale="log")
     return [
-        Panel([*left, read], time, unknown, "test 1: what is still unknown"),
-        Panel(right, time, known, "test 2: covariance of what is known"),
+        Panel(left, time, unknown_axis, "test 1: what is still unknown"),
+        Panel(right, time, known_axis, "test 2: covariance of what is known"),
     ]
 
 
 def start_figure() -> Figure:
     """lambda_max(M) and lambda_max(N) over time in five readings."""
     moving, turning = accelerating(SPEEDS[0], RAMP, 40, 80), slalom(45.0, 4.0, 0.5, 0.4)
-    cases: tuple[tuple[str, StochasticObservability, str, Dash], ...] = (
+    curves: tuple[Curve, ...] = (
         ("constant 40 rad/s", both_tests(constant(SPEEDS[0], 80)), BLUE, "solid"),
         ("constant 100 rad/s", both_tests(constant(SPEEDS[1], 80)), GREEN, "dashed"),
         (moving.name, both_tests(moving), RED, "dash-dot"),
@@ -207,15 +206,7 @@ def start_figure() -> Figure:
         ("slalom, rank tolerance 1e-2", both_tests(turning, tolerance=1e-2), PURPLE, "dashed"),
         ("two states, accelerating", two_states(80), GREY, "solid"),
     )
-    left: list[Mark] = []
-    right: list[Mark] = []
-    for name, found, color, dash in cases:
-        unknown, known = covariance_lines(found, name, color, dash, round(0.1 / SAMPLE_TIME) + 1)
-        left.append(unknown)
-        right.append(known)
-        if found.samples_needed is not None:
-            last = found.samples_needed - 1
-            left.append(dots(last * SAMPLE_TIME, found.largest_unknown[last], color=color, marker="x", size=9))
+    panels = covariance_panels(curves, Axis("time [s]", 0.0, 0.1), round(0.1 / SAMPLE_TIME) + 1, 1e-9)
     return Figure(
         "unknown-start",
         "Both tests for an initial covariance of which nothing is known (200 Hz, Q = 2.5e-3 I, R = 1e-3). Left: M ends at "
@@ -224,5 +215,5 @@ def start_figure() -> Figure:
         "seen; a coarser rank tolerance keeps it small. Figs 2 and 3 of P2, on wheel speeds of our own.",
         "Left: lines that stop after two or three samples, and two straight decays. Right: peaks between 0.1 and 1e8 that "
         "fall off.",
-        covariance_panels(left, right, Axis("time [s]", 0.0, 0.1), 1e-9), legend="below", columns=3,
+        panels, legend="below", columns=3,
     )  # fmt: skip

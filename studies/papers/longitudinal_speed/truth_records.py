@@ -12,13 +12,8 @@ from studies.experiments.motion import Moved
 from studies.experiments.play import run_of
 from studies.papers.longitudinal_speed.inputs import SAMPLE_TIME, WheelRecord, speed_model
 from studies.papers.longitudinal_speed.observability import Ranks, gramian_rank, rank_panels
-from studies.papers.longitudinal_speed.stochastic_observability import (
-    TOPIC,
-    both_tests,
-    covariance_lines,
-    covariance_panels,
-)
-from studies.plots import DASHES, Axis, Figure, Mark
+from studies.papers.longitudinal_speed.stochastic_observability import TOPIC, both_tests, covariance_panels
+from studies.plots import DASHES, Axis, Figure
 from studies.plots.colours import CURVES
 from studies.study import Cell, PartResult, Scope, Table
 from studies.truth import Truth
@@ -130,19 +125,16 @@ def rank_figure(records: Sequence[WheelRecord], ranks: Sequence[Ranks]) -> Figur
 
 def start_figure(records: Sequence[WheelRecord]) -> Figure:
     """Figs. 2 and 3: both tests for two rank tolerances."""
-    left: list[Mark] = []
-    right: list[Mark] = []
-    for record, color in zip(records, CURVES, strict=False):
-        for tolerance, dash in zip(TOLERANCES, DASHES, strict=False):
-            found = both_tests(record.cut(0, STARTS), tolerance=tolerance)
-            unknown, known = covariance_lines(found, f"{record.name}, {tolerance:g}", color, dash)
-            left.append(unknown)
-            right.append(known)
+    curves = [
+        (f"{record.name}, {tolerance:g}", both_tests(record.cut(0, STARTS), tolerance=tolerance), color, dash)
+        for record, color in zip(records, CURVES, strict=False)
+        for tolerance, dash in zip(TOLERANCES, DASHES, strict=False)
+    ]
     return Figure(
         "unknown-start-driven",
         "Figs. 2 and 3 of P2 on truth drives, from the moment on at which the front left wheel changes its speed: what is "
         "unknown of the initial state (a line ends where it is exactly zero) and the covariance of what is known, for two "
         "rank tolerances.",
         "Left: lines that fall and end within some samples. Right: peaks that fall off and settle.",
-        covariance_panels(left, right, Axis("time [s]")), (7.2, 3.8), legend="below", columns=2,
+        covariance_panels(curves, Axis("time [s]")), (7.2, 3.8), legend="below", columns=2,
     )  # fmt: skip
