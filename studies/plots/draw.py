@@ -169,7 +169,10 @@ def _(mark: Bars, axes: Any) -> None:
     else:
         bars = axes.bar(places, values, mark.width, bottom=mark.start, yerr=mark.errors, ecolor="0.25", **known)
     if mark.numbers:
-        axes.bar_label(bars, fmt=mark.numbers, fontsize=7, padding=2)
+        for number in axes.bar_label(bars, fmt=mark.numbers, fontsize=7, padding=2):
+            number.set_bbox(
+                {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+            )  # readable where a level crosses it
 
 
 @draw_mark.register

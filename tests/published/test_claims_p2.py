@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from studies.papers.longitudinal_speed.inputs import PACKAGE, accelerating
+from studies.papers.longitudinal_speed.stochastic_observability import both_tests
 from studies.papers.longitudinal_speed.study import CLAIMS, STUDY
-from studies.papers.longitudinal_speed.unknown_start import both_tests
 from studies.papers.published import published_claims
 from studies.plots.draw import look
 from studies.study import QUICK, PartResult

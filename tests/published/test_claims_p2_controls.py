@@ -8,42 +8,41 @@ import pytest
 
 from studies.claim import Finding, Verdict
 from studies.papers.longitudinal_speed import (
-    claims_accuracy,
-    claims_appendix,
-    claims_bounds,
-    claims_model,
-    claims_observability,
-    claims_slip,
-    claims_unknown_start,
+    accuracy,
+    model,
+    observability,
+    slip_threshold,
+    steady_filter,
+    stochastic_observability,
+    unknown_input_observer,
 )
-from studies.papers.longitudinal_speed.inputs import constant, printed_numbers
+from studies.papers.longitudinal_speed.inputs import constant
 from studies.papers.longitudinal_speed.study import CLAIMS
 from tests.unit.p2_findings import finding
 
 
 def without_the_worse_cells() -> Finding:
-    rows = [list(row) for row in printed_numbers()["table_2_forces"]["rows"]]
+    rows = [list(row) for row in accuracy.FORCES]
     for row in rows:
         for k in (1, 3, 5):
             row[k + 1] = max(row[k + 1], row[k] + 0.01)
-    return claims_accuracy.force_table(rows)
+    return accuracy.force_table(rows)
 
 
 CONTROLS: dict[str, tuple[Callable[[], Finding], Verdict]] = {
-    "P2-19M": (lambda: claims_model.descriptor_form(((1, 0, 0), (0, 1, 0), (0, 1, 1))), Verdict.NOT_REPRODUCED),
-    "P2-kappa": (lambda: claims_model.patch_constant("7/(6 L)"), Verdict.REPRODUCED),
-    "P2-Re": (lambda: claims_model.effective_radius({"table": 0.33, "text": 0.33}), Verdict.REPRODUCED),
-    "P2-O3": (lambda: claims_observability.rank_over_the_region((1, "-5")), Verdict.REPRODUCED),
-    "P2-test1": (lambda: claims_unknown_start.time_of_test_1({"one reading": 0.015}), Verdict.NOT_REPRODUCED),
+    "P2-19M": (lambda: model.descriptor_form(((1, 0, 0), (0, 1, 0), (0, 1, 1))), Verdict.NOT_REPRODUCED),
+    "P2-kappa": (lambda: model.patch_constant("7/(6 L)"), Verdict.REPRODUCED),
+    "P2-Re": (lambda: model.effective_radius({"table": 0.33, "text": 0.33}), Verdict.REPRODUCED),
+    "P2-O3": (lambda: observability.rank_over_the_region((1, "-5")), Verdict.REPRODUCED),
+    "P2-test1": (lambda: stochastic_observability.time_of_test_1({"one reading": 0.015}), Verdict.NOT_REPRODUCED),
     # a wheel at rest leaves an integrator that no sample sees
     "P2-test2": (
-        lambda: claims_unknown_start.bound_of_test_2({"standing": constant(0.0, 60)}), Verdict.NOT_REPRODUCED,
+        lambda: stochastic_observability.bound_of_test_2({"standing": constant(0.0, 60)}), Verdict.NOT_REPRODUCED,
     ),
-    "P2-A": (lambda: claims_appendix.appendix(corrected_noise=0.5), Verdict.NOT_REPRODUCED),
-    "P2-uio": (lambda: claims_bounds.theorem_1(claimed_gain=1.5), Verdict.NOT_REPRODUCED),
+    "P2-A": (lambda: steady_filter.appendix(noise_share=0.5), Verdict.NOT_REPRODUCED),
+    "P2-uio": (lambda: unknown_input_observer.theorem_1(claimed_gain=1.5), Verdict.NOT_REPRODUCED),
     "P2-29": (
-        lambda: claims_slip.slip_threshold(claims_slip.corrected_width(claims_slip.LOWER, claims_slip.UPPER)),
-        Verdict.REPRODUCED,
+        lambda: slip_threshold.slip_threshold(slip_threshold.CORRECTED_WIDTH), Verdict.REPRODUCED,
     ),
     "P2-tab2": (without_the_worse_cells, Verdict.REPRODUCED),
 }  # fmt: skip

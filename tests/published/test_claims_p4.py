@@ -1,4 +1,4 @@
-"""The claims of P4 as the study recomputes them: complete, in line with the reference, and confirmed on a second road."""
+"""The claims of P4 as the study recomputes them: complete, in line with the reference, and recomputed independently."""
 
 from __future__ import annotations
 
@@ -13,43 +13,48 @@ from scipy.integrate import solve_ivp
 
 from estimators.sideslip import FourWheelModel
 from studies.claim import Finding, Verdict
-from studies.papers.ekf_ukf_lateral import claims_equations, claims_observability, claims_table
-from studies.papers.ekf_ukf_lateral.equations import SPEED, single_track, single_track_poles, straight_poles
-from studies.papers.ekf_ukf_lateral.observability import (
+from studies.papers.ekf_ukf_lateral.accuracy import TABLE_1, below_eight_percent
+from studies.papers.ekf_ukf_lateral.inputs import (
     LOADS,
+    PACKAGE,
     STATE,
     corrected_model,
     printed_output_model,
     rear_difference_model,
-    rear_split_is_hidden,
-    sight,
     substitute_car,
 )
-from studies.papers.ekf_ukf_lateral.published_table import table_1
-from studies.papers.ekf_ukf_lateral.study import PACKAGE, STUDY
-from studies.papers.ekf_ukf_lateral.twins import SPLIT, STEP, twins
+from studies.papers.ekf_ukf_lateral.observability import (
+    SPLIT,
+    STEP,
+    motion_pair,
+    rank_figure,
+    rank_of_the_model,
+    rear_split_is_hidden,
+    singular_values,
+)
+from studies.papers.ekf_ukf_lateral.output_equation import lateral_output
+from studies.papers.ekf_ukf_lateral.study import CLAIMS, STUDY
+from studies.papers.ekf_ukf_lateral.tire import SPEED, single_track, single_track_poles, straight_poles, tire_sign
 from studies.papers.published import published_claims
-from studies.study import QUICK
+from studies.study import QUICK, PartResult
 from tests.unit.study_checks import check_result, check_study, desk_parts
 from tests.unit.study_reference import numbers, reference_claims
-
-FUNCTIONS = {**claims_observability.CLAIMS, **claims_equations.CLAIMS, **claims_table.CLAIMS}
 
 
 @cache
 def finding(name: str) -> Finding:
-    return FUNCTIONS[name]()
+    return CLAIMS[name]()
 
 
 def test_every_published_claim_is_computed() -> None:
-    assert set(FUNCTIONS) == set(published_claims(PACKAGE))
+    assert set(CLAIMS) == set(published_claims(PACKAGE))
     assert all(entry.paper == "P4" for entry in published_claims(PACKAGE).values())
 
 
 @pytest.mark.shared
 def test_claims_are_those_of_the_reference() -> None:
     reference = reference_claims("P4")
-    assert set(FUNCTIONS) == set(reference)
+    assert set(CLAIMS) == set(reference)
     for name, entry in reference.items():
         if entry["verdict"] != "yours to find":
             assert str(finding(name).verdict) == entry["verdict"], name
@@ -83,11 +88,11 @@ class TestObservability:
 
     @pytest.mark.parametrize("model", [printed_output_model, rear_difference_model])
     def test_verdict_flips_when_the_rear_split_is_seen(self, model) -> None:  # type: ignore[no-untyped-def]
-        found = claims_observability.observability(model())
+        found = rank_of_the_model(model())
         assert (found.computed["rank"], found.verdict) == (8, Verdict.REPRODUCED)
 
     def test_two_integrated_motions_measure_the_same(self) -> None:
-        """Second road: the symbolic model by an adaptive integrator, two rear splits; the split decays with the distance."""
+        """Recomputed: the symbolic model by an adaptive integrator, two rear splits; the split decays with the distance."""
         model = corrected_model()
         f, h = model.with_constants_inserted()
         arguments = [*model.state_symbols, *model.input_symbols]
@@ -106,25 +111,26 @@ class TestObservability:
         distance = np.trapezoid(one[1], np.linspace(0.0, 0.2, 21))
         assert (two - one)[5, -1] == pytest.approx(700.0 * np.exp(-distance / 0.5), rel=1e-5)
 
-    def test_twins_of_the_figure(self) -> None:
-        run, lag = twins(0.3), substitute_car().rear_relaxation
-        np.testing.assert_allclose(run.outputs[:, 0], run.outputs[:, 1], atol=1e-13)
-        decay = np.prod(1.0 - STEP * run.states[:-1, 0, 1] / lag)
-        assert (run.states[-1, 1] - run.states[-1, 0])[5] == pytest.approx(SPLIT * decay, rel=1e-9)
-        assert np.abs(np.diff(twins(0.3, front=True).outputs, axis=1)).max() > 1e-4  # the front split is seen in a bend
-        straight = twins(0.3, front=True, steered=False)
-        np.testing.assert_allclose(straight.outputs[:, 0], straight.outputs[:, 1], atol=1e-13)
+    def test_motions_of_the_figure(self) -> None:
+        (_, states, outputs), lag = motion_pair(0.3), substitute_car().rear_relaxation
+        np.testing.assert_allclose(outputs[:, 0], outputs[:, 1], atol=1e-13)
+        decay = np.prod(1.0 - STEP * states[:-1, 0, 1] / lag)
+        assert (states[-1, 1] - states[-1, 0])[5] == pytest.approx(SPLIT * decay, rel=1e-9)
+        _, _, outputs = motion_pair(0.3, front=True)
+        assert np.abs(np.diff(outputs, axis=1)).max() > 1e-4  # the front split is seen in a bend
+        _, _, outputs = motion_pair(0.3, front=True, steered=False)
+        np.testing.assert_allclose(outputs[:, 0], outputs[:, 1], atol=1e-13)
 
     def test_singular_values_of_the_map(self) -> None:
         """The numeric gradients behind the map have the ranks that the exact ones have."""
         bend, ahead = np.array(0.05), np.array(0.0)
         for angle, printed, rank in ((bend, False, 7), (ahead, False, 6), (bend, True, 8), (ahead, True, 6)):
-            assert (sight(angle, np.array(20.0), printed).relative > 1e-10).sum() == rank
+            assert (singular_values(angle, np.array(20.0), printed) > 1e-10).sum() == rank
 
 
 class TestEquations:
     def test_output_equation_on_a_motion(self) -> None:
-        """Second road: V (beta' + r) cos(beta) + V' sin(beta) by differences along the runtime's own motion."""
+        """Recomputed: V (beta' + r) cos(beta) + V' sin(beta) by differences along the runtime's own motion."""
         car, step = substitute_car(), 1e-6
         x = np.array([float(value) for value in STATE.values()])
         model = FourWheelModel.at(car, step, np.array(0.08), np.array(list(LOADS.values()), float), 1.0)
@@ -138,18 +144,18 @@ class TestEquations:
         assert finding("P4-y4").verdict is Verdict.ERRATUM
 
     def test_output_verdict_follows_from_the_form(self) -> None:
-        assert claims_equations.lateral_output(corrected_model()).verdict is Verdict.REPRODUCED
+        assert lateral_output(corrected_model()).verdict is Verdict.REPRODUCED
 
     def test_sign_of_the_tire_force(self) -> None:
         found = finding("P4-dugoff")
         assert found.verdict is Verdict.ERRATUM
         np.testing.assert_allclose(found.computed["poles_printed_1_s"], [3.0621, 4.0469], atol=1e-4)
         np.testing.assert_allclose(found.computed["poles_corrected_1_s"], [-3.8848, -3.2242], atol=1e-4)
-        assert claims_equations.tire_sign(printed_sign=1).verdict is Verdict.REPRODUCED
+        assert tire_sign(printed_sign=1).verdict is Verdict.REPRODUCED
 
     @pytest.mark.parametrize("sign", [1, -1])
     def test_poles_in_exact_numbers(self, sign: int) -> None:
-        """Second road: s^2 - tr s + det in rationals; the eliminated eight-state model has the same two roots."""
+        """Recomputed: s^2 - tr s + det in rationals; the eliminated eight-state model has the same two roots."""
         c1, c2 = sign * Fraction(65000), sign * Fraction(50000)
         l1, l2, m, inertia, v = (Fraction(text) for text in ("1.12", "1.46", "1447", "3000", "20"))
         moment = l1 * c1 - l2 * c2
@@ -161,12 +167,12 @@ class TestEquations:
             sign == 1
         )  # Routh: both poles on one side, the side by the sign of the trace
         roots = np.sort(np.roots([1.0, -float(trace), float(det)]).real)
-        np.testing.assert_allclose(straight_poles(sign).quasi_static, roots, rtol=1e-9)
+        np.testing.assert_allclose(straight_poles(sign)[0], roots, rtol=1e-9)
         np.testing.assert_allclose(single_track_poles(sign, SPEED), roots, rtol=1e-9)
 
     def test_relaxation_changes_no_sign(self) -> None:
-        assert straight_poles(1).lagged.max() == pytest.approx(-3.5263, abs=1e-4)
-        assert straight_poles(-1).lagged.max() == pytest.approx(3.7092, abs=1e-4)
+        assert straight_poles(1)[1].max() == pytest.approx(-3.5263, abs=1e-4)
+        assert straight_poles(-1)[1].max() == pytest.approx(3.7092, abs=1e-4)
 
     def test_printed_sign_is_unstable_at_every_speed(self) -> None:
         speeds = np.linspace(1.0, 80.0, 80)
@@ -184,8 +190,8 @@ class TestTable1:
         assert found.computed["ekf_average_percent"] == pytest.approx(10.01, abs=0.005)
 
     def test_verdict_flips_when_every_row_is_below(self) -> None:
-        rows = [replace(row, mean={**row.mean, "ukf": min(row.mean["ukf"], 7.9)}) for row in table_1()]
-        assert claims_table.below_eight_percent(rows).verdict is Verdict.REPRODUCED
+        rows = [replace(row, mean={**row.mean, "ukf": min(row.mean["ukf"], 7.9)}) for row in TABLE_1]
+        assert below_eight_percent(rows).verdict is Verdict.REPRODUCED
 
 
 def test_study_is_complete() -> None:
@@ -201,7 +207,4 @@ def test_parts_stand_on_their_own(part) -> None:  # type: ignore[no-untyped-def]
 
 
 def test_map_of_the_observability_part() -> None:
-    from studies.papers.ekf_ukf_lateral.figures_observability import rank_map
-    from studies.study import PartResult
-
-    check_result(PartResult(drawings=[rank_map(21)]))
+    check_result(PartResult(drawings=[rank_figure(21)]))

@@ -1,7 +1,7 @@
-"""P2 Figs 1 to 3 and the appendix: gramian rank along a drive, and the two tests for an unknown initial covariance.
+"""P2 Figs 1 to 3 and the appendix: gramian rank along a launch, and the two tests for an unknown initial covariance.
 
 P2 prints "Q = 2.5e-3" for a 3 x 3 matrix: Q I is used where its reading matters, and Q B B' beside it. Numbers named
-`reference` are independent recomputations (entries P2-test1, P2-test2, P2-A of the shared claims; sheet section 10, item 11).
+`reference` are independent recomputations (entries P2-test1, P2-test2, P2-A of the shared claims; P2 notes 6).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ MODEL = longitudinal_speed_model(load_parameter_set("longitudinal-speed"))
 TYPICAL = (1e-3, 1.0, 0.1)  # sizes of z [m], V_r [m/s], z' [m/s]
 
 
-def drive(standing: float, duration: float) -> tuple[Array, Array, Array]:
+def history(standing: float, duration: float) -> tuple[Array, Array, Array]:
     """Time, wheel speed, wheel acceleration: stand, launch to 60 rad/s in 4 s with wheel flutter, then cruise."""
     record = launch(standing, duration)
     return record.time, record.speed, record.acceleration
@@ -43,7 +43,7 @@ def constant(model: LpvModel, speed: float, samples: int) -> Any:
 
 
 def test_fig1_gramian_has_full_rank_except_while_the_wheel_stands() -> None:
-    t, speed, acceleration = drive(2.0, 8.0)
+    t, speed, acceleration = history(2.0, 8.0)
     sequence = sampled_sequence(MODEL, np.stack([speed, acceleration], axis=1), STEP)
     for scale in (None, TYPICAL):
         rank = growing_observability(sequence.A, sequence.C, scale).rank(1e-9)
@@ -55,7 +55,7 @@ def test_fig1_gramian_has_full_rank_except_while_the_wheel_stands() -> None:
 
 
 def test_proposition_1_detectable_while_rolling_and_not_at_standstill() -> None:
-    t, speed, acceleration = drive(2.0, 8.0)
+    t, speed, acceleration = history(2.0, 8.0)
     sequence = sampled_sequence(MODEL, np.stack([speed, acceleration], axis=1), STEP)
     rolling, standing = t > 2.5, t < 2.0
     seen = uniform_detectability(sequence.A[rolling], sequence.C[rolling], 40, contraction=0.5, state_scale=TYPICAL)
@@ -93,11 +93,11 @@ def test_test_1_is_met_after_three_samples_while_the_wheel_accelerates() -> None
 
 
 def test_both_tests_agree_with_the_riccati_recursion_in_80_digits() -> None:
-    _, speed, acceleration = drive(0.0, 2.0)
-    kept = slice(100, 130)
+    _, speed, acceleration = history(0.0, 2.0)
+    moving = slice(100, 130)
     for weight in (Q, 2.5e-3 * np.outer([0, 1, 1], [0, 1, 1])):
-        found = wheel_speed_tests(MODEL, speed[kept], acceleration[kept], STEP, weight, R)
-        sequence = sampled_sequence(MODEL, np.stack([speed[kept], acceleration[kept]], axis=1), STEP)
+        found = wheel_speed_tests(MODEL, speed[moving], acceleration[moving], STEP, weight, R)
+        sequence = sampled_sequence(MODEL, np.stack([speed[moving], acceleration[moving]], axis=1), STEP)
         with mp.workdps(80):
             # psi = 1e18 would leave the remainder N^2 / psi of (26) in the comparison: 7e-6 of N here.
             psi = mp.mpf(10) ** 30
@@ -133,10 +133,10 @@ def test_with_the_radius_of_table_i_the_sheet_values_come_out() -> None:
     assert found.largest_unknown[6] / found.largest_unknown[5] == pytest.approx(0.35, abs=5e-3)
 
 
-def test_figs_2_and_3_on_a_drive_depend_on_the_rank_tolerance() -> None:
+def test_figs_2_and_3_on_a_launch_depend_on_the_rank_tolerance() -> None:
     """Nearly silent data: taken as seen it ends test 1 in three samples, and N peaks beyond all use; with a tolerance of
     1e-2 N stays at the size of constant speed for the first samples and M decays, as Fig. 2 shows it."""
-    _, speed, acceleration = drive(0.0, 6.0)
+    _, speed, acceleration = history(0.0, 6.0)
     moving = slice(200, None)
     fine, coarse = (
         wheel_speed_tests(MODEL, speed[moving], acceleration[moving], STEP, Q, R, tolerance)
@@ -151,7 +151,7 @@ def test_figs_2_and_3_on_a_drive_depend_on_the_rank_tolerance() -> None:
 
 
 def test_a_launch_needs_the_wheel_to_turn_before_anything_is_known() -> None:
-    _, speed, acceleration = drive(2.0, 3.0)
+    _, speed, acceleration = history(2.0, 3.0)
     found = wheel_speed_tests(MODEL, speed, acceleration, STEP, Q, R)
     assert found.samples_needed is not None
     assert 2.0 < found.samples_needed * STEP < 2.1

@@ -1,4 +1,4 @@
-"""Table I and Figs. 6 to 9, driven on the truth vehicle."""
+"""Table I and Figs. 5 to 9 on the truth vehicle."""
 
 from __future__ import annotations
 
@@ -7,31 +7,21 @@ from functools import partial
 from studies.experiments.driven import MAGIC_FORMULA, driven_part
 from studies.experiments.four_wheel_report import four_wheel_part
 from studies.experiments.motion import Moved, motion_part
-from studies.papers.ekf_ukf_lateral.published_table import table_1
+from studies.papers.ekf_ukf_lateral.accuracy import TABLE_1
 from studies.study import PartResult, Scope
 
 MANOEUVRE = "p4-bends-dry"
+MOTION = (Moved(MANOEUVRE, "Right, left and right bend, dry (Fig. 5)", course=True),)
 
 
 def _table_1(name: str, scope: Scope, tire: str) -> PartResult:
-    return four_wheel_part(name, MANOEUVRE, table_1(), scope, tire)
+    return four_wheel_part(name, MANOEUVRE, TABLE_1, scope, tire)
 
-
-MOTION = (Moved(MANOEUVRE, "Right, left and right bend, dry (Fig. 5)", course=True),)
 
 PARTS = (
-    driven_part("table-1-driven", "Table I on the truth vehicle", partial(_table_1, "bends"), cost=53.0, quick=True),
-    driven_part(
-        "table-1-other-tire",
-        "Table I on a tire with another shape: Magic Formula with slip lag",
-        partial(_table_1, "bends-other-tire"),
-        cost=53.0,
-        tire=MAGIC_FORMULA,
-    ),
-    driven_part(
-        "motion",
-        "Fig. 5 on the truth vehicle: path, speed, steering, g-g diagram",
-        partial(motion_part, "motion", MOTION),
-        cost=5.0,
-    ),
-)
+    driven_part("table-1-driven", "Table I on the truth vehicle", partial(_table_1, "bends"), 53.0, quick=True),
+    driven_part("table-1-other-tire", "Table I on a tire with another shape: Magic Formula with slip lag",
+                partial(_table_1, "bends-other-tire"), 53.0, MAGIC_FORMULA),
+    driven_part("motion", "Fig. 5 on the truth vehicle: path, speed, steering, g-g diagram",
+                partial(motion_part, "motion", MOTION), 5.0),
+)  # fmt: skip

@@ -1,11 +1,8 @@
-"""Observability of the model of P4: variants, ranks, and what no output sees."""
+"""P4-obs: is the eight-state model observable wherever the car moves and steers? Ranks, and motions that measure the same."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -13,71 +10,49 @@ import sympy as sp
 from analysis.errors import AnalysisError
 from analysis.lie_rank import LieRankTest
 from analysis.lie_structure import GenericRank, generic_rank
-from estimators.sideslip import FourWheel, FourWheelModel
-from synthesis.models.catalogue.four_wheel import SUBSTITUTES, four_wheel_model
+from estimators.sideslip import FourWheelModel
+from studies.claim import Finding, judged
+from studies.papers.ekf_ukf_lateral.inputs import (
+    CAR,
+    LOADS,
+    PACKAGE,
+    STATE,
+    SUBSTITUTES_NOTE,
+    corrected_model,
+    in_numbers,
+    printed_output_model,
+    rear_difference_model,
+    substitute_car,
+)
+from studies.papers.topic import Topic
+from studies.plots import Axis, Dash, Figure, Level, Line, Map, Mark, Panel, Shade, Words, dots
+from studies.plots.colours import BLUE, GREEN, PURPLE, RED, TRUTH
+from studies.study import Cell, PartResult, Scope, Table
 from synthesis.models.nonlinear import NonlinearModel
 from synthesis.polynomials.matrix import FloatArray
 
+TOPIC = Topic(PACKAGE)
 ORDER = 4  # Lie derivatives taken; the rank is complete after the first
 RANGES = {
-    "yaw_rate": (-0.6, 0.6), "speed": (5.0, 40.0), "sideslip": (-0.05, 0.05), "force_fl": (-4e3, 4e3),
-    "force_fr": (-4e3, 4e3), "force_rl": (-4e3, 4e3), "force_rr": (-4e3, 4e3), "front_force_x": (-4e3, 4e3),
-    "steering_angle": (-0.2, 0.2), "load_fl": (1e3, 6e3), "load_fr": (1e3, 6e3), "load_rl": (1e3, 6e3),
-    "load_rr": (1e3, 6e3),
+    "yaw_rate": (-0.6, 0.6), "speed": (5.0, 40.0), "sideslip": (-0.05, 0.05),
+    **dict.fromkeys(("force_fl", "force_fr", "force_rl", "force_rr", "front_force_x"), (-4e3, 4e3)),
+    "steering_angle": (-0.2, 0.2), **dict.fromkeys(LOADS, (1e3, 6e3)),
 }  # fmt: skip
-STRAIGHT = {**RANGES, "steering_angle": (0.0, 0.0)}
-# A left bend at 20 m/s and about 0.5 g: loads and forces are larger on the right.
-STATE: Mapping[str, Any] = {
-    "yaw_rate": "0.25", "speed": 20, "sideslip": "0.01", "force_fl": 1400, "force_fr": 2200, "force_rl": 1100,
-    "force_rr": 1700, "front_force_x": 700,
-}  # fmt: skip
-LOADS: Mapping[str, Any] = {"load_fl": 3200, "load_fr": 4800, "load_rl": 2400, "load_rr": 3700}
 # Typical sizes of the states and of the outputs (and of their rates), to compare singular values.
 STATE_SIZE = np.array([0.4, 8.0, 0.1, 2000.0, 2000.0, 1500.0, 1500.0, 2000.0])
 OUTPUT_SIZE = np.array([0.4, 8.0, 3.0, 3.0])
 RATE = 10.0  # 1/s, by which output rates are compared with outputs
-
-
-@cache
-def corrected_model() -> NonlinearModel:
-    """The model of the catalogue: y_4 ends in x_8 sin(u_1)."""
-    return four_wheel_model()
-
-
-@cache
-def printed_output_model() -> NonlinearModel:
-    """The model with y_4 of (12) as printed: x_6 sin(u_1) in place of x_8 sin(u_1)."""
-    model = corrected_model()
-    x6, x8, u1, m = sp.symbols("force_rl front_force_x steering_angle mass")
-    return _with_outputs(model, [*model.h[:3], model.h[3] + (x6 - x8) * sp.sin(u1) / m])
-
-
-@cache
-def rear_difference_model() -> NonlinearModel:
-    """The corrected model with the rear right lateral force as a fifth output."""
-    model = corrected_model()
-    return _with_outputs(model, [*model.h, sp.Symbol("force_rr")])
-
-
-@cache
-def in_numbers(model: NonlinearModel) -> NonlinearModel:
-    """The same model with its constants as exact rationals in the equations: inserted once, not at every evaluation."""
-    values = {sp.Symbol(name): sp.Rational(str(constant.value)) for name, constant in model.constants.items()}
-    f, h = (sp.Matrix(matrix).applyfunc(lambda entry: entry.xreplace(values)) for matrix in (model.f, model.h))
-    return NonlinearModel(model.name, model.source, model.states, model.outputs, f, h, model.inputs)
-
-
-def _with_outputs(model: NonlinearModel, h: list[sp.Expr]) -> NonlinearModel:
-    outputs = (*model.outputs, model.states[6])[: len(h)]
-    return NonlinearModel(
-        model.name, model.source, model.states, outputs, model.f, sp.Matrix(h), model.inputs, model.constants
-    )
+FLOOR = 1e-17  # singular values below rounding are drawn here
+STEP = 0.001  # s
+SPLIT = 800.0  # N, by which two motions that measure the same differ at the start, to each side
+LAG = "V / sigma"
 
 
 @cache
 def rank_of(model: NonlinearModel, straight: bool) -> GenericRank:
     """Lie rank at a random state and moving inputs (almost every one has it); `straight`: the steering angle is held at zero."""
-    return generic_rank(in_numbers(model), STRAIGHT if straight else RANGES, samples=1, order=ORDER, seed=4)
+    ranges = {**RANGES, "steering_angle": (0.0, 0.0)} if straight else RANGES
+    return generic_rank(in_numbers(model), ranges, samples=1, order=ORDER, seed=4)
 
 
 @cache
@@ -101,31 +76,45 @@ def rear_split_is_hidden(model: NonlinearModel) -> bool:
     Then two motions that start with the same rear sum and another rear split have the same outputs for ever, whatever the
     inputs do: rank 7 at most. An identity of expressions, no linearisation.
     """
-    s, speed, length = sp.symbols("s speed rear_relaxation")
-    shift = {sp.Symbol("force_rl"): sp.Symbol("force_rl") + s, sp.Symbol("force_rr"): sp.Symbol("force_rr") - s}
+    s, speed, length, left, right = sp.symbols("s speed rear_relaxation force_rl force_rr")
+    shift = {left: left + s, right: right - s}
     v = sp.Matrix([0, 0, 0, 0, 0, 1, -1, 0])
     moved = model.f.subs(shift, simultaneous=True) - model.f + speed / length * s * v
     seen = model.h.subs(shift, simultaneous=True) - model.h
     return all(sp.expand(entry) == 0 for entry in (*moved, *seen))
 
 
-@dataclass(frozen=True)
-class Sight:
-    """Singular values (..., 8), descending, of the gradients of [y; y'] by the states, both in typical sizes."""
+@TOPIC.claim("P4-obs")
+def rank_of_the_model(model: NonlinearModel | None = None) -> Finding:
+    """Rank while steering and at zero steering, of (11)-(12) with corrected y_4 (or of `model`), beside the printed y_4."""
+    chosen = model or corrected_model()
+    steering, straight = rank_of(chosen, False), rank_of(chosen, True)
+    printed = [rank_of(printed_output_model(), held).rank for held in (False, True)]
+    hidden = rear_split_is_hidden(chosen)
+    upper = 7 if hidden else 8
+    computed = {
+        "rank": steering.rank, "rank_upper_bound": upper, "rank_at_zero_steering": straight.rank,
+        "rank_steering_through_zero": rank_through_straight(), "hidden_directions": list(steering.structure.describe()),
+        "hidden_directions_at_zero_steering": list(straight.structure.describe()),
+        "singular_at_zero_speed": singular_at_standstill(), "rank_with_y4_as_printed": printed[0],
+        "rank_with_y4_as_printed_at_zero_steering": printed[1],
+    }  # fmt: skip
+    reading = f"The rank is {steering.rank} at almost every state and {straight.rank} while driving straight ahead."
+    if hidden:
+        reading += (
+            " The difference of the rear lateral forces enters no output and no other state: two motions that differ in it "
+            "alone measure the same for ever (an exact identity). It decays with V / sigma_2, so the model is detectable. "
+            "Rank 8 with the exception at zero steering holds for the printed y_4, whose x_6 sin(u_1) is a misprint (rank "
+            f"{printed[0]} and {printed[1]})."
+        )
+    return Finding(computed, judged(min(steering.rank, upper) == 8 and straight.rank < 8), reading)
 
-    values: FloatArray
 
-    @property
-    def relative(self) -> FloatArray:
-        """Divided by the largest one."""
-        return np.asarray(self.values / self.values[..., :1])
+def singular_values(steering: FloatArray, speed: FloatArray, printed: bool = False) -> FloatArray:
+    """Of the gradients of [y; y'] by the states, both in typical sizes, descending, over the largest one: (..., 8).
 
-
-def sight(steering: FloatArray, speed: FloatArray, printed: bool = False) -> Sight:
-    """Of y and its first derivative in the bend `STATE` at other steering angles [rad] and speeds [m/s].
-
-    h is linear in x, so with held steering the gradient of y' is H A: eight rows, as many as states. `printed` takes y_4 of
-    (12) as printed.
+    In the bend `STATE` at other steering angles [rad] and speeds [m/s]. h is linear in x, so with held steering the gradient
+    of y' is H A: eight rows, as many as states. `printed` takes y_4 of (12) as printed.
     """
     angle, v = np.broadcast_arrays(np.asarray(steering, float), np.asarray(speed, float))
     x = np.broadcast_to([float(value) for value in STATE.values()], (*angle.shape, 8)).copy()
@@ -138,22 +127,153 @@ def sight(steering: FloatArray, speed: FloatArray, printed: bool = False) -> Sig
     if printed:
         H[..., 3, 7], H[..., 3, 5] = 0.0, H[..., 3, 5] + np.sin(angle) / model.vehicle.mass
     rows = np.concatenate([H, H @ A / RATE], axis=-2)
-    scaled = rows * STATE_SIZE / np.tile(OUTPUT_SIZE, 2)[:, None]
-    return Sight(np.linalg.svd(scaled, compute_uv=False))
+    values = np.linalg.svd(rows * STATE_SIZE / np.tile(OUTPUT_SIZE, 2)[:, None], compute_uv=False)
+    return np.asarray(values / values[..., :1])
 
 
-def substitute_car() -> FourWheel:
-    """The substitutes of the model (P4 prints no values) as the runtime takes them."""
-    value = {name: constant.value for name, constant in SUBSTITUTES.items()}
-    return FourWheel(
-        mass=value["mass"],
-        yaw_inertia=value["yaw_inertia"],
-        front_lever=value["front_axle_distance"],
-        rear_lever=value["rear_axle_distance"],
-        track=value["track"],
-        front_stiffness=value["front_stiffness"],
-        rear_stiffness=value["rear_stiffness"],
-        front_relaxation=value["front_relaxation"],
-        rear_relaxation=value["rear_relaxation"],
-        friction=value["friction"],
+@TOPIC.part("observability", "Is the eight-state model observable?", 2.0)
+def observability(scope: Scope) -> PartResult:
+    """The claim, and a map of the rank."""
+    return PartResult(TOPIC.found(), (), [rank_figure(41 if scope.quick else 161)], [SUBSTITUTES_NOTE])
+
+
+def rank_figure(points: int = 161) -> Figure:
+    """Singular values over steering angle and speed."""
+    degrees, speed = np.linspace(-8.0, 8.0, points), np.geomspace(1.0, 40.0, max(points // 3, 12))
+    angle, at_20 = np.radians(degrees), np.array(20.0)
+    corrected, printed = (singular_values(angle, at_20, which) for which in (False, True))
+    field = singular_values(angle[None, :], speed[:, None])[..., 6]
+    curves: list[Mark] = [
+        Line(degrees, np.maximum(corrected[:, 6], FLOOR), "7th, y₄ corrected", BLUE, width=1.8),
+        Line(degrees, np.maximum(corrected[:, 7], FLOOR), "8th, y₄ corrected", BLUE, "dotted"),
+        Line(degrees, np.maximum(printed[:, 7], FLOOR), "8th, y₄ as printed", RED, "dashed"),
+        Shade(FLOOR / 3, 1e-14),
+        Words(0.98, 0.07, "zero up to rounding", horizontal="right", relative=True),
+    ]
+    colours: list[Mark] = [
+        Map(degrees, speed, np.log10(np.maximum(field, 1e-9)), "log₁₀ (value / largest) [1]", "viridis", -7.0),
+        Level(x=0.0, color=RED, width=1.6),
+        Words(0.0, 2.0, "rank 6", "white", 9, offset=(6, 0)),
+        Words(-7.5, 22.0, "rank 7", "white", 9),
+    ]
+    steering = "steering angle of the front wheels [deg]"
+    size = Axis("singular value / largest [1]", FLOOR / 3, 1e-1, "log")
+    heights = Axis("speed [m/s]", scale="log", ticks=[1, 2, 5, 10, 20, 40])
+    panels = [
+        Panel(curves, steering, size, "at 20 m/s, steering held", legend="center right"),
+        Panel(colours, steering, heights, "7th singular value, y₄ corrected", grid=False),
+    ]
+    return Figure(
+        "observability",
+        "Observability of the eight-state model in a left bend (yaw rate 0.25 rad/s, forces 1.1 to 2.2 kN): singular values "
+        "of the gradients of the four outputs and of their first derivatives, states and outputs in typical sizes. Left: the "
+        "eighth value is zero at every steering angle, so the rank is 7, not 8; the seventh vanishes at zero steering, rank "
+        "6. Only with y₄ as misprinted in (12) is the eighth value not zero. Right: the seventh value over steering angle "
+        "and speed; speed moves it little, steering decides.",
+        "Left: three curves over the steering angle; one stays at rounding level, two drop sharply at zero steering. Right: "
+        "colour map over steering angle and speed with a dark vertical valley at zero steering.",
+        panels, (9.2, 3.9), widths=(1.15, 1.0),
+    )  # fmt: skip
+
+
+def motion_pair(
+    seconds: float = 1.5, front: bool = False, steered: bool = True
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Time (n,) in s, states (n, 2, 8) and outputs (n, 2, 4) of a slalom at 20 m/s from two starts.
+
+    They differ in the rear left-right split (or, with `front`, the front one). Not `steered`: straight ahead with held
+    steering, where the front split is hidden as well.
+    """
+    car, left = substitute_car(), 3 if front else 5
+    x = np.zeros((2, 8))
+    x[:, 1], x[:, 7] = 20.0, 300.0
+    x[1, left], x[1, left + 1] = SPLIT, -SPLIT
+    time = np.arange(0.0, seconds, STEP)
+    steering = np.radians(3.0) * np.sin(2.0 * np.pi * 0.7 * time) * steered
+    ahead, behind = CAR["front_axle_distance"], CAR["rear_axle_distance"]
+    loads = CAR["mass"] * 9.81 / (2 * (ahead + behind)) * np.tile([behind, behind, ahead, ahead], (2, 1))  # at rest
+    states, outputs = np.empty((len(time), 2, 8)), np.empty((len(time), 2, 4))
+    for k, angle in enumerate(steering):
+        model = FourWheelModel.at(car, STEP, np.full(2, angle), loads, 1.0)
+        states[k], outputs[k] = x, model.measurement(x)
+        x = model.transition(x)
+    return time, states, outputs
+
+
+@TOPIC.part("hidden-split", "What no sensor tells apart", 1.0, quick=False)
+def hidden_split(scope: Scope) -> PartResult:
+    """What each variant of the model hides, and two motions that measure the same."""
+    note = (
+        "The paper sets lateral forces and sideslip to zero where it takes the model as unobservable. That is not needed: "
+        "what is hidden decays with V / sigma by itself, so a filter stays bounded."
     )
+    return PartResult((), [rank_table()], [pair_figure()], [note])
+
+
+def rank_table() -> Table:
+    """Model, situation, rank and what is hidden."""
+    rows: list[list[Cell]] = []
+    for name, model in (
+        ("y4 corrected", corrected_model()),
+        ("y4 as printed", printed_output_model()),
+        ("y4 corrected, F_y22 measured as well", rear_difference_model()),
+    ):
+        for situation, straight in (("steering", False), ("steering held at zero", True)):
+            found = rank_of(model, straight)
+            hidden = found.structure
+            decays = LAG if hidden.proved and hidden.basis.cols else "-"
+            rows.append([name, situation, found.rank, "; ".join(hidden.describe()) or "nothing", decays])
+    at_rest = "no Taylor series: the sideslip rate divides by the speed" if singular_at_standstill() else "regular"
+    rows[2:2] = [
+        ["y4 corrected", "steering through zero at 0.1 rad/s", rank_through_straight(), "force_rl - force_rr", LAG],
+        ["y4 corrected", "standstill", None, at_rest, "-"],
+    ]
+    caption = (
+        "Lie-derivative rank of the eight-state model at random states (20 Lie rows, 320-bit ball arithmetic: a rank is "
+        "proved from below; what is hidden is proved symbolically). 'Decays with' is the rate in 1/s at which the hidden "
+        "part dies out by itself."
+    )
+    columns = ("output equation", "situation", "rank of 8 [1]", "hidden direction", "decays with")
+    return Table("ranks", caption, columns, rows)
+
+
+def pair_figure() -> Figure:
+    """Two starts with another rear split: forces differ, outputs do not."""
+    time, states, outputs = motion_pair()
+    forces, measured = [], []
+    styles: tuple[tuple[str, Dash, float], ...] = (("first", "solid", 2.6), ("second", "dashed", 1.4))
+    for k, (name, dash, width) in enumerate(styles):
+        for side, wheel, color in (("left", 5, BLUE), ("right", 6, RED)):
+            force = states[:, k, wheel] / 1e3
+            forces.append(Line(time, force, f"rear {side}, {name} motion", color, dash, width))
+        for what, values, color in (
+            ("yaw rate [0.1 rad/s]", 10.0 * outputs[:, k, 0], GREEN),
+            ("acceleration [m/s²]", outputs[:, k, 3], PURPLE),
+        ):
+            measured.append(Line(time, values, f"{what}, {name}", color, dash, width))
+    split = np.abs(np.diff(states[:, :, 5], axis=1)[:, 0])
+    seen = np.abs(np.diff(outputs, axis=1)[:, 0]).max(axis=1)
+    lag = np.exp(-time * 20.0 / CAR["rear_relaxation"])
+    differences = [
+        Line(time, np.maximum(split / split[0], FLOOR), "rear left force / 800 N", BLUE, width=2.6),
+        Line(time, lag, "exp(−t V / σ₂)", TRUTH, "dashed", 1.0),
+        dots(time, np.maximum(seen, FLOOR), "outputs, largest [SI units]", GREEN, ".", 2),
+    ]
+    panels = [
+        Panel(lines, "time [s]", y, title, legend="upper right")
+        for lines, y, title in (
+            (forces, Axis("lateral force [kN]", high=3.4), "not measured: rear forces"),
+            (measured, Axis("measured [see legend]", high=9.5), "measured: the motions coincide"),
+            (differences, Axis("difference of the motions [see legend]", FLOOR / 3, 1e4, "log"), "their difference"),
+        )
+    ]
+    return Figure(
+        "twins",
+        "Two motions of the eight-state model in the same slalom (20 m/s, ±3° at 0.7 Hz) that start with the same rear axle "
+        "force and another split of it between left and right. Left: the rear forces differ. Middle: yaw rate and lateral "
+        "acceleration do not, nor do the other outputs. Right: the split dies out with V/σ₂ = 40 1/s by itself while the "
+        "outputs agree to rounding. So the rear split cannot be observed; what filters report of it is the tire model's.",
+        "Three panels over time: rear forces of two motions that start apart and merge; outputs that coincide; the "
+        "difference on a logarithmic scale, a straight line for the force and rounding noise for the outputs.",
+        panels, (9.6, 3.7),
+    )  # fmt: skip

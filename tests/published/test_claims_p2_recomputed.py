@@ -1,4 +1,4 @@
-"""Second roads to what the study of P2 says of observability, unknown starts, bounds and recursions."""
+"""Independent recomputations of what the study of P2 says of observability, unknown starts, bounds and recursions."""
 
 from __future__ import annotations
 
@@ -12,9 +12,6 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from analysis.gramians import observability_gramian
-from studies.papers.longitudinal_speed import claims_bounds, claims_observability
-from studies.papers.longitudinal_speed.covariance import steady_filter
-from studies.papers.longitudinal_speed.figures_observability import drives, gramian_rank
 from studies.papers.longitudinal_speed.inputs import (
     TYPICAL,
     accelerating,
@@ -24,7 +21,10 @@ from studies.papers.longitudinal_speed.inputs import (
     speed_model,
     structures,
 )
-from studies.papers.longitudinal_speed.unknown_start import STRUCTURES, both_tests
+from studies.papers.longitudinal_speed.observability import gramian_rank, histories, speed_observability
+from studies.papers.longitudinal_speed.steady_filter import filter_response
+from studies.papers.longitudinal_speed.stochastic_observability import STRUCTURES, both_tests
+from studies.papers.longitudinal_speed.unknown_input_observer import bounds, worst_runs
 from tests.unit.p2_findings import finding
 
 
@@ -35,7 +35,7 @@ def test_determinant_in_closed_form() -> None:
     w, a, j = sp.symbols("wheel_speed wheel_acceleration wheel_acceleration_rate")
     b = k * R
     expected = b * s1**2 * (j * (s0 + s2 * b * w) + b * a**2 * (s1 - s2) - b * w * a * (s0 + s2 * b * w))
-    (determinant,) = claims_observability.speed_observability().minors(symbolic=True)
+    (determinant,) = speed_observability().minors(symbolic=True)
     assert sp.expand(determinant - expected) == 0 and str(determinant) == computed["determinant"]
     assert computed["lost_while_accelerating_below_rad_s"] == pytest.approx(800 * (0.87 - 0.0016) / 612, rel=1e-4)
 
@@ -63,8 +63,8 @@ def test_rank_by_outputs_of_integrated_motions() -> None:
 
 
 def test_rank_of_the_gramian_of_fig_1() -> None:
-    ranks = {record.name: gramian_rank(record) for record in drives()}
-    t = drives()[0].time
+    ranks = {record.name: gramian_rank(record) for record in histories()}
+    t = histories()[0].time
     assert set(ranks["launch after 2 s"][(t > 0.0) & (t < 2.0)]) == {2} and set(
         ranks["launch after 2 s"][t > 2.05]
     ) == {3}
@@ -82,7 +82,7 @@ def test_rank_of_the_gramian_of_fig_1() -> None:
     np.testing.assert_allclose(whole, total, rtol=1e-9, atol=1e-12 * np.abs(total).max())
 
 
-# ---- tests 1 and 2: second road -------------------------------------------------------------------------------------------
+# ---- tests 1 and 2 -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)
@@ -125,34 +125,30 @@ def test_limits_by_iterating_from_certainty() -> None:
 
 
 def test_readings_of_the_scalar_covariance() -> None:
-    """Sheet section 10 item 10: the unit matrix barely corrects the velocity, B B' within milliseconds."""
-    weak, strong, held = (steady_filter(40.0, s, "normal") for s in ("I", "B B'", "B_k B_k'"))
-    assert weak.velocity_gain == pytest.approx(1.6e-3, abs=5e-5) and weak.time_constant == pytest.approx(1.3, abs=0.05)
-    assert strong.velocity_gain == pytest.approx(0.47, abs=0.01) and strong.time_constant == pytest.approx(
-        3.4e-3, abs=1e-4
-    )
-    assert held.velocity_gain == pytest.approx(0.0077, abs=1e-4)
-    assert steady_filter(40.0, "B B'", "high_slip").velocity_gain == pytest.approx(0.036, abs=5e-4)
+    """P2 notes 10: the unit matrix barely corrects the velocity, B B' within milliseconds."""
+    weak, strong, held = (filter_response(40.0, s, "normal") for s in ("I", "B B'", "B_k B_k'"))
+    assert weak[0] == pytest.approx(1.6e-3, abs=5e-5) and weak[1] == pytest.approx(1.3, abs=0.05)
+    assert strong[0] == pytest.approx(0.47, abs=0.01) and strong[1] == pytest.approx(3.4e-3, abs=1e-4)
+    assert held[0] == pytest.approx(0.0077, abs=1e-4)
+    assert filter_response(40.0, "B B'", "high_slip")[0] == pytest.approx(0.036, abs=5e-4)
 
 
-# ---- Theorem 1 and appendix: second road ------------------------------------------------------------------------------------
+# ---- Theorem 1 and appendix ------------------------------------------------------------------------------------
 
 
 def test_theorem_1_by_the_solution_of_the_scalar_equation() -> None:
-    runs = claims_bounds.worst_runs()
-    t = runs.time[:, None]
-    fade = np.exp(-runs.gain * t)
-    np.testing.assert_allclose(runs.size, fade * runs.size[0] + runs.disturbance / runs.gain * (1 - fade), rtol=1e-10)
-    xi = runs.split
-    bound = runs.size[0] * np.exp(-runs.gain * (1 - xi) * t) + runs.disturbance / (
-        2 * runs.gain * np.sqrt(xi * (1 - xi))
-    )
-    np.testing.assert_allclose(claims_bounds.bounds(runs), bound, rtol=1e-12)
-    assert (runs.size <= bound + 1e-12).all() and finding("P2-uio").computed["violations"] == 0
-    k = int(np.argmax(runs.size[0]))
-    push = runs.disturbance[k]
-    path = solve_ivp(lambda _, e: -runs.gain[k] * e + push, (0.0, 0.8), [runs.size[0, k]], rtol=1e-10, atol=1e-10)
-    assert runs.size[-1, k] == pytest.approx(path.y[0, -1], rel=1e-8)
+    time, size, runs = worst_runs()
+    gain, push, start, xi = runs.T
+    np.testing.assert_array_equal(start, size[0])
+    t = time[:, None]
+    fade = np.exp(-gain * t)
+    np.testing.assert_allclose(size, fade * start + push / gain * (1 - fade), rtol=1e-10)
+    bound = start * np.exp(-gain * (1 - xi) * t) + push / (2 * gain * np.sqrt(xi * (1 - xi)))
+    np.testing.assert_allclose(bounds(time, runs), bound, rtol=1e-12)
+    assert (size <= bound + 1e-12).all() and finding("P2-uio").computed["violations"] == 0
+    k = int(np.argmax(start))
+    path = solve_ivp(lambda _, e: -gain[k] * e + push[k], (0.0, 0.8), [start[k]], rtol=1e-10, atol=1e-10)
+    assert size[-1, k] == pytest.approx(path.y[0, -1], rel=1e-8)
 
 
 def test_appendix_numbers() -> None:
@@ -173,7 +169,7 @@ def test_patch_and_threshold_in_fractions() -> None:
 
 
 def test_launch_starts_standing_and_accelerations_are_derivatives() -> None:
-    for record in (*drives(), launch(0.0, 4.0)):
+    for record in (*histories(), launch(0.0, 4.0)):
         slope = np.gradient(record.speed, record.time)
         np.testing.assert_allclose(slope[2:-2], record.acceleration[2:-2], atol=0.5)
     assert not launch(2.0, 4.0).speed[:400].any()

@@ -1,4 +1,4 @@
-"""P2's rank and unknown-start tests on wheel speeds of a drive: a wheel that stands, then spins up, then too fast."""
+"""P2's rank and unknown-start tests on wheel speeds of the truth: a wheel that stands, then spins up, then too fast."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from studies.experiments.motion import Moved
-from studies.papers.longitudinal_speed.driven_tests import begun, rank_table, start_table, wheel_record
-from studies.papers.longitudinal_speed.figures_observability import gramian_rank
+from studies.papers.longitudinal_speed.observability import gramian_rank
+from studies.papers.longitudinal_speed.truth_records import begun, rank_table, start_table, wheel_record
 from studies.truth import Truth, load_manoeuvre
 
 ROW = Moved("p2-launch-dry", "launch")
@@ -34,7 +34,7 @@ def test_rank_is_full_only_once_the_wheel_turns(launch: Truth) -> None:
     (row,) = rank_table([record], [gramian_rank(record)]).rows
     assert row[2] == 1 and row[3] == 3
     assert isinstance(row[4], float) and STANDING <= row[4] <= STANDING + 5 * STEP
-    still = type(record)("still", record.time[:30], record.speed[:30], record.acceleration[:30])
+    still = record.cut(0, 30)
     (row,) = rank_table([still], [gramian_rank(still)]).rows
     assert row[3] == 2 and row[4] is None and row[1] is None
 
@@ -42,7 +42,7 @@ def test_rank_is_full_only_once_the_wheel_turns(launch: Truth) -> None:
 def test_an_accelerating_wheel_forgets_its_start_in_as_many_samples_as_states(launch: Truth) -> None:
     record = begun(wheel_record(launch, ROW))
     assert record.time[0] == pytest.approx(STANDING, abs=STEP)
-    later = type(record)("ramp", *(value[40:] for value in (record.time, record.speed, record.acceleration)))
+    later = record.cut(40)
     fine, _ = start_table([later]).rows
     assert fine[2] == pytest.approx(3 * STEP)
     constant = type(record)("constant", later.time, np.full_like(later.speed, 40.0), np.zeros_like(later.speed))

@@ -1,0 +1,116 @@
+"""P4-tab1: the text against Table I."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from studies.claim import Finding, judged
+from studies.papers.ekf_ukf_lateral.inputs import PACKAGE
+from studies.papers.published import printed_numbers
+from studies.papers.topic import Topic
+from studies.plots import Axis, Bars, Figure, Level, Mark, Panel, Words
+from studies.plots.colours import EXTENDED, RED, UNSCENTED
+from studies.study import Cell, PartResult, Scope, Table
+
+TOPIC = Topic(PACKAGE)
+LIMIT = 8.0  # %
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of Table I: largest measured value, and mean and standard deviation of the error (13) in % by filter."""
+
+    quantity: str
+    largest: float
+    unit: str
+    mean: dict[str, float]
+    deviation: dict[str, float]
+
+
+TABLE_1 = tuple(
+    Row(quantity, largest, unit, {"ekf": mean[0], "ukf": mean[1]}, {"ekf": deviation[0], "ukf": deviation[1]})
+    for quantity, largest, unit, mean, deviation in printed_numbers(PACKAGE)["table_1"]
+)
+
+
+@TOPIC.claim("P4-tab1")
+def below_eight_percent(table: Sequence[Row] = TABLE_1) -> Finding:
+    """How many means of the unscented filter exceed 8 %, their average, and where it beats the extended one."""
+    ukf, ekf = ([row.mean[kind] for row in table] for kind in ("ukf", "ekf"))
+    above = [row.quantity for row in table if not row.mean["ukf"] < LIMIT]
+    computed = {
+        "ukf_means_percent": ukf, "ukf_average_percent": sum(ukf) / len(ukf),
+        "ekf_average_percent": sum(ekf) / len(ekf), "rows_above_limit": above,
+        "ukf_better_means": sum(row.mean["ukf"] < row.mean["ekf"] for row in table),
+        "ukf_better_deviations": sum(row.deviation["ukf"] < row.deviation["ekf"] for row in table), "rows": len(table),
+    }  # fmt: skip
+    reading = (
+        f"{len(above)} of {len(table)} printed means of the unscented filter are at or above {LIMIT:g} %"
+        + (f" ({', '.join(above)})" if above else "")
+        + f"; their average is {computed['ukf_average_percent']:.2f} %, which is the only reading of 'globally' under which the "
+        f"statement could hold. The unscented filter is better in {computed['ukf_better_means']} means and "
+        f"{computed['ukf_better_deviations']} standard deviations of {len(table)}."
+    )
+    return Finding(computed, judged(not above), reading)
+
+
+@TOPIC.part("table-1", "Table I against the text", 0.2)
+def errors(scope: Scope) -> PartResult:
+    """Table I against the text."""
+    return PartResult(TOPIC.found(), [printed_table()], [error_figure()])
+
+
+def printed_table() -> Table:
+    """Table I, its averages, and the comparison with the text."""
+    columns = ("quantity", "max", "unit", "mean EKF [%]", "mean UKF [%]", "std EKF [%]", "std UKF [%]",
+               f"UKF mean below {LIMIT:g} %", "UKF mean better", "UKF std better")  # fmt: skip
+
+    def line(quantity: str, largest: float | None, unit: str | None, errors: Sequence[float]) -> list[Cell]:
+        ekf, ukf, ekf_spread, ukf_spread = errors
+        return [quantity, largest, unit, *errors, ukf < LIMIT, ukf < ekf, ukf_spread < ekf_spread]
+
+    values = [[*row.mean.values(), *row.deviation.values()] for row in TABLE_1]
+    rows = [line(row.quantity, row.largest, row.unit, found) for row, found in zip(TABLE_1, values, strict=True)]
+    rows.append(line("average", None, None, [round(float(value), 3) for value in np.mean(values, axis=0)]))
+    caption = (
+        "Table I of P4 as printed (road test of a Peugeot 307, errors (13) in percent of the maximum), with its averages and "
+        "whether the statement 'globally less than 8 %' holds."
+    )
+    return Table("table-1", caption, columns, rows)
+
+
+def error_figure() -> Figure:
+    """Means and standard deviations of both filters, with the limit of the text."""
+    places = np.arange(len(TABLE_1))
+    names = {float(k): row.quantity.replace(" ", "\n", 1) for k, row in enumerate(TABLE_1)}
+
+    def bars(values: Sequence[dict[str, float]]) -> list[Mark]:
+        kinds = (("ekf", EXTENDED, "extended", -0.2), ("ukf", UNSCENTED, "unscented", 0.2))
+        return [
+            Bars(places + aside, [v[kind] for v in values], f"{label} Kalman filter", color, 0.38, numbers="%.4g")
+            for kind, color, label, aside in kinds
+        ]
+
+    average = float(np.mean([row.mean["ukf"] for row in TABLE_1]))
+    limits: list[Mark] = [
+        Level(y=LIMIT, color=RED, width=1.2),
+        Words(-0.5, LIMIT + 0.15, f"{LIMIT:g} % of the text", RED),
+        Level(y=average, color=UNSCENTED, dash="dotted", width=1.0),
+        Words(-0.5, average - 0.75, f"unscented,\naverage {average:.2f} %", UNSCENTED, vertical="center"),
+    ]
+    share, quantities = Axis("error, share of the largest value [%]", 0, 16.5), Axis(ticks=names)
+    panels = [
+        Panel([*bars([row.mean for row in TABLE_1]), *limits], quantities, share, "mean"),
+        Panel(bars([row.deviation for row in TABLE_1]), quantities, "", "standard deviation", legend="upper left"),
+    ]
+    return Figure(
+        "table-1",
+        "Table I of P4 as printed: errors (13) of the two filters in the road test. Two of the five means of the unscented "
+        "filter exceed the 8 % that the text calls a global bound; their average does not. The unscented filter is worse in "
+        "the mean of F_y11 and in the deviation of F_y12.",
+        "Grouped bars of the printed errors of both filters for four tire forces and sideslip, with a red line at 8 percent.",
+        panels, (9.2, 3.5), share_y="all",
+    )  # fmt: skip
