@@ -7,21 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from studies.plots import (
-    Axis,
-    Band,
-    Bars,
-    ColouredDots,
-    Figure,
-    Level,
-    Line,
-    Map,
-    Mark,
-    Panel,
-    Shade,
-    Words,
-    dots,
-)
+from studies.plots import Axis, Band, Bars, ColouredDots, Figure, Level, Line, Map, Mark, Panel, Shade, Words, dots
 from studies.plots.colours import ABOVE, BELOW, BEST, DIVERGING, LOWER_END, MIDDLE, NOMINAL, UPPER_END, WORST
 from studies.plots.save import save_figure
 from studies.sweeps.baseline import Baseline

@@ -167,7 +167,7 @@ def rate_figure(curves: Curves) -> Figure:
                 dash, width = DASHES[own], 1.1 if own else 1.8
                 marks.append(Line(curve.wheel_speed, curve.rate, design.name, colour, dash, width))
         if k == 1:
-            marks.append(Words(2.0, PAPER_RATE * 1.02, "200 Hz"))
+            marks.append(Words(2.0, 0.97 * PAPER_RATE, "200 Hz", vertical="top"))
         y = Axis("" if k else "sample rate below which it is unstable [Hz]", 20.0, 1200.0, "log", ticks)
         panels.append(Panel(marks, Axis("wheel speed [rad/s]", *WHEEL_SPEED), y, scheme))
     return Figure(

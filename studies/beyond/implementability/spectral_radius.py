@@ -8,13 +8,7 @@ import numpy as np
 
 from studies.beyond.implementability.break_rates import unstable_wheel_speeds
 from studies.beyond.implementability.designs import PAPER_RATE, WHEEL_SPEED, Design, printed_designs, shipped_designs
-from studies.beyond.implementability.updates import (
-    BREAKABLE,
-    LASTING,
-    UPDATES,
-    exact_closed_loop,
-    spectral_radius,
-)
+from studies.beyond.implementability.updates import BREAKABLE, LASTING, UPDATES, exact_closed_loop, spectral_radius
 from studies.papers.topic import Topic
 from studies.plots import Axis, Contours, Figure, Level, Line, Map, Mark, Panel
 from studies.plots.colours import BLUE, DIVERGING, ORANGE, RED
