@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studies.experiments.accuracy import known_spread, nrms, spread
-from studies.experiments.driven import DRIVEN, LUGRE, MAGIC_FORMULA, driven, driven_part
-from studies.experiments.play import baselines, believed, measured, play, run_of
-from studies.experiments.velocities import USED, side_slip_curve
 from studies.registry import MODULES, load_study
 from studies.study import PartResult, Scope
+from studies.trials.accuracy import known_spread, nrms, spread
+from studies.trials.driven import DRIVEN, LUGRE, MAGIC_FORMULA, driven, driven_part
+from studies.trials.play import baselines, believed, measured, play, run_of
+from studies.trials.velocities import USED, side_slip_curve
 from studies.truth import PERFECT, Truth, drive, load_manoeuvre
 from studies.truth.kept import read_truth, write_truth
 from synthesis.errors import SpecError
@@ -54,8 +54,8 @@ def test_a_truth_of_other_cars_or_of_no_folder_is_refused(truth: Truth, tmp_path
 def test_prepared_drives_are_those_that_are_driven_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Other runs in the batch change nothing but round-off, which saturated tires amplify."""
     shipped = {name: Path(f"{name}.toml") for name in (*NAMES, "p3-launch-split")}
-    monkeypatch.setattr("studies.experiments.driven.shipped_manoeuvres", lambda: shipped)
-    monkeypatch.setattr("studies.experiments.driven.QUICK_SECONDS", SECONDS)
+    monkeypatch.setattr("studies.trials.driven.shipped_manoeuvres", lambda: shipped)
+    monkeypatch.setattr("studies.trials.driven.QUICK_SECONDS", SECONDS)
     folder = tmp_path / DRIVEN[LUGRE].name
     folder.mkdir()
     DRIVEN[LUGRE].run(SHORT, folder)
@@ -71,7 +71,7 @@ def test_prepared_drives_are_those_that_are_driven_alone(tmp_path: Path, monkeyp
 
 def test_a_full_drive_is_not_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[float] = []
-    monkeypatch.setattr("studies.experiments.driven.drive", lambda runs: asked.extend(m.duration for m in runs))
+    monkeypatch.setattr("studies.trials.driven.drive", lambda runs: asked.extend(m.duration for m in runs))
     driven(NAMES, LUGRE, Scope(), 0.5)
     driven(NAMES, LUGRE, SHORT, 0.5)
     assert asked == [load_manoeuvre(name).duration for name in NAMES] + [0.5, 0.5]

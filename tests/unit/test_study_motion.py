@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from studies.experiments.motion import COLUMNS, Moved, extremes, motion_drawings
 from studies.study import PartResult
+from studies.trials.motion import COLUMNS, Moved, extremes, motion_drawings
 from studies.truth import Truth, load_manoeuvre
 from synthesis.errors import SpecError
 from tests.unit.study_checks import check_result

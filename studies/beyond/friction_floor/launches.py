@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from estimators.vehicle import GRAVITY
 from studies.beyond.friction_floor.theory import friction_curve, missed_share
-from studies.experiments.accuracy import Spread, nrms, spread
-from studies.experiments.play import Reading, baselines, measured, play, run_of
-from studies.experiments.sensors import TEST_CAR
-from studies.experiments.velocities import corner_observers
 from studies.study import Scope
+from studies.trials.accuracy import Spread, nrms, spread
+from studies.trials.play import Reading, baselines, measured, play, run_of
+from studies.trials.sensors import TEST_CAR
+from studies.trials.velocities import corner_observers
 from studies.truth import Truth, drive, load_manoeuvre
 from studies.truth.road_table import Road
 from synthesis.models.parameter_set import load_parameter_set

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimators.velocity.slip import LEAST_SPEED
-from studies.experiments.driven import LUGRE, driven
-from studies.experiments.motion import Moved
-from studies.experiments.play import run_of
 from studies.papers.longitudinal_speed.figures_observability import gramian_rank
 from studies.papers.longitudinal_speed.inputs import WheelRecord, printed_value, sample_time, speed_model
 from studies.papers.longitudinal_speed.unknown_start import both_tests
 from studies.plots.colours import CURVES
 from studies.report.canvas import DASHES, canvas, label, legend
 from studies.study import Cell, Drawing, PartResult, Scope, Table
+from studies.trials.driven import LUGRE, driven
+from studies.trials.motion import Moved
+from studies.trials.play import run_of
 from studies.truth import Truth
 
 SECONDS = 6.0

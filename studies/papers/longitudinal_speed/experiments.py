@@ -7,11 +7,11 @@ from functools import partial
 
 from estimators.forces import UnknownInputForceObserver, WheelForceFilter
 from estimators.vehicle import CORNERS, VehicleParameters
-from studies.experiments.driven import driven_part
-from studies.experiments.forces import Driven, force_part
-from studies.experiments.motion import Moved, motion_part
-from studies.experiments.speed import Drive, speed_part
 from studies.papers.longitudinal_speed.driven_tests import driven_tests_part
+from studies.trials.driven import driven_part
+from studies.trials.forces import Driven, force_part
+from studies.trials.motion import Moved, motion_part
+from studies.trials.speed import Drive, speed_part
 
 
 def _printed(

@@ -9,14 +9,14 @@ import numpy.typing as npt
 
 from estimators.vehicle import CORNERS
 from estimators.velocity.slip import LEAST_SPEED
-from studies.experiments.panels import estimate_line, finished, true_line
-from studies.experiments.play import believed, run_of
 from studies.papers.resilient_velocity.compliance_trial import INSIDE, PRINTED_WAY, WITHOUT, ComplianceTrial
 from studies.papers.resilient_velocity.ink import sheet
 from studies.papers.resilient_velocity.setting import DIRECTIONS
 from studies.plots.colours import BLUE, GREY, ORANGE, RED
 from studies.report.canvas import legend
 from studies.study import Drawing
+from studies.trials.panels import estimate_line, finished, true_line
+from studies.trials.play import believed, run_of
 
 if TYPE_CHECKING:
     from studies.papers.resilient_velocity.compliance_report import Shown

@@ -10,10 +10,6 @@ import numpy.typing as npt
 
 from estimators.vehicle import CORNERS
 from estimators.velocity.slip import LEAST_SPEED
-from studies.experiments.accuracy import known_spread, nrms
-from studies.experiments.driven import LUGRE, driven
-from studies.experiments.play import measured, run_of
-from studies.experiments.sensors import TEST_CAR
 from studies.papers.resilient_velocity.compliance_figures import residual_history, wheel_history
 from studies.papers.resilient_velocity.compliance_trial import (
     INSIDE,
@@ -25,6 +21,10 @@ from studies.papers.resilient_velocity.compliance_trial import (
 )
 from studies.papers.resilient_velocity.setting import DIRECTIONS
 from studies.study import Cell, PartResult, Scope, Table
+from studies.trials.accuracy import known_spread, nrms
+from studies.trials.driven import LUGRE, driven
+from studies.trials.play import measured, run_of
+from studies.trials.sensors import TEST_CAR
 
 Array = npt.NDArray[np.float64]
 QUICK_SECONDS = 4.0

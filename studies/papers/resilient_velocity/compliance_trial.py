@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from estimators.velocity import SlipWeights, side_slip_angle, slip_ratio
 from estimators.velocity.corners import CornerVectors, tire_frame
-from studies.experiments.play import Reading, believed, play
 from studies.papers.resilient_velocity.compliant_corners import compliant_parts
 from studies.papers.resilient_velocity.friction import stribeck
 from studies.papers.resilient_velocity.setting import DIRECTIONS, PRINTED
+from studies.trials.play import Reading, believed, play
 from studies.truth import Measured
 from studies.truth.bristle import held
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from functools import partial
 
-from studies.experiments.driven import MAGIC_FORMULA, driven_part
-from studies.experiments.forces import Driven, differentiated_pid, force_part
-from studies.experiments.motion import Moved, motion_part
-from studies.experiments.velocities import Printed, corner_observers, velocity_part
 from studies.papers.resilient_velocity.compliance_report import TESTS, compliance_part
+from studies.trials.driven import MAGIC_FORMULA, driven_part
+from studies.trials.forces import Driven, differentiated_pid, force_part
+from studies.trials.motion import Moved, motion_part
+from studies.trials.velocities import Printed, corner_observers, velocity_part
 
 OBSERVERS = corner_observers("resilient-velocity")
 ROWS = (

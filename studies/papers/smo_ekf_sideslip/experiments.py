@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from functools import partial
 
-from studies.experiments.axle_report import AxleTest, axle_part
-from studies.experiments.driven import MAGIC_FORMULA, driven_part
-from studies.experiments.motion import Moved, motion_part
 from studies.papers.smo_ekf_sideslip.published_tables import MASS_SETTINGS, STIFFNESS_SETTINGS, printed
 from studies.study import PartResult, Scope
+from studies.trials.axle_report import AxleTest, axle_part
+from studies.trials.driven import MAGIC_FORMULA, driven_part
+from studies.trials.motion import Moved, motion_part
 
 
 def slalom(name: str, title: str, scope: Scope, tire: str) -> PartResult:

@@ -16,9 +16,9 @@ from estimators.sideslip import (
     wheel_axes,
 )
 from estimators.vehicle import VehicleParameters
-from studies.experiments.first_block import counted, front_steer, rear_speed
-from studies.experiments.play import believed
-from studies.experiments.tire_curve import TireFacts, tire_facts
+from studies.trials.first_block import counted, front_steer, rear_speed
+from studies.trials.play import believed
+from studies.trials.tire_curve import TireFacts, tire_facts
 from studies.truth import Measured, Truth
 
 Array = npt.NDArray[np.float64]

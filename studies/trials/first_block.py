@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from estimators.forces import AttitudeObserver, VerticalLoads, levelled
 from estimators.signals import FilteredDerivative
-from studies.experiments.play import believed
+from studies.trials.play import believed
 from studies.truth import Measured
 
 Array = npt.NDArray[np.float64]

@@ -10,11 +10,11 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from estimators.vehicle import CORNERS, GRAVITY
-from studies.experiments.driven import LUGRE, driven
-from studies.experiments.panels import finished
-from studies.experiments.play import run_of
 from studies.plots.colours import BLUE, ORANGE, RED
 from studies.study import Cell, Drawing, PartResult, Scope, Table
+from studies.trials.driven import LUGRE, driven
+from studies.trials.panels import finished
+from studies.trials.play import run_of
 from studies.truth import Truth, load_manoeuvre
 
 Array = npt.NDArray[np.float64]

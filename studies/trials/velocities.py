@@ -14,12 +14,12 @@ from estimators.pipeline import CornerObservers
 from estimators.schedule import GainSchedule
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import FusionSettings, SlipWeights, VelocityFusion
-from studies.experiments.accuracy import Spread, nrms, spread
-from studies.experiments.driven import LUGRE, driven
-from studies.experiments.play import QUICK_SECONDS, Parts, Reading, baselines, measured, play, run_of
-from studies.experiments.sensors import TEST_CAR
 from studies.plots import colours
 from studies.study import Cell, Drawing, PartResult, Scope, Table
+from studies.trials.accuracy import Spread, nrms, spread
+from studies.trials.driven import LUGRE, driven
+from studies.trials.play import QUICK_SECONDS, Parts, Reading, baselines, measured, play, run_of
+from studies.trials.sensors import TEST_CAR
 from studies.truth import Measured
 from synthesis.models.parameter_set import load_parameter_set
 

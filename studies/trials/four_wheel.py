@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from estimators.sideslip import FourWheel, FourWheelObserver
 from estimators.vehicle import VehicleParameters
-from studies.experiments.first_block import Levelled, counted, front_steer, level, rear_speed
-from studies.experiments.play import Reading, believed, play
-from studies.experiments.tire_curve import TireFacts, tire_facts
+from studies.trials.first_block import Levelled, counted, front_steer, level, rear_speed
+from studies.trials.play import Reading, believed, play
+from studies.trials.tire_curve import TireFacts, tire_facts
 from studies.truth import Measured
 
 Array = npt.NDArray[np.float64]

@@ -9,9 +9,6 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from studies.experiments.accuracy import Spread
-from studies.experiments.panels import estimate_line, finished, true_line
-from studies.experiments.play import believed, run_of
 from studies.plots.colours import (
     FUSION,
     HIGH_SLIP,
@@ -22,10 +19,13 @@ from studies.plots.colours import (
     SECOND_FILTER,
 )
 from studies.study import Drawing
+from studies.trials.accuracy import Spread
+from studies.trials.panels import estimate_line, finished, true_line
+from studies.trials.play import believed, run_of
 from studies.truth import Measured
 
 if TYPE_CHECKING:
-    from studies.experiments.speed import Drive
+    from studies.trials.speed import Drive
 
 Array = npt.NDArray[np.float64]
 STYLE = {

@@ -12,12 +12,12 @@ from matplotlib.figure import Figure
 
 from estimators.pipeline import DifferentiatedPid
 from estimators.vehicle import CORNERS, VehicleParameters
-from studies.experiments.accuracy import Spread, nrms, spread
-from studies.experiments.driven import LUGRE, driven
-from studies.experiments.play import QUICK_SECONDS, Parts, Reading, measured, play, run_of
-from studies.experiments.sensors import TEST_CAR
 from studies.plots import colours
 from studies.study import Cell, Drawing, PartResult, Scope, Table
+from studies.trials.accuracy import Spread, nrms, spread
+from studies.trials.driven import LUGRE, driven
+from studies.trials.play import QUICK_SECONDS, Parts, Reading, measured, play, run_of
+from studies.trials.sensors import TEST_CAR
 from studies.truth import Truth
 
 Array = npt.NDArray[np.float64]

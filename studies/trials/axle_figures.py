@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from studies.experiments.axle_forces import FORCES, RIGHT, AxleRun
-from studies.experiments.panels import estimate_line, finished, true_line
 from studies.plots.colours import SETTINGS
 from studies.study import Drawing
+from studies.trials.axle_forces import FORCES, RIGHT, AxleRun
+from studies.trials.panels import estimate_line, finished, true_line
 
 _LABELS = {"F_y1": "$F_{y1}$ [kN]", "F_y2": "$F_{y2}$ [kN]", "F_x1": "$F_{x1}$ [kN]", "yaw_rate": "yaw rate [deg/s]"}
 _BANDS = "Lines: first sensor draw; bands: 95 % of all draws."

@@ -10,14 +10,14 @@ from matplotlib.figure import Figure
 
 from estimators.sideslip import used_friction
 from estimators.vehicle import CORNERS
-from studies.experiments.accuracy import Spread
-from studies.experiments.four_wheel import EKF, PIPELINE, SHARE, STEADY, UKF, FourWheelRun
-from studies.experiments.panels import estimate_line, finished, true_line
 from studies.plots import colours
 from studies.study import Drawing
+from studies.trials.accuracy import Spread
+from studies.trials.four_wheel import EKF, PIPELINE, SHARE, STEADY, UKF, FourWheelRun
+from studies.trials.panels import estimate_line, finished, true_line
 
 if TYPE_CHECKING:
-    from studies.experiments.four_wheel_report import PrintedRow
+    from studies.trials.four_wheel_report import PrintedRow
 
 STYLE: dict[str, dict[str, Any]] = {
     EKF: {"color": colours.EXTENDED, "linewidth": 1.9},

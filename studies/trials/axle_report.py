@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from studies.experiments.accuracy import Spread, sample_spreads
-from studies.experiments.axle_figures import force_history, mass_history, stiffness_history
-from studies.experiments.axle_forces import FORCES, RIGHT, AxleRun, Setting, run_axles
-from studies.experiments.driven import LUGRE, driven
-from studies.experiments.first_block import LEAST_SPEED, SAMPLE_TIME, START
-from studies.experiments.sensors import TEST_CAR
-from studies.experiments.tire_curve import USE
 from studies.study import Cell, PartResult, Scope, Table
+from studies.trials.accuracy import Spread, sample_spreads
+from studies.trials.axle_figures import force_history, mass_history, stiffness_history
+from studies.trials.axle_forces import FORCES, RIGHT, AxleRun, Setting, run_axles
+from studies.trials.driven import LUGRE, driven
+from studies.trials.first_block import LEAST_SPEED, SAMPLE_TIME, START
+from studies.trials.sensors import TEST_CAR
+from studies.trials.tire_curve import USE
 from studies.truth import draw
 
 Array = npt.NDArray[np.float64]

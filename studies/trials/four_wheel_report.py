@@ -8,14 +8,14 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from studies.experiments.accuracy import Spread, known_spread, sample_errors, sample_spreads
-from studies.experiments.driven import LUGRE, driven
-from studies.experiments.first_block import LEAST_SPEED, SAMPLE_TIME, START
-from studies.experiments.four_wheel import AT_REST, EKF, UKF, FourWheelRun, run_four_wheel
-from studies.experiments.four_wheel_figures import error_dots, force_history, sideslip_history, used_friction_history
-from studies.experiments.sensors import TEST_CAR
-from studies.experiments.tire_curve import USE
 from studies.study import Cell, PartResult, Scope, Table
+from studies.trials.accuracy import Spread, known_spread, sample_errors, sample_spreads
+from studies.trials.driven import LUGRE, driven
+from studies.trials.first_block import LEAST_SPEED, SAMPLE_TIME, START
+from studies.trials.four_wheel import AT_REST, EKF, UKF, FourWheelRun, run_four_wheel
+from studies.trials.four_wheel_figures import error_dots, force_history, sideslip_history, used_friction_history
+from studies.trials.sensors import TEST_CAR
+from studies.trials.tire_curve import USE
 from studies.truth import draw
 
 Array = npt.NDArray[np.float64]

@@ -13,14 +13,14 @@ from estimators.pipeline import CornerObservers
 from estimators.schedule import GainSchedule
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import FusionSettings, VelocityFusion
-from studies.experiments.accuracy import Spread, known_spread, nrms
-from studies.experiments.driven import LUGRE, driven
-from studies.experiments.ltv_corners import SideBySide, bristle_tire, kalman_corners
-from studies.experiments.play import QUICK_SECONDS, Reading, baselines, measured, play, run_of
-from studies.experiments.sensors import TEST_CAR
-from studies.experiments.speed_figures import error_dots, speed_history
-from studies.experiments.velocities import FUSION, TOLD
 from studies.study import Cell, PartResult, Scope, Table
+from studies.trials.accuracy import Spread, known_spread, nrms
+from studies.trials.driven import LUGRE, driven
+from studies.trials.ltv_corners import SideBySide, bristle_tire, kalman_corners
+from studies.trials.play import QUICK_SECONDS, Reading, baselines, measured, play, run_of
+from studies.trials.sensors import TEST_CAR
+from studies.trials.speed_figures import error_dots, speed_history
+from studies.trials.velocities import FUSION, TOLD
 
 Array = npt.NDArray[np.float64]
 PARAMETERS = SCHEDULE = "longitudinal-speed"
