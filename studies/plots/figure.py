@@ -39,6 +39,7 @@ class Panel:
     legend: str = ""
     grid: bool = True
     columns: int = 1  # of the legend
+    equal: bool = False  # x and y on one scale
 
 
 @dataclass(frozen=True)

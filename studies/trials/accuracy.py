@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.stats import t as student
+
+from studies.study import Cell
 
 Array = npt.NDArray[np.float64]
 
@@ -70,7 +73,26 @@ def known_spread(values: Array) -> Spread:
     return found
 
 
-def sample_spreads(estimate: Array, truth: Array) -> tuple[Spread, Spread]:
-    """Mean and standard deviation over the samples of `sample_errors`, of (S, n) against (n,), each over the runs."""
+ERROR_COLUMNS = ("printed mean [%]", "mean [%]", "printed std [%]", "std [%]", "worst mean of a draw [%]")
+"""Of `SampleSpreads.cells`."""
+
+
+class SampleSpreads(NamedTuple):
+    """Mean and standard deviation over the samples of `sample_errors`, each over the runs."""
+
+    mean: Spread
+    deviation: Spread
+
+    def cells(self, printed: tuple[Cell, Cell] = (None, None)) -> list[Cell]:
+        """`ERROR_COLUMNS`, beside the ``printed`` mean and deviation."""
+        return [printed[0], self.mean.text(), printed[1], self.deviation.text(), round(self.mean.worst, 2)]
+
+    def measures(self, name: str) -> dict[str, float]:
+        """Both means under the name."""
+        return {f"{name}, mean": self.mean.mean, f"{name}, deviation": self.deviation.mean}
+
+
+def sample_spreads(estimate: Array, truth: Array) -> SampleSpreads:
+    """Of the estimates (S, n) against the truth (n,)."""
     error = sample_errors(estimate, truth)
-    return known_spread(error.mean(axis=1)), known_spread(error.std(axis=1))
+    return SampleSpreads(known_spread(error.mean(axis=1)), known_spread(error.std(axis=1)))

@@ -23,12 +23,7 @@ Parts = Callable[[VehicleParameters, float, tuple[int, ...]], Mapping[str, Any]]
 Reading = Callable[[PipelineStep], Array]
 """Takes one signal out of a step."""
 
-VELOCITIES: dict[str, Reading] = {"vx": lambda step: step.vx, "vy": lambda step: step.vy}
-FORCES: dict[str, Reading] = {
-    "force_x": lambda step: step.force_x,
-    "force_z": lambda step: step.force_z,
-    "axle_force_y": lambda step: step.axle_force_y,
-}
+WHEELS, INTEGRATED = "mean wheel speed", "integrated acceleration"
 
 
 def measured(truth: Truth, seeds: Sequence[int], sensors: Sensors) -> Measured:
@@ -44,37 +39,32 @@ def believed(drawn: Measured) -> VehicleParameters:
     return cars[0]
 
 
-def play(
-    drawn: Measured,
-    readings: Mapping[str, Reading],
-    parts: Parts | None = None,
-    vehicle: VehicleParameters | None = None,
-) -> dict[str, Array]:
-    """Every reading at every sample: (S, B, n) or (S, B, n, k).
+def play(drawn: Measured, readings: Mapping[str, Reading], parts: Parts | None = None) -> dict[str, Array]:
+    """Every reading at every sample: (S, B, n) or (S, B, n, k). The estimators know the truth's own parameters.
 
-    ``vehicle`` is what the estimators believe; None: the truth's own parameters. The inertial sensors are fixed to a body
-    that rolls and pitches: an `AttitudeObserver` levels them unless ``parts`` bring another attitude (None: without).
+    The inertial sensors are fixed to a body that rolls and pitches: an `AttitudeObserver` levels them unless ``parts`` bring
+    another attitude (None: without).
     """
-    car = vehicle or believed(drawn)
+    car = believed(drawn)
     time, shape = drawn.sample_time, drawn.batch_shape
     chosen = {"attitude": AttitudeObserver(time, shape), **(parts(car, time, shape) if parts else {})}
     pipeline = EstimationPipeline(car, time, shape, **chosen)
-    kept: dict[str, Array] = {}
+    found: dict[str, Array] = {}
     for k, signals in enumerate(drawn):
         step = pipeline.step(signals)
         for name, reading in readings.items():
             value = reading(step)
-            if name not in kept:
-                kept[name] = np.empty((*shape, drawn.time.size, *value.shape[2:]))
-            kept[name][:, :, k] = value
-    return kept
+            if name not in found:
+                found[name] = np.empty((*shape, drawn.time.size, *value.shape[2:]))
+            found[name][:, :, k] = value
+    return found
 
 
 def baselines(drawn: Measured) -> dict[str, Array]:
-    """V_x (S, B, n) without an observer, m/s: mean wheel speed, and a_x integrated from it."""
+    """V_x (S, B, n) without an observer, m/s: `WHEELS`, their mean speed, and `INTEGRATED`, a_x from it on."""
     wheels = (believed(drawn).radius * drawn.signals["wheel_speed"]).mean(axis=-1)
     moved = np.cumsum(drawn.signals["ax"] * drawn.sample_time, axis=-1)
-    return {"mean wheel speed": wheels, "integrated acceleration": wheels[..., :1] + moved - moved[..., :1]}
+    return {WHEELS: wheels, INTEGRATED: wheels[..., :1] + moved - moved[..., :1]}
 
 
 def run_of(truth: Truth, name: str) -> tuple[int, slice]:

@@ -1,4 +1,4 @@
-"""Steady lateral force of a truth tire against its slip angle, and the simpler tires that estimators are told instead."""
+"""Steady lateral force of a truth tire against its slip angle, and the numbers by which estimators know it."""
 
 from __future__ import annotations
 
@@ -58,10 +58,5 @@ def tire_facts(vehicle: TruthVehicle, kind: str, speed: float, friction: float) 
     angle = np.array([np.interp(USE, row[part], ANGLES[part]) for row, part in zip(curve, rising, strict=True)])
     lugre = kind == LuGreTire.name
     length = 1.0 / vehicle.lugre.kappa[1] if lugre else vehicle.magic_formula.relaxation[1]
-    return TireFacts(
-        _pair(curve[:, 0] * load / ANGLES[0]), _pair(USE * load / angle), _pair(curve.max(axis=1)), (length, length)
-    )
-
-
-def _pair(values: Array) -> tuple[float, float]:
-    return float(values[0]), float(values[1])
+    found = (curve[:, 0] * load / ANGLES[0], USE * load / angle, curve.max(axis=1), (length, length))
+    return TireFacts(*((float(front), float(rear)) for front, rear in found))

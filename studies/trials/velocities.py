@@ -8,24 +8,33 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.figure import Figure
 
 from estimators.pipeline import CornerObservers
 from estimators.schedule import GainSchedule
-from estimators.vehicle import VehicleParameters
+from estimators.vehicle import CORNERS, VehicleParameters
 from estimators.velocity import FusionSettings, SlipWeights, VelocityFusion
-from studies.plots import colours
-from studies.study import Cell, Drawing, PartResult, Scope, Table
+from studies.plots import Axis, Figure, Line, Mark, Panel, colours, dots
+from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import Spread, nrms, spread
 from studies.trials.driven import LUGRE, driven
-from studies.trials.play import QUICK_SECONDS, Parts, Reading, baselines, measured, play, run_of
+from studies.trials.histories import error_dots, history, row_axis, truth_line
+from studies.trials.play import INTEGRATED, QUICK_SECONDS, WHEELS, Parts, Reading, baselines, measured, play, run_of
 from studies.trials.sensors import TEST_CAR
 from studies.truth import Measured
 from synthesis.models.parameter_set import load_parameter_set
 
 Array = npt.NDArray[np.float64]
 OWN, FUSION = "paper's observers", "fusion"
-WHEELS, INTEGRATED = "mean wheel speed", "integrated acceleration"
+LOOKS = {
+    OWN: ("s", colours.OWN_OBSERVERS),
+    FUSION: ("o", colours.FUSION),
+    WHEELS: ("^", colours.MEAN_WHEEL_SPEED),
+    INTEGRATED: ("v", colours.INTEGRATED_ACCELERATION),
+}
+COMPLIANCE_SPREAD = 0.2
+"""Relative spread of the slip compliances that the fusion gets: as well as a fit to a drive knows them."""
+USED = 0.6
+"""Largest F_y/F_z of the fit of the side slip curve: what a car shows on a dry road before it slides."""
 
 
 @dataclass(frozen=True)
@@ -38,14 +47,6 @@ class Printed:
     vx_peak: float | None = None
     vy: float | None = None
     vy_peak: float | None = None
-
-
-TOLD = 0.2
-"""Relative spread of the slip compliances that the fusion is told: as well as a fit to a drive knows them."""
-
-
-USED = 0.6
-"""Largest F_y/F_z of the fit of the side slip curve: what a car shows on a dry road before it slides."""
 
 
 def side_slip_curve(compliance: float) -> tuple[float, float]:
@@ -65,11 +66,11 @@ def corner_observers(parameters: str) -> Parts:
     linear, cubic = side_slip_curve(across)
     settings = FusionSettings(
         slip_compliance=along,
-        slip_compliance_spread=TOLD * along,
+        slip_compliance_spread=COMPLIANCE_SPREAD * along,
         side_compliance=linear,
-        side_compliance_spread=TOLD * linear,
+        side_compliance_spread=COMPLIANCE_SPREAD * linear,
         side_cubic=cubic,
-        side_cubic_spread=cubic,  # friction of the road is not told
+        side_cubic_spread=cubic,  # the fusion does not know the friction of the road
     )
 
     def parts(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) -> Mapping[str, Any]:
@@ -98,113 +99,87 @@ def velocity_part(name: str, rows: Sequence[Printed], parts: Parts, scope: Scope
     """Play every manoeuvre of ``rows`` for the seeds of ``scope`` and put the errors beside the printed ones."""
     truth = driven(tuple(row.manoeuvre for row in rows), tire, scope, QUICK_SECONDS)
     drawn = measured(truth, range(scope.seeds), TEST_CAR)
-    estimates = play(drawn, READINGS, parts)
-    others = baselines(drawn)
+    estimates = play(drawn, READINGS, parts) | baselines(drawn)
+    sources = {"vx": {FUSION: "vx", OWN: "own_vx", WHEELS: WHEELS, INTEGRATED: INTEGRATED},
+               "vy": {FUSION: "vy", OWN: "own_vy"}}  # fmt: skip
     table: list[list[Cell]] = []
     measures: dict[str, float] = {}
-    means: dict[str, dict[str, Spread]] = {}
+    found: dict[str, list[dict[str, Spread]]] = {"vx": [], "vy": []}
     for row in rows:
-        place, samples = run_of(truth, row.manoeuvre)
-        for signal, printed, peak in (("vx", row.vx, row.vx_peak), ("vy", row.vy, row.vy_peak)):
-            true = truth[signal][place, samples]
-            found = {FUSION: estimates[signal], OWN: estimates[f"own_{signal}"]}
-            found |= others if signal == "vx" else {}
-            errors = {who: spread(nrms(value[:, place, samples], true)) for who, value in found.items()}
-            known = {who: value for who, value in errors.items() if value is not None}
-            means[f"{row.title}: {signal}"] = known
+        run, samples = run_of(truth, row.manoeuvre)
+        for signal, who_reads in sources.items():
+            true = truth[signal][run, samples]
+            errors = {who: spread(nrms(estimates[key][:, run, samples], true)) for who, key in who_reads.items()}
+            known = {who: error for who, error in errors.items() if error is not None}
+            texts = {who: error.text() for who, error in known.items()}
+            worst = round(known[FUSION].worst, 2) if FUSION in known else None
             table.append(
                 [
-                    row.title, f"V_{signal[1]}", round(float(np.abs(true).max()), 3), peak, printed,
-                    *(known[who].text() if who in known else None for who in (OWN, FUSION)),
-                    round(known[FUSION].worst, 2) if FUSION in known else None,
-                    *(known[who].text() if who in known else None for who in (WHEELS, INTEGRATED)),
+                    row.title, f"V_{signal[1]}", round(float(np.abs(true).max()), 3), getattr(row, f"{signal}_peak"),
+                    getattr(row, signal), texts.get(OWN), texts.get(FUSION), worst, texts.get(WHEELS), texts.get(INTEGRATED),
                 ]
             )  # fmt: skip
-            measures |= {f"{row.manoeuvre} {signal} {who}": value.mean for who, value in known.items()}
+            measures |= {f"{row.manoeuvre} {signal} {who}": error.mean for who, error in known.items()}
+            found[signal].append(known)
     caption = (
-        f"Velocity errors on the truth vehicle ({' and '.join(sorted(set(truth.tires)))} tires), NRMS in % of "
-        "the peak as P1 (46): "
-        f"mean over {scope.seeds} sensor draws with its 95 % confidence interval. The printed values come "
-        "from a test car on real "
-        "roads; manoeuvres, speeds and frictions are those that the paper names, everything else is ours."
+        f"Velocity errors on the truth vehicle ({' and '.join(sorted(set(truth.tires)))} tires), NRMS in % of the peak as P1 "
+        f"(46): mean over {scope.seeds} sensor draws with its 95 % confidence interval. The printed values come from a test car "
+        "on real roads; manoeuvres, speeds and frictions are those that the paper names, everything else is ours."
     )
-    drawings = [
-        _dots(f"{name}-errors", rows, means),
-        *(_history(name, drawn, row, estimates, others) for row in rows),
-    ]
+    drawings = [_dots(f"{name}-errors", rows, found), *(_history(name, drawn, row, estimates) for row in rows)]
     return PartResult(tables=[Table(f"{name}-errors", caption, COLUMNS, table)], drawings=drawings, measures=measures)
 
 
-STYLE = {
-    OWN: ("s", colours.OWN_OBSERVERS),
-    FUSION: ("o", colours.FUSION),
-    WHEELS: ("^", colours.MEAN_WHEEL_SPEED),
-    INTEGRATED: ("v", colours.INTEGRATED_ACCELERATION),
-}
-
-
-def _dots(name: str, rows: Sequence[Printed], means: Mapping[str, Mapping[str, Spread]]) -> Drawing:
-    figure = Figure(figsize=(8.0, 1.6 + 0.45 * len(rows)), layout="constrained")
-    for axes, signal in zip(figure.subplots(1, 2, sharey=True), ("vx", "vy"), strict=True):
-        for y, row in enumerate(rows):
-            for who, value in means[f"{row.title}: {signal}"].items():
-                marker, colour = STYLE[who]
-                ends = [[value.mean - value.low], [value.high - value.mean]]
-                label = who if y == 0 else None
-                axes.errorbar(
-                    value.mean,
-                    y,
-                    xerr=ends,
-                    fmt=marker,
-                    color=colour,
-                    markersize=5,
-                    capsize=2,
-                    linewidth=1,
-                    label=label,
-                )
-            printed = getattr(row, signal)
-            if printed is not None:
-                axes.plot(printed, y, "k|", markersize=14, markeredgewidth=2, label="printed" if y == 0 else None)
-        axes.set_xscale("log")
-        axes.set_xlabel(f"$V_{signal[1]}$ NRMS [% of the peak]")
-        axes.grid(axis="x", which="both", alpha=0.25)
-    first = figure.axes[0]
-    first.set_yticks(range(len(rows)), [row.title for row in rows])
-    first.set_ylim(len(rows) - 0.5, -0.5)
-    figure.legend(*first.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
-    return Drawing(
+def _dots(name: str, rows: Sequence[Printed], found: Mapping[str, Sequence[Mapping[str, Spread]]]) -> Figure:
+    panels = []
+    for signal, errors in found.items():
+        marks = error_dots(errors, LOOKS)
+        printed = [(value, k) for k, row in enumerate(rows) if (value := getattr(row, signal)) is not None]
+        if printed:
+            marks.append(
+                dots([value for value, _ in printed], [k for _, k in printed], "printed", colours.TRUTH, "|", 14.0)
+            )
+        panels.append(
+            Panel(marks, Axis(f"$V_{signal[1]}$ NRMS [% of the peak]", scale="log"), row_axis([r.title for r in rows]))
+        )
+    return Figure(
         name,
-        "Velocity errors by manoeuvre, mean over the sensor draws with 95 % interval; bars: printed values "
-        "of the paper's own car.",
+        "Velocity errors by manoeuvre, mean over the sensor draws with 95 % interval; bars: printed values of the paper's own "
+        "car.",
         "Dot plot of normalised velocity errors of the paper's observers, the fusion and two baselines for every manoeuvre.",
-        figure,
-    )
+        panels,
+        size=(8.0, 1.6 + 0.45 * len(rows)),
+        legend="below",
+        columns=3,
+        share_y="row",
+    )  # fmt: skip
 
 
-def _history(
-    name: str, drawn: Measured, row: Printed, estimates: Mapping[str, Array], others: Mapping[str, Array]
-) -> Drawing:
+def _history(name: str, drawn: Measured, row: Printed, estimates: Mapping[str, Array]) -> Figure:
     truth = drawn.truth
-    place, samples = run_of(truth, row.manoeuvre)
+    run, samples = run_of(truth, row.manoeuvre)
     time = truth.time[samples]
-    figure = Figure(figsize=(8.0, 5.0), layout="constrained")
-    top, middle, bottom = figure.subplots(3, 1, sharex=True)
-    for axes, signal in ((top, "vx"), (middle, "vy")):
-        axes.plot(time, truth[signal][place, samples], color="black", linewidth=1.6, label="truth")
-        axes.plot(time, estimates[f"own_{signal}"][0, place, samples], color=STYLE[OWN][1], linewidth=0.9, label=OWN)
-        axes.plot(time, estimates[signal][0, place, samples], color=STYLE[FUSION][1], linewidth=0.9, label=FUSION)
-        axes.set_ylabel(f"$V_{signal[1]}$ [m/s]")
-    top.plot(time, others[WHEELS][0, place, samples], color=STYLE[WHEELS][1], linewidth=0.7, label=WHEELS, zorder=0)
-    bottom.plot(time, 100.0 * truth["slip"][place, samples], linewidth=0.8, label=["fl", "fr", "rl", "rr"])
-    bottom.set_ylabel("wheel slip [%]")
-    bottom.set_xlabel("time [s]")
-    for axes in (top, middle, bottom):
-        axes.grid(alpha=0.25)
-    top.legend(ncols=4, fontsize="small", frameon=False, loc="best")
-    bottom.legend(ncols=4, fontsize="small", frameon=False, loc="best")
-    return Drawing(
+
+    def line(key: str, who: str, width: float) -> Mark:
+        return Line(time, estimates[key][0, run, samples], who, LOOKS[who][1], width=width)
+
+    panels = []
+    for signal in ("vx", "vy"):
+        marks: list[Mark] = [line(WHEELS, WHEELS, 0.7)] if signal == "vx" else []
+        marks += [
+            truth_line(time, truth[signal][run, samples]),
+            line(f"own_{signal}", OWN, 0.9),
+            line(signal, FUSION, 0.9),
+        ]
+        panels.append(Panel(marks, y=f"$V_{signal[1]}$ [m/s]", legend="best" if signal == "vx" else "", columns=4))
+    slips = [
+        Line(time, 100.0 * truth["slip"][run, samples, k], corner, color, width=0.8)
+        for k, (corner, color) in enumerate(zip(CORNERS, colours.CORNERS, strict=True))
+    ]
+    return history(
         f"{name}-{row.manoeuvre}",
         f"{row.title}: velocities at the centre of gravity and wheel slip, first sensor draw.",
         f"Time histories of longitudinal and lateral velocity with estimates, and of the four wheel slips, for {row.title}.",
-        figure,
-    )
+        [*panels, Panel(slips, y="wheel slip [%]", legend="best", columns=4)],
+        (8.0, 5.0),
+    )  # fmt: skip

@@ -7,6 +7,8 @@ import re
 from typing import Any
 
 from studies.claim import Verdict
+from studies.plots import Figure
+from studies.plots.draw import draw
 from studies.study import Part, PartResult, Study
 
 
@@ -27,8 +29,9 @@ def check_result(result: PartResult) -> None:
     """Axes carry names and units, captions say something, rows fit their columns, claims are JSON."""
     for drawing in result.drawings:
         assert len(drawing.caption) > 120 and len(drawing.alternative) > 60, drawing.name
-        drawing.figure.draw_without_rendering()
-        for axis in drawing.figure.axes:
+        sheet = draw(drawing) if isinstance(drawing, Figure) else drawing.figure
+        sheet.draw_without_rendering()
+        for axis in sheet.axes:
             for label, wanted in ((axis.get_xlabel(), _bottom(axis)), (axis.get_ylabel(), _leftmost(axis))):
                 if wanted or label:
                     assert label, f"{drawing.name}: an axis has no name"

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 
+from studies.papers.ekf_ukf_lateral.bends import four_wheel_part
 from studies.papers.ekf_ukf_lateral.published_table import table_1
 from studies.study import PartResult, Scope
 from studies.trials.driven import MAGIC_FORMULA, driven_part
-from studies.trials.four_wheel_report import four_wheel_part
 from studies.trials.motion import Moved, motion_part
 
 MANOEUVRE = "p4-bends-dry"

@@ -8,10 +8,10 @@ from functools import partial
 from estimators.forces import UnknownInputForceObserver, WheelForceFilter
 from estimators.vehicle import CORNERS, VehicleParameters
 from studies.papers.longitudinal_speed.driven_tests import driven_tests_part
+from studies.papers.longitudinal_speed.speed_trial import Drive, speed_part
 from studies.trials.driven import driven_part
 from studies.trials.forces import Driven, force_part
 from studies.trials.motion import Moved, motion_part
-from studies.trials.speed import Drive, speed_part
 
 
 def _printed(

@@ -1,4 +1,4 @@
-"""A drive of a single-track car with saturating axles: the design model of P5 with a tire that it does not know."""
+"""A single-track car with saturating axles: the design model of P5 with a tire that it does not know."""
 
 from __future__ import annotations
 
@@ -9,34 +9,17 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from estimators.sideslip import SingleTrack
-from synthesis.models.catalogue.single_track import PEUGEOT_307
+from studies.papers.smo_ekf_sideslip.inputs import CAR, PRINTED_GRAVITY, SAMPLE_TIME, WHEELBASE, published_car
 from synthesis.polynomials.matrix import FloatArray
 
-SAMPLE_TIME = 0.01  # s
-GRAVITY = 9.81  # m/s^2
 LINEAR = 1e9  # friction so large that the axles are linear: an observer with the right stiffness has no model error
-Steering = Callable[[float], float]
-
-
-def published_car(mass_change: float = 0.0, stiffness_factor: float = 1.0) -> SingleTrack:
-    """The car of P5 Table B.1, with another assumed mass [kg] or stiffness."""
-    value = {name: constant.value for name, constant in PEUGEOT_307.items()}
-    return SingleTrack(
-        value["mass"] + mass_change,
-        value["yaw_inertia"],
-        value["front_axle_distance"],
-        value["rear_axle_distance"],
-        value["front_stiffness"] * stiffness_factor,
-        value["rear_stiffness"] * stiffness_factor,
-    )
 
 
 @dataclass(frozen=True)
-class AxleDrive:
+class SimulatedRun:
     """Samples (n,): time s, steering rad, speed m/s, sideslip rad, yaw rate rad/s; slips (n, 2) rad of front and rear axle.
 
-    Wheel-axis forces in N: `forces` (n, 2) lateral, `drive` (n,) longitudinal in front; accelerations (n,) in m/s^2.
+    Wheel-axis forces in N: `forces` (n, 2) lateral, `front_force_x` (n,); accelerations (n,) in m/s^2.
     """
 
     time: FloatArray
@@ -46,7 +29,7 @@ class AxleDrive:
     yaw_rate: FloatArray
     slips: FloatArray
     forces: FloatArray
-    drive: FloatArray
+    front_force_x: FloatArray
     longitudinal_acceleration: FloatArray
     lateral_acceleration: FloatArray
 
@@ -58,20 +41,17 @@ class AxleDrive:
     def body_forces(self) -> FloatArray:
         """F_y1, F_yw2, F_x1 (n, 3) in body axes: what the force observer estimates."""
         sine, cosine = np.sin(self.steering), np.cos(self.steering)
-        front = self.forces[:, 0] * cosine + self.drive * sine
-        return np.stack([front, self.forces[:, 1], self.drive * cosine - self.forces[:, 0] * sine], axis=1)
+        front = self.forces[:, 0] * cosine + self.front_force_x * sine
+        along = self.front_force_x * cosine - self.forces[:, 0] * sine
+        return np.stack([front, self.forces[:, 1], along], axis=1)
 
 
-def with_noise(drive: AxleDrive, seed: int = 0) -> AxleDrive:
-    """The same drive with white noise on what is measured: yaw rate 0.2 deg/s, accelerations 0.1 m/s^2."""
+def with_noise(run: SimulatedRun, seed: int = 0) -> SimulatedRun:
+    """The same run with white noise on what is measured: yaw rate 0.2 deg/s, accelerations 0.1 m/s^2."""
     random = np.random.default_rng(seed)
-    n = len(drive.time)
-    return replace(
-        drive,
-        yaw_rate=drive.yaw_rate + np.radians(0.2) * random.standard_normal(n),
-        longitudinal_acceleration=drive.longitudinal_acceleration + 0.1 * random.standard_normal(n),
-        lateral_acceleration=drive.lateral_acceleration + 0.1 * random.standard_normal(n),
-    )
+    sizes = {"yaw_rate": np.radians(0.2), "longitudinal_acceleration": 0.1, "lateral_acceleration": 0.1}
+    noisy = {name: getattr(run, name) + size * random.standard_normal(run.time.size) for name, size in sizes.items()}
+    return replace(run, **noisy)
 
 
 def slalom(time: float) -> float:
@@ -85,35 +65,31 @@ def steady_turn(time: float) -> float:
     return float(np.radians(3.0) * min(max(time - 1.0, 0.0), 1.0))
 
 
-def axle_drive(
-    steering: Steering = slalom, speed: float = 17.0, seconds: float = 20.0, friction: float = 1.0
-) -> AxleDrive:
+def simulate(
+    steering: Callable[[float], float] = slalom, speed: float = 17.0, seconds: float = 20.0, friction: float = 1.0
+) -> SimulatedRun:
     """F_i = D_i tanh(C_i beta_i / D_i) with D_i = friction times the axle load; the drive force keeps the speed constant.
 
     P5 (10), (11) and (1) with the front forces turned into body axes. A large `friction` makes the axles linear.
     """
-    car = published_car()
-    weight = car.mass * GRAVITY / (car.front_lever + car.rear_lever)
-    limit = friction * weight * np.array([car.rear_lever, car.front_lever])
+    car, front, rear = published_car(), CAR.front_axle_distance, CAR.rear_axle_distance
+    limit = friction * (car.mass * PRINTED_GRAVITY / WHEELBASE) * np.array([rear, front])
     stiffness = np.array([car.front_stiffness, car.rear_stiffness])
 
     def forces(angle: Any, beta: Any, yaw: Any) -> tuple[FloatArray, FloatArray, Any]:
         """Slips (..., 2), lateral forces (..., 2), and the drive force for which V' = 0."""
-        front, rear = angle - beta - car.front_lever * yaw / speed, -beta + car.rear_lever * yaw / speed
-        slips = np.stack([front, rear], axis=-1)
+        slips = np.stack([angle - beta - front * yaw / speed, -beta + rear * yaw / speed], axis=-1)
         across = limit * np.tanh(stiffness * slips / limit)
         turned = angle - beta
-        drive = (across[..., 0] * np.sin(turned) - across[..., 1] * np.sin(beta)) / np.cos(turned)
-        return slips, across, drive
+        return slips, across, (across[..., 0] * np.sin(turned) - across[..., 1] * np.sin(beta)) / np.cos(turned)
 
     def rate(t: float, x: FloatArray) -> list[float]:
         angle = steering(t)
         _, across, drive = forces(angle, x[0], x[1])
         turned = angle - x[0]
         lateral = drive * np.sin(turned) + across[0] * np.cos(turned) + across[1] * np.cos(x[0])
-        front = across[0] * np.cos(angle) + drive * np.sin(angle)
-        turn = (car.front_lever * front - car.rear_lever * across[1]) / car.yaw_inertia
-        return [lateral / (car.mass * speed) - x[1], turn]
+        turn = front * (across[0] * np.cos(angle) + drive * np.sin(angle)) - rear * across[1]
+        return [lateral / (car.mass * speed) - x[1], turn / car.yaw_inertia]
 
     time = np.arange(0.0, seconds, SAMPLE_TIME)
     beta, yaw = solve_ivp(rate, (0.0, seconds), [0.0, 0.0], t_eval=time, rtol=1e-8, atol=1e-10, max_step=0.05).y
@@ -122,4 +98,4 @@ def axle_drive(
     along = drive * np.cos(angle) - across[:, 0] * np.sin(angle)
     side = across[:, 0] * np.cos(angle) + drive * np.sin(angle) + across[:, 1]
     constant = np.full(time.shape, speed)
-    return AxleDrive(time, angle, constant, beta, yaw, slips, across, drive, along / car.mass, side / car.mass)
+    return SimulatedRun(time, angle, constant, beta, yaw, slips, across, drive, along / car.mass, side / car.mass)

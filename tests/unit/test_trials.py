@@ -1,4 +1,4 @@
-"""Experiments on truth drives: what they share, their errors against known ones, and what they refuse."""
+"""Trials on simulated drives: what they share, their errors against known ones, and what they refuse."""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from studies.plots import Line
 from studies.study import PartResult
 from studies.trials.motion import COLUMNS, Moved, extremes, motion_drawings
 from studies.truth import Truth, load_manoeuvre
@@ -50,7 +51,9 @@ def test_figures_stand_on_their_own_and_show_the_path(circle: Truth) -> None:
         "motion-p4-bends-dry", "motion-course-p4-bends-dry", "motion-rear-p4-bends-dry"
     ]  # fmt: skip
     check_result(PartResult(drawings=drawings))
-    path = np.asarray(drawings[1].figure.axes[0].lines[0].get_xydata())
+    line = drawings[1].rows[0][0].marks[0]  # type: ignore[union-attr]
+    assert isinstance(line, Line)
+    path = np.stack([line.x, line.y], axis=-1)
     centre = np.array([0.0, -SPEED / TURN])
     assert np.linalg.norm(path - centre, axis=1) == pytest.approx(SPEED / TURN)
 
