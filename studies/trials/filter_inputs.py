@@ -5,11 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from studies.study import Scope
-from studies.trials.driven import QUICK_SECONDS, driven
 from studies.trials.play import believed
-from studies.trials.sensors import TEST_CAR
-from studies.truth import Measured, draw
+from studies.truth import Measured
 
 Array = npt.NDArray[np.float64]
 SAMPLE_TIME = 0.01
@@ -19,11 +16,6 @@ START = 1.0
 LEAST_SPEED = 3.0
 """m/s below which sideslip has no error."""
 PRINTED_TEST = "Printed values are those of the paper's road test with another driver, road and car."
-
-
-def sampled(manoeuvre: str, tire: str, scope: Scope, seconds: float = QUICK_SECONDS) -> Measured:
-    """Sensor draws (S, 1) of one manoeuvre at 100 Hz; when quick, of its first ``seconds``."""
-    return draw(driven((manoeuvre,), tire, scope, seconds), TEST_CAR, range(scope.seeds), SAMPLE_TIME)
 
 
 def rear_speed(drawn: Measured) -> Array:
@@ -49,6 +41,6 @@ def conditions(drawn: Measured) -> str:
     """The beginning of a caption: tires, time, sensor draws, and what counts."""
     truth = drawn.truth
     return (
-        f"Truth vehicle on {truth.tires[0]} tires, {truth.time[-1]:.0f} s at 100 Hz: means over {len(drawn.seeds)} draws of the "
-        f"sensor errors with 95 % confidence intervals, judged from {START:g} s on above {LEAST_SPEED:g} m/s."
+        f"Truth vehicle on {truth.tires[0]} tires, {truth.time[-1]:.0f} s at 100 Hz: means over {len(drawn.seeds)} draws of "
+        f"the sensor errors with 95 % confidence intervals, judged from {START:g} s on above {LEAST_SPEED:g} m/s."
     )

@@ -14,10 +14,9 @@ from estimators.vehicle import CORNERS, VehicleParameters
 from studies.plots import Figure, Line, Panel, colours
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import nrms, spread
-from studies.trials.driven import LUGRE, driven
+from studies.trials.driven import LUGRE
 from studies.trials.histories import history
-from studies.trials.play import QUICK_SECONDS, Parts, Reading, measured, play, run_of
-from studies.trials.sensors import TEST_CAR
+from studies.trials.play import Parts, Reading, measured_runs, play, run_of
 from studies.truth import Truth
 
 Array = npt.NDArray[np.float64]
@@ -51,8 +50,8 @@ def force_part(
     name: str, rows: Sequence[Driven], methods: Mapping[str, Parts], scope: Scope, tire: str = LUGRE
 ) -> PartResult:
     """Play every manoeuvre with each of the paper's wheel force observers in the pipeline; F_y and F_z from the first one."""
-    truth = driven(tuple(row.manoeuvre for row in rows), tire, scope, QUICK_SECONDS)
-    drawn = measured(truth, range(scope.seeds), TEST_CAR)
+    drawn = measured_runs([row.manoeuvre for row in rows], tire, scope)
+    truth = drawn.truth
     estimates = {method: play(drawn, READINGS, parts) for method, parts in methods.items()}
     first = next(iter(estimates.values()))
     table: list[list[Cell]] = []

@@ -12,6 +12,9 @@ from estimators.forces import AttitudeObserver
 from estimators.pipeline import EstimationPipeline
 from estimators.pipeline.result import PipelineStep
 from estimators.vehicle import VehicleParameters
+from studies.study import Scope
+from studies.trials.driven import driven
+from studies.trials.sensors import TEST_CAR
 from studies.truth import Measured, Sensors, Truth, draw
 from synthesis.errors import SpecError
 
@@ -24,6 +27,13 @@ Reading = Callable[[PipelineStep], Array]
 """Takes one signal out of a step."""
 
 WHEELS, INTEGRATED = "mean wheel speed", "integrated acceleration"
+
+
+def measured_runs(
+    names: Sequence[str], tire: str, scope: Scope, seconds: float = QUICK_SECONDS, sample_time: float = 0.005
+) -> Measured:
+    """Sensor draws (S, B) of the named manoeuvres on one kind of tire; when quick, of the first ``seconds`` of each."""
+    return draw(driven(tuple(names), tire, scope, seconds), TEST_CAR, range(scope.seeds), sample_time)
 
 
 def measured(truth: Truth, seeds: Sequence[int], sensors: Sensors) -> Measured:

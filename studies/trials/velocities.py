@@ -16,10 +16,9 @@ from estimators.velocity import FusionSettings, SlipWeights, VelocityFusion
 from studies.plots import Axis, Figure, Line, Mark, Panel, colours, dots
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import Spread, nrms, spread
-from studies.trials.driven import LUGRE, driven
+from studies.trials.driven import LUGRE
 from studies.trials.histories import error_dots, history, row_axis, truth_line
-from studies.trials.play import INTEGRATED, QUICK_SECONDS, WHEELS, Parts, Reading, baselines, measured, play, run_of
-from studies.trials.sensors import TEST_CAR
+from studies.trials.play import INTEGRATED, WHEELS, Parts, Reading, baselines, measured_runs, play, run_of
 from studies.truth import Measured
 from synthesis.models.parameter_set import load_parameter_set
 
@@ -97,8 +96,8 @@ COLUMNS = (
 
 def velocity_part(name: str, rows: Sequence[Printed], parts: Parts, scope: Scope, tire: str = LUGRE) -> PartResult:
     """Play every manoeuvre of ``rows`` for the seeds of ``scope`` and put the errors beside the printed ones."""
-    truth = driven(tuple(row.manoeuvre for row in rows), tire, scope, QUICK_SECONDS)
-    drawn = measured(truth, range(scope.seeds), TEST_CAR)
+    drawn = measured_runs([row.manoeuvre for row in rows], tire, scope)
+    truth = drawn.truth
     estimates = play(drawn, READINGS, parts) | baselines(drawn)
     sources = {"vx": {FUSION: "vx", OWN: "own_vx", WHEELS: WHEELS, INTEGRATED: INTEGRATED},
                "vy": {FUSION: "vy", OWN: "own_vy"}}  # fmt: skip
@@ -123,8 +122,8 @@ def velocity_part(name: str, rows: Sequence[Printed], parts: Parts, scope: Scope
             found[signal].append(known)
     caption = (
         f"Velocity errors on the truth vehicle ({' and '.join(sorted(set(truth.tires)))} tires), NRMS in % of the peak as P1 "
-        f"(46): mean over {scope.seeds} sensor draws with its 95 % confidence interval. The printed values come from a test car "
-        "on real roads; manoeuvres, speeds and frictions are those that the paper names, everything else is ours."
+        f"(46): mean over {scope.seeds} sensor draws with its 95 % confidence interval. The printed values come from a test "
+        "car on real roads; manoeuvres, speeds and frictions are those that the paper names, everything else is ours."
     )
     drawings = [_dots(f"{name}-errors", rows, found), *(_history(name, drawn, row, estimates) for row in rows)]
     return PartResult(tables=[Table(f"{name}-errors", caption, COLUMNS, table)], drawings=drawings, measures=measures)
@@ -144,8 +143,8 @@ def _dots(name: str, rows: Sequence[Printed], found: Mapping[str, Sequence[Mappi
         )
     return Figure(
         name,
-        "Velocity errors by manoeuvre, mean over the sensor draws with 95 % interval; bars: printed values of the paper's own "
-        "car.",
+        "Velocity errors by manoeuvre, mean over the sensor draws with 95 % interval; bars: printed values of the paper's "
+        "own car.",
         "Dot plot of normalised velocity errors of the paper's observers, the fusion and two baselines for every manoeuvre.",
         panels,
         size=(8.0, 1.6 + 0.45 * len(rows)),

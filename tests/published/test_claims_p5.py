@@ -303,7 +303,7 @@ def test_drive_obeys_its_equations() -> None:
     np.testing.assert_allclose(moment[5:-5], car.yaw_inertia * turn[5:-5], atol=20.0)
     lateral = drive.speed * np.sin(drive.sideslip)
     across = np.gradient(lateral, 0.01) + drive.yaw_rate * drive.speed * np.cos(drive.sideslip)
-    np.testing.assert_allclose(drive.lateral_acceleration[5:-5], across[5:-5], atol=5e-3)
+    np.testing.assert_allclose(drive.ay[5:-5], across[5:-5], atol=5e-3)
     np.testing.assert_allclose(body.sum(axis=1)[0], 0.0, atol=1e-9)
 
 

@@ -18,9 +18,9 @@ from studies.plots import Axis, Dash, Figure, Level, Mark, Panel, colours, dots
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import ERROR_COLUMNS, SampleSpreads, known_spread, sample_errors, sample_spreads
 from studies.trials.driven import LUGRE
-from studies.trials.filter_inputs import PRINTED_TEST, conditions, counted, front_steer, rear_speed, sampled
+from studies.trials.filter_inputs import PRINTED_TEST, SAMPLE_TIME, conditions, counted, front_steer, rear_speed
 from studies.trials.histories import BANDS, dot_heights, error_dots, estimate_lines, history, row_axis, truth_line
-from studies.trials.play import Reading, believed, play
+from studies.trials.play import Reading, believed, measured_runs, play
 from studies.trials.tire_curve import USE, TireFacts, tire_facts
 from studies.truth import Measured
 
@@ -143,7 +143,7 @@ def _observed(
 
 def four_wheel_part(name: str, manoeuvre: str, printed: Sequence[Row], scope: Scope, tire: str = LUGRE) -> PartResult:
     """Both filters on one manoeuvre; ``printed`` are four force rows in the order of the corners, then sideslip."""
-    run = run_four_wheel(sampled(manoeuvre, tire, scope, QUICK_SECONDS))
+    run = run_four_wheel(measured_runs((manoeuvre,), tire, scope, QUICK_SECONDS, SAMPLE_TIME))
     found = [run.errors(k) for k in range(len(printed))]
     rows: list[list[Cell]] = []
     measures: dict[str, float] = {}
@@ -187,9 +187,9 @@ def _about(run: FourWheelRun) -> str:
     tire = run.tire
     return (
         f"{conditions(run.drawn)} The filters believe the truth's masses and lengths, its relaxation length "
-        f"({tire.relaxation[0]:.3g} m), its greatest friction ({np.mean(tire.peak):.2f}), and the secant of its tire at {USE:g} "
-        f"of the static load ({tire.secant[0] / 1e3:.1f} and {tire.secant[1] / 1e3:.1f} kN/rad a tire){AT_REST}: the slope at no "
-        f"slip instead ({tire.slope[0] / 1e3:.1f} and {tire.slope[1] / 1e3:.1f} kN/rad). {PRINTED_TEST}"
+        f"({tire.relaxation[0]:.3g} m), its greatest friction ({np.mean(tire.peak):.2f}), and the secant of its tire at "
+        f"{USE:g} of the static load ({tire.secant[0] / 1e3:.1f} and {tire.secant[1] / 1e3:.1f} kN/rad a tire){AT_REST}: the "
+        f"slope at no slip instead ({tire.slope[0] / 1e3:.1f} and {tire.slope[1] / 1e3:.1f} kN/rad). {PRINTED_TEST}"
     )
 
 
@@ -279,8 +279,8 @@ def used_friction_history(name: str, run: FourWheelRun) -> Figure:
     ]  # fmt: skip
     return history(
         name,
-        f"Fig. 9 of P4 on {run.drawn.truth.tires[0]} tires: used lateral friction (14) of the four wheels, and the greatest that "
-        "the tire has.",
+        f"Fig. 9 of P4 on {run.drawn.truth.tires[0]} tires: used lateral friction (14) of the four wheels, and the greatest "
+        "that the tire has.",
         "Four panels of lateral force over vertical load with the unscented filter's estimate and the friction limit.",
         _corners(run, marks, "$F_y/F_z$"),
         (9.0, 4.6),

@@ -16,20 +16,9 @@ from estimators.velocity import BristleTire, FusionSettings, VelocityFusion
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel, colours
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import Spread, known_spread, nrms
-from studies.trials.driven import LUGRE, driven
+from studies.trials.driven import LUGRE
 from studies.trials.histories import BANDS, backgrounds, error_dots, estimate_lines, history, row_axis, truth_line
-from studies.trials.play import (
-    INTEGRATED,
-    QUICK_SECONDS,
-    WHEELS,
-    Reading,
-    baselines,
-    believed,
-    measured,
-    play,
-    run_of,
-)
-from studies.trials.sensors import TEST_CAR
+from studies.trials.play import INTEGRATED, WHEELS, Reading, baselines, believed, measured_runs, play, run_of
 from studies.trials.velocities import COMPLIANCE_SPREAD, FUSION
 from studies.truth import Measured
 from synthesis.models.parameter_set import load_parameter_set
@@ -109,8 +98,8 @@ def parts(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) ->
 
 def speed_part(name: str, rows: Sequence[Drive], scope: Scope, tire: str = LUGRE) -> PartResult:
     """Errors of V_x of all of them in every manoeuvre."""
-    truth = driven(tuple(row.manoeuvre for row in rows), tire, scope, QUICK_SECONDS)
-    drawn = measured(truth, range(scope.seeds), TEST_CAR)
+    drawn = measured_runs([row.manoeuvre for row in rows], tire, scope)
+    truth = drawn.truth
     estimates = play(drawn, READINGS, parts) | baselines(drawn)
     table: list[list[Cell]] = []
     measures: dict[str, float] = {}
@@ -131,10 +120,10 @@ def speed_part(name: str, rows: Sequence[Drive], scope: Scope, tire: str = LUGRE
             measures[f"{row.manoeuvre}, {who}"] = error.mean
     caption = (
         f"Longitudinal speed at the centre of gravity on the truth vehicle ({tire} tires), NRMS in % of the peak as P1 (46): "
-        f"mean over {scope.seeds} sensor draws with its 95 % confidence interval, the worst draw, and the greatest error in m/s. "
-        "Kalman filters: P2 (19) to (23) with the detector (29), the published covariances and equal weights of the axles; "
-        f"schedule: the shipped '{PARAMETERS}' observer in the same place. The paper claims less than {CLAIMED:g} % without a "
-        "table."
+        f"mean over {scope.seeds} sensor draws with its 95 % confidence interval, the worst draw, and the greatest error in "
+        "m/s. Kalman filters: P2 (19) to (23) with the detector (29), the published covariances and equal weights of the "
+        f"axles; schedule: the shipped '{PARAMETERS}' observer in the same place. The paper claims less than {CLAIMED:g} % "
+        "without a table."
     )
     columns = (
         "manoeuvre", "peak [m/s]", "estimate", "claimed NRMS [%]", "NRMS [%]", "worst draw [%]", "every draw below the claim",
@@ -151,8 +140,8 @@ def dot_figure(name: str, rows: Sequence[Drive], found: Sequence[Mapping[str, Sp
     x = Axis("$V_x$ NRMS [% of the peak]", scale="log")
     return Figure(
         name,
-        "Error of the longitudinal speed by manoeuvre, mean over the sensor draws with 95 % interval; dashed: what P2 claims of "
-        "its own.",
+        "Error of the longitudinal speed by manoeuvre, mean over the sensor draws with 95 % interval; dashed: what P2 claims "
+        "of its own.",
         "Dot plot of the normalised speed error of two Kalman filters, a gain schedule, the fusion and two baselines by "
         "manoeuvre.",
         Panel(marks, x, row_axis([row.title for row in rows])),
@@ -187,8 +176,8 @@ def speed_history(name: str, drawn: Measured, row: Drive, estimates: Mapping[str
     return history(
         name,
         f"{row.title}: speed of the car, its error, and the velocity of the front left wheel's centre. {BANDS}",
-        "Three panels over time: speed with estimates, errors of the estimates, and the front left wheel with detected high slip "
-        "shaded.",
+        "Three panels over time: speed with estimates, errors of the estimates, and the front left wheel with detected high "
+        "slip shaded.",
         [
             Panel(speeds, y="$V_x$ [m/s]", legend="best", columns=3),
             Panel(errors, y="error of $V_x$ [m/s]"),

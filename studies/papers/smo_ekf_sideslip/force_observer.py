@@ -64,9 +64,9 @@ def gain_condition(gains: SlidingModeGains = PUBLISHED) -> Finding:
         "residual_Nm_s": float(residual),
     }
     reading = (
-        f"(7) gives {float(exact):.3f} N/s; the printed {gains[5]:g} is rounded to thousands and leaves a residual "
-        f"of {float(residual):g} N m/s in (A.11). It is harmless: on the sliding surface the equivalent value of the "
-        "lateral sign is zero, so the residual does not act there and the split decays at the same rate."
+        f"(7) gives {float(exact):.3f} N/s; the printed {gains[5]:g} is rounded to thousands and leaves a residual of "
+        f"{float(residual):g} N m/s in (A.11). It is harmless: on the sliding surface the equivalent value of the lateral "
+        "sign is zero, so the residual does not act there and the split decays at the same rate."
     )
     return Finding(computed, judged(agrees(float(exact), gains[5], 0.5)), reading)
 
@@ -89,10 +89,10 @@ def dominance(gains: SlidingModeGains = PUBLISHED) -> Finding:
         "reaching_time_from_60_kNm_s": reaching_time(SlidingModeGains(matrix), CAR, 0.0, 60_000.0),
     }
     reading = (
-        f"Omega_1 dominates while |L_1 x_2 - L_2 x_3| < {found.yaw_moment_limit / 1e3:g} kN m, the worst start from "
-        f"the printed maxima has {WORST_MOMENT / 1e3:.2f} kN m; Omega_12 always dominates. So the condition is local, not "
-        "global. (A.4) prints L_1 x_2 + L_2 x_3; with that sign it is no condition (an error with zero sum makes "
-        "the yaw error grow), (A.5) has the minus."
+        f"Omega_1 dominates while |L_1 x_2 - L_2 x_3| < {found.yaw_moment_limit / 1e3:g} kN m, the worst start from the "
+        f"printed maxima has {WORST_MOMENT / 1e3:.2f} kN m; Omega_12 always dominates. So the condition is local, not global. "
+        "(A.4) prints L_1 x_2 + L_2 x_3; with that sign it is no condition (an error with zero sum makes the yaw error "
+        "grow), (A.5) has the minus."
     )
     return Finding(computed, judged(found.holds and found.yaw_margin > 0.0 and growth > 0.0), reading)
 
@@ -114,9 +114,9 @@ def split_decay(gains: SlidingModeGains = PUBLISHED, tolerance: float = 1e-3) ->
         "epsilon_lateral_N_s": lateral_margin,
     }
     reading = (
-        f"The split error decays at Omega_4 (L_1 + L_2) / (Omega_1 I_z) = {exact} = {float(exact):g} 1/s (time "
-        f"constant {float(1 / exact):.3f} s), in the simulated sliding motion at {-slope:.4f} 1/s: far slower than "
-        "the sum of the forces, which is reached in finite time. Proved for constant true forces only."
+        f"The split error decays at Omega_4 (L_1 + L_2) / (Omega_1 I_z) = {exact} = {float(exact):g} 1/s (time constant "
+        f"{float(1 / exact):.3f} s), in the simulated sliding motion at {-slope:.4f} 1/s: far slower than the sum of the "
+        "forces, which is reached in finite time. Proved for constant true forces only."
     )
     good = exact > 0 and lateral_margin > 0.0 and abs(-slope / float(exact) - 1.0) < tolerance
     return Finding(computed, judged(good), reading)
@@ -141,9 +141,8 @@ def gain_conditions() -> Table:
     ]  # fmt: skip
     return Table(
         "gain-conditions",
-        "Conditions of Appendix A with the printed gains, at the worst start that the printed maxima of Table 1 "
-        f"allow (|L1 x2 - L2 x3| = {WORST_MOMENT / 1e3:.2f} kN m); (A.4) with the minus sign of (A.5). Margins in the unit "
-        "given.",
+        "Conditions of Appendix A with the printed gains, at the worst start that the printed maxima of Table 1 allow (|L1 "
+        f"x2 - L2 x3| = {WORST_MOMENT / 1e3:.2f} kN m); (A.4) with the minus sign of (A.5). Margins in the unit given.",
         ("condition", "unit", "margin or value", "holds"),
         rows,
     )
@@ -168,13 +167,12 @@ def convergence() -> Figure:
     ]
     return Figure(
         "convergence",
-        "Error of the sliding-mode observer from the worst start that the printed maxima allow (6.28 kN in front, "
-        "−3.66 kN at the rear), printed gains, bare sign at 50 kHz, constant true forces. Left: the sum of the "
-        "lateral forces and the longitudinal force are reached within 0.13 s; what remains is a wrong split "
-        "between the axles. Right: that split decays at 3.44 1/s, as (A.12) says, and stays below the limit up to "
-        "which Omega_1 dominates.",
-        "Left: force errors over time; the sum drops to zero at once, front and rear errors decay slowly towards "
-        "zero from opposite sides. Right: the split on a logarithmic scale, parallel to a dashed exponential.",
+        "Error of the sliding-mode observer from the worst start that the printed maxima allow (6.28 kN in front, −3.66 kN "
+        "at the rear), printed gains, bare sign at 50 kHz, constant true forces. Left: the sum of the lateral forces and the "
+        "longitudinal force are reached within 0.13 s; what remains is a wrong split between the axles. Right: that split "
+        "decays at 3.44 1/s, as (A.12) says, and stays below the limit up to which Omega_1 dominates.",
+        "Left: force errors over time; the sum drops to zero at once, front and rear errors decay slowly towards zero from "
+        "opposite sides. Right: the split on a logarithmic scale, parallel to a dashed exponential.",
         [
             Panel(forces, "time [s]", "force error [kN]", legend="best"),
             Panel(marks, "time [s]", Axis("yaw moment error of the split [kN m]", 0.1, 60.0, "log"), legend="best"),

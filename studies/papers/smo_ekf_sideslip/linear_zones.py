@@ -78,10 +78,10 @@ def sampled_switching(readings: Sequence[Sequence[float]] = (WIDE, NARROW)) -> F
     stable = [zone["spectral_radius"] < 1.0 for zone in zones]
     verdict = Verdict.REPRODUCED if all(stable) else Verdict.UNDER_SPECIFIED if any(stable) else Verdict.NOT_REPRODUCED
     reading = (
-        f"The bare sign chatters at 100 Hz by up to {high[0]:.3f} rad/s and by force peaks that depend on "
-        f"the start (front up to {high[1]:.0f} N, longitudinal {low[3]:.0f} to "
-        f"{high[3]:.0f} N). The widths of the linear zones are not printed and decide: each has a lower "
-        f"limit (gain times half a sample: {LEAST[0]:.2f} rad/s, {LEAST[1]:.2f} and {LEAST[2]:.2f} m/s^2). Two readings: "
+        f"The bare sign chatters at 100 Hz by up to {high[0]:.3f} rad/s and by force peaks that depend on the start (front up "
+        f"to {high[1]:.0f} N, longitudinal {low[3]:.0f} to {high[3]:.0f} N). The widths of the linear zones are not printed "
+        f"and decide: each has a lower limit (gain times half a sample: {LEAST[0]:.2f} rad/s, {LEAST[1]:.2f} and "
+        f"{LEAST[2]:.2f} m/s^2). Two readings: "
         + "; ".join(f"{tuple(z['widths'])} gives a spectral radius of {z['spectral_radius']:.4f}" for z in zones)
         + "."
     )
@@ -112,8 +112,8 @@ def zone_table() -> Table:
         rows.append([name, *known, round(float(yaw), 5), *(round(float(peak), 2) for peak in peaks)])
     return Table(
         "zone-widths",
-        "The observer at 100 Hz with different widths of the linear zones (P5 prints none): spectral radius inside "
-        "the zones, and largest errors after 3 s over 60 starts within the printed maxima, true forces constant.",
+        "The observer at 100 Hz with different widths of the linear zones (P5 prints none): spectral radius inside the "
+        "zones, and largest errors after 3 s over 60 starts within the printed maxima, true forces constant.",
         ("reading", "yaw width [rad/s]", "lateral width [m/s^2]", "longitudinal width [m/s^2]", "spectral radius [1]",
          "yaw rate error [rad/s]", "front force error [N]", "rear force error [N]", "longitudinal force error [N]"),
         rows,
@@ -137,12 +137,10 @@ def chatter() -> Figure:
         lower.append(Panel(force, "time [s]", "front force error [kN]" if first else ""))
     return Figure(
         "chatter",
-        "The same start at 100 Hz with Euler steps: error of yaw rate and front lateral force with the bare sign, "
-        "and with linear zones of two widths (rad/s, m/s², m/s²; P5 prints none). The sign chatters by 0.1 rad/s "
-        "and several hundred newtons; zones wide enough converge smoothly, zones narrower than gain times half a "
-        "sample keep chattering.",
-        "Six panels over two seconds: ragged bands for the bare sign and the narrow zone, smooth decay for the "
-        "wide zone.",
+        "The same start at 100 Hz with Euler steps: error of yaw rate and front lateral force with the bare sign, and with "
+        "linear zones of two widths (rad/s, m/s², m/s²; P5 prints none). The sign chatters by 0.1 rad/s and several hundred "
+        "newtons; zones wide enough converge smoothly, zones narrower than gain times half a sample keep chattering.",
+        "Six panels over two seconds: ragged bands for the bare sign and the narrow zone, smooth decay for the wide zone.",
         [upper, lower],
         size=(9.2, 4.6),
         share_x="all",
@@ -178,13 +176,13 @@ def zone_widths(points: int = 121) -> Figure:
     name = "width of the yaw rate zone [rad/s]"
     return Figure(
         "zone-widths",
-        "Spectral radius of the observer error inside the linear zones at 100 Hz (longitudinal zone 1 m/s²). Left: "
-        "black line radius 1, red unstable; dotted: the limits of each loop alone, Omega_1 T/2 = 0.05 rad/s and "
-        "(Omega_5 + Omega_8) T/(2m) = 0.32 m/s². Circle: the widths used here; cross: a pair that chatters. Right: "
-        "cut at 1 m/s²; above the limit the split decays at least as fast as in the sliding motion, fastest at "
-        "critical damping, Omega_1² I_z / (4 Omega_4 (L_1 + L_2)); wider zones are sluggish.",
-        "Left: map with a rectangular unstable region at small widths. Right: curve of the spectral radius that "
-        "dips below one above 0.05 rad/s.",
+        "Spectral radius of the observer error inside the linear zones at 100 Hz (longitudinal zone 1 m/s²). Left: black "
+        "line radius 1, red unstable; dotted: the limits of each loop alone, Omega_1 T/2 = 0.05 rad/s and (Omega_5 + "
+        "Omega_8) T/(2m) = 0.32 m/s². Circle: the widths used here; cross: a pair that chatters. Right: cut at 1 m/s²; above "
+        "the limit the split decays at least as fast as in the sliding motion, fastest at critical damping, Omega_1² I_z / "
+        "(4 Omega_4 (L_1 + L_2)); wider zones are sluggish.",
+        "Left: map with a rectangular unstable region at small widths. Right: curve of the spectral radius that dips below "
+        "one above 0.05 rad/s.",
         [
             Panel(plane, Axis(name, scale="log"),
                   Axis("width of the lateral acceleration zone [m/s²]", scale="log"), grid=False),
@@ -216,14 +214,13 @@ def tracking() -> Figure:
         ]
     return Figure(
         "tracking",
-        "What the proof of Appendix A leaves out: true forces that move. Left: share of the front-rear split that "
-        "the observer misses in steady oscillation, printed gains, linear zones of three widths. Slow motion is "
-        "followed with a lag of 0.29 s whatever the width. Right: the force error that follows on both axles for "
-        "the printed largest yaw rate (33.6 deg/s; the split is yaw inertia times yaw acceleration). The means of "
-        "Table 1 (red) belong to a slalom slower than about 0.25 Hz by this bound; the paper prints neither speed "
-        "nor period.",
-        "Left: three curves of the relative error rising with frequency to about one. Right: force error rising "
-        "with the square of the frequency, crossed by two red lines.",
+        "What the proof of Appendix A leaves out: true forces that move. Left: share of the front-rear split that the "
+        "observer misses in steady oscillation, printed gains, linear zones of three widths. Slow motion is followed with a "
+        "lag of 0.29 s whatever the width. Right: the force error that follows on both axles for the printed largest yaw "
+        "rate (33.6 deg/s; the split is yaw inertia times yaw acceleration). The means of Table 1 (red) belong to a slalom "
+        "slower than about 0.25 Hz by this bound; the paper prints neither speed nor period.",
+        "Left: three curves of the relative error rising with frequency to about one. Right: force error rising with the "
+        "square of the frequency, crossed by two red lines.",
         [
             Panel([*shares, slow], x, Axis("split error / true split [1]", 0.02, 3.0, "log"), legend="lower right"),
             Panel(forces, x, Axis("amplitude of the error of each axle force [N]", 5.0, 2e4, "log")),

@@ -50,10 +50,9 @@ def force_model(model: NonlinearModel | None = None) -> Finding:
         "hidden_with_rear_longitudinal_force": list(with_rear.structure.describe()),
     }
     reading = (
-        "The steering angle is not in the model at all; the determinant of outputs and yaw acceleration is (L_1 + "
-        "L_2) / (m^2 I_z) up to its sign, so the rank is 4 for every car, speed and steering angle. With the rear "
-        "longitudinal force as a fifth state one direction is lost and does not decay, which is why the paper "
-        "neglects it."
+        "The steering angle is not in the model at all; the determinant of outputs and yaw acceleration is (L_1 + L_2) / "
+        "(m^2 I_z) up to its sign, so the rank is 4 for every car, speed and steering angle. With the rear longitudinal "
+        "force as a fifth state one direction is lost and does not decay, which is why the paper neglects it."
     )
     return Finding(computed, judged(found.rank == len(chosen.states) and not steered), reading)
 
@@ -84,10 +83,10 @@ def sideslip_model(model: NonlinearModel | None = None) -> Finding:
         "acceleration_adds_no_rank": third_row_repeats(),
     }
     reading = (
-        f"The rank is {generic.rank} at almost every state: 2 from the forces, the third from their rates. Outputs "
-        "and their first derivatives lose it exactly where both slip angles follow beta_i' = -(V'/V) beta_i. So it "
-        "is 2 for good in a steady turn at constant speed, where sideslip cannot be told from the two stiffnesses, "
-        "and 1 straight ahead. The slip angles must keep changing, as they do in a slalom."
+        f"The rank is {generic.rank} at almost every state: 2 from the forces, the third from their rates. Outputs and their "
+        "first derivatives lose it exactly where both slip angles follow beta_i' = -(V'/V) beta_i. So it is 2 for good in a "
+        "steady turn at constant speed, where sideslip cannot be told from the two stiffnesses, and 1 straight ahead. The "
+        "slip angles must keep changing, as they do in a slalom."
     )
     return Finding(computed, judged(generic.rank == 3), reading)
 
@@ -184,13 +183,13 @@ def stiffness_observability() -> Figure:
     value = Axis("third singular value / largest [1]", 1e-9, 10.0, "log")
     return Figure(
         "stiffness-observability",
-        "When the sideslip filter can tell sideslip from stiffness: third singular value of the gradients of the "
-        "two axle forces and of their rates (states in typical sizes), along a slalom and along a turn that "
-        "becomes steady, linear axles as printed, both at constant 17 m/s. Straight ahead nothing is seen of the "
-        "stiffnesses; in the steady turn the value falls to zero although both axles slip (left), because slip "
-        "angles that do not change cannot be told from softer tires. In the slalom it stays large.",
-        "Left: slip angles over time, oscillating in the slalom and constant in the turn. Right: the singular "
-        "value on a logarithmic scale, large throughout the slalom, falling steadily in the steady turn.",
+        "When the sideslip filter can tell sideslip from stiffness: third singular value of the gradients of the two axle "
+        "forces and of their rates (states in typical sizes), along a slalom and along a turn that becomes steady, linear "
+        "axles as printed, both at constant 17 m/s. Straight ahead nothing is seen of the stiffnesses; in the steady turn "
+        "the value falls to zero although both axles slip (left), because slip angles that do not change cannot be told from "
+        "softer tires. In the slalom it stays large.",
+        "Left: slip angles over time, oscillating in the slalom and constant in the turn. Right: the singular value on a "
+        "logarithmic scale, large throughout the slalom, falling steadily in the steady turn.",
         [
             Panel(slips, "time [s]", Axis("slip angle [deg]", high=9.0), legend="upper left", columns=2),
             Panel(values, "time [s]", value, legend="upper left"),

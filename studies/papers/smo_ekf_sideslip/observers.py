@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from estimators.sideslip import (
     wheel_axes,
 )
 from studies.papers.smo_ekf_sideslip.inputs import SAMPLE_TIME
-from studies.papers.smo_ekf_sideslip.saturating_car import SimulatedRun
 from synthesis.polynomials.matrix import FloatArray
 
 
@@ -56,8 +56,7 @@ def rear_sideslip(
     return rear, stiffness
 
 
-@dataclass(frozen=True)
-class Estimates:
+class Estimates(NamedTuple):
     """For k assumed cars: rear sideslip (n, k) rad; stiffness (n, k, 2) N/rad; F_y1, F_yw2, F_x1 in body axes (n, k, 3) N."""
 
     rear_sideslip: FloatArray
@@ -65,10 +64,8 @@ class Estimates:
     forces: FloatArray
 
 
-def estimates(run: SimulatedRun, cars: Sequence[SingleTrack], adaptive: bool = True) -> Estimates:
-    """Both blocks on a simulated run, for several assumed cars."""
-    signals = Signals(run.yaw_rate, run.lateral_acceleration, run.longitudinal_acceleration, run.steering, run.speed)
+def estimates(signals: Signals, cars: Sequence[SingleTrack], adaptive: bool = True) -> Estimates:
+    """Both blocks on signals (n,), for several assumed cars."""
     states = {car.mass: axle_forces(car, signals) for car in cars}  # block 1 knows the mass alone
-    rear, stiffness = zip(*(rear_sideslip(car, signals, states[car.mass], adaptive) for car in cars), strict=True)
-    forces = [states[car.mass][:, 1:] for car in cars]
-    return Estimates(*(np.stack(values, axis=1) for values in (rear, stiffness, forces)))
+    found = [(*rear_sideslip(car, signals, states[car.mass], adaptive), states[car.mass][:, 1:]) for car in cars]
+    return Estimates(*(np.stack(values, axis=1) for values in zip(*found, strict=True)))

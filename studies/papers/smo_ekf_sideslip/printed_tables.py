@@ -53,10 +53,10 @@ def force_tables(tables: Mapping[str, Any] = PRINTED) -> Finding:
         "nominal_columns_agree_between_tables": agrees,
     }
     reading = (
-        f"Largest mean {mean:g} % and largest standard deviation {deviation:g} % of Tables 1 and 2, both "
-        f"below {LIMIT:g} %. With 300 kg more or less F_y2 runs from {mass['F_y2'][0]:g} to {mass['F_y2'][1]:g} %, "
-        f"the rear sideslip from {mass['beta_2'][0]:g} to {mass['beta_2'][1]:g} %: sideslip suffers least. The "
-        "nominal columns of Tables 1, 3 and 5 agree."
+        f"Largest mean {mean:g} % and largest standard deviation {deviation:g} % of Tables 1 and 2, both below {LIMIT:g} %. "
+        f"With 300 kg more or less F_y2 runs from {mass['F_y2'][0]:g} to {mass['F_y2'][1]:g} %, the rear sideslip from "
+        f"{mass['beta_2'][0]:g} to {mass['beta_2'][1]:g} %: sideslip suffers least. The nominal columns of Tables 1, 3 and 5 "
+        "agree."
     )
     return Finding(computed, judged(mean < LIMIT and deviation < LIMIT and least == "beta_2" and agrees), reading)
 
@@ -76,8 +76,7 @@ def printed_forces() -> Table:
     ]  # fmt: skip
     return Table(
         "tables-1-2",
-        "Tables 1 and 2 of P5 as printed: errors (8) of the force observer in the two road tests, in percent of "
-        "the maximum.",
+        "Tables 1 and 2 of P5 as printed: errors (8) of the force observer in the two road tests, in percent of the maximum.",
         ("test", "quantity", "max", "unit", "mean [%]", "std [%]", "below 6 %"),
         rows,
     )
@@ -98,8 +97,7 @@ def printed_settings() -> Table:
     ]
     return Table(
         "tables-3-5",
-        "Tables 3, 4 and 5 of P5 as printed: errors (8) with other settings of the stiffness and of the mass, in "
-        "percent.",
+        "Tables 3, 4 and 5 of P5 as printed: errors (8) with other settings of the stiffness and of the mass, in percent.",
         ("table", "test", "quantity", "setting", "mean [%]", "std [%]"),
         rows,
     )
@@ -134,12 +132,11 @@ def lateral_models() -> Figure:
     ]
     return Figure(
         "lateral-models",
-        "Fig. 9 of P5: lateral force of the front axle over its slip angle by the linear model with the printed "
-        "stiffness, the linear adaptive model (the secant at the present slip angle) and Burckhardt's model on "
-        f"several roads, at the static axle load of {load / 1e3:.1f} kN. P5 prints no Burckhardt values; the common "
-        "ones are used. The adaptive model needs no road: its slope follows.",
-        "Rising curves of force over slip angle: two straight lines and four saturating curves, snow far below "
-        "asphalt.",
+        "Fig. 9 of P5: lateral force of the front axle over its slip angle by the linear model with the printed stiffness, "
+        "the linear adaptive model (the secant at the present slip angle) and Burckhardt's model on several roads, at the "
+        f"static axle load of {load / 1e3:.1f} kN. P5 prints no Burckhardt values; the common ones are used. The adaptive "
+        "model needs no road: its slope follows.",
+        "Rising curves of force over slip angle: two straight lines and four saturating curves, snow far below asphalt.",
         Panel(
             marks, Axis("front slip angle β₁ [deg]", 0, 12), Axis("front axle lateral force [kN]", 0, 13),
             legend="upper left", columns=2,

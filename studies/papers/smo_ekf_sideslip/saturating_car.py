@@ -10,28 +10,24 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from studies.papers.smo_ekf_sideslip.inputs import CAR, PRINTED_GRAVITY, SAMPLE_TIME, WHEELBASE, published_car
+from studies.papers.smo_ekf_sideslip.observers import Signals
 from synthesis.polynomials.matrix import FloatArray
 
 LINEAR = 1e9  # friction so large that the axles are linear: an observer with the right stiffness has no model error
 
 
 @dataclass(frozen=True)
-class SimulatedRun:
-    """Samples (n,): time s, steering rad, speed m/s, sideslip rad, yaw rate rad/s; slips (n, 2) rad of front and rear axle.
+class SimulatedRun(Signals):
+    """Signals (n,) with what the car does: time s, sideslip rad; slips (n, 2) rad of front and rear axle.
 
-    Wheel-axis forces in N: `forces` (n, 2) lateral, `front_force_x` (n,); accelerations (n,) in m/s^2.
+    Wheel-axis forces in N: `forces` (n, 2) lateral, `front_force_x` (n,).
     """
 
     time: FloatArray
-    steering: FloatArray
-    speed: FloatArray
     sideslip: FloatArray
-    yaw_rate: FloatArray
     slips: FloatArray
     forces: FloatArray
     front_force_x: FloatArray
-    longitudinal_acceleration: FloatArray
-    lateral_acceleration: FloatArray
 
     @property
     def rear_sideslip(self) -> FloatArray:
@@ -49,7 +45,7 @@ class SimulatedRun:
 def with_noise(run: SimulatedRun, seed: int = 0) -> SimulatedRun:
     """The same run with white noise on what is measured: yaw rate 0.2 deg/s, accelerations 0.1 m/s^2."""
     random = np.random.default_rng(seed)
-    sizes = {"yaw_rate": np.radians(0.2), "longitudinal_acceleration": 0.1, "lateral_acceleration": 0.1}
+    sizes = {"yaw_rate": np.radians(0.2), "ax": 0.1, "ay": 0.1}
     noisy = {name: getattr(run, name) + size * random.standard_normal(run.time.size) for name, size in sizes.items()}
     return replace(run, **noisy)
 
@@ -97,5 +93,5 @@ def simulate(
     slips, across, drive = forces(angle, beta, yaw)
     along = drive * np.cos(angle) - across[:, 0] * np.sin(angle)
     side = across[:, 0] * np.cos(angle) + drive * np.sin(angle) + across[:, 1]
-    constant = np.full(time.shape, speed)
-    return SimulatedRun(time, angle, constant, beta, yaw, slips, across, drive, along / car.mass, side / car.mass)
+    signals = (yaw, side / car.mass, along / car.mass, angle, np.full(time.shape, speed))
+    return SimulatedRun(*signals, time, beta, slips, across, drive)

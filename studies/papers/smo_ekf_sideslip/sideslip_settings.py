@@ -5,13 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from studies.claim import Finding, Verdict
-from studies.papers.smo_ekf_sideslip.inputs import (
-    MASS_SETTINGS,
-    PACKAGE,
-    STIFFNESS_SETTINGS,
-    WHEELBASE,
-    published_car,
-)
+from studies.papers.smo_ekf_sideslip.inputs import MASS_SETTINGS, PACKAGE, STIFFNESS_SETTINGS, WHEELBASE, published_car
 from studies.papers.smo_ekf_sideslip.observers import Estimates, estimates
 from studies.papers.smo_ekf_sideslip.saturating_car import LINEAR, SimulatedRun, simulate, with_noise
 from studies.papers.topic import Topic
@@ -24,9 +18,8 @@ from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 MODEL_NOTE = (
-    "The drive is a single track with the printed car values and axles that saturate at friction 1 (hyperbolic "
-    "tangent), at constant speed, without noise: it shows what the equations do. The road tests of the paper are "
-    "regenerated elsewhere."
+    "The drive is a single track with the printed car values and axles that saturate at friction 1 (hyperbolic tangent), at "
+    "constant speed, without noise: it shows what the equations do. The road tests of the paper are regenerated elsewhere."
 )
 COLOURS = (ORANGE, BLUE, GREEN)
 THRESHOLD = 1000.0  # N, lambda_1; not printed
@@ -50,10 +43,10 @@ def fixed_stiffness(settings: tuple[float, ...] = STIFFNESS_SETTINGS) -> Finding
         Verdict.REPRODUCED if low > 0 and high > 0 else Verdict.ERRATUM if low > 0 > high else Verdict.NOT_REPRODUCED
     )
     reading = (
-        "The measured force fixes C beta: sideslip comes out as 1/factor. Reduced stiffness overestimates it "
-        f"(factor {settings[0]:g}: {ratio[0]:.2f} times the true rear sideslip in the simulated slalom), increased "
-        f"stiffness underestimates it (factor {settings[-1]:g}: {ratio[-1]:.2f} times). The text says overestimated "
-        "for both; the second must read underestimated."
+        "The measured force fixes C beta: sideslip comes out as 1/factor. Reduced stiffness overestimates it (factor "
+        f"{settings[0]:g}: {ratio[0]:.2f} times the true rear sideslip in the simulated slalom), increased stiffness "
+        f"underestimates it (factor {settings[-1]:g}: {ratio[-1]:.2f} times). The text says overestimated for both; the "
+        "second must read underestimated."
     )
     return Finding(computed, verdict, reading)
 
@@ -114,8 +107,8 @@ def stiffness_table(run: SimulatedRun, fixed: Estimates, adaptive: Estimates) ->
     ]
     return Table(
         "stiffness-settings",
-        "Error (8) of the rear sideslip in the simulated slalom (saturating axles, no noise, from 5 s on), and the "
-        "size of the estimate against the true one. A model, not the road test of Tables 3 and 4.",
+        "Error (8) of the rear sideslip in the simulated slalom (saturating axles, no noise, from 5 s on), and the size of "
+        "the estimate against the true one. A model, not the road test of Tables 3 and 4.",
         ("observer", "stiffness setting [1]", "mean error [%]", "std of the error [%]", "estimate / true [1]"),
         rows,
     )
@@ -130,8 +123,8 @@ def mass_table(run: SimulatedRun, found: Estimates) -> Table:
         rows.append([change, "beta_2", *_error_cells(run, found.rear_sideslip[:, j], run.rear_sideslip)])
     return Table(
         "mass-settings",
-        "Error (8) in the simulated slalom by assumed mass, and the size of the estimate against the true one: "
-        "forces scale with the mass (300 kg are 20.7 %), sideslip does not. A model, not the road test of Table 5.",
+        "Error (8) in the simulated slalom by assumed mass, and the size of the estimate against the true one: forces scale "
+        "with the mass (300 kg are 20.7 %), sideslip does not. A model, not the road test of Table 5.",
         ("mass change [kg]", "quantity", "mean error [%]", "std of the error [%]", "estimate / true [1]"),
         rows,
     )
@@ -163,14 +156,14 @@ def stiffness_figure(run: SimulatedRun, fixed: Estimates, adaptive: Estimates) -
         lower.append(Panel(marks, "time [s]", y, legend="upper left", columns=2))
     return Figure(
         "stiffness-settings",
-        "Figs. 12 to 17 of P5 on a model: a slalom (17 m/s, straight for 5 s, lateral acceleration to 0.6 g) of a "
-        "single track whose axles saturate, which the observers do not know. Force observer and filter with the "
-        "stiffness set to 0.5, 1 and 1.5 times the printed one. Above: with fixed stiffness the rear sideslip is "
-        "too large for the soft setting and too small for the stiff one; with adaptive stiffness the three "
-        "settings agree soon after the slalom begins. Below: the stiffnesses are frozen while driving straight and "
-        "then converge to common values; the rear one stays low because the force observer follows the split late.",
-        "Upper panels: rear sideslip over time, three spread curves at the left, three nearly equal ones at the "
-        "right. Lower panels: front and rear stiffness, constant until 5 s, then converging.",
+        "Figs. 12 to 17 of P5 on a model: a slalom (17 m/s, straight for 5 s, lateral acceleration to 0.6 g) of a single "
+        "track whose axles saturate, which the observers do not know. Force observer and filter with the stiffness set to "
+        "0.5, 1 and 1.5 times the printed one. Above: with fixed stiffness the rear sideslip is too large for the soft "
+        "setting and too small for the stiff one; with adaptive stiffness the three settings agree soon after the slalom "
+        "begins. Below: the stiffnesses are frozen while driving straight and then converge to common values; the rear one "
+        "stays low because the force observer follows the split late.",
+        "Upper panels: rear sideslip over time, three spread curves at the left, three nearly equal ones at the right. Lower "
+        "panels: front and rear stiffness, constant until 5 s, then converging.",
         [upper, lower],
         size=(9.4, 5.6),
         share_x="all",
@@ -197,11 +190,11 @@ def mass_figure(run: SimulatedRun, found: Estimates) -> Figure:
         )
     return Figure(
         "mass-settings",
-        "Fig. 18 of P5 on a model: the same slalom with the assumed mass 300 kg too small, right, and 300 kg too "
-        "large. Forces scale with the assumed mass (they are mass times measured acceleration); the rear sideslip "
-        "hardly changes, because mass and force cancel in (10) and the adapted stiffness takes the rest.",
-        "Three panels over time: front force, rear force and rear sideslip; force curves differ in size by a "
-        "fifth, sideslip curves nearly coincide.",
+        "Fig. 18 of P5 on a model: the same slalom with the assumed mass 300 kg too small, right, and 300 kg too large. "
+        "Forces scale with the assumed mass (they are mass times measured acceleration); the rear sideslip hardly changes, "
+        "because mass and force cancel in (10) and the adapted stiffness takes the rest.",
+        "Three panels over time: front force, rear force and rear sideslip; force curves differ in size by a fifth, sideslip "
+        "curves nearly coincide.",
         panels,
         size=(9.4, 3.8),
     )  # fmt: skip
@@ -237,12 +230,12 @@ def zones(run: SimulatedRun, found: Estimates) -> Figure:
     background = backgrounds(run.time, kind, [("", color) for _, color in ZONES], alpha=0.35)
     return Figure(
         "zones",
-        "Figs. 10 and 11 of P5 on a model: estimated front lateral force over estimated front slip angle in a "
-        "slalom with saturating axles (17 m/s, 0.6 g, noise on yaw rate and accelerations; stiffness set to 1.5 "
-        "times the printed one), coloured by the zones that switch the covariances, with the threshold λ₁ = 1 kN "
-        "(not printed). Right: the adapted front stiffness moves in zones 5 and 6 and is frozen elsewhere.",
-        "Left: a band of points through the origin, red and orange near the axes, blue outside, with two straight "
-        "lines. Right: stiffness over time that moves where the background is blue.",
+        "Figs. 10 and 11 of P5 on a model: estimated front lateral force over estimated front slip angle in a slalom with "
+        "saturating axles (17 m/s, 0.6 g, noise on yaw rate and accelerations; stiffness set to 1.5 times the printed one), "
+        "coloured by the zones that switch the covariances, with the threshold λ₁ = 1 kN (not printed). Right: the adapted "
+        "front stiffness moves in zones 5 and 6 and is frozen elsewhere.",
+        "Left: a band of points through the origin, red and orange near the axes, blue outside, with two straight lines. "
+        "Right: stiffness over time that moves where the background is blue.",
         [
             Panel(plane, Axis("estimated front slip angle β₁ [deg]", -5.5, 5.5),
                   Axis("estimated front lateral force [kN]", -8, 8), legend="upper left"),

@@ -17,9 +17,9 @@ STUDY = Study(
     title="Axle forces by sliding mode, sideslip with adaptive cornering stiffness",
     paper="P5",
     summary=(
-        "Baffet, Charara, Lechner (2009): a sliding-mode observer estimates axle forces without a tire model; an "
-        "extended Kalman filter on them estimates sideslip and corrects the cornering stiffness. Gain conditions, "
-        "sampling, observability and tables are checked here."
+        "Baffet, Charara, Lechner (2009): a sliding-mode observer estimates axle forces without a tire model; an extended "
+        "Kalman filter on them estimates sideslip and corrects the cornering stiffness. Gain conditions, sampling, "
+        "observability and tables are checked here."
     ),
     parts=(
         *force_observer.TOPIC.parts,

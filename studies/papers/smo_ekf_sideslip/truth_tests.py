@@ -2,27 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from estimators.sideslip import SingleTrack
 from estimators.vehicle import VehicleParameters
-from studies.papers.smo_ekf_sideslip.inputs import FORCES, MASS_SETTINGS, PACKAGE, PRINTED, STIFFNESS_SETTINGS
+from studies.papers.smo_ekf_sideslip.inputs import (
+    FORCES,
+    MASS_SETTINGS,
+    PACKAGE,
+    PRINTED,
+    SAMPLE_TIME,
+    STIFFNESS_SETTINGS,
+)
 from studies.papers.smo_ekf_sideslip.observers import Signals, axle_forces, rear_sideslip
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Mark, Panel
 from studies.plots.colours import SETTINGS
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import ERROR_COLUMNS, SampleSpreads, sample_spreads
-from studies.trials.driven import LUGRE, MAGIC_FORMULA, driven_part
-from studies.trials.filter_inputs import PRINTED_TEST, conditions, counted, front_steer, rear_speed, sampled
+from studies.trials.driven import LUGRE, MAGIC_FORMULA, QUICK_SECONDS, driven_part
+from studies.trials.filter_inputs import PRINTED_TEST, conditions, counted, front_steer, rear_speed
 from studies.trials.histories import BANDS, estimate_lines, history, truth_line
 from studies.trials.motion import Moved, motion_part
-from studies.trials.play import believed
+from studies.trials.play import believed, measured_runs
 from studies.trials.tire_curve import USE, TireFacts, tire_facts
 from studies.truth import Measured, Truth
 
@@ -32,20 +40,6 @@ RIGHT = 0.0, 1.0
 """The setting without an error."""
 Setting = tuple[float, float]
 """kg by which the assumed mass is wrong, and factor on the assumed stiffness."""
-
-
-@dataclass(frozen=True)
-class RoadTest:
-    """A road test of the paper: the manoeuvre here, its name in the printed tables, largest sideslip in deg, masses tried."""
-
-    manoeuvre: str
-    printed: str
-    sideslip_peak: float
-    masses: tuple[float, ...] = ()
-
-
-SLALOM = RoadTest("p5-slalom", "slalom", 5.7, MASS_SETTINGS)
-ROUNDABOUT = RoadTest("p5-roundabout", "roundabout", 5.4)
 
 
 @dataclass(frozen=True)
@@ -126,32 +120,30 @@ def run_axles(drawn: Measured, settings: Sequence[Setting]) -> AxleRun:
     )  # fmt: skip
 
 
-def axle_part(name: str, title: str, test: RoadTest, scope: Scope, tire: str = LUGRE) -> PartResult:
-    """Errors and histories of both blocks by assumed stiffness and mass."""
-    settings = [(0.0, factor) for factor in STIFFNESS_SETTINGS] + [(mass, 1.0) for mass in test.masses if mass != 0.0]
-    run = run_axles(sampled(test.manoeuvre, tire, scope), settings)
+def axle_part(name: str, title: str, test: str, scope: Scope, tire: str = LUGRE) -> PartResult:
+    """Errors and histories of both blocks in the road test "slalom" or "roundabout", by assumed stiffness and mass."""
+    printed = PRINTED[test]
+    settings = [(0.0, factor) for factor in STIFFNESS_SETTINGS]
+    settings += [(mass, 1.0) for mass in MASS_SETTINGS if mass and "mass" in printed]
+    run = run_axles(measured_runs((f"p5-{test}",), tire, scope, QUICK_SECONDS, SAMPLE_TIME), settings)
     measures: dict[str, float] = {}
-    found = [force_table(test, run, measures), stiffness_table(test, run, measures)]
+    found = [force_table(printed["forces"], run, measures), stiffness_table(printed["stiffness"], run, measures)]
     drawings = [force_history(f"{name}-forces", title, run), stiffness_history(f"{name}-stiffness", title, run)]
-    if test.masses:
-        found.append(mass_table(test, run, measures))
+    if "mass" in printed:
+        found.append(mass_table(printed["mass"], run, measures))
         drawings.append(mass_history(f"{name}-mass", title, run))
     about = _about(run)
     tables = [replace(t, name=f"{name}-{t.name}", caption=f"{title}: {t.caption} {about}") for t in found]
     return PartResult(tables=tables, drawings=drawings, measures=measures)
 
 
-def _printed(row: dict[str, list[float]], k: int) -> tuple[float, float]:
-    return row["mean"][k], row["deviation"][k]
-
-
-def force_table(test: RoadTest, run: AxleRun, measures: dict[str, float]) -> Table:
+def force_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
     """Tables 1 and 2, and the forces without an observer."""
     rows: list[list[Cell]] = []
     found = {"sliding mode": run.force_errors(run.forces[RIGHT[0]]), "static split": run.force_errors(run.static)}
     peaks = np.abs(run.true_forces[run.counted]).max(axis=0)
     for quantity, value in zip(FORCES, peaks, strict=True):
-        own = PRINTED[test.printed]["forces"][quantity]
+        own = printed[quantity]
         peak = round(float(np.degrees(value)), 1) if quantity == "yaw_rate" else round(float(value))
         for who, errors in found.items():
             paper = (own["mean"], own["deviation"]) if who == "sliding mode" else (None, None)
@@ -164,15 +156,19 @@ def force_table(test: RoadTest, run: AxleRun, measures: dict[str, float]) -> Tab
     return Table("forces", caption, ("quantity", "unit", "printed peak", "peak", "estimate", *ERROR_COLUMNS), rows)
 
 
-def stiffness_table(test: RoadTest, run: AxleRun, measures: dict[str, float]) -> Table:
+def stiffness_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
     """Tables 3 and 4, and the observer with fixed stiffness."""
     rows: list[list[Cell]] = []
     peak = round(float(np.degrees(np.abs(run.true_sideslip[run.counted]).max())), 2)
-    for who, estimates in (("adaptive (EKF)", run.adaptive), ("fixed (ORL)", run.fixed)):
-        for j, factor in enumerate(STIFFNESS_SETTINGS):
+    none = [None] * len(STIFFNESS_SETTINGS)
+    found = (
+        ("adaptive (EKF)", run.adaptive, printed["mean"], printed["deviation"]),
+        ("fixed (ORL)", run.fixed, none, none),
+    )
+    for who, estimates, *paper in found:
+        for factor, *own in zip(STIFFNESS_SETTINGS, *paper, strict=True):
             errors = run.sideslip_errors(estimates[0.0, factor])
-            paper = _printed(PRINTED[test.printed]["stiffness"], j) if estimates is run.adaptive else (None, None)
-            rows.append([who, factor, test.sideslip_peak, peak, *errors.cells(paper)])
+            rows.append([who, factor, printed["largest"], peak, *errors.cells((own[0], own[1]))])
             measures |= errors.measures(f"beta_2, {who}, stiffness x {factor:g}")
     caption = (
         "errors (8) of the rear sideslip by believed cornering stiffness, adapted or fixed (the paper shows the fixed one in "
@@ -182,13 +178,13 @@ def stiffness_table(test: RoadTest, run: AxleRun, measures: dict[str, float]) ->
     return Table("stiffness", caption, columns, rows)
 
 
-def mass_table(test: RoadTest, run: AxleRun, measures: dict[str, float]) -> Table:
+def mass_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
     """Table 5."""
     rows: list[list[Cell]] = []
-    for j, mass in enumerate(test.masses):
+    for j, mass in enumerate(MASS_SETTINGS):
         errors = run.force_errors(run.forces[mass]) | {"beta_2": run.sideslip_errors(run.adaptive[mass, 1.0])}
-        for quantity, paper in PRINTED[test.printed]["mass"].items():
-            rows.append([quantity, mass, *errors[quantity].cells(_printed(paper, j))])
+        for quantity, paper in printed.items():
+            rows.append([quantity, mass, *errors[quantity].cells((paper["mean"][j], paper["deviation"][j]))])
             measures |= errors[quantity].measures(f"{quantity}, mass {mass:+g} kg")
     caption = "errors (8) of forces and rear sideslip by believed mass, stiffness adapted."
     return Table("mass", caption, ("quantity", "mass error [kg]", *ERROR_COLUMNS), rows)
@@ -197,9 +193,9 @@ def mass_table(test: RoadTest, run: AxleRun, measures: dict[str, float]) -> Tabl
 def _about(run: AxleRun) -> str:
     front, rear = (2e-3 * value for value in run.tire.secant)
     return (
-        f"{conditions(run.drawn)} Believed: the truth's masses and lengths, and the secant of its tires at {USE:g} of the static "
-        f"load, {front:.1f} and {rear:.1f} kN/rad an axle (the paper: 65 and 50). As in the paper accelerations are not "
-        f"corrected for roll, and the force observer starts from the greatest values. {PRINTED_TEST}"
+        f"{conditions(run.drawn)} Believed: the truth's masses and lengths, and the secant of its tires at {USE:g} of the "
+        f"static load, {front:.1f} and {rear:.1f} kN/rad an axle (the paper: 65 and 50). As in the paper accelerations are "
+        f"not corrected for roll, and the force observer starts from the greatest values. {PRINTED_TEST}"
     )
 
 
@@ -251,8 +247,8 @@ def stiffness_history(name: str, title: str, run: AxleRun) -> Figure:
         name,
         f"{title}: rear sideslip with the believed stiffness times 0.5, 1 and 1.5, fixed and adapted, and the adapted "
         f"stiffness of both axles, as Figs. 12 to 17 of P5. {BANDS}",
-        "Upper panels: rear sideslip over time for three settings, fixed left, adapted right. Lower panels: adapted stiffness of "
-        "the axles.",
+        "Upper panels: rear sideslip over time for three settings, fixed left, adapted right. Lower panels: adapted "
+        "stiffness of the axles.",
         [
             _sideslip_panel(run, fixed, labels, "sideslip [deg]", "rear sideslip, stiffness fixed (ORL)"),
             _sideslip_panel(run, adapted, labels, "", "rear sideslip, stiffness adapted (EKF)"),
@@ -283,24 +279,16 @@ def mass_history(name: str, title: str, run: AxleRun) -> Figure:
 
 
 MOTION = (
-    Moved("p5-slalom", "Slalom, dry (Fig. 5)", course=True),
-    Moved("p5-roundabout", "Roundabout, dry (Fig. 6)", course=True),
-)
+    Moved("p5-slalom", "Slalom, dry (Fig. 5)", course=True), Moved("p5-roundabout", "Roundabout, dry (Fig. 6)", course=True),
+)  # fmt: skip
+_slalom = partial(axle_part, "slalom", "Slalom", "slalom")
+_other_tire = partial(axle_part, "slalom-other-tire", "Slalom, other tire", "slalom")
+_OTHER_TITLE = "Tables 1, 3 and 5 on a tire with another shape: Magic Formula with slip lag"
+_roundabout = partial(axle_part, "roundabout", "Roundabout", "roundabout")
+_motion = partial(motion_part, "motion", MOTION)
 TOPIC.parts.extend([
-    driven_part(
-        "slalom-driven", "Tables 1, 3 and 5 on the truth vehicle: slalom",
-        partial(axle_part, "slalom", "Slalom", SLALOM), cost=43.0, quick=True,
-    ),
-    driven_part(
-        "slalom-other-tire", "Tables 1, 3 and 5 on a tire with another shape: Magic Formula with slip lag",
-        partial(axle_part, "slalom-other-tire", "Slalom, other tire", SLALOM), cost=45.0, tire=MAGIC_FORMULA,
-    ),
-    driven_part(
-        "roundabout-driven", "Tables 2 and 4 on the truth vehicle: roundabout",
-        partial(axle_part, "roundabout", "Roundabout", ROUNDABOUT), cost=43.0,
-    ),
-    driven_part(
-        "motion", "Figs. 5 and 6 on the truth vehicle: path and accelerations",
-        partial(motion_part, "motion", MOTION), cost=5.0,
-    ),
+    driven_part("slalom-driven", "Tables 1, 3 and 5 on the truth vehicle: slalom", _slalom, 43.0, quick=True),
+    driven_part("slalom-other-tire", _OTHER_TITLE, _other_tire, 45.0, MAGIC_FORMULA),
+    driven_part("roundabout-driven", "Tables 2 and 4 on the truth vehicle: roundabout", _roundabout, 43.0),
+    driven_part("motion", "Figs. 5 and 6 on the truth vehicle: path and accelerations", _motion, 5.0),
 ])  # fmt: skip
