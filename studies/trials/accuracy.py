@@ -58,11 +58,9 @@ def spread(values: Array) -> Spread | None:
         return None
     if not known.all():
         raise ValueError(f"{int(np.count_nonzero(~known))} of {values.size} runs have no value")
-    mean = float(values.mean())
-    if values.size == 1:
-        return Spread(mean, mean, mean, mean, 1)
-    half = float(student.ppf(0.975, values.size - 1) * values.std(ddof=1) / np.sqrt(values.size))
-    return Spread(mean, mean - half, mean + half, float(values.max()), values.size)
+    mean, runs = float(values.mean()), values.size
+    half = float(student.ppf(0.975, runs - 1) * values.std(ddof=1) / np.sqrt(runs)) if runs > 1 else 0.0
+    return Spread(mean, mean - half, mean + half, float(values.max()), runs)
 
 
 def known_spread(values: Array) -> Spread:

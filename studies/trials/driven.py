@@ -1,11 +1,12 @@
-"""The shipped manoeuvres on truth vehicles, integrated once and shared by all experiments of a run.
+"""The shipped manoeuvres on truth vehicles, integrated once and shared by all trials of a run.
 
 A step costs the same for one run as for all of them, so that every tire drives every manoeuvre in one batch.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 
@@ -19,17 +20,14 @@ QUICK_SECONDS = 12.0
 """So much of each manoeuvre, from its start, when quick."""
 
 
-def _manoeuvres(names: tuple[str, ...], tire: str, seconds: float) -> list[Manoeuvre]:
-    loaded = [load_manoeuvre(name).with_tire(tire) for name in names]
-    return [m.model_copy(update={"duration": min(m.duration, seconds)}) for m in loaded]
-
-
-def _seconds(scope: Scope) -> float:
-    return QUICK_SECONDS if scope.quick else float("inf")
+def _manoeuvres(names: Iterable[str], tire: str, scope: Scope, seconds: float = math.inf) -> list[Manoeuvre]:
+    limit = min(seconds, QUICK_SECONDS) if scope.quick else math.inf
+    loaded = (load_manoeuvre(name).with_tire(tire) for name in names)
+    return [m.model_copy(update={"duration": min(m.duration, limit)}) for m in loaded]
 
 
 def _drive_all(tire: str, scope: Scope, folder: Path) -> None:
-    write_truth(drive(_manoeuvres(tuple(shipped_manoeuvres()), tire, _seconds(scope))), folder)
+    write_truth(drive(_manoeuvres(shipped_manoeuvres(), tire, scope)), folder)
 
 
 DRIVEN = {tire: Preparation(f"{tire}-tires", partial(_drive_all, tire), cost=40.0) for tire in (LUGRE, MAGIC_FORMULA)}
@@ -49,11 +47,10 @@ def driven(names: tuple[str, ...], tire: str, scope: Scope, seconds: float = QUI
     When quick, the first ``seconds`` of each. Raises SpecError for unknown names and where the run did not prepare it.
     """
     if scope.prepared is None:
-        return drive(_manoeuvres(names, tire, min(seconds, QUICK_SECONDS) if scope.quick else float("inf")))
+        return drive(_manoeuvres(names, tire, scope, seconds))
     folder = scope.prepared / DRIVEN[tire].name
     if not folder.is_dir():
         raise SpecError(f"the part does not name its need '{DRIVEN[tire].name}': make it with `driven_part`")
-    everything = _manoeuvres(tuple(shipped_manoeuvres()), tire, _seconds(scope))
-    truth = read_truth(folder, [m.truth_vehicle() for m in everything])
+    truth = read_truth(folder, [m.truth_vehicle() for m in _manoeuvres(shipped_manoeuvres(), tire, scope)])
     chosen = truth.only([truth.names.index(name) for name in names])
     return chosen.until(seconds) if scope.quick else chosen

@@ -110,6 +110,5 @@ def _history(name: str, truth: Truth, row: Driven, estimates: Mapping[str, Array
         f"{name}-{row.manoeuvre}",
         f"{row.title}: forces of the truth (wide) and of the pipeline (thin), first sensor draw.",
         f"Time histories of longitudinal, lateral and vertical tire forces with their estimates for {row.title}.",
-        panels,
-        (8.0, 5.6),
-    )
+        panels, (8.0, 5.6),
+    )  # fmt: skip

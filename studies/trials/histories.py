@@ -37,15 +37,9 @@ def estimate_lines(
 
 
 def history(
-    name: str,
-    caption: str,
-    alternative: str,
-    panels: Sequence[Panel],
-    size: tuple[float, float],
-    columns: int = 1,
-    share_y: Literal["", "row", "all"] = "",
-    legend: Literal["", "below"] = "",
-) -> Figure:
+    name: str, caption: str, alternative: str, panels: Sequence[Panel], size: tuple[float, float], columns: int = 1,
+    share_y: Literal["", "row", "all"] = "", legend: Literal["", "below"] = "",
+) -> Figure:  # fmt: skip
     """Panels in rows over one time, which is named under the last ones."""
     last = len(panels) - columns
     named = [replace(p, x=Axis("time [s]" if k >= last else "", margin=0.01)) for k, p in enumerate(panels)]

@@ -124,6 +124,5 @@ def _rear_wheels(name: str, truth: Truth, row: Moved) -> Figure:
         f"{row.title}: longitudinal force, torque and speed of the rear wheels of the truth on {truth.tires[0]} tires; "
         "torques are those that act at the wheels, drive less brakes.",
         f"Three panels over time for {row.title}: force, torque and speed of the rear left and the rear right wheel.",
-        panels,
-        (8.0, 4.6),
-    )
+        panels, (8.0, 4.6),
+    )  # fmt: skip

@@ -146,11 +146,7 @@ def _dots(name: str, rows: Sequence[Printed], found: Mapping[str, Sequence[Mappi
         "Velocity errors by manoeuvre, mean over the sensor draws with 95 % interval; bars: printed values of the paper's "
         "own car.",
         "Dot plot of normalised velocity errors of the paper's observers, the fusion and two baselines for every manoeuvre.",
-        panels,
-        size=(8.0, 1.6 + 0.45 * len(rows)),
-        legend="below",
-        columns=3,
-        share_y="row",
+        panels, size=(8.0, 1.6 + 0.45 * len(rows)), legend="below", columns=3, share_y="row",
     )  # fmt: skip
 
 
@@ -179,6 +175,5 @@ def _history(name: str, drawn: Measured, row: Printed, estimates: Mapping[str, A
         f"{name}-{row.manoeuvre}",
         f"{row.title}: velocities at the centre of gravity and wheel slip, first sensor draw.",
         f"Time histories of longitudinal and lateral velocity with estimates, and of the four wheel slips, for {row.title}.",
-        [*panels, Panel(slips, y="wheel slip [%]", legend="best", columns=4)],
-        (8.0, 5.0),
+        [*panels, Panel(slips, y="wheel slip [%]", legend="best", columns=4)], (8.0, 5.0),
     )  # fmt: skip

@@ -178,9 +178,8 @@ def _difference(name: str, run: FourWheelRun, printed: Sequence[Row]) -> Table:
         f"{name}-difference",
         "How much larger the error of the extended filter is than that of the unscented one with the same model, noise and "
         f"start, in percentage points, compared draw by draw. {_about(run)}",
-        ("quantity", "printed mean [points]", "mean [points]", "printed std [points]", "std [points]"),
-        rows,
-    )
+        ("quantity", "printed mean [points]", "mean [points]", "printed std [points]", "std [points]"), rows,
+    )  # fmt: skip
 
 
 def _about(run: FourWheelRun) -> str:
@@ -209,11 +208,8 @@ def dot_figure(name: str, printed: Sequence[Row], found: Sequence[Mapping[str, S
         "Errors of lateral forces and sideslip on the truth vehicle (filled, with 95 % confidence interval) and as printed "
         "(open). EKF and UKF have the same model, noise and start.",
         "Dot plot: mean and standard deviation of the error for four lateral forces and the sideslip, by estimate.",
-        panels,
-        size=(8.6, 4.4),
-        legend="below",
-        share_y="row",
-    )
+        panels, size=(8.6, 4.4), legend="below", share_y="row",
+    )  # fmt: skip
 
 
 def _estimate(time: Array, value: Array, who: str) -> list[Mark]:
@@ -245,10 +241,7 @@ def force_history(name: str, run: FourWheelRun) -> Figure:
         f"Figs. 6 and 7 of P4 on {run.drawn.truth.tires[0]} tires: lateral forces of the four wheels, positive to the left. "
         f"{BANDS}",
         "Four panels of lateral force over time, front wheels above, rear wheels below, with estimates of both filters.",
-        _corners(run, marks, "$F_y$ [kN]"),
-        (9.0, 5.4),
-        columns=2,
-        share_y="row",
+        _corners(run, marks, "$F_y$ [kN]"), (9.0, 5.4), columns=2, share_y="row",
     )  # fmt: skip
 
 
@@ -261,9 +254,8 @@ def sideslip_history(name: str, run: FourWheelRun) -> Figure:
         name,
         f"Fig. 8 of P4 on {run.drawn.truth.tires[0]} tires: sideslip at the centre of gravity, positive to the left. {BANDS}",
         "Sideslip over time: truth, both filters, the pipeline and the formula of a linear car in a steady turn.",
-        [Panel(marks, y="sideslip [deg]", legend="best", columns=3)],
-        (8.0, 3.2),
-    )
+        [Panel(marks, y="sideslip [deg]", legend="best", columns=3)], (8.0, 3.2),
+    )  # fmt: skip
 
 
 def used_friction_history(name: str, run: FourWheelRun) -> Figure:
@@ -282,8 +274,5 @@ def used_friction_history(name: str, run: FourWheelRun) -> Figure:
         f"Fig. 9 of P4 on {run.drawn.truth.tires[0]} tires: used lateral friction (14) of the four wheels, and the greatest "
         "that the tire has.",
         "Four panels of lateral force over vertical load with the unscented filter's estimate and the friction limit.",
-        _corners(run, marks, "$F_y/F_z$"),
-        (9.0, 4.6),
-        columns=2,
-        share_y="all",
-    )
+        _corners(run, marks, "$F_y/F_z$"), (9.0, 4.6), columns=2, share_y="all",
+    )  # fmt: skip

@@ -145,8 +145,7 @@ def dot_figure(name: str, rows: Sequence[Drive], found: Sequence[Mapping[str, Sp
         "Dot plot of the normalised speed error of two Kalman filters, a gain schedule, the fusion and two baselines by "
         "manoeuvre.",
         Panel(marks, x, row_axis([row.title for row in rows])),
-        size=(8.0, 1.7 + 0.75 * len(rows)),
-        legend="below",
+        size=(8.0, 1.7 + 0.75 * len(rows)), legend="below",
     )  # fmt: skip
 
 

@@ -58,11 +58,9 @@ def gain_condition(gains: SlidingModeGains = PUBLISHED) -> Finding:
     exact = REAR / FRONT * Fraction(gains[8])
     residual = REAR * Fraction(gains[8]) - FRONT * Fraction(gains[5])
     computed = {
-        "omega5_N_s": float(exact),
-        "omega5_exact": str(exact),
-        "printed_relative_error": float((Fraction(gains[5]) - exact) / exact),
-        "residual_Nm_s": float(residual),
-    }
+        "omega5_N_s": float(exact), "omega5_exact": str(exact),
+        "printed_relative_error": float((Fraction(gains[5]) - exact) / exact), "residual_Nm_s": float(residual),
+    }  # fmt: skip
     reading = (
         f"(7) gives {float(exact):.3f} N/s; the printed {gains[5]:g} is rounded to thousands and leaves a residual of "
         f"{float(residual):g} N m/s in (A.11). It is harmless: on the sliding surface the equivalent value of the lateral "
@@ -81,13 +79,11 @@ def dominance(gains: SlidingModeGains = PUBLISHED) -> Finding:
     matrix = gains.matrix.copy()
     matrix[1, 1] = CAR.rear_axle_distance / CAR.front_axle_distance * gains[8]  # Omega_5 as (7) asks for it
     computed = {
-        "yaw_moment_limit_Nm": found.yaw_moment_limit,
-        "worst_start_Nm": WORST_MOMENT,
-        "epsilon_yaw_rad_s2": found.yaw_margin,
-        "epsilon_longitudinal_N_s": found.longitudinal_margin,
+        "yaw_moment_limit_Nm": found.yaw_moment_limit, "worst_start_Nm": WORST_MOMENT,
+        "epsilon_yaw_rad_s2": found.yaw_margin, "epsilon_longitudinal_N_s": found.longitudinal_margin,
         "growth_where_printed_sign_is_zero_rad_s2": float(growth),
         "reaching_time_from_60_kNm_s": reaching_time(SlidingModeGains(matrix), CAR, 0.0, 60_000.0),
-    }
+    }  # fmt: skip
     reading = (
         f"Omega_1 dominates while |L_1 x_2 - L_2 x_3| < {found.yaw_moment_limit / 1e3:g} kN m, the worst start from the "
         f"printed maxima has {WORST_MOMENT / 1e3:.2f} kN m; Omega_12 always dominates. So the condition is local, not global. "
@@ -107,12 +103,9 @@ def split_decay(gains: SlidingModeGains = PUBLISHED, tolerance: float = 1e-3) ->
     slope = np.polyfit(time[inside], np.log(np.abs(path[inside])), 1)[0]
     lateral_margin = sliding_mode_convergence(gains, CAR).lateral_margin
     computed = {
-        "decay_rate_1_s": float(exact),
-        "decay_rate_exact": str(exact),
-        "time_constant_s": float(1 / exact),
-        "simulated_decay_1_s": float(-slope),
-        "epsilon_lateral_N_s": lateral_margin,
-    }
+        "decay_rate_1_s": float(exact), "decay_rate_exact": str(exact), "time_constant_s": float(1 / exact),
+        "simulated_decay_1_s": float(-slope), "epsilon_lateral_N_s": lateral_margin,
+    }  # fmt: skip
     reading = (
         f"The split error decays at Omega_4 (L_1 + L_2) / (Omega_1 I_z) = {exact} = {float(exact):g} 1/s (time constant "
         f"{float(1 / exact):.3f} s), in the simulated sliding motion at {-slope:.4f} 1/s: far slower than the sum of the "
@@ -143,9 +136,8 @@ def gain_conditions() -> Table:
         "gain-conditions",
         "Conditions of Appendix A with the printed gains, at the worst start that the printed maxima of Table 1 allow (|L1 "
         f"x2 - L2 x3| = {WORST_MOMENT / 1e3:.2f} kN m); (A.4) with the minus sign of (A.5). Margins in the unit given.",
-        ("condition", "unit", "margin or value", "holds"),
-        rows,
-    )
+        ("condition", "unit", "margin or value", "holds"), rows,
+    )  # fmt: skip
 
 
 def convergence() -> Figure:

@@ -71,10 +71,9 @@ def sampled_switching(readings: Sequence[Sequence[float]] = (WIDE, NARROW)) -> F
     names = ("front_lateral", "rear_lateral", "longitudinal")
     computed = {
         "sign_peak_yaw_rate_rad_s": float(high[0]),
-        **{f"sign_peak_{name}_N": [float(low[k]), float(high[k])] for k, name in enumerate(names, 1)},
-        "zones": zones,
+        **{f"sign_peak_{name}_N": [float(low[k]), float(high[k])] for k, name in enumerate(names, 1)}, "zones": zones,
         "least_widths": list(LEAST),
-    }
+    }  # fmt: skip
     stable = [zone["spectral_radius"] < 1.0 for zone in zones]
     verdict = Verdict.REPRODUCED if all(stable) else Verdict.UNDER_SPECIFIED if any(stable) else Verdict.NOT_REPRODUCED
     reading = (
@@ -141,11 +140,8 @@ def chatter() -> Figure:
         "linear zones of two widths (rad/s, m/s², m/s²; P5 prints none). The sign chatters by 0.1 rad/s and several hundred "
         "newtons; zones wide enough converge smoothly, zones narrower than gain times half a sample keep chattering.",
         "Six panels over two seconds: ragged bands for the bare sign and the narrow zone, smooth decay for the wide zone.",
-        [upper, lower],
-        size=(9.2, 4.6),
-        share_x="all",
-        share_y="row",
-    )
+        [upper, lower], size=(9.2, 4.6), share_x="all", share_y="row",
+    )  # fmt: skip
 
 
 def zone_widths(points: int = 121) -> Figure:

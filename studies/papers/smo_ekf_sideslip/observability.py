@@ -41,14 +41,11 @@ def force_model(model: NonlinearModel | None = None) -> Finding:
     with_rear = generic_rank(both, {s.name: (-1.0, 1.0) for s in both.states}, samples=1)
     steered = sp.Symbol("steering_angle") in (chosen.f.free_symbols | chosen.h.free_symbols)
     computed = {
-        "rank": found.rank,
-        "states": len(chosen.states),
-        "determinant": str(force_determinant()),
-        "contains_steering_angle": steered,
-        "rank_with_rear_longitudinal_force": with_rear.rank,
+        "rank": found.rank, "states": len(chosen.states), "determinant": str(force_determinant()),
+        "contains_steering_angle": steered, "rank_with_rear_longitudinal_force": with_rear.rank,
         "states_with_rear_longitudinal_force": len(both.states),
         "hidden_with_rear_longitudinal_force": list(with_rear.structure.describe()),
-    }
+    }  # fmt: skip
     reading = (
         "The steering angle is not in the model at all; the determinant of outputs and yaw acceleration is (L_1 + L_2) / "
         "(m^2 I_z) up to its sign, so the rank is 4 for every car, speed and steering angle. With the rear longitudinal "
@@ -73,15 +70,13 @@ def sideslip_model(model: NonlinearModel | None = None) -> Finding:
     zero = {"sideslip": 0, "front_stiffness_change": 0, "rear_stiffness_change": 0}
     ahead = {"steering_angle": 0, "yaw_rate": 0, "speed": 20, "front_force_x": 0}
     computed = {
-        "generic_rank": generic.rank,
-        "rank_of_outputs_alone": generic.samples[0].by_order[0],
-        "rank_with_first_derivatives": generic.samples[0].by_order[1],
-        "rank_straight_ahead": test.at(zero, ahead).rank,
+        "generic_rank": generic.rank, "rank_of_outputs_alone": generic.samples[0].by_order[0],
+        "rank_with_first_derivatives": generic.samples[0].by_order[1], "rank_straight_ahead": test.at(zero, ahead).rank,
         "rank_as_a_turn_begins": test.at(zero, {**ahead, "yaw_rate": [0, "0.1"]}).rank,
         "rank_in_a_steady_turn": steady_turn_rank(),
         "closed_form_of_rank_loss_proved": all(identity == 0 for identity in rank_loss_identities()),
         "acceleration_adds_no_rank": third_row_repeats(),
-    }
+    }  # fmt: skip
     reading = (
         f"The rank is {generic.rank} at almost every state: 2 from the forces, the third from their rates. Outputs and their "
         "first derivatives lose it exactly where both slip angles follow beta_i' = -(V'/V) beta_i. So it is 2 for good in a "
@@ -194,6 +189,5 @@ def stiffness_observability() -> Figure:
             Panel(slips, "time [s]", Axis("slip angle [deg]", high=9.0), legend="upper left", columns=2),
             Panel(values, "time [s]", value, legend="upper left"),
         ],
-        size=(9.2, 3.7),
-        share_x="all",
-    )
+        size=(9.2, 3.7), share_x="all",
+    )  # fmt: skip

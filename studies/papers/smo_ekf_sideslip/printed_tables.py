@@ -46,12 +46,10 @@ def force_tables(tables: Mapping[str, Any] = PRINTED) -> Finding:
     nominal = {name: row["mean"] for name, row in slalom["forces"].items()} | {"beta_2": slalom["stiffness"]["mean"][1]}
     agrees = all(row["mean"][1] == nominal[name] for name, row in slalom["mass"].items())
     computed = {
-        "largest_mean_percent": mean,
-        "largest_deviation_percent": deviation,
-        "mean_by_mass_percent": {name: list(pair) for name, pair in mass.items()},
-        "least_sensitive_to_mass": least,
+        "largest_mean_percent": mean, "largest_deviation_percent": deviation,
+        "mean_by_mass_percent": {name: list(pair) for name, pair in mass.items()}, "least_sensitive_to_mass": least,
         "nominal_columns_agree_between_tables": agrees,
-    }
+    }  # fmt: skip
     reading = (
         f"Largest mean {mean:g} % and largest standard deviation {deviation:g} % of Tables 1 and 2, both below {LIMIT:g} %. "
         f"With 300 kg more or less F_y2 runs from {mass['F_y2'][0]:g} to {mass['F_y2'][1]:g} %, the rear sideslip from "
@@ -77,9 +75,8 @@ def printed_forces() -> Table:
     return Table(
         "tables-1-2",
         "Tables 1 and 2 of P5 as printed: errors (8) of the force observer in the two road tests, in percent of the maximum.",
-        ("test", "quantity", "max", "unit", "mean [%]", "std [%]", "below 6 %"),
-        rows,
-    )
+        ("test", "quantity", "max", "unit", "mean [%]", "std [%]", "below 6 %"), rows,
+    )  # fmt: skip
 
 
 def printed_settings() -> Table:
@@ -98,9 +95,8 @@ def printed_settings() -> Table:
     return Table(
         "tables-3-5",
         "Tables 3, 4 and 5 of P5 as printed: errors (8) with other settings of the stiffness and of the mass, in percent.",
-        ("table", "test", "quantity", "setting", "mean [%]", "std [%]"),
-        rows,
-    )
+        ("table", "test", "quantity", "setting", "mean [%]", "std [%]"), rows,
+    )  # fmt: skip
 
 
 def burckhardt_force(slip: FloatArray, road: str, load: float) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from studies.claim import Finding, Verdict
+from studies.claim import Finding, Verdict, judged
 from studies.papers.smo_ekf_sideslip.inputs import MASS_SETTINGS, PACKAGE, STIFFNESS_SETTINGS, WHEELBASE, published_car
 from studies.papers.smo_ekf_sideslip.observers import Estimates, estimates
 from studies.papers.smo_ekf_sideslip.saturating_car import LINEAR, SimulatedRun, simulate, with_noise
@@ -35,13 +35,11 @@ def fixed_stiffness(settings: tuple[float, ...] = STIFFNESS_SETTINGS) -> Finding
     ratio = [estimated_share(rear, run.rear_sideslip[turning]) for rear in found.rear_sideslip[turning].T]
     low, high = ratio[0] - 1.0, ratio[-1] - 1.0
     computed = {
-        "stiffness_factors": list(settings),
-        "simulated_rear_sideslip_ratio": ratio,
+        "stiffness_factors": list(settings), "simulated_rear_sideslip_ratio": ratio,
         "steady_state_ratio": [1.0 / factor for factor in settings],
-    }
-    verdict = (
-        Verdict.REPRODUCED if low > 0 and high > 0 else Verdict.ERRATUM if low > 0 > high else Verdict.NOT_REPRODUCED
-    )
+    }  # fmt: skip
+    otherwise = Verdict.ERRATUM if low > 0 > high else Verdict.NOT_REPRODUCED
+    verdict = judged(low > 0 and high > 0, otherwise)
     reading = (
         "The measured force fixes C beta: sideslip comes out as 1/factor. Reduced stiffness overestimates it (factor "
         f"{settings[0]:g}: {ratio[0]:.2f} times the true rear sideslip in the simulated slalom), increased stiffness "
@@ -109,9 +107,8 @@ def stiffness_table(run: SimulatedRun, fixed: Estimates, adaptive: Estimates) ->
         "stiffness-settings",
         "Error (8) of the rear sideslip in the simulated slalom (saturating axles, no noise, from 5 s on), and the size of "
         "the estimate against the true one. A model, not the road test of Tables 3 and 4.",
-        ("observer", "stiffness setting [1]", "mean error [%]", "std of the error [%]", "estimate / true [1]"),
-        rows,
-    )
+        ("observer", "stiffness setting [1]", "mean error [%]", "std of the error [%]", "estimate / true [1]"), rows,
+    )  # fmt: skip
 
 
 def mass_table(run: SimulatedRun, found: Estimates) -> Table:
@@ -125,9 +122,8 @@ def mass_table(run: SimulatedRun, found: Estimates) -> Table:
         "mass-settings",
         "Error (8) in the simulated slalom by assumed mass, and the size of the estimate against the true one: forces scale "
         "with the mass (300 kg are 20.7 %), sideslip does not. A model, not the road test of Table 5.",
-        ("mass change [kg]", "quantity", "mean error [%]", "std of the error [%]", "estimate / true [1]"),
-        rows,
-    )
+        ("mass change [kg]", "quantity", "mean error [%]", "std of the error [%]", "estimate / true [1]"), rows,
+    )  # fmt: skip
 
 
 def _curves(run: SimulatedRun, true: FloatArray, found: FloatArray, labels: list[str]) -> list[Mark]:
@@ -164,10 +160,8 @@ def stiffness_figure(run: SimulatedRun, fixed: Estimates, adaptive: Estimates) -
         "stays low because the force observer follows the split late.",
         "Upper panels: rear sideslip over time, three spread curves at the left, three nearly equal ones at the right. Lower "
         "panels: front and rear stiffness, constant until 5 s, then converging.",
-        [upper, lower],
-        size=(9.4, 5.6),
-        share_x="all",
-    )
+        [upper, lower], size=(9.4, 5.6), share_x="all",
+    )  # fmt: skip
 
 
 def mass_figure(run: SimulatedRun, found: Estimates) -> Figure:
@@ -182,12 +176,8 @@ def mass_figure(run: SimulatedRun, found: Estimates) -> Figure:
     panels = []
     for label, exact, values in shown:
         low, high = (f([f(exact), f(values)]) for f in (np.min, np.max))
-        y = Axis(label, low, high + 0.4 * (high - low))
-        panels.append(
-            Panel(
-                _curves(run, exact, values, labels), Axis("time [s]", 5.0, run.time[-1]), y, "", "upper left", columns=2
-            )
-        )
+        x, y = Axis("time [s]", 5.0, run.time[-1]), Axis(label, low, high + 0.4 * (high - low))
+        panels.append(Panel(_curves(run, exact, values, labels), x, y, legend="upper left", columns=2))
     return Figure(
         "mass-settings",
         "Fig. 18 of P5 on a model: the same slalom with the assumed mass 300 kg too small, right, and 300 kg too large. "
@@ -195,8 +185,7 @@ def mass_figure(run: SimulatedRun, found: Estimates) -> Figure:
         "because mass and force cancel in (10) and the adapted stiffness takes the rest.",
         "Three panels over time: front force, rear force and rear sideslip; force curves differ in size by a fifth, sideslip "
         "curves nearly coincide.",
-        panels,
-        size=(9.4, 3.8),
+        panels, size=(9.4, 3.8),
     )  # fmt: skip
 
 
@@ -223,10 +212,8 @@ def zones(run: SimulatedRun, found: Estimates) -> Figure:
     ]
     for sign, text in ((-1.0, "−λ₁"), (1.0, "λ₁")):
         level = 1e-3 * sign * THRESHOLD
-        plane += [
-            Level(y=level, color=GREY, dash="dotted"),
-            Words(5.4, level, text, horizontal="right", vertical="bottom"),
-        ]
+        name = Words(5.4, level, text, horizontal="right", vertical="bottom")
+        plane += [Level(y=level, color=GREY, dash="dotted"), name]
     background = backgrounds(run.time, kind, [("", color) for _, color in ZONES], alpha=0.35)
     return Figure(
         "zones",
@@ -242,6 +229,5 @@ def zones(run: SimulatedRun, found: Estimates) -> Figure:
             Panel([*background, Line(run.time, stiffness, color=TRUTH)], Axis("time [s]", run.time[0], run.time[-1]),
                   "C₁ + ΔC₁ [kN/rad]", "stiffness over time; background: zone", grid=False),
         ],
-        size=(9.2, 4.0),
-        widths=(1.1, 1.0),
+        size=(9.2, 4.0), widths=(1.1, 1.0),
     )  # fmt: skip

@@ -162,9 +162,8 @@ def stiffness_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str
     peak = round(float(np.degrees(np.abs(run.true_sideslip[run.counted]).max())), 2)
     none = [None] * len(STIFFNESS_SETTINGS)
     found = (
-        ("adaptive (EKF)", run.adaptive, printed["mean"], printed["deviation"]),
-        ("fixed (ORL)", run.fixed, none, none),
-    )
+        ("adaptive (EKF)", run.adaptive, printed["mean"], printed["deviation"]), ("fixed (ORL)", run.fixed, none, none),
+    )  # fmt: skip
     for who, estimates, *paper in found:
         for factor, *own in zip(STIFFNESS_SETTINGS, *paper, strict=True):
             errors = run.sideslip_errors(estimates[0.0, factor])
@@ -213,9 +212,8 @@ def force_history(name: str, title: str, run: AxleRun) -> Figure:
         f"{title}: axle forces and yaw rate of the sliding-mode observer, as Figs. 7 and 8 of P5. It starts from the greatest "
         f"values of the drive. {BANDS}",
         "Four panels over time: front and rear lateral force, front longitudinal force, yaw rate, each with its estimate.",
-        panels,
-        (9.0, 7.0),
-    )
+        panels, (9.0, 7.0),
+    )  # fmt: skip
 
 
 def _settings(time: Array, estimates: Sequence[Array], labels: Sequence[str]) -> list[Mark]:
@@ -254,10 +252,8 @@ def stiffness_history(name: str, title: str, run: AxleRun) -> Figure:
             _sideslip_panel(run, adapted, labels, "", "rear sideslip, stiffness adapted (EKF)"),
             *axles,
         ],
-        (9.4, 6.2),
-        columns=2,
-        legend="below",
-    )
+        (9.4, 6.2), columns=2, legend="below",
+    )  # fmt: skip
 
 
 def mass_history(name: str, title: str, run: AxleRun) -> Figure:
@@ -273,9 +269,8 @@ def mass_history(name: str, title: str, run: AxleRun) -> Figure:
         name,
         f"{title}: front axle force and rear sideslip by believed mass, as Fig. 18 of P5. {BANDS}",
         "Front lateral force and rear sideslip over time for three believed masses.",
-        [force, slip],
-        (9.0, 5.0),
-    )
+        [force, slip], (9.0, 5.0),
+    )  # fmt: skip
 
 
 MOTION = (
