@@ -1,6 +1,6 @@
 """The shipped manoeuvres on truth vehicles, integrated once and shared by all trials of a run.
 
-A step costs the same for one run as for all of them, so that every tire drives every manoeuvre in one batch.
+A step costs the same for one run as for all of them, so that all manoeuvres on one kind of tire are one batch.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ DRIVEN = {tire: Preparation(f"{tire}-tires", partial(_drive_all, tire), cost=40.
 def driven_part(
     name: str, title: str, run: Callable[..., PartResult], cost: float, tire: str = LUGRE, quick: bool = False
 ) -> Part:
-    """A part that plays estimators on shipped manoeuvres: ``run(scope, tire=tire)``; ``quick``: in quick runs, too."""
+    """A part that runs estimators on shipped manoeuvres: ``run(scope, tire=tire)``; ``quick``: in quick runs, too."""
     return Part(name, title, partial(run, tire=tire), cost, (DRIVEN[tire],), quick)
 
 

@@ -49,7 +49,7 @@ def differentiated_pid(car: VehicleParameters, sample_time: float, shape: tuple[
 def force_part(
     name: str, rows: Sequence[Driven], methods: Mapping[str, Parts], scope: Scope, tire: str = LUGRE
 ) -> PartResult:
-    """Play every manoeuvre with each of the paper's wheel force observers in the pipeline; F_y and F_z from the first one."""
+    """Every manoeuvre with each of the paper's wheel force observers in the pipeline; F_y and F_z from the first one."""
     drawn = measured_runs([row.manoeuvre for row in rows], tire, scope)
     truth = drawn.truth
     estimates = {method: play(drawn, READINGS, parts) for method, parts in methods.items()}

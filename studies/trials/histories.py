@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Literal
@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studies.plots import Axis, Band, Dash, ErrorBars, Figure, Line, Mark, Panel, Shade
-from studies.plots.colours import TRUTH
+from studies.plots.colours import SETTINGS, TRUTH
 from studies.trials.accuracy import Spread
 
 Array = npt.NDArray[np.float64]
@@ -34,6 +34,12 @@ def estimate_lines(
         return [line]
     low, high = np.percentile(estimate, BAND, axis=0)
     return [line, Band(time, low, high, color=color, alpha=0.18)]
+
+
+def setting_lines(time: Array, estimates: Iterable[Array], labels: Sequence[str]) -> list[Mark]:
+    """The estimates (S, n) of up to three settings of one estimator."""
+    shown = zip(estimates, labels, SETTINGS, strict=False)
+    return [mark for value, label, color in shown for mark in estimate_lines(time, value, label, color)]
 
 
 def history(

@@ -1,4 +1,4 @@
-"""Several drives of one car, many sensor draws of each: one batch through the estimation pipeline."""
+"""Several manoeuvres of one car, many sensor draws of each: one batch through the estimation pipeline."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from synthesis.errors import SpecError
 
 Array = npt.NDArray[np.float64]
 QUICK_SECONDS = 4.0
-"""So much of each manoeuvre the pipeline plays when quick."""
+"""So much of each manoeuvre goes through the pipeline when quick."""
 Parts = Callable[[VehicleParameters, float, tuple[int, ...]], Mapping[str, Any]]
 """(vehicle, sample time, batch shape) -> parts that replace those of the pipeline, by its argument names."""
 Reading = Callable[[PipelineStep], Array]
@@ -42,7 +42,7 @@ def measured(truth: Truth, seeds: Sequence[int], sensors: Sensors) -> Measured:
 
 
 def believed(drawn: Measured) -> VehicleParameters:
-    """The car of the truth. Raises SpecError when the runs have different ones: one pipeline believes in one car."""
+    """The car of the truth. Raises SpecError when the runs have different ones: a pipeline assumes one car."""
     cars = [vehicle.parameters for vehicle in drawn.truth.vehicles]
     if any(car != cars[0] for car in cars[1:]):
         raise SpecError(f"manoeuvres {', '.join(drawn.truth.names)} drive different cars; play them apart")

@@ -1,4 +1,4 @@
-"""The sensors of every experiment: those that the project's accuracy targets are stated for."""
+"""The sensors of every trial: those that the project's accuracy targets are stated for."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class TireFacts(NamedTuple):
 def lateral_curve(vehicle: TruthVehicle, kind: str, speed: float, friction: float) -> Array:
     """F_y/F_z (2, n) of a front and a rear tire that rolls freely at `speed`, m/s, at the slip angles `ANGLES`.
 
-    Positive for a positive angle, at static load: the deflection (or lagged slip) at rest is its drive over its decay.
+    Positive for a positive angle, at static load: the deflection (or lagged slip) at rest is its source over its decay.
     """
     tire = tires_of(kind, [vehicle] * ANGLES.size)
     shape = (4, ANGLES.size)

@@ -31,7 +31,7 @@ LOOKS = {
     INTEGRATED: ("v", colours.INTEGRATED_ACCELERATION),
 }
 COMPLIANCE_SPREAD = 0.2
-"""Relative spread of the slip compliances that the fusion gets: as well as a fit to a drive knows them."""
+"""Relative spread of the slip compliances that the fusion gets: as well as a fit to logged signals knows them."""
 USED = 0.6
 """Largest F_y/F_z of the fit of the side slip curve: what a car shows on a dry road before it slides."""
 
@@ -95,7 +95,7 @@ COLUMNS = (
 
 
 def velocity_part(name: str, rows: Sequence[Printed], parts: Parts, scope: Scope, tire: str = LUGRE) -> PartResult:
-    """Play every manoeuvre of ``rows`` for the seeds of ``scope`` and put the errors beside the printed ones."""
+    """Errors of every manoeuvre of ``rows`` over the seeds of ``scope``, beside the printed ones."""
     drawn = measured_runs([row.manoeuvre for row in rows], tire, scope)
     truth = drawn.truth
     estimates = play(drawn, READINGS, parts) | baselines(drawn)

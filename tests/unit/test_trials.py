@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from studies.plots import ErrorBars, Panel, Shade
 from studies.registry import MODULES, load_study
 from studies.study import PartResult, Scope
-from studies.trials.accuracy import known_spread, nrms, spread
+from studies.trials.accuracy import Spread, known_spread, nrms, sample_spreads, spread
 from studies.trials.driven import DRIVEN, LUGRE, MAGIC_FORMULA, driven, driven_part
+from studies.trials.histories import backgrounds, dot_heights, error_dots, history
 from studies.trials.play import baselines, believed, measured, play, run_of
 from studies.trials.velocities import USED, side_slip_curve
 from studies.truth import PERFECT, Truth, drive, load_manoeuvre
@@ -138,6 +140,15 @@ def test_spread_is_students_interval() -> None:
         known_spread(np.full(2, np.nan))
 
 
+def test_errors_per_sample_are_percents_of_the_peak() -> None:
+    """P4 (13), P5 (8) by hand: 50 % and 0 in the first draw, none in the second."""
+    found = sample_spreads(np.array([[1.0, 4.0], [2.0, 4.0]]) * [1.5, 0.5], np.array([2.0, 4.0]) * [1.5, 0.5])
+    assert (found.mean.mean, found.mean.worst, found.deviation.worst) == pytest.approx((12.5, 25.0, 25.0))
+    assert found.cells((1.0, None))[::2] == [1.0, None, 25.0] and found.measures("x") == {
+        "x, mean": pytest.approx(12.5), "x, deviation": pytest.approx(12.5)
+    }  # fmt: skip
+
+
 def test_nrms_counts_where_the_truth_is_large() -> None:
     truth = np.array([0.5, 2.0, -4.0])
     estimate = np.array([[9.0, 2.4, -4.3]])
@@ -153,3 +164,27 @@ def test_side_slip_curve_is_that_of_a_bristle_tire() -> None:
     exact = c * mu / (1.0 - mu)
     assert np.abs(c1 * mu + c3 * mu**3 - exact).max() < 0.06 * exact[-1]
     assert np.abs(c * mu - exact).max() > 0.5 * exact[-1]
+
+
+def test_backgrounds_are_the_stretches_of_each_state() -> None:
+    time = 0.1 * np.arange(6)
+    first, second, third = backgrounds(time, np.array([1, 1, 0, 0, 2, 1]), [None, ("high", "red"), ("low", "blue")])
+    assert isinstance(first, Shade) and isinstance(second, Shade) and isinstance(third, Shade)
+    assert (first.low, first.high) == pytest.approx((0.0, 0.2)) and (third.low, third.high) == pytest.approx((0.5, 0.6))
+    assert [mark.label for mark in (first, second, third)] == ["high", "low", ""]  # a legend names a state once
+
+
+def test_dots_of_a_row_stand_in_one_order_and_missing_ones_leave_a_gap() -> None:
+    looks = {"a": ("o", "red"), "b": ("s", "blue")}
+    a, b = Spread(2.0, 1.0, 4.0, 5.0, 3), Spread(3.0, 3.0, 3.0, 3.0, 3)
+    one, other = error_dots([{"a": a, "b": b}, {"b": b}], looks)
+    assert isinstance(one, ErrorBars) and isinstance(other, ErrorBars)
+    assert (np.asarray(one.x), np.asarray(one.below), np.asarray(one.above)) == (2.0, 1.0, 2.0)
+    assert np.asarray(other.y) - np.asarray(one.y)[0] == pytest.approx([0.35, 1.35])
+    np.testing.assert_allclose(dot_heights([0, 1], "b", looks), np.asarray(other.y))
+
+
+def test_time_is_named_under_the_last_panels() -> None:
+    figure = history("n", "c", "a", [Panel([], y=f"{k} [m]") for k in range(4)], (4.0, 3.0), columns=2)
+    labels = [[panel.x.label for panel in row] for row in figure.rows]  # type: ignore[union-attr]
+    assert labels == [["", ""], ["time [s]", "time [s]"]]

@@ -81,12 +81,9 @@ def printed_forces() -> Table:
 
 def printed_settings() -> Table:
     """Tables 3 to 5."""
-    stiffness, mass = (f"stiffness x {k:g}" for k in STIFFNESS_SETTINGS), (f"mass {k:+g} kg" for k in MASS_SETTINGS)
-    factors, changes = tuple(stiffness), tuple(mass)
-    slalom = PRINTED["slalom"]
-    found = [(3, "slalom", "beta_2", slalom["stiffness"], factors)]
-    found += [(4, "roundabout", "beta_2", PRINTED["roundabout"]["stiffness"], factors)]
-    found += [(5, "slalom", name, row, changes) for name, row in slalom["mass"].items()]
+    factors, changes = [f"stiffness x {k:g}" for k in STIFFNESS_SETTINGS], [f"mass {k:+g} kg" for k in MASS_SETTINGS]
+    found = [(n, test, "beta_2", PRINTED[test]["stiffness"], factors) for n, test in ((3, "slalom"), (4, "roundabout"))]
+    found += [(5, "slalom", name, row, changes) for name, row in PRINTED["slalom"]["mass"].items()]
     rows: list[list[Cell]] = [
         [number, test, name, setting, mean, deviation]
         for number, test, name, row, settings in found

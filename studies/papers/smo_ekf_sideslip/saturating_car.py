@@ -64,7 +64,7 @@ def steady_turn(time: float) -> float:
 def simulate(
     steering: Callable[[float], float] = slalom, speed: float = 17.0, seconds: float = 20.0, friction: float = 1.0
 ) -> SimulatedRun:
-    """F_i = D_i tanh(C_i beta_i / D_i) with D_i = friction times the axle load; the drive force keeps the speed constant.
+    """F_i = D_i tanh(C_i beta_i / D_i) with D_i = friction times the axle load; F_xw1 keeps the speed constant.
 
     P5 (10), (11) and (1) with the front forces turned into body axes. A large `friction` makes the axles linear.
     """
@@ -73,7 +73,7 @@ def simulate(
     stiffness = np.array([car.front_stiffness, car.rear_stiffness])
 
     def forces(angle: Any, beta: Any, yaw: Any) -> tuple[FloatArray, FloatArray, Any]:
-        """Slips (..., 2), lateral forces (..., 2), and the drive force for which V' = 0."""
+        """Slips (..., 2), lateral forces (..., 2), and the longitudinal force for which V' = 0."""
         slips = np.stack([angle - beta - front * yaw / speed, -beta + rear * yaw / speed], axis=-1)
         across = limit * np.tanh(stiffness * slips / limit)
         turned = angle - beta
@@ -81,17 +81,17 @@ def simulate(
 
     def rate(t: float, x: FloatArray) -> list[float]:
         angle = steering(t)
-        _, across, drive = forces(angle, x[0], x[1])
+        _, across, pull = forces(angle, x[0], x[1])
         turned = angle - x[0]
-        lateral = drive * np.sin(turned) + across[0] * np.cos(turned) + across[1] * np.cos(x[0])
-        turn = front * (across[0] * np.cos(angle) + drive * np.sin(angle)) - rear * across[1]
+        lateral = pull * np.sin(turned) + across[0] * np.cos(turned) + across[1] * np.cos(x[0])
+        turn = front * (across[0] * np.cos(angle) + pull * np.sin(angle)) - rear * across[1]
         return [lateral / (car.mass * speed) - x[1], turn / car.yaw_inertia]
 
     time = np.arange(0.0, seconds, SAMPLE_TIME)
     beta, yaw = solve_ivp(rate, (0.0, seconds), [0.0, 0.0], t_eval=time, rtol=1e-8, atol=1e-10, max_step=0.05).y
     angle = np.array([steering(t) for t in time])
-    slips, across, drive = forces(angle, beta, yaw)
-    along = drive * np.cos(angle) - across[:, 0] * np.sin(angle)
-    side = across[:, 0] * np.cos(angle) + drive * np.sin(angle) + across[:, 1]
+    slips, across, pull = forces(angle, beta, yaw)
+    along = pull * np.cos(angle) - across[:, 0] * np.sin(angle)
+    side = across[:, 0] * np.cos(angle) + pull * np.sin(angle) + across[:, 1]
     signals = (yaw, side / car.mass, along / car.mass, angle, np.full(time.shape, speed))
-    return SimulatedRun(*signals, time, beta, slips, across, drive)
+    return SimulatedRun(*signals, time, beta, slips, across, pull)

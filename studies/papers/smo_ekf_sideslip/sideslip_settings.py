@@ -13,7 +13,7 @@ from studies.plots import Axis, Figure, Level, Line, Mark, Panel, Words, dots
 from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, RED, TRUTH
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import sample_errors
-from studies.trials.histories import backgrounds
+from studies.trials.histories import backgrounds, setting_lines, truth_line
 from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
@@ -21,7 +21,6 @@ MODEL_NOTE = (
     "The drive is a single track with the printed car values and axles that saturate at friction 1 (hyperbolic tangent), at "
     "constant speed, without noise: it shows what the equations do. The road tests of the paper are regenerated elsewhere."
 )
-COLOURS = (ORANGE, BLUE, GREEN)
 THRESHOLD = 1000.0  # N, lambda_1; not printed
 ZONES = (("zones 1, 2: β₁F < 0", RED), ("zones 3, 4: |F| < λ₁", ORANGE), ("zones 5, 6", BLUE))
 
@@ -128,11 +127,7 @@ def mass_table(run: SimulatedRun, found: Estimates) -> Table:
 
 def _curves(run: SimulatedRun, true: FloatArray, found: FloatArray, labels: list[str]) -> list[Mark]:
     """The truth (n,) and three settings (n, 3)."""
-    shown = zip(found.T, labels, COLOURS, strict=True)
-    return [
-        Line(run.time, true, "true", TRUTH, width=2.2),
-        *(Line(run.time, value, label, color, width=1.1) for value, label, color in shown),
-    ]
+    return [truth_line(run.time, true), *setting_lines(run.time, found.T[:, None], labels)]
 
 
 def stiffness_figure(run: SimulatedRun, fixed: Estimates, adaptive: Estimates) -> Figure:
@@ -176,7 +171,8 @@ def mass_figure(run: SimulatedRun, found: Estimates) -> Figure:
     panels = []
     for label, exact, values in shown:
         low, high = (f([f(exact), f(values)]) for f in (np.min, np.max))
-        x, y = Axis("time [s]", 5.0, run.time[-1]), Axis(label, low, high + 0.4 * (high - low))
+        span = high - low  # above it stands the legend
+        x, y = Axis("time [s]", 5.0, run.time[-1]), Axis(label, low - 0.05 * span, high + 0.4 * span)
         panels.append(Panel(_curves(run, exact, values, labels), x, y, legend="upper left", columns=2))
     return Figure(
         "mass-settings",

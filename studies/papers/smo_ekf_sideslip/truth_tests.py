@@ -22,13 +22,13 @@ from studies.papers.smo_ekf_sideslip.inputs import (
 )
 from studies.papers.smo_ekf_sideslip.observers import Signals, axle_forces, rear_sideslip
 from studies.papers.topic import Topic
-from studies.plots import Axis, Figure, Mark, Panel
+from studies.plots import Axis, Figure, Panel
 from studies.plots.colours import SETTINGS
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import ERROR_COLUMNS, SampleSpreads, sample_spreads
 from studies.trials.driven import LUGRE, MAGIC_FORMULA, QUICK_SECONDS, driven_part
 from studies.trials.filter_inputs import PRINTED_TEST, conditions, counted, front_steer, rear_speed
-from studies.trials.histories import BANDS, estimate_lines, history, truth_line
+from studies.trials.histories import BANDS, estimate_lines, history, setting_lines, truth_line
 from studies.trials.motion import Moved, motion_part
 from studies.trials.play import believed, measured_runs
 from studies.trials.tire_curve import USE, TireFacts, tire_facts
@@ -93,7 +93,7 @@ def single_track(car: VehicleParameters, tire: TireFacts, mass: float = 0.0, fac
 def run_axles(drawn: Measured, settings: Sequence[Setting]) -> AxleRun:
     """Both blocks on the only run of ``drawn`` with every setting; fixed stiffness with the right mass alone.
 
-    Block 1 starts at the greatest values of the drive as in the paper.
+    Block 1 starts at the greatest true values as in the paper.
     """
     car, truth, at = believed(drawn), drawn.truth, counted(drawn, 0)
     speed, friction = float(truth["vx"][0][at].mean()), float(truth["friction"][0].mean())
@@ -216,17 +216,11 @@ def force_history(name: str, title: str, run: AxleRun) -> Figure:
     )  # fmt: skip
 
 
-def _settings(time: Array, estimates: Sequence[Array], labels: Sequence[str]) -> list[Mark]:
-    """The estimates (S, n) of several settings."""
-    shown = zip(estimates, labels, SETTINGS, strict=False)
-    return [mark for value, label, color in shown for mark in estimate_lines(time, value, label, color)]
-
-
 def _sideslip_panel(run: AxleRun, estimates: Sequence[Array], labels: Sequence[str], y: str, title: str = "") -> Panel:
     """True rear sideslip where it counts, with the estimates (S, n)."""
     time, limit = run.drawn.truth.time, 1.9 * float(np.degrees(np.abs(run.true_sideslip[run.counted]).max()))
     true = truth_line(time, np.where(run.counted, np.degrees(run.true_sideslip), np.nan))
-    marks = [true, *_settings(time, [np.degrees(value) for value in estimates], labels)]
+    marks = [true, *setting_lines(time, [np.degrees(value) for value in estimates], labels)]
     return Panel(marks, y=Axis(y, -limit, limit), title=title)
 
 
@@ -236,7 +230,7 @@ def stiffness_history(name: str, title: str, run: AxleRun) -> Figure:
     fixed, adapted, stiffness = ([found[s] for s in run.fixed] for found in (run.fixed, run.adaptive, run.stiffness))
     axles = [
         Panel(
-            _settings(run.drawn.truth.time, [1e-3 * value[:, :, k] for value in stiffness], labels),
+            setting_lines(run.drawn.truth.time, [1e-3 * value[:, :, k] for value in stiffness], labels),
             y=Axis("" if k else "stiffness [kN/rad]", 0.0), title=f"{axle} axle",
         )
         for k, axle in enumerate(("front", "rear"))
@@ -260,7 +254,7 @@ def mass_history(name: str, title: str, run: AxleRun) -> Figure:
     """Fig. 18: front force and rear sideslip by assumed mass."""
     time, masses = run.drawn.truth.time, sorted(run.forces)
     labels = [f"m {mass:+g} kg" if mass else "m" for mass in masses]
-    forces = _settings(time, [1e-3 * run.forces[mass][:, :, 0] for mass in masses], labels)
+    forces = setting_lines(time, [1e-3 * run.forces[mass][:, :, 0] for mass in masses], labels)
     force = Panel(
         [truth_line(time, 1e-3 * run.true_forces[:, 0]), *forces], y="$F_{y1}$ [kN]", legend="upper left", columns=4
     )
