@@ -86,6 +86,8 @@ def _draw_panel(axes: Any, panel: Panel) -> None:
         draw_mark(mark, axes)
     _run(axes, "x", x)
     _run(axes, "y", y)
+    if panel.equal:
+        axes.set_aspect("equal", adjustable="datalim")
     if panel.title:
         axes.set_title(panel.title, loc="left")
     if panel.legend:

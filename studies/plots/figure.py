@@ -40,6 +40,7 @@ class Panel:
     grid: bool = True
     columns: int = 1  # of the legend
     heading: str = ""  # of the legend
+    equal: bool = False  # x and y on one scale
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from studies.drives.drive_file import read_drive
 from studies.drives.log import read_log
 from studies.drives.prepare import CornerInputs, corner_inputs_of
 from studies.drives.replay import centre_map, cg_velocity
-from studies.experiments.accuracy import nrms as nrms_of_runs
 from studies.sweeps.plant import Grid
 from studies.sweeps.subject import Batch, Subject
+from studies.trials.accuracy import nrms as nrms_of_runs
 from synthesis.errors import SpecError
 from synthesis.polynomials.matrix import FloatArray
 

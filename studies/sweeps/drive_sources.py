@@ -89,8 +89,8 @@ class TruthDrive:
     @cached_property
     def recorded(self) -> Recorded:
         """Takes about a second for every second of the manoeuvre. Raises SpecError for a car that cannot drive it."""
-        from studies.experiments.sensors import TEST_CAR
         from studies.sweeps.drive_replay import read_recorded
+        from studies.trials.sensors import TEST_CAR
         from studies.truth import draw, drive, write_drive
 
         truth = drive([self.manoeuvre], [self.manoeuvre.truth_vehicle(self.folder)])
@@ -102,7 +102,7 @@ class TruthDrive:
     @cached_property
     def definition(self) -> Mapping[str, Any]:
         """Name, length and seed, and a digest of manoeuvre, car and sensors: what was asked, not what the simulation made."""
-        from studies.experiments.sensors import TEST_CAR
+        from studies.trials.sensors import TEST_CAR
 
         car = asdict(self.manoeuvre.truth_vehicle(self.folder))
         parts = [self.manoeuvre.model_dump(mode="json"), car, asdict(TEST_CAR)]

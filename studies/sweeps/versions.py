@@ -13,7 +13,7 @@ PACKAGES = (
     "analysis",
     "estimators",
     "studies.drives",
-    "studies.experiments",
+    "studies.trials",
     "studies.sweeps",
     "studies.truth",
     "synthesis",

@@ -15,28 +15,44 @@ from estimators.sideslip import CorneringModel, SlidingModeObserver
 from studies.claim import Finding, Verdict
 from studies.papers.published import published_claims
 from studies.papers.smo_ekf_sideslip import (
-    claims_fixed_stiffness,
-    claims_gains,
-    claims_observability,
-    claims_sampling,
-    claims_tables,
+    force_observer,
+    linear_zones,
+    observability,
+    printed_tables,
+    sideslip_settings,
+    truth_tests,
 )
-from studies.papers.smo_ekf_sideslip.axle_drive import axle_drive, published_car, steady_turn
-from studies.papers.smo_ekf_sideslip.error_motion import LARGEST, error_motion, split, split_tracking
-from studies.papers.smo_ekf_sideslip.figures_models import BURCKHARDT, burckhardt_force, zone_of, zones
-from studies.papers.smo_ekf_sideslip.figures_sideslip import mass_settings, stiffness_settings
-from studies.papers.smo_ekf_sideslip.observer_chain import run_chain
-from studies.papers.smo_ekf_sideslip.published_tables import MASS_SETTINGS, printed
-from studies.papers.smo_ekf_sideslip.stiffness_rank import third_singular_value
-from studies.papers.smo_ekf_sideslip.study import PACKAGE, STUDY
-from studies.papers.smo_ekf_sideslip.tables import mass_on_the_model, settings_on_the_model
+from studies.papers.smo_ekf_sideslip.force_observer import error_motion, split
+from studies.papers.smo_ekf_sideslip.inputs import (
+    CAR,
+    LARGEST,
+    MASS_SETTINGS,
+    PACKAGE,
+    PRINTED,
+    WHEELBASE,
+    published_car,
+)
+from studies.papers.smo_ekf_sideslip.linear_zones import NARROW, WIDE, split_tracking
+from studies.papers.smo_ekf_sideslip.observability import third_singular_value
+from studies.papers.smo_ekf_sideslip.observers import estimates
+from studies.papers.smo_ekf_sideslip.printed_tables import BURCKHARDT, burckhardt_force
+from studies.papers.smo_ekf_sideslip.saturating_car import simulate, steady_turn
+from studies.papers.smo_ekf_sideslip.sideslip_settings import (
+    mass_figure,
+    mass_table,
+    stiffness_figure,
+    stiffness_table,
+    zone_of,
+    zones,
+)
+from studies.papers.smo_ekf_sideslip.study import STUDY
 from studies.study import QUICK, PartResult
 from synthesis.models.catalogue.single_track import axle_force_model
 from tests.unit.study_checks import check_result, check_study, desk_parts
 from tests.unit.study_reference import numbers, reference_claims
 
-MODULES = (claims_gains, claims_sampling, claims_observability, claims_tables, claims_fixed_stiffness)
-FUNCTIONS = {name: function for module in MODULES for name, function in module.CLAIMS.items()}
+TOPICS = (force_observer, linear_zones, observability, printed_tables, sideslip_settings, truth_tests)
+FUNCTIONS = {name: function for module in TOPICS for name, function in module.TOPIC.claims.items()}
 
 
 @cache
@@ -96,15 +112,15 @@ class TestGains:
         assert SlidingModeObserver(published_car()).condition_residual == pytest.approx(160.0)
 
     def test_verdict_flips_with_the_exact_gain(self) -> None:
-        assert claims_gains.gain_condition(changed(5, 52142.857)).verdict is Verdict.REPRODUCED
+        assert force_observer.gain_condition(changed(5, 52142.857)).verdict is Verdict.REPRODUCED
 
     def test_dominance_is_local(self) -> None:
         found = finding("P5-A4")
         assert found.verdict is Verdict.REPRODUCED
         assert found.computed["yaw_moment_limit_Nm"] == 30_000.0
         assert found.computed["worst_start_Nm"] == pytest.approx(1.12 * 6282 + 1.46 * 3663)
-        assert claims_gains.dominance(changed(1, 4.0)).verdict is Verdict.NOT_REPRODUCED  # 12 kN m limit
-        assert claims_gains.dominance(changed(12, -1.0)).verdict is Verdict.NOT_REPRODUCED
+        assert force_observer.dominance(changed(1, 4.0)).verdict is Verdict.NOT_REPRODUCED  # 12 kN m limit
+        assert force_observer.dominance(changed(12, -1.0)).verdict is Verdict.NOT_REPRODUCED
 
     def test_printed_sign_of_a4_is_no_condition(self) -> None:
         """L_1 x_2 + L_2 x_3 = 0, yet the yaw error grows at 1 rad/s^2, by the right-hand side and by simulation."""
@@ -135,7 +151,7 @@ class TestGains:
         "gains", [changed(7, 40_000.0), changed(1, 100.0)], ids=["wrong sign", "not in the window"]
     )
     def test_verdict_flips_when_the_split_does_not_follow(self, gains: SlidingModeGains) -> None:
-        found = claims_gains.split_decay(gains)
+        found = force_observer.split_decay(gains)
         exact, simulated = found.computed["decay_rate_1_s"], found.computed["simulated_decay_1_s"]
         assert (found.verdict is Verdict.REPRODUCED) == (exact > 0 and abs(simulated / exact - 1.0) < 1e-3)
         if exact < 0:
@@ -145,21 +161,20 @@ class TestGains:
 class TestSampling:
     def test_verdict_follows_from_the_readings(self) -> None:
         assert finding("P5-100Hz").verdict is Verdict.UNDER_SPECIFIED
-        wide, narrow = claims_sampling.WIDE, claims_sampling.NARROW
-        assert claims_sampling.sampled_switching((wide, (0.3, 2.0, 2.0))).verdict is Verdict.REPRODUCED
-        assert claims_sampling.sampled_switching((narrow,)).verdict is Verdict.NOT_REPRODUCED
+        assert linear_zones.sampled_switching((WIDE, (0.3, 2.0, 2.0))).verdict is Verdict.REPRODUCED
+        assert linear_zones.sampled_switching((NARROW,)).verdict is Verdict.NOT_REPRODUCED
 
     def test_radius_is_that_of_the_runtime(self) -> None:
-        observer = SlidingModeObserver(published_car(), widths=claims_sampling.WIDE)
-        assert claims_sampling.radius(claims_sampling.WIDE) == pytest.approx(observer.spectral_radius, rel=1e-12)
+        observer = SlidingModeObserver(published_car(), widths=WIDE)
+        assert linear_zones.radius(WIDE) == pytest.approx(observer.spectral_radius, rel=1e-12)
 
     def test_motion_is_that_of_the_runtime(self) -> None:
         """The error of the runtime observer on constant true forces is the simulated one."""
         truth, start = np.array([0.0, 2000.0, 1500.0, 500.0]), np.array([0.1, 900.0, -700.0, 300.0])
-        observer = SlidingModeObserver(published_car(), widths=claims_sampling.WIDE)
+        observer = SlidingModeObserver(published_car(), widths=WIDE)
         observer.reset(state=truth - start)
         rate = (1.12 * 2000.0 - 1.46 * 1500.0) / 3000.0
-        path = error_motion(start, 0.5, 0.01, claims_sampling.WIDE)
+        path = error_motion(start, 0.5, 0.01, WIDE)
         for k in range(50):
             # The runtime compares with the measurement of the sample at whose start the error stands.
             step = observer.step([rate * 0.01 * k, 3500.0 / 1447.0, 500.0 / 1447.0])
@@ -200,7 +215,7 @@ class TestObservability:
         assert found.computed["determinant"] == "(front_axle_distance + rear_axle_distance)/(mass**2*yaw_inertia)"
 
     def test_verdict_flips_with_the_rear_longitudinal_force(self) -> None:
-        found = claims_observability.force_model(axle_force_model(rear_longitudinal_force=True))
+        found = observability.force_model(axle_force_model(rear_longitudinal_force=True))
         assert (found.computed["rank"], found.computed["states"]) == (4, 5)
         assert found.verdict is Verdict.NOT_REPRODUCED
 
@@ -223,11 +238,11 @@ class TestObservability:
         In the steady turn a third of the singular values vanishes against the slalom's: softer tires with more slip measure
         the same.
         """
-        drive = axle_drive(seconds=11.25, friction=1e9, **({"steering": steering} if steering else {}))
+        drive = simulate(seconds=11.25, friction=1e9, **({"steering": steering} if steering else {}))
         rows, product = [], np.eye(3)
         for k in range(-60, 0):
-            model = CorneringModel(published_car(), 0.01, drive.steering[k], drive.yaw_rate[k], drive.speed[k], drive.drive[k],
-                                   np.array(False))  # fmt: skip
+            inputs = (drive.steering[k], drive.yaw_rate[k], drive.speed[k], drive.front_force_x[k])
+            model = CorneringModel(published_car(), 0.01, *inputs, np.array(False))
             x = np.array([drive.sideslip[k], 0.0, 0.0])
             rows.append(model.measurement_jacobian(x)[:2] @ product)
             product = model.transition_jacobian(x) @ product
@@ -235,11 +250,8 @@ class TestObservability:
         assert (values[2] < 1e-4 * values[0]) == hidden
 
     def test_singular_value_vanishes_in_the_steady_turn_alone(self) -> None:
-        drive = axle_drive(steady_turn, seconds=9.0, friction=1e9)
-        signals = {"sideslip": drive.sideslip, "steering_angle": drive.steering, "yaw_rate": drive.yaw_rate,
-                   "speed": drive.speed, "front_force_x": drive.drive}  # fmt: skip
-        rates = {key: np.gradient(value, 0.01) for key, value in signals.items() if key != "sideslip"}
-        value = third_singular_value(signals, rates)
+        drive = simulate(steady_turn, seconds=9.0, friction=1e9)
+        value = third_singular_value(drive)
         assert value[200] > 1e-3 and value[-1] < 1e-7
 
 
@@ -253,12 +265,12 @@ class TestTables:
     @pytest.mark.parametrize(("place", "value"), [(("roundabout", "forces", "F_y1", "mean"), 6.1),
                                                   (("slalom", "mass", "beta_2", "mean"), [14.0, 4.4, 5.1])])  # fmt: skip
     def test_verdict_flips(self, place: tuple[str, ...], value: object) -> None:
-        tables = copy.deepcopy(printed())
+        tables = copy.deepcopy(dict(PRINTED))
         entry = tables
         for key in place[:-1]:
             entry = entry[key]
         entry[place[-1]] = value  # type: ignore[assignment]
-        assert claims_tables.force_tables(tables).verdict is Verdict.NOT_REPRODUCED
+        assert printed_tables.force_tables(tables).verdict is Verdict.NOT_REPRODUCED
 
 
 class TestFixedStiffness:
@@ -269,29 +281,29 @@ class TestFixedStiffness:
         assert low > 1.5 and high < 0.8 and exact == pytest.approx(1.0, abs=0.03)
 
     def test_verdict_follows_from_the_settings(self) -> None:
-        assert claims_fixed_stiffness.fixed_stiffness((0.5, 0.7)).verdict is Verdict.REPRODUCED  # both too soft
+        assert sideslip_settings.fixed_stiffness((0.5, 0.7)).verdict is Verdict.REPRODUCED  # both too soft
 
     def test_steady_state_by_hand(self) -> None:
         """Second road: in a steady turn the rear force is fixed by speed and yaw rate, so the slip is as 1 / factor."""
-        drive = axle_drive(steady_turn, seconds=8.0, friction=1e9)
+        drive = simulate(steady_turn, seconds=8.0, friction=1e9)
         car = published_car()
-        rear = car.mass * drive.speed[-1] * drive.yaw_rate[-1] * car.front_lever / (car.front_lever + car.rear_lever)
+        rear = car.mass * drive.speed[-1] * drive.yaw_rate[-1] * CAR.front_axle_distance / WHEELBASE
         assert drive.rear_sideslip[-1] == pytest.approx(rear / car.rear_stiffness, rel=0.01)
-        run = run_chain(drive, [published_car(stiffness_factor=factor) for factor in (0.5, 1.5)], adaptive=False)
+        run = estimates(drive, [published_car(stiffness_factor=factor) for factor in (0.5, 1.5)], adaptive=False)
         np.testing.assert_allclose(run.rear_sideslip[-1] / drive.rear_sideslip[-1], [2.0, 2.0 / 3.0], rtol=0.04)
 
 
 def test_drive_obeys_its_equations() -> None:
     """Force and moment balance of the drive, and constant speed, by differences."""
-    drive = axle_drive(seconds=9.0)
+    drive = simulate(seconds=9.0)
     car = published_car()
     body = drive.body_forces()
     turn = np.gradient(drive.yaw_rate, 0.01)
-    moment = car.front_lever * body[:, 0] - car.rear_lever * body[:, 1]
+    moment = CAR.front_axle_distance * body[:, 0] - CAR.rear_axle_distance * body[:, 1]
     np.testing.assert_allclose(moment[5:-5], car.yaw_inertia * turn[5:-5], atol=20.0)
     lateral = drive.speed * np.sin(drive.sideslip)
     across = np.gradient(lateral, 0.01) + drive.yaw_rate * drive.speed * np.cos(drive.sideslip)
-    np.testing.assert_allclose(drive.lateral_acceleration[5:-5], across[5:-5], atol=5e-3)
+    np.testing.assert_allclose(drive.ay[5:-5], across[5:-5], atol=5e-3)
     np.testing.assert_allclose(body.sum(axis=1)[0], 0.0, atol=1e-9)
 
 
@@ -322,11 +334,11 @@ def test_parts_stand_on_their_own(part) -> None:  # type: ignore[no-untyped-def]
 
 
 def test_settings_and_zones_on_a_short_drive() -> None:
-    drive = axle_drive(seconds=6.5)
+    drive = simulate(seconds=6.5)
     light, car, heavy = (published_car(mass_change=change) for change in MASS_SETTINGS)
-    run = run_chain(drive, [light, car, heavy])
-    drawings = [stiffness_settings(drive, run, run), mass_settings(drive, run), zones(drive, run)]
-    check_result(PartResult((), [mass_on_the_model(drive, run), settings_on_the_model(drive, run, run)], drawings))
+    run = estimates(drive, [light, car, heavy])
+    drawings = [stiffness_figure(drive, run, run), mass_figure(drive, run), zones(drive, run)]
+    check_result(PartResult((), [mass_table(drive, run), stiffness_table(drive, run, run)], drawings))
     late = drive.time > 6.0
     true = drive.body_forces()[late].sum(axis=1)
     ratio = [forces[late, :].sum(axis=1) @ true / (true @ true) for forces in np.moveaxis(run.forces, 1, 0)]

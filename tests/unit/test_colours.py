@@ -16,7 +16,7 @@ ROOT = Path(studies.__file__).parent
 NAMELESS = re.compile(r"[\"'](#[0-9a-fA-F]{3,8}|tab:\w+)[\"']")
 
 
-@pytest.mark.parametrize("room", ["papers", "beyond", "experiments", "drives", "identify", "sweeps", "commands"])
+@pytest.mark.parametrize("room", ["papers", "beyond", "trials", "drives", "identify", "sweeps", "commands"])
 def test_figures_of_the_studies_take_colours_by_name(room: str) -> None:
     found = [path.name for path in (ROOT / room).rglob("*.py") if NAMELESS.search(path.read_text(encoding="utf-8"))]
     assert not found

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from studies.experiments.motion import Moved
 from studies.papers.longitudinal_speed.observability import gramian_rank
 from studies.papers.longitudinal_speed.truth_records import begun, rank_table, start_table, wheel_record
+from studies.trials.motion import Moved
 from studies.truth import Truth, load_manoeuvre
 
 ROW = Moved("p2-launch-dry", "launch")

@@ -21,7 +21,6 @@ from studies.drives.metrics import deviation
 from studies.drives.prepare import CornerInputs, corner_inputs_of
 from studies.drives.replay import replay
 from studies.drives.run import replay_drive
-from studies.experiments.sensors import TEST_CAR
 from studies.sweeps.engine import run_sweep
 from studies.sweeps.executors import Serial
 from studies.sweeps.measure import Measure
@@ -30,6 +29,7 @@ from studies.sweeps.strict import read_table
 from studies.sweeps.subject import Batch, Subject
 from studies.sweeps.subject_spec import SubjectSpec
 from studies.sweeps.tables import compute
+from studies.trials.sensors import TEST_CAR
 from studies.truth import draw, drive, load_manoeuvre, write_drive
 from synthesis.errors import SpecError
 from tests.drives.synthetic_drive import DRIVE, TORQUES, columns, write_log

@@ -11,14 +11,14 @@ import numpy.typing as npt
 
 from estimators.vehicle import GRAVITY
 from studies.beyond.friction_floor.resting_tire import FRICTIONS, friction_curve, missed_share
-from studies.experiments.accuracy import Spread, nrms, spread
-from studies.experiments.play import Reading, baselines, measured, play, run_of
-from studies.experiments.sensors import TEST_CAR
-from studies.experiments.velocities import corner_observers
 from studies.papers.topic import Topic
 from studies.plots import Axis, ErrorBars, Figure, Line, Mark, Panel
 from studies.plots.colours import FUSION, INTEGRATED_ACCELERATION, MEAN_WHEEL_SPEED, OWN_OBSERVERS, ROADS
 from studies.study import Cell, PartResult, Scope, Table
+from studies.trials.accuracy import Spread, nrms, spread
+from studies.trials.play import Reading, baselines, measured, play, run_of
+from studies.trials.sensors import TEST_CAR
+from studies.trials.velocities import corner_observers
 from studies.truth import Truth, drive, load_manoeuvre
 from studies.truth.road_table import Road
 from synthesis.models.parameter_set import load_parameter_set

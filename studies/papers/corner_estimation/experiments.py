@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 
-from studies.experiments.driven import MAGIC_FORMULA, driven_part
-from studies.experiments.forces import Driven, differentiated_pid, force_part
-from studies.experiments.motion import Moved, motion_part
-from studies.experiments.velocities import Printed, corner_observers, velocity_part
+from studies.trials.driven import MAGIC_FORMULA, driven_part
+from studies.trials.forces import Driven, differentiated_pid, force_part
+from studies.trials.motion import Moved, motion_part
+from studies.trials.velocities import Printed, corner_observers, velocity_part
 
 OBSERVERS = corner_observers("corner-estimation")
 ALL_WHEEL = (

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from functools import partial
 
-from studies.experiments.driven import MAGIC_FORMULA, driven_part
-from studies.experiments.four_wheel_report import four_wheel_part
-from studies.experiments.motion import Moved, motion_part
 from studies.papers.ekf_ukf_lateral.accuracy import TABLE_1
+from studies.papers.ekf_ukf_lateral.bends import four_wheel_part
 from studies.study import PartResult, Scope
+from studies.trials.driven import MAGIC_FORMULA, driven_part
+from studies.trials.motion import Moved, motion_part
 
 MANOEUVRE = "p4-bends-dry"
 MOTION = (Moved(MANOEUVRE, "Right, left and right bend, dry (Fig. 5)", course=True),)

@@ -7,12 +7,12 @@ from functools import partial
 
 from estimators.forces import UnknownInputForceObserver, WheelForceFilter
 from estimators.vehicle import CORNERS, VehicleParameters
-from studies.experiments.driven import driven_part
-from studies.experiments.forces import Driven, force_part
-from studies.experiments.motion import Moved, motion_part
-from studies.experiments.speed import Drive, speed_part
 from studies.papers.longitudinal_speed.accuracy import FORCES, LOADS
+from studies.papers.longitudinal_speed.speed_trial import Drive, speed_part
 from studies.papers.longitudinal_speed.truth_records import truth_part
+from studies.trials.driven import driven_part
+from studies.trials.forces import Driven, force_part
+from studies.trials.motion import Moved, motion_part
 
 
 def _printed(k: int) -> dict[tuple[str, str, str], float]:

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimators.velocity.slip import LEAST_SPEED
-from studies.experiments.driven import LUGRE, driven
-from studies.experiments.motion import Moved
-from studies.experiments.play import run_of
 from studies.papers.longitudinal_speed.inputs import SAMPLE_TIME, WheelRecord, speed_model
 from studies.papers.longitudinal_speed.observability import Ranks, gramian_rank, rank_panels
 from studies.papers.longitudinal_speed.stochastic_observability import TOPIC, both_tests, covariance_panels
 from studies.plots import DASHES, Axis, Figure
 from studies.plots.colours import CURVES
 from studies.study import Cell, PartResult, Scope, Table
+from studies.trials.driven import LUGRE, driven
+from studies.trials.motion import Moved
+from studies.trials.play import run_of
 from studies.truth import Truth
 
 SECONDS = 6.0

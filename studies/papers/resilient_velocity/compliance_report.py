@@ -10,11 +10,6 @@ import numpy.typing as npt
 
 from estimators.vehicle import CORNERS
 from estimators.velocity.slip import LEAST_SPEED
-from studies.experiments.accuracy import known_spread, nrms
-from studies.experiments.driven import LUGRE, driven
-from studies.experiments.panels import BAND
-from studies.experiments.play import believed, measured, run_of
-from studies.experiments.sensors import TEST_CAR
 from studies.papers.published import printed
 from studies.papers.resilient_velocity.compliance_trial import (
     INSIDE,
@@ -28,6 +23,11 @@ from studies.papers.resilient_velocity.inputs import DIRECTIONS, PACKAGE
 from studies.plots import ZERO, Axis, Band, Dash, Figure, Line, Mark, Panel
 from studies.plots.colours import BLUE, GREY, ORANGE, RED, TRUTH
 from studies.study import Cell, PartResult, Scope, Table
+from studies.trials.accuracy import known_spread, nrms
+from studies.trials.driven import LUGRE, driven
+from studies.trials.histories import BAND
+from studies.trials.play import believed, measured, run_of
+from studies.trials.sensors import TEST_CAR
 
 Array = npt.NDArray[np.float64]
 QUICK_SECONDS = 4.0

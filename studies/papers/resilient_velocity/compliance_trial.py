@@ -19,10 +19,10 @@ from estimators.schedule import GainSchedule
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import SlipWeights, SuspensionCompliance, side_slip_angle, slip_ratio
 from estimators.velocity.corners import CornerVectors, tire_frame, vehicle_frame
-from studies.experiments.play import Reading, believed, play
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, PRINTED
 from studies.papers.resilient_velocity.tire import stribeck
 from studies.papers.resilient_velocity.vehicle import table_of_estimator
+from studies.trials.play import Reading, believed, play
 from studies.truth import Measured
 from studies.truth.bristle import held
 

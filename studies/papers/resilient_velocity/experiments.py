@@ -8,15 +8,15 @@ from functools import partial
 import numpy as np
 
 from studies.claim import Finding
-from studies.experiments.driven import LUGRE, MAGIC_FORMULA, driven_part
-from studies.experiments.forces import Driven, differentiated_pid, force_part
-from studies.experiments.motion import Moved, motion_part
-from studies.experiments.velocities import Printed, corner_observers, velocity_part
 from studies.papers.resilient_velocity.compliance_report import BOUNDS, TESTS, compliance_part
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, PACKAGE
 from studies.papers.topic import Topic
 from studies.papers.verdicts import open_choice
 from studies.study import PartResult, Scope
+from studies.trials.driven import LUGRE, MAGIC_FORMULA, driven_part
+from studies.trials.forces import Driven, differentiated_pid, force_part
+from studies.trials.motion import Moved, motion_part
+from studies.trials.velocities import Printed, corner_observers, velocity_part
 from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)

@@ -1,1 +1,0 @@
-"""Estimators on truth vehicles: many sensor draws of one drive, played through a pipeline and judged seed by seed."""

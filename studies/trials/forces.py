@@ -1,0 +1,114 @@
+"""Table and figure of a paper's force errors: its own observers and the pipeline's force, beside what it prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.pipeline import DifferentiatedPid
+from estimators.vehicle import CORNERS, VehicleParameters
+from studies.plots import Figure, Line, Panel, colours
+from studies.study import Cell, PartResult, Scope, Table
+from studies.trials.accuracy import nrms, spread
+from studies.trials.driven import LUGRE
+from studies.trials.histories import history
+from studies.trials.play import Parts, Reading, measured_runs, play, run_of
+from studies.truth import Truth
+
+Array = npt.NDArray[np.float64]
+LEAST = 1000.0
+"""N: samples below it are left out, and a force that never reaches it has no row."""
+AXLES = ("front axle", "rear axle")
+SHOWN = (("F_x", "force_x", CORNERS), ("F_y", "axle_force_y", AXLES), ("F_z", "force_z", CORNERS))
+READINGS: dict[str, Reading] = {
+    "own": lambda step: step.wheels.force,
+    "force_x": lambda step: step.force_x,
+    "axle_force_y": lambda step: step.axle_force_y,
+    "force_z": lambda step: step.force_z,
+}
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A manoeuvre, its name in the paper, and the printed NRMS in % by (signal, place, method)."""
+
+    manoeuvre: str
+    title: str
+    printed: Mapping[tuple[str, str, str], float] = field(default_factory=dict)
+
+
+def differentiated_pid(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) -> Mapping[str, Any]:
+    """Parts with the PID-type observer of P1 (2)-(8) at the wheels."""
+    return {"longitudinal_force": DifferentiatedPid(car, sample_time, (*shape, 4))}
+
+
+def force_part(
+    name: str, rows: Sequence[Driven], methods: Mapping[str, Parts], scope: Scope, tire: str = LUGRE
+) -> PartResult:
+    """Every manoeuvre with each of the paper's wheel force observers in the pipeline; F_y and F_z from the first one."""
+    drawn = measured_runs([row.manoeuvre for row in rows], tire, scope)
+    truth = drawn.truth
+    estimates = {method: play(drawn, READINGS, parts) for method, parts in methods.items()}
+    first = next(iter(estimates.values()))
+    table: list[list[Cell]] = []
+    measures: dict[str, float] = {}
+    for row in rows:
+        run, samples = run_of(truth, row.manoeuvre)
+        for signal, key, places in SHOWN:
+            for k, where in enumerate(places):
+                true = _true(truth, key, run)[samples, k]
+                found = {who: own["own"] for who, own in estimates.items()} if signal == "F_x" else {}
+                errors = {
+                    who: nrms(value[:, run, samples, k], true, LEAST)
+                    for who, value in (found | {"pipeline": first[key]}).items()
+                }
+                if signal == "F_z":
+                    at_rest = float(truth.vehicles[0].parameters.static_loads[k])
+                    errors["quasi-static"] = nrms(np.full((1, true.size), at_rest), true, LEAST)
+                peak = round(float(np.abs(true).max()))
+                for who, values in errors.items():
+                    error = spread(values)
+                    if error is not None:
+                        printed = row.printed.get((signal, where, who))
+                        cells = (peak, printed, error.text(), round(error.worst, 2))
+                        table.append([row.title, signal, where, who, *cells])
+                        measures[f"{row.title}: {signal} {where}, {who}"] = error.mean
+    caption = (
+        f"Force errors on the truth vehicle, NRMS in % of the peak as P1 (46), where the force exceeds {LEAST:g} N: mean over "
+        f"{scope.seeds} sensor draws with its 95 % confidence interval, and the worst draw. Quasi-static: the load at rest. "
+        "The printed values come from a test car or another simulator."
+    )  # fmt: skip
+    columns = ("manoeuvre", "force", "place", "estimate", "peak [N]", "printed NRMS [%]", "NRMS [%]", "worst run [%]")
+    drawings = [_history(name, truth, row, first) for row in rows]
+    return PartResult(tables=[Table(f"{name}-errors", caption, columns, table)], drawings=drawings, measures=measures)
+
+
+def _true(truth: Truth, key: str, run: int) -> Array:
+    """(n, k) N: of the corners, or of the axles for F_y."""
+    if key == "axle_force_y":
+        return np.stack([truth["force_y"][run, :, :2].sum(axis=1), truth["force_y"][run, :, 2:].sum(axis=1)], axis=1)
+    return np.asarray(truth[key][run])
+
+
+def _history(name: str, truth: Truth, row: Driven, estimates: Mapping[str, Array]) -> Figure:
+    run, samples = run_of(truth, row.manoeuvre)
+    time = truth.time[samples]
+    panels = []
+    for signal, key, places in SHOWN:
+        marks = []
+        for k, (where, color) in enumerate(zip(places, colours.CORNERS, strict=False)):
+            marks += [
+                Line(time, 1e-3 * _true(truth, key, run)[samples, k], color=color, width=2.2, alpha=0.35),
+                Line(time, 1e-3 * estimates[key][0, run, samples, k], where, color, width=0.8),
+            ]
+        panels.append(Panel(marks, y=f"${signal}$ [kN]", legend="best", columns=4))
+    return history(
+        f"{name}-{row.manoeuvre}",
+        f"{row.title}: forces of the truth (wide) and of the pipeline (thin), first sensor draw.",
+        f"Time histories of longitudinal, lateral and vertical tire forces with their estimates for {row.title}.",
+        panels, (8.0, 5.6),
+    )  # fmt: skip

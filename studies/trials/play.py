@@ -1,0 +1,85 @@
+"""Several manoeuvres of one car, many sensor draws of each: one batch through the estimation pipeline."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.forces import AttitudeObserver
+from estimators.pipeline import EstimationPipeline
+from estimators.pipeline.result import PipelineStep
+from estimators.vehicle import VehicleParameters
+from studies.study import Scope
+from studies.trials.driven import driven
+from studies.trials.sensors import TEST_CAR
+from studies.truth import Measured, Sensors, Truth, draw
+from synthesis.errors import SpecError
+
+Array = npt.NDArray[np.float64]
+QUICK_SECONDS = 4.0
+"""So much of each manoeuvre goes through the pipeline when quick."""
+Parts = Callable[[VehicleParameters, float, tuple[int, ...]], Mapping[str, Any]]
+"""(vehicle, sample time, batch shape) -> parts that replace those of the pipeline, by its argument names."""
+Reading = Callable[[PipelineStep], Array]
+"""Takes one signal out of a step."""
+
+WHEELS, INTEGRATED = "mean wheel speed", "integrated acceleration"
+
+
+def measured_runs(
+    names: Sequence[str], tire: str, scope: Scope, seconds: float = QUICK_SECONDS, sample_time: float = 0.005
+) -> Measured:
+    """Sensor draws (S, B) of the named manoeuvres on one kind of tire; when quick, of the first ``seconds`` of each."""
+    return draw(driven(tuple(names), tire, scope, seconds), TEST_CAR, range(scope.seeds), sample_time)
+
+
+def measured(truth: Truth, seeds: Sequence[int], sensors: Sensors) -> Measured:
+    """Sensor draws of every run of ``truth``, batch (S, B)."""
+    return draw(truth, sensors, seeds)
+
+
+def believed(drawn: Measured) -> VehicleParameters:
+    """The car of the truth. Raises SpecError when the runs have different ones: a pipeline assumes one car."""
+    cars = [vehicle.parameters for vehicle in drawn.truth.vehicles]
+    if any(car != cars[0] for car in cars[1:]):
+        raise SpecError(f"manoeuvres {', '.join(drawn.truth.names)} drive different cars; play them apart")
+    return cars[0]
+
+
+def play(drawn: Measured, readings: Mapping[str, Reading], parts: Parts | None = None) -> dict[str, Array]:
+    """Every reading at every sample: (S, B, n) or (S, B, n, k). The estimators know the truth's own parameters.
+
+    The inertial sensors are fixed to a body that rolls and pitches: an `AttitudeObserver` levels them unless ``parts`` bring
+    another attitude (None: without).
+    """
+    car = believed(drawn)
+    time, shape = drawn.sample_time, drawn.batch_shape
+    chosen = {"attitude": AttitudeObserver(time, shape), **(parts(car, time, shape) if parts else {})}
+    pipeline = EstimationPipeline(car, time, shape, **chosen)
+    found: dict[str, Array] = {}
+    for k, signals in enumerate(drawn):
+        step = pipeline.step(signals)
+        for name, reading in readings.items():
+            value = reading(step)
+            if name not in found:
+                found[name] = np.empty((*shape, drawn.time.size, *value.shape[2:]))
+            found[name][:, :, k] = value
+    return found
+
+
+def baselines(drawn: Measured) -> dict[str, Array]:
+    """V_x (S, B, n) without an observer, m/s: `WHEELS`, their mean speed, and `INTEGRATED`, a_x from it on."""
+    wheels = (believed(drawn).radius * drawn.signals["wheel_speed"]).mean(axis=-1)
+    moved = np.cumsum(drawn.signals["ax"] * drawn.sample_time, axis=-1)
+    return {WHEELS: wheels, INTEGRATED: wheels[..., :1] + moved - moved[..., :1]}
+
+
+def run_of(truth: Truth, name: str) -> tuple[int, slice]:
+    """Row of the named manoeuvre and the samples of its own duration. Raises SpecError for one that was not driven."""
+    if name not in truth.names:
+        raise SpecError(f"manoeuvre '{name}' was not driven; there are: {', '.join(truth.names)}")
+    row = truth.names.index(name)
+    return row, slice(0, int(np.count_nonzero(truth.valid[row])))
