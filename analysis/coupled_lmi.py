@@ -13,10 +13,11 @@ from scipy.linalg import matrix_balance
 from analysis.constant_lmi import constant_problem, matrix_of
 from analysis.errors import AnalysisError
 from analysis.markov import MarkovJumpSystem
+from estimators.arrays import FloatArray
 from synthesis.lmi.result import LmiResult, Margin, Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
-from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
+from synthesis.polynomials.matrix import MatrixPolynomial
 
 
 @dataclass(frozen=True)

@@ -26,11 +26,12 @@ from analysis.checks import as_stack, probability, square
 from analysis.constant_lmi import constant_problem, matrix_of
 from analysis.errors import AnalysisError
 from analysis.second_moment import lifted, spectral_radius
+from estimators.arrays import FloatArray
 from synthesis.errors import unknown
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
-from synthesis.polynomials.matrix import FloatArray, symmetric_block
+from synthesis.polynomials.matrix import symmetric_block
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -18,7 +18,7 @@ from analysis.errors import AnalysisError
 from analysis.markov import MarkovJumpSystem
 from analysis.markov_chain import ROW_SUM_TOLERANCE, stationary_distribution
 from analysis.second_moment import triangle
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -25,11 +25,11 @@ from analysis.dropout_modes import schedule_drop_modes
 from analysis.dropout_schedule import FrozenDropProbability, frozen_critical_probability
 from analysis.errors import AnalysisError
 from analysis.second_moment import lifted, pack, unpack
+from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
-from synthesis.polynomials.matrix import FloatArray
 
 REFINEMENTS = (1, 2)  # segments of P to a segment of the table, tried in turn
 SHARE = 4  # cells of the LMI to a segment of P

@@ -21,6 +21,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from synthesis.certificate.refute import undetectable_place
 from synthesis.certificate.rounding import round_down, round_up
 from synthesis.errors import ProblemError, unknown
@@ -32,7 +33,7 @@ from synthesis.lmi.solve import solve
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.observer import Update
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray, symmetric_block
+from synthesis.polynomials.matrix import symmetric_block
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from estimators import EstimatorError, GainSchedule
+from estimators.arrays import FloatArray, IntArray
 from estimators.forces import (
     AttitudeObserver,
     LateralForceEstimator,
@@ -38,7 +38,6 @@ from studies.drives.prepare import CornerInputs
 from studies.drives.quantities import CORNERS
 from synthesis.errors import SpecError
 
-Array = npt.NDArray[np.float64]
 PROGRESS_STEPS = 50
 WHEEL_INERTIA = 1.0
 """kg m^2 where the drive has none: without torques it has nothing to act on."""
@@ -52,18 +51,18 @@ class Chain:
     them. ``flags`` and ``checks`` (n,) are sums of ``estimators.Flag`` and ``estimators.pipeline.Check``.
     """
 
-    vx: Array
-    vy: Array
-    sideslip: Array
-    sideslip_part: Array
-    corner_vy: Array
-    force_x: Array
-    axle_force_y: Array
-    force_z: Array
-    slip: Array
-    slip_angle: Array
-    flags: npt.NDArray[np.int64]
-    checks: npt.NDArray[np.int64]
+    vx: FloatArray
+    vy: FloatArray
+    sideslip: FloatArray
+    sideslip_part: FloatArray
+    corner_vy: FloatArray
+    force_x: FloatArray
+    axle_force_y: FloatArray
+    force_z: FloatArray
+    slip: FloatArray
+    slip_angle: FloatArray
+    flags: IntArray
+    checks: IntArray
     assumptions: tuple[str, ...]
 
 

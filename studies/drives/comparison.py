@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from studies.drives.baselines import held, integrated_acceleration
 from studies.drives.chain import Chain
 from studies.drives.corner_inputs import shared_forces, vertical_loads
@@ -16,7 +16,6 @@ from studies.drives.metrics import deviation
 from studies.drives.prepare import CornerInputs
 from studies.drives.quantities import CORNERS
 
-Array = npt.NDArray[np.float64]
 Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
 LEAST_FORCE = 1000.0
@@ -54,21 +53,21 @@ def lateral_motion(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: Dri
     return found
 
 
-def reference_sideslip(log: DriveLog) -> Array:
+def reference_sideslip(log: DriveLog) -> FloatArray:
     """arctan(V_y / |V_x|) (n,) of the references, rad; NaN up to 2 m/s, where a small velocity error is a large angle."""
     vx, vy = log.reference["vx"], log.reference["vy"]
     fast = np.abs(vx) > LEAST_SPEED
     return np.where(fast, np.arctan(vy / np.where(fast, np.abs(vx), 1.0)), np.nan)
 
 
-def quasi_static_axle_forces(log: DriveLog, drive: DriveFile) -> Array:
+def quasi_static_axle_forces(log: DriveLog, drive: DriveFile) -> FloatArray:
     """F_y of each axle (n, 2), N, of a car that does not yaw: the share of m a_y that its distance from the CG gives it."""
     front, rear = drive.vehicle.front_axle_to_cg, drive.vehicle.rear_axle_to_cg
     ay = log.signals.get("ay", np.zeros_like(log.time))
     return np.outer(drive.vehicle.mass * ay, np.array([rear, front]) / (front + rear))
 
 
-def reference_axle_force(log: DriveLog, axle: Axle) -> Array | None:
+def reference_axle_force(log: DriveLog, axle: Axle) -> FloatArray | None:
     """Sum of F_y over both wheels of an axle (n,), N, if the log has both."""
     pair = CORNERS[:2] if axle == "front" else CORNERS[2:]
     wheels = [log.reference.get(f"force_y_{corner}") for corner in pair]
@@ -118,7 +117,7 @@ def forces(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: DriveFile) 
     return found
 
 
-def _judged(estimates: dict[str, Array], reference: Array) -> dict[str, Any]:
+def _judged(estimates: dict[str, FloatArray], reference: FloatArray) -> dict[str, Any]:
     counts = np.abs(reference) > LEAST_FORCE
     found = {}
     for name, value in estimates.items():

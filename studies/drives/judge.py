@@ -8,9 +8,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from estimators import Flag, GainSchedule
+from estimators.arrays import FloatArray, IntArray
 from estimators.pipeline import Check
 from studies.drives import comparison
 from studies.drives.baselines import integrated_acceleration, mean_wheel_speed
@@ -22,7 +22,6 @@ from studies.drives.prepare import CornerInputs
 from studies.drives.quantities import CORNERS
 from studies.drives.replay import Replay, centre_map
 
-Array = npt.NDArray[np.float64]
 LEAST_SPEED = 2.0
 """m/s below which a slip ratio is not formed: the velocity error is then a large part of it."""
 
@@ -43,7 +42,7 @@ class DriveData:
     assumptions: tuple[str, ...] = ()
 
     @cached_property
-    def baselines(self) -> dict[str, Array]:
+    def baselines(self) -> dict[str, FloatArray]:
         """V_x (n,) without an observer, m/s, by name."""
         wheels = mean_wheel_speed(self.inputs.surface_speed)
         start = float(wheels[np.flatnonzero(np.isfinite(wheels))[:1]].sum())
@@ -53,12 +52,12 @@ class DriveData:
         return {"mean_wheel_speed": wheels, "integrated_acceleration": integrated}
 
     @cached_property
-    def slip(self) -> Array:
+    def slip(self) -> FloatArray:
         """Slip ratio (n, 4) from the estimated V_x at the centre of gravity, mapped back to each corner: P1 6.3."""
         return _slip_at(self.inputs, self.replay.velocity)
 
     @cached_property
-    def reference_slip(self) -> Array | None:
+    def reference_slip(self) -> FloatArray | None:
         """Slip ratio (n, 4) from V_x, V_y and yaw rate of the reference, if the log has V_x; a measured yaw rate else.
 
         A steered wheel rolls along a part of V_y: where nobody knows V_y, steered wheels have no reference (NaN).
@@ -73,12 +72,12 @@ class DriveData:
         return np.where(np.abs(inputs.steer) < STRAIGHT, found, np.nan)
 
 
-def _slip_at(inputs: CornerInputs, velocity: Array) -> Array:
+def _slip_at(inputs: CornerInputs, velocity: FloatArray) -> FloatArray:
     gain, shift = centre_map(inputs)
     return slip_ratio(inputs.surface_speed, (velocity[:, None] - shift) / gain)
 
 
-def slip_ratio(surface_speed: Array, wheel_velocity: Array) -> Array:
+def slip_ratio(surface_speed: FloatArray, wheel_velocity: FloatArray) -> FloatArray:
     """lambda = (R_e w - v_xt)/max(|R_e w|, |v_xt|), P1 section 1; NaN below 2 m/s. Positive when driving."""
     size = np.maximum(np.abs(surface_speed), np.abs(wheel_velocity))
     slow = ~(size >= LEAST_SPEED)
@@ -147,11 +146,11 @@ def _force(data: DriveData) -> dict[str, Any]:
     return found
 
 
-def flag_counts(flags: npt.NDArray[np.int64]) -> dict[str, dict[str, int]]:
+def flag_counts(flags: IntArray) -> dict[str, dict[str, int]]:
     """How many samples of each corner carry each flag; flags that never rose are left out."""
     return {corner: _counts(flags[:, k], Flag) for k, corner in enumerate(CORNERS)}
 
 
-def _counts(flags: npt.NDArray[np.int64], names: type[IntFlag]) -> dict[str, int]:
+def _counts(flags: IntArray, names: type[IntFlag]) -> dict[str, int]:
     counted = {str(flag.name).lower(): int(np.count_nonzero(flags & flag.value)) for flag in names}
     return {name: count for name, count in counted.items() if count}

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from studies.drives.align import find_offset
 from studies.drives.csv_log import line_of, read_columns
 from studies.drives.drive_file import DriveFile
@@ -20,7 +20,6 @@ from studies.drives.plausible import check_plausible
 from studies.drives.quantities import REFERENCES, SIGNALS, factor_to
 from studies.drives.resample import Stamped, clean_stamps, resample
 
-Array = npt.NDArray[np.float64]
 LONGEST_GAP = 60.0
 """s without a row: beyond it the clock has jumped, or it is another drive."""
 MOST_SAMPLES = 5_000_000
@@ -34,17 +33,17 @@ class DriveLog:
     ``report`` says for every log what was read, repaired, bridged and found.
     """
 
-    time: Array
-    signals: dict[str, Array]
-    reference: dict[str, Array]
+    time: FloatArray
+    signals: dict[str, FloatArray]
+    reference: dict[str, FloatArray]
     report: dict[str, Any]
 
 
 @dataclass(frozen=True)
 class _Track:
     stamped: Stamped
-    signals: dict[str, Array]
-    reference: dict[str, Array]
+    signals: dict[str, FloatArray]
+    reference: dict[str, FloatArray]
 
 
 def read_log(paths: Sequence[Path], drive: DriveFile) -> DriveLog:
@@ -62,11 +61,11 @@ def read_log(paths: Sequence[Path], drive: DriveFile) -> DriveLog:
     grid = _common_grid(drive, tracks, offsets)
     gaps = {entry.name: entry.allowed_gap for entry in drive.log}
 
-    def on_grid(columns: dict[str, Column], table: str) -> dict[str, Array]:
+    def on_grid(columns: dict[str, Column], table: str) -> dict[str, FloatArray]:
         out = {}
         for name, column in columns.items():
             log = drive.log_of(column)
-            values: dict[str, Array] = getattr(tracks[log], table)
+            values: dict[str, FloatArray] = getattr(tracks[log], table)
             out[name] = resample(tracks[log].stamped.time + offsets[log], values[name], grid, gaps[log])
         return out
 
@@ -166,7 +165,7 @@ def _check_rate(path: Path, entry: LogFile, spacing: float) -> None:
         )
 
 
-def _check_gap(path: Path, entry: LogFile, raw: Array, time: Array) -> None:
+def _check_gap(path: Path, entry: LogFile, raw: FloatArray, time: FloatArray) -> None:
     """``raw``: stamps as they stand in the file, ``time``: those of the track, both in s."""
     k = int(np.argmax(np.diff(time)))
     gap = float(time[k + 1] - time[k])
@@ -205,13 +204,13 @@ def _clock_offsets(drive: DriveFile, tracks: dict[str, _Track], report: dict[str
     return offsets
 
 
-def _find(drive: DriveFile, tracks: dict[str, _Track], name: str) -> tuple[str, Array]:
+def _find(drive: DriveFile, tracks: dict[str, _Track], name: str) -> tuple[str, FloatArray]:
     column = drive.signals.get(name) or drive.reference[name]
     log = drive.log_of(column)
     return log, (tracks[log].signals if name in drive.signals else tracks[log].reference)[name]
 
 
-def _common_grid(drive: DriveFile, tracks: dict[str, _Track], offsets: dict[str, float]) -> Array:
+def _common_grid(drive: DriveFile, tracks: dict[str, _Track], offsets: dict[str, float]) -> FloatArray:
     """The grid t0 + k*Ts over the time that all logs cover."""
     start = max(float(track.stamped.time[0]) + offsets[name] for name, track in tracks.items())
     end = min(float(track.stamped.time[-1]) + offsets[name] for name, track in tracks.items())

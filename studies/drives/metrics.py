@@ -6,9 +6,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from estimators.arrays import FloatArray
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,7 @@ class Deviation:
         return asdict(self)
 
 
-def deviation(estimate: Array, reference: Array, unit: str) -> Deviation:
+def deviation(estimate: FloatArray, reference: FloatArray, unit: str) -> Deviation:
     """Compare (n,) samples; missing ones on either side are left out and not counted.
 
     Raises ValueError when the two differ in length.

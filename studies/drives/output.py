@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import polars as pl
 
+from estimators.arrays import AnyArray
 from studies.drives.errors import LogError
 
 
@@ -60,7 +60,7 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
         beside.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def write_csv(path: Path, columns: Mapping[str, npt.NDArray[Any]]) -> None:
+def write_csv(path: Path, columns: Mapping[str, AnyArray]) -> None:
     """One column a name, six decimals; what is missing is an empty cell."""
     frame = pl.DataFrame({name: np.ascontiguousarray(value) for name, value in columns.items()}, nan_to_null=True)
     with whole_file(path) as beside:

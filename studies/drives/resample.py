@@ -6,28 +6,26 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from studies.drives.csv_log import line_of
 from studies.drives.errors import LogError
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Stamped:
     """Columns over strictly increasing time, s, and what had to be done to get there."""
 
-    time: Array
-    values: dict[str, Array]
+    time: FloatArray
+    values: dict[str, FloatArray]
     duplicates: int
     out_of_order: int
 
 
 def clean_stamps(
     file: str,
-    time: Array,
-    values: dict[str, Array],
+    time: FloatArray,
+    values: dict[str, FloatArray],
     *,
     sort: bool = False,
     duplicates: Literal["mean", "last", "refuse"] = "mean",
@@ -62,7 +60,7 @@ def clean_stamps(
     return Stamped(time=time, values=values, duplicates=int(repeats.size), out_of_order=int(backwards.size))
 
 
-def _merge(time: Array, value: Array, mean: bool) -> Array:
+def _merge(time: FloatArray, value: FloatArray, mean: bool) -> FloatArray:
     """One value per distinct stamp: the mean, or the last, of the finite ones (NaN if there is none)."""
     finite = np.isfinite(value)
     unique, group = np.unique(time, return_inverse=True)
@@ -76,7 +74,7 @@ def _merge(time: Array, value: Array, mean: bool) -> Array:
     return merged
 
 
-def resample(time: Array, value: Array, grid: Array, max_gap: float) -> Array:
+def resample(time: FloatArray, value: FloatArray, grid: FloatArray, max_gap: float) -> FloatArray:
     """Linear interpolation of the finite samples on ``grid``; NaN outside the record and inside gaps.
 
     A gap is a spacing of finite samples above ``max_gap``, s; its two ends are measured and stay. Error of the

@@ -26,14 +26,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from studies.identify.prefilter import Prefilter, first_order_lag
 from studies.identify.settings import IdentifySettings
 from studies.identify.unknowns import Unknown
 from synthesis.models.parameter_set import Tire
 
-Array = npt.NDArray[np.float64]
 MOST_USED = 0.9
 """s |mu| above this is a sliding wheel: no slip velocity belongs to its force."""
 MOST_DAMPING = 0.01
@@ -85,7 +84,9 @@ def tire_unknowns(tire: Tire, settings: IdentifySettings) -> tuple[Unknown, ...]
     )
 
 
-def slip_velocity(p: Mapping[str, float], mu: Array, rolling: Array, filter_: Prefilter, step: float) -> Array:
+def slip_velocity(
+    p: Mapping[str, float], mu: FloatArray, rolling: FloatArray, filter_: Prefilter, step: float
+) -> FloatArray:
     """F[v_r] (n, k), m/s, that belongs to the normalised force mu (n, k) [1] at the rolling speed R|w| (n, k), m/s."""
     s, c = p["saturation"], p["bend"]
     lagged = first_order_lag(mu, step, p["damping_time"], filter_.runs)

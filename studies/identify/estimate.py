@@ -15,15 +15,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from estimators.arrays import BoolArray, FloatArray
 from studies.identify.autocorrelation import correlation_time, effective_stretches, long_run_covariance
 from studies.identify.unknowns import Estimate, Unknown
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 PASSES = 2
 """The first weighs the priors by a guess of the residual, the second by the residual of the first."""
 
@@ -51,33 +49,33 @@ class Rules:
 
 @dataclass(frozen=True)
 class _Problem:
-    residual: Callable[[Mapping[str, float]], Array]
-    mask: Mask
+    residual: Callable[[Mapping[str, float]], FloatArray]
+    mask: BoolArray
     unknowns: tuple[Unknown, ...]
     rules: Rules
 
     @property
-    def home(self) -> Array:
+    def home(self) -> FloatArray:
         return np.array([u.home for u in self.unknowns])
 
     @property
-    def spread(self) -> Array:
+    def spread(self) -> FloatArray:
         return np.array([u.spread for u in self.unknowns])
 
-    def all_rows(self, x: Array) -> Array:
+    def all_rows(self, x: FloatArray) -> FloatArray:
         return self.residual({u.name: u.value(float(v)) for u, v in zip(self.unknowns, x, strict=True)})
 
-    def rows(self, x: Array) -> Array:
+    def rows(self, x: FloatArray) -> FloatArray:
         return self.all_rows(x)[self.mask]
 
-    def thinned(self) -> Mask:
+    def thinned(self) -> BoolArray:
         """One row in half a correlation length of the prefilter: enough to come near."""
         out = np.zeros_like(self.mask)
         step = max(self.rules.correlation // 2, 1)
         out[::step] = self.mask[::step]
         return out if np.count_nonzero(out) > 20 * len(self.unknowns) else self.mask
 
-    def size(self, x: Array) -> tuple[float, float]:
+    def size(self, x: FloatArray) -> tuple[float, float]:
         """Residual size, not below the floor, and its correlation time in samples."""
         e = np.zeros(self.mask.shape)
         e[self.mask] = self.rows(x)
@@ -87,8 +85,8 @@ class _Problem:
 
 
 def estimate(
-    residual: Callable[[Mapping[str, float]], Array],
-    mask: Mask,
+    residual: Callable[[Mapping[str, float]], FloatArray],
+    mask: BoolArray,
     unknowns: Sequence[Unknown],
     rules: Rules,
     start: Mapping[str, float] | None = None,
@@ -124,7 +122,7 @@ def estimate(
     return replace(found, excited=excited, half={**half, **refused}, singular_values=singular)
 
 
-def _fit(problem: _Problem, active: Mask, x: Array, many: bool) -> Array:
+def _fit(problem: _Problem, active: BoolArray, x: FloatArray, many: bool) -> FloatArray:
     free = np.flatnonzero(active)
     unknowns = [problem.unknowns[i] for i in free]
     low, high = (np.array([u.reach[side] for u in unknowns]) for side in (0, 1))
@@ -137,7 +135,9 @@ def _fit(problem: _Problem, active: Mask, x: Array, many: bool) -> Array:
         share = np.count_nonzero(mask) / np.count_nonzero(problem.mask)
         weight = np.where(informed, size * np.sqrt(time * share), 0.0) / spread
 
-        def cost(part: Array, weight: Array = weight, held: Array = x, mask: Mask = mask) -> Array:
+        def cost(
+            part: FloatArray, weight: FloatArray = weight, held: FloatArray = x, mask: BoolArray = mask
+        ) -> FloatArray:
             full = held.copy()
             full[free] = part
             return np.concatenate([problem.all_rows(full)[mask], (weight * (part - home))[informed]])
@@ -153,7 +153,7 @@ def _fit(problem: _Problem, active: Mask, x: Array, many: bool) -> Array:
     return x
 
 
-def _judge(problem: _Problem, active: Mask, x: Array) -> Estimate:
+def _judge(problem: _Problem, active: BoolArray, x: FloatArray) -> Estimate:
     """Covariance of :mod:`.autocorrelation`, with the prior as one more measurement, and the consider part."""
     spread, mask = problem.spread, problem.mask
     e = problem.rows(x)
@@ -218,7 +218,7 @@ def _judge(problem: _Problem, active: Mask, x: Array) -> Estimate:
     )
 
 
-def _half_width(estimated: Array, sure: Array, freedom: Array | float, confidence: float) -> Array:
+def _half_width(estimated: FloatArray, sure: FloatArray, freedom: FloatArray | float, confidence: float) -> FloatArray:
     """Of variances that are in part estimated: the rest has no degrees of freedom to lose (Satterthwaite 1946)."""
     whole = np.maximum(estimated + sure, 1e-300)
     each = np.maximum(freedom / np.clip(estimated / whole, 1e-3, 1.0) ** 2, 1.0)

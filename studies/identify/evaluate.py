@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from studies.identify.identify import Identification
 from studies.identify.slip_limit import LimitedFit
 from synthesis.models.parameter_set import Tire
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

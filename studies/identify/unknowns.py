@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from estimators.arrays import FloatArray
 
 
 @dataclass(frozen=True)
@@ -73,11 +72,11 @@ class Estimate:
     """
 
     unknowns: tuple[Unknown, ...]
-    x: Array
-    covariance: Array
+    x: FloatArray
+    covariance: FloatArray
     excited: dict[str, bool]
     half: dict[str, float]
-    residual: Array
+    residual: FloatArray
     samples: int
     rms: float
     correlation: float

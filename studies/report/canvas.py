@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from estimators.arrays import FloatArray
 from studies.running.drawing import drawing_style
 
 DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (6, 1.5, 1, 1.5)))
@@ -43,6 +43,6 @@ def legend(target: Any, **options: Any) -> None:
         target.legend(**{"frameon": False, "fontsize": 8, "loc": "best", **options})
 
 
-def grid(low: float, high: float, points: int) -> npt.NDArray[np.float64]:
+def grid(low: float, high: float, points: int) -> FloatArray:
     """Evenly spaced values, both ends included."""
     return np.linspace(low, high, points)

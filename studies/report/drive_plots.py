@@ -9,17 +9,16 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from estimators.arrays import FloatArray
 from studies.drives.chain import Chain
 from studies.drives.comparison import AXLES, quasi_static_axle_forces, reference_axle_force, reference_sideslip
 from studies.drives.judge import LEAST_SPEED, DriveData
 from studies.drives.quantities import CORNERS
 from studies.report import colours
 
-Array = npt.NDArray[np.float64]
 Save = Callable[[Path], None]
 
 REFERENCE = {"color": colours.TRUTH, "linewidth": 1.8, "label": "reference"}
@@ -175,7 +174,7 @@ def loads(data: DriveData, chain: Chain) -> Figure:
     return figure
 
 
-def _force_unit(force: Array) -> tuple[float, str]:
+def _force_unit(force: FloatArray) -> tuple[float, str]:
     return (1e3, "kN") if np.nanmax(np.abs(force), initial=0.0) > 1e3 else (1.0, "N")
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -18,7 +17,6 @@ from studies.identify.slip_limit import LimitedFit
 from studies.report.colours import BLUE
 from studies.report.drive_plots import STYLE
 
-Array = npt.NDArray[np.float64]
 Save = Callable[[Path], None]
 USED, LEFT_OUT, LINE = BLUE, "0.8", "#d1495b"
 NAMES = {

@@ -9,13 +9,13 @@ Sliding makes a as large as 2e4 1/s on ice; the exact step is regular there and 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from estimators.arrays import FloatArray
+
 _SMALL = 1e-3  # below, psi by its series, whose error is s^3/120
 
 
-def held(z: Array, v: Array, a: Array, h: float) -> tuple[Array, Array, Array]:
+def held(z: FloatArray, v: FloatArray, a: FloatArray, h: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """z after the step, its mean and the mean of z' (same shapes); m, m/s, 1/s (not negative), s."""
     s = a * h
     few = s < _SMALL

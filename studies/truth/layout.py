@@ -11,7 +11,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from estimators.arrays import FloatArray
+
 BODY: Final = (
     "x",  # m, of the centre of gravity on the road
     "y",
@@ -50,7 +51,7 @@ GIVE: Final = slice(W["compliance_x"].start, W["compliance_y"].stop)
 GIVE_RATE: Final = slice(W["compliance_x_rate"].start, W["compliance_y_rate"].stop)
 
 
-def rolling(speed: npt.ArrayLike, radius: Array) -> Array:
+def rolling(speed: npt.ArrayLike, radius: FloatArray) -> FloatArray:
     """State (STATES, B) of cars that roll freely straight ahead at ``speed`` (B,), m/s; negative is backwards, 0 at rest."""
     state = np.zeros((STATES, radius.shape[1]))
     state[B["vx"]] = speed

@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
+from estimators.arrays import FloatArray
 from studies.drives import quantities
 from studies.drives.drive_tables import Table
 from studies.drives.quantities import Duration, to_si
@@ -17,7 +18,7 @@ from studies.truth.course import Course
 from studies.truth.drivetrain import Assist
 from studies.truth.fleet import TIRES
 from studies.truth.path import PathPiece, curvature
-from studies.truth.profile import GRID, Array, Piece, check_units, sampled
+from studies.truth.profile import GRID, Piece, check_units, sampled
 from studies.truth.road_table import Road
 from studies.truth.vehicle import TruthVehicle, load_vehicle
 from synthesis.errors import SpecError, unknown
@@ -136,7 +137,7 @@ class Manoeuvre(Table):
     def course(self) -> Course:
         """As arrays."""
 
-        def table(pieces: Sequence[Piece], unit: str, start: float = 0.0) -> Array:
+        def table(pieces: Sequence[Piece], unit: str, start: float = 0.0) -> FloatArray:
             return sampled(pieces, unit, self.duration, start)
 
         start = to_si(self.speed, "m/s")

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from zlib import crc32
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from estimators.pipeline.signals import VehicleSignals
 from estimators.signals.ticks import TickSpeed
 from studies.truth.record import Truth
 from studies.truth.sensors import Sensors
 from synthesis.errors import SpecError
 
-Array = npt.NDArray[np.float64]
 SOURCES = {
     "wheel_speed": "wheel_speed", "steer": "steer", "torque": "torque",
     "ax": "ax", "ay": "ay", "az": "az",
@@ -36,8 +35,8 @@ class Measured:
     ``at(k)`` is what an `EstimationPipeline` of ``batch_shape`` (S, B) takes at sample k.
     """
 
-    time: Array  # (n,) s
-    signals: dict[str, Array]
+    time: FloatArray  # (n,) s
+    signals: dict[str, FloatArray]
     seeds: tuple[int, ...]
     truth: Truth  # at the same samples
     batch_shape: tuple[int, int]
@@ -82,7 +81,7 @@ def draw(truth: Truth, sensors: Sensors, seeds: Sequence[int], sample_time: floa
         raise SpecError("draw: no seeds; give at least one, such as range(200)")
     truth = truth.every(every)
     samples, shape = truth.time.size, (len(seeds), truth.size)
-    signals: dict[str, Array] = {}
+    signals: dict[str, FloatArray] = {}
     for name, source in SOURCES.items():
         count = name == "wheel_speed" and sensors.ticks is not None
         true = truth["wheel_angle" if count else source]
@@ -97,7 +96,7 @@ def draw(truth: Truth, sensors: Sensors, seeds: Sequence[int], sample_time: floa
     return Measured(truth.time, signals, tuple(seeds), truth, shape)
 
 
-def _counted(angle: Array, rng: np.random.Generator, sensors: Sensors) -> Array:
+def _counted(angle: FloatArray, rng: np.random.Generator, sensors: Sensors) -> FloatArray:
     """Ticks (n, 4) counted up to each sample, from a random position of the teeth; lost ones are NaN."""
     assert sensors.ticks is not None
     start = rng.random(angle.shape[1:])
@@ -106,7 +105,7 @@ def _counted(angle: Array, rng: np.random.Generator, sensors: Sensors) -> Array:
     return np.where(lost, np.nan, counts)
 
 
-def _speeds(counts: Array, sensors: Sensors, sample_time: float) -> Array:
+def _speeds(counts: FloatArray, sensors: Sensors, sample_time: float) -> FloatArray:
     assert sensors.ticks is not None
     own = sensors.ticks
     shape = (*counts.shape[:2], 4)

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from estimators.arrays import FloatArray
 from studies.drives.drive_tables import Table
 from studies.drives.quantities import Length
 from studies.truth.course import PATH_GRID
 
-Array = npt.NDArray[np.float64]
 BLEND = 5.0
 """m over which the curvature changes between pieces: roads are no compasses, and drivers cannot jump."""
 _NEEDS: dict[str, tuple[set[str], set[str]]] = {
@@ -50,7 +49,7 @@ class PathPiece(Table):
             raise ValueError(f"{self.kind} takes no {name}; it takes {', '.join(sorted(needs))}")
         return self
 
-    def curvature(self) -> Array:
+    def curvature(self) -> FloatArray:
         """1/m on the grid."""
         if self.kind == "arc" and self.radius and self.angle_deg is not None:
             angle = math.radians(self.angle_deg)
@@ -66,7 +65,7 @@ class PathPiece(Table):
         return np.zeros_like(s)
 
 
-def curvature(pieces: Sequence[PathPiece]) -> Array:
+def curvature(pieces: Sequence[PathPiece]) -> FloatArray:
     """Curvature over the way (m, on `PATH_GRID`), blended over `BLEND`; straight on after the end."""
     row = np.concatenate([np.tile(piece.curvature(), piece.repeat) for piece in pieces])
     window = round(BLEND / PATH_GRID)

@@ -10,14 +10,13 @@ from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from estimators.arrays import FloatArray
 from studies.drives import quantities
 from studies.drives.drive_tables import Table
 from studies.drives.quantities import Duration
 
-Array = npt.NDArray[np.float64]
 GRID = 0.005
 """s, spacing of the tables."""
 _SHARE = re.compile(r"[-+]?[0-9]*\.?[0-9]+( ?%)?")
@@ -70,7 +69,7 @@ class Piece(Table):
         """s."""
         return self.times[-1] if self.times is not None else float(self.time or 0.0)
 
-    def value(self, t: Array, start: float, unit: str) -> Array:
+    def value(self, t: FloatArray, start: float, unit: str) -> FloatArray:
         """At ``t`` seconds from the start of the piece, from the value ``start``, in ``unit``; clipped to the piece."""
         T = self.duration
         t = np.clip(t, 0.0, T)
@@ -126,7 +125,7 @@ def _named(place: str, read: Callable[[], float]) -> None:
         raise ValueError(f"{place}: {error}") from None
 
 
-def sampled(pieces: Sequence[Piece], unit: str, duration: float, start: float = 0.0, grid: float = GRID) -> Array:
+def sampled(pieces: Sequence[Piece], unit: str, duration: float, start: float = 0.0, grid: float = GRID) -> FloatArray:
     """The profile at 0, grid, 2 grid, ... beyond ``duration``, in ``unit``; after the last piece its value stays."""
     t = grid * np.arange(int(np.ceil(duration / grid - 1e-9)) + 2)
     out, begin = np.full(t.shape, start), 0.0

@@ -8,13 +8,11 @@ from dataclasses import dataclass, replace
 from zlib import crc32
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from studies.truth.signals import UNITS
 from studies.truth.vehicle import TruthVehicle
 from synthesis.errors import SpecError, unknown
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -25,10 +23,10 @@ class Truth:
     nothing; `valid` masks it. `vehicles` are the cars as they were driven.
     """
 
-    time: Array  # (n,) s
-    signals: dict[str, Array]
+    time: FloatArray  # (n,) s
+    signals: dict[str, FloatArray]
     names: tuple[str, ...]  # (B,) of the manoeuvres
-    duration: Array  # (B,) s
+    duration: FloatArray  # (B,) s
     vehicles: tuple[TruthVehicle, ...]
     tires: tuple[str, ...]  # (B,)
     keys: tuple[tuple[int, int], ...] = ()  # (B,) of the random numbers: manoeuvre, and which of its runs
@@ -53,7 +51,7 @@ class Truth:
         return len(self.names)
 
     @property
-    def valid(self) -> npt.NDArray[np.bool_]:
+    def valid(self) -> BoolArray:
         """(B, n): samples within the run's own duration."""
         return np.asarray(self.time <= self.duration[:, None] + 1e-9)
 
@@ -62,7 +60,7 @@ class Truth:
         """Unit of every signal kept."""
         return {name: UNITS[name] for name in self.signals}
 
-    def __getitem__(self, name: str) -> Array:
+    def __getitem__(self, name: str) -> FloatArray:
         """A signal by name. Raises SpecError with the nearest names."""
         if name not in self.signals:
             raise SpecError(f"truth: {unknown('signal', name, self.signals)}")

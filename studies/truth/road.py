@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from estimators.vehicle import CORNERS
 from synthesis.errors import SpecError
 
-Array = npt.NDArray[np.float64]
 SURFACES = {"dry": 1.0, "wet": 0.6, "snow": 0.35, "ice": 0.2}
 """Friction by name: ordinary values; the manoeuvre files of the papers give numbers."""
 _EVER = 1e12
@@ -38,7 +38,7 @@ class Roads:
     """Friction (4, B) of B cars: a base for each, and their zones, padded to the same number."""
 
     def __init__(self, base: npt.ArrayLike, zones: Sequence[Sequence[Zone]]) -> None:
-        self.base: Array = np.ones((len(CORNERS), 1)) * np.asarray(base, dtype=np.float64)
+        self.base: FloatArray = np.ones((len(CORNERS), 1)) * np.asarray(base, dtype=np.float64)
         if not (np.isfinite(self.base).all() and (self.base > 0).all()):
             raise SpecError("road friction must be finite and above 0")
         most = max((len(z) for z in zones), default=0)
@@ -46,7 +46,7 @@ class Roads:
         rows = [[*z, *[nothing] * (most - len(z))] for z in zones]
         self._zones = [_Layer([row[k] for row in rows]) for k in range(most)]
 
-    def friction(self, place: Array, time: float) -> Array:
+    def friction(self, place: FloatArray, time: float) -> FloatArray:
         """At the places (4, B), m, of the wheels and one time, s."""
         out = self.base
         for zone in self._zones:
@@ -58,7 +58,7 @@ class _Layer:
     """One zone of each car."""
 
     def __init__(self, zones: Sequence[Zone]) -> None:
-        def column(name: str) -> Array:
+        def column(name: str) -> FloatArray:
             return np.array([getattr(z, name) for z in zones], dtype=np.float64)
 
         self.friction = column("friction")
@@ -67,7 +67,7 @@ class _Layer:
         self._since, self._until = column("from_time"), column("to_time")
         self._placed = bool((self._from > -_EVER).any() or (self._to < _EVER).any())
 
-    def share(self, place: Array, time: float) -> Array:
+    def share(self, place: FloatArray, time: float) -> FloatArray:
         """How much of the contact patch is in the zone, 0 to 1."""
         inside = self.corners * _over(time - self._since, self._blend) * _over(self._until - time, self._blend)
         if self._placed:
@@ -75,6 +75,6 @@ class _Layer:
         return inside
 
 
-def _over(way: Array, blend: Array) -> Array:
-    out: Array = np.minimum(np.maximum(way / blend + 0.5, 0.0), 1.0)
+def _over(way: FloatArray, blend: FloatArray) -> FloatArray:
+    out: FloatArray = np.minimum(np.maximum(way / blend + 0.5, 0.0), 1.0)
     return out

@@ -6,12 +6,9 @@ import math
 from dataclasses import dataclass, field, fields
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from synthesis.errors import SpecError
-
-Array = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -91,7 +88,7 @@ class Channel:
         if self.dropped not in {"missing", "hold"}:
             raise SpecError(f"sensor.dropped = '{self.dropped}': write missing or hold")
 
-    def read(self, true: Array, rng: np.random.Generator, time_step: float) -> Array:
+    def read(self, true: FloatArray, rng: np.random.Generator, time_step: float) -> FloatArray:
         """What the sensor says of ``true`` (n, ...), sampled every ``time_step``, s."""
         samples, shape = true.shape[0], true.shape[1:]
         gain = 1.0 + self.scale * rng.standard_normal(shape)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from studies.truth.course import Course, Courses
 from studies.truth.driver import Driver
 from studies.truth.fleet import Fleet, tires_of
@@ -18,7 +18,6 @@ from studies.truth.stepper import Step, advance
 from studies.truth.vehicle import TruthVehicle
 from synthesis.errors import GainsmithError, SpecError, unknown
 
-Array = npt.NDArray[np.float64]
 STEP = 0.001
 """s, by the convergence study of the tests: velocities are then right to 1e-4 m/s, wheel speeds to 1e-2 rad/s."""
 RECORD_TIME = 0.005
@@ -92,7 +91,7 @@ def _run(
     every: int,
     record: Sequence[str],
     progress: Callable[[float], None] | None,
-) -> dict[str, Array]:
+) -> dict[str, FloatArray]:
     fleet = Fleet(vehicles)
     plant = Plant(fleet, tires_of(courses[0].tire, vehicles))
     driver = Driver(Courses(courses), fleet)

@@ -14,33 +14,31 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from studies.truth.bristle import held
 from studies.truth.layout import DEFLECTION, W
 from studies.truth.plant import Controls, Forces, Plant, Slide, Turned
-
-Array = npt.NDArray[np.float64]
 
 
 class Step(NamedTuple):
     """State at the end of a step, and means over it."""
 
-    state: Array  # (STATES, B)
-    rates: Array  # (STATES, B) of the body; zero for wheel speeds and deflections
+    state: FloatArray  # (STATES, B)
+    rates: FloatArray  # (STATES, B) of the body; zero for wheel speeds and deflections
     forces: Forces
-    torque: Array  # (4, B) N m, drive minus brake, as it acted: what a torque sensor in the half shaft shows
-    rolling: Array  # (4, B) N m, rolling resistance, positive against forward rolling
+    torque: FloatArray  # (4, B) N m, drive minus brake, as it acted: what a torque sensor in the half shaft shows
+    rolling: FloatArray  # (4, B) N m, rolling resistance, positive against forward rolling
     slide: Slide
 
 
 class _Spin(NamedTuple):
-    w: Array
-    torque: Array
-    rolling: Array
+    w: FloatArray
+    torque: FloatArray
+    rolling: FloatArray
 
 
-def advance(plant: Plant, state: Array, controls: Controls, h: float) -> Step:
+def advance(plant: Plant, state: FloatArray, controls: Controls, h: float) -> Step:
     """One step of ``h`` seconds under controls that are held over it (best: those at its middle)."""
     turned = Turned(np.sin(controls.steer), np.cos(controls.steer))
     start, load = plant.slide(state, turned), plant.loads(state)
@@ -63,8 +61,15 @@ def advance(plant: Plant, state: Array, controls: Controls, h: float) -> Step:
 
 
 def _contact(
-    plant: Plant, z: Array, at: Array, moving: Slide, load: Array, controls: Controls, turned: Turned, h: float
-) -> tuple[Array, Forces]:
+    plant: Plant,
+    z: FloatArray,
+    at: FloatArray,
+    moving: Slide,
+    load: FloatArray,
+    controls: Controls,
+    turned: Turned,
+    h: float,
+) -> tuple[FloatArray, Forces]:
     """Deflections (2, 4, B) at the end of the step and mean forces over it; rates are taken at the deflections `at`."""
     transport, tire = plant.transport(moving), plant.tire
     a, push = tire.rates(at, moving.slip, np.absolute(moving.surface), transport, controls.friction)
@@ -73,7 +78,7 @@ def _contact(
     return after, plant.in_body_axes(force, load, turned)
 
 
-def _wheels(plant: Plant, state: Array, forces: Forces, controls: Controls, h: float) -> _Spin:
+def _wheels(plant: Plant, state: FloatArray, forces: Forces, controls: Controls, h: float) -> _Spin:
     """Wheel speeds at the end of the step, and the torques that acted."""
     car, before = plant.fleet, state[W["wheel_speed"]]
     rolling = car.radius * car.rolling_resistance * forces.load

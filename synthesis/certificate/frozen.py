@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from flint import fmpq
 
+from estimators.arrays import FloatArray
 from synthesis.certificate.refute import grid
 from synthesis.hinf_observer import Channel, channel_matrices
 from synthesis.loop.observer import ObserverLoop
 from synthesis.loop.system import Region, System
 from synthesis.polynomials.enclosure import PolynomialMatrix
-from synthesis.polynomials.matrix import FloatArray
 
 if TYPE_CHECKING:
     from synthesis.deploy import Deployment

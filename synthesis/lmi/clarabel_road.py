@@ -9,9 +9,9 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
+from estimators.arrays import FloatArray
 from synthesis.lmi.conic import ConicData, triangle
 from synthesis.lmi.settings import LmiSettings
-from synthesis.polynomials.matrix import FloatArray
 
 PROJECTIONS = 50
 

@@ -6,6 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
 from synthesis.lmi.clarabel_road import RawAnswer, solve_with_clarabel
 from synthesis.lmi.conic import assemble
@@ -13,7 +14,7 @@ from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.relaxation import RelaxedProblem, relax
 from synthesis.lmi.result import LmiResult, Margin, SolverReport, Verdict
 from synthesis.lmi.settings import LmiSettings
-from synthesis.polynomials.matrix import FloatArray, constant
+from synthesis.polynomials.matrix import constant
 from synthesis.polynomials.positivity import prove_positive
 
 # An objective on the boundary of feasibility is loosened by these fractions, in turn, until every inequality is proved.

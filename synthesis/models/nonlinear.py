@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import sympy as sp
 
+from estimators.arrays import FloatArray
 from synthesis.errors import ModelError, unknown
 from synthesis.models.param import Constant, Signal
-from synthesis.polynomials.matrix import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

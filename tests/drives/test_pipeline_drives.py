@@ -9,10 +9,9 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
-from estimators.interpolate import FloatArray
+from estimators.arrays import FlagArray, FloatArray
 from estimators.pipeline import Check, EstimationPipeline, VehicleSignals
 from estimators.vehicle import CORNERS
 from studies.drives.csv_log import read_columns
@@ -48,10 +47,10 @@ FORCES = {"force_x": 7.0, "force_z": 4.0, "force_y": 7.0}
 class Found(NamedTuple):
     velocity: dict[str, FloatArray]  # NRMS %, (drives, seeds)
     force: dict[str, FloatArray]  # (drives, seeds, corners or axles), NaN where the reference stays small
-    failed: npt.NDArray[np.int32]  # (drives, seeds, n) sums of Check
+    failed: FlagArray  # (drives, seeds, n) sums of Check
 
 
-def piped(runs: Runs) -> tuple[dict[str, FloatArray], npt.NDArray[np.int32]]:
+def piped(runs: Runs) -> tuple[dict[str, FloatArray], FlagArray]:
     pipeline = EstimationPipeline(vehicle_of(SIMULATED["launch"]), STEP, runs.ax.shape[:-1])
     rows: dict[str, list[FloatArray]] = {"vx": [], "vy": [], "force_x": [], "force_z": [], "axle_force_y": []}
     failed = []

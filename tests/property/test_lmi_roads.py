@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from estimators.arrays import FloatArray
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import solve
-from synthesis.polynomials.matrix import FloatArray
 from tests.unit.lmi_cases import SLACK, confirmed, gain_problem, held, lyapunov_problem, parameter, within
 
 SMALL = settings(deadline=None, max_examples=12)

@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from estimators.arrays import FloatArray
 from synthesis.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import solve
-from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
+from synthesis.polynomials.matrix import MatrixPolynomial
 from tests.unit.lmi_cases import (
     SLACK,
     capped,

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from estimators.arrays import FloatArray
 from studies.papers.corner_estimation.lyapunov import Certificate, Reading, certificate, convexity
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.models.catalogue.corner import Direction
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray
 from synthesis.printed import judge
 from synthesis.stability import Form, GainBox, affine_quadratic_stability
 from tests.unit.lmi_cases import corner

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import RegularGridInterpolator
 from scipy.linalg import expm
 
+from estimators.arrays import FloatArray
 from synthesis.certificate.claims import Claim, ClaimChannel
 from synthesis.certificate.inside_sample import inside_sample
 from synthesis.certificate.refute import refuting_place, undetectable_place
@@ -23,7 +24,6 @@ from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
 from synthesis.polynomials.enclosure import PolynomialMatrix
-from synthesis.polynomials.matrix import FloatArray
 from synthesis.polynomials.rational import decimal, rational
 from tests.unit.lmi_cases import parameter, small_model
 
