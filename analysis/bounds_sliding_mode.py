@@ -11,7 +11,7 @@ import numpy as np
 from analysis.checks import positive, square
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
-from synthesis.errors import unknown
+from estimators.errors import unknown
 from synthesis.models.param import Constant
 
 Output = Literal["yaw_rate", "lateral_acceleration", "longitudinal_acceleration"]

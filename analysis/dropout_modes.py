@@ -26,8 +26,8 @@ from scipy.linalg import expm
 from analysis.checks import as_stack, leading, positive, square
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from estimators.schedule import GainSchedule, Update
-from synthesis.errors import unknown
 from synthesis.models.discretise import zero_order_hold
 
 if TYPE_CHECKING:

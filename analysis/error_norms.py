@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from analysis.errors import AnalysisError
 from analysis.norms import HinfNorm, hinf_norm
 from estimators.arrays import FloatArray
-from synthesis.errors import unknown
+from estimators.errors import unknown
 from synthesis.models.lpv import LpvModel
 
 

@@ -27,7 +27,7 @@ from analysis.constant_lmi import constant_problem, matrix_of
 from analysis.errors import AnalysisError
 from analysis.second_moment import lifted, spectral_radius
 from estimators.arrays import FloatArray
-from synthesis.errors import unknown
+from estimators.errors import unknown
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve

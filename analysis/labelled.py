@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
-from synthesis.errors import unknown
+from estimators.errors import unknown
 
 SCHEMA = "gainsmith.labelled/1"
 Labels: TypeAlias = FloatArray | NDArray[np.str_]

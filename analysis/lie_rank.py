@@ -15,7 +15,7 @@ from analysis.errors import AnalysisError
 from analysis.lie_series import Evaluator, ball, series_arithmetic
 from analysis.observability import exact_number
 from estimators.arrays import FloatArray
-from synthesis.errors import unknown
+from estimators.errors import unknown
 from synthesis.models.nonlinear import NonlinearModel
 
 Number: TypeAlias = float | int | str | Any  # or an exact sympy number

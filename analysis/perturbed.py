@@ -14,7 +14,7 @@ from analysis.checks import as_stack
 from analysis.error_norms import checked_gain
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
-from synthesis.errors import unknown
+from estimators.errors import unknown
 from synthesis.models.extract import MATRICES
 from synthesis.models.lpv import LpvModel
 

@@ -9,8 +9,9 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from estimators.errors import unknown
 from synthesis.deploy import DeploySettings
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 from synthesis.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
 from synthesis.lmi.settings import LmiSettings
 from synthesis.models.catalogue import CATALOGUE

@@ -22,9 +22,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from synthesis.certificate.refute import undetectable_place
 from synthesis.certificate.rounding import round_down, round_up
-from synthesis.errors import ProblemError, unknown
+from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.scaling import observer_scale

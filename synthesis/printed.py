@@ -9,7 +9,8 @@ from typing import Any, get_args
 
 from flint import fmpq, fmpq_poly
 
-from synthesis.errors import ProblemError, unknown
+from estimators.errors import unknown
+from synthesis.errors import ProblemError
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.enclosure import PolynomialMatrix
 from synthesis.polynomials.rational import (

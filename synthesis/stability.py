@@ -16,12 +16,13 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 
 from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from synthesis.certificate.claims import Claim
 from synthesis.certificate.proof import place_words
 from synthesis.certificate.refute import unstable_place
 from synthesis.certificate.rounding import rounded_lyapunov
 from synthesis.certificate.verify import Names, Outcome, Verifier
-from synthesis.errors import ProblemError, unknown
+from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Margin, Verdict
 from synthesis.lmi.scaling import error_scale

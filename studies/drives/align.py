@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from estimators.arrays import FloatArray
-from studies.drives.errors import LogError
+from studies.errors import LogError
 
 HALF_WINDOW = 0.05
 """h in s: long enough for 100 Hz logs, short against a brake application."""

@@ -12,8 +12,8 @@ import numpy as np
 import polars as pl
 
 from estimators.arrays import FloatArray
-from studies.drives.errors import LogError
-from synthesis.errors import unknown
+from estimators.errors import unknown
+from studies.errors import LogError
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from estimators.errors import unknown
 from studies.drives.drive_tables import Align, Column, Estimators, LogFile, Schedules, Vehicle
 from studies.drives.quantities import CORNERS, REFERENCES, SIGNALS
-from synthesis.errors import unknown
 
 WHEEL_SPEEDS = tuple(f"wheel_speed_{corner}" for corner in CORNERS)
 TORQUES = tuple(f"torque_{corner}" for corner in CORNERS)

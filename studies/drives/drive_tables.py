@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from estimators.errors import unknown
 from studies.drives.quantities import (
     AngularSpeed,
     Duration,
@@ -19,7 +20,6 @@ from studies.drives.quantities import (
     Stiffness,
     factor_to,
 )
-from synthesis.errors import unknown
 
 
 def _a_time(unit: str) -> str:

@@ -15,10 +15,10 @@ from studies.drives.align import find_offset
 from studies.drives.csv_log import line_of, read_columns
 from studies.drives.drive_file import DriveFile
 from studies.drives.drive_tables import Column, LogFile
-from studies.drives.errors import LogError
 from studies.drives.plausible import check_plausible
 from studies.drives.quantities import REFERENCES, SIGNALS, factor_to
 from studies.drives.resample import Stamped, clean_stamps, resample
+from studies.errors import LogError
 
 LONGEST_GAP = 60.0
 """s without a row: beyond it the clock has jumped, or it is another drive."""

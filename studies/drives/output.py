@@ -14,7 +14,7 @@ import numpy as np
 import polars as pl
 
 from estimators.arrays import AnyArray
-from studies.drives.errors import LogError
+from studies.errors import LogError
 
 
 def check_folder(out: Path) -> None:

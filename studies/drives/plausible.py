@@ -14,8 +14,8 @@ import numpy as np
 from estimators.arrays import FloatArray
 from studies.drives.drive_file import DriveFile
 from studies.drives.drive_tables import Column
-from studies.drives.errors import LogError
 from studies.drives.quantities import CORNERS, SIGNALS, factor_to
+from studies.errors import LogError
 
 
 class Limit(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from studies.drives.csv_log import line_of
-from studies.drives.errors import LogError
+from studies.errors import LogError
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from synthesis.errors import SpecError, unknown
+from estimators.errors import unknown
+from synthesis.errors import SpecError
 
 _Step = int | str
 _Model = typing.TypeVar("_Model", bound=BaseModel)

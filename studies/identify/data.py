@@ -12,7 +12,7 @@ from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.prepare import CornerInputs, corner_inputs_of
 from studies.drives.quantities import CORNERS
-from studies.identify.errors import IdentifyError
+from studies.errors import IdentifyError
 from studies.identify.prefilter import Prefilter
 from studies.identify.settings import IdentifySettings
 

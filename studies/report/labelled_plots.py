@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 
 from analysis.labelled import Axis, LabelledArray
-from synthesis.errors import GainsmithError
+from estimators.errors import GainsmithError
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

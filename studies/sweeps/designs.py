@@ -11,10 +11,11 @@ from pydantic import Field
 
 from analysis.errors import AnalysisError
 from analysis.sensitivity_designs import power_of_two
+from estimators.errors import unknown
 from studies.sweeps.skip_ahead import BITS, latin_points, sobol_points
 from studies.sweeps.strict import Strict
 from studies.sweeps.vary import Varied
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 from synthesis.polynomials.matrix import FloatArray
 
 Indices = NDArray[np.int64]

@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import Field
 
+from estimators.errors import unknown
 from studies.sweeps.designs import STAGES, Stage
 from studies.sweeps.measure import Measure
 from studies.sweeps.measures import FAST, MeasureSpec
@@ -18,7 +19,7 @@ from studies.sweeps.strict import Strict, read_kind, read_table
 from studies.sweeps.subject_spec import SubjectSpec
 from studies.sweeps.sweep import Sweep
 from studies.sweeps.vary import Vary
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 
 MEASURES: dict[str, type[MeasureSpec]] = {**FAST, **COSTLY, **DRIVE}
 

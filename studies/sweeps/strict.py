@@ -7,7 +7,8 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from synthesis.errors import SpecError, unknown
+from estimators.errors import unknown
+from synthesis.errors import SpecError
 
 
 class Strict(BaseModel):

@@ -8,14 +8,14 @@ from typing import Any, Self
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
-from estimators.errors import EstimatorError
+from estimators.errors import EstimatorError, unknown
 from estimators.schedule import SHIPPED, GainSchedule, read_content
 from studies.spec import ScheduleSpec, explain
 from studies.sweeps.plant import Box, ModelPlant, Plant, PolynomialPlant
 from studies.sweeps.strict import Strict
 from studies.sweeps.subject import Gains, Subject, model_subject
 from studies.sweeps.vary import Vary
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 from synthesis.models.catalogue import CATALOGUE
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Signal

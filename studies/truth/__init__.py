@@ -16,6 +16,7 @@ sensor errors are then drawn for as many seeds as wanted from the one truth:
     error = steps[-1].vx - one["vx"][:, -1]        # (seeds, runs)
 """
 
+from studies.errors import SimulationError
 from studies.truth.drivetrain import Assist, Drivetrain
 from studies.truth.export import write_drive
 from studies.truth.manoeuvre import Manoeuvre
@@ -25,7 +26,7 @@ from studies.truth.monte_carlo import varied
 from studies.truth.record import Truth
 from studies.truth.sensors import PERFECT, Channel, Drops, Sensors, Ticks
 from studies.truth.signals import UNITS
-from studies.truth.simulate import SimulationError, simulate
+from studies.truth.simulate import simulate
 from studies.truth.vehicle import Chassis, TruthVehicle, load_vehicle
 
 __all__ = [

@@ -13,7 +13,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from estimators.arrays import FloatArray
-from synthesis.errors import SpecError, unknown
+from estimators.errors import unknown
+from synthesis.errors import SpecError
 
 FRONT_SHARES = {"AWD": 0.5, "FWD": 1.0, "RWD": 0.0}
 """Share of the drive torque that goes to the front axle."""

@@ -8,12 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from estimators.vehicle import GRAVITY
 from studies.truth.drivetrain import Drivetrains
 from studies.truth.lugre import LuGreTire
 from studies.truth.magic_formula import MagicFormulaTire
 from studies.truth.vehicle import TruthVehicle
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 
 AIR_DENSITY = 1.2
 """kg/m^3"""

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from studies.drives import quantities
 from studies.drives.drive_tables import Table
 from studies.drives.quantities import Duration, to_si
@@ -21,7 +22,7 @@ from studies.truth.path import PathPiece, curvature
 from studies.truth.profile import GRID, Piece, check_units, sampled
 from studies.truth.road_table import Road
 from studies.truth.vehicle import TruthVehicle, load_vehicle
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 
 
 def _pieces(unit: str) -> AfterValidator:

@@ -7,13 +7,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from estimators.errors import unknown
 from studies.drives.validation import read_toml
 from studies.truth.manoeuvre import Manoeuvre
 from studies.truth.monte_carlo import simulate_in_processes
 from studies.truth.record import Truth
 from studies.truth.simulate import EVERYTHING, RECORD_TIME, STEP, simulate
 from studies.truth.vehicle import TruthVehicle
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 
 
 def shipped_manoeuvres(paper: str = "") -> dict[str, Path]:

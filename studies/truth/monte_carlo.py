@@ -13,12 +13,13 @@ from zlib import crc32
 
 import numpy as np
 
+from estimators.errors import unknown
 from estimators.vehicle import VehicleParameters
 from studies.truth.course import Course
 from studies.truth.record import Truth
 from studies.truth.simulate import simulate
 from studies.truth.vehicle import Chassis, TruthVehicle
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 
 
 def varied(vehicle: TruthVehicle, spread: Mapping[str, float], seeds: Sequence[int]) -> list[TruthVehicle]:

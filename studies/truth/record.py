@@ -10,9 +10,10 @@ from zlib import crc32
 import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
+from estimators.errors import unknown
 from studies.truth.signals import UNITS
 from studies.truth.vehicle import TruthVehicle
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 
 
 @dataclass(frozen=True)

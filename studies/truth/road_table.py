@@ -6,12 +6,12 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from estimators.errors import unknown
 from estimators.vehicle import CORNERS
 from studies.drives.drive_tables import Table
 from studies.drives.quantities import Offset, to_si
 from studies.truth.profile import Piece, check_units
 from studies.truth.road import SURFACES, Zone
-from synthesis.errors import unknown
 
 _GROUPS = {
     "all": CORNERS, "left": ("fl", "rl"), "right": ("fr", "rr"), "front": ("fl", "fr"), "rear": ("rl", "rr"),

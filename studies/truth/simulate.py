@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from estimators.arrays import FloatArray
+from estimators.errors import unknown
+from studies.errors import SimulationError
 from studies.truth.course import Course, Courses
 from studies.truth.driver import Driver
 from studies.truth.fleet import Fleet, tires_of
@@ -16,17 +18,13 @@ from studies.truth.record import Truth
 from studies.truth.signals import UNITS, WHEEL_UNITS, signals_of
 from studies.truth.stepper import Step, advance
 from studies.truth.vehicle import TruthVehicle
-from synthesis.errors import GainsmithError, SpecError, unknown
+from synthesis.errors import SpecError
 
 STEP = 0.001
 """s, by the convergence study of the tests: velocities are then right to 1e-4 m/s, wheel speeds to 1e-2 rad/s."""
 RECORD_TIME = 0.005
 """s between samples, 200 Hz as in P1 to P3."""
 EVERYTHING = tuple(UNITS)
-
-
-class SimulationError(GainsmithError):
-    """A truth run that left the range of numbers: the message names run and time."""
 
 
 def simulate(

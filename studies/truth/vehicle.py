@@ -7,12 +7,13 @@ from dataclasses import dataclass, field, fields, replace
 from importlib import resources
 from pathlib import Path
 
+from estimators.errors import unknown
 from estimators.vehicle import VehicleParameters
 from estimators.velocity.suspension import SuspensionParameters
 from studies.truth.drivetrain import Drivetrain
 from studies.truth.lugre import LuGreParameters
 from studies.truth.magic_formula import MagicFormulaParameters
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
 
 

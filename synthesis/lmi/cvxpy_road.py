@@ -8,7 +8,8 @@ from time import perf_counter
 import cvxpy as cp
 import numpy as np
 
-from synthesis.errors import ProblemError, unknown
+from estimators.errors import unknown
+from synthesis.errors import ProblemError
 from synthesis.lmi.clarabel_road import RawAnswer
 from synthesis.lmi.conic import gram_matrices, structural_zeros, triangle
 from synthesis.lmi.relaxation import RelaxedProblem

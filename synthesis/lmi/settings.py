@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from synthesis.errors import ProblemError, unknown
+from estimators.errors import unknown
+from synthesis.errors import ProblemError
 
 Relaxation = Literal["auto", "grid", "vertex", "exact"]
 

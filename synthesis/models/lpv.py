@@ -11,7 +11,8 @@ import numpy as np
 import sympy as sp
 
 from estimators.arrays import FloatArray
-from synthesis.errors import ModelError, unknown
+from estimators.errors import unknown
+from synthesis.errors import ModelError
 from synthesis.models.extract import MATRICES, ExactModel, PolynomialModel, extract, in_floats
 from synthesis.models.numeric import NumericModel, evaluate
 from synthesis.models.param import Constant, SchedulingParameter, Signal

@@ -9,7 +9,8 @@ import numpy as np
 import sympy as sp
 
 from estimators.arrays import FloatArray
-from synthesis.errors import ModelError, unknown
+from estimators.errors import unknown
+from synthesis.errors import ModelError
 from synthesis.models.param import Constant, Signal
 
 

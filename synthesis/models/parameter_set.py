@@ -9,7 +9,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from synthesis.errors import ModelError, SpecError, unknown
+from estimators.errors import unknown
+from synthesis.errors import ModelError, SpecError
 from synthesis.models.param import Constant
 
 

@@ -11,11 +11,11 @@ import polars as pl
 import pytest
 
 from estimators.schedule import write_content
-from studies.drives.errors import LogError
 from studies.drives.judge import DriveData, judge
 from studies.drives.quantities import CORNERS
 from studies.drives.run import RunResult, replay_drive, run_drive
 from studies.drives.summary import HEADER, summary_rows
+from studies.errors import LogError
 from tests.drives.synthetic_drive import (
     DRIVE,
     MASS,

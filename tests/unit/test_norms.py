@@ -11,7 +11,7 @@ from analysis.errors import AnalysisError
 from analysis.hamiltonian import crosses_level
 from analysis.norms import hinf_norm, stability_margin
 from analysis.norms_h2 import h2_norm
-from synthesis.errors import GainsmithError
+from estimators.errors import GainsmithError
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.parameter_set import load_parameter_set
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synthesis.errors import GainsmithError
+from estimators.errors import GainsmithError
 from synthesis.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.solve import solve

@@ -15,12 +15,12 @@ from estimators import GainSchedule
 from estimators.pipeline import ScheduledCorners
 from estimators.schedule import write_content
 from studies.drives.drive_file import read_drive
-from studies.drives.errors import LogError
 from studies.drives.log import read_log
 from studies.drives.metrics import deviation
 from studies.drives.prepare import CornerInputs, corner_inputs_of
 from studies.drives.replay import replay
 from studies.drives.run import replay_drive
+from studies.errors import LogError
 from studies.experiments.sensors import TEST_CAR
 from studies.sweeps.engine import run_sweep
 from studies.sweeps.executors import Serial
