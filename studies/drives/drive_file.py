@@ -13,12 +13,12 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from studies.drives.drive_checks import check_alignment, check_columns, check_estimators, check_logs, check_signals
-from studies.drives.drive_tables import Column, Estimators, LogFile, Observer, Schedules, Table, Vehicle
+from studies.drives.drive_tables import Column, Estimators, LogFile, Observer, Schedules, Vehicle
 from studies.drives.quantities import Duration
-from studies.drives.validation import read_toml
+from synthesis.toml_file import StrictTable, load_toml
 
 
-class DriveFile(Table):
+class DriveFile(StrictTable):
     """A drive file that was read, checked and converted to SI."""
 
     schema_: Literal["gainsmith.drive/1"] = Field(alias="schema", examples=["gainsmith.drive/1"])
@@ -49,4 +49,4 @@ class DriveFile(Table):
 
 def read_drive(path: Path) -> DriveFile:
     """Read and check a drive file. Raises SpecError, one line: file, key, what is wrong, what would be right."""
-    return read_toml(path, DriveFile, "drive")
+    return load_toml(path, DriveFile, "drive")

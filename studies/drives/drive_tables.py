@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, Field
 
 from estimators.errors import unknown
 from studies.drives.quantities import (
@@ -20,6 +20,7 @@ from studies.drives.quantities import (
     Stiffness,
     factor_to,
 )
+from synthesis.toml_file import StrictTable
 
 
 def _a_time(unit: str) -> str:
@@ -27,13 +28,7 @@ def _a_time(unit: str) -> str:
     return unit
 
 
-class Table(BaseModel):
-    """Strict and frozen: no unknown key, no number in quotes, no infinity."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-
-class Column(Table):
+class Column(StrictTable):
     """One log column: value in SI = factor * sign * (column in ``unit``)."""
 
     column: str = Field(min_length=1, examples=["omega_fl"])
@@ -47,7 +42,7 @@ class Column(Table):
         return factor_to(self.unit, si_unit) * self.factor * (-1.0 if self.sign == "negative" else 1.0)
 
 
-class Align(Table):
+class Align(StrictTable):
     """Estimate a clock offset: the derivative of ``velocity`` must look like ``acceleration`` (:mod:`.align`)."""
 
     to: str = Field(examples=["imu"])
@@ -56,7 +51,7 @@ class Align(Table):
     search: Duration | None = None
 
 
-class LogFile(Table):
+class LogFile(StrictTable):
     """One log file: its clock, its rate, and the longest pause that may be bridged by interpolation."""
 
     name: str = Field(min_length=1, examples=["car"])
@@ -77,7 +72,7 @@ class LogFile(Table):
         return self.max_gap if self.max_gap is not None else 5.0 / self.rate
 
 
-class Vehicle(Table):
+class Vehicle(StrictTable):
     """Rigid-body and wheel data, SI. Lengths are to the centre of gravity; tracks are wheel centre to wheel centre."""
 
     mass: Mass = Field(examples=["1600 kg"])
@@ -97,7 +92,7 @@ class Vehicle(Table):
     relaxation_length: Length | None = None
 
 
-class Observer(Table):
+class Observer(StrictTable):
     """How the observer inputs are formed: lag of the differentiators, and when a wheel counts as stopped."""
 
     derivative_lag: Lag = 0.01
@@ -113,7 +108,7 @@ def _one_of(*names: str) -> Callable[[str], str]:
     return check
 
 
-class Estimators(Table):
+class Estimators(StrictTable):
     """Which estimators make up the pipeline, and which run at the corners beside it; the first of each is the default.
 
     ``corner_velocity`` is what the result calls corner observers; the same kind cross-checks the pipeline where a lateral
@@ -147,7 +142,7 @@ class Estimators(Table):
     ] = "none"
 
 
-class Schedules(Table):
+class Schedules(StrictTable):
     """The gain schedule of each direction: a shipped name, or the path of a JSON file beside the drive file."""
 
     longitudinal: str = Field(min_length=1, examples=["corner-estimation-longitudinal"])

@@ -13,7 +13,6 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from studies.drives import quantities
-from studies.drives.drive_tables import Table
 from studies.drives.quantities import Duration, to_si
 from studies.truth.course import Course
 from studies.truth.drivetrain import Assist
@@ -23,6 +22,7 @@ from studies.truth.profile import GRID, Piece, check_units, sampled
 from studies.truth.road_table import Road
 from studies.truth.vehicle import TruthVehicle, load_vehicle
 from synthesis.errors import SpecError
+from synthesis.toml_file import StrictTable
 
 
 def _pieces(unit: str) -> AfterValidator:
@@ -58,7 +58,7 @@ Moment = Annotated[float, _above_zero("N*m")]
 Power = Annotated[float, _above_zero("W")]
 
 
-class Car(Table):
+class Car(StrictTable):
     """Which vehicle, by the name of its parameter set or as a TOML file beside the manoeuvre, and what is fitted to it."""
 
     parameters: str = Field(min_length=1)
@@ -72,7 +72,7 @@ class Car(Table):
     maximum_brake_torque: Moment | None = None  # of all wheels
 
 
-class Manoeuvre(Table):
+class Manoeuvre(StrictTable):
     """A manoeuvre that was read and checked.
 
     Steering: ``steer`` (at the road wheels) or ``hand_wheel`` (needs ``vehicle.steering_ratio``), or a ``path`` that the

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from estimators.errors import unknown
-from studies.drives.validation import read_toml
 from studies.truth.manoeuvre import Manoeuvre
 from studies.truth.monte_carlo import simulate_in_processes
 from studies.truth.record import Truth
 from studies.truth.simulate import EVERYTHING, RECORD_TIME, STEP, simulate
 from studies.truth.vehicle import TruthVehicle
-from synthesis.errors import SpecError
+from synthesis.toml_file import find_toml, load_toml, shipped_files
 
 
 def shipped_manoeuvres(paper: str = "") -> dict[str, Path]:
     """The manoeuvre files that come with the package, by name; those of one paper (``"P1"``) if asked."""
-    folder = Path(str(resources.files("studies") / "manoeuvres"))
-    return {path.stem: path for path in sorted(folder.glob(f"{paper.lower()}*.toml"))}
+    found = shipped_files("studies", "manoeuvres")
+    return {name: path for name, path in found.items() if name.startswith(paper.lower())}
 
 
 def load_manoeuvre(name: str | Path) -> Manoeuvre:
@@ -28,13 +25,7 @@ def load_manoeuvre(name: str | Path) -> Manoeuvre:
 
     Raises SpecError, one line: file, key, what is wrong, what would be right.
     """
-    path = Path(name)
-    if path.suffix != ".toml":
-        known = shipped_manoeuvres()
-        if str(name) not in known:
-            raise SpecError(unknown("manoeuvre", str(name), known) + "; a file of your own ends with .toml")
-        path = known[str(name)]
-    return read_toml(path, Manoeuvre, "manoeuvre")
+    return load_toml(find_toml(name, shipped_manoeuvres(), "manoeuvre"), Manoeuvre, "manoeuvre")
 
 
 def drive(

@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from estimators.arrays import FloatArray
-from studies.drives.drive_tables import Table
 from studies.drives.quantities import Length
 from studies.truth.course import PATH_GRID
+from synthesis.toml_file import StrictTable
 
 BLEND = 5.0
 """m over which the curvature changes between pieces: roads are no compasses, and drivers cannot jump."""
@@ -24,7 +24,7 @@ _NEEDS: dict[str, tuple[set[str], set[str]]] = {
 }
 
 
-class PathPiece(Table):
+class PathPiece(StrictTable):
     """straight: ``length``. arc: ``radius`` and ``angle_deg``, positive to the left. lane-change: ``offset`` sideways
     within ``length``, k = 2 pi w/L^2 sin(2 pi s/L). slalom: y = offset sin(2 pi s/wavelength), k = y''. ``side`` turns
     the last two to the right.

@@ -14,8 +14,8 @@ from pydantic import Field, model_validator
 
 from estimators.arrays import FloatArray
 from studies.drives import quantities
-from studies.drives.drive_tables import Table
 from studies.drives.quantities import Duration
+from synthesis.toml_file import StrictTable
 
 GRID = 0.005
 """s, spacing of the tables."""
@@ -32,7 +32,7 @@ _NEEDS: dict[str, tuple[set[str], set[str]]] = {
 """Keys that each kind must have, and those that it may have."""
 
 
-class Piece(Table):
+class Piece(StrictTable):
     """One piece; values are quantities with a unit.
 
     hold: stays, after a jump to ``to`` if given. ramp: linear to ``to``. smooth: half a cosine to ``to``. sine: starts at

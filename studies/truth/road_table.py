@@ -8,10 +8,10 @@ from pydantic import AfterValidator, Field, model_validator
 
 from estimators.errors import unknown
 from estimators.vehicle import CORNERS
-from studies.drives.drive_tables import Table
 from studies.drives.quantities import Offset, to_si
 from studies.truth.profile import Piece, check_units
 from studies.truth.road import SURFACES, Zone
+from synthesis.toml_file import StrictTable
 
 _GROUPS = {
     "all": CORNERS, "left": ("fl", "rl"), "right": ("fr", "rr"), "front": ("fl", "fr"), "rear": ("rl", "rr"),
@@ -41,7 +41,7 @@ def _friction(friction: float | None, surface: str | None) -> float:
     return SURFACES[surface] if surface is not None else float(friction or 0.0)
 
 
-class ZoneTable(Table):
+class ZoneTable(StrictTable):
     """A stretch of place (of each wheel along its way) or time, with its own friction for some wheels."""
 
     corners: Annotated[str, AfterValidator(_known)] = "all"
@@ -67,7 +67,7 @@ class ZoneTable(Table):
         return Zone(_friction(self.friction, self.surface), (a, b, c, d), blend=self.blend, **given)
 
 
-class Road(Table):
+class Road(StrictTable):
     """Friction (1 is dry asphalt) or surface everywhere, zones above it (later ones on top), grade and bank over time."""
 
     friction: float | None = Field(default=None, gt=0.0, le=2.0)

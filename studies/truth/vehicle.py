@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields, replace
-from importlib import resources
 from pathlib import Path
 
 from estimators.errors import unknown
@@ -15,6 +14,7 @@ from studies.truth.lugre import LuGreParameters
 from studies.truth.magic_formula import MagicFormulaParameters
 from synthesis.errors import SpecError
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
+from synthesis.toml_file import shipped_files
 
 
 @dataclass(frozen=True)
@@ -111,5 +111,4 @@ def load_vehicle(name: str | Path) -> TruthVehicle:
 
 def shipped_vehicles() -> dict[str, Path]:
     """Vehicles that only the truth needs, by name; those of the models are found by `load_parameter_set`."""
-    folder = Path(str(resources.files("studies.truth") / "vehicles"))
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    return shipped_files("studies.truth", "vehicles")

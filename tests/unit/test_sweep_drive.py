@@ -26,12 +26,12 @@ from studies.sweeps.engine import run_sweep
 from studies.sweeps.executors import Serial
 from studies.sweeps.measure import Measure
 from studies.sweeps.spec import MEASURES, build_sweep
-from studies.sweeps.strict import read_table
 from studies.sweeps.subject import Batch, Subject
 from studies.sweeps.subject_spec import SubjectSpec
 from studies.sweeps.tables import compute
 from studies.truth import draw, drive, load_manoeuvre, write_drive
 from synthesis.errors import SpecError
+from synthesis.toml_file import read_table
 from tests.drives.synthetic_drive import DRIVE, TORQUES, columns, write_log
 from tests.drives.synthetic_drive import write_drive as write_drive_file
 from tests.unit.schedule_content import schedule_content
