@@ -1,4 +1,4 @@
-r"""Mean-square stability by LMI, the second road beside the spectral radius: P_i > 0 with
+r"""Mean-square stability by LMI, the second method beside the spectral radius: P_i > 0 with
 
 P_i - A_i' (sum_j p_ij P_j) A_i > 0   for every mode i   (Costa, Fragoso and Marques 2005, Theorem 3.9).
 """

@@ -10,7 +10,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from studies.claim import Verdict
+from studies.claim import ClaimVerdict
 from studies.commands.progress import progress_bar
 from studies.registry import SHIPPED, Registry
 from studies.report.scoreboard import MARKS
@@ -116,7 +116,7 @@ def _content(summary: RunSummary, folder: Path) -> dict[str, Any]:
         "missing_claims": summary.missing_claims,
         "verdicts": {
             str(verdict): sum(c["verdict"] == verdict for r in summary.records for c in r.claims)
-            for verdict in Verdict
+            for verdict in ClaimVerdict
         },
         "files": [str(path) for path in summary.paths],
     }  # fmt: skip

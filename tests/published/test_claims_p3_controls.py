@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from studies.claim import Verdict
+from studies.claim import ClaimVerdict
 from studies.papers.resilient_velocity import (
     claims_accuracy,
     claims_drops,
@@ -48,35 +48,35 @@ def with_vehicle(**values: float) -> Setting:
 
 
 FLIPS = [
-    ("P3-ex1-eig", claims_example1.eigenvalue, with_gain((1.18, 385.0)), Verdict.NOT_REPRODUCED),
-    ("P3-ex1-eig", claims_example1.eigenvalue, with_tire("longitudinal", sigma1=1.001), Verdict.NOT_REPRODUCED),
-    ("P3-ex1-sym", claims_example1.symmetric, replace(PRINTED, example_speed=33.5293), Verdict.REPRODUCED),
-    ("P3-ex1-T", claims_example1.transformed, replace(PRINTED, example_speed=30.0), Verdict.REPRODUCED),
-    ("P3-ex1-Topt", claims_example1.best_transform, with_gain((0.1, 387.0)), Verdict.NOT_REPRODUCED),
-    ("P3-prop1-young", claims_example1.young, with_gain((-1.18, -387.0)), Verdict.NOT_REPRODUCED),
-    ("P3-fig2-x", claims_norms.longitudinal, with_tire("longitudinal", sigma2=2.0), Verdict.NOT_REPRODUCED),
-    ("P3-fig2-y", claims_norms.lateral, with_gain(lateral=(1.21, 2.0)), Verdict.NOT_REPRODUCED),
-    ("P3-fig2-nonexp", claims_norms.non_expansive, with_gain((1.18, 1e5), (1.21, 5e3)), Verdict.REPRODUCED),
-    ("P3-fig345", claims_sensitivity.small_deviations, with_gain(lateral=(1.4, 16.8)), Verdict.NOT_REPRODUCED),
-    ("P3-obs", claims_sensitivity.observability, with_tire("lateral", sigma1=0.2), Verdict.REPRODUCED),
-    ("P3-20", claims_switching.common_decay, replace(PRINTED, high_slip=(1.18, 380.0)), Verdict.REPRODUCED),
-    ("P3-ex2-arb", claims_switching.arbitrary_switching, replace(PRINTED, high_slip=(0.22, 1.0)), Verdict.NOT_REPRODUCED),
-    ("P3-fig6", claims_markov.markov_margin, replace(PRINTED, high_slip=(-0.22, -0.1)), Verdict.NOT_REPRODUCED),
-    ("P3-kron", claims_markov.orientation, with_gain((0.0, 0.0)), Verdict.NOT_REPRODUCED),
-    ("P3-ex3", claims_example3.twenty_percent, replace(PRINTED, example_drop=0.8), Verdict.UNDER_SPECIFIED),
-    ("P3-ex3-arb", claims_example3.any_pattern, with_gain((0.3, 1.0)), Verdict.REPRODUCED),
-    ("P3-pcr", claims_drops.critical_probability, replace(PRINTED, example_drop=0.6), Verdict.NOT_REPRODUCED),
-    ("P3-pcr", claims_drops.critical_probability, with_gain((-1.18, -387.0)), Verdict.NOT_REPRODUCED),
-    ("P3-rem4", claims_drops.detectable_mixture, with_gain((0.3, 387.0)), Verdict.NOT_REPRODUCED),
-    ("P3-zoh", claims_sampling.zero_order_hold_reading, replace(PRINTED, sample_time=1e-4), Verdict.REPRODUCED),
-    ("P3-susp", claims_suspension.modes, with_vehicle(suspension_damping=3e4), Verdict.NOT_REPRODUCED),
+    ("P3-ex1-eig", claims_example1.eigenvalue, with_gain((1.18, 385.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-ex1-eig", claims_example1.eigenvalue, with_tire("longitudinal", sigma1=1.001), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-ex1-sym", claims_example1.symmetric, replace(PRINTED, example_speed=33.5293), ClaimVerdict.REPRODUCED),
+    ("P3-ex1-T", claims_example1.transformed, replace(PRINTED, example_speed=30.0), ClaimVerdict.REPRODUCED),
+    ("P3-ex1-Topt", claims_example1.best_transform, with_gain((0.1, 387.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-prop1-young", claims_example1.young, with_gain((-1.18, -387.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-fig2-x", claims_norms.longitudinal, with_tire("longitudinal", sigma2=2.0), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-fig2-y", claims_norms.lateral, with_gain(lateral=(1.21, 2.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-fig2-nonexp", claims_norms.non_expansive, with_gain((1.18, 1e5), (1.21, 5e3)), ClaimVerdict.REPRODUCED),
+    ("P3-fig345", claims_sensitivity.small_deviations, with_gain(lateral=(1.4, 16.8)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-obs", claims_sensitivity.observability, with_tire("lateral", sigma1=0.2), ClaimVerdict.REPRODUCED),
+    ("P3-20", claims_switching.common_decay, replace(PRINTED, high_slip=(1.18, 380.0)), ClaimVerdict.REPRODUCED),
+    ("P3-ex2-arb", claims_switching.arbitrary_switching, replace(PRINTED, high_slip=(0.22, 1.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-fig6", claims_markov.markov_margin, replace(PRINTED, high_slip=(-0.22, -0.1)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-kron", claims_markov.orientation, with_gain((0.0, 0.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-ex3", claims_example3.twenty_percent, replace(PRINTED, example_drop=0.8), ClaimVerdict.UNDER_SPECIFIED),
+    ("P3-ex3-arb", claims_example3.any_pattern, with_gain((0.3, 1.0)), ClaimVerdict.REPRODUCED),
+    ("P3-pcr", claims_drops.critical_probability, replace(PRINTED, example_drop=0.6), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-pcr", claims_drops.critical_probability, with_gain((-1.18, -387.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-rem4", claims_drops.detectable_mixture, with_gain((0.3, 387.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-zoh", claims_sampling.zero_order_hold_reading, replace(PRINTED, sample_time=1e-4), ClaimVerdict.REPRODUCED),
+    ("P3-susp", claims_suspension.modes, with_vehicle(suspension_damping=3e4), ClaimVerdict.NOT_REPRODUCED),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("claim", "setting", "verdict"), [row[1:] for row in FLIPS], ids=[f"{row[0]}-{k}" for k, row in enumerate(FLIPS)]
 )
-def test_a_changed_input_changes_the_verdict(claim: Any, setting: Setting, verdict: Verdict) -> None:
+def test_a_changed_input_changes_the_verdict(claim: Any, setting: Setting, verdict: ClaimVerdict) -> None:
     assert claim().verdict is not verdict
     assert claim(setting).verdict is verdict
 
@@ -85,30 +85,30 @@ def test_a_changed_formula_changes_the_verdict(monkeypatch: pytest.MonkeyPatch) 
     """Claims without an input that could break them: break the statement instead."""
     other = with_tire("longitudinal", sigma2=3.0)
     other.__dict__["models"] = PRINTED.models  # the floor of one tire, the norm of another
-    assert claims_norms.any_gain(other).verdict is Verdict.NOT_REPRODUCED
+    assert claims_norms.any_gain(other).verdict is ClaimVerdict.NOT_REPRODUCED
     flat = np.ones(10**6)
     flat[0] = 0.0
-    assert claims_accuracy.normalised_errors({"longitudinal": flat, "lateral": flat}).verdict is Verdict.REPRODUCED
+    assert claims_accuracy.normalised_errors({"longitudinal": flat, "lateral": flat}).verdict is ClaimVerdict.REPRODUCED
     with monkeypatch.context() as patch:
         patch.setattr(claims_drops, "FIG8_DROPS", (0.2, 0.2))
-        assert claims_drops.radius_under_drops().verdict is Verdict.REPRODUCED
+        assert claims_drops.radius_under_drops().verdict is ClaimVerdict.REPRODUCED
         patch.setattr(claims_drops, "bisected", lambda A0, A1: np.full(len(A0), 0.7))
-        assert claims_drops.exact_critical_probability().verdict is Verdict.NOT_REPRODUCED
+        assert claims_drops.exact_critical_probability().verdict is ClaimVerdict.NOT_REPRODUCED
         patch.setattr(claims_loads, "residual", lambda formula: (sp.S(0),) * 3)
-        assert claims_loads.loads().verdict is Verdict.REPRODUCED
+        assert claims_loads.loads().verdict is ClaimVerdict.REPRODUCED
         patch.setattr(claims_friction, "PRINTED_UNITS", claims_friction.CORRECTED_UNITS)
-        assert claims_friction.steady_curve().verdict is Verdict.NOT_REPRODUCED
+        assert claims_friction.steady_curve().verdict is ClaimVerdict.NOT_REPRODUCED
         patch.setattr(claims_sensitivity, "CHANGE", 3.0)
-        assert claims_sensitivity.small_deviations().verdict is Verdict.REPRODUCED
+        assert claims_sensitivity.small_deviations().verdict is ClaimVerdict.REPRODUCED
 
 
 def test_the_comparisons_behind_the_verdicts() -> None:
-    assert erratum(True, False) is Verdict.REPRODUCED  # a printed form that holds is no erratum
-    assert erratum(False, False) is Verdict.NOT_REPRODUCED  # nor is one whose correction fails
-    assert derived(False) is Verdict.NOT_REPRODUCED
-    assert among_readings([0.9, 1.1], 1.0, 0.05) is Verdict.UNDER_SPECIFIED
-    assert among_readings([1.0, 1.01], 1.0, 0.05) is Verdict.REPRODUCED
-    assert among_readings([0.9, 0.8], 1.0, 0.05) is Verdict.NOT_REPRODUCED
-    assert among_readings([float("nan")], 1.0, 0.05) is not Verdict.REPRODUCED
-    assert open_choice([[1.0, 2.0], [1.0, 2.0]], 0.0) is Verdict.REPRODUCED
-    assert open_choice([[1.0, 2.0], [1.0, 2.1]], 0.05) is Verdict.UNDER_SPECIFIED
+    assert erratum(True, False) is ClaimVerdict.REPRODUCED  # a printed form that holds is no erratum
+    assert erratum(False, False) is ClaimVerdict.NOT_REPRODUCED  # nor is one whose correction fails
+    assert derived(False) is ClaimVerdict.NOT_REPRODUCED
+    assert among_readings([0.9, 1.1], 1.0, 0.05) is ClaimVerdict.UNDER_SPECIFIED
+    assert among_readings([1.0, 1.01], 1.0, 0.05) is ClaimVerdict.REPRODUCED
+    assert among_readings([0.9, 0.8], 1.0, 0.05) is ClaimVerdict.NOT_REPRODUCED
+    assert among_readings([float("nan")], 1.0, 0.05) is not ClaimVerdict.REPRODUCED
+    assert open_choice([[1.0, 2.0], [1.0, 2.0]], 0.0) is ClaimVerdict.REPRODUCED
+    assert open_choice([[1.0, 2.0], [1.0, 2.1]], 0.05) is ClaimVerdict.UNDER_SPECIFIED

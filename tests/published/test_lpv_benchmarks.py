@@ -304,7 +304,7 @@ def test_reference_problem(kind: Relaxation, degree: int) -> None:
 
 
 @pytest.mark.parametrize(("kind", "degree"), [("exact", 1), ("exact", 2), ("exact", 3), ("grid", 2)])
-def test_reference_problem_by_the_second_road(kind: Relaxation, degree: int) -> None:
+def test_reference_problem_by_the_second_backend(kind: Relaxation, degree: int) -> None:
     """cvxpy canonicalises by itself; the verdict is ours."""
     model = corner("corner-estimation", "longitudinal", 140.0)[0]
     found = design_observer(model, reference_design(degree, kind, "cvxpy:CLARABEL"))

@@ -20,7 +20,7 @@ from estimators.schedule import read_content, write_content
 from studies.cli import main
 from studies.schedules import run_spec
 from studies.spec import shipped_specs
-from synthesis.lmi.clarabel_road import RawAnswer, solve_with_clarabel
+from synthesis.lmi.clarabel_backend import RawAnswer, solve_with_clarabel
 from synthesis.lmi.conic import ConicData
 
 ROOT = Path(__file__).parents[2]

@@ -12,7 +12,7 @@ import pytest
 from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
 from synthesis.lmi import solve as solve_module
-from synthesis.lmi.clarabel_road import RawAnswer
+from synthesis.lmi.clarabel_backend import RawAnswer
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.scaling import error_scale

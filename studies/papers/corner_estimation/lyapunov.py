@@ -12,7 +12,7 @@ from synthesis.errors import SpecError
 from synthesis.models.catalogue.corner import Direction
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.matrix import FloatArray
-from synthesis.printed import Judgement, judge
+from synthesis.published_certificate import CertifiedRange, check_certificate
 from synthesis.stability import Form
 
 Reading = Literal["primal", "swapped", "dual", "adjugate"]
@@ -30,9 +30,9 @@ class Certificate:
     matrix: Coefficients
     form: Form
 
-    def judgement(self, search: tuple[float, float] = (0.0, STATED_SPEED)) -> Judgement:
+    def judgement(self, search: tuple[float, float] = (0.0, STATED_SPEED)) -> CertifiedRange:
         """Where it proves stability, in exact arithmetic."""
-        return judge(self.model, self.gains, self.matrix, self.form, search)
+        return check_certificate(self.model, self.gains, self.matrix, self.form, search)
 
     def at(self, omega: FloatArray) -> tuple[FloatArray, FloatArray]:
         """M (g, 2, 2) and its inequality at both rate bounds (2, g, 2, 2), to be negative: (28), (40) or the dual."""

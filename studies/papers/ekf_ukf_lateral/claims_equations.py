@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from studies.claim import Finding, Verdict, judged
+from studies.claim import ClaimVerdict, Finding, judged
 from studies.papers.ekf_ukf_lateral.equations import SPEED, acceleration_mismatch, straight_poles
 from studies.papers.ekf_ukf_lateral.observability import corrected_model, printed_output_model
 from synthesis.models.nonlinear import NonlinearModel
@@ -18,7 +18,9 @@ def lateral_output(printed: NonlinearModel | None = None) -> Finding:
         "By the force balance (1) the term is F_x1 sin(delta) = x_8 sin(u_1). With it y_4 equals the acceleration "
         "of the states identically; with the printed x_6 the two differ by (F_y21 - F_x1) sin(delta) / m."
     )
-    return Finding(computed, judged(wrong == 0, Verdict.ERRATUM if erratum else Verdict.NOT_REPRODUCED), reading)
+    return Finding(
+        computed, judged(wrong == 0, ClaimVerdict.ERRATUM if erratum else ClaimVerdict.NOT_REPRODUCED), reading
+    )
 
 
 def tire_sign(printed_sign: int = -1) -> Finding:
@@ -37,7 +39,9 @@ def tire_sign(printed_sign: int = -1) -> Finding:
         "sign gives two stable ones."
     )
     erratum = corrected.stable and not printed.stable
-    return Finding(computed, judged(printed.stable, Verdict.ERRATUM if erratum else Verdict.NOT_REPRODUCED), reading)
+    return Finding(
+        computed, judged(printed.stable, ClaimVerdict.ERRATUM if erratum else ClaimVerdict.NOT_REPRODUCED), reading
+    )
 
 
 CLAIMS = {"P4-y4": lateral_output, "P4-dugoff": tire_sign}

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from analysis.dropout import drop_radius
 from analysis.joint_spectral_radius import joint_spectral_radius
 from analysis.second_moment import spectral_radius
-from studies.claim import ClaimFunction, Finding, Verdict, judged
+from studies.claim import ClaimFunction, ClaimVerdict, Finding, judged
 from studies.papers.plain import by_speed, floats
 from studies.papers.resilient_velocity.drops import harmless_from, radius, updates
 from studies.papers.resilient_velocity.setting import HIGHEST_SPEED, PRINTED, Setting
@@ -84,7 +84,7 @@ def any_pattern(setting: Setting = PRINTED) -> Finding:
         "marginal_from_rad_per_s": start,
         "radius_with_every_sample_lost": floats([always.min(), always.max()]),
     }
-    verdict = judged(all(marginal), Verdict.PARTLY if any(marginal) else Verdict.NOT_REPRODUCED)
+    verdict = judged(all(marginal), ClaimVerdict.PARTLY if any(marginal) else ClaimVerdict.NOT_REPRODUCED)
     worst = max(found, key=lambda j: j.lower)
     undecided = len(found) - sum(marginal) - sum(grows)
     below = (

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from analysis.second_moment import spectral_radius
-from studies.claim import ClaimFunction, Finding, Verdict
+from studies.claim import ClaimFunction, ClaimVerdict, Finding
 from studies.papers.plain import by_speed
 from studies.papers.resilient_velocity.setting import HIGHEST_SPEED, PRINTED, Gain, Setting
 from synthesis.models.catalogue.corner import corner_velocity_model
@@ -75,9 +75,9 @@ def zero_order_hold_reading(setting: Setting = PRINTED) -> Finding:
         SHOWN, radii(*earlier, setting.sample_time, innovation_held, SHOWN)
     )
     if all(stable.values()):
-        verdict = Verdict.REPRODUCED
+        verdict = ClaimVerdict.REPRODUCED
     else:
-        verdict = Verdict.UNDER_SPECIFIED if any(stable.values()) else Verdict.NOT_REPRODUCED
+        verdict = ClaimVerdict.UNDER_SPECIFIED if any(stable.values()) else ClaimVerdict.NOT_REPRODUCED
     good = [name.replace("_", " ") for name, ok in stable.items() if ok]
     bad = [name.replace("_", " ") for name, ok in stable.items() if not ok]
     return Finding(

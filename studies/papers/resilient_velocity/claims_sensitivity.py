@@ -8,7 +8,7 @@ from analysis.observability import observability_matrix
 from analysis.observability_modes import frozen_modes, hautus_test
 from analysis.rank_loss import rank_loss
 from analysis.sensitivity import OneAtATime
-from studies.claim import ClaimFunction, Finding, Verdict, judged
+from studies.claim import ClaimFunction, ClaimVerdict, Finding, judged
 from studies.papers.resilient_velocity.deviations import (
     CHANGE,
     CONSTANTS,
@@ -53,7 +53,7 @@ def small_deviations(setting: Setting = PRINTED) -> Finding:
                 worst[f"{direction} {name}, {constant}"] = float(value)
     large = {name: value for name, value in worst.items() if value > CHANGE}
     rest = max(value for name, value in worst.items() if not name.endswith("sigma1"))
-    verdict = judged(stable and not large, Verdict.PARTLY if stable else Verdict.NOT_REPRODUCED)
+    verdict = judged(stable and not large, ClaimVerdict.PARTLY if stable else ClaimVerdict.NOT_REPRODUCED)
     return Finding(
         computed,
         verdict,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from studies.claim import Finding, Verdict
+from studies.claim import ClaimVerdict, Finding
 from studies.papers.smo_ekf_sideslip.axle_drive import LINEAR, axle_drive, published_car
 from studies.papers.smo_ekf_sideslip.observer_chain import run_chain
 from studies.papers.smo_ekf_sideslip.published_tables import STIFFNESS_SETTINGS
@@ -22,7 +22,11 @@ def fixed_stiffness(settings: tuple[float, ...] = STIFFNESS_SETTINGS) -> Finding
         "steady_state_ratio": [1.0 / factor for factor in settings],
     }
     verdict = (
-        Verdict.REPRODUCED if low > 0 and high > 0 else Verdict.ERRATUM if low > 0 > high else Verdict.NOT_REPRODUCED
+        ClaimVerdict.REPRODUCED
+        if low > 0 and high > 0
+        else ClaimVerdict.ERRATUM
+        if low > 0 > high
+        else ClaimVerdict.NOT_REPRODUCED
     )
     reading = (
         "The measured force fixes C beta: sideslip comes out as 1/factor. Reduced stiffness overestimates it "

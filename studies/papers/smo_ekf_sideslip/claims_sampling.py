@@ -14,7 +14,7 @@ from analysis.bounds_sliding_mode import (
     sampled_radius,
     smallest_zone_widths,
 )
-from studies.claim import Finding, Verdict
+from studies.claim import ClaimVerdict, Finding
 from studies.papers.smo_ekf_sideslip.error_motion import CAR, LARGEST, error_motion
 from synthesis.polynomials.matrix import FloatArray
 
@@ -57,7 +57,13 @@ def sampled_switching(readings: Sequence[Sequence[float]] = (WIDE, NARROW)) -> F
         "least_widths": [limits[name] for name in OUTPUTS],
     }
     stable = [zone["spectral_radius"] < 1.0 for zone in zones]
-    verdict = Verdict.REPRODUCED if all(stable) else Verdict.UNDER_SPECIFIED if any(stable) else Verdict.NOT_REPRODUCED
+    verdict = (
+        ClaimVerdict.REPRODUCED
+        if all(stable)
+        else ClaimVerdict.UNDER_SPECIFIED
+        if any(stable)
+        else ClaimVerdict.NOT_REPRODUCED
+    )
     reading = (
         f"The bare sign chatters at 100 Hz by up to {bare[:, 0].max():.3f} rad/s and by force peaks that depend on "
         f"the start (front up to {bare[:, 1].max():.0f} N, longitudinal {bare[:, 3].min():.0f} to "

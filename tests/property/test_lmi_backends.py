@@ -1,4 +1,4 @@
-"""Two roads to one answer: our conic data and cvxpy, floating-point verdicts and exact rational proofs."""
+"""Two back ends, one answer: our conic data and cvxpy, floating-point verdicts and exact rational proofs."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_certified_means_certified(seed: int, shift: float, kind: Relaxation) ->
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("kind", ["grid", "vertex", "exact"])
 def test_cvxpy_comes_to_the_same_answer(seed: int, kind: Relaxation) -> None:
-    """The same optimum, and a gain 1 % above it is proved on both roads."""
+    """The same optimum, and a gain 1 % above it is proved with both back ends."""
     A, B, C = random_plant(seed, 1.5)
     answers, proofs = [], []
     for solver in ("CLARABEL", "cvxpy:CLARABEL"):

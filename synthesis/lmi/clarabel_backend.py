@@ -1,4 +1,4 @@
-"""First road: conic data straight into Clarabel."""
+"""The first back end: conic data straight into Clarabel."""
 
 from __future__ import annotations
 
