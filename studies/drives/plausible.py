@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimators.arrays import FloatArray
-from studies.drives.drive_file import DriveFile
-from studies.drives.drive_tables import Column
+from studies.drives.drive_file import Column, DriveFile
 from studies.drives.quantities import CORNERS, SIGNALS, factor_to
 from studies.errors import LogError
 

@@ -10,15 +10,14 @@ from typing import Any
 import numpy as np
 
 from studies.drives.chain import Chain, pipeline_of, run_chain
-from studies.drives.corner_observers import corner_observer
 from studies.drives.drive_file import read_drive
-from studies.drives.judge import DriveData, judge
+from studies.drives.evaluation import DriveData, evaluate
 from studies.drives.log import read_log
 from studies.drives.output import check_folder, ready_folder, whole_file, write_csv, write_json
 from studies.drives.prepare import corner_inputs_of
 from studies.drives.quantities import CORNERS
 from studies.drives.replay import replay
-from studies.drives.schedules import check_radii, load_schedule
+from studies.drives.schedules import check_radii, corner_observer, load_schedule
 
 Progress = Callable[[float], None]
 
@@ -42,7 +41,7 @@ def run_drive(logs: Sequence[Path], drive: Path, out: Path, *, progress: Progres
     told = progress if progress is not None else _silent
     check_folder(out)
     data = replay_drive(logs, drive, progress=lambda done: told(0.4 * done))
-    metrics = judge(data)
+    metrics = evaluate(data)
     ready_folder(out)
     paths = [out / "estimates.csv", out / "metrics.json"]
     write_csv(paths[0], estimate_columns(data))

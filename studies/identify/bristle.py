@@ -28,9 +28,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from estimators.arrays import FloatArray
+from studies.identify.estimate import Unknown
 from studies.identify.prefilter import Prefilter, first_order_lag
 from studies.identify.settings import IdentifySettings
-from studies.identify.unknowns import Unknown
 from synthesis.models.parameter_set import Tire
 
 MOST_USED = 0.9

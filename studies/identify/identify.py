@@ -12,12 +12,12 @@ import numpy as np
 from studies.drives.drive_file import DriveFile, read_drive
 from studies.drives.log import DriveLog, read_log
 from studies.identify.data import DriveSignals, drive_signals
+from studies.identify.estimate import Estimate
 from studies.identify.inertia import fit_inertia
 from studies.identify.lateral import LateralSlip
 from studies.identify.longitudinal import LongitudinalSlip, wheel_force
 from studies.identify.settings import IdentifySettings
 from studies.identify.slip_limit import LimitedFit, fit_low_slip
-from studies.identify.unknowns import Estimate
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
 
 Progress = Callable[[float], None]

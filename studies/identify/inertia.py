@@ -20,9 +20,8 @@ import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
 from studies.identify.data import DriveSignals
-from studies.identify.estimate import Rules, estimate
+from studies.identify.estimate import Estimate, Rules, Unknown, estimate
 from studies.identify.settings import IdentifySettings
-from studies.identify.unknowns import Estimate, Unknown
 
 STRAIGHT = 0.01
 """rad of steering below which lateral forces hardly brake the car."""

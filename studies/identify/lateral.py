@@ -23,9 +23,9 @@ import numpy as np
 from estimators.arrays import BoolArray, FloatArray
 from studies.identify.bristle import slip_velocity, tire_unknowns
 from studies.identify.data import DriveSignals
+from studies.identify.estimate import Unknown
 from studies.identify.prefilter import Prefilter
 from studies.identify.settings import IdentifySettings
-from studies.identify.unknowns import Unknown
 from synthesis.models.parameter_set import Tire
 
 ANGLES = ("angle_front", "angle_rear")

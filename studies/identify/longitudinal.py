@@ -15,9 +15,9 @@ from estimators.arrays import BoolArray, FloatArray
 from studies.drives.corner_inputs import GRAVITY, shared_forces, wheel_forces
 from studies.identify.bristle import slip_velocity, tire_unknowns
 from studies.identify.data import DriveSignals
+from studies.identify.estimate import Unknown
 from studies.identify.prefilter import pitched
 from studies.identify.settings import IdentifySettings
-from studies.identify.unknowns import Unknown
 from synthesis.models.parameter_set import Tire
 
 RADII = ("radius_front", "radius_rear")

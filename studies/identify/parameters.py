@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from studies.identify.estimate import Estimate
 from studies.identify.identify import Identification, yaw_inertia_prior
 from studies.identify.slip_limit import LimitedFit
-from studies.identify.unknowns import Estimate
 
 
 @dataclass(frozen=True)

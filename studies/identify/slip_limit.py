@@ -14,9 +14,8 @@ from typing import Protocol
 import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
-from studies.identify.estimate import Rules, estimate
+from studies.identify.estimate import Estimate, Rules, Unknown, estimate
 from studies.identify.settings import IdentifySettings
-from studies.identify.unknowns import Estimate, Unknown
 
 NOTHING = 10.0
 """Half width of ln C beyond which the widest range shows no trace of slip: the narrower ones have less."""

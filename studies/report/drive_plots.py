@@ -14,8 +14,14 @@ from matplotlib.figure import Figure
 
 from estimators.arrays import FloatArray
 from studies.drives.chain import Chain
-from studies.drives.comparison import AXLES, quasi_static_axle_forces, reference_axle_force, reference_sideslip
-from studies.drives.judge import LEAST_SPEED, DriveData
+from studies.drives.evaluation import (
+    AXLES,
+    LEAST_SPEED,
+    DriveData,
+    quasi_static_axle_forces,
+    reference_axle_force,
+    reference_sideslip,
+)
 from studies.drives.quantities import CORNERS
 from studies.report import colours
 

@@ -8,11 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimators.arrays import FloatArray
-from studies.truth.profile import GRID
+from studies.truth.profile import GRID, PATH_GRID
 from studies.truth.road import Roads, Zone
-
-PATH_GRID = 0.25
-"""m, spacing of curvature tables."""
 
 
 @dataclass(frozen=True)

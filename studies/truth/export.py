@@ -9,7 +9,7 @@ from estimators.arrays import FloatArray
 from estimators.vehicle import CORNERS, VehicleParameters
 from studies.drives.output import ready_folder, whole_file, write_csv
 from studies.drives.quantities import REFERENCES, SIGNALS
-from studies.truth.measure import Measured
+from studies.truth.sensors import Measured
 from synthesis.errors import SpecError
 
 _NAMES = ("wheel_speed", "torque", "ax", "ay", "az", "yaw_rate", "roll_rate", "pitch_rate")

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
@@ -17,12 +17,13 @@ from studies.drives.quantities import Duration, to_si
 from studies.truth.course import Course
 from studies.truth.drivetrain import Assist
 from studies.truth.fleet import TIRES
-from studies.truth.path import PathPiece, curvature
-from studies.truth.profile import GRID, Piece, check_units, sampled
-from studies.truth.road_table import Road
+from studies.truth.profile import GRID, PathPiece, Piece, check_units, curvature, sampled
+from studies.truth.record import Truth
+from studies.truth.road import Road
+from studies.truth.simulate import EVERYTHING, RECORD_TIME, STEP, simulate, simulate_in_processes
 from studies.truth.vehicle import TruthVehicle, load_vehicle
 from synthesis.errors import SpecError
-from synthesis.toml_file import StrictTable
+from synthesis.toml_file import StrictTable, find_toml, load_toml, shipped_files
 
 
 def _pieces(unit: str) -> AfterValidator:
@@ -167,3 +168,42 @@ class Manoeuvre(StrictTable):
             speed=target,
             curvature=curvature(self.path) if self.path else None,
         )
+
+
+def shipped_manoeuvres(paper: str = "") -> dict[str, Path]:
+    """The manoeuvre files that come with the package, by name; those of one paper (``"P1"``) if asked."""
+    found = shipped_files("studies", "manoeuvres")
+    return {name: path for name, path in found.items() if name.startswith(paper.lower())}
+
+
+def load_manoeuvre(name: str | Path) -> Manoeuvre:
+    """A shipped manoeuvre by name, or one of your own by its path (ends with .toml).
+
+    Raises SpecError, one line: file, key, what is wrong, what would be right.
+    """
+    return load_toml(find_toml(name, shipped_manoeuvres(), "manoeuvre"), Manoeuvre, "manoeuvre")
+
+
+def simulate_manoeuvres(
+    manoeuvres: Sequence[Manoeuvre],
+    vehicles: Sequence[TruthVehicle] | None = None,
+    *,
+    step: float = STEP,
+    record_time: float = RECORD_TIME,
+    record: Sequence[str] = EVERYTHING,
+    progress: Callable[[float], None] | None = None,
+    workers: int = 1,
+) -> Truth:
+    """Simulate every manoeuvre of the batch, with its own vehicle or `vehicles[b]`, in ``workers`` processes; see `simulate`.
+
+    ``progress`` is called by the only process; with several it is not called.
+    """
+    courses = {id(m): m.course() for m in manoeuvres}
+    if vehicles is None:
+        own = {id(m): m.truth_vehicle() for m in manoeuvres}
+        vehicles = [own[id(m)] for m in manoeuvres]
+    batch = [courses[id(m)] for m in manoeuvres]
+    options: dict[str, Any] = {"step": step, "record_time": record_time, "record": record}
+    if workers > 1:
+        return simulate_in_processes(batch, vehicles, workers, **options)
+    return simulate(batch, vehicles, progress=progress, **options)

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import sys
+import threading
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -119,3 +125,30 @@ def _run(
         if progress is not None and k % 50 == 0:
             progress(k / samples)
     return out
+
+
+def simulate_in_processes(
+    courses: Sequence[Course], vehicles: Sequence[TruthVehicle], workers: int, **options: Any
+) -> Truth:
+    """`simulate` in ``workers`` processes, each with its share of the batch; the numbers are the same."""
+    parts = min(workers, len(courses))
+    if parts < 2:
+        return simulate(courses, vehicles, **options)
+    rows = [range(k * len(courses) // parts, (k + 1) * len(courses) // parts) for k in range(parts)]
+    longest = max(c.duration for c in courses)
+    work = [([courses[k] for k in r], [vehicles[k] for k in r], {**options, "until": longest}) for r in rows]
+    forks = sys.platform == "linux" and threading.active_count() == 1
+    with ProcessPoolExecutor(parts, mp_context=multiprocessing.get_context("fork" if forks else "spawn")) as pool:
+        done = list(pool.map(_work, work))
+    merged = {name: np.concatenate([part.signals[name] for part in done]) for name in done[0].signals}
+    names = tuple(name for part in done for name in part.names)
+    tires = tuple(tire for part in done for tire in part.tires)
+    duration = np.concatenate([part.duration for part in done])
+    return replace(
+        done[0], signals=merged, names=names, duration=duration, vehicles=tuple(vehicles), tires=tires, keys=()
+    )
+
+
+def _work(item: tuple[list[Course], list[TruthVehicle], dict[str, Any]]) -> Truth:
+    courses, vehicles, options = item
+    return simulate(courses, vehicles, **options)

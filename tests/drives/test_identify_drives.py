@@ -11,11 +11,10 @@ import pytest
 from studies.drives.drive_file import DriveFile, read_drive
 from studies.drives.log import DriveLog, read_log
 from studies.identify.data import drive_signals
-from studies.identify.evaluate import tire_residual
 from studies.identify.identify import Identification, identify_drive, identify_log
 from studies.identify.inertia import fit_inertia
 from studies.identify.parameters import Identified, tire_parameters, vehicle_parameters
-from studies.identify.result import identified_tire
+from studies.identify.result import identified_tire, tire_residual
 from studies.identify.settings import IdentifySettings
 from synthesis.models.parameter_set import load_parameter_set
 

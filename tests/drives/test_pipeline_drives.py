@@ -16,7 +16,7 @@ from estimators.pipeline import Check, EstimationPipeline, VehicleSignals
 from estimators.vehicle import CORNERS
 from studies.drives.csv_log import read_columns
 from studies.drives.drive_file import read_drive
-from studies.drives.judge import judge
+from studies.drives.evaluation import evaluate
 from studies.drives.log import DriveLog, read_log
 from studies.drives.run import replay_drive
 from tests.drives.test_fusion_drives import (
@@ -142,7 +142,7 @@ def test_sensors_within_their_errors_raise_no_balance_check(found: Found) -> Non
 def test_recorded_drive_through_its_own_drive_file() -> None:
     """No torques there: forces are shares of m a_x, so their sum is judged against m times the slope of the GNSS speed."""
     data = replay_drive([DATA], HERE / "bmw_m8_launch_brake.toml")
-    metrics = judge(data)
+    metrics = evaluate(data)
     assert metrics["velocity"]["pipeline"]["rms"] < 0.3
     # Not so the integrated acceleration: 0.028 m/s RMS beside 0.135. It is no fair baseline on this log, see the next two tests.
     for other in ("mean_wheel_speed", "corner_observers"):
@@ -190,7 +190,7 @@ def test_with_the_bias_of_a_sensor_it_beats_all_three_on_the_recorded_drive(
         return replace(log, signals={**log.signals, "ax": log.signals["ax"] + bias})
 
     monkeypatch.setattr("studies.drives.run.read_log", biased)
-    velocity = judge(replay_drive([DATA], HERE / "bmw_m8_launch_brake.toml"))["velocity"]
+    velocity = evaluate(replay_drive([DATA], HERE / "bmw_m8_launch_brake.toml"))["velocity"]
     assert velocity["pipeline"]["rms"] < 0.3
     for other in ("mean_wheel_speed", "corner_observers", "integrated_acceleration", *(f"corner_{c}" for c in CORNERS)):
         assert velocity["pipeline"]["rms"] < velocity[other]["rms"]
@@ -198,7 +198,7 @@ def test_with_the_bias_of_a_sensor_it_beats_all_three_on_the_recorded_drive(
 
 @pytest.mark.parametrize("name", SIMULATED.values())
 def test_every_signal_of_a_run_has_its_baselines(name: str) -> None:
-    signals = judge(replay_drive([DATA], HERE / f"{name}.toml"))["pipeline"]["signals"]
+    signals = evaluate(replay_drive([DATA], HERE / f"{name}.toml"))["pipeline"]["signals"]
     for corner in CORNERS:
         assert set(signals[f"force_x_{corner}"]) == {"pipeline", "corner_input", "quasi_static"}
         assert set(signals[f"force_z_{corner}"]) == {"pipeline", "quasi_static"}

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from studies.drives.metrics import deviation
+from studies.drives.evaluation import deviation
 
 
 def test_by_hand() -> None:

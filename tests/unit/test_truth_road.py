@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from studies.truth.course import PATH_GRID, Courses
+from studies.truth.course import Courses
 from studies.truth.driver import Driver
 from studies.truth.fleet import Fleet, tires_of
 from studies.truth.layout import B, rolling
-from studies.truth.path import PathPiece, curvature
 from studies.truth.plant import Plant, Turned
-from studies.truth.profile import GRID, Piece, sampled, to_si
+from studies.truth.profile import GRID, PATH_GRID, PathPiece, Piece, curvature, sampled, to_si
 from studies.truth.road import Roads, Zone
 from tests.unit.truth_cases import course, ramp, run, suv
 

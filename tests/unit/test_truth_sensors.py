@@ -7,7 +7,7 @@ import pytest
 
 from estimators.pipeline import EstimationPipeline
 from studies.truth import PERFECT, Channel, Drops, Sensors, Ticks, Truth, draw, simulate
-from studies.truth.measure import SOURCES
+from studies.truth.sensors import SOURCES
 from synthesis.errors import SpecError
 from tests.unit.truth_cases import course, ramp, suv
 

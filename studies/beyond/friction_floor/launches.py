@@ -15,8 +15,8 @@ from studies.experiments.play import Reading, baselines, measured, play, run_of
 from studies.experiments.sensors import TEST_CAR
 from studies.experiments.velocities import corner_observers
 from studies.study import Scope
-from studies.truth import Truth, drive, load_manoeuvre
-from studies.truth.road_table import Road
+from studies.truth import Truth, load_manoeuvre, simulate_manoeuvres
+from studies.truth.road import Road
 from synthesis.models.parameter_set import load_parameter_set
 
 Array = npt.NDArray[np.float64]
@@ -56,7 +56,7 @@ def launched(quick: bool = False) -> Truth:
             "name": name_of(friction), "road": Road(friction=friction), "torque": pieces, "duration": pace * base.duration,
         }  # fmt: skip
         runs.append(base.model_copy(update=changes))
-    return drive(runs)
+    return simulate_manoeuvres(runs)
 
 
 @dataclass(frozen=True)
