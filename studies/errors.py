@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from estimators.errors import GainsmithError
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from estimators.errors import EstimatorError, GainsmithError
+from synthesis.errors import SpecError
 
 
 class LogError(GainsmithError):
@@ -15,3 +19,12 @@ class IdentifyError(GainsmithError):
 
 class SimulationError(GainsmithError):
     """A simulated run that left the range of numbers: the message names run and time."""
+
+
+@contextmanager
+def refused_at(place: str) -> Iterator[None]:
+    """What an estimator refuses inside becomes a SpecError that starts with the ``place`` in the user's file."""
+    try:
+        yield
+    except EstimatorError as error:
+        raise SpecError(f"{place}: {error}") from error

@@ -78,9 +78,7 @@ class ScheduleSpec(StrictTable):
         if self.model.id not in CATALOGUE:
             raise SpecError(f"spec '{self.name}': {unknown('model', self.model.id, CATALOGUE)}")
         return CATALOGUE[self.model.id](
-            parameters,
-            wheel_speed_maximum=self.model.wheel_speed_maximum,
-            wheel_speed_rate=self.model.wheel_speed_rate,
+            parameters, wheel_speed_maximum=self.model.wheel_speed_maximum, wheel_speed_rate=self.model.wheel_speed_rate
         )
 
     def observer_design(self) -> ObserverDesign:

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-
-from studies.commands.progress import progress_bar
+from studies.commands.terminal import print_table, progress_bar
 from studies.drives.run import RunResult, run_drive
 
 HEADER = ("quantity", "NRMS (%)", "RMS", "maximum", "reference peak", "unit", "samples")
@@ -67,12 +63,7 @@ def run_log(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int:
     if as_json:
         print(json.dumps(result.metrics, indent=1))
         return 0
-    table = Table(title=f"{result.metrics.get('drive', drive.stem)}: against the reference")
-    for i, heading in enumerate(HEADER):
-        table.add_column(heading, justify="left" if i == 0 else "right")
-    for row in summary_rows(result):
-        table.add_row(*row)
-    Console(width=None if sys.stdout.isatty() else 120).print(table)
+    print_table(f"{result.metrics.get('drive', drive.stem)}: against the reference", HEADER, summary_rows(result))
     for line in remarks(result):
         print(line)
     print(f"written to {out}")

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from studies.claim import ClaimVerdict
-from studies.commands.progress import progress_bar
+from studies.commands.terminal import progress_bar
 from studies.registry import SHIPPED, Registry
 from studies.report.scoreboard import MARKS
 from studies.running.pool import available_cores

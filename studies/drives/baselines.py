@@ -10,15 +10,10 @@ from estimators.arrays import FloatArray
 
 
 def mean_over(values: FloatArray) -> FloatArray:
-    """Mean of (n, k) over k, of what is not missing; NaN where all of a row is."""
+    """Mean of (n, k) over k, of what is not missing; NaN where all of a row is. Of R_e w: wrong by the mean slip velocity."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Mean of empty slice", category=RuntimeWarning)
         return np.asarray(np.nanmean(values, axis=1))
-
-
-def mean_wheel_speed(surface_speed: FloatArray) -> FloatArray:
-    """Mean of R_e w over the wheels (n,), m/s: wrong by the mean slip velocity."""
-    return mean_over(surface_speed)
 
 
 def integrated_acceleration(

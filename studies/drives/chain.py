@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from estimators import EstimatorError, GainSchedule
+from estimators import GainSchedule
 from estimators.arrays import FloatArray, IntArray
 from estimators.forces import (
     AttitudeObserver,
@@ -36,8 +36,10 @@ from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.prepare import CornerInputs
 from studies.drives.quantities import CORNERS
-from synthesis.errors import SpecError
+from studies.errors import refused_at
 
+Progress = Callable[[float], None]
+"""Called with the fraction done."""
 PROGRESS_STEPS = 50
 WHEEL_INERTIA = 1.0
 """kg m^2 where the drive has none: without torques it has nothing to act on."""
@@ -66,21 +68,6 @@ class Chain:
     assumptions: tuple[str, ...]
 
 
-def pipeline_of(
-    drive: DriveFile, longitudinal: GainSchedule | CornerKind, lateral: GainSchedule | None = None
-) -> tuple[EstimationPipeline, tuple[str, ...]]:
-    """The pipeline that the drive file asks for, for one car, and what had to be assumed.
-
-    ``longitudinal``: the corner observers along the wheels, for this pipeline alone; they run where ``lateral`` is given.
-
-    Raises SpecError, one line, on vehicle data that no car has.
-    """
-    try:
-        return _pipeline_of(drive, longitudinal, lateral)
-    except EstimatorError as error:
-        raise SpecError(f"estimators: {error}") from error
-
-
 def vehicle_of(drive: DriveFile) -> tuple[VehicleParameters, tuple[str, ...]]:
     """The car of the drive file for the estimators, and what had to be assumed of it."""
     car, assumptions = drive.vehicle, []
@@ -101,9 +88,16 @@ def vehicle_of(drive: DriveFile) -> tuple[VehicleParameters, tuple[str, ...]]:
     return vehicle, tuple(assumptions)
 
 
-def _pipeline_of(
-    drive: DriveFile, longitudinal: GainSchedule | CornerKind, lateral: GainSchedule | None
+@refused_at("estimators")
+def pipeline_of(
+    drive: DriveFile, longitudinal: GainSchedule | CornerKind, lateral: GainSchedule | None = None
 ) -> tuple[EstimationPipeline, tuple[str, ...]]:
+    """The pipeline that the drive file asks for, for one car, and what had to be assumed.
+
+    ``longitudinal``: the corner observers along the wheels, for this pipeline alone; they run where ``lateral`` is given.
+
+    Raises SpecError, one line, on vehicle data that no car has.
+    """
     vehicle, assumptions = vehicle_of(drive)
     time, chosen = drive.sample_time, drive.estimators
     forces: dict[str, Callable[..., Any]] = {
@@ -153,7 +147,7 @@ def run_chain(
     inputs: CornerInputs,
     pipeline: EstimationPipeline,
     assumptions: tuple[str, ...] = (),
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = lambda _done: None,
 ) -> Chain:
     """Every sample through the pipeline; signals that the log lacks are not flagged, missing samples are."""
     n, signals = log.time.size, log.signals
@@ -169,6 +163,8 @@ def run_chain(
         )
         part = np.nan if step.sideslip_step is None else step.sideslip_step.sideslip
         corner = np.nan if step.corners is None else step.corners.vy
+        forces = step.force_x, step.axle_force_y, step.force_z
+        wheels = step.slip, step.slip_angle
         rows.append(
             (
                 step.vx,
@@ -176,16 +172,13 @@ def run_chain(
                 step.sideslip,
                 part,
                 corner,
-                step.force_x,
-                step.axle_force_y,
-                step.force_z,
-                step.slip,
-                step.slip_angle,
+                *forces,
+                *wheels,
                 int(step.flags),
                 int(step.consistency.failed),
             )
         )
-        if progress is not None and k % max(1, n // PROGRESS_STEPS) == 0:
+        if k % max(1, n // PROGRESS_STEPS) == 0:
             progress(k / n)
     columns: list[Any] = [np.array(column) for column in zip(*rows, strict=True)]
     return Chain(*[*columns, assumptions])

@@ -7,11 +7,11 @@ the observers run with. Every quantity carries its unit; nothing is guessed from
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from estimators.errors import unknown
 from studies.drives.quantities import (
@@ -108,47 +108,45 @@ class Observer(StrictTable):
     stopped_below: AngularSpeed = 1.0
 
 
-def _one_of(*names: str) -> Callable[[str], str]:
-    def check(name: str) -> str:
-        if name not in names:
-            raise ValueError(unknown("estimator", name, names))
-        return name
-
-    return check
+CHOICES = {
+    "longitudinal_force": ("unknown-input", "pid", "unscented", "linear"),
+    "vertical_load": ("dynamic", "quasi-static"),
+    "lateral_force": ("linear", "unscented"),
+    "attitude": ("none", "gyro"),
+    "velocity": ("fusion", "corners", "kinematic"),
+    "corner_velocity": ("lpv", "gain-switched", "kalman-three-state", "kalman-two-state"),
+    "axle_weights": ("equal", "slip"),
+    "sideslip": (
+        "none", "four-wheel-extended", "four-wheel-unscented", "adaptive-stiffness", "fixed-stiffness", "sliding-mode"
+    ),
+}  # fmt: skip
+"""Names of the estimators."""
 
 
 class Estimators(StrictTable):
-    """Which estimators make up the pipeline, and which run at the corners beside it; the first of each is the default.
+    """Which estimators make up the pipeline, and which run at the corners beside it.
 
     ``corner_velocity`` is what the result calls corner observers; the same kind cross-checks the pipeline where a lateral
     schedule is given. With ``velocity = "corners"`` they are its only source of velocities, as in the papers; with
     ``"kinematic"`` they correct the kinematic model with bias states, P2 (15). ``axle_weights``: P1 weighs by slip.
     """
 
-    longitudinal_force: Annotated[str, AfterValidator(_one_of("unknown-input", "pid", "unscented", "linear"))] = (
-        "unknown-input"
-    )
-    vertical_load: Annotated[str, AfterValidator(_one_of("dynamic", "quasi-static"))] = "dynamic"
-    lateral_force: Annotated[str, AfterValidator(_one_of("linear", "unscented"))] = "linear"
-    attitude: Annotated[str, AfterValidator(_one_of("none", "gyro"))] = "none"
-    velocity: Annotated[str, AfterValidator(_one_of("fusion", "corners", "kinematic"))] = "fusion"
-    corner_velocity: Annotated[
-        str, AfterValidator(_one_of("lpv", "gain-switched", "kalman-three-state", "kalman-two-state"))
-    ] = "lpv"
-    axle_weights: Annotated[str, AfterValidator(_one_of("equal", "slip"))] = "equal"
-    sideslip: Annotated[
-        str,
-        AfterValidator(
-            _one_of(
-                "none",
-                "four-wheel-extended",
-                "four-wheel-unscented",
-                "adaptive-stiffness",
-                "fixed-stiffness",
-                "sliding-mode",
-            )
-        ),
-    ] = "none"
+    longitudinal_force: str = "unknown-input"
+    vertical_load: str = "dynamic"
+    lateral_force: str = "linear"
+    attitude: str = "none"
+    velocity: str = "fusion"
+    corner_velocity: str = "lpv"
+    axle_weights: str = "equal"
+    sideslip: str = "none"
+
+    @field_validator("*")
+    @classmethod
+    def _is_known(cls, name: str, field: ValidationInfo) -> str:
+        known = CHOICES[field.field_name or ""]
+        if name not in known:
+            raise ValueError(unknown("estimator", name, known))
+        return name
 
 
 class Schedules(StrictTable):
@@ -255,15 +253,14 @@ def check_estimators(chosen: Estimators, signals: Mapping[str, Column], vehicle:
             'add it, such as lateral = "corner-estimation-lateral"'
         )
     wanted = {name: str(getattr(chosen, name)) for name in chosen.model_fields_set}
-    parameters, needed = _PARAMETERS, _SIGNALS
     for place, estimator in wanted.items():
-        for parameter, example in parameters.get((place, estimator), ()):
+        for parameter, example in _PARAMETERS.get((place, estimator), ()):
             if getattr(vehicle, parameter) is None:
                 raise ValueError(
                     f"vehicle.{parameter}: missing, but estimators.{place} = '{estimator}' needs it; "
                     f'add it, such as "{example}"'
                 )
-        for signal in needed.get((place, estimator), ()):
+        for signal in _SIGNALS.get((place, estimator), ()):
             if signal not in signals:
                 raise ValueError(
                     f"signals.{signal}: missing, but estimators.{place} = '{estimator}' needs it; {_add_signal(signal)}"

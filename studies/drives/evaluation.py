@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from enum import IntFlag
 from functools import cached_property
@@ -12,7 +13,7 @@ import numpy as np
 from estimators import Flag, GainSchedule
 from estimators.arrays import FloatArray, IntArray
 from estimators.pipeline import Check
-from studies.drives.baselines import held, integrated_acceleration, mean_wheel_speed
+from studies.drives.baselines import held, integrated_acceleration, mean_over
 from studies.drives.chain import Chain
 from studies.drives.corner_inputs import shared_forces, vertical_loads
 from studies.drives.drive_file import DriveFile
@@ -37,10 +38,6 @@ class Deviation:
     rms: float | None
     max_error: float | None
     reference_peak: float | None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain data, for a JSON file."""
-        return asdict(self)
 
 
 def deviation(estimate: FloatArray, reference: FloatArray, unit: str) -> Deviation:
@@ -72,7 +69,7 @@ AXLES: tuple[Axle, ...] = ("front", "rear")
 LEAST_FORCE = 1000.0
 """N that a reference force must exceed for a sample to count: the papers report forces that do something."""
 LEAST_SPEED = 2.0
-"""m/s that the reference must exceed for a sideslip angle to count."""
+"""m/s below which no slip ratio and no sideslip angle is formed: the velocity error is then a large part of it."""
 RULES = {
     "nrms": "RMS error over the largest magnitude of the reference, %",
     "forces": f"samples where the reference force exceeds {LEAST_FORCE:g} N; the peak is that of all samples",
@@ -89,19 +86,19 @@ def lateral_motion(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: Dri
     wheels = np.nan_to_num(held(inputs.surface_speed.mean(axis=1)))
     integrated = integrated_acceleration(ay, -inputs.yaw_rate, wheels, drive.sample_time, 0.0)
     estimates = {"pipeline": chain.vy, "corner_observers": chain.corner_vy, "integrated_acceleration": integrated}
-    found["vy"] = {
-        name: deviation(value, reference["vy"], "m/s").as_dict()
-        for name, value in estimates.items()
-        if np.isfinite(value).any()
-    }
+    found["vy"] = _deviations(estimates, reference["vy"], "m/s")
     if "vx" in reference:
-        true = reference_sideslip(log)
         angles = {"pipeline": chain.sideslip, drive.estimators.sideslip: chain.sideslip_part}
         angles["integrated_acceleration"] = np.arctan(integrated / np.maximum(np.abs(wheels), LEAST_SPEED))
-        found["sideslip"] = {
-            name: deviation(value, true, "rad").as_dict() for name, value in angles.items() if np.isfinite(value).any()
-        }
+        found["sideslip"] = _deviations(angles, reference_sideslip(log), "rad")
     return found
+
+
+def _deviations(estimates: Mapping[str, FloatArray], reference: FloatArray, unit: str) -> dict[str, dict[str, Any]]:
+    """Of the estimates that the drive has."""
+    return {
+        name: asdict(deviation(value, reference, unit)) for name, value in estimates.items() if np.isfinite(value).any()
+    }
 
 
 def reference_sideslip(log: DriveLog) -> FloatArray:
@@ -170,17 +167,14 @@ def forces(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: DriveFile) 
 
 def _above_least_force(estimates: dict[str, FloatArray], reference: FloatArray) -> dict[str, Any]:
     counts = np.abs(reference) > LEAST_FORCE
+    peak = float(np.nanmax(np.abs(reference), initial=0.0))
     found = {}
     for name, value in estimates.items():
         entry = deviation(np.where(counts, value, np.nan), reference, "N")
-        peak = float(np.nanmax(np.abs(reference), initial=0.0))
-        whole = entry.as_dict() | {"reference_peak": peak}
-        found[name] = whole | {"nrms_percent": None if entry.rms is None else 100.0 * entry.rms / peak}
+        nrms = None if entry.rms is None else 100.0 * entry.rms / peak
+        found[name] = asdict(replace(entry, reference_peak=peak, nrms_percent=nrms))
     return found
 
-
-LEAST_SPEED = 2.0
-"""m/s below which a slip ratio is not formed: the velocity error is then a large part of it."""
 
 STRAIGHT = 0.01
 """rad below which steered wheels hardly add lateral force to m a_x: the sum of F_x then misses only the drag of air."""
@@ -201,7 +195,7 @@ class DriveData:
     @cached_property
     def baselines(self) -> dict[str, FloatArray]:
         """V_x (n,) without an observer, m/s, by name."""
-        wheels = mean_wheel_speed(self.inputs.surface_speed)
+        wheels = mean_over(self.inputs.surface_speed)
         start = float(wheels[np.flatnonzero(np.isfinite(wheels))[:1]].sum())
         integrated = integrated_acceleration(
             self.inputs.ax, self.inputs.yaw_rate, self.inputs.vy, self.drive.sample_time, start
@@ -286,7 +280,7 @@ def _velocity(data: DriveData) -> dict[str, Any]:
     estimates = {"pipeline": data.chain.vx} if data.chain is not None else {}
     estimates |= {"corner_observers": data.replay.velocity, **data.baselines}
     estimates |= {f"corner_{corner}": data.replay.corner_velocity[:, k] for k, corner in enumerate(CORNERS)}
-    return {name: deviation(value, reference, "m/s").as_dict() for name, value in estimates.items()}
+    return {name: asdict(deviation(value, reference, "m/s")) for name, value in estimates.items()}
 
 
 def _force(data: DriveData) -> dict[str, Any]:
@@ -295,11 +289,11 @@ def _force(data: DriveData) -> dict[str, Any]:
         for k, corner in enumerate(CORNERS):
             name = f"force_{direction}_{corner}"
             if name in reference:
-                found[name] = deviation(values[:, k], reference[name], "N").as_dict()
+                found[name] = asdict(deviation(values[:, k], reference[name], "N"))
     if "ax" in reference and "m*a_x shared by load" not in data.inputs.force_sources:
         straight = np.abs(data.inputs.steer).max(axis=1) < STRAIGHT
         total = np.where(straight, data.inputs.force.sum(axis=1), np.nan)
-        found["total_force_x_straight"] = deviation(total, data.drive.vehicle.mass * reference["ax"], "N").as_dict()
+        found["total_force_x_straight"] = asdict(deviation(total, data.drive.vehicle.mass * reference["ax"], "N"))
     return found
 
 

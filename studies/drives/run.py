@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from studies.drives.chain import Chain, pipeline_of, run_chain
+from studies.drives.chain import Chain, Progress, pipeline_of, run_chain
 from studies.drives.drive_file import read_drive
 from studies.drives.evaluation import DriveData, evaluate
 from studies.drives.log import read_log
@@ -18,8 +18,6 @@ from studies.drives.prepare import corner_inputs_of
 from studies.drives.quantities import CORNERS
 from studies.drives.replay import replay
 from studies.drives.schedules import check_radii, corner_observer, load_schedule
-
-Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)
@@ -31,29 +29,29 @@ class RunResult:
     paths: tuple[Path, ...]
 
 
-def run_drive(logs: Sequence[Path], drive: Path, out: Path, *, progress: Progress | None = None) -> RunResult:
+def run_drive(logs: Sequence[Path], drive: Path, out: Path, *, progress: Progress = lambda _done: None) -> RunResult:
     """Run the pipeline and the four-corner longitudinal observers over the ``logs`` that the ``drive`` file describes.
 
     Writes estimates.csv, metrics.json and the plots (svg and png) to ``out``, each whole or not at all. ``progress``
     is called with the fraction done. Raises SpecError (drive file, schedule) or LogError (logs, ``out``), one line
     each, before anything is written.
     """
-    told = progress if progress is not None else _silent
     check_folder(out)
-    data = replay_drive(logs, drive, progress=lambda done: told(0.4 * done))
+    data = replay_drive(logs, drive, progress=lambda done: progress(0.4 * done))
     metrics = evaluate(data)
     ready_folder(out)
     paths = [out / "estimates.csv", out / "metrics.json"]
     write_csv(paths[0], estimate_columns(data))
     write_json(paths[1], metrics)
-    paths += _draw(data, out, told)
-    told(1.0)
+    from studies.report.drive_plots import figures  # matplotlib costs a second that bad input must not
+
+    paths += write_pictures(figures(data), out, lambda done: progress(0.4 + 0.6 * done))
+    progress(1.0)
     return RunResult(metrics=metrics, log_report=data.log.report, paths=tuple(paths))
 
 
-def replay_drive(logs: Sequence[Path], drive: Path, *, progress: Progress | None = None) -> DriveData:
+def replay_drive(logs: Sequence[Path], drive: Path, *, progress: Progress = lambda _done: None) -> DriveData:
     """As :func:`run_drive`, but the arrays are returned and nothing is written."""
-    told = progress if progress is not None else _silent
     description = read_drive(drive)
     names, time = description.schedules, description.sample_time
     schedule = load_schedule(names.longitudinal, drive.parent, time)
@@ -62,15 +60,11 @@ def replay_drive(logs: Sequence[Path], drive: Path, *, progress: Progress | None
     observer = corner_observer(description, drive.parent, schedule)
     pipeline, assumptions = pipeline_of(description, corner_observer(description, drive.parent, schedule), lateral)
     log = read_log(logs, description)
-    told(0.2)
+    progress(0.2)
     inputs = corner_inputs_of(log, description)
-    replayed = replay(inputs, observer, lambda done: told(0.2 + 0.1 * done))
-    chain = run_chain(log, inputs, pipeline, assumptions, lambda done: told(0.3 + 0.7 * done))
+    replayed = replay(inputs, observer, lambda done: progress(0.2 + 0.1 * done))
+    chain = run_chain(log, inputs, pipeline, assumptions, lambda done: progress(0.3 + 0.7 * done))
     return DriveData(description, schedule, log, inputs, replayed, chain, assumed)
-
-
-def _silent(_done: float) -> None:
-    pass
 
 
 def estimate_columns(data: DriveData) -> dict[str, np.ndarray[Any, Any]]:
@@ -120,16 +114,13 @@ def chain_columns(chain: Chain) -> dict[str, np.ndarray[Any, Any]]:
     return columns
 
 
-def _draw(data: DriveData, out: Path, told: Progress) -> list[Path]:
-    from studies.report.drive_plots import figures  # matplotlib costs a second that bad input must not
-
+def write_pictures(drawn: Mapping[str, Callable[[Path], None]], out: Path, progress: Progress) -> list[Path]:
+    """Each picture as SVG and PNG, whole or not at all; ``drawn`` saves them by name."""
     paths = []
-    drawn = figures(data)
     for k, (name, save) in enumerate(drawn.items()):
         for suffix in (".svg", ".png"):
-            path = out / f"{name}{suffix}"
-            with whole_file(path) as beside:
+            paths.append(out / f"{name}{suffix}")
+            with whole_file(paths[-1]) as beside:
                 save(beside)
-            paths.append(path)
-        told(0.4 + 0.6 * (k + 1) / len(drawn))
+        progress((k + 1) / len(drawn))
     return paths

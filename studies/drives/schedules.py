@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal
 
-from estimators import EstimatorError, GainSchedule
+from estimators import GainSchedule
 from estimators.pipeline import KalmanCorners, ScheduledCorners, SwitchedCorners
 from estimators.pipeline.corner_kinds import CornerKind
 from estimators.schedule import SHIPPED, read_content
 from estimators.velocity import BristleTire
 from studies.drives.drive_file import DriveFile
+from studies.errors import refused_at
 from synthesis.errors import SpecError
 
 MODEL = "corner-velocity-{}"
@@ -30,10 +31,8 @@ def load_schedule(name: str, folder: Path, sample_time: float, direction: Direct
     Raises SpecError, before anything runs: unreadable or edited, another model or direction, another sample time.
     """
     content, file = _content(name, folder, direction)
-    try:
+    with refused_at(f"schedules.{direction}"):
         schedule = GainSchedule.from_content(content, file)
-    except EstimatorError as error:
-        raise SpecError(f"schedules.{direction}: {error}") from error
     model = content["model"]["id"]
     wanted = MODEL.format(direction)
     if model != wanted:
@@ -59,10 +58,8 @@ def load_tire(name: str, folder: Path) -> BristleTire:
             f"schedules.longitudinal: the model of '{name}' has no constant {', '.join(missing)}, which the Kalman "
             "filters of estimators.corner_velocity need; name a schedule of the bristle model"
         )
-    try:
+    with refused_at(f"schedules.longitudinal: '{name}'"):
         return BristleTire(**{own: float(constants[key]["value"]) for own, key in _TIRE.items()})
-    except EstimatorError as error:
-        raise SpecError(f"schedules.longitudinal: '{name}': {error}") from error
 
 
 def check_radii(drive: DriveFile, folder: Path) -> tuple[str, ...]:
@@ -131,20 +128,17 @@ def _radius(name: str, folder: Path, direction: Direction) -> float | None:
 
 def _content(name: str, folder: Path, direction: Direction) -> tuple[dict[str, Any], str]:
     """The content of the file, and its name."""
-    try:
-        if name.endswith(".json"):
-            path = folder / name
-            if not path.is_file():
-                raise SpecError(
-                    f"schedules.{direction}: no file '{name}' beside the drive file; give its path from there, or the "
-                    f"name of a shipped schedule: {', '.join(sorted(file.stem for file in SHIPPED.glob('*.json')))}"
-                )
-        else:
+    with refused_at(f"schedules.{direction}"):
+        if not name.endswith(".json"):
             GainSchedule.shipped(name)  # refuses an unknown name with a list of those there are
-            path = SHIPPED / f"{name}.json"
+            return read_content(SHIPPED / f"{name}.json"), f"{name}.json"
+        path = folder / name
+        if not path.is_file():
+            raise SpecError(
+                f"schedules.{direction}: no file '{name}' beside the drive file; give its path from there, or the "
+                f"name of a shipped schedule: {', '.join(sorted(file.stem for file in SHIPPED.glob('*.json')))}"
+            )
         return read_content(path), path.name
-    except EstimatorError as error:
-        raise SpecError(f"schedules.{direction}: {error}") from error
 
 
 def corner_observer(drive: DriveFile, folder: Path, schedule: GainSchedule) -> CornerKind:
@@ -156,12 +150,10 @@ def corner_observer(drive: DriveFile, folder: Path, schedule: GainSchedule) -> C
     Raises SpecError, one line, when the schedule cannot serve it.
     """
     kind = drive.estimators.corner_velocity
-    try:
+    with refused_at(f"estimators.corner_velocity = '{kind}'"):
         if kind == "gain-switched":
             return SwitchedCorners(schedule)
         if kind == "lpv":
             return ScheduledCorners(schedule)
         tire = load_tire(drive.schedules.longitudinal, folder)
         return KalmanCorners(tire, schedule.sample_time, states=3 if kind == "kalman-three-state" else 2)
-    except EstimatorError as error:
-        raise SpecError(f"estimators.corner_velocity = '{kind}': {error}") from error

@@ -46,42 +46,21 @@ def tire_unknowns(tire: Tire, settings: IdentifySettings) -> tuple[Unknown, ...]
     relaxation = 1.0 / tire.kappa.value
     near = (float(np.log(0.01 / relaxation)), float(np.log(1.5 / relaxation)))
     damping = tire.sigma1.value / tire.sigma0.value
+    s = settings
+    considered = s.curvature / s.saturation_spread
     return (
+        Unknown("slip_stiffness", stiffness, s.stiffness_spread, s.stiffness_width, far, informed=False, starts=(-1.2,)),
+        Unknown("relaxation_length", relaxation, s.relaxation_spread, s.relaxation_width, near, informed=False),
         Unknown(
-            "slip_stiffness",
-            stiffness,
-            settings.stiffness_spread,
-            settings.stiffness_width,
-            far,
-            informed=False,
-            starts=(-1.2,),
+            "damping_time", damping, damping, s.damping_width, (0.0, MOST_DAMPING),
+            positive=False, informed=False, relative=True,
         ),
         Unknown(
-            "relaxation_length", relaxation, settings.relaxation_spread, settings.relaxation_width, near, informed=False
+            "saturation", 0.0, s.saturation_spread, s.saturation_width, (-0.1, 5.0),
+            considered=considered, apart=s.saturation_apart, positive=False, informed=False,
         ),
-        Unknown(
-            "damping_time",
-            damping,
-            damping,
-            settings.damping_width,
-            (0.0, MOST_DAMPING),
-            positive=False,
-            informed=False,
-            relative=True,
-        ),
-        Unknown(
-            "saturation",
-            0.0,
-            settings.saturation_spread,
-            settings.saturation_width,
-            (-0.1, 5.0),
-            positive=False,
-            informed=False,
-            considered=settings.curvature / settings.saturation_spread,
-            apart=settings.saturation_apart,
-        ),
-        Unknown("bend", settings.bend, settings.bend_spread, settings.bend_spread, (-2.0, 5.0), positive=False),
-    )
+        Unknown("bend", s.bend, s.bend_spread, s.bend_spread, (-2.0, 5.0), positive=False),
+    )  # fmt: skip
 
 
 def slip_velocity(

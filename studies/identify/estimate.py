@@ -1,4 +1,4 @@
-"""Nonlinear least squares with intervals that can be believed, and parameters held where a log says nothing of them.
+"""Nonlinear least squares with honest confidence intervals, and parameters held where a log says nothing of them.
 
 All unknowns are fitted together, informed ones with their prior as one more measurement, weighed by the residual size and
 its correlation time. The uninformed unknown whose interval is widest against its prior's is then held at the prior and the
@@ -202,7 +202,7 @@ def estimate(
     singular: tuple[float, ...] = ()
     while True:
         x = _fit(problem, active, np.where(active, x, problem.home), many=not singular and start is None)
-        found = _judge(problem, active, x)
+        found = _covariance(problem, active, x)
         singular = singular or found.singular_values
         half = found.half
         silence = {
@@ -254,7 +254,7 @@ def _fit(problem: _Problem, active: BoolArray, x: FloatArray, many: bool) -> Flo
     return x
 
 
-def _judge(problem: _Problem, active: BoolArray, x: FloatArray) -> Estimate:
+def _covariance(problem: _Problem, active: BoolArray, x: FloatArray) -> Estimate:
     """Covariance of :mod:`.autocorrelation`, with the prior as one more measurement, and the consider part."""
     spread, mask = problem.spread, problem.mask
     e = problem.rows(x)
@@ -304,19 +304,10 @@ def _judge(problem: _Problem, active: BoolArray, x: FloatArray) -> Estimate:
     out[mask] = e
     names = [u.name for u in problem.unknowns]
     return Estimate(
-        unknowns=problem.unknowns,
-        x=x,
-        covariance=covariance,
-        excited={},
-        half={name: float(h) for name, h in zip(names, half, strict=True)},
-        residual=out,
-        samples=e.size,
-        rms=float(np.sqrt(np.mean(e**2))),
-        correlation=time,
-        freedom=freedom,
-        factors={name: float(f) for name, f in zip(names, factors, strict=True)},
-        singular_values=tuple(float(v) for v in singular),
-    )
+        problem.unknowns, x, covariance, {}, dict(zip(names, map(float, half), strict=True)), out, samples=e.size,
+        rms=float(np.sqrt(np.mean(e**2))), correlation=time, freedom=freedom,
+        factors=dict(zip(names, map(float, factors), strict=True)), singular_values=tuple(map(float, singular)),
+    )  # fmt: skip
 
 
 def _half_width(estimated: FloatArray, sure: FloatArray, freedom: FloatArray | float, confidence: float) -> FloatArray:
@@ -331,21 +322,12 @@ def _nothing(problem: _Problem) -> Estimate:
     factor = float(student.ppf(0.5 + problem.rules.confidence / 2, 1e6))
     names = [u.name for u in problem.unknowns]
     half = {u.name: factor * u.spread for u in problem.unknowns}
-    empty = np.full(problem.mask.shape, np.nan)
-    covariance = np.diag(problem.spread**2)
-    off = dict.fromkeys(names, False)
-    none = (0.0,) * len(names)
-    return Estimate(
-        problem.unknowns,
-        problem.home,
-        covariance,
-        off,
-        half,
-        empty,
-        0,
-        0.0,
-        1.0,
-        0.0,
-        dict.fromkeys(names, factor),
-        none,
+    empty, covariance, off = (
+        np.full(problem.mask.shape, np.nan),
+        np.diag(problem.spread**2),
+        dict.fromkeys(names, False),
     )
+    factors, none = dict.fromkeys(names, factor), (0.0,) * len(names)
+    return Estimate(
+        problem.unknowns, problem.home, covariance, off, half, empty, 0, 0.0, 1.0, 0.0, factors, none
+    )  # in the order of the fields

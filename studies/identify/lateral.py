@@ -56,8 +56,7 @@ class LateralSlip:
         steer = inputs.steer[:, :2].mean(axis=1)
         sine, cosine = np.sin(steer), np.cos(steer)
         axle_x = np.stack([force_x[:, :2].sum(axis=1), force_x[:, 2:].sum(axis=1)], axis=1)
-        told = 0.0 if data.torque is None else 1.0
-        dragged = told * np.sum(force_x * np.cos(inputs.steer) * inputs.y, axis=1)
+        dragged = float(data.torque is not None) * np.sum(force_x * np.cos(inputs.steer) * inputs.y, axis=1)
         outward = np.sum(data.load[:, :2] * inputs.y[:2], axis=1) / np.sum(data.load[:, :2], axis=1)
         across, pulled = car.mass * data.ay, axle_x[:, 0] * sine
         lever = base * cosine + outward * sine

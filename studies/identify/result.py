@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -87,7 +87,7 @@ def content(found: Identification) -> dict[str, Any]:
         "assumptions": list(found.data.inputs.assumptions),
         "confidence": found.settings.confidence,
         "parameters": {
-            group: {name: entry.as_dict() for name, entry in entries.items()}
+            group: {name: asdict(entry) for name, entry in entries.items()}
             for group, entries in all_parameters(found).items()
         },
         "fits": {direction: _fit(limited) for direction, limited in found.fits.items()},

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from studies.drives.output import ready_folder, whole_file, write_json
+from studies.drives.run import write_pictures
 from studies.identify.identify import Identification
 from studies.identify.parameters import Identified, tire_parameters, vehicle_parameters
 from studies.identify.result import content
@@ -90,10 +91,4 @@ def write_identification(found: Identification, out: Path) -> tuple[Path, ...]:
         beside.write_text(parameter_file(found), encoding="utf-8")
         load_parameter_set(beside)
     write_json(paths[1], content(found))
-    for name, save in figures(found).items():
-        for suffix in (".svg", ".png"):
-            path = out / f"{name}{suffix}"
-            with whole_file(path) as beside:
-                save(beside)
-            paths.append(path)
-    return tuple(paths)
+    return (*paths, *write_pictures(figures(found), out, lambda _done: None))

@@ -89,8 +89,8 @@ class Driver:
         wanted = np.clip(wanted, -LARGEST_STEER, LARGEST_STEER)
         self.steer = self.steer + (1.0 - np.exp(-h / STEER_LAG)) * (wanted - self.steer)
         sine, cosine = np.sin(self.heading), np.cos(self.heading)
-        pace = (vx * cosine - vy * sine) / np.maximum(1.0 - bend * self.error, 0.2)
-        self.way = self.way + h * pace
+        path_speed = (vx * cosine - vy * sine) / np.maximum(1.0 - bend * self.error, 0.2)
+        self.way = self.way + h * path_speed
         self.error = self.error + h * (vx * sine + vy * cosine)
-        self.heading = self.heading + h * (r - bend * pace)
+        self.heading = self.heading + h * (r - bend * path_speed)
         return self.steer

@@ -5,58 +5,35 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from studies.drives import quantities
-from studies.drives.quantities import Duration, to_si
+from studies.drives.quantities import Duration
 from studies.truth.course import Course
 from studies.truth.drivetrain import Assist
 from studies.truth.fleet import TIRES
-from studies.truth.profile import GRID, PathPiece, Piece, check_units, curvature, sampled
+from studies.truth.profile import (
+    GRID,
+    Angles,
+    PathPiece,
+    Piece,
+    Shares,
+    Speeds,
+    Torques,
+    curvature,
+    sampled,
+)
 from studies.truth.record import Truth
 from studies.truth.road import Road
 from studies.truth.simulate import EVERYTHING, RECORD_TIME, STEP, simulate, simulate_in_processes
 from studies.truth.vehicle import TruthVehicle, load_vehicle
 from synthesis.errors import SpecError
 from synthesis.toml_file import StrictTable, find_toml, load_toml, shipped_files
-
-
-def _pieces(unit: str) -> AfterValidator:
-    def check(pieces: list[Piece]) -> list[Piece]:
-        check_units(pieces, unit)
-        return pieces
-
-    return AfterValidator(check)
-
-
-def _speed(text: str) -> str:
-    to_si(text, "m/s")
-    return text
-
-
-Angle = Annotated[list[Piece], _pieces("rad")]
-Torque = Annotated[list[Piece], _pieces("N*m")]
-Speed = Annotated[list[Piece], _pieces("m/s")]
-Share = Annotated[list[Piece], _pieces("share")]
-
-
-def _above_zero(unit: str) -> BeforeValidator:
-    def read(text: object) -> float:
-        value = quantities.to_si(text, unit)
-        if not value > 0:
-            raise ValueError(f"'{text}' is out of range; it must be above 0 {unit}")
-        return value
-
-    return BeforeValidator(read)
-
-
-Moment = Annotated[float, _above_zero("N*m")]
-Power = Annotated[float, _above_zero("W")]
 
 
 class Car(StrictTable):
@@ -68,9 +45,9 @@ class Car(StrictTable):
     steering_ratio: float | None = Field(default=None, gt=0.0)
     traction_control: Literal["off", "poor"] = "off"
     anti_lock: Literal["off", "poor"] = "off"
-    maximum_torque: Moment | None = None  # of all driven wheels; what full throttle gives at low speed
-    maximum_power: Power | None = None
-    maximum_brake_torque: Moment | None = None  # of all wheels
+    maximum_torque: quantities.Torque | None = None  # of all driven wheels; what full throttle gives at low speed
+    maximum_power: quantities.Power | None = None
+    maximum_brake_torque: quantities.Torque | None = None  # of all wheels
 
 
 class Manoeuvre(StrictTable):
@@ -90,16 +67,16 @@ class Manoeuvre(StrictTable):
     given: list[str] = Field(default_factory=list)  # what the source says
     chosen: list[str] = Field(default_factory=list)  # what it does not say, and what is taken instead
     duration: Duration
-    speed: Annotated[str, AfterValidator(_speed)] = "0 m/s"
+    speed: quantities.Velocity = 0.0
     vehicle: Car
     road: Road = Road()
-    steer: Angle = Field(default_factory=list)
-    hand_wheel: Angle = Field(default_factory=list)
-    torque: Torque = Field(default_factory=list)
-    throttle: Share = Field(default_factory=list)
-    brake_torque: Torque = Field(default_factory=list)
-    brake: Share = Field(default_factory=list)
-    target_speed: Speed = Field(default_factory=list)
+    steer: Angles = Field(default_factory=list)
+    hand_wheel: Angles = Field(default_factory=list)
+    torque: Torques = Field(default_factory=list)
+    throttle: Shares = Field(default_factory=list)
+    brake_torque: Torques = Field(default_factory=list)
+    brake: Shares = Field(default_factory=list)
+    target_speed: Speeds = Field(default_factory=list)
     free_after: Duration | None = None
     path: list[PathPiece] = Field(default_factory=list)
 
@@ -142,19 +119,18 @@ class Manoeuvre(StrictTable):
         def table(pieces: Sequence[Piece], unit: str, start: float = 0.0) -> FloatArray:
             return sampled(pieces, unit, self.duration, start)
 
-        start = to_si(self.speed, "m/s")
         steer = table(self.steer, "rad")
         if self.hand_wheel and self.vehicle.steering_ratio:
             steer = table(self.hand_wheel, "rad") / self.vehicle.steering_ratio
         target = None
         if self.target_speed:
-            target = table(self.target_speed, "m/s", start)
+            target = table(self.target_speed, "m/s", self.speed)
             if self.free_after is not None:
                 target[int(np.ceil(self.free_after / GRID)) :] = np.nan
         return Course(
             name=self.name,
             duration=self.duration,
-            initial_speed=start,
+            initial_speed=self.speed,
             tire=self.vehicle.tire,
             steer=steer,
             drive_torque=table(self.torque, "N*m"),

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
-from typing import Literal
+from collections.abc import Sequence, Set
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from estimators.arrays import FloatArray
 from studies.drives import quantities
@@ -32,6 +32,13 @@ _NEEDS: dict[str, tuple[set[str], set[str]]] = {
 """Keys that each kind must have, and those that it may have."""
 
 
+def _check_keys(kind: str, given: Set[str], needs: Set[str], may: Set[str]) -> None:
+    for name in sorted(needs - given):
+        raise ValueError(f"{kind} needs {name}; add it")
+    for name in sorted(given - needs - may):
+        raise ValueError(f"{kind} takes no {name}; it takes {', '.join(sorted(needs | may))}")
+
+
 class Piece(StrictTable):
     """One piece; values are quantities with a unit.
 
@@ -52,12 +59,7 @@ class Piece(StrictTable):
 
     @model_validator(mode="after")
     def _keys_fit_kind(self) -> Piece:
-        needs, may = _NEEDS[self.kind]
-        given = {name for name in self.model_fields_set if name != "kind"}
-        for name in sorted(needs - given):
-            raise ValueError(f"{self.kind} needs {name}; add it")
-        for name in sorted(given - needs - may):
-            raise ValueError(f"{self.kind} takes no {name}; it takes {', '.join(sorted(needs | may))}")
+        _check_keys(self.kind, self.model_fields_set - {"kind"}, *_NEEDS[self.kind])
         if self.kind == "table":
             times, values = np.array(self.times), np.array(self.values)
             if times.size < 2 or times.size != values.size or times[0] != 0.0 or (np.diff(times) <= 0).any():
@@ -108,21 +110,27 @@ def to_si(text: object, unit: str) -> float:
     return value
 
 
-def check_units(pieces: Sequence[Piece], unit: str) -> None:
-    """Raises ValueError naming the piece and the key that is no quantity in a unit of ``unit``."""
-    for k, piece in enumerate(pieces):
-        for name in ("to", "amplitude"):
-            if getattr(piece, name) is not None:
-                _named(f"piece[{k}].{name}", lambda p=piece, n=name: to_si(getattr(p, n), unit))  # type: ignore[misc]
-        if piece.unit is not None:
-            _named(f"piece[{k}].unit", lambda p=piece: to_si(f"1 {p.unit}".strip(), unit))  # type: ignore[misc]
+def _pieces(unit: str) -> AfterValidator:
+    """Refuses pieces with a value that is no quantity in a unit of ``unit``, by number and key."""
+
+    def check(pieces: list[Piece]) -> list[Piece]:
+        for k, piece in enumerate(pieces):
+            given = {"to": piece.to, "amplitude": piece.amplitude}
+            given["unit"] = None if piece.unit is None else f"1 {piece.unit}".strip()
+            for name, text in given.items():
+                try:
+                    _ = None if text is None else to_si(text, unit)
+                except ValueError as error:
+                    raise ValueError(f"piece[{k}].{name}: {error}") from None
+        return pieces
+
+    return AfterValidator(check)
 
 
-def _named(place: str, read: Callable[[], float]) -> None:
-    try:
-        read()
-    except ValueError as error:
-        raise ValueError(f"{place}: {error}") from None
+Angles = Annotated[list[Piece], _pieces("rad")]
+Torques = Annotated[list[Piece], _pieces("N*m")]
+Speeds = Annotated[list[Piece], _pieces("m/s")]
+Shares = Annotated[list[Piece], _pieces("share")]
 
 
 def sampled(pieces: Sequence[Piece], unit: str, duration: float, start: float = 0.0, grid: float = GRID) -> FloatArray:
@@ -140,11 +148,11 @@ def sampled(pieces: Sequence[Piece], unit: str, duration: float, start: float = 
 
 BLEND = 5.0
 """m over which the curvature changes between pieces: roads are no compasses, and drivers cannot jump."""
-_PATH_NEEDS: dict[str, tuple[set[str], set[str]]] = {
-    "straight": ({"length"}, set()),
-    "arc": ({"radius", "angle_deg"}, set()),
-    "lane-change": ({"length", "offset"}, set()),
-    "slalom": ({"length", "wavelength", "offset"}, set()),
+_PATH_NEEDS = {
+    "straight": {"length"},
+    "arc": {"radius", "angle_deg"},
+    "lane-change": {"length", "offset"},
+    "slalom": {"length", "wavelength", "offset"},
 }
 
 
@@ -165,12 +173,7 @@ class PathPiece(StrictTable):
 
     @model_validator(mode="after")
     def _keys_fit_kind(self) -> PathPiece:
-        needs, may = _PATH_NEEDS[self.kind]
-        given = self.model_fields_set - {"kind", "repeat", "side"}
-        for name in sorted(needs - given):
-            raise ValueError(f"{self.kind} needs {name}; add it")
-        for name in sorted(given - needs - may):
-            raise ValueError(f"{self.kind} takes no {name}; it takes {', '.join(sorted(needs))}")
+        _check_keys(self.kind, self.model_fields_set - {"kind", "repeat", "side"}, _PATH_NEEDS[self.kind], set())
         return self
 
     def curvature(self) -> FloatArray:

@@ -13,8 +13,8 @@ from pydantic import AfterValidator, Field, model_validator
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from estimators.vehicle import CORNERS
-from studies.drives.quantities import Offset, to_si
-from studies.truth.profile import Piece, check_units
+from studies.drives.quantities import Offset, Place
+from studies.truth.profile import Angles
 from synthesis.errors import SpecError
 from synthesis.toml_file import StrictTable
 
@@ -92,20 +92,10 @@ _GROUPS = {
 }  # fmt: skip
 
 
-def _angles(pieces: list[Piece]) -> list[Piece]:
-    check_units(pieces, "rad")
-    return pieces
-
-
 def _known(corners: str) -> str:
     if corners not in _GROUPS:
         raise ValueError(unknown("corners", corners, _GROUPS))
     return corners
-
-
-def _place(text: str) -> str:
-    to_si(text, "m")
-    return text
 
 
 def _friction(friction: float | None, surface: str | None) -> float:
@@ -120,8 +110,8 @@ class ZoneTable(StrictTable):
     corners: Annotated[str, AfterValidator(_known)] = "all"
     friction: float | None = Field(default=None, gt=0.0, le=2.0)
     surface: Literal["dry", "wet", "snow", "ice"] | None = None
-    from_place: Annotated[str, AfterValidator(_place)] | None = None
-    to_place: Annotated[str, AfterValidator(_place)] | None = None
+    from_place: Place | None = None
+    to_place: Place | None = None
     from_time: Offset | None = None
     to_time: Offset | None = None
     blend: float = Field(default=0.15, gt=0.0)  # m, or s for times
@@ -133,8 +123,8 @@ class ZoneTable(StrictTable):
 
     def zone(self) -> Zone:
         """For the road."""
-        given = {name: to_si(text, "m") for name in ("from_place", "to_place") if (text := getattr(self, name))}
-        given |= {name: value for name in ("from_time", "to_time") if (value := getattr(self, name)) is not None}
+        ends = ("from_place", "to_place", "from_time", "to_time")
+        given = {name: value for name in ends if (value := getattr(self, name)) is not None}
         chosen = _GROUPS[self.corners]
         a, b, c, d = (corner in chosen for corner in CORNERS)
         return Zone(_friction(self.friction, self.surface), (a, b, c, d), blend=self.blend, **given)
@@ -146,8 +136,8 @@ class Road(StrictTable):
     friction: float | None = Field(default=None, gt=0.0, le=2.0)
     surface: Literal["dry", "wet", "snow", "ice"] | None = None
     zone: list[ZoneTable] = Field(default_factory=list)
-    grade: Annotated[list[Piece], AfterValidator(_angles)] = Field(default_factory=list)
-    bank: Annotated[list[Piece], AfterValidator(_angles)] = Field(default_factory=list)
+    grade: Angles = Field(default_factory=list)
+    bank: Angles = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _one_friction(self) -> Road:
@@ -158,11 +148,8 @@ class Road(StrictTable):
     @property
     def coefficient(self) -> float:
         """Friction where no zone is; dry if nothing is said."""
-        return (
-            SURFACES["dry"]
-            if self.friction is None and self.surface is None
-            else _friction(self.friction, self.surface)
-        )
+        given = self.friction is not None or self.surface is not None
+        return _friction(self.friction, self.surface) if given else SURFACES["dry"]
 
     def zones(self) -> tuple[Zone, ...]:
         """For the road."""

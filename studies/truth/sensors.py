@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from zlib import crc32
 
 import numpy as np
@@ -113,9 +113,8 @@ class Channel:
         if self.dropped == "missing":
             return np.where(lost, np.nan, value)
         row = np.arange(samples).reshape(-1, *[1] * len(shape))
-        last = np.maximum.accumulate(
-            np.where(lost, 0, row), axis=0
-        )  # a run that starts with a loss holds its first value
+        # a run that starts with a loss holds its first value
+        last = np.maximum.accumulate(np.where(lost, 0, row), axis=0)
         return np.take_along_axis(value, np.broadcast_to(last, value.shape), axis=0)
 
 
@@ -132,23 +131,15 @@ class Ticks:
             raise SpecError(f"ticks.teeth = {self.teeth}: at least 1")
 
 
-def _imu() -> Channel:
-    return Channel(noise=0.05, bias=0.05, scale=0.002)
-
-
-def _gyro() -> Channel:
-    return Channel(noise=0.002, bias=0.002, scale=0.002)
-
-
 @dataclass(frozen=True)
 class Sensors:
     """The sensors of a car; the defaults are those of a good production car at 200 Hz."""
 
-    wheel_speed: Channel = field(default_factory=lambda: Channel(noise=0.05))  # rad/s
-    acceleration: Channel = field(default_factory=_imu)  # m/s^2: ax, ay, az
-    rate: Channel = field(default_factory=_gyro)  # rad/s: yaw, roll, pitch
-    steer: Channel = field(default_factory=lambda: Channel(noise=0.0005, bias=0.001))  # rad at the road wheels
-    torque: Channel = field(default_factory=lambda: Channel(noise=5.0, scale=0.02))  # N m at each wheel
+    wheel_speed: Channel = Channel(noise=0.05)  # rad/s
+    acceleration: Channel = Channel(noise=0.05, bias=0.05, scale=0.002)  # m/s^2: ax, ay, az
+    rate: Channel = Channel(noise=0.002, bias=0.002, scale=0.002)  # rad/s: yaw, roll, pitch
+    steer: Channel = Channel(noise=0.0005, bias=0.001)  # rad at the road wheels
+    torque: Channel = Channel(noise=5.0, scale=0.02)  # N m at each wheel
     ticks: Ticks | None = None  # wheel speed from an encoder instead of a noisy speed
 
 
@@ -189,18 +180,7 @@ class Measured:
 
     def at(self, k: int) -> VehicleSignals:
         """Sample k of all seeds and runs. Grade and bank of the road are not measured: they stay 0."""
-        s = self.signals
-        return VehicleSignals(
-            wheel_speed=s["wheel_speed"][:, :, k],
-            ax=s["ax"][:, :, k],
-            ay=s["ay"][:, :, k],
-            yaw_rate=s["yaw_rate"][:, :, k],
-            steer=s["steer"][:, :, k],
-            torque=s["torque"][:, :, k],
-            az=s["az"][:, :, k],
-            roll_rate=s["roll_rate"][:, :, k],
-            pitch_rate=s["pitch_rate"][:, :, k],
-        )
+        return VehicleSignals(**{name: value[:, :, k] for name, value in self.signals.items()})
 
     def __iter__(self) -> Iterator[VehicleSignals]:
         return (self.at(k) for k in range(self.time.size))

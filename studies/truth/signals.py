@@ -53,33 +53,16 @@ def signals_of(fleet: Fleet, step: Step, controls: Controls) -> dict[str, FloatA
     moving = step.slide
     out = {name: s[B[name]] for name in ("x", "y", "yaw", "distance", "vx", "vy", "yaw_rate", "roll", "pitch")}
     out |= {
-        "yaw_acceleration": step.rates[B["yaw_rate"]],
-        "sideslip": np.arctan2(vy, np.maximum(np.absolute(vx), 1e-3)),
-        "road_ax": along,
-        "road_ay": across,
-        "ax": ax,
-        "ay": ay,
-        "az": az,
-        "roll_rate": spin_x,
-        "pitch_rate": spin_y,
-        "yaw_gyro": spin_z,
-        "grade": controls.grade,
-        "bank": controls.bank,
-        "drag": drag,
-        "steer": controls.steer,
-        "torque": step.torque,
-        "rolling_torque": step.rolling,
-        "force_x": f.tire[0],
-        "force_y": f.tire[1],
-        "force_z": f.load,
-        "slip": slip_ratio(moving.surface, moving.velocity[0]),
-        "slip_angle": side_slip_angle(*moving.velocity),
-        "slip_velocity_x": moving.slip[0],
-        "slip_velocity_y": moving.slip[1],
-        "wheel_vx": moving.velocity[0],
-        "wheel_vy": moving.velocity[1],
-        "friction": controls.friction,
-    }
+        "yaw_acceleration": step.rates[B["yaw_rate"]], "sideslip": np.arctan2(vy, np.maximum(np.absolute(vx), 1e-3)),
+        "road_ax": along, "road_ay": across, "ax": ax, "ay": ay, "az": az,
+        "roll_rate": spin_x, "pitch_rate": spin_y, "yaw_gyro": spin_z,
+        "grade": controls.grade, "bank": controls.bank, "drag": drag, "friction": controls.friction,
+        "steer": controls.steer, "torque": step.torque, "rolling_torque": step.rolling,
+        "force_x": f.tire[0], "force_y": f.tire[1], "force_z": f.load,
+        "slip": slip_ratio(moving.surface, moving.velocity[0]), "slip_angle": side_slip_angle(*moving.velocity),
+        "slip_velocity_x": moving.slip[0], "slip_velocity_y": moving.slip[1],
+        "wheel_vx": moving.velocity[0], "wheel_vy": moving.velocity[1],
+    }  # fmt: skip
     wheels = ("wheel_speed", "wheel_angle", "deflection_x", "deflection_y", "compliance_x_rate", "compliance_y_rate")
     return out | {name: s[W[name]] for name in wheels}
 

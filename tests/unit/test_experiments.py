@@ -71,7 +71,9 @@ def test_prepared_drives_are_those_that_are_driven_alone(tmp_path: Path, monkeyp
 
 def test_a_full_drive_is_not_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[float] = []
-    monkeypatch.setattr("studies.experiments.driven.simulate_manoeuvres", lambda runs: asked.extend(m.duration for m in runs))
+    monkeypatch.setattr(
+        "studies.experiments.driven.simulate_manoeuvres", lambda runs: asked.extend(m.duration for m in runs)
+    )
     driven(NAMES, LUGRE, Scope(), 0.5)
     driven(NAMES, LUGRE, SHORT, 0.5)
     assert asked == [load_manoeuvre(name).duration for name in NAMES] + [0.5, 0.5]
