@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from estimators.arrays import AnyArray
 from studies.drives.chain import Chain, Progress, pipeline_of, run_chain
 from studies.drives.drive_file import read_drive
 from studies.drives.evaluation import DriveData, evaluate
@@ -18,6 +19,8 @@ from studies.drives.prepare import corner_inputs_of
 from studies.drives.quantities import CORNERS
 from studies.drives.replay import replay
 from studies.drives.schedules import check_radii, corner_observer, load_schedule
+
+Columns = dict[str, AnyArray]
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,7 @@ def run_drive(logs: Sequence[Path], drive: Path, out: Path, *, progress: Progres
     paths = [out / "estimates.csv", out / "metrics.json"]
     write_csv(paths[0], estimate_columns(data))
     write_json(paths[1], metrics)
-    from studies.report.drive_plots import figures  # matplotlib costs a second that bad input must not
+    from studies.drives.pictures import figures  # matplotlib costs a second that bad input must not
 
     paths += write_pictures(figures(data), out, lambda done: progress(0.4 + 0.6 * done))
     progress(1.0)
@@ -67,9 +70,9 @@ def replay_drive(logs: Sequence[Path], drive: Path, *, progress: Progress = lamb
     return DriveData(description, schedule, log, inputs, replayed, chain, assumed)
 
 
-def estimate_columns(data: DriveData) -> dict[str, np.ndarray[Any, Any]]:
+def estimate_columns(data: DriveData) -> Columns:
     """The columns of estimates.csv, SI, the unit in every name."""
-    columns: dict[str, np.ndarray[Any, Any]] = {"time_s": data.log.time, "vx_mps": data.replay.velocity}
+    columns: Columns = {"time_s": data.log.time, "vx_mps": data.replay.velocity}
     columns |= {f"vx_{name}_mps": value for name, value in data.baselines.items()}
     per_corner = {
         "vx_{}_mps": data.replay.corner_velocity,
@@ -81,8 +84,7 @@ def estimate_columns(data: DriveData) -> dict[str, np.ndarray[Any, Any]]:
         "innovation_{}": data.replay.innovation,
         "flags_{}": data.replay.flags,
     }
-    for pattern, values in per_corner.items():
-        columns |= {pattern.format(corner): values[:, k] for k, corner in enumerate(CORNERS)}
+    columns |= _by_corner(per_corner)
     if data.chain is not None:
         columns |= chain_columns(data.chain)
     units = {"v": "mps", "a": "mps2", "y": "radps", "f": "N"}
@@ -90,9 +92,9 @@ def estimate_columns(data: DriveData) -> dict[str, np.ndarray[Any, Any]]:
     return columns
 
 
-def chain_columns(chain: Chain) -> dict[str, np.ndarray[Any, Any]]:
+def chain_columns(chain: Chain) -> Columns:
     """The pipeline's columns of estimates.csv; those of parts that a drive did not ask for are left out."""
-    columns: dict[str, np.ndarray[Any, Any]] = {
+    columns: Columns = {
         "pipeline_vx_mps": chain.vx,
         "pipeline_vy_mps": chain.vy,
         "pipeline_sideslip_rad": chain.sideslip,
@@ -109,9 +111,17 @@ def chain_columns(chain: Chain) -> dict[str, np.ndarray[Any, Any]]:
         "pipeline_slip_{}": chain.slip,
         "pipeline_slip_angle_{}_rad": chain.slip_angle,
     }
-    for pattern, values in per_corner.items():
-        columns |= {pattern.format(corner): values[:, k] for k, corner in enumerate(CORNERS)}
+    columns |= _by_corner(per_corner)
     return columns
+
+
+def _by_corner(per_corner: Mapping[str, AnyArray]) -> Columns:
+    """One column a corner of each (n, 4)."""
+    return {
+        pattern.format(corner): values[:, k]
+        for pattern, values in per_corner.items()
+        for k, corner in enumerate(CORNERS)
+    }
 
 
 def write_pictures(drawn: Mapping[str, Callable[[Path], None]], out: Path, progress: Progress) -> list[Path]:

@@ -83,7 +83,7 @@ def write_identification(found: Identification, out: Path) -> tuple[Path, ...]:
 
     Raises LogError when ``out`` cannot be written.
     """
-    from studies.report.identify_plots import figures  # matplotlib costs a second that bad input must not
+    from studies.identify.pictures import figures  # matplotlib costs a second that bad input must not
 
     ready_folder(out)
     paths = [out / "identified.toml", out / "identification.json"]

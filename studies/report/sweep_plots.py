@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from studies.report.drive_plots import STYLE
+from studies.drives.pictures import STYLE
 from studies.report.sweep_comparison_plot import draw_before_after
 from studies.report.sweep_panels import BEST, HIGH, LOW, NOMINAL, WORST, better, finished, panels, titled, words
 from studies.sweeps.baseline import Baseline

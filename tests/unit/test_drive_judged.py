@@ -13,10 +13,11 @@ from matplotlib.figure import Figure
 
 from estimators.schedule import write_content
 from studies.commands.run import remarks, summary_rows
+from studies.drives import pictures
 from studies.drives.evaluation import DriveData, evaluate
 from studies.drives.quantities import CORNERS
 from studies.drives.run import RunResult, estimate_columns, replay_drive, run_drive
-from studies.report import colours, drive_plots
+from studies.report import colours
 from tests.drives.synthetic_drive import DRIVE, FRONT, MASS, REAR, TORQUES, TRACK, columns, write_drive, write_log
 from tests.unit.schedule_content import EFFECTIVE_RADIUS, schedule_content
 
@@ -160,17 +161,17 @@ def test_pictures_show_estimates_beside_their_references(everything: tuple[Drive
     chain = data.chain
     assert chain is not None
     assert {path.stem for path in result.paths} >= {"lateral", "axle_forces", "loads"}
-    motion = drive_plots.lateral(data, chain)
+    motion = pictures.lateral(data, chain)
     sideways, angle = lines(motion, 0), lines(motion, 1)
     np.testing.assert_allclose(sideways["reference"], VY)
     np.testing.assert_array_equal(sideways["pipeline"], chain.vy)
     np.testing.assert_array_equal(sideways["corner observers"], chain.corner_vy)
     np.testing.assert_allclose(angle["reference"], np.degrees(np.arctan2(VY, VX)))
     np.testing.assert_allclose(angle["fixed stiffness estimator"], np.degrees(chain.sideslip_part))
-    axle = lines(drive_plots.axle_forces(data, chain), 1)
+    axle = lines(pictures.axle_forces(data, chain), 1)
     np.testing.assert_allclose(axle["reference"], 3.2)
     np.testing.assert_allclose(axle["quasi-static"], MASS * TURN * VX * FRONT / (FRONT + REAR) / 1e3)
-    load = lines(drive_plots.loads(data, chain), 3)
+    load = lines(pictures.loads(data, chain), 3)
     np.testing.assert_allclose(load["reference"], 3.9)
     np.testing.assert_allclose(load["pipeline"], chain.force_z[:, 3] / 1e3)
     colour = {str(line.get_label()): line.get_color() for line in motion.axes[0].lines}
@@ -182,5 +183,5 @@ def test_pictures_show_estimates_beside_their_references(everything: tuple[Drive
 def test_pictures_show_nothing_that_is_not_there(tmp_path: Path) -> None:
     data = replayed(tmp_path, TURNING, turn())
     assert data.chain is not None
-    assert set(lines(drive_plots.lateral(data, data.chain), 0)) == {"pipeline"}
-    assert set(lines(drive_plots.loads(data, data.chain), 0)) == {"pipeline", "quasi-static"}
+    assert set(lines(pictures.lateral(data, data.chain), 0)) == {"pipeline"}
+    assert set(lines(pictures.loads(data, data.chain), 0)) == {"pipeline", "quasi-static"}

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from studies.drives.pictures import STYLE, Save, new_figure, save_figure
 from studies.identify.identify import Identification
 from studies.identify.slip_limit import LimitedFit
 from studies.report.colours import BLUE
-from studies.report.drive_plots import STYLE
 
-Save = Callable[[Path], None]
 USED, LEFT_OUT, LINE = BLUE, "0.8", "#d1495b"
 NAMES = {
     "longitudinal": ("front left", "front right", "rear left", "rear right", "mean of the corners"),
@@ -29,13 +25,12 @@ def figures(found: Identification) -> dict[str, Save]:
     """Every plot by file stem: a function that writes it to a path, in the format of its suffix."""
     with mpl.rc_context(STYLE):
         drawn = {f"residual_{direction}": residual(found, limited) for direction, limited in found.fits.items()}
-    return {name: partial(_save, figure) for name, figure in drawn.items()}
+    return {name: partial(save_figure, figure) for name, figure in drawn.items()}
 
 
 def residual(found: Identification, limited: LimitedFit) -> Figure:
     """Force over slip, residual over time, residual over force, and autocorrelation of the residual of one direction."""
-    figure = Figure(figsize=(9.0, 6.4), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(9.0, 6.4)
     axes = figure.subplots(2, 2)
     _force(axes[0, 0], limited)
     mu, _ = limited.model.picture()
@@ -93,9 +88,3 @@ def _correlation(ax: Axes, limited: LimitedFit, step: float) -> None:
 def _label(ax: Axes, x: str, y: str) -> None:
     ax.set_xlabel(x)
     ax.set_ylabel(y, fontsize=8)
-
-
-def _save(figure: Figure, path: Path) -> None:
-    metadata = {"Date": None} if path.suffix == ".svg" else {}  # the same drive gives the same file
-    with mpl.rc_context(STYLE):
-        figure.savefig(path, dpi=150, metadata=metadata)

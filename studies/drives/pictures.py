@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,11 @@ from studies.drives.quantities import CORNERS
 from studies.report import colours
 
 Save = Callable[[Path], None]
+Corners = Sequence[FloatArray | None] | FloatArray
+"""One (n,) of each corner."""
+Lines = list[tuple[Corners, Any]]
+"""With the style of each."""
+NOTHING = (None,) * 4
 
 REFERENCE = {"color": colours.TRUTH, "linewidth": 1.8, "label": "reference"}
 ESTIMATE = {"color": colours.OWN_OBSERVERS, "linewidth": 1.1, "label": "corner observers"}
@@ -61,7 +66,7 @@ def figures(data: DriveData) -> dict[str, Save]:
             drawn["lateral"] = lateral(data, data.chain)
             drawn["axle_forces"] = axle_forces(data, data.chain)
             drawn["loads"] = loads(data, data.chain)
-    return {name: partial(_save, figure) for name, figure in drawn.items()}
+    return {name: partial(save_figure, figure) for name, figure in drawn.items()}
 
 
 def velocity(data: DriveData) -> Figure:
@@ -72,7 +77,7 @@ def velocity(data: DriveData) -> Figure:
     lines.append(("corner_observers", data.replay.velocity, ESTIMATE))
     if data.chain is not None:
         lines.append(("pipeline", data.chain.vx, PIPELINE))
-    figure = _figure(9.0, 5.6 if reference is not None else 3.6)
+    figure = new_figure(9.0, 5.6 if reference is not None else 3.6)
     axes = np.atleast_1d(figure.subplots(1 + (reference is not None), 1, sharex=True))
     if reference is not None:
         axes[0].plot(time, reference, **REFERENCE)
@@ -90,42 +95,31 @@ def velocity(data: DriveData) -> Figure:
 
 def slip(data: DriveData) -> Figure:
     """Slip ratio of each corner from the estimated velocity, and from the reference one."""
-    figure = _figure(9.0, 5.6)
-    axes = figure.subplots(2, 2, sharex=True, sharey=True)
-    for k, ax in enumerate(axes.flat):
-        if data.reference_slip is not None:
-            ax.plot(data.log.time, data.reference_slip[:, k], **REFERENCE)
-        ax.plot(data.log.time, data.slip[:, k], **ESTIMATE)
-        if data.chain is not None:
-            fast = np.where(np.abs(data.chain.vx) >= LEAST_SPEED, data.chain.slip[:, k], np.nan)
-            ax.plot(data.log.time, fast, **PIPELINE)
-    _label_corners(axes, "slip ratio (1)")
-    _finish(figure, axes, data, "slip ratio from the velocity at the centre of gravity")
-    return figure
+    known = data.reference_slip
+    lines: Lines = [(NOTHING if known is None else known.T, REFERENCE), (data.slip.T, ESTIMATE)]
+    if data.chain is not None:
+        fast = np.abs(data.chain.vx)[:, None] >= LEAST_SPEED
+        lines.append((np.where(fast, data.chain.slip, np.nan).T, PIPELINE))
+    return _corner_figure(data, lines, "slip ratio (1)", "slip ratio from the velocity at the centre of gravity")
 
 
 def forces(data: DriveData) -> Figure:
     """Longitudinal force of each corner as fed to the observers, and the measured one where the log has it."""
     scale, unit = _force_unit(data.inputs.force)
-    figure = _figure(9.0, 5.6)
-    axes = figure.subplots(2, 2, sharex=True, sharey=True)
-    for k, (corner, ax) in enumerate(zip(CORNERS, axes.flat, strict=True)):
-        measured = data.log.reference.get(f"force_x_{corner}")
-        if measured is not None:
-            ax.plot(data.log.time, measured / scale, **REFERENCE)
-        ax.plot(data.log.time, data.inputs.force[:, k] / scale, **{**ESTIMATE, "label": "observer input"})
-        if data.chain is not None:
-            ax.plot(data.log.time, data.chain.force_x[:, k] / scale, **PIPELINE)
-    _label_corners(axes, f"longitudinal force ({unit})")
+    lines: Lines = [
+        (_measured(data, "force_x", scale), REFERENCE),
+        (data.inputs.force.T / scale, {**ESTIMATE, "label": "observer input"}),
+    ]
+    if data.chain is not None:
+        lines.append((data.chain.force_x.T / scale, PIPELINE))
     sources = ", ".join(sorted(set(data.inputs.force_sources)))
-    _finish(figure, axes, data, f"longitudinal force ({sources})")
-    return figure
+    return _corner_figure(data, lines, f"longitudinal force ({unit})", f"longitudinal force ({sources})")
 
 
 def lateral(data: DriveData, chain: Chain) -> Figure:
     """V_y and sideslip angle of the pipeline, and of the corner observers and the sideslip part where they run."""
     time, reference = data.log.time, data.log.reference
-    figure = _figure(9.0, 5.6)
+    figure = new_figure(9.0, 5.6)
     axes = figure.subplots(2, 1, sharex=True)
     if "vy" in reference:
         axes[0].plot(time, reference["vy"], **REFERENCE)
@@ -151,7 +145,7 @@ def axle_forces(data: DriveData, chain: Chain) -> Figure:
     references = [reference_axle_force(data.log, axle) for axle in AXLES]
     rigid = quasi_static_axle_forces(data.log, data.drive)
     scale, unit = _force_unit(chain.axle_force_y)
-    figure = _figure(9.0, 5.6)
+    figure = new_figure(9.0, 5.6)
     axes = figure.subplots(2, 1, sharex=True)
     for k, (ax, reference) in enumerate(zip(axes, references, strict=True)):
         if reference is not None:
@@ -167,16 +161,34 @@ def axle_forces(data: DriveData, chain: Chain) -> Figure:
 
 def loads(data: DriveData, chain: Chain) -> Figure:
     """F_z of each corner: pipeline, quasi-static, and measured where the log has it."""
-    figure = _figure(9.0, 5.6)
+    lines: Lines = [
+        (_measured(data, "force_z", 1e3), REFERENCE),
+        (data.inputs.vertical_load.T / 1e3, QUASI_STATIC),
+        (chain.force_z.T / 1e3, PIPELINE),
+    ]
+    return _corner_figure(data, lines, "vertical load (kN)", "vertical load of the wheels")
+
+
+def _measured(data: DriveData, signal: str, scale: float) -> Corners:
+    """The reference of each corner that the log has."""
+    found = [data.log.reference.get(f"{signal}_{corner}") for corner in CORNERS]
+    return [None if value is None else value / scale for value in found]
+
+
+def _corner_figure(data: DriveData, lines: Lines, label: str, what: str) -> Figure:
+    """Four panels, with one line of each of ``lines`` where the corner has it."""
+    figure = new_figure(9.0, 5.6)
     axes = figure.subplots(2, 2, sharex=True, sharey=True)
     for k, (corner, ax) in enumerate(zip(CORNERS, axes.flat, strict=True)):
-        measured = data.log.reference.get(f"force_z_{corner}")
-        if measured is not None:
-            ax.plot(data.log.time, measured / 1e3, **REFERENCE)
-        ax.plot(data.log.time, data.inputs.vertical_load[:, k] / 1e3, **QUASI_STATIC)
-        ax.plot(data.log.time, chain.force_z[:, k] / 1e3, **PIPELINE)
-    _label_corners(axes, "vertical load (kN)")
-    _finish(figure, axes, data, "vertical load of the wheels")
+        for values, style in lines:
+            if values[k] is not None:
+                ax.plot(data.log.time, values[k], **style)
+        ax.set_title(TITLES[corner], loc="left", fontsize=9)
+    for ax in axes[:, 0]:
+        ax.set_ylabel(label)
+    for ax in axes[-1]:
+        ax.set_xlabel("time (s)")
+    _finish(figure, axes, data, what)
     return figure
 
 
@@ -184,19 +196,11 @@ def _force_unit(force: FloatArray) -> tuple[float, str]:
     return (1e3, "kN") if np.nanmax(np.abs(force), initial=0.0) > 1e3 else (1.0, "N")
 
 
-def _figure(width: float, height: float) -> Figure:
+def new_figure(width: float, height: float) -> Figure:
+    """An empty one, inches."""
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
-
-
-def _label_corners(axes: Any, label: str) -> None:
-    for corner, ax in zip(CORNERS, axes.flat, strict=True):
-        ax.set_title(TITLES[corner], loc="left", fontsize=9)
-    for ax in axes[:, 0]:
-        ax.set_ylabel(label)
-    for ax in axes[-1]:
-        ax.set_xlabel("time (s)")
 
 
 def _finish(figure: Figure, axes: Any, data: DriveData, what: str) -> None:
@@ -211,7 +215,8 @@ def _finish(figure: Figure, axes: Any, data: DriveData, what: str) -> None:
     figure.set_layout_engine("none")  # laid out once; the layout does not depend on the file format
 
 
-def _save(figure: Figure, path: Path) -> None:
-    metadata = {"Date": None} if path.suffix == ".svg" else {}  # the same drive gives the same file
+def save_figure(figure: Figure, path: Path) -> None:
+    """In the format of the suffix; the same drive gives the same file."""
+    metadata = {"Date": None} if path.suffix == ".svg" else {}
     with mpl.rc_context(STYLE):
         figure.savefig(path, dpi=150, metadata=metadata)
