@@ -217,17 +217,11 @@ def _read_track(path: Path, entry: LogFile, drive: DriveFile) -> tuple[_Track, d
     _check_rate(path, entry, float(np.median(spacing)))
     _check_gap(path, entry, seconds, stamped.time)
     report: dict[str, Any] = {
-        "file": path.name,
-        "rows": table.rows,
-        "duplicates": stamped.duplicates,
-        "out_of_order": stamped.out_of_order,
-        "gaps": int(np.count_nonzero(spacing > entry.allowed_gap * (1 + 1e-9))),
-        "largest_gap_s": float(spacing.max()),
-        "allowed_gap_s": entry.allowed_gap,
-        "median_rate_hz": float(1.0 / np.median(spacing)),
-        "clock_offset_s": entry.clock_offset,
-        "not_finite": table.not_finite,
-    }
+        "file": path.name, "rows": table.rows, "duplicates": stamped.duplicates, "out_of_order": stamped.out_of_order,
+        "gaps": int(np.count_nonzero(spacing > entry.allowed_gap * (1 + 1e-9))), "largest_gap_s": float(spacing.max()),
+        "allowed_gap_s": entry.allowed_gap, "median_rate_hz": float(1.0 / np.median(spacing)),
+        "clock_offset_s": entry.clock_offset, "not_finite": table.not_finite,
+    }  # fmt: skip
     track = _Track(
         stamped=stamped,
         signals={n: stamped.values[c.column] * c.scale(SIGNALS[n]) for n, c in signals.items()},
@@ -266,13 +260,8 @@ def _clock_offsets(drive: DriveFile, tracks: dict[str, _Track], report: dict[str
             continue
         velocity_log, velocity = _find(drive, tracks, entry.align.velocity)
         acceleration_log, acceleration = _find(drive, tracks, entry.align.acceleration)
-        found = find_offset(
-            tracks[velocity_log].stamped.time,
-            velocity,
-            tracks[acceleration_log].stamped.time,
-            acceleration,
-            entry.align.search,
-        )
+        times = [tracks[log].stamped.time for log in (velocity_log, acceleration_log)]
+        found = find_offset(times[0], velocity, times[1], acceleration, entry.align.search)
         sign = 1.0 if velocity_log == entry.name else -1.0
         offsets[entry.name] = offsets[entry.align.to] + sign * found.seconds
         report["logs"][entry.name]["clock_offset_s"] = offsets[entry.name]

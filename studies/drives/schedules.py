@@ -68,27 +68,24 @@ def check_radii(drive: DriveFile, folder: Path) -> tuple[str, ...]:
     Compared is ``effective_radius`` of each schedule's model, as a share of it. Raises SpecError, one line: more than 10 %
     off the car's radii, or schedules whose radii differ by more than 1 %.
     """
-    named: dict[Direction, str | None] = {
-        "longitudinal": drive.schedules.longitudinal,
-        "lateral": drive.schedules.lateral,
-    }
-    radii: dict[Direction, float] = {}
+    named: dict[Direction, str] = {"longitudinal": drive.schedules.longitudinal}
+    if drive.schedules.lateral is not None:
+        named["lateral"] = drive.schedules.lateral
+    found = {direction: _radius(name, folder, direction) for direction, name in named.items()}
     assumptions = []
-    for direction, name in named.items():
-        if name is None:
-            continue
-        radius = _radius(name, folder, direction)
+    for direction, radius in found.items():
+        name = named[direction]
         if radius is None:
             assumptions.append(
                 f"{direction} schedule '{name}' does not say for which effective_radius: taken as fitting"
             )
-            continue
-        radii[direction] = radius
-        assumptions += _against_car(drive, direction, name, radius)
-    if len(radii) == 2 and abs(radii["lateral"] / radii["longitudinal"] - 1.0) > OTHER_PAIR:
+        else:
+            assumptions += _against_car(drive, direction, name, radius)
+    along, across = found["longitudinal"], found.get("lateral")
+    if along is not None and across is not None and abs(across / along - 1.0) > OTHER_PAIR:
         raise SpecError(
-            f"schedules: '{named['longitudinal']}' is for effective_radius = {radii['longitudinal']:g} m, "
-            f"'{named['lateral']}' for {radii['lateral']:g} m; name two schedules of one car"
+            f"schedules: '{named['longitudinal']}' is for effective_radius = {along:g} m, "
+            f"'{named['lateral']}' for {across:g} m; name two schedules of one car"
         )
     return tuple(assumptions)
 

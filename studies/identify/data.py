@@ -63,7 +63,8 @@ def drive_signals(log: DriveLog, drive: DriveFile, settings: IdentifySettings) -
         )
     inputs = corner_inputs_of(log, drive)
     vx = log.reference["vx"]
-    vy, has_vy = _lateral_velocity(log)
+    measured = log.reference.get("vy", log.signals.get("vy"))
+    vy = np.zeros_like(log.time) if measured is None else measured
     ay, yaw_rate = log.signals.get("ay"), log.signals.get("yaw_rate")
     names = [f"torque_{corner}" for corner in CORNERS]
     torque = np.stack([log.signals[n] for n in names], axis=-1) if all(n in log.signals for n in names) else None
@@ -77,17 +78,19 @@ def drive_signals(log: DriveLog, drive: DriveFile, settings: IdentifySettings) -
     light = inputs.vertical_load < settings.least_load * drive.vehicle.mass * GRAVITY / 4
     slow = ~(np.abs(vx) >= settings.least_speed)
     signals = DriveSignals(
-        drive, inputs, prefilter, vx, vy, has_vy, ay, yaw_rate, torque, held | light | slow[:, None] | ~known[:, None]
+        drive,
+        inputs,
+        prefilter,
+        vx,
+        vy,
+        measured is not None,
+        ay,
+        yaw_rate,
+        torque,
+        held | light | slow[:, None] | ~known[:, None],
     )
     _refuse_short(signals, slow | ~known, settings)
     return signals
-
-
-def _lateral_velocity(log: DriveLog) -> tuple[FloatArray, bool]:
-    for table in (log.reference, log.signals):
-        if "vy" in table:
-            return table["vy"], True
-    return np.zeros_like(log.time), False
 
 
 def _refuse_short(signals: DriveSignals, slow: BoolArray, settings: IdentifySettings) -> None:

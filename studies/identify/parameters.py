@@ -105,7 +105,7 @@ def vehicle_parameters(found: Identification) -> dict[str, Identified]:
         out["wheel_inertia"] = _fitted(found, spin, "wheel_inertia", "kg*m^2", found.wheel_inertia, prior, plain)
     across = found.fits.get("lateral")
     if across is not None:
-        given = "m L_f L_r" if getattr(car, "yaw_inertia", None) is None else name
+        given = "m L_f L_r" if car.yaw_inertia is None else name
         out["yaw_inertia"] = _fitted(
             found, across.fit, "yaw_inertia", "kg*m^2", yaw_inertia_prior(found.drive), given, plain
         )

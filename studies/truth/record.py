@@ -60,7 +60,7 @@ class Truth:
 
     @property
     def units(self) -> dict[str, str]:
-        """Unit of every signal kept."""
+        """Unit of every recorded signal."""
         return {name: UNITS[name] for name in self.signals}
 
     def __getitem__(self, name: str) -> FloatArray:

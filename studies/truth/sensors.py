@@ -21,16 +21,16 @@ class Drops:
     """Lost samples. With `burst` 1 they are independent, with probability `share`.
 
     Else Gilbert's chain: lost in the bad state only, `burst` samples long on average and `share` of all in the long run:
-    bad -> good with 1/burst, good -> bad with share/((1 - share) burst). `kept_in_bad` lets some through (Elliott).
+    bad -> good with 1/burst, good -> bad with share/((1 - share) burst). `received_in_bad` lets some through (Elliott).
     """
 
     share: float = 0.0
     burst: float = 1.0
-    kept_in_bad: float = 0.0
+    received_in_bad: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (0.0 <= self.share < 1.0 and self.burst >= 1.0 and 0.0 <= self.kept_in_bad < 1.0):
-            raise SpecError(f"drops: {self}: share in [0, 1), burst at least 1 sample, kept_in_bad in [0, 1)")
+        if not (0.0 <= self.share < 1.0 and self.burst >= 1.0 and 0.0 <= self.received_in_bad < 1.0):
+            raise SpecError(f"drops: {self}: share in [0, 1), burst at least 1 sample, received_in_bad in [0, 1)")
         if self.burst > 1.0 and self._bad / (1.0 - self._bad) / self.burst > 1.0:
             raise SpecError(
                 f"drops: bursts of {self.burst:g} samples cannot be so frequent; lower share or lengthen burst"
@@ -39,9 +39,9 @@ class Drops:
     @property
     def _bad(self) -> float:
         """Long-run share of the bad state."""
-        bad = self.share / (1.0 - self.kept_in_bad)
+        bad = self.share / (1.0 - self.received_in_bad)
         if bad >= 1.0:
-            raise SpecError(f"drops: {self}: share must be below 1 - kept_in_bad")
+            raise SpecError(f"drops: {self}: share must be below 1 - received_in_bad")
         return bad
 
     def lost(self, rng: np.random.Generator, samples: int, shape: tuple[int, ...]) -> BoolArray:
@@ -64,8 +64,8 @@ class Drops:
         state = np.take_along_axis(value, last, axis=0)
         if enter > stay:
             state ^= (row - last) % 2 == 1
-        if self.kept_in_bad:
-            state &= rng.random(state.shape) >= self.kept_in_bad
+        if self.received_in_bad:
+            state &= rng.random(state.shape) >= self.received_in_bad
         return np.asarray(state, dtype=np.bool_)
 
 
@@ -154,10 +154,10 @@ SOURCES = {
 }  # fmt: skip
 """The signal of the truth behind each measured one."""
 _CHANNELS = {
-    "wheel_speed": "wheel_speed", "steer": "steer", "torque": "torque",
-    "ax": "acceleration", "ay": "acceleration", "az": "acceleration",
-    "yaw_rate": "rate", "roll_rate": "rate", "pitch_rate": "rate",
-}  # fmt: skip
+    **dict.fromkeys(("ax", "ay", "az"), "acceleration"),
+    **dict.fromkeys(("yaw_rate", "roll_rate", "pitch_rate"), "rate"),
+}
+"""Of `Sensors`, where the channel is not called like the signal."""
 
 
 @dataclass(frozen=True)
@@ -207,7 +207,7 @@ def draw(truth: Truth, sensors: Sensors, seeds: Sequence[int], sample_time: floa
         count = name == "wheel_speed" and sensors.ticks is not None
         true = truth["wheel_angle" if count else source]
         out = np.empty((*shape, samples, *true.shape[2:]))
-        channel = getattr(sensors, _CHANNELS[name])
+        channel = getattr(sensors, _CHANNELS.get(name, name))
         for b in range(truth.size):
             for s, seed in enumerate(seeds):
                 rng = np.random.default_rng(np.random.SeedSequence((seed, *truth.keys[b], crc32(name.encode()))))
