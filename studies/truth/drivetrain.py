@@ -14,6 +14,7 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
+from studies.truth.layout import column
 from synthesis.errors import SpecError
 
 FRONT_SHARES = {"AWD": 0.5, "FWD": 1.0, "RWD": 0.0}
@@ -66,12 +67,12 @@ class Drivetrains:
 
     def __init__(self, drivetrains: Sequence[Drivetrain]) -> None:
         front = np.array([FRONT_SHARES[d.layout] for d in drivetrains])
-        brake = np.array([d.front_brake_share for d in drivetrains])
+        brake = column(drivetrains, "front_brake_share")
         self.share: FloatArray = 0.5 * np.stack([front, front, 1 - front, 1 - front])
         self.brake_share: FloatArray = 0.5 * np.stack([brake, brake, 1 - brake, 1 - brake])
-        self.maximum = np.array([d.maximum_torque for d in drivetrains])
-        self.power = np.array([d.maximum_power for d in drivetrains])
-        self.maximum_brake = np.array([d.maximum_brake_torque for d in drivetrains])
+        self.maximum = column(drivetrains, "maximum_torque")
+        self.power = column(drivetrains, "maximum_power")
+        self.maximum_brake = column(drivetrains, "maximum_brake_torque")
         self.traction = _Assists([d.traction_control for d in drivetrains], 1.0)
         self.anti_lock = _Assists([d.anti_lock for d in drivetrains], -1.0)
 

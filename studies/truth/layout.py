@@ -6,6 +6,7 @@ the step three times as fast. Outside, the batch comes first.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -49,6 +50,11 @@ JACK: Final = slice(B["jack_front"], B["jack_rear"] + 1)
 DEFLECTION: Final = slice(W["deflection_x"].start, W["deflection_y"].stop)
 GIVE: Final = slice(W["compliance_x"].start, W["compliance_y"].stop)
 GIVE_RATE: Final = slice(W["compliance_x_rate"].start, W["compliance_y_rate"].stop)
+
+
+def column(items: Sequence[object], name: str) -> FloatArray:
+    """An attribute of all items as one array with the items last: (B,) of numbers, (2, B) of pairs."""
+    return np.ascontiguousarray(np.array([getattr(item, name) for item in items], dtype=np.float64).T)
 
 
 def rolling(speed: npt.ArrayLike, radius: FloatArray) -> FloatArray:

@@ -16,6 +16,7 @@ from typing import ClassVar
 import numpy as np
 
 from estimators.arrays import FloatArray
+from studies.truth.layout import column
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set, quantities
 
 
@@ -55,14 +56,11 @@ class LuGreTire:
     name: ClassVar[str] = "lugre"
 
     def __init__(self, parameters: list[LuGreParameters]) -> None:
-        def both(name: str) -> FloatArray:
-            return np.array([getattr(p, name) for p in parameters], dtype=np.float64).T[:, None, :]
-
-        def one(name: str) -> FloatArray:
-            return np.array([getattr(p, name) for p in parameters], dtype=np.float64)
-
-        self.sigma0, self.sigma1, self.sigma2, self.kappa = (both(n) for n in ("sigma0", "sigma1", "sigma2", "kappa"))
-        self.sliding, self.rise, self.stribeck = one("sliding"), one("static") - one("sliding"), one("stribeck")
+        self.sigma0, self.sigma1, self.sigma2, self.kappa = (
+            column(parameters, name)[:, None, :] for name in ("sigma0", "sigma1", "sigma2", "kappa")
+        )
+        self.sliding, static, self.stribeck = (column(parameters, n) for n in ("sliding", "static", "stribeck"))
+        self.rise: FloatArray = static - self.sliding
 
     def rates(
         self, _z: FloatArray, slide: FloatArray, surface: FloatArray, _transport: FloatArray, friction: FloatArray

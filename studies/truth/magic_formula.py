@@ -24,6 +24,7 @@ from typing import ClassVar
 import numpy as np
 
 from estimators.arrays import FloatArray
+from studies.truth.layout import column
 
 
 @dataclass(frozen=True)
@@ -57,11 +58,11 @@ class MagicFormulaTire:
     name: ClassVar[str] = "magic-formula"
 
     def __init__(self, parameters: list[MagicFormulaParameters]) -> None:
-        def pair(name: str) -> FloatArray:
-            return np.array([getattr(p, name) for p in parameters], dtype=np.float64).T[:, None, :]
-
         def one(name: str) -> FloatArray:
-            return np.array([getattr(p, name) for p in parameters], dtype=np.float64)
+            return column(parameters, name)
+
+        def pair(name: str) -> FloatArray:
+            return one(name)[:, None, :]
 
         self.nominal_load, self.damping_speed = one("nominal_load"), one("damping_speed")
         self.nominal_friction, self.relaxation_least = one("nominal_friction"), one("relaxation_least")
@@ -69,7 +70,7 @@ class MagicFormulaTire:
         self.curve, self.curve_load, self.curve_load2 = pair("curve"), pair("curve_load"), pair("curve_load2")
         self.weight, self.weight_fall, self.weight_shape = pair("weight"), pair("weight_fall"), pair("weight_shape")
         self.relaxation, self.damping = pair("relaxation"), pair("damping")
-        self.stiffness_x, self.stiffness_y = one("stiffness_x").T, one("stiffness_y").T
+        self.stiffness_x, self.stiffness_y = one("stiffness_x"), one("stiffness_y")
         first = np.stack([self.stiffness_x[0], self.stiffness_y[0]])[:, None, :]
         self.narrow: FloatArray = first / self.peak * self.nominal_friction  # 1/kappa_s, 1/alpha_s at friction 1
 

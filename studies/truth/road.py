@@ -14,6 +14,7 @@ from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from estimators.vehicle import CORNERS
 from studies.drives.quantities import Offset, Place
+from studies.truth.layout import column
 from studies.truth.profile import Angles
 from synthesis.errors import SpecError
 from synthesis.toml_file import StrictTable
@@ -64,13 +65,14 @@ class _Layer:
     """One zone of each car."""
 
     def __init__(self, zones: Sequence[Zone]) -> None:
-        def column(name: str) -> FloatArray:
-            return np.array([getattr(z, name) for z in zones], dtype=np.float64)
-
-        self.friction = column("friction")
-        self.corners = np.array([z.corners for z in zones], dtype=np.float64).T
-        self._from, self._to, self._blend = column("from_place"), column("to_place"), column("blend")
-        self._since, self._until = column("from_time"), column("to_time")
+        self.friction = column(zones, "friction")
+        self.corners = column(zones, "corners")
+        self._from, self._to, self._blend = (
+            column(zones, "from_place"),
+            column(zones, "to_place"),
+            column(zones, "blend"),
+        )
+        self._since, self._until = column(zones, "from_time"), column(zones, "to_time")
         self._placed = bool((self._from > -_EVER).any() or (self._to < _EVER).any())
 
     def share(self, place: FloatArray, time: float) -> FloatArray:

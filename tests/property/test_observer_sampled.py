@@ -1,4 +1,4 @@
-"""Gains that correct once a sample, xhat+ = e^(TA) xhat + T phi(TA) B u + K (y - C xhat - D u), by independent roads."""
+"""Gains that correct once a sample, xhat+ = e^(TA) xhat + T phi(TA) B u + K (y - C xhat - D u), by independent ways."""
 
 from __future__ import annotations
 

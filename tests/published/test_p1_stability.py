@@ -221,7 +221,7 @@ def test_by_how_much_the_primal_reading_fails(direction: Direction, omega: float
 @settings(deadline=None, max_examples=30)
 @given(st.sampled_from(list(JUDGED)), st.floats(0.0, 180.0))
 def test_judgements_agree_with_dense_eigenvalues(case: tuple[Direction, Reading], omega: float) -> None:
-    """Second road: numpy eigenvalues at any wheel speed that is not right at an end of an interval."""
+    """Independent check: numpy eigenvalues at any wheel speed that is not right at an end of an interval."""
     model, gains, matrix, form = printed(*case)
     intervals = check_certificate(model, gains, matrix, form).intervals
     if any(abs(omega - end) < 1e-3 for interval in intervals for end in interval):

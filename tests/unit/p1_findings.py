@@ -1,4 +1,4 @@
-"""The findings of the study of P1, computed once a process, and the printed decimals that second roads start from."""
+"""The findings of the study of P1, computed once a process, and the printed decimals that independent checks start from."""
 
 from __future__ import annotations
 

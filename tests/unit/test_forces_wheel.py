@@ -68,7 +68,7 @@ def test_unknown_input_observer_is_a_first_order_lag_of_the_force() -> None:
 
 
 def test_unknown_input_observer_follows_its_differential_equation() -> None:
-    """The second road: what itself, integrated as (1), (2) of P2 with a gain K_p, by matrix exponential."""
+    """The independent check: what itself, integrated as (1), (2) of P2 with a gain K_p, by matrix exponential."""
     lag, nominal = 0.03, 500.0
     inertia, radius = CAR.wheel_inertia, 0.33
     gain = inertia / lag

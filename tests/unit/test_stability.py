@@ -46,7 +46,7 @@ def test_a_decay_rate_is_proved_up_to_the_true_one(decay: float, verdict: Verdic
 @pytest.mark.parametrize("form", ["primal", "dual"])
 @pytest.mark.parametrize("degree", [0, 1, 2])
 def test_the_lyapunov_function_falls_along_simulated_errors(form: str, degree: int) -> None:
-    """Second road: integrate e' = A_e(p(t)) e with p swinging at the largest allowed rate and watch V."""
+    """Independent check: integrate e' = A_e(p(t)) e with p swinging at the largest allowed rate and watch V."""
     gain = np.array([[1.5], [0.5]])
     result = affine_quadratic_stability(SPRING, gain, degree, form, EXACT)  # type: ignore[arg-type]
     assert result.verdict is Verdict.CERTIFIED

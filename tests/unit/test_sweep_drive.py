@@ -1,4 +1,4 @@
-"""The velocity error on a drive: the runtime's own replay, and a plain integration of every corner, as second roads."""
+"""The velocity error on a drive: the runtime's own replay, and a plain integration of every corner, as independent checks."""
 
 from __future__ import annotations
 
