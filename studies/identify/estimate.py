@@ -31,7 +31,7 @@ class Unknown:
     measurement (nuisances, and what the catalogue knows well: radii); without it the data alone decide, and where they
     say less than the prior, the parameter is held there: it then adds ``considered`` times its spread to the intervals of
     the others. ``width`` is the largest half width of the confidence interval in x (times |x| if ``relative``) at which it
-    counts as identified; it is held as well where it is not ``apart`` half widths from the prior; ``reach`` bounds x;
+    counts as identified; it is held as well where it is not ``apart`` half widths from the prior; x stays within ``bounds``;
     ``starts`` are further x to start from.
     """
 
@@ -39,7 +39,7 @@ class Unknown:
     prior: float
     spread: float
     width: float
-    reach: tuple[float, float]
+    bounds: tuple[float, float]
     positive: bool = True
     informed: bool = True
     relative: bool = False
@@ -52,24 +52,24 @@ class Unknown:
         return float(self.prior * math.exp(min(x, 300.0))) if self.positive else float(x)
 
     @property
-    def home(self) -> float:
+    def prior_x(self) -> float:
         """The prior as x."""
         return 0.0 if self.positive else self.prior
 
-    def stuck(self, x: float) -> bool:
+    def at_bound(self, x: float) -> bool:
         """Whether x is at a bound."""
-        low, high = self.reach
+        low, high = self.bounds
         return min(x - low, high - x) < 1e-6 * (high - low)
 
     def narrow(self, x: float, half: float) -> bool:
         """Whether an interval of this half width counts as identified."""
-        return not self.stuck(x) and half <= self.width * (abs(x) if self.relative else 1.0)
+        return not self.at_bound(x) and half <= self.width * (abs(x) if self.relative else 1.0)
 
-    def silence(self, x: float, half: float) -> float:
+    def width_over_prior(self, x: float, half: float) -> float:
         """Half width over that of the prior: above 1 the log says less than the prior; infinite at a bound."""
-        if self.stuck(x):
+        if self.at_bound(x):
             return math.inf
-        near = self.apart * half / max(abs(x - self.home), 1e-12) if self.apart else 0.0
+        near = self.apart * half / max(abs(x - self.prior_x), 1e-12) if self.apart else 0.0
         return max(half / (2.0 * self.spread), near)
 
 
@@ -156,8 +156,8 @@ class _Problem:
     rules: Rules
 
     @property
-    def home(self) -> FloatArray:
-        return np.array([u.home for u in self.unknowns])
+    def prior_x(self) -> FloatArray:
+        return np.array([u.prior_x for u in self.unknowns])
 
     @property
     def spread(self) -> FloatArray:
@@ -197,21 +197,21 @@ def estimate(
     if not mask.any():
         return _nothing(problem)
     active = np.ones(len(problem.unknowns), dtype=bool)
-    x = np.array([(start or {}).get(u.name, u.home) for u in problem.unknowns])
+    x = np.array([(start or {}).get(u.name, u.prior_x) for u in problem.unknowns])
     refused: dict[str, float] = {}
     singular: tuple[float, ...] = ()
     while True:
-        x = _fit(problem, active, np.where(active, x, problem.home), many=not singular and start is None)
+        x = _fit(problem, active, np.where(active, x, problem.prior_x), many=not singular and start is None)
         found = _covariance(problem, active, x)
         singular = singular or found.singular_values
         half = found.half
-        silence = {
-            u.name: u.silence(float(v), half[u.name])
+        uncertain = {
+            u.name: u.width_over_prior(float(v), half[u.name])
             for u, v, a in zip(problem.unknowns, x, active, strict=True)
             if a and not u.informed
         }
-        worst = max(silence, key=lambda name: silence[name], default="")
-        if not worst or silence[worst] <= 1.0:
+        worst = max(uncertain, key=lambda name: uncertain[name], default="")
+        if not worst or uncertain[worst] <= 1.0:
             break
         refused[worst] = half[worst]
         active[found.index(worst)] = False
@@ -226,8 +226,8 @@ def estimate(
 def _fit(problem: _Problem, active: BoolArray, x: FloatArray, many: bool) -> FloatArray:
     free = np.flatnonzero(active)
     unknowns = [problem.unknowns[i] for i in free]
-    low, high = (np.array([u.reach[side] for u in unknowns]) for side in (0, 1))
-    home, spread = problem.home[free], problem.spread[free]
+    low, high = (np.array([u.bounds[side] for u in unknowns]) for side in (0, 1))
+    prior, spread = problem.prior_x[free], problem.spread[free]
     informed = np.array([u.informed for u in unknowns])
     margin = 1e-9 * (high - low)
     size, time = 10 * problem.rules.floor, float(problem.rules.correlation)
@@ -241,7 +241,7 @@ def _fit(problem: _Problem, active: BoolArray, x: FloatArray, many: bool) -> Flo
         ) -> FloatArray:
             full = held.copy()
             full[free] = part
-            return np.concatenate([problem.all_rows(full)[mask], (weight * (part - home))[informed]])
+            return np.concatenate([problem.all_rows(full)[mask], (weight * (part - prior))[informed]])
 
         starts = [np.clip(x[free], low + margin, high - margin)]
         if many and k == 0:
@@ -329,5 +329,5 @@ def _nothing(problem: _Problem) -> Estimate:
     )
     factors, none = dict.fromkeys(names, factor), (0.0,) * len(names)
     return Estimate(
-        problem.unknowns, problem.home, covariance, off, half, empty, 0, 0.0, 1.0, 0.0, factors, none
+        problem.unknowns, problem.prior_x, covariance, off, half, empty, 0, 0.0, 1.0, 0.0, factors, none
     )  # in the order of the fields

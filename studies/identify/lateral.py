@@ -97,7 +97,7 @@ class LateralSlip:
         bad = np.stack([self.data.bad[:, :2].any(axis=1), self.data.bad[:, 2:].any(axis=1)], axis=1)
         return self.filter.settled(~(np.abs(self.slip(p)) <= limit) | bad | self._pulled)
 
-    def picture(self) -> tuple[FloatArray, FloatArray]:
+    def force_and_speed(self) -> tuple[FloatArray, FloatArray]:
         """Filtered normalised force (at the prior yaw inertia) and speed (n, 2)."""
         prior = next(u.prior for u in self.unknowns if u.name == "yaw_inertia")
         return self.filter.smooth(self.force(prior) / self.load), self._measured[1]

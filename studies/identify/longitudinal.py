@@ -119,7 +119,7 @@ class LongitudinalSlip:
         rolling = good & self.data.filter.settled(pushed)
         return np.concatenate([rolling, all_good & ~rolling.any(axis=1, keepdims=True)], axis=1)
 
-    def picture(self) -> tuple[FloatArray, FloatArray]:
+    def force_and_speed(self) -> tuple[FloatArray, FloatArray]:
         """Filtered normalised force and rolling speed (n, k), of the corners, or of their mean without torques."""
         mu, speed = self.data.filter.smooth(self.mu), self.data.filter.smooth(np.abs(self.along))
         mean = [np.sum(self.share * value, axis=1, keepdims=True) for value in (mu, speed)]

@@ -33,7 +33,7 @@ def residual(found: Identification, limited: LimitedFit) -> Figure:
     figure = new_figure(9.0, 6.4)
     axes = figure.subplots(2, 2)
     _force(axes[0, 0], limited)
-    mu, _ = limited.model.picture()
+    mu, _ = limited.model.force_and_speed()
     for k, name in enumerate(NAMES[limited.model.direction]):
         error = limited.fit.residual[:, k]
         if np.isfinite(error).any():
@@ -60,7 +60,7 @@ def _force(ax: Axes, limited: LimitedFit) -> None:
     """Normalised force over slip of all samples within twice the limit, used ones in colour; the fitted origin."""
     values = limited.fit.values()
     slip = limited.model.slip(values)
-    mu = limited.model.picture()[0][:, : slip.shape[1]]
+    mu = limited.model.force_and_speed()[0][:, : slip.shape[1]]
     used = limited.mask[:, : slip.shape[1]]
     near = np.abs(slip) <= 2 * limited.limit
     ax.plot(slip[near & ~used], mu[near & ~used], ".", color=LEFT_OUT, markersize=2, label="left out")

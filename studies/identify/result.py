@@ -43,7 +43,7 @@ def tire_residual(found: Identification, direction: str, tire: Tire, limit: floa
     if not mask.any():
         return None
     error = limited.model.residual(values)[mask]
-    mu, _ = limited.model.picture()
+    mu, _ = limited.model.force_and_speed()
     width = min(mask.shape[1], limited.model.slip(values).shape[1])
     inside = mask[:, :width]
     force = (mu[:, :width] - values["slip_stiffness"] * limited.model.slip(values))[inside]

@@ -31,7 +31,7 @@ class SlipModel(Protocol):
     def residual(self, p: Mapping[str, float]) -> FloatArray: ...  # noqa: D102
     def mask(self, limit: float, p: Mapping[str, float]) -> BoolArray: ...  # noqa: D102
     def slip(self, p: Mapping[str, float]) -> FloatArray: ...  # noqa: D102
-    def picture(self) -> tuple[FloatArray, FloatArray]: ...  # noqa: D102
+    def force_and_speed(self) -> tuple[FloatArray, FloatArray]: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def _agree(wide: LimitedFit, narrow: LimitedFit, settings: IdentifySettings) -> 
     c as well, with mu^4.
     """
     a, b = wide.fit, narrow.fit
-    mu = narrow.model.picture()[0][:, : narrow.mask.shape[1]][narrow.mask]
+    mu = narrow.model.force_and_speed()[0][:, : narrow.mask.shape[1]][narrow.mask]
     power = float(np.sum(mu**2))
     curved = sum(
         (a.value(name) - b.value(name)) * float(np.sum(np.abs(mu) ** k)) / power if power > 0 else 0.0

@@ -60,10 +60,10 @@ class Fleet:
         self._springs(vehicles)
         under = [v.suspension for v in vehicles]
         self.unsprung = column(under, "unsprung_mass")
-        self.give_stiffness: FloatArray = np.repeat(
+        self.compliance_stiffness: FloatArray = np.repeat(
             [[u.stiffness_x for u in under], [u.stiffness_y for u in under]], 4, axis=0
         )
-        self.give_damping: FloatArray = np.repeat(
+        self.compliance_damping: FloatArray = np.repeat(
             [[u.damping_x for u in under], [u.damping_y for u in under]], 4, axis=0
         )
         self.drivetrains = Drivetrains([v.drivetrain for v in vehicles])

@@ -48,8 +48,8 @@ W: Final = {name: slice(len(BODY) + 4 * k, len(BODY) + 4 * k + 4) for k, name in
 """Rows fl, fr, rl, rr of each wheel state."""
 JACK: Final = slice(B["jack_front"], B["jack_rear"] + 1)
 DEFLECTION: Final = slice(W["deflection_x"].start, W["deflection_y"].stop)
-GIVE: Final = slice(W["compliance_x"].start, W["compliance_y"].stop)
-GIVE_RATE: Final = slice(W["compliance_x_rate"].start, W["compliance_y_rate"].stop)
+COMPLIANCE: Final = slice(W["compliance_x"].start, W["compliance_y"].stop)
+COMPLIANCE_RATE: Final = slice(W["compliance_x_rate"].start, W["compliance_y_rate"].stop)
 
 
 def column(items: Sequence[object], name: str) -> FloatArray:

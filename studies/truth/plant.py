@@ -21,7 +21,7 @@ import numpy as np
 from estimators.arrays import FloatArray
 from estimators.vehicle import GRAVITY
 from studies.truth.fleet import Fleet, Tire
-from studies.truth.layout import DEFLECTION, GIVE, GIVE_RATE, JACK, B, W
+from studies.truth.layout import COMPLIANCE, COMPLIANCE_RATE, DEFLECTION, JACK, B, W
 
 
 class Controls(NamedTuple):
@@ -35,7 +35,7 @@ class Controls(NamedTuple):
     bank: FloatArray  # (B,) rad, left side up
 
 
-class Turned(NamedTuple):
+class SteerAngles(NamedTuple):
     """Sine and cosine of the steering angles (4, B)."""
 
     sine: FloatArray
@@ -66,12 +66,12 @@ class Plant:
         self._drop: FloatArray = fleet.height - fleet.radius  # wheel centres below the centre of gravity
         self._roll_arm: FloatArray = fleet.height - fleet.roll_center
 
-    def slide(self, state: FloatArray, turned: Turned) -> Slide:
-        """Velocities of the wheel centres, P1 section 6, with roll, pitch and the give of the suspension."""
+    def slide(self, state: FloatArray, steered: SteerAngles) -> Slide:
+        """Velocities of the wheel centres, P1 section 6, with roll, pitch and the compliance of the suspension."""
         car, spin = self.fleet, state[B["yaw_rate"]]
         x = state[B["vx"]] - spin * car.y + self._drop * state[B["pitch_speed"]] + state[W["compliance_x_rate"]]
         y = state[B["vy"]] + self._roll_arm * state[B["roll_speed"]] + spin * car.x + state[W["compliance_y_rate"]]
-        velocity = _pair(x * turned.cosine + y * turned.sine, y * turned.cosine - x * turned.sine)
+        velocity = _pair(x * steered.cosine + y * steered.sine, y * steered.cosine - x * steered.sine)
         surface = car.radius * state[W["wheel_speed"]]
         slip = -velocity
         slip[0] += surface
@@ -96,10 +96,10 @@ class Plant:
         out: FloatArray = np.maximum(load, 0.0)
         return out
 
-    def in_body_axes(self, tire: FloatArray, load: FloatArray, turned: Turned) -> Forces:
+    def in_body_axes(self, tire: FloatArray, load: FloatArray, steered: SteerAngles) -> Forces:
         """Tire forces (2, 4, B) turned by the steering angle."""
         x, y = tire
-        body = _pair(x * turned.cosine - y * turned.sine, x * turned.sine + y * turned.cosine)
+        body = _pair(x * steered.cosine - y * steered.sine, x * steered.sine + y * steered.cosine)
         return Forces(tire, body, load)
 
     def body_rates(self, state: FloatArray, forces: Forces, torque: FloatArray, controls: Controls) -> FloatArray:
@@ -123,10 +123,10 @@ class Plant:
         side = across[0::2] + across[1::2]
         out[JACK] = (car.roll_center * side / car.track - state[JACK]) / car.load_lag
         out[B["distance"]] = np.copysign(np.sqrt(vx * vx + vy * vy), vx)
-        speed = state[GIVE_RATE]
-        out[GIVE] = speed
-        out[GIVE_RATE] = (
-            forces.body.reshape(8, -1) - car.give_stiffness * state[GIVE] - car.give_damping * speed
+        speed = state[COMPLIANCE_RATE]
+        out[COMPLIANCE] = speed
+        out[COMPLIANCE_RATE] = (
+            forces.body.reshape(8, -1) - car.compliance_stiffness * state[COMPLIANCE] - car.compliance_damping * speed
         ) / car.unsprung
         return out
 
@@ -135,13 +135,13 @@ class Plant:
 
         A wheel that stands still is held by brake and rolling resistance as far as they reach.
         """
-        car, turned = self.fleet, Turned(np.sin(controls.steer), np.cos(controls.steer))
-        moving, load = self.slide(state, turned), self.loads(state)
+        car, steered = self.fleet, SteerAngles(np.sin(controls.steer), np.cos(controls.steer))
+        moving, load = self.slide(state, steered), self.loads(state)
         transport, z = self.transport(moving), state[DEFLECTION].reshape(2, 4, -1)
         a, push = self.tire.rates(z, moving.slip, np.absolute(moving.surface), transport, controls.friction)
         dz = push - a * z
         tire = self.tire.forces(z, dz, moving.slip, transport, load, controls.friction)
-        forces = self.in_body_axes(tire, load, turned)
+        forces = self.in_body_axes(tire, load, steered)
         w = state[W["wheel_speed"]]
         free = controls.drive - car.radius * tire[0]
         rolling = car.radius * car.rolling_resistance * load

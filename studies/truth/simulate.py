@@ -19,7 +19,7 @@ from studies.truth.course import Course, Courses
 from studies.truth.driver import Driver
 from studies.truth.fleet import Fleet, tires_of
 from studies.truth.layout import B, rolling
-from studies.truth.plant import Plant, Turned
+from studies.truth.plant import Plant, SteerAngles
 from studies.truth.record import Truth
 from studies.truth.signals import UNITS, WHEEL_UNITS, signals_of
 from studies.truth.stepper import Step, advance
@@ -102,7 +102,7 @@ def _run(
     state = rolling([c.initial_speed for c in courses], fleet.radius)
     out = {name: np.empty((fleet.size, samples, *_corner_axis(name))) for name in record}
     nothing = np.zeros((4, fleet.size))
-    moving = plant.slide(state, Turned(nothing, nothing + 1.0))
+    moving = plant.slide(state, SteerAngles(nothing, nothing + 1.0))
     for k in range(samples):
         if k == 0:  # the first sample shows what acts at the start
             controls = driver.act(state, moving, 0.0, 0.0)

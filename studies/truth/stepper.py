@@ -17,7 +17,7 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from studies.truth.layout import DEFLECTION, W
-from studies.truth.plant import Controls, Forces, Plant, Slide, Turned
+from studies.truth.plant import Controls, Forces, Plant, Slide, SteerAngles
 
 _SMALL = 1e-3  # below, psi by its series, whose error is s^3/120
 
@@ -59,17 +59,17 @@ class _Spin(NamedTuple):
 
 def advance(plant: Plant, state: FloatArray, controls: Controls, h: float) -> Step:
     """One step of ``h`` seconds under controls that are held over it (best: those at its middle)."""
-    turned = Turned(np.sin(controls.steer), np.cos(controls.steer))
-    start, load = plant.slide(state, turned), plant.loads(state)
+    steered = SteerAngles(np.sin(controls.steer), np.cos(controls.steer))
+    start, load = plant.slide(state, steered), plant.loads(state)
     z = state[DEFLECTION].reshape(2, 4, -1)
-    end_z, forces = _contact(plant, z, z, start, load, controls, turned, h)
+    end_z, forces = _contact(plant, z, z, start, load, controls, steered, h)
     spin = _wheels(plant, state, forces, controls, h)
     guess = state + h * plant.body_rates(state, forces, spin.torque, controls)
     guess[W["wheel_speed"]] = spin.w
-    end = plant.slide(guess, turned)
+    end = plant.slide(guess, steered)
     middle = Slide(*(0.5 * (a + b) for a, b in zip(start, end, strict=True)))
     load = 0.5 * (load + plant.loads(guess))
-    end_z, forces = _contact(plant, z, 0.5 * (z + end_z), middle, load, controls, turned, h)
+    end_z, forces = _contact(plant, z, 0.5 * (z + end_z), middle, load, controls, steered, h)
     spin = _wheels(plant, state, forces, controls, h)
     rates = plant.body_rates(0.5 * (state + guess), forces, spin.torque, controls)
     out = state + h * rates
@@ -86,7 +86,7 @@ def _contact(
     moving: Slide,
     load: FloatArray,
     controls: Controls,
-    turned: Turned,
+    steered: SteerAngles,
     h: float,
 ) -> tuple[FloatArray, Forces]:
     """Deflections (2, 4, B) at the end of the step and mean forces over it; rates are taken at the deflections `at`."""
@@ -94,7 +94,7 @@ def _contact(
     a, push = tire.rates(at, moving.slip, np.absolute(moving.surface), transport, controls.friction)
     after, mean, rate = stepped_deflection(z, push, a, h)
     force = tire.forces(mean, rate, moving.slip, transport, load, controls.friction)
-    return after, plant.in_body_axes(force, load, turned)
+    return after, plant.in_body_axes(force, load, steered)
 
 
 def _wheels(plant: Plant, state: FloatArray, forces: Forces, controls: Controls, h: float) -> _Spin:

@@ -13,7 +13,7 @@ from studies.truth import Truth, TruthVehicle, load_vehicle, simulate
 from studies.truth.course import Course, Courses
 from studies.truth.driver import Driver
 from studies.truth.fleet import Fleet, tires_of
-from studies.truth.plant import Controls, Plant, Turned
+from studies.truth.plant import Controls, Plant, SteerAngles
 from studies.truth.profile import GRID
 from studies.truth.road import Zone
 
@@ -61,7 +61,7 @@ def plant_of(one: Course, vehicle: TruthVehicle) -> tuple[Plant, Callable[[Float
     nothing = np.zeros((4, 1))
 
     def controls(state: FloatArray, time: float) -> Controls:
-        return driver.act(state, plant.slide(state, Turned(nothing, nothing + 1.0)), time, 0.0)
+        return driver.act(state, plant.slide(state, SteerAngles(nothing, nothing + 1.0)), time, 0.0)
 
     return plant, controls
 
