@@ -68,10 +68,9 @@ class ScheduleSpec(StrictTable):
     gains: DesignSpec = Field(alias="design")
     deploy: DeploySpec
 
-    def parameter_set(self, folder: Path | None = None) -> ParameterSet:
+    def parameter_set(self, folder: Path = Path()) -> ParameterSet:
         """The parameter values: a shipped set by name, or a TOML file beside the specification."""
-        name = self.model.parameters
-        return load_parameter_set(folder / name if name.endswith(".toml") and folder else name)
+        return load_parameter_set(self.model.parameters, folder)
 
     def build_model(self, parameters: ParameterSet) -> LpvModel:
         """The LPV model over its box."""

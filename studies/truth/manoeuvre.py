@@ -97,11 +97,10 @@ class Manoeuvre(StrictTable):
             raise SpecError(unknown("tire", tire, TIRES))
         return self.model_copy(update={"vehicle": self.vehicle.model_copy(update={"tire": tire})})
 
-    def truth_vehicle(self, folder: Path | None = None) -> TruthVehicle:
-        """The car. Raises SpecError when there is no such parameter set."""
+    def truth_vehicle(self, folder: Path = Path()) -> TruthVehicle:
+        """The car; a file of its own lies in ``folder``. Raises SpecError when there is no such parameter set."""
         own = self.vehicle
-        name = own.parameters
-        car = load_vehicle(folder / name if name.endswith(".toml") and folder else name)
+        car = load_vehicle(own.parameters, folder)
         limits = ("maximum_torque", "maximum_power", "maximum_brake_torque")
         given = {name: value for name in limits if (value := getattr(own, name)) is not None}
         fitted = replace(

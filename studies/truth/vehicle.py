@@ -92,14 +92,14 @@ def vehicle_parameters(values: ParameterSet) -> VehicleParameters:
         raise SpecError(f"parameter set '{values.id}': {error}; add it to [vehicle]") from None
 
 
-def load_vehicle(name: str | Path) -> TruthVehicle:
-    """The truth vehicle of a parameter set: shipped with the models or with the truth by name, or a TOML file of yours.
+def load_vehicle(name: str | Path, folder: Path = Path()) -> TruthVehicle:
+    """The truth vehicle of a parameter set: shipped with the models or with the truth by name, or a TOML file in ``folder``.
 
     Raises:
         SpecError: no such set, or values that no car has.
     """
     own = shipped_vehicles()
-    values = load_parameter_set(own.get(str(name), name))
+    values = load_parameter_set(own.get(str(name), name), folder)
     given = {key: entry.value for key, entry in values.vehicle.items()}
     suspension = SuspensionParameters()
     if "suspension_stiffness_longitudinal" in given:

@@ -60,12 +60,12 @@ class ParameterSet(StrictTable):
     tire: Annotated[dict[str, Tire], Field(min_length=1)]
 
 
-def load_parameter_set(name: str | Path) -> ParameterSet:
-    """A shipped set by its name, or a set of your own by its path (ends with .toml).
+def load_parameter_set(name: str | Path, folder: Path = Path()) -> ParameterSet:
+    """A shipped set by its name, or a set of your own by its path from ``folder`` (ends with .toml).
 
     Raises SpecError naming the file, the key and the remedy.
     """
-    return load_toml(find_toml(name, shipped_parameter_sets(), "parameter set"), ParameterSet, "parameter")
+    return load_toml(folder / find_toml(name, shipped_parameter_sets(), "parameter set"), ParameterSet, "parameter")
 
 
 def shipped_parameter_sets() -> dict[str, Path]:
