@@ -22,6 +22,20 @@ from studies.drives.prepare import CornerInputs
 from studies.drives.quantities import CORNERS
 from studies.drives.replay import Replay, centre_map
 
+Axle = Literal["front", "rear"]
+AXLES: tuple[Axle, ...] = ("front", "rear")
+LEAST_FORCE = 1000.0
+"""N that a reference force must exceed for a sample to count: the papers report forces that do something."""
+LEAST_SPEED = 2.0
+"""m/s below which no slip ratio and no sideslip angle is formed: the velocity error is then a large part of it."""
+RULES = {
+    "nrms": "RMS error over the largest magnitude of the reference, %",
+    "forces": f"samples where the reference force exceeds {LEAST_FORCE:g} N; the peak is that of all samples",
+    "sideslip": f"samples where the reference V_x exceeds {LEAST_SPEED:g} m/s",
+}
+STRAIGHT = 0.01
+"""rad below which steered wheels hardly add lateral force to m a_x: the sum of F_x then misses only the drag of air."""
+
 
 @dataclass(frozen=True)
 class Deviation:
@@ -62,19 +76,6 @@ def deviation(estimate: FloatArray, reference: FloatArray, unit: str) -> Deviati
         max_error=float(np.max(np.abs(error))),
         reference_peak=peak,
     )
-
-
-Axle = Literal["front", "rear"]
-AXLES: tuple[Axle, ...] = ("front", "rear")
-LEAST_FORCE = 1000.0
-"""N that a reference force must exceed for a sample to count: the papers report forces that do something."""
-LEAST_SPEED = 2.0
-"""m/s below which no slip ratio and no sideslip angle is formed: the velocity error is then a large part of it."""
-RULES = {
-    "nrms": "RMS error over the largest magnitude of the reference, %",
-    "forces": f"samples where the reference force exceeds {LEAST_FORCE:g} N; the peak is that of all samples",
-    "sideslip": f"samples where the reference V_x exceeds {LEAST_SPEED:g} m/s",
-}
 
 
 def lateral_motion(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: DriveFile) -> dict[str, dict[str, Any]]:
@@ -174,10 +175,6 @@ def _above_least_force(estimates: dict[str, FloatArray], reference: FloatArray) 
         nrms = None if entry.rms is None else 100.0 * entry.rms / peak
         found[name] = asdict(replace(entry, reference_peak=peak, nrms_percent=nrms))
     return found
-
-
-STRAIGHT = 0.01
-"""rad below which steered wheels hardly add lateral force to m a_x: the sum of F_x then misses only the drag of air."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
-"""Profiles over time and paths over the way: pieces in a row, as tables on a uniform grid, linear between its points."""
+"""Profiles over time and paths over the way: pieces in a row, as tables on a uniform grid, linear between its points.
+
+Each piece starts from the value at which the last one ended; the truth records what was applied.
+"""
 
 from __future__ import annotations
 
@@ -30,6 +33,14 @@ _NEEDS: dict[str, tuple[set[str], set[str]]] = {
     "table": ({"times", "values", "unit"}, set()),
 }
 """Keys that each kind must have, and those that it may have."""
+BLEND = 5.0
+"""m over which the curvature changes between pieces: roads are no compasses, and drivers cannot jump."""
+_PATH_NEEDS = {
+    "straight": {"length"},
+    "arc": {"radius", "angle_deg"},
+    "lane-change": {"length", "offset"},
+    "slalom": {"length", "wavelength", "offset"},
+}
 
 
 def _check_keys(kind: str, given: Set[str], needs: Set[str], may: Set[str]) -> None:
@@ -144,16 +155,6 @@ def sampled(pieces: Sequence[Piece], unit: str, duration: float, start: float = 
         start = piece.end(start, unit)
         out[t >= begin - 1e-9] = start
     return out
-
-
-BLEND = 5.0
-"""m over which the curvature changes between pieces: roads are no compasses, and drivers cannot jump."""
-_PATH_NEEDS = {
-    "straight": {"length"},
-    "arc": {"radius", "angle_deg"},
-    "lane-change": {"length", "offset"},
-    "slalom": {"length", "wavelength", "offset"},
-}
 
 
 class PathPiece(StrictTable):

@@ -103,7 +103,10 @@ RUNS = "runs.json"
 
 
 def write_truth(truth: Truth, folder: Path) -> None:
-    """Write times, signals and what is known of the runs, except their vehicles, to the folder."""
+    """Write times, signals and what is known of the runs, except their vehicles, to the folder.
+
+    One array file for each signal, mapped into memory when it is read, so that a few runs cost little.
+    """
     np.save(folder / "time.npy", truth.time)
     for name, value in truth.signals.items():
         np.save(folder / f"{name}.npy", value)

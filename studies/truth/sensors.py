@@ -15,6 +15,18 @@ from estimators.signals.ticks import TickSpeed
 from studies.truth.record import Truth
 from synthesis.errors import SpecError
 
+SOURCES = {
+    "wheel_speed": "wheel_speed", "steer": "steer", "torque": "torque",
+    "ax": "ax", "ay": "ay", "az": "az",
+    "yaw_rate": "yaw_gyro", "roll_rate": "roll_rate", "pitch_rate": "pitch_rate",
+}  # fmt: skip
+"""The signal of the truth behind each measured one."""
+_CHANNELS = {
+    **dict.fromkeys(("ax", "ay", "az"), "acceleration"),
+    **dict.fromkeys(("yaw_rate", "roll_rate", "pitch_rate"), "rate"),
+}
+"""Of `Sensors`, where the channel is not called like the signal."""
+
 
 @dataclass(frozen=True)
 class Drops:
@@ -145,19 +157,6 @@ class Sensors:
 
 PERFECT = Sensors(Channel(), Channel(), Channel(), Channel(), Channel())
 """Sensors without any error."""
-
-
-SOURCES = {
-    "wheel_speed": "wheel_speed", "steer": "steer", "torque": "torque",
-    "ax": "ax", "ay": "ay", "az": "az",
-    "yaw_rate": "yaw_gyro", "roll_rate": "roll_rate", "pitch_rate": "pitch_rate",
-}  # fmt: skip
-"""The signal of the truth behind each measured one."""
-_CHANNELS = {
-    **dict.fromkeys(("ax", "ay", "az"), "acceleration"),
-    **dict.fromkeys(("yaw_rate", "roll_rate", "pitch_rate"), "rate"),
-}
-"""Of `Sensors`, where the channel is not called like the signal."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,15 @@ _SMALL = 1e-3  # below, psi by its series, whose error is s^3/120
 def stepped_deflection(
     z: FloatArray, v: FloatArray, a: FloatArray, h: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """z after the step, its mean and the mean of z' (same shapes); m, m/s, 1/s (not negative), s."""
+    """z after the step, its mean and the mean of z' (same shapes); m, m/s, 1/s (not negative), s.
+
+    What both tires have in common is a deflection with z' = v - a z, stepped exactly for v and a held over the step:
+
+        z(h) = z e^-s + h v phi,   mean z = z phi + h v psi,   s = a h, phi = (1 - e^-s)/s, psi = (1 - phi)/s
+        mean z' = (z(h) - z)/h = v - a (mean z),
+
+    regular where a is 2e4 1/s (sliding on ice) and at a = 0 (a wheel at rest).
+    """
     s = a * h
     few = s < _SMALL
     if few.any():
