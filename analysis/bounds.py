@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 
 from analysis.checks import as_stack, positive
 from analysis.errors import AnalysisError
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -10,9 +10,9 @@ import numpy as np
 
 from analysis.checks import positive, square
 from analysis.errors import AnalysisError
-from synthesis.errors import unknown
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from synthesis.models.param import Constant
-from synthesis.polynomials.matrix import FloatArray
 
 Output = Literal["yaw_rate", "lateral_acceleration", "longitudinal_acceleration"]
 OUTPUTS: tuple[Output, ...] = ("yaw_rate", "lateral_acceleration", "longitudinal_acceleration")

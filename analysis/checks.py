@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.errors import AnalysisError
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from synthesis.lmi.problem import LmiProblem
-from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
+from synthesis.polynomials.matrix import MatrixPolynomial
 
 
 def constant_problem() -> LmiProblem:

@@ -1,4 +1,4 @@
-r"""Mean-square stability by LMI, the second road beside the spectral radius: P_i > 0 with
+r"""Mean-square stability by LMI, the second method beside the spectral radius: P_i > 0 with
 
 P_i - A_i' (sum_j p_ij P_j) A_i > 0   for every mode i   (Costa, Fragoso and Marques 2005, Theorem 3.9).
 """
@@ -13,10 +13,11 @@ from scipy.linalg import matrix_balance
 from analysis.constant_lmi import constant_problem, matrix_of
 from analysis.errors import AnalysisError
 from analysis.markov import MarkovJumpSystem
+from estimators.arrays import FloatArray
 from synthesis.lmi.result import LmiResult, Margin, Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
-from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
+from synthesis.polynomials.matrix import MatrixPolynomial
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from analysis.checks import positive_semidefinite
 from analysis.errors import AnalysisError
 from analysis.markov import MarkovJumpSystem
 from analysis.second_moment import pack, unpack
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

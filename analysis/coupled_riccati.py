@@ -19,7 +19,7 @@ from analysis.coupled_lmi import single
 from analysis.coupled_lyapunov import solve_coupled_lyapunov
 from analysis.errors import AnalysisError
 from analysis.markov import MarkovJumpSystem
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

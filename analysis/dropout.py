@@ -25,7 +25,7 @@ from analysis.checks import leading, probability, same_size, square
 from analysis.dropout_planar import critical_planar
 from analysis.errors import AnalysisError
 from analysis.second_moment import lifted, spectral_radius
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
+from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule, PlantPolynomial
-from synthesis.polynomials.matrix import FloatArray
 
 SAMPLES = 32  # of s in the bound on e^{s M}
 _HOPELESS = 1e100  # a bound that proves nothing: larger ones overflow

@@ -25,10 +25,10 @@ from scipy.linalg import expm
 
 from analysis.checks import as_stack, leading, positive, square
 from analysis.errors import AnalysisError
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from estimators.schedule import GainSchedule, Update
-from synthesis.errors import unknown
 from synthesis.models.discretise import zero_order_hold
-from synthesis.polynomials.matrix import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

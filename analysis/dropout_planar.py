@@ -12,9 +12,8 @@ out, and the other two come from a quadratic.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import BoolArray, FloatArray
 
 # |det(I - A0)| up to so many roundings of its terms counts as an eigenvalue 1 of A0.
 ROUNDINGS = 8.0
@@ -43,7 +42,7 @@ def _square(X: FloatArray) -> tuple[tuple[FloatArray, ...], ...]:
 
 def _characteristic(
     A0: FloatArray, A1: FloatArray
-) -> tuple[tuple[FloatArray, FloatArray, FloatArray], NDArray[np.bool_], NDArray[np.bool_]]:
+) -> tuple[tuple[FloatArray, FloatArray, FloatArray], BoolArray, BoolArray]:
     """Invariants of K, where A1 is stable, and where A0 has an eigenvalue 1."""
     trace, det = A1[..., 0, 0] + A1[..., 1, 1], _det2(A1)
     stable = (np.abs(trace) < 1.0 + det) & (np.abs(det) < 1.0)  # Jury

@@ -10,8 +10,8 @@ from scipy.optimize import minimize_scalar
 from analysis.dropout import critical_drop_probability
 from analysis.dropout_modes import DropPolicy, schedule_drop_modes
 from analysis.errors import AnalysisError
+from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule
-from synthesis.polynomials.matrix import FloatArray
 
 
 @dataclass(frozen=True)

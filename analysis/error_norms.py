@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from analysis.errors import AnalysisError
 from analysis.norms import HinfNorm, hinf_norm
-from synthesis.errors import unknown
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray
 
 
 def selection(model: LpvModel, disturbances: Sequence[str], errors: Sequence[str]) -> tuple[FloatArray, FloatArray]:

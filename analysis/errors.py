@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from synthesis.errors import GainsmithError
+from estimators.errors import GainsmithError
 
 
 class AnalysisError(GainsmithError):

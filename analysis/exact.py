@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 
 from flint import fmpq, fmpq_mat
 
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 from synthesis.polynomials.rational import is_positive_definite, rational
 
 Rational: TypeAlias = Any  # flint.fmpq_mat; flint has no type stubs

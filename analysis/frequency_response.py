@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from analysis.checks import as_stack, leading, square
 from analysis.errors import AnalysisError
-from synthesis.polynomials.matrix import FloatArray, IndexArray
-
-ComplexArray: TypeAlias = NDArray[np.complex128]
-BoolArray: TypeAlias = NDArray[np.bool_]
+from estimators.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 
 
 @dataclass(frozen=True)
@@ -81,7 +78,7 @@ def largest_gain(systems: Systems, s: ArrayLike) -> FloatArray:
     return sigma_max(systems.C[:, None] @ states + systems.D[:, None])
 
 
-def sigma_max(G: NDArray[Any]) -> FloatArray:
+def sigma_max(G: AnyArray) -> FloatArray:
     """Largest singular value of a stack (..., p, m): closed form for ranks one and two, which is what most loops are."""
     p, m = G.shape[-2:]
     if min(p, m) > 2:
@@ -99,5 +96,5 @@ def sigma_max(G: NDArray[Any]) -> FloatArray:
     return np.asarray(np.sqrt(largest) * scale)
 
 
-def _energy(rows: NDArray[Any]) -> FloatArray:
+def _energy(rows: AnyArray) -> FloatArray:
     return np.asarray((rows.real**2 + rows.imag**2).sum(axis=-1))

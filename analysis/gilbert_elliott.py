@@ -24,7 +24,7 @@ from analysis.dropout import CHECK, REAL, pair, stable_intervals
 from analysis.errors import AnalysisError
 from analysis.markov import MarkovJumpSystem, second_moment_operator
 from analysis.second_moment import lifted, spectral_radius
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -9,9 +9,9 @@ import numpy as np
 
 from analysis.checks import as_stack, positive, square
 from analysis.errors import AnalysisError
+from estimators.arrays import FloatArray
 from synthesis.models.discretise import zero_order_hold
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

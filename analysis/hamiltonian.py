@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from analysis.errors import AnalysisError
-from analysis.frequency_response import BoolArray, ComplexArray, Systems, largest_gain, read_systems, sigma_max
-from synthesis.polynomials.matrix import FloatArray
+from analysis.frequency_response import Systems, largest_gain, read_systems, sigma_max
+from estimators.arrays import BoolArray, ComplexArray, FloatArray
 
 # How near to the imaginary axis an eigenvalue must be to be looked at: far above rounding. Each one is then decided by
 # evaluating the gain there, so a generous number costs time and no accuracy.

@@ -26,16 +26,17 @@ from analysis.checks import as_stack, probability, square
 from analysis.constant_lmi import constant_problem, matrix_of
 from analysis.errors import AnalysisError
 from analysis.second_moment import lifted, spectral_radius
-from synthesis.errors import unknown
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
-from synthesis.polynomials.matrix import FloatArray, symmetric_block
+from synthesis.polynomials.matrix import symmetric_block
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-Road = Literal["riccati", "lmi"]
+Method = Literal["riccati", "lmi"]
 SWEEPS = 20_000  # of the nonlinear power iteration
 GUARD = 1e-12  # relative, for the rounding of eigenvalues
 
@@ -87,20 +88,20 @@ def static_gain_radius(A: ArrayLike, C: ArrayLike, gain: ArrayLike, arrival: Arr
     return spectral_radius(a * lifted(plant - K @ output) + (1.0 - a) * lifted(plant))
 
 
-def judge_static_gain(
-    A: ArrayLike, C: ArrayLike, arrival: float, road: Road = "riccati", settings: LmiSettings | None = None
+def certify_static_gain(
+    A: ArrayLike, C: ArrayLike, arrival: float, method: Method = "riccati", settings: LmiSettings | None = None
 ) -> StaticGain:
     """Whether some static gain is mean-square stable at this arrival rate.
 
-    The gain comes from the nonlinear Perron problem (road "riccati") or from the LMI (road "lmi"), and is judged by its
-    radius alone; a refutation is one matrix inequality on either road. Raises AnalysisError for matrices that do not fit.
+    The gain comes from the nonlinear Perron problem (method "riccati") or from the LMI (method "lmi"), and is judged by its
+    radius alone; a refutation is one matrix inequality by either method. Raises AnalysisError for matrices that do not fit.
     """
     plant, output = _plant(A, C)
     a = float(probability("arrival", arrival))
-    if road not in get_args(Road):
-        raise AnalysisError(unknown("road", str(road), get_args(Road)))
+    if method not in get_args(Method):
+        raise AnalysisError(unknown("method", str(method), get_args(Method)))
     X, gain = _perron(plant, output, a)
-    candidate = gain if road == "riccati" else lmi_gain(plant, output, a, settings)
+    candidate = gain if method == "riccati" else lmi_gain(plant, output, a, settings)
     if candidate is not None:
         gain, radius = candidate, float(static_gain_radius(plant, output, candidate, a))
         if radius < 1.0:
@@ -115,7 +116,7 @@ def static_critical_arrival(
     A: ArrayLike,
     C: ArrayLike,
     tolerance: float = 1e-9,
-    road: Road = "riccati",
+    method: Method = "riccati",
     settings: LmiSettings | None = None,
 ) -> CriticalArrival:
     """Bracket of the smallest arrival rate at which one static gain is mean-square stable (lambda-bar).
@@ -131,12 +132,12 @@ def static_critical_arrival(
     if open_radius < 1.0:
         return CriticalArrival(Verdict.CERTIFIED, 0.0, 0.0, none, open_radius)
     _require_detectable(plant, output)
-    best = judge_static_gain(plant, output, 1.0, road, settings)
+    best = certify_static_gain(plant, output, 1.0, method, settings)
     if best.verdict is not Verdict.CERTIFIED:
         raise AnalysisError("no static gain was found that is stable with every measurement; scale the states")
     low, high, narrow = lower_bound(plant), 1.0, True
     while high - low > tolerance:
-        answer = judge_static_gain(plant, output, 0.5 * (low + high), road, settings)
+        answer = certify_static_gain(plant, output, 0.5 * (low + high), method, settings)
         if answer.verdict is Verdict.CERTIFIED:
             best, high = answer, answer.arrival
         elif answer.verdict is Verdict.REFUTED:
@@ -151,7 +152,7 @@ def kalman_critical_arrival(
     A: ArrayLike,
     C: ArrayLike,
     tolerance: float = 1e-9,
-    road: Road = "riccati",
+    method: Method = "riccati",
     settings: LmiSettings | None = None,
 ) -> KalmanArrival:
     """Bounds of the arrival rate below which the expected covariance of the Kalman filter grows without bound.
@@ -160,7 +161,7 @@ def kalman_critical_arrival(
     unstable direction.
     """
     plant, output = _plant(A, C)
-    static = static_critical_arrival(plant, output, tolerance, road, settings)
+    static = static_critical_arrival(plant, output, tolerance, method, settings)
     low = lower_bound(plant)
     exact, reason = _nondegenerate(plant, output)
     return KalmanArrival(low, low if exact else static.upper, exact, reason, static)

@@ -19,8 +19,8 @@ from analysis.errors import AnalysisError
 from analysis.jsr_ellipsoid import Ellipsoid, best_ellipsoid
 from analysis.jsr_polytope import grow_polytope, proved_polytope_bound
 from analysis.jsr_products import multiply_out, proved_rate, search_products, vanishes
+from estimators.arrays import FloatArray
 from synthesis.lmi.result import Verdict
-from synthesis.polynomials.matrix import FloatArray
 
 Proof = Literal["ellipsoid", "polytope", "nilpotent"]
 FRACTIONS = (0.8, 0.4)  # of the tolerance, by which modes are scaled down before a polytope is grown

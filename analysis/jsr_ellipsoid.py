@@ -8,8 +8,8 @@ import numpy as np
 
 from analysis.exact import as_float_up, congruence, is_positive, rationals
 from analysis.switching_lyapunov import common_quadratic_lyapunov
+from estimators.arrays import FloatArray
 from synthesis.lmi.result import Verdict
-from synthesis.polynomials.matrix import FloatArray
 from synthesis.polynomials.rational import rational
 
 BISECTIONS = 40

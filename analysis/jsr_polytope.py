@@ -15,7 +15,7 @@ from scipy.linalg import qr
 from scipy.optimize import linprog
 
 from analysis.exact import absolute, as_float_up, rationals
-from synthesis.polynomials.matrix import FloatArray, IndexArray
+from estimators.arrays import FloatArray, IndexArray
 
 LARGE = 1e6  # vertices this far out in units of the start: the modes do not contract
 SMALL = 1e-3  # size of the axis vectors that make the polytope solid

@@ -12,7 +12,7 @@ import numpy as np
 from flint import fmpq, fmpq_mat, fmpq_poly
 
 from analysis.exact import Rational, rationals, total
-from synthesis.polynomials.matrix import FloatArray, IndexArray
+from estimators.arrays import FloatArray, IndexArray
 from synthesis.polynomials.rational import rational
 
 WIDTH = 4000  # products kept at each length

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
-from synthesis.errors import unknown
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
 
 SCHEMA = "gainsmith.labelled/1"
-Labels: TypeAlias = NDArray[np.float64] | NDArray[np.str_]
+Labels: TypeAlias = FloatArray | NDArray[np.str_]
 
 
 @dataclass(frozen=True)

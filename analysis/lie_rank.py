@@ -14,9 +14,9 @@ from flint import arb, arb_mat, arb_series
 from analysis.errors import AnalysisError
 from analysis.lie_series import Evaluator, ball, series_arithmetic
 from analysis.observability import exact_number
-from synthesis.errors import unknown
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from synthesis.models.nonlinear import NonlinearModel
-from synthesis.polynomials.matrix import FloatArray
 
 Number: TypeAlias = float | int | str | Any  # or an exact sympy number
 BITS = 320

@@ -9,8 +9,8 @@ import numpy as np
 
 from analysis.checks import as_stack
 from analysis.errors import AnalysisError
+from estimators.arrays import FloatArray
 from synthesis.models.parameter_set import ParameterSet
-from synthesis.polynomials.matrix import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

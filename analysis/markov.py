@@ -22,7 +22,7 @@ from analysis.errors import AnalysisError
 from analysis.markov_chain import distribution, stationary_distribution, stochastic
 from analysis.markov_planar import planar_radius
 from analysis.second_moment import lifted, pack, spectral_radius, unpack
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

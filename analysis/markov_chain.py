@@ -8,10 +8,10 @@ import numpy as np
 
 from analysis.checks import probability, square
 from analysis.errors import AnalysisError
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
 # How far the sum of a row of printed probabilities may lie from 1: accumulated rounding, not rounding to a few digits.
 ROW_SUM_TOLERANCE = 1e-9
@@ -56,7 +56,7 @@ def stochastic_vector(name: str, array: ArrayLike) -> FloatArray:
     return np.asarray(out / out.sum(axis=-1, keepdims=True))
 
 
-def reachable(transition: FloatArray) -> NDArray[np.bool_]:
+def reachable(transition: FloatArray) -> BoolArray:
     """Whether j can be reached from i in any number of steps, zero included."""
     size = transition.shape[-1]
     out = (transition > 0.0) | np.eye(size, dtype=bool)
@@ -65,7 +65,7 @@ def reachable(transition: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(out)
 
 
-def recurrent(transition: FloatArray) -> NDArray[np.bool_]:
+def recurrent(transition: FloatArray) -> BoolArray:
     """Modes that are visited for ever once entered: every mode that can be reached leads back."""
     reach = reachable(transition)
     return np.asarray((~reach | np.swapaxes(reach, -1, -2)).all(axis=-1))
@@ -96,7 +96,7 @@ def stationary_distribution(transition: FloatArray) -> FloatArray:
 
 def sample_paths(
     transition: FloatArray, start: FloatArray, steps: int, runs: int, generator: np.random.Generator
-) -> NDArray[np.int64]:
+) -> IntArray:
     """Modes (steps + 1, runs) of independent runs of one chain; `start` (m,) is the distribution of the first one."""
     cumulative = np.cumsum(transition, axis=-1)
     modes = np.empty((steps + 1, runs), dtype=np.int64)

@@ -18,7 +18,7 @@ from analysis.errors import AnalysisError
 from analysis.markov import MarkovJumpSystem
 from analysis.markov_chain import ROW_SUM_TOLERANCE, stationary_distribution
 from analysis.second_moment import triangle
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -83,7 +83,7 @@ class MarkovJumpProcess:
     def small_step(self, step: float) -> MarkovJumpSystem:
         """The jump system of one short step in s: modes e^{A_i h}, transition e^{Q h}; jumps only at its ends.
 
-        Its radius r obeys log(r) / h -> abscissa as h -> 0: the second road for tests and Monte Carlo.
+        Its radius r obeys log(r) / h -> abscissa as h -> 0: the independent check for tests and Monte Carlo.
         """
         h = positive("step", step)
         return MarkovJumpSystem(expm(self.modes * h), expm(self.generator * h))

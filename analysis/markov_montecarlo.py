@@ -13,7 +13,7 @@ from analysis.coupled_lmi import single
 from analysis.errors import AnalysisError
 from analysis.markov import MarkovJumpSystem
 from analysis.markov_chain import distribution, sample_paths
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

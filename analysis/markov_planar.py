@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 SQUARINGS = 9  # M^512: enough unless two moduli differ by less than some 5 %
 AGREEMENT = 1e-13  # relative distance of the bounds at which an answer is taken

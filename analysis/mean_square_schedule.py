@@ -25,11 +25,11 @@ from analysis.dropout_modes import schedule_drop_modes
 from analysis.dropout_schedule import FrozenDropProbability, frozen_critical_probability
 from analysis.errors import AnalysisError
 from analysis.second_moment import lifted, pack, unpack
+from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
-from synthesis.polynomials.matrix import FloatArray
 
 REFINEMENTS = (1, 2)  # segments of P to a segment of the table, tried in turn
 SHARE = 4  # cells of the LMI to a segment of P
@@ -61,7 +61,7 @@ def mean_square_schedule(
     frozen: FrozenDropProbability | None = None,
     settings: LmiSettings | None = None,
 ) -> MeanSquareSchedule:
-    """Judge one drop probability; `frozen` may be passed in if it is known already.
+    """Check one drop probability; `frozen` may be passed in if it is known already.
 
     Raises AnalysisError for a probability outside [0, 1].
     """
@@ -75,7 +75,7 @@ def mean_square_schedule(
             words = f"refuted: second-moment radius {radius:.6g} at {name} = {frozen.place:.6g} {unit}, standing still"
             return MeanSquareSchedule(Verdict.REFUTED, p, words, 1.0 - radius, frozen.place)
     for refinement in REFINEMENTS:
-        answer = judge(schedule, p, *design(schedule, p, refinement, settings))
+        answer = check_mean_square(schedule, p, *design(schedule, p, refinement, settings))
         if answer.verdict is Verdict.CERTIFIED:
             break
     return answer
@@ -129,7 +129,9 @@ def design(
     return nodes, np.stack([matrix_of(result.values[f"P{i}"]) for i in range(len(nodes))]), scale
 
 
-def judge(schedule: GainSchedule, p: float, nodes: FloatArray, P: FloatArray, scale: FloatArray) -> MeanSquareSchedule:
+def check_mean_square(
+    schedule: GainSchedule, p: float, nodes: FloatArray, P: FloatArray, scale: FloatArray
+) -> MeanSquareSchedule:
     """Prove the inequality on every cell of the range for these P (b, n, n), halving the cells that need it.
 
     `scale` S sets the coordinates in which P is given, P_physical = S' P S.

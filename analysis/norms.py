@@ -18,7 +18,7 @@ from analysis.errors import AnalysisError
 from analysis.frequency_response import Systems, read_systems
 from analysis.hamiltonian import between, gain_at, near_axis, surely_clear, to_continuous
 from analysis.peak_start import starting_bound
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 ROUNDS = 40
 CHUNK = 4_000_000  # matrix entries treated at once, to bound memory

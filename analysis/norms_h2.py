@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from analysis.errors import AnalysisError
 from analysis.frequency_response import read_systems
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 DOUBLINGS = 64  # covers spectral radii up to 1 - 2^-60
 

@@ -11,7 +11,7 @@ from itertools import combinations
 import sympy as sp
 
 from analysis.errors import AnalysisError
-from synthesis.errors import unknown
+from estimators.errors import unknown
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter
 

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from analysis.checks import as_stack, square
 from analysis.errors import AnalysisError
 from analysis.gramians import Gramians
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 NODES = 8
 

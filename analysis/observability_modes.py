@@ -10,7 +10,7 @@ import sympy as sp
 
 from analysis.checks import as_stack, leading, square
 from analysis.errors import AnalysisError
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -27,17 +27,17 @@ class HautusTest:
 
     eigenvalues: np.ndarray[Any, np.dtype[np.complex128]]
     distance: FloatArray
-    hidden: np.ndarray[Any, np.dtype[np.bool_]]
-    decays: np.ndarray[Any, np.dtype[np.bool_]]
+    hidden: BoolArray
+    decays: BoolArray
     tolerance: float
 
     @property
-    def frozen_observable(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    def frozen_observable(self) -> BoolArray:
         """Every mode of the held pair is seen, (...)."""
         return np.asarray(~self.hidden.any(axis=-1))
 
     @property
-    def frozen_detectable(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    def frozen_detectable(self) -> BoolArray:
         """Every hidden mode of the held pair decays, (...)."""
         return np.asarray((self.decays | ~self.hidden).all(axis=-1))
 

@@ -10,8 +10,8 @@ import numpy as np
 from analysis.checks import positive
 from analysis.errors import AnalysisError
 from analysis.gramians import Gramians, sliding_controllability, sliding_observability
+from estimators.arrays import FloatArray
 from synthesis.lmi.result import Verdict
-from synthesis.polynomials.matrix import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

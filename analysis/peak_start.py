@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.frequency_response import BoolArray, ComplexArray, Systems, largest_gain, sigma_max
+from analysis.frequency_response import Systems, largest_gain, sigma_max
 from analysis.hamiltonian import gain_at
-from synthesis.polynomials.matrix import FloatArray, IndexArray
+from estimators.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 
 STEPS = (0.4, 0.05, 2e-3, 4e-5)  # of the parabolas through three points, in half-widths of the resonance
 

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 from analysis.checks import as_stack
 from analysis.error_norms import checked_gain
 from analysis.errors import AnalysisError
-from synthesis.errors import unknown
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from synthesis.models.extract import MATRICES
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray
 
 
 @dataclass(frozen=True)

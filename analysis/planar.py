@@ -16,7 +16,7 @@ import numpy as np
 
 from analysis.checks import as_stack, leading, square
 from analysis.errors import AnalysisError
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -13,8 +13,8 @@ import numpy as np
 
 from analysis.checks import square
 from analysis.errors import AnalysisError
+from estimators.arrays import FloatArray
 from estimators.phi import Phi
-from synthesis.polynomials.matrix import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

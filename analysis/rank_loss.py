@@ -10,7 +10,7 @@ import sympy as sp
 
 from analysis.errors import AnalysisError
 from analysis.observability import ObservabilityMatrix, exact_number
-from synthesis.errors import unknown
+from estimators.errors import unknown
 
 Interval = tuple[sp.Expr, sp.Expr]
 

@@ -11,8 +11,8 @@ import sympy as sp
 
 from analysis.errors import AnalysisError
 from analysis.observability import observability_matrix, rate_symbol
+from estimators.arrays import FloatArray
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray
 
 REAL = 1e-7  # imaginary part of a real root, relative to its size: double roots split by the root of the rounding error
 

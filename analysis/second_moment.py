@@ -18,7 +18,7 @@ import numpy as np
 
 from analysis.checks import square, symmetric
 from analysis.errors import AnalysisError
-from synthesis.polynomials.matrix import FloatArray, IndexArray
+from estimators.arrays import FloatArray, IndexArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -18,7 +18,7 @@ from analysis.checks import as_stack
 from analysis.errors import AnalysisError
 from analysis.labelled import Axis, LabelledArray
 from analysis.sensitivity_designs import Design
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 Measure: TypeAlias = Callable[[Mapping[str, FloatArray]], ArrayLike]
 

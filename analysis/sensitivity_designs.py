@@ -12,7 +12,7 @@ from scipy.stats import qmc
 
 from analysis.checks import as_stack
 from analysis.errors import AnalysisError
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 Ranges: TypeAlias = Mapping[str, tuple[float, float]]
 

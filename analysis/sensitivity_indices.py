@@ -15,7 +15,7 @@ from analysis.errors import AnalysisError
 from analysis.labelled import Axis, LabelledArray
 from analysis.sensitivity import Measure, evaluate
 from analysis.sensitivity_designs import Ranges, bounds, power_of_two
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 
 @dataclass(frozen=True)

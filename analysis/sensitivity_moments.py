@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from analysis.errors import AnalysisError
-from synthesis.polynomials.matrix import FloatArray, IndexArray
+from estimators.arrays import FloatArray, IndexArray
 
 HALF_WIDTH = float(ndtri(0.975))
 

@@ -11,7 +11,7 @@ from scipy.optimize import differential_evolution, minimize
 from analysis.errors import AnalysisError
 from analysis.sensitivity import Measure, evaluate
 from analysis.sensitivity_designs import Ranges, bounds, corners, sobol
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 MOST_CORNERS = 12  # parameters; beyond, the search starts from samples alone
 

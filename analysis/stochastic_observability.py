@@ -23,8 +23,8 @@ import numpy as np
 from analysis.checks import as_stack, positive_definite, positive_semidefinite, square
 from analysis.errors import AnalysisError
 from analysis.gramians import sampled_sequence
+from estimators.arrays import FloatArray
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -20,11 +20,11 @@ from analysis.checks import square
 from analysis.constant_lmi import constant_problem, matrix_of
 from analysis.errors import AnalysisError
 from analysis.exact import Rational, congruence, is_positive, rationals, total
+from estimators.arrays import FloatArray, IndexArray
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
-from synthesis.polynomials.matrix import FloatArray, IndexArray
 
 SETTINGS = LmiSettings(relaxation="vertex")
 

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from analysis.checks import leading, square
 from analysis.errors import AnalysisError
 from analysis.exact import Rational, rationals
+from estimators.arrays import FloatArray
 from synthesis.lmi.result import Verdict
-from synthesis.polynomials.matrix import FloatArray
 
 
 def pair_margin(first: ArrayLike, second: ArrayLike, discrete: bool = False) -> FloatArray:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from analysis.checks import as_stack, positive, square
 from analysis.errors import AnalysisError
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 
 @dataclass(frozen=True)

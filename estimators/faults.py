@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from enum import IntFlag
-from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
-FlagArray = npt.NDArray[np.int32]
-BoolArray = npt.NDArray[np.bool_]
+from estimators.arrays import AnyArray, FlagArray
+from estimators.arrays import BoolArray as BoolArray  # noqa: PLC0414 - until the last importer from here has gone
 
 
 class Flag(IntFlag):
@@ -37,6 +33,6 @@ DRIVING = Flag.STANDING | Flag.NOT_EXCITED
 """What the car does, not what is wrong with a signal: most of a drive carries one of these."""
 
 
-def raise_flag(flags: FlagArray, where: npt.NDArray[Any], flag: Flag) -> None:
+def raise_flag(flags: FlagArray, where: AnyArray, flag: Flag) -> None:
     """Adds `flag` to the entries `where`, in place."""
     flags[where] |= int(flag)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from bisect import bisect_right
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from estimators.arrays import BoolArray, FloatArray, IndexArray
 
 _MOST_BUCKETS = 65536
 
@@ -43,16 +42,16 @@ class PiecewiseLinear:
         self.searched = buckets == _MOST_BUCKETS  # breakpoints nearly coincide: search instead
         self.scale = buckets / span
         edges = self.low + np.arange(buckets + 1) / self.scale
-        self.first: npt.NDArray[np.intp] = np.searchsorted(self.inner, edges, "right")
+        self.first: IndexArray = np.searchsorted(self.inner, edges, "right")
 
-    def workspace(self, count: int) -> tuple[FloatArray, npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
+    def workspace(self, count: int) -> tuple[FloatArray, IndexArray, BoolArray]:
         """Scratch memory for `into` with `count` parameters."""
         return np.empty((self.rows.shape[0], count)), np.empty(count, dtype=np.intp), np.empty(count, dtype=np.bool_)
 
     def into(
         self,
         parameter: FloatArray,
-        workspace: tuple[FloatArray, npt.NDArray[np.intp], npt.NDArray[np.bool_]],
+        workspace: tuple[FloatArray, IndexArray, BoolArray],
         out: FloatArray,
     ) -> None:
         """Writes the values at `parameter` (m,), which must lie in the range, to `out` (k, m)."""

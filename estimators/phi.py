@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from estimators.interpolate import FloatArray
+from estimators.arrays import FloatArray
 
 _SERIES_LIMIT = 4.0  # |delta| up to which the series of sinh(r/2)/(r/2) below is exact to float64
 _SERIES = [1.0 / math.factorial(2 * k + 1) for k in range(9)]

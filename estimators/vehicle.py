@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from estimators.errors import EstimatorError
-from estimators.interpolate import FloatArray
 
 GRAVITY = 9.80665
 """Standard acceleration of free fall, m/s^2: what a level accelerometer reads upwards at rest."""

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-from estimators.errors import ScheduleError
+from estimators.errors import GainsmithError
 from estimators.schedule import read_content
 from estimators.schedule.checker import printable
 from estimators.schedule.files import place_of
 from synthesis.certificate.claims import written
 from synthesis.certificate.proof import Proof, certificate
-from synthesis.errors import GainsmithError
 
 LONGEST = 300  # characters of a message
 UNTIED = "format 1: constants and units are words only, tied to nothing that is proved"
@@ -56,7 +55,7 @@ def certify(path: Path) -> Certification:
     try:
         content = read_content(path)
         found = certificate(content, where)
-    except (ScheduleError, GainsmithError) as error:
+    except GainsmithError as error:
         words = printable(str(error).removeprefix(f"{where}: "), LONGEST - len("refused: "))
         return Certification(path, path.stem, (), words, perf_counter() - start)
     remarks = [f"a parameter moving inside a sample adds to the error of {line}" for line in found.inside_sample]

@@ -12,7 +12,7 @@ JsonValue = Any
 """Numbers, texts, lists and dictionaries of them: what a JSON file can hold."""
 
 
-class Verdict(StrEnum):
+class ClaimVerdict(StrEnum):
     """What became of a published claim."""
 
     REPRODUCED = "reproduced"
@@ -40,7 +40,7 @@ class Finding:
     """Our half: the value computed now, the verdict that follows from it, and the reading under which it holds."""
 
     computed: JsonValue
-    verdict: Verdict
+    verdict: ClaimVerdict
     reading: str
 
 
@@ -64,9 +64,9 @@ ClaimFunction = Callable[[], Finding]
 """Computes one claim from the models and analyses; takes nothing and reads no stored result."""
 
 
-def judged(holds: bool, otherwise: Verdict = Verdict.NOT_REPRODUCED) -> Verdict:
+def judged(holds: bool, otherwise: ClaimVerdict = ClaimVerdict.NOT_REPRODUCED) -> ClaimVerdict:
     """REPRODUCED when the computed value ``holds``, else ``otherwise``: a verdict follows from a comparison."""
-    return Verdict.REPRODUCED if holds else otherwise
+    return ClaimVerdict.REPRODUCED if holds else otherwise
 
 
 def agrees(computed: float, published: float, half_last_digit: float) -> bool:

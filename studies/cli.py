@@ -93,14 +93,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Work is spread over processes and the matrices are tiny: more threads of linear algebra only cost time.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    from estimators.errors import EstimatorError
-    from synthesis.errors import GainsmithError
+    from estimators.errors import GainsmithError
 
     del chosen["command"]
     module, function = chosen.pop("function").split(".")
     try:
         code: int = getattr(import_module(f"studies.commands.{module}"), function)(**chosen)
-    except (GainsmithError, EstimatorError) as error:
+    except GainsmithError as error:
         print(f"gainsmith: {error}", file=sys.stderr)
         return REFUSED
     except OSError as error:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from importlib import import_module, resources
 
+from estimators.errors import unknown
 from studies.study import Study
 from synthesis.errors import SpecError
 
@@ -32,8 +32,7 @@ class Registry:
     def check(self, study_id: str) -> None:
         """Raises SpecError that offers the nearest names when there is no study ``study_id``."""
         if study_id not in self.modules:
-            near = get_close_matches(study_id, self.modules, n=3) or list(self.modules)
-            raise SpecError(f"study '{study_id}' does not exist; there are: {', '.join(near)}")
+            raise SpecError(unknown("study", study_id, self.modules))
 
     def load(self, study_id: str) -> Study:
         """The study named ``study_id``. Raises SpecError for an unknown one."""

@@ -21,14 +21,13 @@ from typing import Any
 
 import numpy as np
 
-from estimators.errors import ScheduleError
+from estimators.errors import GainsmithError
 from estimators.schedule import read_content
 from studies.spec import load_spec
 from synthesis.certificate.export import export, schedule_content
 from synthesis.certificate.frozen import frozen_gain
 from synthesis.certificate.proof import Proof, prove
 from synthesis.deploy import deploy
-from synthesis.errors import GainsmithError
 from synthesis.hinf_observer import channel_matrices
 from synthesis.models.parameter_set import ParameterSet
 
@@ -83,7 +82,7 @@ def _run(item: tuple[str, Path, bool]) -> ScheduleRun:
     start = perf_counter()
     try:
         return run_spec(name, out, check)
-    except (GainsmithError, ScheduleError) as error:
+    except GainsmithError as error:
         return ScheduleRun(Path(name).stem, "failed", perf_counter() - start, str(error))
 
 
@@ -120,7 +119,7 @@ def compare(
     try:
         old = read_content(path)
         proofs = tuple(prove(old, str(path)))
-    except (ScheduleError, GainsmithError) as error:
+    except GainsmithError as error:
         return "drift", str(error), (), None
     failed = [proof for proof in proofs if not proof.proved]
     if failed:

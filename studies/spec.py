@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-import tomllib
-from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
+from estimators.errors import unknown
 from synthesis.deploy import DeploySettings
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 from synthesis.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
 from synthesis.lmi.settings import LmiSettings
 from synthesis.models.catalogue import CATALOGUE
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
 from synthesis.sampled_observer import design_sampled_observer
+from synthesis.toml_file import StrictTable, find_toml, load_toml, shipped_files
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
-
-
-class ModelSpec(_Strict):
+class ModelSpec(StrictTable):
     """Which model of the catalogue, with which parameter values, over which box."""
 
     id: str
@@ -32,7 +28,7 @@ class ModelSpec(_Strict):
     wheel_speed_rate: float = Field(ge=0)
 
 
-class ChannelSpec(_Strict):
+class ChannelSpec(StrictTable):
     """One channel of the design; without `bound` it is the one that is minimised."""
 
     disturbances: list[str] = Field(min_length=1)
@@ -41,7 +37,7 @@ class ChannelSpec(_Strict):
     weights: list[float] | None = None
 
 
-class DesignSpec(_Strict):
+class DesignSpec(StrictTable):
     """What is asked of the gains (synthesis.hinf_observer)."""
 
     degree: int = 1
@@ -54,7 +50,7 @@ class DesignSpec(_Strict):
     channels: list[ChannelSpec] = Field(min_length=1)
 
 
-class DeploySpec(_Strict):
+class DeploySpec(StrictTable):
     """How the gains become a table (synthesis.deploy) and how they are run (synthesis.loop.observer)."""
 
     update: Literal["held", "sampled"] = "held"
@@ -63,7 +59,7 @@ class DeploySpec(_Strict):
     interpolation_cost: float = 0.01
 
 
-class ScheduleSpec(_Strict):
+class ScheduleSpec(StrictTable):
     """A whole specification."""
 
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$")
@@ -72,19 +68,16 @@ class ScheduleSpec(_Strict):
     gains: DesignSpec = Field(alias="design")
     deploy: DeploySpec
 
-    def parameter_set(self, folder: Path | None = None) -> ParameterSet:
+    def parameter_set(self, folder: Path = Path()) -> ParameterSet:
         """The parameter values: a shipped set by name, or a TOML file beside the specification."""
-        name = self.model.parameters
-        return load_parameter_set(folder / name if name.endswith(".toml") and folder else name)
+        return load_parameter_set(self.model.parameters, folder)
 
     def build_model(self, parameters: ParameterSet) -> LpvModel:
         """The LPV model over its box."""
         if self.model.id not in CATALOGUE:
             raise SpecError(f"spec '{self.name}': {unknown('model', self.model.id, CATALOGUE)}")
         return CATALOGUE[self.model.id](
-            parameters,
-            wheel_speed_maximum=self.model.wheel_speed_maximum,
-            wheel_speed_rate=self.model.wheel_speed_rate,
+            parameters, wheel_speed_maximum=self.model.wheel_speed_maximum, wheel_speed_rate=self.model.wheel_speed_rate
         )
 
     def observer_design(self) -> ObserverDesign:
@@ -119,8 +112,7 @@ class ScheduleSpec(_Strict):
 
 def shipped_specs() -> dict[str, Path]:
     """The specifications that come with the package, by name."""
-    folder = Path(str(resources.files("studies") / "specs"))
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    return shipped_files("studies", "specs")
 
 
 def load_spec(name: str | Path) -> tuple[ScheduleSpec, Path]:
@@ -128,41 +120,5 @@ def load_spec(name: str | Path) -> tuple[ScheduleSpec, Path]:
 
     Raises SpecError with the file, the key and what is wrong.
     """
-    path = Path(name)
-    if path.suffix != ".toml":
-        known = shipped_specs()
-        if str(name) not in known:
-            raise SpecError(unknown("specification", str(name), known) + "; a file of your own ends with .toml")
-        path = known[str(name)]
-    try:
-        with path.open("rb") as file:
-            data = tomllib.load(file)
-    except FileNotFoundError:
-        raise SpecError(f"{path}: no such specification file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise SpecError(f"{path}: {error}") from None
-    try:
-        return ScheduleSpec.model_validate(data), path.parent
-    except ValidationError as error:
-        raise SpecError(f"{path}: {explain(error)}") from None
-
-
-def explain(error: ValidationError) -> str:
-    """All violations in one line, unknown keys with the nearest known ones."""
-    parts = []
-    for entry in error.errors():
-        place = ".".join(str(part) for part in entry["loc"])
-        if entry["type"] == "extra_forbidden":
-            parts.append(f"{place}: {unknown('key', str(entry['loc'][-1]), _keys(entry['loc'][:-1]))}")
-        else:
-            parts.append(f"{place}: {entry['msg'][0].lower()}{entry['msg'][1:]}")
-    return "; ".join(parts)
-
-
-def _keys(place: tuple[int | str, ...]) -> list[str]:
-    """The keys that a table of a specification knows."""
-    tables: dict[str, type[BaseModel]] = {
-        "model": ModelSpec, "design": DesignSpec, "deploy": DeploySpec, "channels": ChannelSpec,
-    }  # fmt: skip
-    words = [part for part in place if isinstance(part, str)]
-    return list((tables[words[-1]] if words else ScheduleSpec).model_fields)
+    path = find_toml(name, shipped_specs(), "specification")
+    return load_toml(path, ScheduleSpec, "specification"), path.parent

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from flint import fmpq_mat
 
+from estimators.arrays import FloatArray
 from synthesis.certificate.claims import Claim, ClaimChannel
 from synthesis.certificate.levels import held_claims, sampled_claims
 from synthesis.certificate.rounding import significant
@@ -20,7 +21,6 @@ from synthesis.lmi.result import Verdict
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray
 from synthesis.polynomials.rational import decimal
 from synthesis.well_posedness import well_posedness
 

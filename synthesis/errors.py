@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from difflib import get_close_matches
-
-
-class GainsmithError(ValueError):
-    """Bad input: the message names the place and the remedy. The command line turns it into exit code 2."""
+from estimators.errors import GainsmithError
 
 
 class ModelError(GainsmithError):
@@ -20,11 +15,3 @@ class SpecError(GainsmithError):
 
 class ProblemError(GainsmithError):
     """An LMI problem that is not affine, not polynomial, or unsuitable for the chosen relaxation."""
-
-
-def unknown(what: str, name: str, known: Iterable[str]) -> str:
-    """One sentence that names the unknown word and the nearest known ones."""
-    names = sorted(known)
-    close = get_close_matches(name, names, n=3)
-    hint = f"did you mean {', '.join(close)}?" if close else f"known: {', '.join(names) or 'none'}"
-    return f"unknown {what} '{name}'; {hint}"

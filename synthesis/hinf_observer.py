@@ -21,9 +21,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from synthesis.certificate.refute import undetectable_place
 from synthesis.certificate.rounding import round_down, round_up
-from synthesis.errors import ProblemError, unknown
+from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.scaling import observer_scale
@@ -32,7 +34,7 @@ from synthesis.lmi.solve import solve
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.observer import Update
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray, symmetric_block
+from synthesis.polynomials.matrix import symmetric_block
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from itertools import product
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
 from synthesis.hinf_observer import (
     ObserverDesign,
@@ -35,7 +36,7 @@ from synthesis.loop.from_model import plant_of
 from synthesis.loop.motion import one_sample_later, rates
 from synthesis.models.discretise import zero_order_hold
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial, symmetric_block, variable
+from synthesis.polynomials.matrix import MatrixPolynomial, symmetric_block, variable
 
 FIT = 1e-10  # relative
 DEGREES = (4, 8, 12, 16, 24)

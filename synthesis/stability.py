@@ -15,12 +15,14 @@ from typing import Literal, get_args
 import numpy as np
 from flint import fmpq, fmpq_mat
 
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from synthesis.certificate.claims import Claim
 from synthesis.certificate.proof import place_words
 from synthesis.certificate.refute import unstable_place
 from synthesis.certificate.rounding import rounded_lyapunov
 from synthesis.certificate.verify import Names, Outcome, Verifier
-from synthesis.errors import ProblemError, unknown
+from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Margin, Verdict
 from synthesis.lmi.scaling import error_scale
@@ -29,7 +31,6 @@ from synthesis.lmi.solve import solve
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray
 from synthesis.polynomials.rational import decimal, rational
 
 PRECISE = 15  # digits of P when it is proved right here

@@ -12,12 +12,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
 from synthesis.hinf_observer import ObserverDesign, observer_problem, timed_scale, to_gamma
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.solve import solve
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray, symmetric_block
+from synthesis.polynomials.matrix import symmetric_block
 
 BACKOFFS = (1e-1, 1e-2, 1e-3)  # closer than this the margins of the solver decide, not the problem
 GROWTH = 2.0  # energy that grows by more than this for every decade of back-off is taken as unbounded

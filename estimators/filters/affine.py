@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from estimators.interpolate import FloatArray
+from estimators.arrays import FloatArray
 
 SlopeFunction = Callable[[FloatArray, FloatArray], FloatArray]
 

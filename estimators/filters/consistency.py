@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import FloatArray, IntArray
 from estimators.errors import EstimatorError
 from estimators.filters.chi_square import chi_square_quantile
 from estimators.filters.step import numbers
-from estimators.interpolate import FloatArray
 
 
 def nees(error: npt.ArrayLike, covariance: npt.ArrayLike) -> FloatArray:
@@ -25,7 +25,7 @@ def nees(error: npt.ArrayLike, covariance: npt.ArrayLike) -> FloatArray:
     return _normalised(numbers(error, "error"), numbers(covariance, "covariance"))
 
 
-def nis(innovation: npt.ArrayLike, innovation_covariance: npt.ArrayLike) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+def nis(innovation: npt.ArrayLike, innovation_covariance: npt.ArrayLike) -> tuple[FloatArray, IntArray]:
     """Normalised innovation squared nu' S^-1 nu over the channels present, and how many these are; (..., m) to (...).
 
     Source: Bar-Shalom, Li, Kirubarajan (2001), (5.4.2-5).

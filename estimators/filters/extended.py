@@ -6,10 +6,9 @@ from collections.abc import Callable
 
 import numpy.typing as npt
 
-from estimators.faults import BoolArray
+from estimators.arrays import BoolArray, FloatArray
 from estimators.filters.joseph import CovarianceFilter
 from estimators.filters.step import FilterStep, broadcast, numbers, quiet
-from estimators.interpolate import FloatArray
 
 StateFunction = Callable[[FloatArray], FloatArray]
 

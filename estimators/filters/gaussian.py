@@ -7,10 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray
 from estimators.filters.step import LIMIT, broadcast, numbers
-from estimators.interpolate import FloatArray
 
 
 class GaussianFilter:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray
 from estimators.filters.gaussian import GaussianFilter
 from estimators.filters.step import (
     FilterStep,
@@ -19,7 +19,6 @@ from estimators.filters.step import (
     numbers,
     refused,
 )
-from estimators.interpolate import FloatArray
 
 
 class CovarianceFilter(GaussianFilter):

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray
 from estimators.filters.joseph import CovarianceFilter
 from estimators.filters.step import FilterStep, broadcast, fits, numbers, quiet
-from estimators.interpolate import FloatArray
 
 
 class KalmanFilter(CovarianceFilter):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from estimators.filters.triangular import checked_factor, lower_factor, products
 from estimators.filters.workspace import Workspace
-from estimators.interpolate import FloatArray
 
 
 class Predicted:

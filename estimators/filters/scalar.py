@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimators.faults import BoolArray
+from estimators.arrays import BoolArray, FloatArray
 from estimators.filters.joseph import CovarianceFilter
 from estimators.filters.step import all_bounded, bounded, quiet
-from estimators.interpolate import FloatArray
 
 
 class ScalarStep(NamedTuple):

@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray
 from estimators.filters.chi_square import chi_square_quantile
-from estimators.interpolate import FloatArray
 from estimators.signals.checks import LIMIT
 from estimators.signals.checks import quiet as all_bounded  # `quiet` is the decorator here
 

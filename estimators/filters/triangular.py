@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from estimators.errors import EstimatorError
-from estimators.interpolate import FloatArray
 
 FEW = 48  # batch entries up to which LAPACK is faster
 _TINY = 1e-150

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray
 from estimators.filters.affine import Affine
 from estimators.filters.gaussian import GaussianFilter
 from estimators.filters.sigma import SigmaWeights
@@ -18,7 +18,6 @@ from estimators.filters.step import FilterStep, broadcast, fits, gate_threshold,
 from estimators.filters.triangular import FEW, semidefinite_factor
 from estimators.filters.unscented_few import Directions, FewPoints
 from estimators.filters.unscented_many import ManyPoints
-from estimators.interpolate import FloatArray
 
 StateFunction = Callable[[FloatArray], FloatArray]
 

@@ -6,12 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray
 from estimators.filters.sigma import MOST, SigmaWeights
 from estimators.filters.step import all_bounded, bounded, diagonal, refused
 from estimators.filters.triangular import upper_factor
-from estimators.interpolate import FloatArray
 
 UNRESOLVED = (
     "R is lost in the curvature of the measurement: it is smaller than the rounding of its even parts; give every channel a "

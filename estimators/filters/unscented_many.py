@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimators.faults import BoolArray
+from estimators.arrays import BoolArray, FloatArray
 from estimators.filters.predicted import Predicted
 from estimators.filters.sigma import MOST, SigmaWeights
 from estimators.filters.step import all_bounded, bounded, refused
@@ -18,7 +18,6 @@ from estimators.filters.triangular import (
 )
 from estimators.filters.unscented_few import UNRESOLVED, Corrected, Directions
 from estimators.filters.workspace import Workspace
-from estimators.interpolate import FloatArray
 
 
 class ManyPoints:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from estimators.interpolate import FloatArray
+from estimators.arrays import FloatArray
 
 
 class Workspace:

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
-from estimators.interpolate import FloatArray
+from estimators.arrays import BoolArray, FlagArray, FloatArray
+from estimators.faults import Flag, raise_flag
 from estimators.signals.checks import LIMIT, any_missing, batch, bounded, mask, number, pair, quiet, setting
 from estimators.signals.held import Held
 from estimators.signals.renewable import Renewable

@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import AnyArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.interpolate import FloatArray
 from estimators.phi import phi
 from estimators.signals.checks import batch, mask, setting
 from estimators.signals.held import Held
@@ -114,7 +114,7 @@ class BodyResponse(Memory):
         self.starts = self.starts | chosen
         self._any_start = bool(self.starts.any())
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         super()._take(saved)
         self._any_start = bool(self.starts.any())
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.faults import BoolArray
+from estimators.arrays import AnyArray, BoolArray, FloatArray
 from estimators.forces.wheel import WheelForceStep, WheelInputs, WheelSignals
-from estimators.interpolate import FloatArray
 from estimators.signals.checks import mask
 from estimators.signals.memory import Memory
 from estimators.vehicle import VehicleParameters
@@ -81,7 +80,7 @@ class SpeedInterval(Memory):
         self.torque, self.samples = np.where(chosen, 0.0, self.torque), np.where(chosen, 0.0, self.samples)
         self.closed = False
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         super()._take(saved)
         self.closed = bool(saved["closed"])
 

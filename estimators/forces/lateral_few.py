@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 
+from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray
 from estimators.filters.joseph import CovarianceFilter
 from estimators.filters.step import LIMIT
 from estimators.filters.three_states import informed
 from estimators.forces.planar import planar_entries
-from estimators.interpolate import FloatArray
 from estimators.vehicle import VehicleParameters
 
 FEW = 8  # cars up to which plain numbers are faster than arrays

@@ -8,13 +8,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
+from estimators.faults import Flag, raise_flag
 from estimators.filters import FilterStep, KalmanFilter, UnscentedKalmanFilter
 from estimators.filters.step import gate_threshold
 from estimators.forces.lateral_few import FEW, KILO, LateralFew
 from estimators.forces.planar import PlanarModel, planar_model
-from estimators.interpolate import FloatArray
 from estimators.signals import limits
 from estimators.signals.checks import any_missing, batch, entries, mask, quiet, setting
 from estimators.signals.held import Held

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import AnyArray, BoolArray, FloatArray
 from estimators.errors import EstimatorError
 from estimators.faults import Flag, raise_flag
 from estimators.forces.wheel import WheelForceStep, WheelInputs, WheelSignals
-from estimators.interpolate import FloatArray
 from estimators.phi import phi
 from estimators.signals.checks import entries, mask, setting
 from estimators.signals.held import Held
@@ -158,11 +157,11 @@ class PidForceObserver(Memory):
         self.starts = self.starts | chosen
         self.flowing = False
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         super()._take(saved)
         self.flowing = bool(saved["flowing"])
 
-    def _move_speed(self, speed: FloatArray, rate: FloatArray, error: FloatArray, again: npt.NDArray[np.bool_]) -> None:
+    def _move_speed(self, speed: FloatArray, rate: FloatArray, error: FloatArray, again: BoolArray) -> None:
         """what at the end of the sample: (5) over one sample, exactly."""
         both = np.stack((np.where(again, 0.0, self.speed_integral), error), axis=-1)
         moved = np.einsum("cij,...cj->...ci", self._move, both)

@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from estimators.interpolate import FloatArray
+from estimators.arrays import FloatArray
 from estimators.vehicle import VehicleParameters
 
 Number = TypeVar("Number", float, FloatArray)

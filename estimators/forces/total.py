@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from estimators.faults import BoolArray
-from estimators.interpolate import FloatArray
+from estimators.arrays import BoolArray, FloatArray
 
 
 class Reconciled(NamedTuple):

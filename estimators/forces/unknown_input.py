@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 
-from estimators.faults import BoolArray
+from estimators.arrays import BoolArray, FloatArray
 from estimators.forces.interval import IntervalObserver, MeanForce
 from estimators.forces.wheel import WheelForceStep, WheelSignals
-from estimators.interpolate import FloatArray
 from estimators.signals.checks import setting
 from estimators.vehicle import VehicleParameters
 

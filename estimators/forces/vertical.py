@@ -17,9 +17,9 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
+from estimators.arrays import BoolArray, FlagArray, FloatArray
+from estimators.faults import Flag, raise_flag
 from estimators.forces.body_response import PITCH, ROLL, BodyResponse
-from estimators.interpolate import FloatArray
 from estimators.signals import limits
 from estimators.signals.checks import any_missing, batch, mask, number, pair
 from estimators.signals.held import Held

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
-from estimators.interpolate import FloatArray
+from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.faults import Flag, raise_flag
 from estimators.signals import limits
 from estimators.signals.checks import batch, mask, setting
 from estimators.signals.held import Held
@@ -140,6 +140,6 @@ class WheelInputs(Renewable):
         self._renew(chosen)
         return chosen
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         super()._take(saved)
         self._any_slow = bool(self.slow.any())

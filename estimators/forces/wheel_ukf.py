@@ -7,13 +7,12 @@ from typing import Literal
 
 import numpy as np
 
+from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray
 from estimators.filters import UnscentedKalmanFilter
 from estimators.filters.scalar import ScalarKalmanFilter, ScalarStep
 from estimators.forces.interval import IntervalObserver, MeanForce
 from estimators.forces.wheel import WheelForceStep, WheelSignals
-from estimators.interpolate import FloatArray
 from estimators.signals.checks import setting
 from estimators.vehicle import VehicleParameters
 

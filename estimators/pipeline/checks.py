@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import AnyArray
 from estimators.pipeline.result import Check, Consistency
 from estimators.signals.checks import batch, entries, mask, setting
 from estimators.signals.memory import Memory
@@ -103,5 +104,5 @@ class CrossChecks(Memory):
         chosen = self._kit.own(mask(where, self.batch_shape, "where"))
         self.gaps = [self._kit.where(chosen, 0.0, gap) for gap in self.gaps]
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         self.gaps = list(kept_signals(saved["gaps"], math.prod(self.batch_shape) == 1))

@@ -6,13 +6,12 @@ and the accelerations of the car), `step(CornerSample) -> CornerStep` and `reset
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.faults import BoolArray, FlagArray
-from estimators.interpolate import FloatArray
+from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from estimators.schedule import GainSchedule
 from estimators.signals.checks import batch, mask
 from estimators.signals.memory import Memory
@@ -58,7 +57,7 @@ class CornerKind(Protocol):
     def reset(self, where: npt.ArrayLike | None = None) -> None:
         """Starts the corners `where` (bool mask of the batch shape; None: all) afresh."""
 
-    def save(self) -> dict[str, npt.NDArray[Any]]:
+    def save(self) -> dict[str, AnyArray]:
         """Everything needed to continue later."""
 
 

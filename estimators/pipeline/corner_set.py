@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray, Flag, FlagArray
-from estimators.interpolate import FloatArray
+from estimators.faults import Flag
 from estimators.pipeline.corner_kinds import CornerKind, CornerSample, ScheduledCorners
 from estimators.schedule import GainSchedule
 from estimators.signals import FilteredDerivative, limits
@@ -212,7 +212,7 @@ class CornerObservers(Memory):
             lambda slip, angle: (kit.where(here, 0.0, slip), kit.where(here, 0.0, angle)), self.slip, self.angle
         )
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         super()._take(saved)
         self.vx, self.vy = (self._kit.own(saved[name].copy()) for name in ("vx", "vy"))
         self.slip, self.angle = (kept_signals(saved[name], self._count == 1) for name in ("slip", "angle"))

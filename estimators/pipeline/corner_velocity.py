@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray, Flag, FlagArray
-from estimators.interpolate import FloatArray
+from estimators.faults import Flag
 from estimators.pipeline.corner_set import CornerObservers, CornerSetStep
 from estimators.pipeline.parts import check_parts
 from estimators.signals import limits

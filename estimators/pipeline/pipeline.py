@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from estimators.faults import BoolArray, Flag, FlagArray
+from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.faults import Flag
 from estimators.forces import (
     LateralForceEstimator,
     UnknownInputForceObserver,
@@ -18,7 +19,6 @@ from estimators.forces import (
     reconcile,
     without_gravity,
 )
-from estimators.interpolate import FloatArray
 from estimators.pipeline.checks import CrossChecks
 from estimators.pipeline.parts import CORNER_PARTS, check_parts
 from estimators.pipeline.readings import WheelReadings
@@ -234,7 +234,7 @@ class EstimationPipeline(Memory):
         self.front, self.angle = choose(here, 0.0, self.front), choose(here, 0.0, self.angle)
         self.drive = choose(here, math.nan, self.drive)
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         super()._take(saved)
         for name in ("bias", "speed"):
             setattr(self, name, list(kept_signals(saved[name], self._single)))

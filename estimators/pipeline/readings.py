@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from estimators.faults import BoolArray
-from estimators.interpolate import FloatArray
+from estimators.arrays import BoolArray, FloatArray, IntArray
 from estimators.signals.memory import Memory
 
 
@@ -22,7 +20,7 @@ class WheelReadings(Memory):
     def __init__(self, shape: tuple[int, ...], hold: int) -> None:
         self._hold = hold
         self.last: FloatArray = np.full(shape, np.nan)
-        self.age: npt.NDArray[np.int64] = np.zeros(shape, dtype=np.int64)
+        self.age: IntArray = np.zeros(shape, dtype=np.int64)
 
     def step(self, wheel_speed: FloatArray) -> BoolArray | None:
         """Which of them (..., 4) are new; None: all."""

@@ -5,11 +5,7 @@ from __future__ import annotations
 from enum import IntFlag
 from typing import Any, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
-from estimators.faults import FlagArray
-from estimators.interpolate import FloatArray
+from estimators.arrays import FlagArray, FloatArray
 
 
 class Check(IntFlag):
@@ -36,7 +32,7 @@ class Consistency(NamedTuple):
     force_y_gap: FloatArray  # (...) m/s^2, a_y minus what the axle forces make of it
     load_gap: FloatArray  # (...) sum of F_z over m a_z, minus 1
     velocity_gap: FloatArray  # (...) m/s, V_x minus that of the corner observers; 0 without them
-    failed: npt.NDArray[np.int32]  # (...) sums of `Check`
+    failed: FlagArray  # (...) sums of `Check`
 
 
 class PipelineStep(NamedTuple):

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from estimators.interpolate import FloatArray
+from estimators.arrays import FloatArray
 from estimators.sideslip import (
     AdaptiveStiffnessObserver,
     FixedStiffnessObserver,

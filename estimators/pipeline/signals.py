@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from estimators.interpolate import FloatArray
+from estimators.arrays import FloatArray
 from estimators.signals.checks import entries
 
 

@@ -20,7 +20,7 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 _UNIT = re.compile(r"[A-Za-z0-9_%°µ*/^(). +-]+\Z")
 
 
-def printable(text: str, most: int) -> str:
+def printable(text: str, most: int = 10**6) -> str:
     """Text for a message: no control characters, on one line, cut to a length."""
     clean = "".join(c if c.isprintable() else "?" for c in text[: most + 1])
     return clean if len(clean) <= most else clean[: most - 3] + "..."

@@ -11,8 +11,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from estimators.errors import EstimatorError, RangeError, ScheduleError
-from estimators.interpolate import FloatArray, PiecewiseLinear
+from estimators.interpolate import PiecewiseLinear
 from estimators.schedule.check import SHAPES, SIGNALS, check_content, check_depth
 from estimators.schedule.checker import shown
 from estimators.schedule.files import check_seal, read_content, sealed

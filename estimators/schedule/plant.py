@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from estimators.interpolate import FloatArray
+from estimators.arrays import FloatArray
 
 
 class PlantPolynomial(NamedTuple):

@@ -10,8 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimators.faults import BoolArray
-from estimators.interpolate import FloatArray
+from estimators.arrays import BoolArray, FloatArray
 from estimators.sideslip.vehicle import SingleTrack
 
 REST_TIME = 0.1  # s, with which sideslip fades away at standstill

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimators.interpolate import FloatArray
+from estimators.arrays import FloatArray
 
 LEAST_KNEE = 1e-15  # keeps 0/0 away where a lifted wheel does not slip
 

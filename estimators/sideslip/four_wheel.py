@@ -9,13 +9,13 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
+from estimators.faults import Flag, raise_flag
 from estimators.filters import ExtendedKalmanFilter, FilterStep, UnscentedKalmanFilter
 from estimators.filters.affine import Affine
 from estimators.filters.step import all_bounded, broadcast, diagonal
 from estimators.filters.workspace import Workspace
-from estimators.interpolate import FloatArray
 from estimators.sideslip.dugoff import used_friction
 from estimators.sideslip.four_wheel_model import AFFINE_FROM, FourWheelModel
 from estimators.sideslip.inputs import HeldInput, check_saved, checked_noise
@@ -212,9 +212,9 @@ class FourWheelObserver:
         self._before = None
         self._renewed |= chosen
 
-    def save(self) -> dict[str, npt.NDArray[Any]]:
+    def save(self) -> dict[str, AnyArray]:
         """Everything needed to continue later, as plain arrays."""
-        saved: dict[str, npt.NDArray[Any]] = {
+        saved: dict[str, AnyArray] = {
             "steering": self._steering.value.copy(),
             "loads": self._loads.value.copy(),
             "renewed": self._renewed.copy(),
@@ -222,7 +222,7 @@ class FourWheelObserver:
         memories = [each.save() for each in self._filters]
         return saved | {key: np.concatenate([memory[key] for memory in memories]) for key in memories[0]}
 
-    def restore(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def restore(self, saved: Mapping[str, AnyArray]) -> None:
         """Continues from `save`, bit for bit.
 
         Raises:
@@ -239,7 +239,7 @@ class FourWheelObserver:
         self._before = None
         self._renewed = np.array(saved["renewed"], dtype=np.bool_)
 
-    def _restore_filters(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _restore_filters(self, saved: Mapping[str, AnyArray]) -> None:
         for part, each in zip(self._parts, self._filters, strict=True):
             each.restore({key: saved[key][part] for key in each.save()})
 

@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimators.faults import BoolArray
+from estimators.arrays import BoolArray, FloatArray
 from estimators.filters.workspace import Workspace
-from estimators.interpolate import FloatArray
 from estimators.sideslip.dugoff import LEAST_KNEE, dugoff_force, dugoff_slope
 from estimators.sideslip.vehicle import FourWheel
 

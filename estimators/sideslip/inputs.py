@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
+from estimators.faults import Flag, raise_flag
 from estimators.filters.step import bounded, broadcast, numbers
-from estimators.interpolate import FloatArray
 
 
 class HeldInput:
@@ -70,7 +69,7 @@ def checked_noise(value: npt.ArrayLike | None, default: tuple[float, ...], what:
     return np.diag(variances)
 
 
-def check_saved(saved: Mapping[str, npt.NDArray[Any]], own: Mapping[str, npt.NDArray[Any]]) -> None:
+def check_saved(saved: Mapping[str, AnyArray], own: Mapping[str, AnyArray]) -> None:
     """Compares saved arrays with what is expected.
 
     Raises:

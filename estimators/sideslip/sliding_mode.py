@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
+from estimators.faults import Flag, raise_flag
 from estimators.filters.step import bounded, broadcast
-from estimators.interpolate import FloatArray
 from estimators.sideslip.inputs import HeldInput, check_saved
 from estimators.sideslip.vehicle import SingleTrack, positive
 from estimators.signals import limits
@@ -157,7 +157,7 @@ class SlidingModeObserver:
         self._steering.forget(mask)
         self._renewed |= mask
 
-    def save(self) -> dict[str, npt.NDArray[Any]]:
+    def save(self) -> dict[str, AnyArray]:
         """Everything needed to continue later, as plain arrays."""
         return {
             "state": self._state.copy(),
@@ -165,7 +165,7 @@ class SlidingModeObserver:
             "renewed": self._renewed.copy(),
         }
 
-    def restore(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def restore(self, saved: Mapping[str, AnyArray]) -> None:
         """Continues from `save`, bit for bit.
 
         Raises:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
+from estimators.faults import Flag, raise_flag
 from estimators.filters import ExtendedKalmanFilter, FilterStep
 from estimators.filters.step import broadcast
-from estimators.interpolate import FloatArray
 from estimators.sideslip.cornering_model import CorneringModel
 from estimators.sideslip.inputs import HeldInput, check_saved
 from estimators.sideslip.vehicle import SingleTrack, positive
@@ -158,12 +158,12 @@ class AdaptiveStiffnessObserver:
             held.forget(mask)
         self._renewed |= mask
 
-    def save(self) -> dict[str, npt.NDArray[Any]]:
+    def save(self) -> dict[str, AnyArray]:
         """Everything needed to continue later, as plain arrays."""
         inputs = {held.what: np.array(held.value) for held in self._inputs}
         return {**self._filter.save(), **inputs, "renewed": self._renewed.copy()}
 
-    def restore(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def restore(self, saved: Mapping[str, AnyArray]) -> None:
         """Continues from `save`, bit for bit.
 
         Raises:

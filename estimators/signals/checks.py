@@ -7,9 +7,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray
-from estimators.interpolate import FloatArray
 
 LIMIT = 1e100  # a magnitude beyond it is treated as not finite: no physical quantity, and products would overflow
 _FEW, _SMALL = 6, 4096  # entries

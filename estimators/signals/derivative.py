@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray, IntArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
-from estimators.interpolate import FloatArray
+from estimators.faults import Flag, raise_flag
 from estimators.signals.checks import batch, entries, mask, quiet, setting
 from estimators.signals.freshness import Freshness
 from estimators.signals.memory import Memory
@@ -78,7 +78,7 @@ class FilteredDerivative(Memory):
         self.value: FloatArray = np.zeros(self.batch_shape)
         self.reading: FloatArray = np.full(self.batch_shape, np.nan)
         self.slope: FloatArray = np.zeros(self.batch_shape)
-        self.elapsed: npt.NDArray[np.int64] = np.zeros(self.batch_shape, dtype=np.int64)
+        self.elapsed: IntArray = np.zeros(self.batch_shape, dtype=np.int64)
         self.starts: BoolArray = np.ones(self.batch_shape, dtype=np.bool_)  # no slope yet: the next is taken as it is
         self._simple = hold == 1 and stale_after is None  # every finite sample is new
         self.flowing = False  # the last sample was new everywhere, and has a slope
@@ -131,6 +131,6 @@ class FilteredDerivative(Memory):
         self.starts = self.starts | chosen
         self.flowing = False
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         super()._take(saved)
         self.flowing = bool(saved["flowing"])

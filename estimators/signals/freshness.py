@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FlagArray, FloatArray, IntArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
-from estimators.interpolate import FloatArray
+from estimators.faults import Flag, raise_flag
 from estimators.signals.checks import batch, bounded, entries, mask
 from estimators.signals.memory import Memory
 
@@ -18,7 +18,7 @@ class FreshStep(NamedTuple):
     """Leading axes are those of the batch."""
 
     fresh: BoolArray  # a new reading: use it as a measurement
-    age: npt.NDArray[np.int64]  # samples since the last new one, 0 where it is new
+    age: IntArray  # samples since the last new one, 0 where it is new
     flags: FlagArray  # MISSING_MEASUREMENT, STALE_MEASUREMENT
 
 
@@ -49,8 +49,8 @@ class Freshness(Memory):
             raise EstimatorError(f"stale_after = {stale_after} samples must be at least hold = {hold}, or None")
         self.batch_shape, self.hold, self.stale_after = batch(batch_shape), hold, stale_after
         self.last: FloatArray = np.full(self.batch_shape, np.nan)
-        self.age: npt.NDArray[np.int64] = np.zeros(self.batch_shape, dtype=np.int64)
-        self.run: npt.NDArray[np.int64] = np.zeros(self.batch_shape, dtype=np.int64)
+        self.age: IntArray = np.zeros(self.batch_shape, dtype=np.int64)
+        self.run: IntArray = np.zeros(self.batch_shape, dtype=np.int64)
 
     def step(self, value: npt.ArrayLike) -> FreshStep:
         """Judges one sample of the batch shape.

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from estimators.faults import BoolArray
-from estimators.interpolate import FloatArray
+from estimators.arrays import BoolArray, FloatArray
 from estimators.signals.checks import LIMIT, bounded, entries, quiet
 from estimators.signals.memory import Memory
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import AnyArray
 from estimators.errors import EstimatorError
 
-Saved = dict[str, npt.NDArray[Any]]
+Saved = dict[str, AnyArray]
 
 
 class Memory:
@@ -30,7 +29,7 @@ class Memory:
             saved |= {f"{part}.{name}": array for name, array in getattr(self, part).save().items()}
         return saved
 
-    def restore(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def restore(self, saved: Mapping[str, AnyArray]) -> None:
         """Continues from `save`, bit for bit.
 
         Raises:
@@ -44,7 +43,7 @@ class Memory:
             self._take(before)
             raise
 
-    def _check(self, saved: Mapping[str, npt.NDArray[Any]], prefix: str = "") -> None:
+    def _check(self, saved: Mapping[str, AnyArray], prefix: str = "") -> None:
         for name, own in self.save().items():
             key = prefix + name
             if key not in saved:
@@ -65,7 +64,7 @@ class Memory:
                 found |= owner._all_unknowns()
         return found
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         for name in self.memory:
             setattr(self, name, np.array(saved[name]))
         for part in self.parts:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
+from estimators.arrays import AnyArray, BoolArray, FlagArray
+from estimators.faults import Flag, raise_flag
 from estimators.signals.memory import Memory
 
 
@@ -37,6 +36,6 @@ class Renewable(Memory):
             raise_flag(flags, self.renewed, Flag.RESET)
             self.renewed, self._any_renewed = np.zeros(self.batch_shape, dtype=np.bool_), False
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         super()._take(saved)
         self._any_renewed = bool(self.renewed.any())

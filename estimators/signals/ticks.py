@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FlagArray, FloatArray, IntArray
 from estimators.errors import EstimatorError
-from estimators.faults import Flag, FlagArray, raise_flag
-from estimators.interpolate import FloatArray
+from estimators.faults import Flag, raise_flag
 from estimators.signals.checks import batch, bounded, entries, mask, setting
 from estimators.signals.memory import Memory
 
@@ -20,7 +20,7 @@ class TickStep(NamedTuple):
 
     speed: FloatArray  # rad/s, mean over the window; late by half of it
     resolution: FloatArray  # rad/s: the mean speed over the window is off by less than this
-    window: npt.NDArray[np.int64]  # samples
+    window: IntArray  # samples
     flags: FlagArray  # MISSING_MEASUREMENT
 
 
@@ -67,7 +67,7 @@ class TickSpeed(Memory):
         self.turns: FloatArray = np.zeros(self.batch_shape)
         self.last: FloatArray = np.full(self.batch_shape, np.nan)
         self.speed: FloatArray = np.zeros(self.batch_shape)
-        self.width: npt.NDArray[np.int64] = np.full(self.batch_shape, longest_window, dtype=np.int64)
+        self.width: IntArray = np.full(self.batch_shape, longest_window, dtype=np.int64)
 
     def step(self, count: npt.ArrayLike) -> TickStep:
         """Takes one reading of the counters, of the batch shape; a missing one holds the speed.
@@ -103,7 +103,7 @@ class TickSpeed(Memory):
         self.turns, self.speed = np.where(chosen, 0.0, self.turns), np.where(chosen, 0.0, self.speed)
         self.width = np.where(chosen, self.longest_window, self.width)
 
-    def _unwrapped(self, raw: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
+    def _unwrapped(self, raw: FloatArray, missing: BoolArray) -> FloatArray:
         """The count without wraps, NaN where missing: a jump of more than half the modulus is a wrap."""
         clean = np.where(missing, np.nan, raw)
         if self.modulus is None:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import AnyArray
 from estimators.signals.checks import entries, number
 
 Number = Any
@@ -77,11 +78,11 @@ class Arithmetic:
         """Numbers side by side."""
         raise NotImplementedError
 
-    def rows(self, value: npt.NDArray[Any], width: int) -> Signals:
+    def rows(self, value: AnyArray, width: int) -> Signals:
         """The `width` columns of (..., width)."""
         raise NotImplementedError
 
-    def table(self, groups: Sequence[Signals], shape: tuple[int, ...]) -> npt.NDArray[Any]:
+    def table(self, groups: Sequence[Signals], shape: tuple[int, ...]) -> AnyArray:
         """The contrary of `rows`: (*shape, width), the groups side by side."""
         raise NotImplementedError
 
@@ -137,12 +138,12 @@ class OneCar(Arithmetic):
         """As they are."""
         return values
 
-    def rows(self, value: npt.NDArray[Any], width: int) -> Signals:
+    def rows(self, value: AnyArray, width: int) -> Signals:
         """The entries as a list."""
         out: list[Number] = (value if value.ndim == 1 else value.reshape(width)).tolist()
         return out
 
-    def table(self, groups: Sequence[Signals], shape: tuple[int, ...]) -> npt.NDArray[Any]:
+    def table(self, groups: Sequence[Signals], shape: tuple[int, ...]) -> AnyArray:
         """An array of the entries, behind axes of length one if `shape` has any."""
         array = np.array(list(chain.from_iterable(groups)))
         return array.reshape(*shape, -1) if shape else array
@@ -187,11 +188,11 @@ class ManyCars(Arithmetic):
         """(k, ...)."""
         return np.stack(values)
 
-    def rows(self, value: npt.NDArray[Any], width: int) -> Signals:
+    def rows(self, value: AnyArray, width: int) -> Signals:
         """Contiguous (width, ...)."""
         return np.ascontiguousarray(np.moveaxis(value.reshape(*self.shape, width), -1, 0))
 
-    def table(self, groups: Sequence[Signals], shape: tuple[int, ...]) -> npt.NDArray[Any]:
+    def table(self, groups: Sequence[Signals], shape: tuple[int, ...]) -> AnyArray:
         """Groups that are lists are stacked first."""
         arrays = [group if isinstance(group, np.ndarray) else np.stack(group) for group in groups]
         return np.moveaxis(np.concatenate(arrays), 0, -1).reshape(*shape, -1)
@@ -202,6 +203,6 @@ def arithmetic(shape: tuple[int, ...]) -> Arithmetic:
     return OneCar() if math.prod(shape) == 1 else ManyCars(shape)
 
 
-def kept_signals(array: npt.NDArray[Any], single: bool) -> Signals:
+def kept_signals(array: AnyArray, single: bool) -> Signals:
     """Saved signals, of which the first axis counts the entries."""
     return array.reshape(len(array)).tolist() if single else array.copy()

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
-import numpy.typing as npt
-
+from estimators.arrays import AnyArray
 from estimators.signals.memory import Memory
 from estimators.velocity.arithmetic import Arithmetic, Number
 
@@ -16,7 +14,7 @@ class CarsMemory(Memory):
 
     kit: Arithmetic
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         for name in self.memory:
             setattr(self, name, self.kit.own(saved[name].copy()))
 

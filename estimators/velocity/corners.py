@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from estimators.interpolate import FloatArray
+from estimators.arrays import FloatArray
 from estimators.vehicle import VehicleParameters
 from estimators.velocity.arithmetic import Number
 

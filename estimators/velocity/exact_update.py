@@ -12,15 +12,14 @@ Its error follows the plant's own motion within a sample; that of `sampled` does
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import ScheduleError
-from estimators.faults import BoolArray
-from estimators.interpolate import FloatArray, PiecewiseLinear
+from estimators.interpolate import PiecewiseLinear
 from estimators.phi import Phi
 from estimators.schedule import GainSchedule
 
-Factor = npt.NDArray[np.float64] | None  # an entry of a matrix: None where zero, 0-d where constant, else (n,)
+Factor = FloatArray | None  # an entry of a matrix: None where zero, 0-d where constant, else (n,)
 _MOST_GROWTH = 50.0  # exponent of growth in one sample; from e^700 on float64 overflows
 _LARGEST_STEP = 1e50  # of the numbers in T A, T L C: their products meet states of up to 1e100 (screening.LIMIT)
 _LOOKS = 65  # places between which growth may hide: it has room from e^50 to e^700

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import AnyArray
 from estimators.errors import EstimatorError
 from estimators.faults import Flag
 from estimators.signals.checks import batch, mask, setting
@@ -177,7 +177,7 @@ class VelocityFusion(Memory):
         self.start = self._kit.stacked(start)
         self._forget(chosen)
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         super()._take(saved)
         self.start = kept_signals(saved["start"], self._count == 1)
         self.new, self.renewed = (self._kit.own(saved[name].copy()) for name in ("new", "renewed"))

@@ -11,10 +11,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy.typing as npt
-
+from estimators.arrays import AnyArray
 from estimators.faults import Flag
 from estimators.signals import limits
 from estimators.signals.memory import Memory
@@ -65,7 +64,7 @@ class FusionScreen(Memory):
         self.steer, self.age, self.slope, self.slip_left, self.wheel_speed = wheels
         self.swing: Number = zero  # filtered yaw acceleration, rad/s^2
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         for name in self.memory:
             if name == "swing":
                 self.swing = self.kit.own(saved[name].copy())

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from estimators.faults import BoolArray, FlagArray
-from estimators.interpolate import FloatArray
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 
 
 class FusionStep(NamedTuple):

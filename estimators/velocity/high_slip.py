@@ -16,9 +16,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray
-from estimators.interpolate import FloatArray
 from estimators.signals.checks import batch, entries, mask
 from estimators.signals.memory import Memory
 

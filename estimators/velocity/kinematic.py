@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
+from estimators.arrays import BoolArray, FlagArray, FloatArray
+from estimators.faults import Flag, raise_flag
 from estimators.filters import KalmanFilter
 from estimators.filters.step import broadcast
-from estimators.interpolate import FloatArray
 from estimators.signals.checks import any_missing, batch, entries, mask, setting
 from estimators.signals.renewable import Renewable
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
-from estimators.interpolate import FloatArray
+from estimators.faults import Flag, raise_flag
 from estimators.schedule import GainSchedule
 from estimators.signals.checks import quiet
 from estimators.velocity.exact_update import ExactUpdate, refuse_explosive
@@ -148,7 +148,7 @@ class LpvVelocityObserver:
         self._renewed |= chosen
         self._any_renewed = True
 
-    def save(self) -> dict[str, npt.NDArray[Any]]:
+    def save(self) -> dict[str, AnyArray]:
         """Everything needed to continue later, as plain arrays."""
         screen = self._screen
         return {
@@ -159,7 +159,7 @@ class LpvVelocityObserver:
             **{key: getattr(screen, key).copy() for key in MEMORY},
         }
 
-    def restore(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def restore(self, saved: Mapping[str, AnyArray]) -> None:
         """Continues from `save`, bit for bit.
 
         Raises:

@@ -9,11 +9,10 @@ import math
 
 import numpy as np
 
+from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray
 from estimators.filters.joseph import CovarianceFilter
 from estimators.filters.step import LIMIT
-from estimators.interpolate import FloatArray
 from estimators.velocity.ltv_model import BristleTire, integrals
 
 FEW = 16  # corners up to which plain numbers are faster than arrays

@@ -15,8 +15,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from estimators.errors import EstimatorError
-from estimators.interpolate import FloatArray
 
 _SERIES_BELOW = 0.5  # a T below which the quotients lose digits and the series has converged
 _TERMS = [(1.0 / math.factorial(n + 2), (n + 1.0) / math.factorial(n + 3)) for n in reversed(range(16))]

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from estimators.errors import EstimatorError
-from estimators.interpolate import FloatArray
 from estimators.vehicle import VehicleParameters
 from estimators.velocity.arithmetic import Arithmetic, ManyCars, Number, Signals
 from estimators.velocity.corners import CornerVectors, corner_velocity, tire_frame

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.errors import RangeError
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
-from estimators.interpolate import FloatArray
+from estimators.faults import Flag, raise_flag
 from estimators.schedule import SchedulingParameter, outside_range
 
 LIMIT = 1e100  # a magnitude beyond it is treated as not finite: no physical quantity, and products would overflow

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from estimators.interpolate import FloatArray
+from estimators.arrays import FloatArray
 from estimators.velocity.arithmetic import Arithmetic, Number
 
 LEAST_SPEED = 0.5

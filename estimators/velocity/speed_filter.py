@@ -21,7 +21,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimators.interpolate import FloatArray
+from estimators.arrays import FloatArray
 from estimators.signals.memory import Memory
 from estimators.velocity.arithmetic import Number, Signals
 

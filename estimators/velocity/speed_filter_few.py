@@ -7,12 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from estimators.interpolate import FloatArray
+from estimators.arrays import AnyArray, FloatArray, IntArray
 from estimators.velocity.speed_filter import Columns, SpeedFilter, Values
 
 _Row = list[float]
@@ -29,9 +27,9 @@ class SpeedFilterFew(SpeedFilter):
         self._rows: dict[tuple[int, ...], FloatArray] = {}  # of the transition matrix, the first: 1 and the coupling
         self._floor = self.prior.copy()
         self._floor[0] = self._floor[:, 0] = 0.0
-        self._sensitivities: dict[int, tuple[FloatArray, npt.NDArray[np.int64], Columns]] = {}
+        self._sensitivities: dict[int, tuple[FloatArray, IntArray, Columns]] = {}
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         super()._take(saved)
         self.mean, self.waiting, self.waited = (saved[name].tolist() for name in ("mean", "waiting", "waited"))
 

@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
-from estimators.interpolate import FloatArray
+from estimators.faults import Flag, raise_flag
 from estimators.phi import phi
 from estimators.signals import limits
 from estimators.signals.checks import any_missing, batch, entries, mask, setting

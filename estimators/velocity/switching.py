@@ -12,14 +12,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
-from estimators.interpolate import FloatArray
+from estimators.faults import Flag, raise_flag
 from estimators.schedule import GainSchedule
 from estimators.signals.checks import any_missing, batch, entries, mask, quiet
 from estimators.signals.memory import Memory
@@ -76,7 +76,7 @@ class _SavedScreen(Screen, Memory):
     memory = MEMORY
     unknowns = ("raw", "measurement")
 
-    def restore(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def restore(self, saved: Mapping[str, AnyArray]) -> None:
         """Continues from `save`."""
         super().restore(saved)
         self.gaps = bool(self.gap.any())

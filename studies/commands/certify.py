@@ -6,6 +6,7 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
+from estimators.schedule.checker import printable
 from studies.certify import certify
 from synthesis.certificate.claims import written
 
@@ -25,16 +26,10 @@ def run_certify(files: list[Path], as_json: bool) -> int:
             print(f"{printable(str(result.path))}: {printable(result.message)} ({result.seconds:.2f} s)")
             for proof in result.proofs:
                 state = "proved" if proof.proved else "FAILS "
-                print(
-                    printable(f"  {state}  {proof.claim} {written(proof.level)} {proof.unit}  {proof.place}").rstrip()
-                )
+                line = f"  {state}  {proof.claim} {written(proof.level)} {proof.unit}  {proof.place}"
+                print(printable(line).rstrip())
             for remark in result.remarks:
                 print(printable(f"  note    {remark}"))
     if any(result.refusal for result in results):
         return 2
     return 0 if all(result.certified for result in results) else 1
-
-
-def printable(text: str) -> str:
-    """The text on one line, without control characters: nothing in a file can write a line of its own."""
-    return "".join(c if c.isprintable() else "?" for c in text)

@@ -6,10 +6,7 @@ import json
 import sys
 from pathlib import Path
 
-from rich.console import Console
-from rich.table import Table
-
-from studies.commands.progress import progress_bar
+from studies.commands.terminal import print_table, progress_bar
 from studies.drives.output import check_folder
 from studies.identify.identify import identify_drive
 from studies.identify.result import HEADER, content, rows, warnings
@@ -27,12 +24,12 @@ def run_identify(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int
     if as_json:
         print(json.dumps(content(found), indent=1, allow_nan=False))
         return 0
-    table = Table(title=f"{found.drive.name}: identified", caption=f"velocity reference: {found.velocity_reference}")
-    for i, heading in enumerate(HEADER):
-        table.add_column(heading, justify="left" if i == 0 else "right")
-    for row in rows(found):
-        table.add_row(*row)
-    Console(width=None if sys.stdout.isatty() else 120).print(table)
+    print_table(
+        f"{found.drive.name}: identified",
+        HEADER,
+        rows(found),
+        caption=f"velocity reference: {found.velocity_reference}",
+    )
     for line in warnings(found):
         print(f"warning: {line}", file=sys.stderr)
     print(f"written to {out}")

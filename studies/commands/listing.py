@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import json
-from importlib import resources
 
+from estimators.schedule import SHIPPED
 from studies.registry import MODULES
 from studies.spec import load_spec, shipped_specs
 from synthesis.models.catalogue import CATALOGUE
+from synthesis.models.parameter_set import shipped_parameter_sets
+from synthesis.toml_file import shipped_files
 
 
 def run_list(as_json: bool) -> int:
     """What comes with the package."""
-
-    def stems(package: str, folder: str, ending: str) -> list[str]:
-        entries = (resources.files(package) / folder).iterdir()
-        return sorted(entry.name.removesuffix(ending) for entry in entries if entry.name.endswith(ending))
-
     found = {
         "specifications": {name: load_spec(name)[0].description for name in shipped_specs()},
-        "parameter sets": stems("synthesis.models", "parameters", ".toml"),
+        "parameter sets": sorted(shipped_parameter_sets()),
         "models": sorted(CATALOGUE),
-        "schedules": stems("estimators", "schedules", ".json"),
+        "schedules": sorted(path.stem for path in SHIPPED.glob("*.json")),
         "studies": list(MODULES),
-        "sweeps": stems("studies", "sweeps/specs", ".toml"),
-        "manoeuvres": stems("studies", "manoeuvres", ".toml"),
+        "sweeps": sorted(shipped_files("studies", "sweeps/specs")),
+        "manoeuvres": sorted(shipped_files("studies", "manoeuvres")),
     }
     if as_json:
         print(json.dumps(found, indent=1))

@@ -1,17 +1,58 @@
-"""Output of `gainsmith run`."""
+"""Output of `gainsmith run`: the result as a table, and what to know beside it."""
 
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
+from typing import Any
 
-from rich.console import Console
-from rich.table import Table
+from studies.commands.terminal import print_table, progress_bar
+from studies.drives.run import RunResult, run_drive
 
-from studies.commands.progress import progress_bar
-from studies.drives.run import run_drive
-from studies.drives.summary import HEADER, remarks, summary_rows
+HEADER = ("quantity", "NRMS (%)", "RMS", "maximum", "reference peak", "unit", "samples")
+
+
+def summary_rows(result: RunResult) -> list[tuple[str, ...]]:
+    """One row an estimate of a quantity in the columns of ``HEADER``, V_x first; none without references.
+
+    Forces that never exceed the least one of the rule have nothing to compare, and no row.
+    """
+    notes = result.metrics["pipeline"].get("notes", {})
+    signals = {"vx": result.metrics["velocity"], **result.metrics["pipeline"].get("signals", {})}
+    rows = []
+    for signal, estimates in signals.items():
+        for name, entry in estimates.items():
+            if entry["samples"]:
+                mark = " (*)" if signal in notes else ""
+                rows.append((f"{signal.replace('_', ' ')}: {name.replace('_', ' ')}{mark}", *_cells(entry)))
+    return rows
+
+
+def remarks(result: RunResult) -> list[str]:
+    """What to know beside the table, one line each: rows marked (*) first, then everything that was assumed."""
+    pipeline = result.metrics["pipeline"]
+    marked = [f"(*) {signal.replace('_', ' ')}: {text}" for signal, text in _shown(pipeline).items()]
+    assumed = dict.fromkeys([*result.metrics["assumptions"], *pipeline.get("assumptions", [])])
+    return [*marked, *(f"assumed: {text}" for text in assumed)]
+
+
+def _shown(pipeline: dict[str, Any]) -> dict[str, str]:
+    """Notes of the signals that have a row."""
+    signals = pipeline.get("signals", {})
+    notes: dict[str, str] = pipeline.get("notes", {})
+    return {
+        name: text for name, text in notes.items() if any(entry["samples"] for entry in signals.get(name, {}).values())
+    }
+
+
+def _cells(entry: dict[str, Any]) -> tuple[str, ...]:
+    digits = {"m/s": 3, "rad": 4}.get(entry["unit"], 0)
+    sizes = [_number(entry[key], digits) for key in ("rms", "max_error", "reference_peak")]
+    return (_number(entry["nrms_percent"], 2), *sizes, entry["unit"], str(entry["samples"]))
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
 
 
 def run_log(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int:
@@ -22,12 +63,7 @@ def run_log(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int:
     if as_json:
         print(json.dumps(result.metrics, indent=1))
         return 0
-    table = Table(title=f"{result.metrics.get('drive', drive.stem)}: against the reference")
-    for i, heading in enumerate(HEADER):
-        table.add_column(heading, justify="left" if i == 0 else "right")
-    for row in summary_rows(result):
-        table.add_row(*row)
-    Console(width=None if sys.stdout.isatty() else 120).print(table)
+    print_table(f"{result.metrics.get('drive', drive.stem)}: against the reference", HEADER, summary_rows(result))
     for line in remarks(result):
         print(line)
     print(f"written to {out}")

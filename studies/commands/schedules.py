@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from studies.commands.gain_figure import gain_figure
-from studies.commands.progress import progress_bar
+from studies.commands.terminal import print_table, progress_bar
 from studies.plots.save import save_figure
 from studies.schedules import ScheduleRun, regenerate
 from studies.spec import load_spec, shipped_specs
@@ -39,7 +37,9 @@ def run_schedules(specs: list[str], out: Path | None, check: bool, figures: Path
     if as_json:
         print(json.dumps([_row(run) for run in runs], indent=1))
     else:
-        Console(width=None if sys.stdout.isatty() else 190).print(_table(runs))
+        print_table(
+            "Gain schedules", HEADINGS, map(_cells, runs), left=(0, 1, 11), caption=CAPTION, no_wrap=True, width=190
+        )
         for run in runs:
             if run.message:
                 print(f"{run.name}: {run.message}", file=sys.stderr)
@@ -52,34 +52,29 @@ HEADINGS = (
 )  # fmt: skip
 
 
-def _table(runs: list[ScheduleRun]) -> Table:
-    table = Table(
-        title="Gain schedules",
-        caption="friction, noise: gain of the update to the velocity error, lower bound .. proved for the deployed table at any "
-        "admissible rate; decay of the update [1/s] and drop probability: proved",
-    )
-    for heading in HEADINGS:
-        left = heading in ("schedule", "update", "state")
-        table.add_column(heading, justify="left" if left else "right", no_wrap=True)
-    for run in runs:
-        if not run.content:
-            table.add_row(run.name, *[""] * 10, run.state, f"{run.seconds:.1f}")
-            continue
-        gains = np.array(run.content["gain"]["table"])[..., 0]
-        proved = {kind: [p.level for p in run.proofs if p.kind == kind] for kind in {p.kind for p in run.proofs}}
-        bands = [f"{low:g}..{high:g}" for low, high in run.published or ((np.nan, np.nan),) * 2]
-        levels = proved.get("sampled gain", [])
-        channels = [f"{low:.4g}..{level:.4g}" for low, level in zip(run.least, levels, strict=False)] or ["", ""]
-        decay = (proved.get("internal update") or proved.get("sampled error") or [np.nan])[0]
-        drops = proved.get("drop probability")
-        table.add_row(
-            run.name, run.content["update"]["kind"], str(len(gains)),
-            f"{gains[:, 0].min():.3f}..{gains[:, 0].max():.3f}", bands[0],
-            f"{gains[:, 1].min():.1f}..{gains[:, 1].max():.1f}", bands[1],
-            channels[0], channels[-1], f"{decay:g}", f"{drops[0]:g}" if drops else "none",
-            run.state, f"{run.seconds:.1f}",
-        )  # fmt: skip
-    return table
+CAPTION = (
+    "friction, noise: gain of the update to the velocity error, lower bound .. proved for the deployed table at any "
+    "admissible rate; decay of the update [1/s] and drop probability: proved"
+)
+
+
+def _cells(run: ScheduleRun) -> tuple[str, ...]:
+    if not run.content:
+        return (run.name, *[""] * 10, run.state, f"{run.seconds:.1f}")
+    gains = np.array(run.content["gain"]["table"])[..., 0]
+    proved = {kind: [p.level for p in run.proofs if p.kind == kind] for kind in {p.kind for p in run.proofs}}
+    bands = [f"{low:g}..{high:g}" for low, high in run.published or ((np.nan, np.nan),) * 2]
+    levels = proved.get("sampled gain", [])
+    channels = [f"{low:.4g}..{level:.4g}" for low, level in zip(run.least, levels, strict=False)] or ["", ""]
+    decay = (proved.get("internal update") or proved.get("sampled error") or [np.nan])[0]
+    drops = proved.get("drop probability")
+    return (
+        run.name, run.content["update"]["kind"], str(len(gains)),
+        f"{gains[:, 0].min():.3f}..{gains[:, 0].max():.3f}", bands[0],
+        f"{gains[:, 1].min():.1f}..{gains[:, 1].max():.1f}", bands[1],
+        channels[0], channels[-1], f"{decay:g}", f"{drops[0]:g}" if drops else "none",
+        run.state, f"{run.seconds:.1f}",
+    )  # fmt: skip
 
 
 def _row(run: ScheduleRun) -> dict[str, Any]:

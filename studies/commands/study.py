@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-
-from studies.claim import Verdict
-from studies.commands.progress import progress_bar
+from studies.claim import ClaimVerdict
+from studies.commands.terminal import print_table, progress_bar
 from studies.registry import SHIPPED, Registry
 from studies.report.scoreboard import MARKS
 from studies.running.pool import available_cores
@@ -20,6 +18,9 @@ from studies.study import QUICK, Scope
 from synthesis.errors import SpecError
 
 DEFAULT_OUT = Path("out") / "studies"
+CAPTION = "parts: computed now + kept from an earlier run; claims: " + ", ".join(
+    f"{mark} {verdict}" for verdict, mark in MARKS.items()
+)
 
 
 def run_study(
@@ -58,7 +59,8 @@ def run_study(
     if as_json:
         print(json.dumps(_content(summary, folder), indent=1))
     else:
-        Console(width=None if sys.stdout.isatty() else 120).print(_table(summary))
+        headings = ("study", "parts", "failed", *MARKS.values(), "missing", "s")
+        print_table("Studies", headings, _rows(summary), caption=CAPTION, no_wrap=True)
     for study, part, message in summary.failures:
         print(f"{study}/{part}: {message}", file=sys.stderr)
     if summary.missing_claims:
@@ -86,23 +88,17 @@ def _scope(quick: bool, seeds: int | None) -> Scope:
     return Scope(quick=quick, seeds=seeds)
 
 
-def _table(summary: RunSummary) -> Table:
-    states = {record.id: [o for o in summary.outcomes if o.study == record.id] for record in summary.records}
-    legend = ", ".join(f"{mark} {verdict}" for verdict, mark in MARKS.items())
-    table = Table(title="Studies", caption=f"parts: computed now + kept from an earlier run; claims: {legend}")
-    for heading in ("study", "parts", "failed", *MARKS.values(), "missing", "s"):
-        table.add_column(heading, justify="left" if heading == "study" else "right", no_wrap=True)
+def _rows(summary: RunSummary) -> Iterator[tuple[str, ...]]:
     for record in summary.records:
-        outcomes = states[record.id]
+        outcomes = [outcome for outcome in summary.outcomes if outcome.study == record.id]
         computed = sum(outcome.state == "computed" for outcome in outcomes)
-        kept = sum(part.stored is not None for part in record.parts) - computed
+        earlier = sum(part.stored is not None for part in record.parts) - computed
         verdicts = [claim["verdict"] for claim in record.claims]
-        table.add_row(
-            record.id, f"{computed} + {kept}", str(sum(bool(part.failure) for part in record.parts)),
+        yield (
+            record.id, f"{computed} + {earlier}", str(sum(bool(part.failure) for part in record.parts)),
             *(str(verdicts.count(verdict)) for verdict in MARKS), str(len(record.missing_claims)),
             f"{sum(outcome.seconds for outcome in outcomes):.1f}",
         )  # fmt: skip
-    return table
 
 
 def _content(summary: RunSummary, folder: Path) -> dict[str, Any]:
@@ -116,7 +112,7 @@ def _content(summary: RunSummary, folder: Path) -> dict[str, Any]:
         "missing_claims": summary.missing_claims,
         "verdicts": {
             str(verdict): sum(c["verdict"] == verdict for r in summary.records for c in r.claims)
-            for verdict in Verdict
+            for verdict in ClaimVerdict
         },
         "files": [str(path) for path in summary.paths],
     }  # fmt: skip

@@ -10,7 +10,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from studies.commands.progress import progress_bar
+from studies.commands.terminal import progress_bar
 from studies.sweeps.baseline import Baseline, of_sweep, read_baseline, write_baseline
 from studies.sweeps.cluster import Cluster
 from studies.sweeps.engine import SweepResult, default_executor

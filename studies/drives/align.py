@@ -13,12 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize_scalar
 
-from studies.drives.errors import LogError
+from estimators.arrays import FloatArray
+from studies.errors import LogError
 
-Array = npt.NDArray[np.float64]
 HALF_WINDOW = 0.05
 """h in s: long enough for 100 Hz logs, short against a brake application."""
 LEAST_CORRELATION = 0.9
@@ -38,10 +37,10 @@ class Offset:
 
 
 def find_offset(
-    velocity_time: Array,
-    velocity: Array,
-    acceleration_time: Array,
-    acceleration: Array,
+    velocity_time: FloatArray,
+    velocity: FloatArray,
+    acceleration_time: FloatArray,
+    acceleration: FloatArray,
     search: float | None = None,
     step: float = 0.01,
 ) -> Offset:
@@ -86,13 +85,13 @@ def find_offset(
     return Offset(seconds=seconds, correlation=correlation, slope=slope)
 
 
-def _finite(time: Array, value: Array) -> tuple[Array, Array]:
+def _finite(time: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
     keep = np.isfinite(value)
     if np.count_nonzero(keep) < 2 or np.ptp(time[keep]) <= 4 * HALF_WINDOW:
         raise LogError("the logs cannot be aligned: one of the signals is shorter than 0.2 s; give clock_offset")
     return time[keep], value[keep]
 
 
-def _increment(time: Array, value: Array, t: Array) -> Array:
+def _increment(time: FloatArray, value: FloatArray, t: FloatArray) -> FloatArray:
     ends = [np.interp(t + side, time, value, left=np.nan, right=np.nan) for side in (HALF_WINDOW, -HALF_WINDOW)]
     return np.asarray((ends[0] - ends[1]) / (2 * HALF_WINDOW))

@@ -5,24 +5,20 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from estimators.arrays import FloatArray
 
 
-def mean_over(values: Array) -> Array:
-    """Mean of (n, k) over k, of what is not missing; NaN where all of a row is."""
+def mean_over(values: FloatArray) -> FloatArray:
+    """Mean of (n, k) over k, of what is not missing; NaN where all of a row is. Of R_e w: wrong by the mean slip velocity."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Mean of empty slice", category=RuntimeWarning)
         return np.asarray(np.nanmean(values, axis=1))
 
 
-def mean_wheel_speed(surface_speed: Array) -> Array:
-    """Mean of R_e w over the wheels (n,), m/s: wrong by the mean slip velocity."""
-    return mean_over(surface_speed)
-
-
-def integrated_acceleration(ax: Array, yaw_rate: Array, vy: Array, sample_time: float, start: float) -> Array:
+def integrated_acceleration(
+    ax: FloatArray, yaw_rate: FloatArray, vy: FloatArray, sample_time: float, start: float
+) -> FloatArray:
     """V_x(t) = V_x(0) + integral of (a_x + r V_y) dt, m/s, P1 section 5, by the trapezoidal rule.
 
     Drifts with sensor bias and road grade; a missing sample keeps the last known acceleration.
@@ -32,7 +28,7 @@ def integrated_acceleration(ax: Array, yaw_rate: Array, vy: Array, sample_time: 
     return start + np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def held(value: Array) -> Array:
+def held(value: FloatArray) -> FloatArray:
     """Missing samples replaced by the last known one (0 before the first)."""
     known = np.isfinite(value)
     last = np.maximum.accumulate(np.where(known, np.arange(value.size), -1))

@@ -8,9 +8,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from estimators import EstimatorError, GainSchedule
+from estimators import GainSchedule
+from estimators.arrays import FloatArray, IntArray
 from estimators.forces import (
     AttitudeObserver,
     LateralForceEstimator,
@@ -36,9 +36,10 @@ from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.prepare import CornerInputs
 from studies.drives.quantities import CORNERS
-from synthesis.errors import SpecError
+from studies.errors import refused_at
 
-Array = npt.NDArray[np.float64]
+Progress = Callable[[float], None]
+"""Called with the fraction done."""
 PROGRESS_STEPS = 50
 WHEEL_INERTIA = 1.0
 """kg m^2 where the drive has none: without torques it has nothing to act on."""
@@ -52,34 +53,19 @@ class Chain:
     them. ``flags`` and ``checks`` (n,) are sums of ``estimators.Flag`` and ``estimators.pipeline.Check``.
     """
 
-    vx: Array
-    vy: Array
-    sideslip: Array
-    sideslip_part: Array
-    corner_vy: Array
-    force_x: Array
-    axle_force_y: Array
-    force_z: Array
-    slip: Array
-    slip_angle: Array
-    flags: npt.NDArray[np.int64]
-    checks: npt.NDArray[np.int64]
+    vx: FloatArray
+    vy: FloatArray
+    sideslip: FloatArray
+    sideslip_part: FloatArray
+    corner_vy: FloatArray
+    force_x: FloatArray
+    axle_force_y: FloatArray
+    force_z: FloatArray
+    slip: FloatArray
+    slip_angle: FloatArray
+    flags: IntArray
+    checks: IntArray
     assumptions: tuple[str, ...]
-
-
-def pipeline_of(
-    drive: DriveFile, longitudinal: GainSchedule | CornerKind, lateral: GainSchedule | None = None
-) -> tuple[EstimationPipeline, tuple[str, ...]]:
-    """The pipeline that the drive file asks for, for one car, and what had to be assumed.
-
-    ``longitudinal``: the corner observers along the wheels, for this pipeline alone; they run where ``lateral`` is given.
-
-    Raises SpecError, one line, on vehicle data that no car has.
-    """
-    try:
-        return _pipeline_of(drive, longitudinal, lateral)
-    except EstimatorError as error:
-        raise SpecError(f"estimators: {error}") from error
 
 
 def vehicle_of(drive: DriveFile) -> tuple[VehicleParameters, tuple[str, ...]]:
@@ -102,9 +88,16 @@ def vehicle_of(drive: DriveFile) -> tuple[VehicleParameters, tuple[str, ...]]:
     return vehicle, tuple(assumptions)
 
 
-def _pipeline_of(
-    drive: DriveFile, longitudinal: GainSchedule | CornerKind, lateral: GainSchedule | None
+@refused_at("estimators")
+def pipeline_of(
+    drive: DriveFile, longitudinal: GainSchedule | CornerKind, lateral: GainSchedule | None = None
 ) -> tuple[EstimationPipeline, tuple[str, ...]]:
+    """The pipeline that the drive file asks for, for one car, and what had to be assumed.
+
+    ``longitudinal``: the corner observers along the wheels, for this pipeline alone; they run where ``lateral`` is given.
+
+    Raises SpecError, one line, on vehicle data that no car has.
+    """
     vehicle, assumptions = vehicle_of(drive)
     time, chosen = drive.sample_time, drive.estimators
     forces: dict[str, Callable[..., Any]] = {
@@ -154,7 +147,7 @@ def run_chain(
     inputs: CornerInputs,
     pipeline: EstimationPipeline,
     assumptions: tuple[str, ...] = (),
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = lambda _done: None,
 ) -> Chain:
     """Every sample through the pipeline; signals that the log lacks are not flagged, missing samples are."""
     n, signals = log.time.size, log.signals
@@ -170,6 +163,8 @@ def run_chain(
         )
         part = np.nan if step.sideslip_step is None else step.sideslip_step.sideslip
         corner = np.nan if step.corners is None else step.corners.vy
+        forces = step.force_x, step.axle_force_y, step.force_z
+        wheels = step.slip, step.slip_angle
         rows.append(
             (
                 step.vx,
@@ -177,16 +172,13 @@ def run_chain(
                 step.sideslip,
                 part,
                 corner,
-                step.force_x,
-                step.axle_force_y,
-                step.force_z,
-                step.slip,
-                step.slip_angle,
+                *forces,
+                *wheels,
                 int(step.flags),
                 int(step.consistency.failed),
             )
         )
-        if progress is not None and k % max(1, n // PROGRESS_STEPS) == 0:
+        if k % max(1, n // PROGRESS_STEPS) == 0:
             progress(k / n)
     columns: list[Any] = [np.array(column) for column in zip(*rows, strict=True)]
     return Chain(*[*columns, assumptions])

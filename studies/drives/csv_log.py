@@ -9,20 +9,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import polars as pl
 
-from studies.drives.errors import LogError
-from synthesis.errors import unknown
-
-Array = npt.NDArray[np.float64]
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
+from studies.errors import LogError
 
 
 @dataclass(frozen=True)
 class CsvColumns:
     """The wanted columns as numbers; an empty cell, NaN or infinity is NaN. Row k stands on line k + 2 of the file."""
 
-    values: dict[str, Array]
+    values: dict[str, FloatArray]
     rows: int
     not_finite: dict[str, int]
 
@@ -103,7 +101,7 @@ def _refuse_short_rows(path: Path, table: pl.DataFrame, delimiter: str) -> None:
             )
 
 
-def _numbers(path: Path, text: pl.Series) -> Array:
+def _numbers(path: Path, text: pl.Series) -> FloatArray:
     stripped = text.str.strip_chars()
     numbers = stripped.cast(pl.Float64, strict=False)
     wrong = (numbers.is_null() & stripped.is_not_null() & (stripped != "")).arg_true()

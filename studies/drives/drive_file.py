@@ -7,18 +7,294 @@ the observers run with. Every quantity carries its unit; nothing is guessed from
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
-from studies.drives.drive_checks import check_alignment, check_columns, check_estimators, check_logs, check_signals
-from studies.drives.drive_tables import Column, Estimators, LogFile, Observer, Schedules, Table, Vehicle
-from studies.drives.quantities import Duration
-from studies.drives.validation import read_toml
+from estimators.errors import unknown
+from studies.drives.quantities import (
+    CORNERS,
+    REFERENCES,
+    SIGNALS,
+    AngularSpeed,
+    Duration,
+    Inertia,
+    Lag,
+    Length,
+    Mass,
+    Offset,
+    Rate,
+    Stiffness,
+    factor_to,
+)
+from synthesis.toml_file import StrictTable, load_toml
 
 
-class DriveFile(Table):
+def _a_time(unit: str) -> str:
+    factor_to(unit, "s")
+    return unit
+
+
+class Column(StrictTable):
+    """One log column: value in SI = factor * sign * (column in ``unit``)."""
+
+    column: str = Field(min_length=1, examples=["omega_fl"])
+    unit: str = Field(min_length=1, examples=["rad/s"])
+    log: str | None = None
+    sign: Literal["positive", "negative"] = "positive"
+    factor: float = Field(default=1.0, examples=[0.5])
+
+    def scale(self, si_unit: str) -> float:
+        """The number that turns the column into ``si_unit`` with the sign of this project (x forward, y left, z up)."""
+        return factor_to(self.unit, si_unit) * self.factor * (-1.0 if self.sign == "negative" else 1.0)
+
+
+class Align(StrictTable):
+    """Estimate a clock offset: the derivative of ``velocity`` must look like ``acceleration`` (:mod:`.align`)."""
+
+    to: str = Field(examples=["imu"])
+    velocity: str = "vx"
+    acceleration: str = "ax"
+    search: Duration | None = None
+
+
+class LogFile(StrictTable):
+    """One log file: its clock, its rate, and the longest pause that may be bridged by interpolation."""
+
+    name: str = Field(min_length=1, examples=["car"])
+    rate: Rate = Field(examples=["200 Hz"])
+    file: str | None = None
+    time: str = "time"
+    time_unit: Annotated[str, AfterValidator(_a_time)] = "s"
+    delimiter: str = Field(default=",", min_length=1, max_length=1)
+    max_gap: Duration | None = None
+    duplicates: Literal["mean", "last", "refuse"] = "mean"
+    sort: bool = False
+    clock_offset: Offset = 0.0
+    align: Align | None = None
+
+    @property
+    def allowed_gap(self) -> float:
+        """The longest spacing of samples that is interpolated over, s (five nominal periods if the file names none)."""
+        return self.max_gap if self.max_gap is not None else 5.0 / self.rate
+
+
+class Vehicle(StrictTable):
+    """Rigid-body and wheel data, SI. Lengths are to the centre of gravity; tracks are wheel centre to wheel centre."""
+
+    mass: Mass = Field(examples=["1600 kg"])
+    front_axle_to_cg: Length = Field(examples=["1.4 m"])
+    rear_axle_to_cg: Length = Field(examples=["1.5 m"])
+    cg_height: Length = Field(examples=["0.55 m"])
+    track_front: Length = Field(examples=["1.6 m"])
+    track_rear: Length = Field(examples=["1.6 m"])
+    effective_radius_front: Length = Field(examples=["0.34 m"])
+    effective_radius_rear: Length = Field(examples=["0.34 m"])
+    wheel_inertia: Inertia | None = None
+    rolling_resistance: float = Field(default=0.0, ge=0.0, le=0.2, examples=[0.012])
+    steering_ratio: float | None = Field(default=None, gt=0.0, examples=[15.0])
+    yaw_inertia: Inertia | None = None
+    cornering_stiffness_front: Stiffness | None = None  # of the axle, both wheels
+    cornering_stiffness_rear: Stiffness | None = None
+    relaxation_length: Length | None = None
+
+
+class Observer(StrictTable):
+    """How the observer inputs are formed: lag of the differentiators, and when a wheel counts as stopped."""
+
+    derivative_lag: Lag = 0.01
+    stopped_below: AngularSpeed = 1.0
+
+
+CHOICES = {
+    "longitudinal_force": ("unknown-input", "pid", "unscented", "linear"),
+    "vertical_load": ("dynamic", "quasi-static"),
+    "lateral_force": ("linear", "unscented"),
+    "attitude": ("none", "gyro"),
+    "velocity": ("fusion", "corners", "kinematic"),
+    "corner_velocity": ("lpv", "gain-switched", "kalman-three-state", "kalman-two-state"),
+    "axle_weights": ("equal", "slip"),
+    "sideslip": (
+        "none", "four-wheel-extended", "four-wheel-unscented", "adaptive-stiffness", "fixed-stiffness", "sliding-mode"
+    ),
+}  # fmt: skip
+"""Names of the estimators."""
+
+
+class Estimators(StrictTable):
+    """Which estimators make up the pipeline, and which run at the corners beside it.
+
+    ``corner_velocity`` is what the result calls corner observers; the same kind cross-checks the pipeline where a lateral
+    schedule is given. With ``velocity = "corners"`` they are its only source of velocities, as in the papers; with
+    ``"kinematic"`` they correct the kinematic model with bias states, P2 (15). ``axle_weights``: P1 weighs by slip.
+    """
+
+    longitudinal_force: str = "unknown-input"
+    vertical_load: str = "dynamic"
+    lateral_force: str = "linear"
+    attitude: str = "none"
+    velocity: str = "fusion"
+    corner_velocity: str = "lpv"
+    axle_weights: str = "equal"
+    sideslip: str = "none"
+
+    @field_validator("*")
+    @classmethod
+    def _is_known(cls, name: str, field: ValidationInfo) -> str:
+        known = CHOICES[field.field_name or ""]
+        if name not in known:
+            raise ValueError(unknown("estimator", name, known))
+        return name
+
+
+class Schedules(StrictTable):
+    """The gain schedule of each direction: a shipped name, or the path of a JSON file beside the drive file."""
+
+    longitudinal: str = Field(min_length=1, examples=["corner-estimation-longitudinal"])
+    lateral: str | None = None
+
+
+WHEEL_SPEEDS = tuple(f"wheel_speed_{corner}" for corner in CORNERS)
+TORQUES = tuple(f"torque_{corner}" for corner in CORNERS)
+
+
+def check_logs(logs: Sequence[LogFile]) -> None:
+    """Every log has a name of its own."""
+    names = [log.name for log in logs]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"log: two entries are called '{name}'; give every log its own name")
+
+
+def check_columns(signals: Mapping[str, Column], reference: Mapping[str, Column], logs: Sequence[LogFile]) -> None:
+    """Every signal is a known one, has a unit that measures it, and says which log holds it."""
+    names = [log.name for log in logs]
+    for table, known, columns in (("signals", SIGNALS, signals), ("reference", REFERENCES, reference)):
+        for name, column in columns.items():
+            _check_column(f"{table}.{name}", name, column, known, names)
+
+
+def _check_column(place: str, name: str, column: Column, known: dict[str, str], logs: list[str]) -> None:
+    if name not in known:
+        raise ValueError(f"{place}: {unknown('signal', name, known)}")
+    if column.factor == 0:
+        raise ValueError(f"{place}.factor: 0 is not a scale; use a finite number other than zero")
+    try:
+        column.scale(known[name])
+    except ValueError as error:
+        raise ValueError(f"{place}.unit: {error}") from error
+    if column.log is None and len(logs) > 1:
+        raise ValueError(f"{place}.log: missing; say which log holds column '{column.column}': {', '.join(logs)}")
+    if column.log is not None and column.log not in logs:
+        raise ValueError(f"{place}.log: {unknown('log', column.log, logs)}")
+
+
+def check_alignment(columns: Mapping[str, Column], logs: Sequence[LogFile]) -> None:
+    """A log is aligned to one with a clock of its own: velocity in one of the two, acceleration in the other."""
+    for log in logs:
+        if log.align is not None:
+            _check_alignment(f"log '{log.name}'.align", log, log.align, columns, logs)
+
+
+def _check_alignment(
+    place: str, log: LogFile, align: Align, columns: Mapping[str, Column], logs: Sequence[LogFile]
+) -> None:
+    others = [other.name for other in logs if other.name != log.name and other.align is None]
+    if align.to not in others:
+        raise ValueError(f"{place}.to: {unknown('log', align.to, others)} (a log with a clock of its own)")
+    if log.clock_offset != 0:
+        raise ValueError(f"{place}: clock_offset is given as well; keep one of the two")
+    for role in (align.velocity, align.acceleration):
+        if role not in columns:
+            raise ValueError(f"{place}: {unknown('signal', role, columns)}")
+    held = {columns[align.velocity].log, columns[align.acceleration].log}
+    if held != {log.name, align.to}:
+        raise ValueError(
+            f"{place}: one of {align.velocity}, {align.acceleration} must be in log '{log.name}', "
+            f"the other in '{align.to}'"
+        )
+
+
+def check_signals(signals: Mapping[str, Column], vehicle: Vehicle) -> None:
+    """What the observers cannot do without is there, and the vehicle has what the signals need."""
+    for name in (*WHEEL_SPEEDS, "ax"):
+        if name not in signals:
+            raise ValueError(f"signals.{name}: missing; {_add_signal(name)}")
+    if any(name in signals for name in TORQUES) and vehicle.wheel_inertia is None:
+        raise ValueError('vehicle.wheel_inertia: missing, but wheel torques are given; add it, such as "1.6 kg*m^2"')
+    if "hand_wheel" in signals and vehicle.steering_ratio is None:
+        raise ValueError("vehicle.steering_ratio: missing, but hand_wheel is given; add it, such as 15.0")
+    steering = [name for name in ("steering", "hand_wheel", "steer_fl", "steer_fr") if name in signals]
+    if len(steering) > 1 and steering != ["steer_fl", "steer_fr"]:
+        raise ValueError(
+            f"signals: {' and '.join(steering)} say the same thing; keep steering, hand_wheel, or steer_fl and steer_fr"
+        )
+    for pair in (("steer_fl", "steer_fr"), ("steer_rl", "steer_rr")):
+        given = [name for name in pair if name in signals]
+        if len(given) == 1:
+            (missing,) = set(pair) - set(given)
+            raise ValueError(
+                f"signals.{missing}: missing, but {given[0]} is given; {_add_signal(missing)}"
+                + (", or give steering for both front wheels" if missing.startswith("steer_f") else "")
+            )
+
+
+def _add_signal(name: str) -> str:
+    return f'add {name} = {{ column = "...", unit = "{SIGNALS[name]}" }}'
+
+
+def check_estimators(chosen: Estimators, signals: Mapping[str, Column], vehicle: Vehicle, schedules: Schedules) -> None:
+    """Every estimator that the file asks for by name has the vehicle data, the signals and the schedules that it needs."""
+    if chosen.velocity != "fusion" and schedules.lateral is None:
+        raise ValueError(
+            f"schedules.lateral: missing, but estimators.velocity = '{chosen.velocity}' has V_y from nothing else; "
+            'add it, such as lateral = "corner-estimation-lateral"'
+        )
+    wanted = {name: str(getattr(chosen, name)) for name in chosen.model_fields_set}
+    for place, estimator in wanted.items():
+        for parameter, example in _PARAMETERS.get((place, estimator), ()):
+            if getattr(vehicle, parameter) is None:
+                raise ValueError(
+                    f"vehicle.{parameter}: missing, but estimators.{place} = '{estimator}' needs it; "
+                    f'add it, such as "{example}"'
+                )
+        for signal in _SIGNALS.get((place, estimator), ()):
+            if signal not in signals:
+                raise ValueError(
+                    f"signals.{signal}: missing, but estimators.{place} = '{estimator}' needs it; {_add_signal(signal)}"
+                )
+        if (place, estimator) in _STEERED and not any(
+            name in signals for name in ("steering", "hand_wheel", "steer_fl")
+        ):
+            raise ValueError(
+                f"signals.steering: missing, but estimators.{place} = '{estimator}' needs it; {_add_signal('steering')}, "
+                "or hand_wheel, or steer_fl and steer_fr"
+            )
+
+
+_YAW = ("yaw_inertia", "3900 kg*m^2")
+_STIFFNESS = (_YAW, ("cornering_stiffness_front", "160 kN/rad"), ("cornering_stiffness_rear", "180 kN/rad"))
+_TIRE = (*_STIFFNESS, ("relaxation_length", "0.5 m"))
+_PARAMETERS = {
+    ("lateral_force", "linear"): (_YAW,),
+    ("lateral_force", "unscented"): (_YAW,),
+    ("sideslip", "four-wheel-extended"): _TIRE,
+    ("sideslip", "four-wheel-unscented"): _TIRE,
+    ("sideslip", "adaptive-stiffness"): _STIFFNESS,
+    ("sideslip", "fixed-stiffness"): _STIFFNESS,
+    ("sideslip", "sliding-mode"): _STIFFNESS,
+}
+_STEERED = {(place, name) for place, name in _PARAMETERS if place == "sideslip"}
+_SIGNALS = {
+    **dict.fromkeys((*_STEERED, ("lateral_force", "linear"), ("lateral_force", "unscented")), ("yaw_rate", "ay")),
+    **{("longitudinal_force", name): TORQUES for name in ("unknown-input", "pid", "unscented", "linear")},
+    ("attitude", "gyro"): ("roll_rate", "pitch_rate"),
+}
+
+
+class DriveFile(StrictTable):
     """A drive file that was read, checked and converted to SI."""
 
     schema_: Literal["gainsmith.drive/1"] = Field(alias="schema", examples=["gainsmith.drive/1"])
@@ -49,4 +325,4 @@ class DriveFile(Table):
 
 def read_drive(path: Path) -> DriveFile:
     """Read and check a drive file. Raises SpecError, one line: file, key, what is wrong, what would be right."""
-    return read_toml(path, DriveFile, "drive")
+    return load_toml(path, DriveFile, "drive")

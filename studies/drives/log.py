@@ -6,21 +6,100 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from studies.drives.align import find_offset
 from studies.drives.csv_log import line_of, read_columns
-from studies.drives.drive_file import DriveFile
-from studies.drives.drive_tables import Column, LogFile
-from studies.drives.errors import LogError
+from studies.drives.drive_file import Column, DriveFile, LogFile
 from studies.drives.plausible import check_plausible
 from studies.drives.quantities import REFERENCES, SIGNALS, factor_to
-from studies.drives.resample import Stamped, clean_stamps, resample
+from studies.errors import LogError
 
-Array = npt.NDArray[np.float64]
+
+@dataclass(frozen=True)
+class Stamped:
+    """Columns over strictly increasing time, s, and what had to be done to get there."""
+
+    time: FloatArray
+    values: dict[str, FloatArray]
+    duplicates: int
+    out_of_order: int
+
+
+def clean_stamps(
+    file: str,
+    time: FloatArray,
+    values: dict[str, FloatArray],
+    *,
+    sort: bool = False,
+    duplicates: Literal["mean", "last", "refuse"] = "mean",
+) -> Stamped:
+    """Strictly increasing stamps: sorted if ``sort``, equal stamps averaged or reduced to the last one.
+
+    Raises LogError with the line of the first stamp that is missing, runs backwards or (``refuse``) repeats.
+    """
+    missing = np.flatnonzero(~np.isfinite(time))
+    if missing.size:
+        raise LogError(f"{file}: line {line_of(int(missing[0]))} has no time stamp; remove the line")
+    backwards = np.flatnonzero(np.diff(time) < 0)
+    if backwards.size and not sort:
+        k = int(backwards[0])
+        raise LogError(
+            f"{file}: time runs backwards on line {line_of(k + 1)} ({time[k + 1]:g} s after {time[k]:g} s); "
+            "repair the log, or set sort = true for it in the drive file"
+        )
+    order = np.argsort(time, kind="stable")
+    time = time[order]
+    values = {name: value[order] for name, value in values.items()}
+    repeats = np.flatnonzero(np.diff(time) == 0)
+    if repeats.size and duplicates == "refuse":
+        k = int(repeats[0]) + 1
+        raise LogError(
+            f"{file}: time {time[k]:g} s appears twice, again on line {line_of(int(order[k]))}; "
+            'set duplicates = "mean" or "last" for this log'
+        )
+    if repeats.size:
+        values = {name: _merge(time, value, duplicates == "mean") for name, value in values.items()}
+        time = np.unique(time)
+    return Stamped(time=time, values=values, duplicates=int(repeats.size), out_of_order=int(backwards.size))
+
+
+def _merge(time: FloatArray, value: FloatArray, mean: bool) -> FloatArray:
+    """One value per distinct stamp: the mean, or the last, of the finite ones (NaN if there is none)."""
+    finite = np.isfinite(value)
+    unique, group = np.unique(time, return_inverse=True)
+    merged = np.full(unique.size, np.nan)
+    if not mean:
+        merged[group[finite]] = value[finite]  # numpy assigns in order: the last one stays
+        return merged
+    count = np.bincount(group[finite], minlength=unique.size)
+    total = np.bincount(group[finite], weights=value[finite], minlength=unique.size)
+    np.divide(total, count, out=merged, where=count > 0)
+    return merged
+
+
+def resample(time: FloatArray, value: FloatArray, grid: FloatArray, max_gap: float) -> FloatArray:
+    """Linear interpolation of the finite samples on ``grid``; NaN outside the record and inside gaps.
+
+    A gap is a spacing of finite samples above ``max_gap``, s; its two ends are measured and stay. Error of the
+    interpolation between samples at distance h: at most h^2/8 times the largest second derivative.
+    """
+    finite = np.isfinite(value)
+    time, value = time[finite], value[finite]
+    if time.size < 2:
+        return np.full(grid.shape, np.nan)
+    tolerance = 1e-9 * max(1.0, abs(float(time[-1])))  # rounding of the stamps, not a physical time
+    out = np.interp(grid, time, value)
+    out[(grid < time[0] - tolerance) | (grid > time[-1] + tolerance)] = np.nan
+    left = np.clip(np.searchsorted(time, grid + tolerance, side="right") - 1, 0, time.size - 2)
+    gap = np.diff(time)[left] > max_gap + tolerance
+    out[gap & (grid > time[left] + tolerance) & (grid < time[left + 1] - tolerance)] = np.nan
+    return out
+
+
 LONGEST_GAP = 60.0
 """s without a row: beyond it the clock has jumped, or it is another drive."""
 MOST_SAMPLES = 5_000_000
@@ -34,17 +113,17 @@ class DriveLog:
     ``report`` says for every log what was read, repaired, bridged and found.
     """
 
-    time: Array
-    signals: dict[str, Array]
-    reference: dict[str, Array]
+    time: FloatArray
+    signals: dict[str, FloatArray]
+    reference: dict[str, FloatArray]
     report: dict[str, Any]
 
 
 @dataclass(frozen=True)
 class _Track:
     stamped: Stamped
-    signals: dict[str, Array]
-    reference: dict[str, Array]
+    signals: dict[str, FloatArray]
+    reference: dict[str, FloatArray]
 
 
 def read_log(paths: Sequence[Path], drive: DriveFile) -> DriveLog:
@@ -62,11 +141,11 @@ def read_log(paths: Sequence[Path], drive: DriveFile) -> DriveLog:
     grid = _common_grid(drive, tracks, offsets)
     gaps = {entry.name: entry.allowed_gap for entry in drive.log}
 
-    def on_grid(columns: dict[str, Column], table: str) -> dict[str, Array]:
+    def on_grid(columns: dict[str, Column], table: str) -> dict[str, FloatArray]:
         out = {}
         for name, column in columns.items():
             log = drive.log_of(column)
-            values: dict[str, Array] = getattr(tracks[log], table)
+            values: dict[str, FloatArray] = getattr(tracks[log], table)
             out[name] = resample(tracks[log].stamped.time + offsets[log], values[name], grid, gaps[log])
         return out
 
@@ -138,17 +217,11 @@ def _read_track(path: Path, entry: LogFile, drive: DriveFile) -> tuple[_Track, d
     _check_rate(path, entry, float(np.median(spacing)))
     _check_gap(path, entry, seconds, stamped.time)
     report: dict[str, Any] = {
-        "file": path.name,
-        "rows": table.rows,
-        "duplicates": stamped.duplicates,
-        "out_of_order": stamped.out_of_order,
-        "gaps": int(np.count_nonzero(spacing > entry.allowed_gap * (1 + 1e-9))),
-        "largest_gap_s": float(spacing.max()),
-        "allowed_gap_s": entry.allowed_gap,
-        "median_rate_hz": float(1.0 / np.median(spacing)),
-        "clock_offset_s": entry.clock_offset,
-        "not_finite": table.not_finite,
-    }
+        "file": path.name, "rows": table.rows, "duplicates": stamped.duplicates, "out_of_order": stamped.out_of_order,
+        "gaps": int(np.count_nonzero(spacing > entry.allowed_gap * (1 + 1e-9))), "largest_gap_s": float(spacing.max()),
+        "allowed_gap_s": entry.allowed_gap, "median_rate_hz": float(1.0 / np.median(spacing)),
+        "clock_offset_s": entry.clock_offset, "not_finite": table.not_finite,
+    }  # fmt: skip
     track = _Track(
         stamped=stamped,
         signals={n: stamped.values[c.column] * c.scale(SIGNALS[n]) for n, c in signals.items()},
@@ -166,7 +239,7 @@ def _check_rate(path: Path, entry: LogFile, spacing: float) -> None:
         )
 
 
-def _check_gap(path: Path, entry: LogFile, raw: Array, time: Array) -> None:
+def _check_gap(path: Path, entry: LogFile, raw: FloatArray, time: FloatArray) -> None:
     """``raw``: stamps as they stand in the file, ``time``: those of the track, both in s."""
     k = int(np.argmax(np.diff(time)))
     gap = float(time[k + 1] - time[k])
@@ -187,13 +260,8 @@ def _clock_offsets(drive: DriveFile, tracks: dict[str, _Track], report: dict[str
             continue
         velocity_log, velocity = _find(drive, tracks, entry.align.velocity)
         acceleration_log, acceleration = _find(drive, tracks, entry.align.acceleration)
-        found = find_offset(
-            tracks[velocity_log].stamped.time,
-            velocity,
-            tracks[acceleration_log].stamped.time,
-            acceleration,
-            entry.align.search,
-        )
+        times = [tracks[log].stamped.time for log in (velocity_log, acceleration_log)]
+        found = find_offset(times[0], velocity, times[1], acceleration, entry.align.search)
         sign = 1.0 if velocity_log == entry.name else -1.0
         offsets[entry.name] = offsets[entry.align.to] + sign * found.seconds
         report["logs"][entry.name]["clock_offset_s"] = offsets[entry.name]
@@ -205,13 +273,13 @@ def _clock_offsets(drive: DriveFile, tracks: dict[str, _Track], report: dict[str
     return offsets
 
 
-def _find(drive: DriveFile, tracks: dict[str, _Track], name: str) -> tuple[str, Array]:
+def _find(drive: DriveFile, tracks: dict[str, _Track], name: str) -> tuple[str, FloatArray]:
     column = drive.signals.get(name) or drive.reference[name]
     log = drive.log_of(column)
     return log, (tracks[log].signals if name in drive.signals else tracks[log].reference)[name]
 
 
-def _common_grid(drive: DriveFile, tracks: dict[str, _Track], offsets: dict[str, float]) -> Array:
+def _common_grid(drive: DriveFile, tracks: dict[str, _Track], offsets: dict[str, float]) -> FloatArray:
     """The grid t0 + k*Ts over the time that all logs cover."""
     start = max(float(track.stamped.time[0]) + offsets[name] for name, track in tracks.items())
     end = min(float(track.stamped.time[-1]) + offsets[name] for name, track in tracks.items())

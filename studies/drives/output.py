@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import polars as pl
 
-from studies.drives.errors import LogError
+from estimators.arrays import AnyArray
+from studies.errors import LogError
+from studies.plots import Figure
+from studies.plots.save import save_as
 
 
 def check_folder(out: Path) -> None:
@@ -60,8 +62,22 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
         beside.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def write_csv(path: Path, columns: Mapping[str, npt.NDArray[Any]]) -> None:
+def write_csv(path: Path, columns: Mapping[str, AnyArray]) -> None:
     """One column a name, six decimals; what is missing is an empty cell."""
     frame = pl.DataFrame({name: np.ascontiguousarray(value) for name, value in columns.items()}, nan_to_null=True)
     with whole_file(path) as beside:
         frame.write_csv(beside, float_scientific=False, float_precision=6)
+
+
+def write_figures(
+    figures: Sequence[Figure], out: Path, progress: Callable[[float], None] = lambda _done: None
+) -> list[Path]:
+    """Each figure as SVG and PNG under its name; ``progress`` hears the share done."""
+    paths = []
+    for k, figure in enumerate(figures):
+        svg, png = (out / f"{figure.name}{suffix}" for suffix in (".svg", ".png"))
+        with whole_file(svg) as first, whole_file(png) as second:
+            save_as(figure, first, second)
+        paths += [svg, png]
+        progress((k + 1) / len(figures))
+    return paths

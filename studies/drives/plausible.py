@@ -10,14 +10,11 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from studies.drives.drive_file import DriveFile
-from studies.drives.drive_tables import Column
-from studies.drives.errors import LogError
+from estimators.arrays import FloatArray
+from studies.drives.drive_file import Column, DriveFile
 from studies.drives.quantities import CORNERS, SIGNALS, factor_to
-
-Array = npt.NDArray[np.float64]
+from studies.errors import LogError
 
 
 class Limit(NamedTuple):
@@ -53,7 +50,7 @@ ENOUGH = 20
 
 
 def check_plausible(
-    drive: DriveFile, signals: Mapping[str, Array], reference: Mapping[str, Array], files: Mapping[str, str]
+    drive: DriveFile, signals: Mapping[str, FloatArray], reference: Mapping[str, FloatArray], files: Mapping[str, str]
 ) -> None:
     """Refuse signals in SI (n,) that no car produces; ``files`` names the file of each log.
 
@@ -66,7 +63,7 @@ def check_plausible(
         _check_rolling(drive, signals, reference["vx"], files)
 
 
-def _check_size(drive: DriveFile, files: Mapping[str, str], name: str, value: Array, limit: Limit) -> None:
+def _check_size(drive: DriveFile, files: Mapping[str, str], name: str, value: FloatArray, limit: Limit) -> None:
     size = np.abs(value[np.isfinite(value)])
     high = float(np.percentile(size, QUANTILE)) if size.size else 0.0
     if high <= limit.largest:
@@ -80,7 +77,9 @@ def _check_size(drive: DriveFile, files: Mapping[str, str], name: str, value: Ar
     )
 
 
-def _check_rolling(drive: DriveFile, signals: Mapping[str, Array], vx: Array, files: Mapping[str, str]) -> None:
+def _check_rolling(
+    drive: DriveFile, signals: Mapping[str, FloatArray], vx: FloatArray, files: Mapping[str, str]
+) -> None:
     car = drive.vehicle
     radius = np.repeat([car.effective_radius_front, car.effective_radius_rear], 2)
     surface = np.stack([signals[f"wheel_speed_{corner}"] for corner in CORNERS], axis=-1) * radius
@@ -103,7 +102,7 @@ def _check_rolling(drive: DriveFile, signals: Mapping[str, Array], vx: Array, fi
 
 
 def _odd_wheel(
-    drive: DriveFile, files: Mapping[str, str], wheel: int, ratio: float, speed: Array, *, whole: bool
+    drive: DriveFile, files: Mapping[str, str], wheel: int, ratio: float, speed: FloatArray, *, whole: bool
 ) -> str:
     name = f"wheel_speed_{CORNERS[wheel]}"
     column, velocity = drive.signals[name], drive.reference["vx"]

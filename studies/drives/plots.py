@@ -9,8 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from studies.drives.chain import Chain
-from studies.drives.comparison import AXLES, quasi_static_axle_forces, reference_axle_force, reference_sideslip
-from studies.drives.judge import LEAST_SPEED, DriveData
+from studies.drives.evaluation import (
+    AXLES,
+    LEAST_SPEED,
+    DriveData,
+    quasi_static_axle_forces,
+    reference_axle_force,
+    reference_sideslip,
+)
 from studies.drives.quantities import CORNERS
 from studies.plots import ZERO, Figure, Line, Mark, Panel, colours
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from studies.drives import corner_inputs
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.quantities import CORNERS
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -23,27 +21,27 @@ class CornerInputs:
     observers run. ``assumptions`` says what the log did not give, ``force_sources`` where each corner's force is from.
     """
 
-    time: Array
-    wheel_speed: Array
-    radius: Array
-    wheel_acceleration: Array
-    vertical_load: Array
-    force: Array
-    normalised_force: Array
-    free: Array
-    per_speed: Array
-    steer: Array
-    yaw_rate: Array
-    ax: Array
-    ay: Array
-    vy: Array
-    x: Array
-    y: Array
+    time: FloatArray
+    wheel_speed: FloatArray
+    radius: FloatArray
+    wheel_acceleration: FloatArray
+    vertical_load: FloatArray
+    force: FloatArray
+    normalised_force: FloatArray
+    free: FloatArray
+    per_speed: FloatArray
+    steer: FloatArray
+    yaw_rate: FloatArray
+    ax: FloatArray
+    ay: FloatArray
+    vy: FloatArray
+    x: FloatArray
+    y: FloatArray
     force_sources: tuple[str, ...]
     assumptions: tuple[str, ...]
 
     @property
-    def surface_speed(self) -> Array:
+    def surface_speed(self) -> FloatArray:
         """R_e w (n, 4), m/s."""
         return self.radius * self.wheel_speed
 
@@ -53,12 +51,12 @@ def corner_inputs_of(log: DriveLog, drive: DriveFile) -> CornerInputs:
     car, lag, step = drive.vehicle, drive.observer.derivative_lag, drive.sample_time
     assumptions: list[str] = []
 
-    def measured(name: str, meaning: str) -> Array:
+    def measured(name: str, meaning: str) -> FloatArray:
         if name not in log.signals:
             assumptions.append(f"{meaning} is not measured: taken as 0")
         return log.signals.get(name, np.zeros_like(log.time))
 
-    def rate(value: Array) -> Array:
+    def rate(value: FloatArray) -> FloatArray:
         columns = [corner_inputs.derivative(column, step, lag) for column in np.atleast_2d(value.T)]
         return np.stack(columns, axis=-1).reshape(value.shape)
 
@@ -97,12 +95,12 @@ def corner_inputs_of(log: DriveLog, drive: DriveFile) -> CornerInputs:
     )
 
 
-def _four(log: DriveLog, name: str) -> Array:
+def _four(log: DriveLog, name: str) -> FloatArray:
     nothing = np.full_like(log.time, np.nan)
     return np.stack([log.signals.get(f"{name}_{corner}", nothing) for corner in CORNERS], axis=-1)
 
 
-def _steer(log: DriveLog, drive: DriveFile, assumptions: list[str]) -> Array:
+def _steer(log: DriveLog, drive: DriveFile, assumptions: list[str]) -> FloatArray:
     """Road-wheel angles (n, 4), rad: per corner where measured, else both front wheels alike, rear wheels straight."""
     steer = np.zeros((log.time.size, 4))
     if "steering" in log.signals:
@@ -117,8 +115,13 @@ def _steer(log: DriveLog, drive: DriveFile, assumptions: list[str]) -> Array:
 
 
 def _forces(
-    log: DriveLog, drive: DriveFile, wheel_speed: Array, wheel_acceleration: Array, load: Array, radius: Array
-) -> tuple[Array, tuple[str, ...]]:
+    log: DriveLog,
+    drive: DriveFile,
+    wheel_speed: FloatArray,
+    wheel_acceleration: FloatArray,
+    load: FloatArray,
+    radius: FloatArray,
+) -> tuple[FloatArray, tuple[str, ...]]:
     """F_x per corner: wheel dynamics where the torque is known, what is left of m a_x shared by load elsewhere."""
     car = drive.vehicle
     dynamics = corner_inputs.wheel_forces(

@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from studies.drives.chain import Chain, pipeline_of, run_chain
-from studies.drives.corner_observers import corner_observer
+from estimators.arrays import AnyArray
+from studies.drives.chain import Chain, Progress, pipeline_of, run_chain
 from studies.drives.drive_file import read_drive
-from studies.drives.judge import DriveData, judge
+from studies.drives.evaluation import DriveData, evaluate
 from studies.drives.log import read_log
-from studies.drives.output import check_folder, ready_folder, whole_file, write_csv, write_json
+from studies.drives.output import check_folder, ready_folder, write_csv, write_figures, write_json
 from studies.drives.plots import figures
 from studies.drives.prepare import corner_inputs_of
 from studies.drives.quantities import CORNERS
 from studies.drives.replay import replay
-from studies.drives.schedules import check_radii, load_schedule
-from studies.plots.save import save_as
+from studies.drives.schedules import check_radii, corner_observer, load_schedule
 
-Progress = Callable[[float], None]
+Columns = dict[str, AnyArray]
 
 
 @dataclass(frozen=True)
@@ -34,29 +33,27 @@ class RunResult:
     paths: tuple[Path, ...]
 
 
-def run_drive(logs: Sequence[Path], drive: Path, out: Path, *, progress: Progress | None = None) -> RunResult:
+def run_drive(logs: Sequence[Path], drive: Path, out: Path, *, progress: Progress = lambda _done: None) -> RunResult:
     """Run the pipeline and the four-corner longitudinal observers over the ``logs`` that the ``drive`` file describes.
 
     Writes estimates.csv, metrics.json and the plots (svg and png) to ``out``, each whole or not at all. ``progress``
     is called with the fraction done. Raises SpecError (drive file, schedule) or LogError (logs, ``out``), one line
     each, before anything is written.
     """
-    told = progress if progress is not None else _silent
     check_folder(out)
-    data = replay_drive(logs, drive, progress=lambda done: told(0.4 * done))
-    metrics = judge(data)
+    data = replay_drive(logs, drive, progress=lambda done: progress(0.4 * done))
+    metrics = evaluate(data)
     ready_folder(out)
     paths = [out / "estimates.csv", out / "metrics.json"]
     write_csv(paths[0], estimate_columns(data))
     write_json(paths[1], metrics)
-    paths += _draw(data, out, told)
-    told(1.0)
+    paths += write_figures(figures(data), out, lambda done: progress(0.4 + 0.6 * done))
+    progress(1.0)
     return RunResult(metrics=metrics, log_report=data.log.report, paths=tuple(paths))
 
 
-def replay_drive(logs: Sequence[Path], drive: Path, *, progress: Progress | None = None) -> DriveData:
+def replay_drive(logs: Sequence[Path], drive: Path, *, progress: Progress = lambda _done: None) -> DriveData:
     """As :func:`run_drive`, but the arrays are returned and nothing is written."""
-    told = progress if progress is not None else _silent
     description = read_drive(drive)
     names, time = description.schedules, description.sample_time
     schedule = load_schedule(names.longitudinal, drive.parent, time)
@@ -65,20 +62,16 @@ def replay_drive(logs: Sequence[Path], drive: Path, *, progress: Progress | None
     observer = corner_observer(description, drive.parent, schedule)
     pipeline, assumptions = pipeline_of(description, corner_observer(description, drive.parent, schedule), lateral)
     log = read_log(logs, description)
-    told(0.2)
+    progress(0.2)
     inputs = corner_inputs_of(log, description)
-    replayed = replay(inputs, observer, lambda done: told(0.2 + 0.1 * done))
-    chain = run_chain(log, inputs, pipeline, assumptions, lambda done: told(0.3 + 0.7 * done))
+    replayed = replay(inputs, observer, lambda done: progress(0.2 + 0.1 * done))
+    chain = run_chain(log, inputs, pipeline, assumptions, lambda done: progress(0.3 + 0.7 * done))
     return DriveData(description, schedule, log, inputs, replayed, chain, assumed)
 
 
-def _silent(_done: float) -> None:
-    pass
-
-
-def estimate_columns(data: DriveData) -> dict[str, np.ndarray[Any, Any]]:
+def estimate_columns(data: DriveData) -> Columns:
     """The columns of estimates.csv, SI, the unit in every name."""
-    columns: dict[str, np.ndarray[Any, Any]] = {"time_s": data.log.time, "vx_mps": data.replay.velocity}
+    columns: Columns = {"time_s": data.log.time, "vx_mps": data.replay.velocity}
     columns |= {f"vx_{name}_mps": value for name, value in data.baselines.items()}
     per_corner = {
         "vx_{}_mps": data.replay.corner_velocity,
@@ -90,8 +83,7 @@ def estimate_columns(data: DriveData) -> dict[str, np.ndarray[Any, Any]]:
         "innovation_{}": data.replay.innovation,
         "flags_{}": data.replay.flags,
     }
-    for pattern, values in per_corner.items():
-        columns |= {pattern.format(corner): values[:, k] for k, corner in enumerate(CORNERS)}
+    columns |= _by_corner(per_corner)
     if data.chain is not None:
         columns |= chain_columns(data.chain)
     units = {"v": "mps", "a": "mps2", "y": "radps", "f": "N"}
@@ -99,9 +91,9 @@ def estimate_columns(data: DriveData) -> dict[str, np.ndarray[Any, Any]]:
     return columns
 
 
-def chain_columns(chain: Chain) -> dict[str, np.ndarray[Any, Any]]:
+def chain_columns(chain: Chain) -> Columns:
     """The pipeline's columns of estimates.csv; those of parts that a drive did not ask for are left out."""
-    columns: dict[str, np.ndarray[Any, Any]] = {
+    columns: Columns = {
         "pipeline_vx_mps": chain.vx,
         "pipeline_vy_mps": chain.vy,
         "pipeline_sideslip_rad": chain.sideslip,
@@ -118,18 +110,14 @@ def chain_columns(chain: Chain) -> dict[str, np.ndarray[Any, Any]]:
         "pipeline_slip_{}": chain.slip,
         "pipeline_slip_angle_{}_rad": chain.slip_angle,
     }
-    for pattern, values in per_corner.items():
-        columns |= {pattern.format(corner): values[:, k] for k, corner in enumerate(CORNERS)}
+    columns |= _by_corner(per_corner)
     return columns
 
 
-def _draw(data: DriveData, out: Path, told: Progress) -> list[Path]:
-    paths = []
-    drawn = figures(data)
-    for k, figure in enumerate(drawn):
-        svg, png = (out / f"{figure.name}{suffix}" for suffix in (".svg", ".png"))
-        with whole_file(svg) as first, whole_file(png) as second:
-            save_as(figure, first, second)
-        paths += [svg, png]
-        told(0.4 + 0.6 * (k + 1) / len(drawn))
-    return paths
+def _by_corner(per_corner: Mapping[str, AnyArray]) -> Columns:
+    """One column a corner of each (n, 4)."""
+    return {
+        pattern.format(corner): values[:, k]
+        for pattern, values in per_corner.items()
+        for k, corner in enumerate(CORNERS)
+    }

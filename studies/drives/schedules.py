@@ -1,14 +1,17 @@
-"""The schedules that a drive file names, and the tire for which each was designed."""
+"""The schedules and corner observers that a drive file names, and the tire for which each was designed."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any, Literal
 
-from estimators import EstimatorError, GainSchedule
+from estimators import GainSchedule
+from estimators.pipeline import KalmanCorners, ScheduledCorners, SwitchedCorners
+from estimators.pipeline.corner_kinds import CornerKind
 from estimators.schedule import SHIPPED, read_content
 from estimators.velocity import BristleTire
 from studies.drives.drive_file import DriveFile
+from studies.errors import refused_at
 from synthesis.errors import SpecError
 
 MODEL = "corner-velocity-{}"
@@ -28,10 +31,8 @@ def load_schedule(name: str, folder: Path, sample_time: float, direction: Direct
     Raises SpecError, before anything runs: unreadable or edited, another model or direction, another sample time.
     """
     content, file = _content(name, folder, direction)
-    try:
+    with refused_at(f"schedules.{direction}"):
         schedule = GainSchedule.from_content(content, file)
-    except EstimatorError as error:
-        raise SpecError(f"schedules.{direction}: {error}") from error
     model = content["model"]["id"]
     wanted = MODEL.format(direction)
     if model != wanted:
@@ -57,10 +58,8 @@ def load_tire(name: str, folder: Path) -> BristleTire:
             f"schedules.longitudinal: the model of '{name}' has no constant {', '.join(missing)}, which the Kalman "
             "filters of estimators.corner_velocity need; name a schedule of the bristle model"
         )
-    try:
+    with refused_at(f"schedules.longitudinal: '{name}'"):
         return BristleTire(**{own: float(constants[key]["value"]) for own, key in _TIRE.items()})
-    except EstimatorError as error:
-        raise SpecError(f"schedules.longitudinal: '{name}': {error}") from error
 
 
 def check_radii(drive: DriveFile, folder: Path) -> tuple[str, ...]:
@@ -69,27 +68,24 @@ def check_radii(drive: DriveFile, folder: Path) -> tuple[str, ...]:
     Compared is ``effective_radius`` of each schedule's model, as a share of it. Raises SpecError, one line: more than 10 %
     off the car's radii, or schedules whose radii differ by more than 1 %.
     """
-    named: dict[Direction, str | None] = {
-        "longitudinal": drive.schedules.longitudinal,
-        "lateral": drive.schedules.lateral,
-    }
-    radii: dict[Direction, float] = {}
+    named: dict[Direction, str] = {"longitudinal": drive.schedules.longitudinal}
+    if drive.schedules.lateral is not None:
+        named["lateral"] = drive.schedules.lateral
+    found = {direction: _radius(name, folder, direction) for direction, name in named.items()}
     assumptions = []
-    for direction, name in named.items():
-        if name is None:
-            continue
-        radius = _radius(name, folder, direction)
+    for direction, radius in found.items():
+        name = named[direction]
         if radius is None:
             assumptions.append(
                 f"{direction} schedule '{name}' does not say for which effective_radius: taken as fitting"
             )
-            continue
-        radii[direction] = radius
-        assumptions += _against_car(drive, direction, name, radius)
-    if len(radii) == 2 and abs(radii["lateral"] / radii["longitudinal"] - 1.0) > OTHER_PAIR:
+        else:
+            assumptions += _against_car(drive, direction, name, radius)
+    along, across = found["longitudinal"], found.get("lateral")
+    if along is not None and across is not None and abs(across / along - 1.0) > OTHER_PAIR:
         raise SpecError(
-            f"schedules: '{named['longitudinal']}' is for effective_radius = {radii['longitudinal']:g} m, "
-            f"'{named['lateral']}' for {radii['lateral']:g} m; name two schedules of one car"
+            f"schedules: '{named['longitudinal']}' is for effective_radius = {along:g} m, "
+            f"'{named['lateral']}' for {across:g} m; name two schedules of one car"
         )
     return tuple(assumptions)
 
@@ -129,17 +125,32 @@ def _radius(name: str, folder: Path, direction: Direction) -> float | None:
 
 def _content(name: str, folder: Path, direction: Direction) -> tuple[dict[str, Any], str]:
     """The content of the file, and its name."""
-    try:
-        if name.endswith(".json"):
-            path = folder / name
-            if not path.is_file():
-                raise SpecError(
-                    f"schedules.{direction}: no file '{name}' beside the drive file; give its path from there, or the "
-                    f"name of a shipped schedule: {', '.join(sorted(file.stem for file in SHIPPED.glob('*.json')))}"
-                )
-        else:
+    with refused_at(f"schedules.{direction}"):
+        if not name.endswith(".json"):
             GainSchedule.shipped(name)  # refuses an unknown name with a list of those there are
-            path = SHIPPED / f"{name}.json"
+            return read_content(SHIPPED / f"{name}.json"), f"{name}.json"
+        path = folder / name
+        if not path.is_file():
+            raise SpecError(
+                f"schedules.{direction}: no file '{name}' beside the drive file; give its path from there, or the "
+                f"name of a shipped schedule: {', '.join(sorted(file.stem for file in SHIPPED.glob('*.json')))}"
+            )
         return read_content(path), path.name
-    except EstimatorError as error:
-        raise SpecError(f"schedules.{direction}: {error}") from error
+
+
+def corner_observer(drive: DriveFile, folder: Path, schedule: GainSchedule) -> CornerKind:
+    """What ``estimators.corner_velocity`` of the drive file asks for; ``folder`` is that of the drive file.
+
+    ``lpv``: P1 (24). ``gain-switched``: the schedule up to 15 % of slip, P3's gain of high slip beyond it, P3 (19), Example 2.
+    ``kalman-three-state``, ``kalman-two-state``: P2 (19)-(23) with the covariances switched by P2 (29) and |dw/dt|.
+
+    Raises SpecError, one line, when the schedule cannot serve it.
+    """
+    kind = drive.estimators.corner_velocity
+    with refused_at(f"estimators.corner_velocity = '{kind}'"):
+        if kind == "gain-switched":
+            return SwitchedCorners(schedule)
+        if kind == "lpv":
+            return ScheduledCorners(schedule)
+        tire = load_tire(drive.schedules.longitudinal, folder)
+        return KalmanCorners(tire, schedule.sample_time, states=3 if kind == "kalman-three-state" else 2)

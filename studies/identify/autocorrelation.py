@@ -26,20 +26,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from estimators.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
 class LongRun:
     """Omega (p, p) and the bandwidth L in samples."""
 
-    covariance: Array
+    covariance: FloatArray
     bandwidth: int
 
 
-def long_run_covariance(scores: Array, least_bandwidth: int) -> LongRun:
+def long_run_covariance(scores: FloatArray, least_bandwidth: int) -> LongRun:
     """Of the scores (n, p) over all n instants in time order; zero where nothing was used.
 
     ``least_bandwidth`` is the correlation length that the prefilter alone brings, samples.
@@ -54,7 +53,7 @@ def long_run_covariance(scores: Array, least_bandwidth: int) -> LongRun:
     return LongRun(omega * n / max(n - scores.shape[1], 1), bandwidth)
 
 
-def _andrews(scores: Array, n: int) -> float:
+def _andrews(scores: FloatArray, n: int) -> float:
     """1.1447 (alpha n)^(1/3), alpha = sum_p 4 rho^2 s^4/((1-rho)^6 (1+rho)^2) / sum_p s^4/(1-rho)^4, each score scaled."""
     if len(scores) < 3:
         return 1.0
@@ -69,7 +68,7 @@ def _andrews(scores: Array, n: int) -> float:
     return float(1.1447 * (top / np.sum(noise**2 / (1 - rho) ** 4) * n) ** (1 / 3))
 
 
-def correlation_time(residual: Array, least_bandwidth: int) -> float:
+def correlation_time(residual: FloatArray, least_bandwidth: int) -> float:
     """How many of the rows (n, k) stand for one independent one: correlation over time and among rows of one instant.
 
     1 + 2 sum_l (1 - l/(L+1)) rho_l of the sums over k; ``residual`` is 0 where nothing was used.
@@ -79,7 +78,7 @@ def correlation_time(residual: Array, least_bandwidth: int) -> float:
     return float(long_run_covariance(total, least_bandwidth).covariance[0, 0]) / power if power > 0 else 1.0
 
 
-def effective_stretches(influence: Array, rows: npt.NDArray[np.int64], length: int) -> Array:
+def effective_stretches(influence: FloatArray, rows: IntArray, length: int) -> FloatArray:
     """How many independent stretches tell each parameter: (sum g_b)^2/sum g_b^2, g_b the influence squared in stretch b.
 
     ``influence`` (n, p) of the residuals on the estimates, ``rows`` (n,) their instants, ``length`` of a stretch in samples.

@@ -26,14 +26,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
+from studies.identify.estimate import Unknown
 from studies.identify.prefilter import Prefilter, first_order_lag
 from studies.identify.settings import IdentifySettings
-from studies.identify.unknowns import Unknown
 from synthesis.models.parameter_set import Tire
 
-Array = npt.NDArray[np.float64]
 MOST_USED = 0.9
 """s |mu| above this is a sliding wheel: no slip velocity belongs to its force."""
 MOST_DAMPING = 0.01
@@ -47,45 +46,26 @@ def tire_unknowns(tire: Tire, settings: IdentifySettings) -> tuple[Unknown, ...]
     relaxation = 1.0 / tire.kappa.value
     near = (float(np.log(0.01 / relaxation)), float(np.log(1.5 / relaxation)))
     damping = tire.sigma1.value / tire.sigma0.value
+    s = settings
+    considered = s.curvature / s.saturation_spread
     return (
+        Unknown("slip_stiffness", stiffness, s.stiffness_spread, s.stiffness_width, far, informed=False, starts=(-1.2,)),
+        Unknown("relaxation_length", relaxation, s.relaxation_spread, s.relaxation_width, near, informed=False),
         Unknown(
-            "slip_stiffness",
-            stiffness,
-            settings.stiffness_spread,
-            settings.stiffness_width,
-            far,
-            informed=False,
-            starts=(-1.2,),
+            "damping_time", damping, damping, s.damping_width, (0.0, MOST_DAMPING),
+            positive=False, informed=False, relative=True,
         ),
         Unknown(
-            "relaxation_length", relaxation, settings.relaxation_spread, settings.relaxation_width, near, informed=False
+            "saturation", 0.0, s.saturation_spread, s.saturation_width, (-0.1, 5.0),
+            considered=considered, apart=s.saturation_apart, positive=False, informed=False,
         ),
-        Unknown(
-            "damping_time",
-            damping,
-            damping,
-            settings.damping_width,
-            (0.0, MOST_DAMPING),
-            positive=False,
-            informed=False,
-            relative=True,
-        ),
-        Unknown(
-            "saturation",
-            0.0,
-            settings.saturation_spread,
-            settings.saturation_width,
-            (-0.1, 5.0),
-            positive=False,
-            informed=False,
-            considered=settings.curvature / settings.saturation_spread,
-            apart=settings.saturation_apart,
-        ),
-        Unknown("bend", settings.bend, settings.bend_spread, settings.bend_spread, (-2.0, 5.0), positive=False),
-    )
+        Unknown("bend", s.bend, s.bend_spread, s.bend_spread, (-2.0, 5.0), positive=False),
+    )  # fmt: skip
 
 
-def slip_velocity(p: Mapping[str, float], mu: Array, rolling: Array, filter_: Prefilter, step: float) -> Array:
+def slip_velocity(
+    p: Mapping[str, float], mu: FloatArray, rolling: FloatArray, filter_: Prefilter, step: float
+) -> FloatArray:
     """F[v_r] (n, k), m/s, that belongs to the normalised force mu (n, k) [1] at the rolling speed R|w| (n, k), m/s."""
     s, c = p["saturation"], p["bend"]
     lagged = first_order_lag(mu, step, p["damping_time"], filter_.runs)

@@ -5,19 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from studies.drives.corner_inputs import GRAVITY
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.prepare import CornerInputs, corner_inputs_of
 from studies.drives.quantities import CORNERS
-from studies.identify.errors import IdentifyError
+from studies.errors import IdentifyError
 from studies.identify.prefilter import Prefilter
 from studies.identify.settings import IdentifySettings
-
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -31,13 +28,13 @@ class DriveSignals:
     drive: DriveFile
     inputs: CornerInputs
     filter: Prefilter
-    vx: Array
-    vy: Array
+    vx: FloatArray
+    vy: FloatArray
     has_vy: bool
-    ay: Array | None
-    yaw_rate: Array | None
-    torque: Array | None
-    bad: Mask
+    ay: FloatArray | None
+    yaw_rate: FloatArray | None
+    torque: FloatArray | None
+    bad: BoolArray
 
     @property
     def step(self) -> float:
@@ -45,14 +42,14 @@ class DriveSignals:
         return self.drive.sample_time
 
     @property
-    def along(self) -> Array:
+    def along(self) -> FloatArray:
         """Reference velocity of the wheel centres along the tire, (n, 4), m/s: P1 (33) inverted, with lever arms."""
         x, y, sine, cosine = self.inputs.x, self.inputs.y, np.sin(self.inputs.steer), np.cos(self.inputs.steer)
         r = self.inputs.yaw_rate[:, None]
         return np.asarray((self.vx[:, None] - r * y) * cosine + (self.vy[:, None] + r * x) * sine)
 
     @property
-    def load(self) -> Array:
+    def load(self) -> FloatArray:
         """Vertical loads (n, 4), N, never below the least one of a wheel on the ground."""
         return np.maximum(self.inputs.vertical_load, 0.05 * self.drive.vehicle.mass * GRAVITY / 4)
 
@@ -66,7 +63,8 @@ def drive_signals(log: DriveLog, drive: DriveFile, settings: IdentifySettings) -
         )
     inputs = corner_inputs_of(log, drive)
     vx = log.reference["vx"]
-    vy, has_vy = _lateral_velocity(log)
+    measured = log.reference.get("vy", log.signals.get("vy"))
+    vy = np.zeros_like(log.time) if measured is None else measured
     ay, yaw_rate = log.signals.get("ay"), log.signals.get("yaw_rate")
     names = [f"torque_{corner}" for corner in CORNERS]
     torque = np.stack([log.signals[n] for n in names], axis=-1) if all(n in log.signals for n in names) else None
@@ -80,20 +78,22 @@ def drive_signals(log: DriveLog, drive: DriveFile, settings: IdentifySettings) -
     light = inputs.vertical_load < settings.least_load * drive.vehicle.mass * GRAVITY / 4
     slow = ~(np.abs(vx) >= settings.least_speed)
     signals = DriveSignals(
-        drive, inputs, prefilter, vx, vy, has_vy, ay, yaw_rate, torque, held | light | slow[:, None] | ~known[:, None]
+        drive,
+        inputs,
+        prefilter,
+        vx,
+        vy,
+        measured is not None,
+        ay,
+        yaw_rate,
+        torque,
+        held | light | slow[:, None] | ~known[:, None],
     )
     _refuse_short(signals, slow | ~known, settings)
     return signals
 
 
-def _lateral_velocity(log: DriveLog) -> tuple[Array, bool]:
-    for table in (log.reference, log.signals):
-        if "vy" in table:
-            return table["vy"], True
-    return np.zeros_like(log.time), False
-
-
-def _refuse_short(signals: DriveSignals, slow: Mask, settings: IdentifySettings) -> None:
+def _refuse_short(signals: DriveSignals, slow: BoolArray, settings: IdentifySettings) -> None:
     place, step = f"drive '{signals.drive.name}'", signals.step
     fastest = float(np.nanmax(np.abs(signals.vx)))
     if fastest < settings.least_speed:

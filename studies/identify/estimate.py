@@ -1,4 +1,4 @@
-"""Nonlinear least squares with intervals that can be believed, and parameters held where a log says nothing of them.
+"""Nonlinear least squares with honest confidence intervals, and parameters held where a log says nothing of them.
 
 All unknowns are fitted together, informed ones with their prior as one more measurement, weighed by the residual size and
 its correlation time. The uninformed unknown whose interval is widest against its prior's is then held at the prior and the
@@ -10,20 +10,119 @@ either: with its spread s it adds S s^2 S', S = -H^-1 J'J_held, to the covarianc
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from estimators.arrays import BoolArray, FloatArray
 from studies.identify.autocorrelation import correlation_time, effective_stretches, long_run_covariance
-from studies.identify.unknowns import Estimate, Unknown
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
+
+@dataclass(frozen=True)
+class Unknown:
+    """A parameter p, fitted as x: p = prior*exp(x) if ``positive``, else p = x.
+
+    ``spread`` is the standard deviation of the prior in x. With ``informed`` the prior takes part in the fit like a
+    measurement (nuisances, and what the catalogue knows well: radii); without it the data alone decide, and where they
+    say less than the prior, the parameter is held there: it then adds ``considered`` times its spread to the intervals of
+    the others. ``width`` is the largest half width of the confidence interval in x (times |x| if ``relative``) at which it
+    counts as identified; it is held as well where it is not ``apart`` half widths from the prior; x stays within ``bounds``;
+    ``starts`` are further x to start from.
+    """
+
+    name: str
+    prior: float
+    spread: float
+    width: float
+    bounds: tuple[float, float]
+    positive: bool = True
+    informed: bool = True
+    relative: bool = False
+    considered: float = 1.0
+    apart: float = 0.0
+    starts: tuple[float, ...] = ()
+
+    def value(self, x: float) -> float:
+        """p from x."""
+        return float(self.prior * math.exp(min(x, 300.0))) if self.positive else float(x)
+
+    @property
+    def prior_x(self) -> float:
+        """The prior as x."""
+        return 0.0 if self.positive else self.prior
+
+    def at_bound(self, x: float) -> bool:
+        """Whether x is at a bound."""
+        low, high = self.bounds
+        return min(x - low, high - x) < 1e-6 * (high - low)
+
+    def narrow(self, x: float, half: float) -> bool:
+        """Whether an interval of this half width counts as identified."""
+        return not self.at_bound(x) and half <= self.width * (abs(x) if self.relative else 1.0)
+
+    def width_over_prior(self, x: float, half: float) -> float:
+        """Half width over that of the prior: above 1 the log says less than the prior; infinite at a bound."""
+        if self.at_bound(x):
+            return math.inf
+        near = self.apart * half / max(abs(x - self.prior_x), 1e-12) if self.apart else 0.0
+        return max(half / (2.0 * self.spread), near)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """``x`` and ``covariance`` of all unknowns (held ones: prior and spread), and which of them the log ``excited``.
+
+    ``half`` are the half widths of the confidence intervals in x: for a held unknown the one at which it was refused.
+    ``factors`` are half widths over standard deviations. ``residual`` (n, k) is NaN where nothing was used, ``rms`` its size,
+    ``correlation`` its correlation time in samples, ``freedom`` the degrees of freedom left. ``singular_values`` are those of
+    the Jacobian of all unknowns at the first fit, each column times its spread, over the residual size times the root of the
+    correlation time: below 1 the log says less in that direction than the prior.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    x: FloatArray
+    covariance: FloatArray
+    excited: dict[str, bool]
+    half: dict[str, float]
+    residual: FloatArray
+    samples: int
+    rms: float
+    correlation: float
+    freedom: float
+    factors: dict[str, float]
+    singular_values: tuple[float, ...]
+
+    def index(self, name: str) -> int:
+        """Place of an unknown."""
+        return [u.name for u in self.unknowns].index(name)
+
+    def value(self, name: str) -> float:
+        """Fitted value, or the prior of one that is held."""
+        i = self.index(name)
+        return self.unknowns[i].value(float(self.x[i]))
+
+    def values(self) -> dict[str, float]:
+        """All values by name."""
+        return {u.name: u.value(float(x)) for u, x in zip(self.unknowns, self.x, strict=True)}
+
+    def deviation(self, **weights: float) -> float:
+        """Standard deviation of a weighted sum of the x of the named unknowns."""
+        w = np.zeros(len(self.unknowns))
+        for name, weight in weights.items():
+            w[self.index(name)] = weight
+        return float(math.sqrt(max(float(w @ self.covariance @ w), 0.0)))
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """Confidence interval of the value."""
+        i, half = self.index(name), self.half[name]
+        return self.unknowns[i].value(float(self.x[i]) - half), self.unknowns[i].value(float(self.x[i]) + half)
+
+
 PASSES = 2
 """The first weighs the priors by a guess of the residual, the second by the residual of the first."""
 
@@ -51,33 +150,33 @@ class Rules:
 
 @dataclass(frozen=True)
 class _Problem:
-    residual: Callable[[Mapping[str, float]], Array]
-    mask: Mask
+    residual: Callable[[Mapping[str, float]], FloatArray]
+    mask: BoolArray
     unknowns: tuple[Unknown, ...]
     rules: Rules
 
     @property
-    def home(self) -> Array:
-        return np.array([u.home for u in self.unknowns])
+    def prior_x(self) -> FloatArray:
+        return np.array([u.prior_x for u in self.unknowns])
 
     @property
-    def spread(self) -> Array:
+    def spread(self) -> FloatArray:
         return np.array([u.spread for u in self.unknowns])
 
-    def all_rows(self, x: Array) -> Array:
+    def all_rows(self, x: FloatArray) -> FloatArray:
         return self.residual({u.name: u.value(float(v)) for u, v in zip(self.unknowns, x, strict=True)})
 
-    def rows(self, x: Array) -> Array:
+    def rows(self, x: FloatArray) -> FloatArray:
         return self.all_rows(x)[self.mask]
 
-    def thinned(self) -> Mask:
+    def thinned(self) -> BoolArray:
         """One row in half a correlation length of the prefilter: enough to come near."""
         out = np.zeros_like(self.mask)
         step = max(self.rules.correlation // 2, 1)
         out[::step] = self.mask[::step]
         return out if np.count_nonzero(out) > 20 * len(self.unknowns) else self.mask
 
-    def size(self, x: Array) -> tuple[float, float]:
+    def size(self, x: FloatArray) -> tuple[float, float]:
         """Residual size, not below the floor, and its correlation time in samples."""
         e = np.zeros(self.mask.shape)
         e[self.mask] = self.rows(x)
@@ -87,8 +186,8 @@ class _Problem:
 
 
 def estimate(
-    residual: Callable[[Mapping[str, float]], Array],
-    mask: Mask,
+    residual: Callable[[Mapping[str, float]], FloatArray],
+    mask: BoolArray,
     unknowns: Sequence[Unknown],
     rules: Rules,
     start: Mapping[str, float] | None = None,
@@ -98,21 +197,21 @@ def estimate(
     if not mask.any():
         return _nothing(problem)
     active = np.ones(len(problem.unknowns), dtype=bool)
-    x = np.array([(start or {}).get(u.name, u.home) for u in problem.unknowns])
+    x = np.array([(start or {}).get(u.name, u.prior_x) for u in problem.unknowns])
     refused: dict[str, float] = {}
     singular: tuple[float, ...] = ()
     while True:
-        x = _fit(problem, active, np.where(active, x, problem.home), many=not singular and start is None)
-        found = _judge(problem, active, x)
+        x = _fit(problem, active, np.where(active, x, problem.prior_x), many=not singular and start is None)
+        found = _covariance(problem, active, x)
         singular = singular or found.singular_values
         half = found.half
-        silence = {
-            u.name: u.silence(float(v), half[u.name])
+        uncertain = {
+            u.name: u.width_over_prior(float(v), half[u.name])
             for u, v, a in zip(problem.unknowns, x, active, strict=True)
             if a and not u.informed
         }
-        worst = max(silence, key=lambda name: silence[name], default="")
-        if not worst or silence[worst] <= 1.0:
+        worst = max(uncertain, key=lambda name: uncertain[name], default="")
+        if not worst or uncertain[worst] <= 1.0:
             break
         refused[worst] = half[worst]
         active[found.index(worst)] = False
@@ -124,11 +223,11 @@ def estimate(
     return replace(found, excited=excited, half={**half, **refused}, singular_values=singular)
 
 
-def _fit(problem: _Problem, active: Mask, x: Array, many: bool) -> Array:
+def _fit(problem: _Problem, active: BoolArray, x: FloatArray, many: bool) -> FloatArray:
     free = np.flatnonzero(active)
     unknowns = [problem.unknowns[i] for i in free]
-    low, high = (np.array([u.reach[side] for u in unknowns]) for side in (0, 1))
-    home, spread = problem.home[free], problem.spread[free]
+    low, high = (np.array([u.bounds[side] for u in unknowns]) for side in (0, 1))
+    prior, spread = problem.prior_x[free], problem.spread[free]
     informed = np.array([u.informed for u in unknowns])
     margin = 1e-9 * (high - low)
     size, time = 10 * problem.rules.floor, float(problem.rules.correlation)
@@ -137,10 +236,12 @@ def _fit(problem: _Problem, active: Mask, x: Array, many: bool) -> Array:
         share = np.count_nonzero(mask) / np.count_nonzero(problem.mask)
         weight = np.where(informed, size * np.sqrt(time * share), 0.0) / spread
 
-        def cost(part: Array, weight: Array = weight, held: Array = x, mask: Mask = mask) -> Array:
+        def cost(
+            part: FloatArray, weight: FloatArray = weight, held: FloatArray = x, mask: BoolArray = mask
+        ) -> FloatArray:
             full = held.copy()
             full[free] = part
-            return np.concatenate([problem.all_rows(full)[mask], (weight * (part - home))[informed]])
+            return np.concatenate([problem.all_rows(full)[mask], (weight * (part - prior))[informed]])
 
         starts = [np.clip(x[free], low + margin, high - margin)]
         if many and k == 0:
@@ -153,7 +254,7 @@ def _fit(problem: _Problem, active: Mask, x: Array, many: bool) -> Array:
     return x
 
 
-def _judge(problem: _Problem, active: Mask, x: Array) -> Estimate:
+def _covariance(problem: _Problem, active: BoolArray, x: FloatArray) -> Estimate:
     """Covariance of :mod:`.autocorrelation`, with the prior as one more measurement, and the consider part."""
     spread, mask = problem.spread, problem.mask
     e = problem.rows(x)
@@ -203,22 +304,13 @@ def _judge(problem: _Problem, active: Mask, x: Array) -> Estimate:
     out[mask] = e
     names = [u.name for u in problem.unknowns]
     return Estimate(
-        unknowns=problem.unknowns,
-        x=x,
-        covariance=covariance,
-        excited={},
-        half={name: float(h) for name, h in zip(names, half, strict=True)},
-        residual=out,
-        samples=e.size,
-        rms=float(np.sqrt(np.mean(e**2))),
-        correlation=time,
-        freedom=freedom,
-        factors={name: float(f) for name, f in zip(names, factors, strict=True)},
-        singular_values=tuple(float(v) for v in singular),
-    )
+        problem.unknowns, x, covariance, {}, dict(zip(names, map(float, half), strict=True)), out, samples=e.size,
+        rms=float(np.sqrt(np.mean(e**2))), correlation=time, freedom=freedom,
+        factors=dict(zip(names, map(float, factors), strict=True)), singular_values=tuple(map(float, singular)),
+    )  # fmt: skip
 
 
-def _half_width(estimated: Array, sure: Array, freedom: Array | float, confidence: float) -> Array:
+def _half_width(estimated: FloatArray, sure: FloatArray, freedom: FloatArray | float, confidence: float) -> FloatArray:
     """Of variances that are in part estimated: the rest has no degrees of freedom to lose (Satterthwaite 1946)."""
     whole = np.maximum(estimated + sure, 1e-300)
     each = np.maximum(freedom / np.clip(estimated / whole, 1e-3, 1.0) ** 2, 1.0)
@@ -230,21 +322,12 @@ def _nothing(problem: _Problem) -> Estimate:
     factor = float(student.ppf(0.5 + problem.rules.confidence / 2, 1e6))
     names = [u.name for u in problem.unknowns]
     half = {u.name: factor * u.spread for u in problem.unknowns}
-    empty = np.full(problem.mask.shape, np.nan)
-    covariance = np.diag(problem.spread**2)
-    off = dict.fromkeys(names, False)
-    none = (0.0,) * len(names)
-    return Estimate(
-        problem.unknowns,
-        problem.home,
-        covariance,
-        off,
-        half,
-        empty,
-        0,
-        0.0,
-        1.0,
-        0.0,
-        dict.fromkeys(names, factor),
-        none,
+    empty, covariance, off = (
+        np.full(problem.mask.shape, np.nan),
+        np.diag(problem.spread**2),
+        dict.fromkeys(names, False),
     )
+    factors, none = dict.fromkeys(names, factor), (0.0,) * len(names)
+    return Estimate(
+        problem.unknowns, problem.prior_x, covariance, off, half, empty, 0, 0.0, 1.0, 0.0, factors, none
+    )  # in the order of the fields

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from studies.drives.chain import Progress
 from studies.drives.drive_file import DriveFile, read_drive
 from studies.drives.log import DriveLog, read_log
 from studies.identify.data import DriveSignals, drive_signals
+from studies.identify.estimate import Estimate
 from studies.identify.inertia import fit_inertia
 from studies.identify.lateral import LateralSlip
 from studies.identify.longitudinal import LongitudinalSlip, wheel_force
 from studies.identify.settings import IdentifySettings
 from studies.identify.slip_limit import LimitedFit, fit_low_slip
-from studies.identify.unknowns import Estimate
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
 
-Progress = Callable[[float], None]
 BASE = "corner-estimation"
 """The parameter set whose values stand where a log says nothing."""
 
@@ -55,7 +55,7 @@ def identify_drive(
     *,
     base: str = BASE,
     settings: IdentifySettings | None = None,
-    progress: Progress | None = None,
+    progress: Progress = lambda _done: None,
 ) -> Identification:
     """Fit wheel inertia, longitudinal and lateral tire from the ``logs`` that the ``drive`` file describes.
 
@@ -75,29 +75,30 @@ def identify_log(
     names: tuple[str, ...],
     *,
     settings: IdentifySettings | None = None,
-    progress: Progress | None = None,
+    progress: Progress = lambda _done: None,
 ) -> Identification:
     """As :func:`identify_drive`, of a log that was read."""
     chosen = settings or IdentifySettings()
-    told = progress or _silent
     data = drive_signals(log, drive, chosen)
     correlation = data.filter.correlation
     prior = drive.vehicle.wheel_inertia or base.vehicle["wheel_inertia"].value
     spin = fit_inertia(data, prior, chosen)
     inertia = spin.value("wheel_inertia") if spin is not None and spin.excited["wheel_inertia"] else prior
-    told(0.1)
+    progress(0.1)
     fits: dict[str, LimitedFit] = {}
     absent: dict[str, str] = {}
     along = LongitudinalSlip(data, base.tire["longitudinal"], inertia, chosen, torque_delay(spin, chosen))
-    fits["longitudinal"] = fit_low_slip(along, chosen, correlation, lambda done: told(0.1 + 0.45 * done))
+    fits["longitudinal"] = fit_low_slip(along, chosen, correlation, lambda done: progress(0.1 + 0.45 * done))
     missing = [name for name, there in _lateral_needs(data, base).items() if not there]
     if missing:
         absent["lateral"] = f"not fitted: {', '.join(missing)} missing"
     else:
         force = np.nan_to_num(wheel_force(data, inertia), nan=0.0)
         across = LateralSlip(data, base.tire["lateral"], force, yaw_inertia_prior(drive), chosen)
-        fits["lateral"] = fit_low_slip(across, chosen, across.filter.correlation, lambda done: told(0.55 + 0.45 * done))
-    told(1.0)
+        fits["lateral"] = fit_low_slip(
+            across, chosen, across.filter.correlation, lambda done: progress(0.55 + 0.45 * done)
+        )
+    progress(1.0)
     return Identification(drive, base, names, data, chosen, fits, spin, inertia, absent)
 
 
@@ -120,10 +121,5 @@ def _lateral_needs(data: DriveSignals, base: ParameterSet) -> dict[str, bool]:
 
 def yaw_inertia_prior(drive: DriveFile) -> float:
     """Of the drive file if it has one, else m L_f L_r, kg m^2: a dynamic index of one, cars lie between 0.8 and 1.1."""
-    given = getattr(drive.vehicle, "yaw_inertia", None)
     car = drive.vehicle
-    return float(given) if given is not None else car.mass * car.front_axle_to_cg * car.rear_axle_to_cg
-
-
-def _silent(_done: float) -> None:
-    pass
+    return car.yaw_inertia or car.mass * car.front_axle_to_cg * car.rear_axle_to_cg

@@ -18,10 +18,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from studies.identify.data import Array, DriveSignals, Mask
-from studies.identify.estimate import Rules, estimate
+from estimators.arrays import BoolArray, FloatArray
+from studies.identify.data import DriveSignals
+from studies.identify.estimate import Estimate, Rules, Unknown, estimate
 from studies.identify.settings import IdentifySettings
-from studies.identify.unknowns import Estimate, Unknown
 
 STRAIGHT = 0.01
 """rad of steering below which lateral forces hardly brake the car."""
@@ -42,7 +42,7 @@ def fit_inertia(data: DriveSignals, prior: float, settings: IdentifySettings) ->
     felt = smooth(data.inputs.ax)
     weight = car.rolling_resistance * 9.80665
 
-    def balance(p: Mapping[str, float]) -> Array:
+    def balance(p: Mapping[str, float]) -> FloatArray:
         rest = p["torque_scale"] * (pull - p["torque_delay"] * late) - felt - p["wheel_inertia"] * spin
         return np.asarray(rest - p["drag"] * drag - p["acceleration_bias"])[:, None]
 
@@ -61,7 +61,7 @@ def fit_inertia(data: DriveSignals, prior: float, settings: IdentifySettings) ->
     trust = np.ones_like(jumps)
     for _ in range(PASSES):
 
-        def residual(p: Mapping[str, float], trust: Array = trust) -> Array:
+        def residual(p: Mapping[str, float], trust: FloatArray = trust) -> FloatArray:
             return balance(p) * trust
 
         found = estimate(residual, mask, unknowns, rules)
@@ -69,13 +69,13 @@ def fit_inertia(data: DriveSignals, prior: float, settings: IdentifySettings) ->
     return found
 
 
-def _between_samples(data: DriveSignals) -> Array:
+def _between_samples(data: DriveSignals) -> FloatArray:
     """Variance (n, 1) of F[a_x], m^2/s^4, by what a_x did between its samples."""
     jump = np.diff(data.inputs.ax, prepend=data.inputs.ax[:1])
     return data.filter.power(np.nan_to_num(jump) ** 2 / 12)[:, None]
 
 
-def straight(data: DriveSignals) -> Mask:
+def straight(data: DriveSignals) -> BoolArray:
     """Samples (n, 1) of straight forward driving with all wheels turning."""
     turned = np.abs(data.inputs.steer).max(axis=1) > STRAIGHT
     return data.filter.settled(data.bad.any(axis=1) | turned | (data.vx < 0))[:, None]

@@ -19,17 +19,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from studies.identify.bristle import slip_velocity, tire_unknowns
 from studies.identify.data import DriveSignals
+from studies.identify.estimate import Unknown
 from studies.identify.prefilter import Prefilter
 from studies.identify.settings import IdentifySettings
-from studies.identify.unknowns import Unknown
 from synthesis.models.parameter_set import Tire
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 ANGLES = ("angle_front", "angle_rear")
 
 
@@ -39,7 +37,7 @@ class LateralSlip:
     direction = "lateral"
 
     def __init__(
-        self, data: DriveSignals, tire: Tire, force_x: Array, yaw_inertia: float, settings: IdentifySettings
+        self, data: DriveSignals, tire: Tire, force_x: FloatArray, yaw_inertia: float, settings: IdentifySettings
     ) -> None:
         if data.ay is None or data.yaw_rate is None:
             raise ValueError("lateral identification needs ay and yaw_rate")
@@ -58,8 +56,7 @@ class LateralSlip:
         steer = inputs.steer[:, :2].mean(axis=1)
         sine, cosine = np.sin(steer), np.cos(steer)
         axle_x = np.stack([force_x[:, :2].sum(axis=1), force_x[:, 2:].sum(axis=1)], axis=1)
-        told = 0.0 if data.torque is None else 1.0
-        dragged = told * np.sum(force_x * np.cos(inputs.steer) * inputs.y, axis=1)
+        dragged = float(data.torque is not None) * np.sum(force_x * np.cos(inputs.steer) * inputs.y, axis=1)
         outward = np.sum(data.load[:, :2] * inputs.y[:2], axis=1) / np.sum(data.load[:, :2], axis=1)
         across, pulled = car.mass * data.ay, axle_x[:, 0] * sine
         lever = base * cosine + outward * sine
@@ -77,11 +74,11 @@ class LateralSlip:
         self._viscous = tire.sigma2.value * self.relative
         self._measured = self.filter.smooth(self.relative), self.filter.smooth(self.speed)
 
-    def force(self, yaw_inertia: float) -> Array:
+    def force(self, yaw_inertia: float) -> FloatArray:
         """F_y of both axles in the tire frame (n, 2), N."""
         return np.asarray(self._static + yaw_inertia * self._turn)
 
-    def residual(self, p: Mapping[str, float]) -> Array:
+    def residual(self, p: Mapping[str, float]) -> FloatArray:
         """F[v_ry] minus what the axle force asks for, m/s."""
         mu = self.force(p["yaw_inertia"]) / self.load - self._viscous
         asked = slip_velocity(p, mu, self.speed, self.filter, self.data.step)
@@ -89,18 +86,18 @@ class LateralSlip:
         relative, speed = self._measured
         return np.asarray(relative + np.array([p[name] for name in ANGLES]) * speed - asked)
 
-    def slip(self, p: Mapping[str, float]) -> Array:
+    def slip(self, p: Mapping[str, float]) -> FloatArray:
         """F[v_ry]/F[v_xt] (n, 2) [1], the tangent of the slip angle."""
         relative, speed = self._measured
         offset = np.array([p.get(name, 0.0) for name in ANGLES])
         return np.asarray(relative / np.maximum(speed, self.settings.least_speed) + offset)
 
-    def mask(self, limit: float, p: Mapping[str, float]) -> Mask:
+    def mask(self, limit: float, p: Mapping[str, float]) -> BoolArray:
         """Rows within the slip ``limit`` ever since the filters remember; an axle counts only with both its wheels."""
         bad = np.stack([self.data.bad[:, :2].any(axis=1), self.data.bad[:, 2:].any(axis=1)], axis=1)
         return self.filter.settled(~(np.abs(self.slip(p)) <= limit) | bad | self._pulled)
 
-    def picture(self) -> tuple[Array, Array]:
+    def force_and_speed(self) -> tuple[FloatArray, FloatArray]:
         """Filtered normalised force (at the prior yaw inertia) and speed (n, 2)."""
         prior = next(u.prior for u in self.unknowns if u.name == "yaw_inertia")
         return self.filter.smooth(self.force(prior) / self.load), self._measured[1]

@@ -10,18 +10,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from studies.drives.corner_inputs import GRAVITY, shared_forces, wheel_forces
 from studies.identify.bristle import slip_velocity, tire_unknowns
 from studies.identify.data import DriveSignals
+from studies.identify.estimate import Unknown
 from studies.identify.prefilter import pitched
 from studies.identify.settings import IdentifySettings
-from studies.identify.unknowns import Unknown
 from synthesis.models.parameter_set import Tire
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 RADII = ("radius_front", "radius_rear")
 SIDES = ("side_front", "side_rear")
 DAMPINGS = ("pitch_damping_front", "pitch_damping_rear")
@@ -77,7 +75,7 @@ class LongitudinalSlip:
         self._turning = np.abs(data.filter.smooth(ay)) > settings.cross_force * GRAVITY
         self._measured = data.filter.smooth(self.surface), data.filter.smooth(self.along)
 
-    def residual(self, p: Mapping[str, float]) -> Array:
+    def residual(self, p: Mapping[str, float]) -> FloatArray:
         """F[R_e w - v_xt] minus what the force asks for, m/s."""
         ratio = self._ratio(p)
         surface, along = self._measured
@@ -86,12 +84,12 @@ class LongitudinalSlip:
         corners = surface * ratio - along - asked
         return np.concatenate([corners, np.sum(self.share * corners, axis=1, keepdims=True)], axis=1)
 
-    def _ratio(self, p: Mapping[str, float]) -> Array:
+    def _ratio(self, p: Mapping[str, float]) -> FloatArray:
         """R_e of the corners (4,) relative to the drive file."""
         sides = np.outer([p.get(name, 0.0) for name in SIDES], [1.0, -1.0]).ravel()
         return np.asarray(np.repeat([p.get(name, 1.0) for name in RADII], 2) * (1.0 + sides))
 
-    def _friction(self, p: Mapping[str, float]) -> Array:
+    def _friction(self, p: Mapping[str, float]) -> FloatArray:
         """mu (n, 4): transferred load follows acceleration as the body pitches."""
         if not self.torques_known:
             return self.mu  # shared by load: mu is a_x/g at every wheel
@@ -103,14 +101,14 @@ class LongitudinalSlip:
         load = np.maximum(self._static + np.concatenate(sides, axis=1), self._least)
         return np.asarray((self.force - p["torque_delay"] * self._late) / load - self.viscous)
 
-    def slip(self, p: Mapping[str, float]) -> Array:
+    def slip(self, p: Mapping[str, float]) -> FloatArray:
         """F[R_e w - v_xt]/F[v_xt] (n, 4) [1]: what the slip limit is compared with."""
         ratio = self._ratio(p)
         surface, along = self._measured
         size = np.maximum(np.abs(along), self.settings.least_speed)
         return np.asarray((surface * ratio - along) / size)
 
-    def mask(self, limit: float, p: Mapping[str, float]) -> Mask:
+    def mask(self, limit: float, p: Mapping[str, float]) -> BoolArray:
         """Rows within the slip ``limit`` ever since the filters remember."""
         beyond = ~(np.abs(self.slip(p)) <= limit) | self.data.bad | self._turning[:, None]
         good = self.data.filter.settled(beyond)
@@ -121,14 +119,14 @@ class LongitudinalSlip:
         rolling = good & self.data.filter.settled(pushed)
         return np.concatenate([rolling, all_good & ~rolling.any(axis=1, keepdims=True)], axis=1)
 
-    def picture(self) -> tuple[Array, Array]:
+    def force_and_speed(self) -> tuple[FloatArray, FloatArray]:
         """Filtered normalised force and rolling speed (n, k), of the corners, or of their mean without torques."""
         mu, speed = self.data.filter.smooth(self.mu), self.data.filter.smooth(np.abs(self.along))
         mean = [np.sum(self.share * value, axis=1, keepdims=True) for value in (mu, speed)]
         return np.concatenate([mu, mean[0]], axis=1), np.concatenate([speed, mean[1]], axis=1)
 
 
-def wheel_force(data: DriveSignals, inertia: float) -> Array:
+def wheel_force(data: DriveSignals, inertia: float) -> FloatArray:
     """F_x (n, 4), N; NaN at held wheels. Central differences of w: the prefilter comes after them."""
     car, inputs = data.drive.vehicle, data.inputs
     nothing = np.zeros((len(data.vx), 4))

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
+from studies.identify.estimate import Estimate
 from studies.identify.identify import Identification, yaw_inertia_prior
 from studies.identify.slip_limit import LimitedFit
-from studies.identify.unknowns import Estimate
+from synthesis.models.parameter_set import quantities
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,6 @@ class Identified:
     source: str
     half_width: float | None = None
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain data, for a JSON file."""
-        return asdict(self)
-
 
 def tire_parameters(found: Identification, direction: str) -> dict[str, Identified]:
     """slip_stiffness = sigma0/kappa, kappa, sigma0, sigma1, sigma2 and the saturation of one direction.
@@ -38,12 +34,11 @@ def tire_parameters(found: Identification, direction: str) -> dict[str, Identifi
     another tire: at sigma0/sigma1 = kappa R|w| bristles leave the output, P1 section 11 item 18).
     """
     tire = found.base.tire[direction]
-    base = f"{found.base.id}"
+    base = found.base.id
     limited = found.fits.get(direction)
     if limited is None:
         why = f"prior: {base}; {found.absent.get(direction, 'not fitted')}"
-        values = {"kappa": tire.kappa, "sigma0": tire.sigma0, "sigma1": tire.sigma1, "sigma2": tire.sigma2}
-        out = {n: Identified(q.value, q.unit, None, False, 0, why) for n, q in values.items()}
+        out = {n: Identified(q.value, q.unit, None, False, 0, why) for n, q in quantities(tire).items()}
         ratio = tire.sigma0.value / tire.kappa.value
         return {"slip_stiffness": Identified(ratio, "1", None, False, 0, why), **out}
     fit, where = limited.fit, _place(found, limited)
@@ -97,34 +92,34 @@ def vehicle_parameters(found: Identification) -> dict[str, Identified]:
     along = found.fits["longitudinal"]
     out: dict[str, Identified] = {}
     for axle, nominal in (("front", car.effective_radius_front), ("rear", car.effective_radius_rear)):
-        out[f"effective_radius_{axle}"] = _scaled(found, along, f"radius_{axle}", nominal, "m", name)
+        out[f"effective_radius_{axle}"] = _fitted(
+            found, along.fit, f"radius_{axle}", "m", nominal, name, _place(found, along)
+        )
+    plain = f"identified from {', '.join(found.logs)}"
     prior = name if car.wheel_inertia is not None else found.base.id
     spin = found.inertia
     if spin is None:
         source = f"not excited: no torques; prior: {prior}"
         out["wheel_inertia"] = Identified(found.wheel_inertia, "kg*m^2", None, False, 0, source)
     else:
-        out["wheel_inertia"] = _plain(found, spin, "wheel_inertia", found.wheel_inertia, prior)
+        out["wheel_inertia"] = _fitted(found, spin, "wheel_inertia", "kg*m^2", found.wheel_inertia, prior, plain)
     across = found.fits.get("lateral")
     if across is not None:
-        given = "m L_f L_r" if getattr(car, "yaw_inertia", None) is None else name
-        out["yaw_inertia"] = _plain(found, across.fit, "yaw_inertia", yaw_inertia_prior(found.drive), given)
+        given = "m L_f L_r" if car.yaw_inertia is None else name
+        out["yaw_inertia"] = _fitted(
+            found, across.fit, "yaw_inertia", "kg*m^2", yaw_inertia_prior(found.drive), given, plain
+        )
     return out
 
 
-def _plain(found: Identification, fit: Estimate, name: str, prior: float, given: str) -> Identified:
-    yes, logs = fit.excited[name], ", ".join(found.logs)
-    source = f"identified from {logs}" if yes else f"not excited by {logs}; prior: {given}"
-    value = fit.value(name) if yes else prior
-    interval = fit.interval(name) if yes else None
-    return Identified(value, "kg*m^2", interval, yes, fit.samples, source, _finite(fit.half[name]))
-
-
-def _scaled(found: Identification, limited: LimitedFit, name: str, nominal: float, unit: str, given: str) -> Identified:
-    fit, yes = limited.fit, limited.fit.excited[name]
-    source = _place(found, limited) if yes else f"not excited by {', '.join(found.logs)}; prior: {given}"
-    value = nominal * fit.value(name) if yes else nominal
-    interval = _times(fit.interval(name), nominal) if yes else None
+def _fitted(
+    found: Identification, fit: Estimate, name: str, unit: str, prior: float, given: str, where: str
+) -> Identified:
+    """A radius is fitted relative to its ``prior``, everything else as it is; ``given`` says where the prior is from."""
+    yes, factor = fit.excited[name], prior if unit == "m" else 1.0
+    source = where if yes else f"not excited by {', '.join(found.logs)}; prior: {given}"
+    value = factor * fit.value(name) if yes else prior
+    interval = _times(fit.interval(name), factor) if yes else None
     return Identified(value, unit, interval, yes, fit.samples, source, _finite(fit.half[name]))
 
 

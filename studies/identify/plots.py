@@ -22,7 +22,7 @@ def figures(found: Identification) -> list[Figure]:
 
 def residual(found: Identification, direction: str, limited: LimitedFit) -> Figure:
     """Force over slip, residual over time, residual over force, and autocorrelation of the residual of one direction."""
-    mu, _ = limited.model.picture()
+    mu, _ = limited.model.force_and_speed()
     over_time, over_force = list[Mark](), list[Mark]()
     for k, name in enumerate(NAMES[limited.model.direction]):
         error = limited.fit.residual[:, k]
@@ -59,7 +59,7 @@ def _force(limited: LimitedFit) -> list[Mark]:
     """Normalised force over slip of all samples within twice the limit, used ones in colour; the fitted origin."""
     values = limited.fit.values()
     slip = limited.model.slip(values)
-    mu = limited.model.picture()[0][:, : slip.shape[1]]
+    mu = limited.model.force_and_speed()[0][:, : slip.shape[1]]
     used = limited.mask[:, : slip.shape[1]]
     near = np.abs(slip) <= 2 * limited.limit
     force = np.linspace(-1.5, 1.5, 601)

@@ -8,11 +8,9 @@ Products such as omega*mu are formed before they are filtered.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import bilinear, lfilter, lfilter_zi
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
+from estimators.arrays import BoolArray, FloatArray
 
 
 class Prefilter:
@@ -22,7 +20,7 @@ class Prefilter:
     every bad sample, and a third of that after a run began: until then the filters remember what was before.
     """
 
-    def __init__(self, known: Mask, step: float, lag: float, settling: float) -> None:
+    def __init__(self, known: BoolArray, step: float, lag: float, settling: float) -> None:
         edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
         self.runs = [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
         self.known = known
@@ -35,15 +33,15 @@ class Prefilter:
         self._smooth = (*smooth, lfilter_zi(*smooth))
         self._rate = (*rate, lfilter_zi(*rate))
 
-    def smooth(self, value: Array) -> Array:
+    def smooth(self, value: FloatArray) -> FloatArray:
         """F[value] of (n,) or (n, k); NaN outside the runs."""
         return self._apply(self._smooth, value)
 
-    def rate(self, value: Array) -> Array:
+    def rate(self, value: FloatArray) -> FloatArray:
         """D[value] = F[d value/dt], per second."""
         return self._apply(self._rate, value)
 
-    def power(self, variance: Array) -> Array:
+    def power(self, variance: FloatArray) -> FloatArray:
         """Variance of F[noise], noise independent from sample to sample with this ``variance`` (n,)."""
         pulse = np.zeros(2 * self.memory)
         pulse[0] = 1.0
@@ -53,7 +51,7 @@ class Prefilter:
             out[run] = lfilter(weights, [1.0], variance[run])
         return out
 
-    def settled(self, bad: Mask) -> Mask:
+    def settled(self, bad: BoolArray) -> BoolArray:
         """Where neither a bad sample (n,) or (n, k) nor the start of a run is remembered."""
         out = np.zeros(bad.shape, dtype=bool)
         for run in self.runs:
@@ -65,7 +63,7 @@ class Prefilter:
             out[run.start : run.start + self.start] = False
         return out
 
-    def _apply(self, filter_: tuple[Array, Array, Array], value: Array) -> Array:
+    def _apply(self, filter_: tuple[FloatArray, FloatArray, FloatArray], value: FloatArray) -> FloatArray:
         numerator, denominator, rest = filter_
         out = np.full(value.shape, np.nan)
         for run in self.runs:
@@ -75,7 +73,7 @@ class Prefilter:
         return out
 
 
-def first_order_lag(value: Array, step: float, lag: float, runs: list[slice]) -> Array:
+def first_order_lag(value: FloatArray, step: float, lag: float, runs: list[slice]) -> FloatArray:
     """value/(lag s + 1) of (n, k), exact for linear interpolation between samples; lag 0 returns the value."""
     if lag < 1e-9:
         return value
@@ -89,7 +87,7 @@ def first_order_lag(value: Array, step: float, lag: float, runs: list[slice]) ->
     return out
 
 
-def pitched(value: Array, step: float, frequency: float, damping: float, runs: list[slice]) -> Array:
+def pitched(value: FloatArray, step: float, frequency: float, damping: float, runs: list[slice]) -> FloatArray:
     """(2 z w s + w^2)/(s^2 + 2 z w s + w^2) of (n, k), w = 2 pi ``frequency`` in Hz, by the trapezoidal rule; at rest before.
 
     scipy's `bilinear` takes general polynomials and two hundred times as long, inside a fit.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
-from studies.identify.errors import IdentifyError
+from studies.errors import IdentifyError
 
 
 @dataclass(frozen=True)

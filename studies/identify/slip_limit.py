@@ -12,15 +12,10 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-from studies.identify.estimate import Rules, estimate
+from estimators.arrays import BoolArray, FloatArray
+from studies.identify.estimate import Estimate, Rules, Unknown, estimate
 from studies.identify.settings import IdentifySettings
-from studies.identify.unknowns import Estimate, Unknown
-
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
-
 
 NOTHING = 10.0
 """Half width of ln C beyond which the widest range shows no trace of slip: the narrower ones have less."""
@@ -33,10 +28,10 @@ class SlipModel(Protocol):
     def direction(self) -> str: ...  # noqa: D102
     @property
     def unknowns(self) -> tuple[Unknown, ...]: ...  # noqa: D102
-    def residual(self, p: Mapping[str, float]) -> Array: ...  # noqa: D102
-    def mask(self, limit: float, p: Mapping[str, float]) -> Mask: ...  # noqa: D102
-    def slip(self, p: Mapping[str, float]) -> Array: ...  # noqa: D102
-    def picture(self) -> tuple[Array, Array]: ...  # noqa: D102
+    def residual(self, p: Mapping[str, float]) -> FloatArray: ...  # noqa: D102
+    def mask(self, limit: float, p: Mapping[str, float]) -> BoolArray: ...  # noqa: D102
+    def slip(self, p: Mapping[str, float]) -> FloatArray: ...  # noqa: D102
+    def force_and_speed(self) -> tuple[FloatArray, FloatArray]: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -46,7 +41,7 @@ class LimitedFit:
     model: SlipModel
     limit: float
     fit: Estimate
-    mask: Mask
+    mask: BoolArray
     tried: dict[float, float | None]
 
 
@@ -108,7 +103,7 @@ def _agree(wide: LimitedFit, narrow: LimitedFit, settings: IdentifySettings) -> 
     c as well, with mu^4.
     """
     a, b = wide.fit, narrow.fit
-    mu = narrow.model.picture()[0][:, : narrow.mask.shape[1]][narrow.mask]
+    mu = narrow.model.force_and_speed()[0][:, : narrow.mask.shape[1]][narrow.mask]
     power = float(np.sum(mu**2))
     curved = sum(
         (a.value(name) - b.value(name)) * float(np.sum(np.abs(mu) ** k)) / power if power > 0 else 0.0

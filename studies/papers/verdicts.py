@@ -7,39 +7,39 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from studies.claim import Verdict, agrees
+from studies.claim import ClaimVerdict, agrees
 
 
-def derived(holds: bool) -> Verdict:
+def derived(holds: bool) -> ClaimVerdict:
     """DERIVED if a relation that the paper does not state holds as derived, else NOT_REPRODUCED."""
-    return Verdict.DERIVED if holds else Verdict.NOT_REPRODUCED
+    return ClaimVerdict.DERIVED if holds else ClaimVerdict.NOT_REPRODUCED
 
 
-def erratum(printed_holds: bool, corrected_holds: bool) -> Verdict:
+def erratum(printed_holds: bool, corrected_holds: bool) -> ClaimVerdict:
     """ERRATUM only if the printed form fails and the corrected one holds; a printed form that holds is REPRODUCED."""
     if printed_holds:
-        return Verdict.REPRODUCED
-    return Verdict.ERRATUM if corrected_holds else Verdict.NOT_REPRODUCED
+        return ClaimVerdict.REPRODUCED
+    return ClaimVerdict.ERRATUM if corrected_holds else ClaimVerdict.NOT_REPRODUCED
 
 
-def under_specified(spread: float, smallest: float, holds: bool = True) -> Verdict:
+def under_specified(spread: float, smallest: float, holds: bool = True) -> ClaimVerdict:
     """UNDER_SPECIFIED when admissible readings of the paper differ by more than `smallest`.
 
     When they do not, one value is determined and the claim stands or falls with `holds`.
     """
     if spread > smallest:
-        return Verdict.UNDER_SPECIFIED
-    return Verdict.REPRODUCED if holds else Verdict.NOT_REPRODUCED
+        return ClaimVerdict.UNDER_SPECIFIED
+    return ClaimVerdict.REPRODUCED if holds else ClaimVerdict.NOT_REPRODUCED
 
 
-def partly(whole: bool, part: bool) -> Verdict:
+def partly(whole: bool, part: bool) -> ClaimVerdict:
     """REPRODUCED on the whole, PARTLY on a part that the paper names, else NOT_REPRODUCED."""
     if whole:
-        return Verdict.REPRODUCED
-    return Verdict.PARTLY if part else Verdict.NOT_REPRODUCED
+        return ClaimVerdict.REPRODUCED
+    return ClaimVerdict.PARTLY if part else ClaimVerdict.NOT_REPRODUCED
 
 
-def among_readings(values: Iterable[float], published: float, half_last_digit: float) -> Verdict:
+def among_readings(values: Iterable[float], published: float, half_last_digit: float) -> ClaimVerdict:
     """A printed number against its value under every reading of what is left open.
 
     All readings round to it: REPRODUCED. It lies between two of them, which differ: UNDER_SPECIFIED. None reaches it:
@@ -47,12 +47,12 @@ def among_readings(values: Iterable[float], published: float, half_last_digit: f
     """
     array = np.asarray(list(values), float)
     if all(agrees(float(v), published, half_last_digit) for v in array):
-        return Verdict.REPRODUCED
+        return ClaimVerdict.REPRODUCED
     inside = array.min() - half_last_digit <= published <= array.max() + half_last_digit
-    return Verdict.UNDER_SPECIFIED if inside else Verdict.NOT_REPRODUCED
+    return ClaimVerdict.UNDER_SPECIFIED if inside else ClaimVerdict.NOT_REPRODUCED
 
 
-def open_choice(readings: Iterable[ArrayLike], resolution: float) -> Verdict:
+def open_choice(readings: Iterable[ArrayLike], resolution: float) -> ClaimVerdict:
     """Nothing is printed to compare with: UNDER_SPECIFIED if the readings differ by more than `resolution`, else REPRODUCED."""
     stack = np.stack([np.asarray(r, float) for r in readings])
-    return Verdict.UNDER_SPECIFIED if np.ptp(stack, axis=0).max() > resolution else Verdict.REPRODUCED
+    return ClaimVerdict.UNDER_SPECIFIED if np.ptp(stack, axis=0).max() > resolution else ClaimVerdict.REPRODUCED

@@ -8,10 +8,10 @@ import numpy as np
 
 from analysis.labelled import Axis as LabelledAxis
 from analysis.labelled import LabelledArray
+from estimators.errors import GainsmithError
 from studies.plots.figure import Axis, Figure, Panel
 from studies.plots.marks import ZERO, Bars, Line, Mark
 from studies.plots.save import save_as
-from synthesis.errors import GainsmithError
 
 MOST_SERIES = 12
 

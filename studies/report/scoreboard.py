@@ -5,26 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from studies.claim import JsonValue, Verdict
+from studies.claim import ClaimVerdict, JsonValue
 from studies.running.record import PAPERS, paper_rank
 
 MARKS = {
-    Verdict.REPRODUCED: "✓",
-    Verdict.PARTLY: "½",
-    Verdict.NOT_REPRODUCED: "✗",
-    Verdict.ERRATUM: "!",
-    Verdict.UNDER_SPECIFIED: "?",
-    Verdict.DERIVED: "+",
+    ClaimVerdict.REPRODUCED: "✓",
+    ClaimVerdict.PARTLY: "½",
+    ClaimVerdict.NOT_REPRODUCED: "✗",
+    ClaimVerdict.ERRATUM: "!",
+    ClaimVerdict.UNDER_SPECIFIED: "?",
+    ClaimVerdict.DERIVED: "+",
 }
 """A sign for each verdict, so that none is told by its colour alone."""
 
 MEANINGS = {
-    Verdict.REPRODUCED: "our value agrees with the printed one within half its last digit",
-    Verdict.PARTLY: "part of the claim holds, the reading says which",
-    Verdict.NOT_REPRODUCED: "under no reading that we found does our value agree",
-    Verdict.ERRATUM: "the paper prints a formula or number that contradicts itself; the reading corrects it",
-    Verdict.UNDER_SPECIFIED: "the paper leaves open what the number depends on; the reading says under which choice it holds",
-    Verdict.DERIVED: "not claimed by the paper, and computed here because other claims rest on it",
+    ClaimVerdict.REPRODUCED: "our value agrees with the printed one within half its last digit",
+    ClaimVerdict.PARTLY: "part of the claim holds, the reading says which",
+    ClaimVerdict.NOT_REPRODUCED: "under no reading that we found does our value agree",
+    ClaimVerdict.ERRATUM: "the paper prints a formula or number that contradicts itself; the reading corrects it",
+    ClaimVerdict.UNDER_SPECIFIED: "the paper leaves open what the number depends on; "
+    "the reading says under which choice it holds",
+    ClaimVerdict.DERIVED: "not claimed by the paper, and computed here because other claims rest on it",
 }
 
 
@@ -36,7 +37,7 @@ class PaperScore:
     name: str
     claims: tuple[dict[str, JsonValue], ...]
 
-    def count(self, verdict: Verdict) -> int:
+    def count(self, verdict: ClaimVerdict) -> int:
         """Claims with ``verdict``."""
         return sum(claim["verdict"] == verdict for claim in self.claims)
 
@@ -59,7 +60,7 @@ class Scoreboard:
             return "Studies beyond the papers"
         return f"{self.total} published claim{'' if self.total == 1 else 's'}, recomputed"
 
-    def count(self, verdict: Verdict) -> int:
+    def count(self, verdict: ClaimVerdict) -> int:
         """Claims of all papers with ``verdict``."""
         return sum(paper.count(verdict) for paper in self.papers)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from studies.claim import Verdict
+from studies.claim import ClaimVerdict
 from studies.report.html.page import environment
 from studies.report.scoreboard import Scoreboard
 
@@ -21,10 +21,10 @@ def scoreboard_svg(board: Scoreboard) -> str:
         ]
         rows.append({"paper": paper, "y": y, "squares": squares})
         y += ROW + PITCH * ((len(paper.claims) - 1) // ACROSS)
-    columns = [WIDTH * (0.03 + 0.31 * (i % 3)) for i in range(len(Verdict))]
+    columns = [WIDTH * (0.03 + 0.31 * (i % 3)) for i in range(len(ClaimVerdict))]
     legend = [
         {"verdict": verdict, "x": round(columns[i]), "y": y + 14 + LEGEND * (i // 3), "count": board.count(verdict)}
-        for i, verdict in enumerate(Verdict)
+        for i, verdict in enumerate(ClaimVerdict)
     ]
     return environment().get_template("scoreboard.svg.jinja").render(
         board=board, rows=rows, legend=legend, width=WIDTH, height=y + 14 + 2 * LEGEND + 12, side=SQUARE

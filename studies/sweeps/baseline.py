@@ -12,10 +12,10 @@ from pydantic import Field
 
 from studies.sweeps.figures import Figure, Summary
 from studies.sweeps.store import write_whole
-from studies.sweeps.strict import Strict, read_table
 from studies.sweeps.sweep import Sweep
 from studies.sweeps.versions import versions
 from synthesis.errors import SpecError
+from synthesis.toml_file import StrictTable, read_table
 
 SCHEMA = "gainsmith.sweep-baseline/1"
 DIGITS = 8
@@ -24,7 +24,7 @@ HEAD = """\
 """
 
 
-class _FigureLine(Strict):
+class _FigureLine(StrictTable):
     value: float = Field(allow_inf_nan=True)
     unit: str = "1"
     kind: str = "value"
@@ -33,18 +33,18 @@ class _FigureLine(Strict):
     at: dict[str, float] = Field(default_factory=dict)
 
 
-class _Constant(Strict):
+class _Constant(StrictTable):
     value: float
     unit: str
 
 
-class _Nominal(Strict):
+class _Nominal(StrictTable):
     constants: dict[str, _Constant]
     breakpoints: list[float]
     gains: list[list[list[float]]]
 
 
-class _File(Strict):
+class _File(StrictTable):
     schema_: str = Field(alias="schema")
     sweep: str
     form: str

@@ -11,17 +11,18 @@ from pydantic import Field
 
 from analysis.errors import AnalysisError
 from analysis.sensitivity_designs import power_of_two
+from estimators.errors import unknown
 from studies.sweeps.skip_ahead import BITS, latin_points, sobol_points
-from studies.sweeps.strict import Strict
 from studies.sweeps.vary import Varied
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 from synthesis.polynomials.matrix import FloatArray
+from synthesis.toml_file import StrictTable
 
 Indices = NDArray[np.int64]
 MOST_CORNERS = 20  # parameters
 
 
-class Stage(Strict):
+class Stage(StrictTable):
     """A set of designs of one kind. `random` ones fill the box evenly: quantiles are taken over them.
 
     `rows` and `block` (rows that stay together) depend on the number of parameters d and of measures.

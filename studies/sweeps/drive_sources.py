@@ -91,9 +91,9 @@ class TruthDrive:
         """Takes about a second for every second of the manoeuvre. Raises SpecError for a car that cannot drive it."""
         from studies.sweeps.drive_replay import read_recorded
         from studies.trials.sensors import TEST_CAR
-        from studies.truth import draw, drive, write_drive
+        from studies.truth import draw, simulate_manoeuvres, write_drive
 
-        truth = drive([self.manoeuvre], [self.manoeuvre.truth_vehicle(self.folder)])
+        truth = simulate_manoeuvres([self.manoeuvre], [self.manoeuvre.truth_vehicle(self.folder)])
         measured = draw(truth, TEST_CAR, [self.seed], self.sample_time)
         with TemporaryDirectory() as folder:
             log, file = write_drive(Path(folder), measured)

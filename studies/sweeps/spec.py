@@ -9,42 +9,43 @@ from typing import Any
 
 from pydantic import Field
 
+from estimators.errors import unknown
 from studies.sweeps.designs import STAGES, Stage
 from studies.sweeps.measure import Measure
 from studies.sweeps.measures import FAST, MeasureSpec
 from studies.sweeps.measures_costly import COSTLY
 from studies.sweeps.measures_drive import DRIVE
-from studies.sweeps.strict import Strict, read_kind, read_table
 from studies.sweeps.subject_spec import SubjectSpec
 from studies.sweeps.sweep import Sweep
 from studies.sweeps.vary import Vary
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
+from synthesis.toml_file import StrictTable, read_kind, read_table
 
 MEASURES: dict[str, type[MeasureSpec]] = {**FAST, **COSTLY, **DRIVE}
 
 
-class GridSpec(Strict):
+class GridSpec(StrictTable):
     """`points` of every scheduling parameter, over the whole range or over a narrower one by name."""
 
     points: int = Field(default=141, ge=2)
     range: dict[str, list[float]] = Field(default_factory=dict)
 
 
-class GateSpec(Strict):
+class GateSpec(StrictTable):
     """By how much of its distance to worthlessness a figure may fall behind the baseline; `measures` by measure name."""
 
     tolerance: float = Field(default=0.01, ge=0)
     measures: dict[str, float] = Field(default_factory=dict)
 
 
-class Quick(Strict):
+class Quick(StrictTable):
     """What `--quick` replaces: fewer grid points and smaller designs."""
 
     points: int = Field(default=29, ge=2)
     designs: list[Any] = Field(min_length=1)
 
 
-class SweepSpec(Strict):
+class SweepSpec(StrictTable):
     """A whole file; [[subjects]], [[measures]] and [[designs]] are read one by one so that errors name them."""
 
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$")

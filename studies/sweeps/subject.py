@@ -17,11 +17,12 @@ from analysis.perturbed import Matrices
 from analysis.planar import planar_margin
 from analysis.planar_exponential import planar_exponential
 from analysis.second_moment import spectral_radius
+from estimators.errors import unknown
 from estimators.interpolate import PiecewiseLinear
 from estimators.schedule import Update
 from studies.spec import ScheduleSpec
 from studies.sweeps.plant import Grid, ModelPlant, Parameter, Plant
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.matrix import FloatArray
 

@@ -6,23 +6,23 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from estimators.errors import EstimatorError
+from estimators.errors import EstimatorError, unknown
 from estimators.schedule import SHIPPED, GainSchedule, read_content
-from studies.spec import ScheduleSpec, explain
+from studies.spec import ScheduleSpec
 from studies.sweeps.plant import Box, ModelPlant, Plant, PolynomialPlant
-from studies.sweeps.strict import Strict
 from studies.sweeps.subject import Gains, Subject, model_subject
 from studies.sweeps.vary import Vary
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 from synthesis.models.catalogue import CATALOGUE
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Signal
 from synthesis.models.parameter_set import ParameterSet, Quantity, load_parameter_set
+from synthesis.toml_file import StrictTable, read_table
 
 
-class SubjectSpec(Strict):
+class SubjectSpec(StrictTable):
     """`schedule` with or without today's `parameters`, or `model`, `parameters`, `gain` and `sample_time`.
 
     Files are looked for beside the sweep file. Without `parameters` a schedule is swept around the constants it was made with.
@@ -139,10 +139,7 @@ def designed_from(content: dict[str, Any]) -> ScheduleSpec | None:
     spec = {k: v for k, v in content["provenance"].get("spec", {}).items() if k != "parameter_set"}
     if not spec:
         return None
-    try:
-        return ScheduleSpec.model_validate(spec)
-    except ValidationError as error:
-        raise SpecError(f"schedule '{content['name']}': provenance.spec: {explain(error)}") from None
+    return read_table(ScheduleSpec, spec, f"schedule '{content['name']}': provenance.spec")
 
 
 def _parameters(name: str, folder: Path) -> ParameterSet:

@@ -11,14 +11,14 @@ from pydantic import Field, model_validator
 from analysis.errors import AnalysisError
 from analysis.sensitivity_designs import around, bounds
 from studies.sweeps.plant import Parameter
-from studies.sweeps.strict import Strict
 from studies.sweeps.subject import Subject
 from synthesis.errors import SpecError
+from synthesis.toml_file import StrictTable
 
 ALL = "constants"  # the name that stands for every parameter of the plant
 
 
-class Vary(Strict):
+class Vary(StrictTable):
     """`relative` to the nominal value, or a `range` in the parameter's own unit, which `unit` may state to be checked."""
 
     relative: float | None = Field(default=None, gt=0)

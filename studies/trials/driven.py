@@ -11,8 +11,8 @@ from functools import partial
 from pathlib import Path
 
 from studies.study import Part, PartResult, Preparation, Scope
-from studies.truth import Manoeuvre, Truth, drive, load_manoeuvre, shipped_manoeuvres
-from studies.truth.kept import read_truth, write_truth
+from studies.truth import Manoeuvre, Truth, load_manoeuvre, shipped_manoeuvres, simulate_manoeuvres
+from studies.truth.record import read_truth, write_truth
 from synthesis.errors import SpecError
 
 LUGRE, MAGIC_FORMULA = "lugre", "magic-formula"
@@ -27,7 +27,7 @@ def _manoeuvres(names: Iterable[str], tire: str, scope: Scope, seconds: float = 
 
 
 def _drive_all(tire: str, scope: Scope, folder: Path) -> None:
-    write_truth(drive(_manoeuvres(shipped_manoeuvres(), tire, scope)), folder)
+    write_truth(simulate_manoeuvres(_manoeuvres(shipped_manoeuvres(), tire, scope)), folder)
 
 
 DRIVEN = {tire: Preparation(f"{tire}-tires", partial(_drive_all, tire), cost=40.0) for tire in (LUGRE, MAGIC_FORMULA)}
@@ -47,7 +47,7 @@ def driven(names: tuple[str, ...], tire: str, scope: Scope, seconds: float = QUI
     When quick, the first ``seconds`` of each. Raises SpecError for unknown names and where the run did not prepare it.
     """
     if scope.prepared is None:
-        return drive(_manoeuvres(names, tire, scope, seconds))
+        return simulate_manoeuvres(_manoeuvres(names, tire, scope, seconds))
     folder = scope.prepared / DRIVEN[tire].name
     if not folder.is_dir():
         raise SpecError(f"the part does not name its need '{DRIVEN[tire].name}': make it with `driven_part`")

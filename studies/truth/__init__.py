@@ -5,10 +5,10 @@ combined-slip LuGre tires or on the Magic Formula with slip lag is driven throug
 sensor errors are then drawn for as many seeds as wanted from the one truth:
 
     from estimators.pipeline import EstimationPipeline
-    from studies.truth import Sensors, draw, drive, load_manoeuvre
+    from studies.truth import Sensors, draw, load_manoeuvre, simulate_manoeuvres
 
     manoeuvres = [load_manoeuvre("p1-launch-split"), load_manoeuvre("p1-lane-change-dry")]
-    truth = drive(manoeuvres)                      # B runs, 200 Hz; truth.names, truth.valid (B, n), truth.vehicles
+    truth = simulate_manoeuvres(manoeuvres)        # B runs, 200 Hz; truth.names, truth.valid (B, n), truth.vehicles
     one = truth.only("p1-launch-split")            # one manoeuvre, cut to its own length
     measured = draw(one, Sensors(), seeds=range(8))
     pipeline = EstimationPipeline(one.vehicles[0].parameters, measured.sample_time, measured.batch_shape)
@@ -16,20 +16,18 @@ sensor errors are then drawn for as many seeds as wanted from the one truth:
     error = steps[-1].vx - one["vx"][:, -1]        # (seeds, runs)
 """
 
+from studies.errors import SimulationError
 from studies.truth.drivetrain import Assist, Drivetrain
 from studies.truth.export import write_drive
-from studies.truth.manoeuvre import Manoeuvre
-from studies.truth.manoeuvre_file import drive, load_manoeuvre, shipped_manoeuvres
-from studies.truth.measure import Measured, draw
-from studies.truth.monte_carlo import varied
+from studies.truth.manoeuvre import Manoeuvre, load_manoeuvre, shipped_manoeuvres, simulate_manoeuvres
 from studies.truth.record import Truth
-from studies.truth.sensors import PERFECT, Channel, Drops, Sensors, Ticks
+from studies.truth.sensors import PERFECT, Channel, Drops, Measured, Sensors, Ticks, draw
 from studies.truth.signals import UNITS
-from studies.truth.simulate import SimulationError, simulate
-from studies.truth.vehicle import Chassis, TruthVehicle, load_vehicle
+from studies.truth.simulate import simulate
+from studies.truth.vehicle import Chassis, TruthVehicle, load_vehicle, varied
 
 __all__ = [
     "PERFECT", "UNITS", "Assist", "Channel", "Chassis", "Drivetrain", "Drops", "Manoeuvre", "Measured", "Sensors",
-    "SimulationError", "Ticks", "Truth", "TruthVehicle", "draw", "drive", "load_manoeuvre", "load_vehicle",
-    "shipped_manoeuvres", "simulate", "varied", "write_drive",
+    "SimulationError", "Ticks", "Truth", "TruthVehicle", "draw", "load_manoeuvre", "load_vehicle",
+    "shipped_manoeuvres", "simulate", "simulate_manoeuvres", "varied", "write_drive",
 ]  # fmt: skip

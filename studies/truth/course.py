@@ -6,14 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from studies.truth.profile import GRID
+from estimators.arrays import FloatArray
+from studies.truth.profile import GRID, PATH_GRID
 from studies.truth.road import Roads, Zone
-
-Array = npt.NDArray[np.float64]
-PATH_GRID = 0.25
-"""m, spacing of curvature tables."""
 
 
 @dataclass(frozen=True)
@@ -27,17 +23,17 @@ class Course:
     duration: float  # s
     initial_speed: float  # m/s
     tire: str
-    steer: Array  # rad, front road wheels
-    drive_torque: Array  # N m, sum of the driven wheels
-    drive_share: Array  # of what the drivetrain can give, -1 to 1
-    brake_torque: Array  # N m, sum
-    brake_share: Array  # of the greatest brake torque, 0 to 1
-    grade: Array  # rad
-    bank: Array  # rad
+    steer: FloatArray  # rad, front road wheels
+    drive_torque: FloatArray  # N m, sum of the driven wheels
+    drive_share: FloatArray  # of what the drivetrain can give, -1 to 1
+    brake_torque: FloatArray  # N m, sum
+    brake_share: FloatArray  # of the greatest brake torque, 0 to 1
+    grade: FloatArray  # rad
+    bank: FloatArray  # rad
     friction: float
     zones: tuple[Zone, ...] = ()
-    speed: Array | None = None  # m/s, target of the driver; NaN where it leaves the torques alone
-    curvature: Array | None = None  # 1/m over the way, of the path that the driver follows
+    speed: FloatArray | None = None  # m/s, target of the driver; NaN where it leaves the torques alone
+    curvature: FloatArray | None = None  # 1/m over the way, of the path that the driver follows
 
 
 class Courses:
@@ -50,13 +46,13 @@ class Courses:
         self.duration = max(c.duration for c in courses)
         self.steps = int(np.ceil(self.duration / GRID - 1e-9)) + 2
 
-        def table(pick: Callable[[Course], Array]) -> Array:
+        def table(pick: Callable[[Course], FloatArray]) -> FloatArray:
             rows = [pick(c)[: self.steps] for c in unique]
             return np.stack([np.pad(r, (0, self.steps - r.size), mode="edge") for r in rows], axis=1)
 
         nothing = np.full(2, np.nan)
         names = ("steer", "drive_torque", "drive_share", "brake_torque", "brake_share", "grade", "bank")
-        rows: list[Callable[[Course], Array]] = [lambda c, n=name: getattr(c, n) for name in names]  # type: ignore[misc]
+        rows: list[Callable[[Course], FloatArray]] = [lambda c, n=name: getattr(c, n) for name in names]  # type: ignore[misc]
         rows.append(lambda c: nothing if c.speed is None else c.speed)
         self._table = np.stack([table(row) for row in rows])  # (8, steps, courses)
         self.roads = Roads([c.friction for c in courses], [c.zones for c in courses])
@@ -66,20 +62,20 @@ class Courses:
         bends = [np.zeros(2) if c.curvature is None else c.curvature for c in unique]
         self._bend = np.stack([np.pad(b, (0, longest - b.size)) for b in bends])
 
-    def at(self, time: float) -> Array:
+    def at(self, time: float) -> FloatArray:
         """(8, B): steer, drive torque, drive share, brake torque, brake share, grade, bank, target speed."""
         k = min(max(time / GRID, 0.0), self.steps - 1.001)
         low = int(k)
         w = k - low
         both = self._table[:, low : low + 2]
-        row: Array = both[:, 0] if w < 1e-9 else (1.0 - w) * both[:, 0] + w * both[:, 1]
-        out: Array = row[:, self.which]
+        row: FloatArray = both[:, 0] if w < 1e-9 else (1.0 - w) * both[:, 0] + w * both[:, 1]
+        out: FloatArray = row[:, self.which]
         return out
 
-    def bend(self, way: Array) -> Array:
+    def bend(self, way: FloatArray) -> FloatArray:
         """Curvature (B,), 1/m, of the paths at the ways (B,), m."""
         k = np.clip(way / PATH_GRID, 0.0, self._bend.shape[1] - 1.001)
         low = k.astype(np.int64)
         w = k - low
-        out: Array = (1.0 - w) * self._bend[self.which, low] + w * self._bend[self.which, low + 1]
+        out: FloatArray = (1.0 - w) * self._bend[self.which, low] + w * self._bend[self.which, low + 1]
         return out

@@ -10,14 +10,13 @@ through a lag: pure pursuit of a point d ahead with the curvature fed forward.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from studies.truth.course import Courses
 from studies.truth.fleet import Fleet
 from studies.truth.layout import B, W
 from studies.truth.plant import Controls, Slide
 
-Array = npt.NDArray[np.float64]
 TAU, INTEGRAL = 0.4, 2.0  # s, of the speed controller
 PREVIEW_TIME, PREVIEW_LEAST = 0.7, 4.0  # s, m
 UNDERSTEER = 0.0015  # rad s^2/m, K: more steering with speed
@@ -35,7 +34,7 @@ class Driver:
         self._base = fleet.x[0] - fleet.x[2]
         fleet.drivetrains.restart()
 
-    def act(self, state: Array, moving: Slide, time: float, h: float) -> Controls:
+    def act(self, state: FloatArray, moving: Slide, time: float, h: float) -> Controls:
         """Controls of the step from ``time`` to ``time + h``, s."""
         courses, trains = self.courses, self.fleet.drivetrains
         middle = time + 0.5 * h
@@ -58,8 +57,15 @@ class Driver:
         return Controls(angles, driven, braked, courses.roads.friction(place, middle), grade, bank)
 
     def _speed(
-        self, state: Array, target: Array, soon: Array, available: Array, drive: Array, brake: Array, h: float
-    ) -> tuple[Array, Array]:
+        self,
+        state: FloatArray,
+        target: FloatArray,
+        soon: FloatArray,
+        available: FloatArray,
+        drive: FloatArray,
+        brake: FloatArray,
+        h: float,
+    ) -> tuple[FloatArray, FloatArray]:
         on = np.isfinite(target)
         wanted = np.where(on, target, 0.0)
         slope = np.where(np.isfinite(soon) & on, (soon - wanted) / 0.02, 0.0)
@@ -73,7 +79,7 @@ class Driver:
         hold = np.where(rests, 0.5 * self.fleet.drivetrains.maximum_brake, np.maximum(-force, 0.0))
         return drive + np.where(on, pull, 0.0), brake + np.where(on, hold, 0.0)
 
-    def _path(self, state: Array, h: float) -> Array:
+    def _path(self, state: FloatArray, h: float) -> FloatArray:
         vx, vy, r = state[B["vx"]], state[B["vy"]], state[B["yaw_rate"]]
         bend = self.courses.bend(self.way)
         ahead = np.maximum(PREVIEW_LEAST, PREVIEW_TIME * np.absolute(vx))
@@ -83,8 +89,8 @@ class Driver:
         wanted = np.clip(wanted, -LARGEST_STEER, LARGEST_STEER)
         self.steer = self.steer + (1.0 - np.exp(-h / STEER_LAG)) * (wanted - self.steer)
         sine, cosine = np.sin(self.heading), np.cos(self.heading)
-        pace = (vx * cosine - vy * sine) / np.maximum(1.0 - bend * self.error, 0.2)
-        self.way = self.way + h * pace
+        path_speed = (vx * cosine - vy * sine) / np.maximum(1.0 - bend * self.error, 0.2)
+        self.way = self.way + h * path_speed
         self.error = self.error + h * (vx * sine + vy * cosine)
-        self.heading = self.heading + h * (r - bend * pace)
+        self.heading = self.heading + h * (r - bend * path_speed)
         return self.steer

@@ -11,11 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-import numpy.typing as npt
 
-from synthesis.errors import SpecError, unknown
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
+from studies.truth.layout import column
+from synthesis.errors import SpecError
 
-Array = npt.NDArray[np.float64]
 FRONT_SHARES = {"AWD": 0.5, "FWD": 1.0, "RWD": 0.0}
 """Share of the drive torque that goes to the front axle."""
 
@@ -66,24 +67,30 @@ class Drivetrains:
 
     def __init__(self, drivetrains: Sequence[Drivetrain]) -> None:
         front = np.array([FRONT_SHARES[d.layout] for d in drivetrains])
-        brake = np.array([d.front_brake_share for d in drivetrains])
-        self.share: Array = 0.5 * np.stack([front, front, 1 - front, 1 - front])
-        self.brake_share: Array = 0.5 * np.stack([brake, brake, 1 - brake, 1 - brake])
-        self.maximum = np.array([d.maximum_torque for d in drivetrains])
-        self.power = np.array([d.maximum_power for d in drivetrains])
-        self.maximum_brake = np.array([d.maximum_brake_torque for d in drivetrains])
+        brake = column(drivetrains, "front_brake_share")
+        self.share: FloatArray = 0.5 * np.stack([front, front, 1 - front, 1 - front])
+        self.brake_share: FloatArray = 0.5 * np.stack([brake, brake, 1 - brake, 1 - brake])
+        self.maximum = column(drivetrains, "maximum_torque")
+        self.power = column(drivetrains, "maximum_power")
+        self.maximum_brake = column(drivetrains, "maximum_brake_torque")
         self.traction = _Assists([d.traction_control for d in drivetrains], 1.0)
         self.anti_lock = _Assists([d.anti_lock for d in drivetrains], -1.0)
 
-    def available(self, wheel_speed: Array) -> Array:
+    def available(self, wheel_speed: FloatArray) -> FloatArray:
         """Greatest drive torque (B,), N m, at the mean speed of the driven wheels (4, B), rad/s: flat, then hyperbola."""
         mean = np.absolute((wheel_speed * self.share).sum(axis=0))
-        limit: Array = np.minimum(self.maximum, self.power / np.maximum(mean, 1e-3))
+        limit: FloatArray = np.minimum(self.maximum, self.power / np.maximum(mean, 1e-3))
         return limit
 
     def torques(
-        self, drive: Array, brake: Array, slip: Array, speed: Array, wheel_speed: Array, h: float
-    ) -> tuple[Array, Array]:
+        self,
+        drive: FloatArray,
+        brake: FloatArray,
+        slip: FloatArray,
+        speed: FloatArray,
+        wheel_speed: FloatArray,
+        h: float,
+    ) -> tuple[FloatArray, FloatArray]:
         """Drive and brake torque of each wheel (4, B), N m.
 
         From the sums asked for (B,), slips (4, B), |v| (B,) m/s, wheel speeds (4, B) rad/s and the step, s. A spinning
@@ -110,16 +117,16 @@ class _Assists:
             setattr(self, entry.name, np.array(values))
         self.restart()
 
-    limit: Array
-    release: Array
-    apply: Array
-    least: Array
-    inactive_below: Array
+    limit: FloatArray
+    release: FloatArray
+    apply: FloatArray
+    least: FloatArray
+    inactive_below: FloatArray
 
     def restart(self) -> None:
-        self.share: Array = np.ones((4, self.on.size))
+        self.share: FloatArray = np.ones((4, self.on.size))
 
-    def step(self, slip: Array, speed: Array, h: float) -> Array | float:
+    def step(self, slip: FloatArray, speed: FloatArray, h: float) -> FloatArray | float:
         """Share of the asked torque that each wheel gets (4, B)."""
         if not self.any:
             return 1.0

@@ -5,16 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
+from estimators.arrays import FloatArray
 from estimators.vehicle import CORNERS, VehicleParameters
 from studies.drives.output import ready_folder, whole_file, write_csv
 from studies.drives.quantities import REFERENCES, SIGNALS
-from studies.truth.measure import Measured
+from studies.truth.sensors import Measured
 from synthesis.errors import SpecError
 
-Array = npt.NDArray[np.float64]
 _NAMES = ("wheel_speed", "torque", "ax", "ay", "az", "yaw_rate", "roll_rate", "pitch_rate")
 _REFERENCES = {
     "vx": "vx", "vy": "vy", "ax": "road_ax", "force_x": "force_x", "force_y": "force_y", "force_z": "force_z"
@@ -50,7 +47,7 @@ def write_drive(
         raise SpecError(f"seed {seed}, run {run}: the measurements have {seeds} seeds and {runs} runs")
     truth, name = measured.truth, measured.truth.names[run]
     keep = truth.time <= truth.duration[run] + 1e-9
-    columns: dict[str, Array] = {"t": truth.time[keep]}
+    columns: dict[str, FloatArray] = {"t": truth.time[keep]}
     signals, references = [], []
     for signal in _NAMES:
         value = measured.signals[signal][seed, run][keep]
@@ -100,7 +97,7 @@ def write_drive(
     return log, drive
 
 
-def _columns(name: str, value: Array) -> list[tuple[str, Array]]:
+def _columns(name: str, value: FloatArray) -> list[tuple[str, FloatArray]]:
     return [(name, value)] if value.ndim == 1 else [(f"{name}_{c}", value[:, k]) for k, c in enumerate(CORNERS)]
 
 

@@ -6,16 +6,17 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from estimators.vehicle import GRAVITY
 from studies.truth.drivetrain import Drivetrains
+from studies.truth.layout import column
 from studies.truth.lugre import LuGreTire
 from studies.truth.magic_formula import MagicFormulaTire
 from studies.truth.vehicle import TruthVehicle
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 
-Array = npt.NDArray[np.float64]
 AIR_DENSITY = 1.2
 """kg/m^3"""
 Tire = LuGreTire | MagicFormulaTire
@@ -40,32 +41,31 @@ class Fleet:
             raise SpecError("a truth batch needs at least one vehicle")
         cars, bodies = [v.parameters for v in vehicles], [v.chassis for v in vehicles]
 
-        def column(values: list[float]) -> Array:
-            return np.array(values, dtype=np.float64)
-
         self.size = len(cars)
-        self.mass = column([c.mass for c in cars])
-        self.yaw_inertia = column([c.yaw_inertia for c in cars])
-        self.roll_inertia: Array = self.yaw_inertia * [b.roll_inertia_ratio for b in bodies]
-        self.pitch_inertia: Array = self.yaw_inertia * [b.pitch_inertia_ratio for b in bodies]
-        self.wheel_inertia = column([c.wheel_inertia for c in cars])
-        self.radius: Array = np.stack([c.radius for c in cars], axis=1)
-        self.x: Array = np.stack([c.corner_x for c in cars], axis=1)
-        self.y: Array = np.stack([c.corner_y for c in cars], axis=1)
-        self.height = column([c.cg_height for c in cars])
-        self.roll_center = column([c.roll_center_height for c in cars])
-        self.track: Array = np.array([[c.front_track for c in cars], [c.rear_track for c in cars]])
-        self.static_load: Array = np.stack([c.static_loads for c in cars], axis=1)
-        self.drag = column([0.5 * AIR_DENSITY * b.drag_area for b in bodies])
-        self.rolling_resistance = column([b.rolling_resistance for b in bodies])
-        self.load_lag = column([b.load_lag for b in bodies])
+        self.mass = column(cars, "mass")
+        self.yaw_inertia = column(cars, "yaw_inertia")
+        self.roll_inertia: FloatArray = self.yaw_inertia * column(bodies, "roll_inertia_ratio")
+        self.pitch_inertia: FloatArray = self.yaw_inertia * column(bodies, "pitch_inertia_ratio")
+        self.wheel_inertia = column(cars, "wheel_inertia")
+        self.radius: FloatArray = column(cars, "radius")
+        self.x: FloatArray = column(cars, "corner_x")
+        self.y: FloatArray = column(cars, "corner_y")
+        self.height = column(cars, "cg_height")
+        self.roll_center = column(cars, "roll_center_height")
+        self.track: FloatArray = np.array([[c.front_track for c in cars], [c.rear_track for c in cars]])
+        self.static_load: FloatArray = column(cars, "static_loads")
+        self.drag: FloatArray = 0.5 * AIR_DENSITY * column(bodies, "drag_area")
+        self.rolling_resistance = column(bodies, "rolling_resistance")
+        self.load_lag = column(bodies, "load_lag")
         self._springs(vehicles)
         under = [v.suspension for v in vehicles]
-        self.unsprung = column([u.unsprung_mass for u in under])
-        self.give_stiffness: Array = np.repeat(
+        self.unsprung = column(under, "unsprung_mass")
+        self.compliance_stiffness: FloatArray = np.repeat(
             [[u.stiffness_x for u in under], [u.stiffness_y for u in under]], 4, axis=0
         )
-        self.give_damping: Array = np.repeat([[u.damping_x for u in under], [u.damping_y for u in under]], 4, axis=0)
+        self.compliance_damping: FloatArray = np.repeat(
+            [[u.damping_x for u in under], [u.damping_y for u in under]], 4, axis=0
+        )
         self.drivetrains = Drivetrains([v.drivetrain for v in vehicles])
 
     def _springs(self, vehicles: Sequence[TruthVehicle]) -> None:
@@ -73,9 +73,9 @@ class Fleet:
         ride = np.array([[b.front_ride_frequency for b in bodies], [b.rear_ride_frequency for b in bodies]])
         speed = 2.0 * math.pi * np.repeat(ride, 2, axis=0)
         corner_mass = self.static_load / GRAVITY
-        self.spring: Array = corner_mass * speed**2
-        self.damper: Array = 2.0 * np.array([b.ride_damping for b in bodies]) * corner_mass * speed
-        bars = np.array([b.anti_roll_ratio for b in bodies]) * (self.spring * self.y**2).sum(axis=0)  # N m/rad
-        front = np.array([b.anti_roll_front_share for b in bodies])
+        self.spring: FloatArray = corner_mass * speed**2
+        self.damper: FloatArray = 2.0 * column(bodies, "ride_damping") * corner_mass * speed
+        bars = column(bodies, "anti_roll_ratio") * (self.spring * self.y**2).sum(axis=0)  # N m/rad
+        front = column(bodies, "anti_roll_front_share")
         # N per wheel and rad of roll: K phi = 2 F T/2
-        self.bar: Array = np.stack([bars * front, bars * (1.0 - front)]) / self.track
+        self.bar: FloatArray = np.stack([bars * front, bars * (1.0 - front)]) / self.track

@@ -6,12 +6,14 @@ the step three times as fast. Outside, the batch comes first.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from estimators.arrays import FloatArray
+
 BODY: Final = (
     "x",  # m, of the centre of gravity on the road
     "y",
@@ -46,11 +48,16 @@ W: Final = {name: slice(len(BODY) + 4 * k, len(BODY) + 4 * k + 4) for k, name in
 """Rows fl, fr, rl, rr of each wheel state."""
 JACK: Final = slice(B["jack_front"], B["jack_rear"] + 1)
 DEFLECTION: Final = slice(W["deflection_x"].start, W["deflection_y"].stop)
-GIVE: Final = slice(W["compliance_x"].start, W["compliance_y"].stop)
-GIVE_RATE: Final = slice(W["compliance_x_rate"].start, W["compliance_y_rate"].stop)
+COMPLIANCE: Final = slice(W["compliance_x"].start, W["compliance_y"].stop)
+COMPLIANCE_RATE: Final = slice(W["compliance_x_rate"].start, W["compliance_y_rate"].stop)
 
 
-def rolling(speed: npt.ArrayLike, radius: Array) -> Array:
+def column(items: Sequence[object], name: str) -> FloatArray:
+    """An attribute of all items as one array with the items last: (B,) of numbers, (2, B) of pairs."""
+    return np.ascontiguousarray(np.array([getattr(item, name) for item in items], dtype=np.float64).T)
+
+
+def rolling(speed: npt.ArrayLike, radius: FloatArray) -> FloatArray:
     """State (STATES, B) of cars that roll freely straight ahead at ``speed`` (B,), m/s; negative is backwards, 0 at rest."""
     state = np.zeros((STATES, radius.shape[1]))
     state[B["vx"]] = speed

@@ -14,11 +14,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
+from studies.truth.layout import column
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set, quantities
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -57,22 +56,29 @@ class LuGreTire:
     name: ClassVar[str] = "lugre"
 
     def __init__(self, parameters: list[LuGreParameters]) -> None:
-        def both(name: str) -> Array:
-            return np.array([getattr(p, name) for p in parameters], dtype=np.float64).T[:, None, :]
+        self.sigma0, self.sigma1, self.sigma2, self.kappa = (
+            column(parameters, name)[:, None, :] for name in ("sigma0", "sigma1", "sigma2", "kappa")
+        )
+        self.sliding, static, self.stribeck = (column(parameters, n) for n in ("sliding", "static", "stribeck"))
+        self.rise: FloatArray = static - self.sliding
 
-        def one(name: str) -> Array:
-            return np.array([getattr(p, name) for p in parameters], dtype=np.float64)
-
-        self.sigma0, self.sigma1, self.sigma2, self.kappa = (both(n) for n in ("sigma0", "sigma1", "sigma2", "kappa"))
-        self.sliding, self.rise, self.stribeck = one("sliding"), one("static") - one("sliding"), one("stribeck")
-
-    def rates(self, _z: Array, slide: Array, surface: Array, _transport: Array, friction: Array) -> tuple[Array, Array]:
+    def rates(
+        self, _z: FloatArray, slide: FloatArray, surface: FloatArray, _transport: FloatArray, friction: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """a (2, 4, B), 1/s, and what drives the bristles, m/s: z' = v_r - a z, from v_r, |R_e w| (4, B), m/s, and theta."""
         speed = np.sqrt((slide * slide).sum(axis=0))
         grip = friction * (self.sliding + self.rise * np.exp(-np.sqrt(speed / self.stribeck)))
         return self.kappa * surface + self.sigma0 * (speed / grip), slide
 
-    def forces(self, z: Array, dz: Array, slide: Array, _transport: Array, load: Array, _friction: Array) -> Array:
+    def forces(
+        self,
+        z: FloatArray,
+        dz: FloatArray,
+        slide: FloatArray,
+        _transport: FloatArray,
+        load: FloatArray,
+        _friction: FloatArray,
+    ) -> FloatArray:
         """F (2, 4, B), N, in the tire frame, from deflection (m), its rate and the slip velocity (m/s), load (4, B), N."""
-        out: Array = (self.sigma0 * z + self.sigma1 * dz + self.sigma2 * slide) * load
+        out: FloatArray = (self.sigma0 * z + self.sigma1 * dz + self.sigma2 * slide) * load
         return out

@@ -22,9 +22,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from estimators.arrays import FloatArray
+from studies.truth.layout import column
 
 
 @dataclass(frozen=True)
@@ -58,11 +58,11 @@ class MagicFormulaTire:
     name: ClassVar[str] = "magic-formula"
 
     def __init__(self, parameters: list[MagicFormulaParameters]) -> None:
-        def pair(name: str) -> Array:
-            return np.array([getattr(p, name) for p in parameters], dtype=np.float64).T[:, None, :]
+        def one(name: str) -> FloatArray:
+            return column(parameters, name)
 
-        def one(name: str) -> Array:
-            return np.array([getattr(p, name) for p in parameters], dtype=np.float64)
+        def pair(name: str) -> FloatArray:
+            return one(name)[:, None, :]
 
         self.nominal_load, self.damping_speed = one("nominal_load"), one("damping_speed")
         self.nominal_friction, self.relaxation_least = one("nominal_friction"), one("relaxation_least")
@@ -70,20 +70,28 @@ class MagicFormulaTire:
         self.curve, self.curve_load, self.curve_load2 = pair("curve"), pair("curve_load"), pair("curve_load2")
         self.weight, self.weight_fall, self.weight_shape = pair("weight"), pair("weight_fall"), pair("weight_shape")
         self.relaxation, self.damping = pair("relaxation"), pair("damping")
-        self.stiffness_x, self.stiffness_y = one("stiffness_x").T, one("stiffness_y").T
+        self.stiffness_x, self.stiffness_y = one("stiffness_x"), one("stiffness_y")
         first = np.stack([self.stiffness_x[0], self.stiffness_y[0]])[:, None, :]
-        self.narrow: Array = first / self.peak * self.nominal_friction  # 1/kappa_s, 1/alpha_s at friction 1
+        self.narrow: FloatArray = first / self.peak * self.nominal_friction  # 1/kappa_s, 1/alpha_s at friction 1
 
     def rates(
-        self, slip: Array, slide: Array, _surface: Array, transport: Array, friction: Array
-    ) -> tuple[Array, Array]:
+        self, slip: FloatArray, slide: FloatArray, _surface: FloatArray, transport: FloatArray, friction: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """a (2, 4, B), 1/s, and what drives the slips, v_r/sigma, 1/s: slip' = v_r/sigma - a slip, a = W/sigma."""
         near = slip * (self.narrow / friction)
         stiff = 1.0 + (near * near).sum(axis=0)
         sigma = np.maximum(self.relaxation / (stiff * np.sqrt(stiff)), self.relaxation_least)
         return transport / sigma, slide / sigma
 
-    def forces(self, slip: Array, _rate: Array, slide: Array, transport: Array, load: Array, friction: Array) -> Array:
+    def forces(
+        self,
+        slip: FloatArray,
+        _rate: FloatArray,
+        slide: FloatArray,
+        transport: FloatArray,
+        load: FloatArray,
+        friction: FloatArray,
+    ) -> FloatArray:
         """F (2, 4, B), N, in the tire frame, from lagged slips, slip velocity (m/s), load (4, B), N, and friction."""
         slow = np.maximum(1.0 - transport / self.damping_speed, 0.0)
         slip = slip + slow * self.damping * slide
@@ -95,10 +103,10 @@ class MagicFormulaTire:
         angle = np.stack([slip[0], np.arctan(slip[1])])  # kappa and alpha: each weakens the other's force
         own = self.weight_fall * angle
         weight = np.cos(self.weight_shape * np.arctan(self.weight * angle[::-1] / np.sqrt(1.0 + own * own)))
-        out: Array = pure * weight * load
+        out: FloatArray = pure * weight * load
         return out
 
-    def _stiffness(self, load: Array, df: Array) -> Array:
+    def _stiffness(self, load: FloatArray, df: FloatArray) -> FloatArray:
         """B C D/F_z (2, 4, B): K_x = F_z (p_1 + p_2 df) exp(p_3 df), K_y = p_1 F_z0 sin(2 atan(F_z/(p_2 F_z0)))."""
         first, second, exponent = self.stiffness_x
         along = (first + second * df) * np.exp(exponent * df)

@@ -2,61 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from studies.drives import quantities
-from studies.drives.drive_tables import Table
-from studies.drives.quantities import Duration, to_si
+from studies.drives.quantities import Duration
 from studies.truth.course import Course
 from studies.truth.drivetrain import Assist
 from studies.truth.fleet import TIRES
-from studies.truth.path import PathPiece, curvature
-from studies.truth.profile import GRID, Array, Piece, check_units, sampled
-from studies.truth.road_table import Road
+from studies.truth.profile import (
+    GRID,
+    Angles,
+    PathPiece,
+    Piece,
+    Shares,
+    Speeds,
+    Torques,
+    curvature,
+    sampled,
+)
+from studies.truth.record import Truth
+from studies.truth.road import Road
+from studies.truth.simulate import EVERYTHING, RECORD_TIME, STEP, simulate, simulate_in_processes
 from studies.truth.vehicle import TruthVehicle, load_vehicle
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
+from synthesis.toml_file import StrictTable, find_toml, load_toml, shipped_files
 
 
-def _pieces(unit: str) -> AfterValidator:
-    def check(pieces: list[Piece]) -> list[Piece]:
-        check_units(pieces, unit)
-        return pieces
-
-    return AfterValidator(check)
-
-
-def _speed(text: str) -> str:
-    to_si(text, "m/s")
-    return text
-
-
-Angle = Annotated[list[Piece], _pieces("rad")]
-Torque = Annotated[list[Piece], _pieces("N*m")]
-Speed = Annotated[list[Piece], _pieces("m/s")]
-Share = Annotated[list[Piece], _pieces("share")]
-
-
-def _above_zero(unit: str) -> BeforeValidator:
-    def read(text: object) -> float:
-        value = quantities.to_si(text, unit)
-        if not value > 0:
-            raise ValueError(f"'{text}' is out of range; it must be above 0 {unit}")
-        return value
-
-    return BeforeValidator(read)
-
-
-Moment = Annotated[float, _above_zero("N*m")]
-Power = Annotated[float, _above_zero("W")]
-
-
-class Car(Table):
+class Car(StrictTable):
     """Which vehicle, by the name of its parameter set or as a TOML file beside the manoeuvre, and what is fitted to it."""
 
     parameters: str = Field(min_length=1)
@@ -65,12 +45,12 @@ class Car(Table):
     steering_ratio: float | None = Field(default=None, gt=0.0)
     traction_control: Literal["off", "poor"] = "off"
     anti_lock: Literal["off", "poor"] = "off"
-    maximum_torque: Moment | None = None  # of all driven wheels; what full throttle gives at low speed
-    maximum_power: Power | None = None
-    maximum_brake_torque: Moment | None = None  # of all wheels
+    maximum_torque: quantities.Torque | None = None  # of all driven wheels; what full throttle gives at low speed
+    maximum_power: quantities.Power | None = None
+    maximum_brake_torque: quantities.Torque | None = None  # of all wheels
 
 
-class Manoeuvre(Table):
+class Manoeuvre(StrictTable):
     """A manoeuvre that was read and checked.
 
     Steering: ``steer`` (at the road wheels) or ``hand_wheel`` (needs ``vehicle.steering_ratio``), or a ``path`` that the
@@ -87,16 +67,16 @@ class Manoeuvre(Table):
     given: list[str] = Field(default_factory=list)  # what the source says
     chosen: list[str] = Field(default_factory=list)  # what it does not say, and what is taken instead
     duration: Duration
-    speed: Annotated[str, AfterValidator(_speed)] = "0 m/s"
+    speed: quantities.Velocity = 0.0
     vehicle: Car
     road: Road = Road()
-    steer: Angle = Field(default_factory=list)
-    hand_wheel: Angle = Field(default_factory=list)
-    torque: Torque = Field(default_factory=list)
-    throttle: Share = Field(default_factory=list)
-    brake_torque: Torque = Field(default_factory=list)
-    brake: Share = Field(default_factory=list)
-    target_speed: Speed = Field(default_factory=list)
+    steer: Angles = Field(default_factory=list)
+    hand_wheel: Angles = Field(default_factory=list)
+    torque: Torques = Field(default_factory=list)
+    throttle: Shares = Field(default_factory=list)
+    brake_torque: Torques = Field(default_factory=list)
+    brake: Shares = Field(default_factory=list)
+    target_speed: Speeds = Field(default_factory=list)
     free_after: Duration | None = None
     path: list[PathPiece] = Field(default_factory=list)
 
@@ -117,11 +97,10 @@ class Manoeuvre(Table):
             raise SpecError(unknown("tire", tire, TIRES))
         return self.model_copy(update={"vehicle": self.vehicle.model_copy(update={"tire": tire})})
 
-    def truth_vehicle(self, folder: Path | None = None) -> TruthVehicle:
-        """The car. Raises SpecError when there is no such parameter set."""
+    def truth_vehicle(self, folder: Path = Path()) -> TruthVehicle:
+        """The car; a file of its own lies in ``folder``. Raises SpecError when there is no such parameter set."""
         own = self.vehicle
-        name = own.parameters
-        car = load_vehicle(folder / name if name.endswith(".toml") and folder else name)
+        car = load_vehicle(own.parameters, folder)
         limits = ("maximum_torque", "maximum_power", "maximum_brake_torque")
         given = {name: value for name in limits if (value := getattr(own, name)) is not None}
         fitted = replace(
@@ -136,22 +115,21 @@ class Manoeuvre(Table):
     def course(self) -> Course:
         """As arrays."""
 
-        def table(pieces: Sequence[Piece], unit: str, start: float = 0.0) -> Array:
+        def table(pieces: Sequence[Piece], unit: str, start: float = 0.0) -> FloatArray:
             return sampled(pieces, unit, self.duration, start)
 
-        start = to_si(self.speed, "m/s")
         steer = table(self.steer, "rad")
         if self.hand_wheel and self.vehicle.steering_ratio:
             steer = table(self.hand_wheel, "rad") / self.vehicle.steering_ratio
         target = None
         if self.target_speed:
-            target = table(self.target_speed, "m/s", start)
+            target = table(self.target_speed, "m/s", self.speed)
             if self.free_after is not None:
                 target[int(np.ceil(self.free_after / GRID)) :] = np.nan
         return Course(
             name=self.name,
             duration=self.duration,
-            initial_speed=start,
+            initial_speed=self.speed,
             tire=self.vehicle.tire,
             steer=steer,
             drive_torque=table(self.torque, "N*m"),
@@ -165,3 +143,42 @@ class Manoeuvre(Table):
             speed=target,
             curvature=curvature(self.path) if self.path else None,
         )
+
+
+def shipped_manoeuvres(paper: str = "") -> dict[str, Path]:
+    """The manoeuvre files that come with the package, by name; those of one paper (``"P1"``) if asked."""
+    found = shipped_files("studies", "manoeuvres")
+    return {name: path for name, path in found.items() if name.startswith(paper.lower())}
+
+
+def load_manoeuvre(name: str | Path) -> Manoeuvre:
+    """A shipped manoeuvre by name, or one of your own by its path (ends with .toml).
+
+    Raises SpecError, one line: file, key, what is wrong, what would be right.
+    """
+    return load_toml(find_toml(name, shipped_manoeuvres(), "manoeuvre"), Manoeuvre, "manoeuvre")
+
+
+def simulate_manoeuvres(
+    manoeuvres: Sequence[Manoeuvre],
+    vehicles: Sequence[TruthVehicle] | None = None,
+    *,
+    step: float = STEP,
+    record_time: float = RECORD_TIME,
+    record: Sequence[str] = EVERYTHING,
+    progress: Callable[[float], None] | None = None,
+    workers: int = 1,
+) -> Truth:
+    """Simulate every manoeuvre of the batch, with its own vehicle or `vehicles[b]`, in ``workers`` processes; see `simulate`.
+
+    ``progress`` is called by the only process; with several it is not called.
+    """
+    courses = {id(m): m.course() for m in manoeuvres}
+    if vehicles is None:
+        own = {id(m): m.truth_vehicle() for m in manoeuvres}
+        vehicles = [own[id(m)] for m in manoeuvres]
+    batch = [courses[id(m)] for m in manoeuvres]
+    options: dict[str, Any] = {"step": step, "record_time": record_time, "record": record}
+    if workers > 1:
+        return simulate_in_processes(batch, vehicles, workers, **options)
+    return simulate(batch, vehicles, progress=progress, **options)

@@ -17,47 +17,45 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from estimators.vehicle import GRAVITY
 from studies.truth.fleet import Fleet, Tire
-from studies.truth.layout import DEFLECTION, GIVE, GIVE_RATE, JACK, B, W
-
-Array = npt.NDArray[np.float64]
+from studies.truth.layout import COMPLIANCE, COMPLIANCE_RATE, DEFLECTION, JACK, B, W
 
 
 class Controls(NamedTuple):
     """What acts on the cars from outside, held over a step."""
 
-    steer: Array  # (4, B) rad, road-wheel angles
-    drive: Array  # (4, B) N m
-    brake: Array  # (4, B) N m that the brake can hold, >= 0
-    friction: Array  # (4, B) of the road under each wheel
-    grade: Array  # (B,) rad, uphill positive
-    bank: Array  # (B,) rad, left side up
+    steer: FloatArray  # (4, B) rad, road-wheel angles
+    drive: FloatArray  # (4, B) N m
+    brake: FloatArray  # (4, B) N m that the brake can hold, >= 0
+    friction: FloatArray  # (4, B) of the road under each wheel
+    grade: FloatArray  # (B,) rad, uphill positive
+    bank: FloatArray  # (B,) rad, left side up
 
 
-class Turned(NamedTuple):
+class SteerAngles(NamedTuple):
     """Sine and cosine of the steering angles (4, B)."""
 
-    sine: Array
-    cosine: Array
+    sine: FloatArray
+    cosine: FloatArray
 
 
 class Slide(NamedTuple):
     """How the tires move over the road, tire frame, m/s."""
 
-    velocity: Array  # (2, 4, B) v_xt, v_yt of the wheel centres
-    surface: Array  # (4, B) R_e w
-    slip: Array  # (2, 4, B) v_rx = R_e w - v_xt, v_ry = -v_yt
+    velocity: FloatArray  # (2, 4, B) v_xt, v_yt of the wheel centres
+    surface: FloatArray  # (4, B) R_e w
+    slip: FloatArray  # (2, 4, B) v_rx = R_e w - v_xt, v_ry = -v_yt
 
 
 class Forces(NamedTuple):
     """N: x and y in the tire frame and in the axes of the body (2, 4, B), and loads (4, B)."""
 
-    tire: Array
-    body: Array
-    load: Array
+    tire: FloatArray
+    body: FloatArray
+    load: FloatArray
 
 
 class Plant:
@@ -65,26 +63,26 @@ class Plant:
 
     def __init__(self, fleet: Fleet, tire: Tire) -> None:
         self.fleet, self.tire = fleet, tire
-        self._drop: Array = fleet.height - fleet.radius  # wheel centres below the centre of gravity
-        self._roll_arm: Array = fleet.height - fleet.roll_center
+        self._drop: FloatArray = fleet.height - fleet.radius  # wheel centres below the centre of gravity
+        self._roll_arm: FloatArray = fleet.height - fleet.roll_center
 
-    def slide(self, state: Array, turned: Turned) -> Slide:
-        """Velocities of the wheel centres, P1 section 6, with roll, pitch and the give of the suspension."""
+    def slide(self, state: FloatArray, steered: SteerAngles) -> Slide:
+        """Velocities of the wheel centres, P1 section 6, with roll, pitch and the compliance of the suspension."""
         car, spin = self.fleet, state[B["yaw_rate"]]
         x = state[B["vx"]] - spin * car.y + self._drop * state[B["pitch_speed"]] + state[W["compliance_x_rate"]]
         y = state[B["vy"]] + self._roll_arm * state[B["roll_speed"]] + spin * car.x + state[W["compliance_y_rate"]]
-        velocity = _pair(x * turned.cosine + y * turned.sine, y * turned.cosine - x * turned.sine)
+        velocity = _pair(x * steered.cosine + y * steered.sine, y * steered.cosine - x * steered.sine)
         surface = car.radius * state[W["wheel_speed"]]
         slip = -velocity
         slip[0] += surface
         return Slide(velocity, surface, slip)
 
-    def transport(self, moving: Slide) -> Array:
+    def transport(self, moving: Slide) -> FloatArray:
         """max(|R_e w|, |v_xt|, |v_yt|) (4, B), m/s: how fast the contact patch is renewed at least."""
-        out: Array = np.maximum(np.absolute(moving.surface), np.absolute(moving.velocity).max(axis=0))
+        out: FloatArray = np.maximum(np.absolute(moving.surface), np.absolute(moving.velocity).max(axis=0))
         return out
 
-    def loads(self, state: Array) -> Array:
+    def loads(self, state: FloatArray) -> FloatArray:
         """F_z (4, B), N."""
         car, roll = self.fleet, state[B["roll"]]
         lift = state[B["heave"]] + car.y * roll + car.x * state[B["pitch"]]
@@ -95,16 +93,16 @@ class Plant:
         # links cannot pull a wheel through the road: they take no more than the springs leave on it
         jack = np.minimum(np.maximum(state[JACK], -np.maximum(right, 0.0)), np.maximum(left, 0.0))
         load[0::2], load[1::2] = left - jack, right + jack
-        out: Array = np.maximum(load, 0.0)
+        out: FloatArray = np.maximum(load, 0.0)
         return out
 
-    def in_body_axes(self, tire: Array, load: Array, turned: Turned) -> Forces:
+    def in_body_axes(self, tire: FloatArray, load: FloatArray, steered: SteerAngles) -> Forces:
         """Tire forces (2, 4, B) turned by the steering angle."""
         x, y = tire
-        body = _pair(x * turned.cosine - y * turned.sine, x * turned.sine + y * turned.cosine)
+        body = _pair(x * steered.cosine - y * steered.sine, x * steered.sine + y * steered.cosine)
         return Forces(tire, body, load)
 
-    def body_rates(self, state: Array, forces: Forces, torque: Array, controls: Controls) -> Array:
+    def body_rates(self, state: FloatArray, forces: Forces, torque: FloatArray, controls: Controls) -> FloatArray:
         """d(state)/dt (STATES, B) of everything but wheel speed and deflections; `torque` (4, B) N m acts on wheels and body."""
         car, out = self.fleet, np.zeros_like(state)
         vx, vy, r, heading = state[B["vx"]], state[B["vy"]], state[B["yaw_rate"]], state[B["yaw"]]
@@ -125,25 +123,25 @@ class Plant:
         side = across[0::2] + across[1::2]
         out[JACK] = (car.roll_center * side / car.track - state[JACK]) / car.load_lag
         out[B["distance"]] = np.copysign(np.sqrt(vx * vx + vy * vy), vx)
-        speed = state[GIVE_RATE]
-        out[GIVE] = speed
-        out[GIVE_RATE] = (
-            forces.body.reshape(8, -1) - car.give_stiffness * state[GIVE] - car.give_damping * speed
+        speed = state[COMPLIANCE_RATE]
+        out[COMPLIANCE] = speed
+        out[COMPLIANCE_RATE] = (
+            forces.body.reshape(8, -1) - car.compliance_stiffness * state[COMPLIANCE] - car.compliance_damping * speed
         ) / car.unsprung
         return out
 
-    def derivative(self, state: Array, controls: Controls) -> tuple[Array, Forces]:
+    def derivative(self, state: FloatArray, controls: Controls) -> tuple[FloatArray, Forces]:
         """d(state)/dt (STATES, B) of everything at one instant, and the forces; for integrators of other people.
 
         A wheel that stands still is held by brake and rolling resistance as far as they reach.
         """
-        car, turned = self.fleet, Turned(np.sin(controls.steer), np.cos(controls.steer))
-        moving, load = self.slide(state, turned), self.loads(state)
+        car, steered = self.fleet, SteerAngles(np.sin(controls.steer), np.cos(controls.steer))
+        moving, load = self.slide(state, steered), self.loads(state)
         transport, z = self.transport(moving), state[DEFLECTION].reshape(2, 4, -1)
         a, push = self.tire.rates(z, moving.slip, np.absolute(moving.surface), transport, controls.friction)
         dz = push - a * z
         tire = self.tire.forces(z, dz, moving.slip, transport, load, controls.friction)
-        forces = self.in_body_axes(tire, load, turned)
+        forces = self.in_body_axes(tire, load, steered)
         w = state[W["wheel_speed"]]
         free = controls.drive - car.radius * tire[0]
         rolling = car.radius * car.rolling_resistance * load
@@ -157,7 +155,7 @@ class Plant:
         return out, forces
 
 
-def _pair(x: Array, y: Array) -> Array:
+def _pair(x: FloatArray, y: FloatArray) -> FloatArray:
     """Both side by side, (2, ...): at these sizes three times as fast as `numpy.stack`."""
     out = np.empty((2, *x.shape))
     out[0], out[1] = x, y

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from zlib import crc32
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
+from estimators.errors import unknown
 from studies.truth.signals import UNITS
 from studies.truth.vehicle import TruthVehicle
-from synthesis.errors import SpecError, unknown
-
-Array = npt.NDArray[np.float64]
+from synthesis.errors import SpecError
 
 
 @dataclass(frozen=True)
@@ -25,10 +26,10 @@ class Truth:
     nothing; `valid` masks it. `vehicles` are the cars as they were driven.
     """
 
-    time: Array  # (n,) s
-    signals: dict[str, Array]
+    time: FloatArray  # (n,) s
+    signals: dict[str, FloatArray]
     names: tuple[str, ...]  # (B,) of the manoeuvres
-    duration: Array  # (B,) s
+    duration: FloatArray  # (B,) s
     vehicles: tuple[TruthVehicle, ...]
     tires: tuple[str, ...]  # (B,)
     keys: tuple[tuple[int, int], ...] = ()  # (B,) of the random numbers: manoeuvre, and which of its runs
@@ -53,16 +54,16 @@ class Truth:
         return len(self.names)
 
     @property
-    def valid(self) -> npt.NDArray[np.bool_]:
+    def valid(self) -> BoolArray:
         """(B, n): samples within the run's own duration."""
         return np.asarray(self.time <= self.duration[:, None] + 1e-9)
 
     @property
     def units(self) -> dict[str, str]:
-        """Unit of every signal kept."""
+        """Unit of every recorded signal."""
         return {name: UNITS[name] for name in self.signals}
 
-    def __getitem__(self, name: str) -> Array:
+    def __getitem__(self, name: str) -> FloatArray:
         """A signal by name. Raises SpecError with the nearest names."""
         if name not in self.signals:
             raise SpecError(f"truth: {unknown('signal', name, self.signals)}")
@@ -96,3 +97,46 @@ class Truth:
         if n == 1:
             return self
         return replace(self, time=self.time[::n], signals={name: v[:, ::n] for name, v in self.signals.items()})
+
+
+RUNS = "runs.json"
+
+
+def write_truth(truth: Truth, folder: Path) -> None:
+    """Write times, signals and what is known of the runs, except their vehicles, to the folder.
+
+    One array file for each signal, mapped into memory when it is read, so that a few runs cost little.
+    """
+    np.save(folder / "time.npy", truth.time)
+    for name, value in truth.signals.items():
+        np.save(folder / f"{name}.npy", value)
+    runs = {"names": truth.names, "duration": truth.duration.tolist(), "tires": truth.tires, "keys": truth.keys}
+    (folder / RUNS).write_text(json.dumps(runs, indent=1) + "\n", encoding="utf-8")
+
+
+def read_truth(folder: Path, vehicles: Sequence[TruthVehicle]) -> Truth:
+    """The truth that `write_truth` left, read-only; ``vehicles`` of the runs in their order.
+
+    Raises SpecError where there is none, or one of another number of runs.
+    """
+    try:
+        runs = json.loads((folder / RUNS).read_text(encoding="utf-8"))
+        time = np.load(folder / "time.npy", allow_pickle=False)
+        signals = {
+            path.stem: np.load(path, mmap_mode="r", allow_pickle=False)
+            for path in sorted(folder.glob("*.npy"))
+            if path.stem in UNITS
+        }
+    except (OSError, ValueError) as error:
+        raise SpecError(f"{folder}: no truth can be read there ({error})") from error
+    if len(runs["names"]) != len(vehicles):
+        raise SpecError(f"{folder}: {len(runs['names'])} runs, but {len(vehicles)} vehicles")
+    return Truth(
+        time,
+        signals,
+        tuple(runs["names"]),
+        np.array(runs["duration"]),
+        tuple(vehicles),
+        tuple(runs["tires"]),
+        tuple((int(a), int(b)) for a, b in runs["keys"]),
+    )

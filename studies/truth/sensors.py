@@ -1,17 +1,31 @@
-"""What sensors make of the truth: noise, bias, scale, resolution, rate, delay and drops, channel by channel."""
+"""What sensors make of the truth, channel by channel, drawn for many seeds, and what a car hands to its estimators."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from zlib import crc32
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
+from estimators.pipeline.signals import VehicleSignals
+from estimators.signals.ticks import TickSpeed
+from studies.truth.record import Truth
 from synthesis.errors import SpecError
 
-Array = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
+SOURCES = {
+    "wheel_speed": "wheel_speed", "steer": "steer", "torque": "torque",
+    "ax": "ax", "ay": "ay", "az": "az",
+    "yaw_rate": "yaw_gyro", "roll_rate": "roll_rate", "pitch_rate": "pitch_rate",
+}  # fmt: skip
+"""The signal of the truth behind each measured one."""
+_CHANNELS = {
+    **dict.fromkeys(("ax", "ay", "az"), "acceleration"),
+    **dict.fromkeys(("yaw_rate", "roll_rate", "pitch_rate"), "rate"),
+}
+"""Of `Sensors`, where the channel is not called like the signal."""
 
 
 @dataclass(frozen=True)
@@ -19,16 +33,16 @@ class Drops:
     """Lost samples. With `burst` 1 they are independent, with probability `share`.
 
     Else Gilbert's chain: lost in the bad state only, `burst` samples long on average and `share` of all in the long run:
-    bad -> good with 1/burst, good -> bad with share/((1 - share) burst). `kept_in_bad` lets some through (Elliott).
+    bad -> good with 1/burst, good -> bad with share/((1 - share) burst). `received_in_bad` lets some through (Elliott).
     """
 
     share: float = 0.0
     burst: float = 1.0
-    kept_in_bad: float = 0.0
+    received_in_bad: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (0.0 <= self.share < 1.0 and self.burst >= 1.0 and 0.0 <= self.kept_in_bad < 1.0):
-            raise SpecError(f"drops: {self}: share in [0, 1), burst at least 1 sample, kept_in_bad in [0, 1)")
+        if not (0.0 <= self.share < 1.0 and self.burst >= 1.0 and 0.0 <= self.received_in_bad < 1.0):
+            raise SpecError(f"drops: {self}: share in [0, 1), burst at least 1 sample, received_in_bad in [0, 1)")
         if self.burst > 1.0 and self._bad / (1.0 - self._bad) / self.burst > 1.0:
             raise SpecError(
                 f"drops: bursts of {self.burst:g} samples cannot be so frequent; lower share or lengthen burst"
@@ -37,9 +51,9 @@ class Drops:
     @property
     def _bad(self) -> float:
         """Long-run share of the bad state."""
-        bad = self.share / (1.0 - self.kept_in_bad)
+        bad = self.share / (1.0 - self.received_in_bad)
         if bad >= 1.0:
-            raise SpecError(f"drops: {self}: share must be below 1 - kept_in_bad")
+            raise SpecError(f"drops: {self}: share must be below 1 - received_in_bad")
         return bad
 
     def lost(self, rng: np.random.Generator, samples: int, shape: tuple[int, ...]) -> BoolArray:
@@ -62,8 +76,8 @@ class Drops:
         state = np.take_along_axis(value, last, axis=0)
         if enter > stay:
             state ^= (row - last) % 2 == 1
-        if self.kept_in_bad:
-            state &= rng.random(state.shape) >= self.kept_in_bad
+        if self.received_in_bad:
+            state &= rng.random(state.shape) >= self.received_in_bad
         return np.asarray(state, dtype=np.bool_)
 
 
@@ -91,7 +105,7 @@ class Channel:
         if self.dropped not in {"missing", "hold"}:
             raise SpecError(f"sensor.dropped = '{self.dropped}': write missing or hold")
 
-    def read(self, true: Array, rng: np.random.Generator, time_step: float) -> Array:
+    def read(self, true: FloatArray, rng: np.random.Generator, time_step: float) -> FloatArray:
         """What the sensor says of ``true`` (n, ...), sampled every ``time_step``, s."""
         samples, shape = true.shape[0], true.shape[1:]
         gain = 1.0 + self.scale * rng.standard_normal(shape)
@@ -111,9 +125,8 @@ class Channel:
         if self.dropped == "missing":
             return np.where(lost, np.nan, value)
         row = np.arange(samples).reshape(-1, *[1] * len(shape))
-        last = np.maximum.accumulate(
-            np.where(lost, 0, row), axis=0
-        )  # a run that starts with a loss holds its first value
+        # a run that starts with a loss holds its first value
+        last = np.maximum.accumulate(np.where(lost, 0, row), axis=0)
         return np.take_along_axis(value, np.broadcast_to(last, value.shape), axis=0)
 
 
@@ -130,25 +143,91 @@ class Ticks:
             raise SpecError(f"ticks.teeth = {self.teeth}: at least 1")
 
 
-def _imu() -> Channel:
-    return Channel(noise=0.05, bias=0.05, scale=0.002)
-
-
-def _gyro() -> Channel:
-    return Channel(noise=0.002, bias=0.002, scale=0.002)
-
-
 @dataclass(frozen=True)
 class Sensors:
     """The sensors of a car; the defaults are those of a good production car at 200 Hz."""
 
-    wheel_speed: Channel = field(default_factory=lambda: Channel(noise=0.05))  # rad/s
-    acceleration: Channel = field(default_factory=_imu)  # m/s^2: ax, ay, az
-    rate: Channel = field(default_factory=_gyro)  # rad/s: yaw, roll, pitch
-    steer: Channel = field(default_factory=lambda: Channel(noise=0.0005, bias=0.001))  # rad at the road wheels
-    torque: Channel = field(default_factory=lambda: Channel(noise=5.0, scale=0.02))  # N m at each wheel
+    wheel_speed: Channel = Channel(noise=0.05)  # rad/s
+    acceleration: Channel = Channel(noise=0.05, bias=0.05, scale=0.002)  # m/s^2: ax, ay, az
+    rate: Channel = Channel(noise=0.002, bias=0.002, scale=0.002)  # rad/s: yaw, roll, pitch
+    steer: Channel = Channel(noise=0.0005, bias=0.001)  # rad at the road wheels
+    torque: Channel = Channel(noise=5.0, scale=0.02)  # N m at each wheel
     ticks: Ticks | None = None  # wheel speed from an encoder instead of a noisy speed
 
 
 PERFECT = Sensors(Channel(), Channel(), Channel(), Channel(), Channel())
 """Sensors without any error."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Measured signals of S seeds x B runs over n samples, arrays (S, B, n) and (S, B, n, 4); SI, ISO frame.
+
+    ``at(k)`` is what an `EstimationPipeline` of ``batch_shape`` (S, B) takes at sample k.
+    """
+
+    time: FloatArray  # (n,) s
+    signals: dict[str, FloatArray]
+    seeds: tuple[int, ...]
+    truth: Truth  # at the same samples
+    batch_shape: tuple[int, int]
+
+    @property
+    def sample_time(self) -> float:
+        """s."""
+        return float(self.time[1] - self.time[0])
+
+    def at(self, k: int) -> VehicleSignals:
+        """Sample k of all seeds and runs. Grade and bank of the road are not measured: they stay 0."""
+        return VehicleSignals(**{name: value[:, :, k] for name, value in self.signals.items()})
+
+    def __iter__(self) -> Iterator[VehicleSignals]:
+        return (self.at(k) for k in range(self.time.size))
+
+
+def draw(truth: Truth, sensors: Sensors, seeds: Sequence[int], sample_time: float = 0.005) -> Measured:
+    """Measurements of every run for every seed.
+
+    The errors of a run depend on its seed, its manoeuvre and the signal alone, not on what else is drawn or how many:
+    `numpy.random.SeedSequence` over the three. Of equal manoeuvres in one batch each has errors of its own.
+
+    Raises:
+        SpecError: no seeds, a sample time that is no multiple of the truth's, a signal that was not recorded.
+    """
+    every = round(sample_time / truth.sample_time)
+    if every < 1 or abs(every * truth.sample_time - sample_time) > 1e-9:
+        raise SpecError(f"sample_time = {sample_time:g} s is not a multiple of the truth's {truth.sample_time:g} s")
+    if not len(seeds):
+        raise SpecError("draw: no seeds; give at least one, such as range(200)")
+    truth = truth.every(every)
+    samples, shape = truth.time.size, (len(seeds), truth.size)
+    signals: dict[str, FloatArray] = {}
+    for name, source in SOURCES.items():
+        count = name == "wheel_speed" and sensors.ticks is not None
+        true = truth["wheel_angle" if count else source]
+        out = np.empty((*shape, samples, *true.shape[2:]))
+        channel = getattr(sensors, _CHANNELS.get(name, name))
+        for b in range(truth.size):
+            for s, seed in enumerate(seeds):
+                rng = np.random.default_rng(np.random.SeedSequence((seed, *truth.keys[b], crc32(name.encode()))))
+                value = _counted(true[b], rng, sensors) if count else true[b]
+                out[s, b] = value if count else channel.read(value, rng, sample_time)
+        signals[name] = _speeds(out, sensors, sample_time) if count else out
+    return Measured(truth.time, signals, tuple(seeds), truth, shape)
+
+
+def _counted(angle: FloatArray, rng: np.random.Generator, sensors: Sensors) -> FloatArray:
+    """Ticks (n, 4) counted up to each sample, from a random position of the teeth; lost ones are NaN."""
+    assert sensors.ticks is not None
+    start = rng.random(angle.shape[1:])
+    counts = np.floor(angle * sensors.ticks.teeth / (2.0 * np.pi) + start)
+    lost = sensors.wheel_speed.drops.lost(rng, angle.shape[0], angle.shape[1:])
+    return np.where(lost, np.nan, counts)
+
+
+def _speeds(counts: FloatArray, sensors: Sensors, sample_time: float) -> FloatArray:
+    assert sensors.ticks is not None
+    own = sensors.ticks
+    shape = (*counts.shape[:2], 4)
+    meter = TickSpeed(own.teeth, sample_time, shape, own.least_ticks, own.longest_window)
+    return np.stack([meter.step(counts[:, :, k]).speed for k in range(counts.shape[2])], axis=2)

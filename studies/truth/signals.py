@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from estimators.velocity.slip import side_slip_angle, slip_ratio
 from studies.truth.fleet import Fleet
 from studies.truth.layout import B, W
 from studies.truth.plant import Controls
 from studies.truth.stepper import Step
 
-Array = npt.NDArray[np.float64]
 CAR_UNITS: Final = {
     "x": "m", "y": "m", "yaw": "rad", "distance": "m",
     "vx": "m/s", "vy": "m/s", "yaw_rate": "rad/s", "yaw_acceleration": "rad/s^2", "sideslip": "rad",
@@ -41,7 +40,7 @@ UNITS: Final = {**CAR_UNITS, **WHEEL_UNITS}
 """Unit of every signal."""
 
 
-def signals_of(fleet: Fleet, step: Step, controls: Controls) -> dict[str, Array]:
+def signals_of(fleet: Fleet, step: Step, controls: Controls) -> dict[str, FloatArray]:
     """Every signal at the end of a step, (B,) or (4, B): states as they are, forces as means over the step."""
     s, f = step.state, step.forces
     vx, vy, r = s[B["vx"]], s[B["vy"]], s[B["yaw_rate"]]
@@ -54,38 +53,23 @@ def signals_of(fleet: Fleet, step: Step, controls: Controls) -> dict[str, Array]
     moving = step.slide
     out = {name: s[B[name]] for name in ("x", "y", "yaw", "distance", "vx", "vy", "yaw_rate", "roll", "pitch")}
     out |= {
-        "yaw_acceleration": step.rates[B["yaw_rate"]],
-        "sideslip": np.arctan2(vy, np.maximum(np.absolute(vx), 1e-3)),
-        "road_ax": along,
-        "road_ay": across,
-        "ax": ax,
-        "ay": ay,
-        "az": az,
-        "roll_rate": spin_x,
-        "pitch_rate": spin_y,
-        "yaw_gyro": spin_z,
-        "grade": controls.grade,
-        "bank": controls.bank,
-        "drag": drag,
-        "steer": controls.steer,
-        "torque": step.torque,
-        "rolling_torque": step.rolling,
-        "force_x": f.tire[0],
-        "force_y": f.tire[1],
-        "force_z": f.load,
-        "slip": slip_ratio(moving.surface, moving.velocity[0]),
-        "slip_angle": side_slip_angle(*moving.velocity),
-        "slip_velocity_x": moving.slip[0],
-        "slip_velocity_y": moving.slip[1],
-        "wheel_vx": moving.velocity[0],
-        "wheel_vy": moving.velocity[1],
-        "friction": controls.friction,
-    }
+        "yaw_acceleration": step.rates[B["yaw_rate"]], "sideslip": np.arctan2(vy, np.maximum(np.absolute(vx), 1e-3)),
+        "road_ax": along, "road_ay": across, "ax": ax, "ay": ay, "az": az,
+        "roll_rate": spin_x, "pitch_rate": spin_y, "yaw_gyro": spin_z,
+        "grade": controls.grade, "bank": controls.bank, "drag": drag, "friction": controls.friction,
+        "steer": controls.steer, "torque": step.torque, "rolling_torque": step.rolling,
+        "force_x": f.tire[0], "force_y": f.tire[1], "force_z": f.load,
+        "slip": slip_ratio(moving.surface, moving.velocity[0]), "slip_angle": side_slip_angle(*moving.velocity),
+        "slip_velocity_x": moving.slip[0], "slip_velocity_y": moving.slip[1],
+        "wheel_vx": moving.velocity[0], "wheel_vy": moving.velocity[1],
+    }  # fmt: skip
     wheels = ("wheel_speed", "wheel_angle", "deflection_x", "deflection_y", "compliance_x_rate", "compliance_y_rate")
     return out | {name: s[W[name]] for name in wheels}
 
 
-def _in_body(x: Array, y: Array, z: Array, roll: Array, pitch: Array) -> tuple[Array, Array, Array]:
+def _in_body(
+    x: FloatArray, y: FloatArray, z: FloatArray, roll: FloatArray, pitch: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """A vector of the road's axes in those of the body: the inverse of `estimators.forces.levelled`."""
     left = y * np.cos(roll) + z * np.sin(roll)
     up = z * np.cos(roll) - y * np.sin(roll)

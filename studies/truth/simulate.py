@@ -2,32 +2,35 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import sys
+import threading
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
+from studies.errors import SimulationError
 from studies.truth.course import Course, Courses
 from studies.truth.driver import Driver
 from studies.truth.fleet import Fleet, tires_of
 from studies.truth.layout import B, rolling
-from studies.truth.plant import Plant, Turned
+from studies.truth.plant import Plant, SteerAngles
 from studies.truth.record import Truth
 from studies.truth.signals import UNITS, WHEEL_UNITS, signals_of
 from studies.truth.stepper import Step, advance
 from studies.truth.vehicle import TruthVehicle
-from synthesis.errors import GainsmithError, SpecError, unknown
+from synthesis.errors import SpecError
 
-Array = npt.NDArray[np.float64]
 STEP = 0.001
 """s, by the convergence study of the tests: velocities are then right to 1e-4 m/s, wheel speeds to 1e-2 rad/s."""
 RECORD_TIME = 0.005
 """s between samples, 200 Hz as in P1 to P3."""
 EVERYTHING = tuple(UNITS)
-
-
-class SimulationError(GainsmithError):
-    """A truth run that left the range of numbers: the message names run and time."""
 
 
 def simulate(
@@ -92,14 +95,14 @@ def _run(
     every: int,
     record: Sequence[str],
     progress: Callable[[float], None] | None,
-) -> dict[str, Array]:
+) -> dict[str, FloatArray]:
     fleet = Fleet(vehicles)
     plant = Plant(fleet, tires_of(courses[0].tire, vehicles))
     driver = Driver(Courses(courses), fleet)
     state = rolling([c.initial_speed for c in courses], fleet.radius)
     out = {name: np.empty((fleet.size, samples, *_corner_axis(name))) for name in record}
     nothing = np.zeros((4, fleet.size))
-    moving = plant.slide(state, Turned(nothing, nothing + 1.0))
+    moving = plant.slide(state, SteerAngles(nothing, nothing + 1.0))
     for k in range(samples):
         if k == 0:  # the first sample shows what acts at the start
             controls = driver.act(state, moving, 0.0, 0.0)
@@ -122,3 +125,30 @@ def _run(
         if progress is not None and k % 50 == 0:
             progress(k / samples)
     return out
+
+
+def simulate_in_processes(
+    courses: Sequence[Course], vehicles: Sequence[TruthVehicle], workers: int, **options: Any
+) -> Truth:
+    """`simulate` in ``workers`` processes, each with its share of the batch; the numbers are the same."""
+    parts = min(workers, len(courses))
+    if parts < 2:
+        return simulate(courses, vehicles, **options)
+    rows = [range(k * len(courses) // parts, (k + 1) * len(courses) // parts) for k in range(parts)]
+    longest = max(c.duration for c in courses)
+    work = [([courses[k] for k in r], [vehicles[k] for k in r], {**options, "until": longest}) for r in rows]
+    forks = sys.platform == "linux" and threading.active_count() == 1
+    with ProcessPoolExecutor(parts, mp_context=multiprocessing.get_context("fork" if forks else "spawn")) as pool:
+        done = list(pool.map(_work, work))
+    merged = {name: np.concatenate([part.signals[name] for part in done]) for name in done[0].signals}
+    names = tuple(name for part in done for name in part.names)
+    tires = tuple(tire for part in done for tire in part.tires)
+    duration = np.concatenate([part.duration for part in done])
+    return replace(
+        done[0], signals=merged, names=names, duration=duration, vehicles=tuple(vehicles), tires=tires, keys=()
+    )
+
+
+def _work(item: tuple[list[Course], list[TruthVehicle], dict[str, Any]]) -> Truth:
+    courses, vehicles, options = item
+    return simulate(courses, vehicles, **options)

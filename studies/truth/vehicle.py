@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from importlib import resources
 from pathlib import Path
+from zlib import crc32
 
+import numpy as np
+
+from estimators.errors import unknown
 from estimators.vehicle import VehicleParameters
 from estimators.velocity.suspension import SuspensionParameters
 from studies.truth.drivetrain import Drivetrain
 from studies.truth.lugre import LuGreParameters
 from studies.truth.magic_formula import MagicFormulaParameters
-from synthesis.errors import SpecError, unknown
+from synthesis.errors import SpecError
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
+from synthesis.toml_file import shipped_files
 
 
 @dataclass(frozen=True)
@@ -87,14 +92,14 @@ def vehicle_parameters(values: ParameterSet) -> VehicleParameters:
         raise SpecError(f"parameter set '{values.id}': {error}; add it to [vehicle]") from None
 
 
-def load_vehicle(name: str | Path) -> TruthVehicle:
-    """The truth vehicle of a parameter set: shipped with the models or with the truth by name, or a TOML file of yours.
+def load_vehicle(name: str | Path, folder: Path = Path()) -> TruthVehicle:
+    """The truth vehicle of a parameter set: shipped with the models or with the truth by name, or a TOML file in ``folder``.
 
     Raises:
         SpecError: no such set, or values that no car has.
     """
     own = shipped_vehicles()
-    values = load_parameter_set(own.get(str(name), name))
+    values = load_parameter_set(own.get(str(name), name), folder)
     given = {key: entry.value for key, entry in values.vehicle.items()}
     suspension = SuspensionParameters()
     if "suspension_stiffness_longitudinal" in given:
@@ -110,5 +115,29 @@ def load_vehicle(name: str | Path) -> TruthVehicle:
 
 def shipped_vehicles() -> dict[str, Path]:
     """Vehicles that only the truth needs, by name; those of the models are found by `load_parameter_set`."""
-    folder = Path(str(resources.files("studies.truth") / "vehicles"))
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    return shipped_files("studies.truth", "vehicles")
+
+
+def varied(vehicle: TruthVehicle, spread: Mapping[str, float], seeds: Sequence[int]) -> list[TruthVehicle]:
+    """One car per seed, each parameter of ``spread`` times 1 + spread u, u uniform in [-1, 1].
+
+    Keys are those of `VehicleParameters` and `Chassis`; a seed gives a parameter the same u whatever else is varied.
+    Raises SpecError for an unknown key or a spread outside [0, 1).
+    """
+    known = {entry.name for kind in (VehicleParameters, Chassis) for entry in fields(kind) if entry.init}
+    for name, size in spread.items():
+        if name not in known:
+            raise SpecError(f"spread: {unknown('parameter', name, known)}")
+        if not 0.0 <= size < 1.0:
+            raise SpecError(f"spread of {name} = {size!r}: a share of the value, at least 0 and below 1")
+    cars = []
+    for seed in seeds:
+        changes: dict[str, object] = {}
+        for name, size in spread.items():
+            rng = np.random.default_rng(np.random.SeedSequence((seed, crc32(name.encode()))))
+            owner = vehicle.chassis if hasattr(vehicle.chassis, name) else vehicle.parameters
+            factor = 1.0 + size * rng.uniform(-1.0, 1.0)
+            value = getattr(owner, name)
+            changes[name] = tuple(v * factor for v in value) if isinstance(value, tuple) else value * factor
+        cars.append(vehicle.changed(**changes))
+    return cars

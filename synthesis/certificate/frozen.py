@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from flint import fmpq
 
+from estimators.arrays import FloatArray
 from synthesis.certificate.refute import grid
 from synthesis.loop.observer import ObserverLoop
 from synthesis.loop.system import Region, System
 from synthesis.polynomials.enclosure import PolynomialMatrix
-from synthesis.polynomials.matrix import FloatArray
 
 BISECTIONS = 40
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from flint import fmpq_mat
 
+from estimators.arrays import FloatArray
 from synthesis.polynomials.chebyshev import from_chebyshev, to_chebyshev
 from synthesis.polynomials.enclosure import PolynomialMatrix
-from synthesis.polynomials.matrix import FloatArray
 from synthesis.polynomials.rational import decimal, rational
 
 LYAPUNOV_DIGITS = 8  # of P, relative to its largest value in each entry's own units

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from synthesis.certificate.claims import ERROR_EQUATION, WITH_CHANNEL, Claim, ClaimChannel, rows_of
 from synthesis.certificate.inequalities import Question, inequalities
 from synthesis.certificate.rounding import rounded_lyapunov
@@ -26,7 +27,7 @@ from synthesis.loop.motion import one_sample_later, rates, time_derivative
 from synthesis.loop.observer import ObserverLoop
 from synthesis.loop.system import Region, System
 from synthesis.models.param import SchedulingParameter
-from synthesis.polynomials.matrix import FloatArray, variable
+from synthesis.polynomials.matrix import variable
 
 POINTS_PER_CELL = 5
 ANGLES = np.concatenate([[0.0], np.geomspace(1e-3, np.pi, 15)])  # per sample, where the size of a gain is looked for

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from synthesis.loop.system import System
 from synthesis.polynomials.enclosure import PolynomialMatrix
-from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial, constant, symmetric_block
+from synthesis.polynomials.matrix import MatrixPolynomial, constant, symmetric_block
 
 
 class Unknowns:

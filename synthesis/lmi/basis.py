@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 
 def chebyshev_basis(parameters: int, degree: int | tuple[int, ...]) -> FloatArray:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from estimators.arrays import FloatArray, IndexArray
 from synthesis.lmi.relaxation import RelaxedProblem, SampledInequality, SosInequality
-from synthesis.polynomials.matrix import FloatArray, IndexArray
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
 from synthesis.lmi.basis import chebyshev_basis
 from synthesis.models.param import SchedulingParameter
-from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial, constant, variable
+from synthesis.polynomials.matrix import MatrixPolynomial, constant, variable
 
 MARGIN = "margin"
 CURVED = 100.0

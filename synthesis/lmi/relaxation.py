@@ -7,10 +7,11 @@ from itertools import product
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import Inequality, LmiProblem
 from synthesis.lmi.settings import LmiSettings
-from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial, padded
+from synthesis.polynomials.matrix import MatrixPolynomial, padded
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
+from estimators.arrays import FloatArray
+from synthesis.polynomials.matrix import MatrixPolynomial
 
 
 class Verdict(StrEnum):

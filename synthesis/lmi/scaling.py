@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import LinAlgError, matrix_balance, solve_continuous_are
 
+from estimators.arrays import FloatArray
 from synthesis.models.extract import PolynomialModel
 from synthesis.models.numeric import evaluate
 from synthesis.models.param import SchedulingParameter
-from synthesis.polynomials.matrix import FloatArray
 
 
 def observer_scale(model: PolynomialModel, parameters: tuple[SchedulingParameter, ...]) -> FloatArray:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from synthesis.errors import ProblemError, unknown
+from estimators.errors import unknown
+from synthesis.errors import ProblemError
 
 Relaxation = Literal["auto", "grid", "vertex", "exact"]
 
@@ -17,7 +18,7 @@ class LmiSettings:
     relaxation: Relaxation = "auto"  # auto: exact or grid for one parameter, whichever is cheaper; grid for more
     points: int = 140  # grid points for each parameter
     margin: float = 1e-8  # every inequality holds by this much, in balanced coordinates
-    solver: str = "CLARABEL"  # CLARABEL is assembled directly; "cvxpy:NAME" takes the second road
+    solver: str = "CLARABEL"  # CLARABEL is assembled directly; "cvxpy:NAME" takes the second back end
     tolerance: float = 1e-8  # gap and feasibility tolerance of the solver
     max_iterations: int = 200  # of the interior-point method
     verify: bool = True  # re-evaluate every inequality outside the solver

@@ -6,14 +6,15 @@ from time import perf_counter
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
-from synthesis.lmi.clarabel_road import RawAnswer, solve_with_clarabel
+from synthesis.lmi.clarabel_backend import RawAnswer, solve_with_clarabel
 from synthesis.lmi.conic import assemble
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.relaxation import RelaxedProblem, relax
 from synthesis.lmi.result import LmiResult, Margin, SolverReport, Verdict
 from synthesis.lmi.settings import LmiSettings
-from synthesis.polynomials.matrix import FloatArray, constant
+from synthesis.polynomials.matrix import constant
 from synthesis.polynomials.positivity import prove_positive
 
 # An objective on the boundary of feasibility is loosened by these fractions, in turn, until every inequality is proved.
@@ -36,7 +37,7 @@ def solve(problem: LmiProblem, settings: LmiSettings | None = None) -> LmiResult
     relaxed = relax(problem, settings)
     if settings.solver.startswith("cvxpy:"):
         assembly = perf_counter() - start
-        from synthesis.lmi.cvxpy_road import solve_with_cvxpy  # cvxpy takes 1 s to import
+        from synthesis.lmi.cvxpy_backend import solve_with_cvxpy  # cvxpy takes 1 s to import
 
         answer = solve_with_cvxpy(relaxed, settings.solver.removeprefix("cvxpy:"), settings)
     else:

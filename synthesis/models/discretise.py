@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import expm
 
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 
 def zero_order_hold(A: FloatArray, B: FloatArray, sample_time: float) -> tuple[FloatArray, FloatArray]:

@@ -13,11 +13,12 @@ import numpy as np
 import sympy as sp
 from flint import fmpq, fmpq_mat
 
+from estimators.arrays import FloatArray
 from synthesis.errors import ModelError
 from synthesis.models.param import Constant, SchedulingParameter
 from synthesis.polynomials.definite import sign_on_box
 from synthesis.polynomials.enclosure import PolynomialMatrix, Powers
-from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
+from synthesis.polynomials.matrix import MatrixPolynomial
 from synthesis.polynomials.positivity import prove_positive
 from synthesis.polynomials.rational import decimal
 

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sympy as sp
 
-from synthesis.errors import ModelError, unknown
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
+from synthesis.errors import ModelError
 from synthesis.models.extract import MATRICES, ExactModel, PolynomialModel, extract, in_floats
 from synthesis.models.numeric import NumericModel, evaluate
 from synthesis.models.param import Constant, SchedulingParameter, Signal
-from synthesis.polynomials.matrix import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

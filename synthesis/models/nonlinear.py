@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import sympy as sp
 
-from synthesis.errors import ModelError, unknown
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
+from synthesis.errors import ModelError
 from synthesis.models.param import Constant, Signal
-from synthesis.polynomials.matrix import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from synthesis.models.extract import MATRICES, PolynomialModel
 from synthesis.models.param import SchedulingParameter
-from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
+from synthesis.polynomials.matrix import MatrixPolynomial
 
 
 @dataclass(frozen=True)

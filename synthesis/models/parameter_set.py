@@ -2,36 +2,36 @@
 
 from __future__ import annotations
 
-import tomllib
-from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, model_validator
 
-from synthesis.errors import ModelError, SpecError, unknown
 from synthesis.models.param import Constant
+from synthesis.toml_file import StrictTable, find_toml, load_toml, shipped_files
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Quantity(_Strict):
+class Quantity(StrictTable):
     """A value with its unit and the place where it is printed."""
 
     value: float
     unit: str
     source: str
 
+    @model_validator(mode="after")
+    def _unit_exists(self) -> Self:
+        self.constant()
+        return self
+
     def constant(self) -> Constant:
         """As a model constant (checks the unit)."""
         return Constant(self.value, self.unit, self.source)
 
 
-class Published(_Strict):
+class Published(StrictTable):
     """Gains and matrices as the source prints them, for comparison; never used as a certificate."""
 
+    model_config = ConfigDict(strict=False)  # a list of TOML becomes a tuple
     gains: tuple[float, ...] | None = None
     gains_high_slip: tuple[float, ...] | None = None
     gain_box: tuple[tuple[float, float], ...] | None = None
@@ -40,7 +40,7 @@ class Published(_Strict):
     source: str
 
 
-class Tire(_Strict):
+class Tire(StrictTable):
     """Average lumped LuGre tire in one direction."""
 
     sigma0: Quantity
@@ -50,7 +50,7 @@ class Tire(_Strict):
     published: Published | None = None
 
 
-class ParameterSet(_Strict):
+class ParameterSet(StrictTable):
     """One vehicle with its tires, as published or as identified."""
 
     id: str
@@ -60,40 +60,19 @@ class ParameterSet(_Strict):
     tire: Annotated[dict[str, Tire], Field(min_length=1)]
 
 
-def load_parameter_set(name: str | Path) -> ParameterSet:
-    """A shipped set by its name, or a set of your own by its path (ends with .toml).
+def load_parameter_set(name: str | Path, folder: Path = Path()) -> ParameterSet:
+    """A shipped set by its name, or a set of your own by its path from ``folder`` (ends with .toml).
 
     Raises SpecError naming the file, the key and the remedy.
     """
-    path = Path(name)
-    if path.suffix == ".toml":
-        where, read = str(path), path.read_bytes
-        if not path.is_file():
-            raise SpecError(f"{path}: no such parameter file")
-    else:
-        folder = resources.files("synthesis.models") / "parameters"
-        names = sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
-        if str(name) not in names:
-            raise SpecError(unknown("parameter set", str(name), names))
-        where, read = f"{name}.toml", (folder / f"{name}.toml").read_bytes
-    try:
-        data: dict[str, Any] = tomllib.loads(read().decode("utf-8"))
-        found = ParameterSet.model_validate(data)
-        for entry in (*found.vehicle.values(), *(q for t in found.tire.values() for q in quantities(t).values())):
-            entry.constant()
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, ModelError) as error:
-        raise SpecError(f"{where}: {error}") from None
-    except ValidationError as error:
-        raise SpecError(f"{where}: {first_line(error)}") from None
-    return found
+    return load_toml(folder / find_toml(name, shipped_parameter_sets(), "parameter set"), ParameterSet, "parameter")
+
+
+def shipped_parameter_sets() -> dict[str, Path]:
+    """The parameter sets that come with the models, by name."""
+    return shipped_files("synthesis.models", "parameters")
 
 
 def quantities(tire: Tire) -> dict[str, Quantity]:
     """The four LuGre constants by name."""
     return {"sigma0": tire.sigma0, "sigma1": tire.sigma1, "sigma2": tire.sigma2, "kappa": tire.kappa}
-
-
-def first_line(error: ValidationError) -> str:
-    """All violations of a file in one line: key and what is wrong with it."""
-    parts = [f"{'.'.join(str(part) for part in entry['loc'])}: {entry['msg'].lower()}" for entry in error.errors()]
-    return "; ".join(parts)

@@ -8,8 +8,9 @@ from math import comb
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
-from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
+from synthesis.polynomials.matrix import MatrixPolynomial
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from studies.truth import load_manoeuvre, varied
-from studies.truth.monte_carlo import simulate_in_processes
+from studies.truth.simulate import simulate_in_processes
 from tests.unit.truth_cases import TIRES, shortened
 
 RUNS = int(os.environ.get("GAINSMITH_TRUTH_RUNS", "200"))

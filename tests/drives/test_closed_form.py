@@ -11,11 +11,11 @@ import polars as pl
 import pytest
 
 from estimators.schedule import write_content
-from studies.drives.errors import LogError
-from studies.drives.judge import DriveData, judge
+from studies.commands.run import HEADER, summary_rows
+from studies.drives.evaluation import DriveData, evaluate
 from studies.drives.quantities import CORNERS
 from studies.drives.run import RunResult, replay_drive, run_drive
-from studies.drives.summary import HEADER, summary_rows
+from studies.errors import LogError
 from tests.drives.synthetic_drive import (
     DRIVE,
     MASS,
@@ -126,7 +126,7 @@ def test_gap_is_flagged_coasted_and_not_compared(tmp_path: Path) -> None:
     table = columns()
     keep = (table["t"] < 0.999) | (table["t"] > 1.099)
     data = replayed(tmp_path, WITH_TORQUE, {name: value[keep] for name, value in table.items()})
-    metrics = judge(data)
+    metrics = evaluate(data)
     report = data.log.report
     assert report["logs"]["log"]["gaps"] == 1
     assert report["logs"]["log"]["largest_gap_s"] == pytest.approx(0.105)
@@ -142,7 +142,7 @@ def test_one_lost_wheel_sensor_leaves_the_others_at_work(tmp_path: Path) -> None
     table = columns()
     table["w_fl"] = np.where(table["t"] > 1.0, np.nan, table["w_fl"])
     data = replayed(tmp_path, WITH_TORQUE, table)
-    metrics = judge(data)
+    metrics = evaluate(data)
     assert data.log.report["logs"]["log"]["not_finite"] == {"w_fl": 400}
     assert worst(data) < 2e-3
     assert np.isfinite(data.replay.velocity).all()

@@ -8,14 +8,13 @@ recorded drive is taken as it is: its catalogue radii are about 2 % too large, a
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
+from estimators.arrays import AnyArray, FloatArray
 from estimators.faults import Flag
-from estimators.interpolate import FloatArray
 from estimators.schedule import GainSchedule
 from estimators.vehicle import CORNERS, VehicleParameters
 from estimators.velocity import LpvVelocityObserver, VelocityFusion, corner_acceleration, to_centre, vehicle_frame
@@ -272,7 +271,7 @@ def test_real_drive_teaches_the_radii() -> None:
     assert (after < 0.7 * before).all()
 
 
-def row(values: npt.NDArray[Any]) -> str:
+def row(values: AnyArray) -> str:
     return f"{values.mean():6.2f} {values.max():6.2f}"
 
 

@@ -11,11 +11,10 @@ import pytest
 from studies.drives.drive_file import DriveFile, read_drive
 from studies.drives.log import DriveLog, read_log
 from studies.identify.data import drive_signals
-from studies.identify.evaluate import tire_residual
 from studies.identify.identify import Identification, identify_drive, identify_log
 from studies.identify.inertia import fit_inertia
 from studies.identify.parameters import Identified, tire_parameters, vehicle_parameters
-from studies.identify.result import identified_tire
+from studies.identify.result import identified_tire, tire_residual
 from studies.identify.settings import IdentifySettings
 from synthesis.models.parameter_set import load_parameter_set
 
@@ -96,7 +95,7 @@ def test_lateral_residual_is_no_pattern_below_a_slip_of_three_percent(found: dic
     """What is left is a hundredth of the slip velocity: the track moments and the curve of the tire are in the model."""
     limited = found[NAMES[2]].fits["lateral"]
     low = limited.mask & (np.abs(limited.model.slip(limited.fit.values())) < 0.03)
-    speed = np.abs(limited.model.slip(limited.fit.values())) * limited.model.picture()[1]
+    speed = np.abs(limited.model.slip(limited.fit.values())) * limited.model.force_and_speed()[1]
     turning = low & (speed > 0.1)
     assert np.count_nonzero(turning) > 20
     assert np.sqrt(np.mean(limited.fit.residual[turning] ** 2)) < 0.02 * np.sqrt(np.mean(speed[turning] ** 2))

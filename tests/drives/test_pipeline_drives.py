@@ -9,15 +9,14 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
-from estimators.interpolate import FloatArray
+from estimators.arrays import FlagArray, FloatArray
 from estimators.pipeline import Check, EstimationPipeline, VehicleSignals
 from estimators.vehicle import CORNERS
 from studies.drives.csv_log import read_columns
 from studies.drives.drive_file import read_drive
-from studies.drives.judge import judge
+from studies.drives.evaluation import evaluate
 from studies.drives.log import DriveLog, read_log
 from studies.drives.run import replay_drive
 from tests.drives.test_fusion_drives import (
@@ -48,10 +47,10 @@ FORCES = {"force_x": 7.0, "force_z": 4.0, "force_y": 7.0}
 class Found(NamedTuple):
     velocity: dict[str, FloatArray]  # NRMS %, (drives, seeds)
     force: dict[str, FloatArray]  # (drives, seeds, corners or axles), NaN where the reference stays small
-    failed: npt.NDArray[np.int32]  # (drives, seeds, n) sums of Check
+    failed: FlagArray  # (drives, seeds, n) sums of Check
 
 
-def piped(runs: Runs) -> tuple[dict[str, FloatArray], npt.NDArray[np.int32]]:
+def piped(runs: Runs) -> tuple[dict[str, FloatArray], FlagArray]:
     pipeline = EstimationPipeline(vehicle_of(SIMULATED["launch"]), STEP, runs.ax.shape[:-1])
     rows: dict[str, list[FloatArray]] = {"vx": [], "vy": [], "force_x": [], "force_z": [], "axle_force_y": []}
     failed = []
@@ -143,7 +142,7 @@ def test_sensors_within_their_errors_raise_no_balance_check(found: Found) -> Non
 def test_recorded_drive_through_its_own_drive_file() -> None:
     """No torques there: forces are shares of m a_x, so their sum is judged against m times the slope of the GNSS speed."""
     data = replay_drive([DATA], HERE / "bmw_m8_launch_brake.toml")
-    metrics = judge(data)
+    metrics = evaluate(data)
     assert metrics["velocity"]["pipeline"]["rms"] < 0.3
     # Not so the integrated acceleration: 0.028 m/s RMS beside 0.135. It is no fair baseline on this log, see the next two tests.
     for other in ("mean_wheel_speed", "corner_observers"):
@@ -191,7 +190,7 @@ def test_with_the_bias_of_a_sensor_it_beats_all_three_on_the_recorded_drive(
         return replace(log, signals={**log.signals, "ax": log.signals["ax"] + bias})
 
     monkeypatch.setattr("studies.drives.run.read_log", biased)
-    velocity = judge(replay_drive([DATA], HERE / "bmw_m8_launch_brake.toml"))["velocity"]
+    velocity = evaluate(replay_drive([DATA], HERE / "bmw_m8_launch_brake.toml"))["velocity"]
     assert velocity["pipeline"]["rms"] < 0.3
     for other in ("mean_wheel_speed", "corner_observers", "integrated_acceleration", *(f"corner_{c}" for c in CORNERS)):
         assert velocity["pipeline"]["rms"] < velocity[other]["rms"]
@@ -199,7 +198,7 @@ def test_with_the_bias_of_a_sensor_it_beats_all_three_on_the_recorded_drive(
 
 @pytest.mark.parametrize("name", SIMULATED.values())
 def test_every_signal_of_a_run_has_its_baselines(name: str) -> None:
-    signals = judge(replay_drive([DATA], HERE / f"{name}.toml"))["pipeline"]["signals"]
+    signals = evaluate(replay_drive([DATA], HERE / f"{name}.toml"))["pipeline"]["signals"]
     for corner in CORNERS:
         assert set(signals[f"force_x_{corner}"]) == {"pipeline", "corner_input", "quasi_static"}
         assert set(signals[f"force_z_{corner}"]) == {"pipeline", "quasi_static"}

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from studies.drives.csv_log import read_columns
-from studies.drives.judge import DriveData, judge
+from studies.drives.evaluation import DriveData, evaluate
 from studies.drives.quantities import CORNERS
 from studies.drives.run import replay_drive
 
@@ -29,7 +29,7 @@ Drive = tuple[DriveData, dict[str, Any]]
 
 def replayed(name: str) -> Drive:
     data = replay_drive([DATA], HERE / f"{name}.toml")
-    return data, judge(data)
+    return data, evaluate(data)
 
 
 @pytest.fixture(scope="module")

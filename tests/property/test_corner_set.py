@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimators import GainSchedule
+from estimators.arrays import FloatArray
 from estimators.pipeline import CornerObservers, KalmanCorners, SwitchedCorners
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import BristleTire, SlipWeights
@@ -23,7 +24,6 @@ FAULTS = st.lists(
     max_size=12,
 )
 SPEEDS = st.lists(st.sampled_from([20.0, 3.0, 0.0, -4.0]), min_size=10, max_size=10)
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def observers(lateral: bool, weights: SlipWeights | None, kind: str = "scheduled") -> list[CornerObservers]:
@@ -37,7 +37,7 @@ def observers(lateral: bool, weights: SlipWeights | None, kind: str = "scheduled
     return [CornerObservers(CAR, make(b), across if lateral else None, b, weights) for b in ((), (1,), (2,))]
 
 
-def stepped(corners: CornerObservers, row: Array, speed: float) -> Any:
+def stepped(corners: CornerObservers, row: FloatArray, speed: float) -> Any:
     shape = corners.batch_shape
 
     def wide(values: Any) -> Any:

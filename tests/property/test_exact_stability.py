@@ -1,6 +1,6 @@
 """`affine_quadratic_stability` on random and offset ranges next to the boundary: nothing false certified, nothing false refuted.
 
-Every answer is judged in rational numbers by Sturm's and Routh's theorems (`tests.support.exact_road`), which share no code with
+Every answer is checked in rational numbers by the theorems of Sturm and Routh (`tests.support.exact_stability`), without code of
 the prover. 10,000 cases by hand: `python -m tests.support.stability_cases 10000`.
 """
 
@@ -25,7 +25,7 @@ from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.enclosure import PolynomialMatrix
 from synthesis.stability import affine_quadratic_stability
-from tests.support import exact_road as road
+from tests.support import exact_stability as oracle
 from tests.support.stability_cases import FAMILIES, Case, asked, case_of, complaint, survey
 from tests.unit.lmi_cases import parameter, small_model
 
@@ -121,7 +121,7 @@ def test_an_unstable_spike_is_found_where_no_failed_proof_points_at_it(seed: int
 @pytest.mark.parametrize("family", ["2 states", "3 states", "rate-bounded", "rational", "one end", "scalar power"])
 @pytest.mark.parametrize("dual", [False, True])
 def test_a_random_lyapunov_matrix_is_decided_as_sturm_decides_it(family: str, dual: bool) -> None:
-    """P affine in p, its best decay rate (of either sign) bisected on the second road: no proof beyond it, one before it."""
+    """P affine in p, its best decay rate (of either sign) bisected by the oracle: no proof beyond it, one before it."""
     decided = 0
     for seed in range(10 if family != "rational" else 6):
         draw = np.random.default_rng(seed)
@@ -131,17 +131,17 @@ def test_a_random_lyapunov_matrix_is_decided_as_sturm_decides_it(family: str, du
         if not speeds:
             continue
         low, high = Fraction(-4000), Fraction(1000)
-        if not road.lyapunov_on_range(case.closed, P, case.below, speeds, low, dual):
+        if not oracle.lyapunov_on_range(case.closed, P, case.below, speeds, low, dual):
             continue
         while high - low > Fraction(1, 10**4) * max(abs(low + high), Fraction(1, 100)):
             middle = (low + high) / 2
-            good = road.lyapunov_on_range(case.closed, P, case.below, speeds, middle, dual)
+            good = oracle.lyapunov_on_range(case.closed, P, case.below, speeds, middle, dual)
             low, high = (middle, high) if good else (low, middle)
         gain = fmpq_mat([[fmpq(*float(g).as_integer_ratio())] for g in case.gain or [0.0] * case.states])
         loop = ObserverLoop.constant_gain(plant_of(case.model), gain)
         verifier = Verifier(loop, Names(tuple(f"x{i + 1}" for i in range(case.states)), ()))
         exact = PolynomialMatrix(
-            {(k,): fmpq_mat([[road.rational(x) for x in row] for row in m]) for k, m in enumerate(P)},
+            {(k,): fmpq_mat([[oracle.rational(x) for x in row] for row in m]) for k, m in enumerate(P)},
             (case.states,) * 2,
             1,
         )
@@ -158,7 +158,7 @@ def random_lyapunov(case: Case, draw: np.random.Generator, dual: bool) -> list[l
     root = draw.normal(size=(n, n))
     for v in (Fraction(-1), Fraction(0), Fraction(1)):
         below = sum(float(c) * float(v) ** k for k, c in enumerate(case.below))
-        A = np.array(road.at(case.closed, v), float) / below
+        A = np.array(oracle.at(case.closed, v), float) / below
         A = A - (max(np.linalg.eigvals(A).real.max(), 0.0) + 0.3) * np.eye(n)
         values.append(solve_continuous_lyapunov(A if dual else A.T, -(root @ root.T + 0.1 * np.eye(n))))
     size = np.abs(values[1]).max()
@@ -191,13 +191,13 @@ def test_the_judge_knows_what_numpy_knows() -> None:
         series = [
             [[Fraction(int(x), 10) for x in row] for row in draw.integers(-9, 10, (n, n))] for _ in range(degree + 1)
         ]
-        series = road.shifted(series, Fraction(-int(draw.integers(0, 3))))
+        series = oracle.shifted(series, Fraction(-int(draw.integers(0, 3))))
         v = np.linspace(-1.0, 1.0, 501)
         worst = np.linalg.eigvals(
             sum(np.array(m, float) * v[:, None, None] ** k for k, m in enumerate(series))
         ).real.max()
         if abs(worst) > 1e-2:
-            assert road.stable_on_range(series) == (worst < 0.0)
+            assert oracle.stable_on_range(series) == (worst < 0.0)
             clear[bool(worst < 0.0)] += 1
     assert min(clear.values()) > 40
 
@@ -210,7 +210,7 @@ def test_the_judge_knows_what_numpy_knows() -> None:
     ],
 )  # fmt: skip
 def test_roots_in_the_range_are_counted_exactly(coefficients: list[fmpq], free: bool) -> None:
-    assert road.no_root(fmpq_poly(coefficients)) is free
+    assert oracle.no_root(fmpq_poly(coefficients)) is free
 
 
 def test_false_answers_are_seen() -> None:
@@ -241,4 +241,4 @@ def test_the_lyapunov_matrix_in_physical_parameters_proves_it_too() -> None:
     for m in P:
         m[1][0] = m[0][1]
     rates = [Fraction(repr(rate)) / case.half for rate in case.rates]
-    assert road.lyapunov_on_range(case.closed, P, case.below, rates, Fraction(0), dual=False)
+    assert oracle.lyapunov_on_range(case.closed, P, case.below, rates, Fraction(0), dual=False)

@@ -1,4 +1,4 @@
-"""Filters on random linear models: three roads to one answer, and an order of channels that does not matter."""
+"""Filters on random linear models: three ways to one answer, and an order of channels that does not matter."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from estimators.filters import ExtendedKalmanFilter, KalmanFilter, UnscentedKalm
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 10**6), st.integers(1, 6), st.integers(1, 4), st.sampled_from([(), (2,), (50,)]))
-def test_three_roads(seed: int, n: int, m: int, batch: tuple[int, ...]) -> None:
+def test_three_ways(seed: int, n: int, m: int, batch: tuple[int, ...]) -> None:
     draw = np.random.default_rng(seed)
     A, C = draw.normal(size=(n, n)), draw.normal(size=(*batch, m, n))
     root = draw.normal(size=(n, n))

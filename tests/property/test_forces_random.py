@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from estimators.arrays import FloatArray
 from estimators.faults import Flag
 from estimators.forces import (
     AttitudeObserver,
@@ -30,12 +31,11 @@ TIME = 0.005
 CAR = replace(VehicleParameters.published_suv(), rolling_resistance=0.012)
 BAD = st.sampled_from([math.nan, math.inf, -math.inf, 1e150, -1e300])
 ANY = st.floats(-500, 500, width=32) | BAD | st.just(0.0)
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 @settings(max_examples=60, deadline=None)
 @given(arrays(np.float64, (12, 3, 4), elements=ANY))
-def test_wheel_forces_are_finite_whatever_comes_in(signals: Array) -> None:
+def test_wheel_forces_are_finite_whatever_comes_in(signals: FloatArray) -> None:
     speed, torque, load = signals[:, 0], 10 * signals[:, 1], 20 * signals[:, 2]
     slope = FilteredDerivative(TIME, 0.005)
     runners = UnknownInputForceObserver(CAR, TIME), WheelForceFilter(CAR, TIME)
@@ -58,7 +58,7 @@ def test_wheel_forces_are_finite_whatever_comes_in(signals: Array) -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(arrays(np.float64, (10, 14), elements=ANY))
-def test_lateral_forces_loads_and_attitude_are_finite_whatever_comes_in(signals: Array) -> None:
+def test_lateral_forces_loads_and_attitude_are_finite_whatever_comes_in(signals: FloatArray) -> None:
     lateral = [LateralForceEstimator(CAR, TIME, method=m) for m in ("unscented", "linear")]  # type: ignore[arg-type]
     loads, attitude = VerticalLoads(CAR, TIME), AttitudeObserver(TIME)
     for row in signals:
@@ -76,7 +76,7 @@ def test_lateral_forces_loads_and_attitude_are_finite_whatever_comes_in(signals:
 
 @settings(max_examples=60, deadline=None)
 @given(arrays(np.float64, (30,), elements=st.integers(0, 4000) | st.just(math.nan)))
-def test_tick_speeds_are_finite(counts: Array) -> None:
+def test_tick_speeds_are_finite(counts: FloatArray) -> None:
     counter = TickSpeed(48, TIME, (), longest_window=7)
     for count in counts:
         assert np.isfinite(counter.step(count).speed)
@@ -88,7 +88,7 @@ def small(low: float, high: float, shape: tuple[int, ...]) -> Any:
 
 @settings(max_examples=80, deadline=None)
 @given(small(-15, 15, (2,)), st.floats(4, 16), small(-0.3, 0.3, (2,)))
-def test_loads_sum_to_what_holds_the_car_up(a: Array, up: float, tilt: Array) -> None:
+def test_loads_sum_to_what_holds_the_car_up(a: FloatArray, up: float, tilt: FloatArray) -> None:
     raw = vertical_loads(CAR, a[0], a[1], up, tilt[0], tilt[1])
     total = CAR.mass * ((up * np.cos(tilt[0]) + a[0] * np.sin(tilt[0])) * np.cos(tilt[1]) + a[1] * np.sin(tilt[1]))
     np.testing.assert_allclose(raw.sum(), total, rtol=1e-9, atol=1e-6)
@@ -98,7 +98,7 @@ def test_loads_sum_to_what_holds_the_car_up(a: Array, up: float, tilt: Array) ->
 
 @settings(max_examples=40, deadline=None)
 @given(st.floats(0.05, 0.5), st.sampled_from([-1.0, 1.0]), small(-4000, 4000, (8,)))
-def test_planar_forces_come_back_from_the_motion_they_make(angle: float, side: float, forces: Array) -> None:
+def test_planar_forces_come_back_from_the_motion_they_make(angle: float, side: float, forces: FloatArray) -> None:
     """Start from the answer: any forces, their accelerations, and the filter finds the axles again."""
     fx, fy, steer = forces[:4], forces[4:], np.array(side * angle)
     y = planar_outputs(CAR, steer, fx, fy)
@@ -110,7 +110,9 @@ def test_planar_forces_come_back_from_the_motion_they_make(angle: float, side: f
 
 @settings(max_examples=60, deadline=None)
 @given(small(-5000, 5000, (4,)), small(10, 900, (4,)), st.floats(-2e4, 2e4), st.floats(1, 1e3))
-def test_reconciled_forces_never_disagree_more_than_before(force: Array, spread: Array, total: float, s: float) -> None:
+def test_reconciled_forces_never_disagree_more_than_before(
+    force: FloatArray, spread: FloatArray, total: float, s: float
+) -> None:
     found = reconcile(force, spread, total, s, CAR.static_loads, np.zeros(4, dtype=bool))
     assert abs(found.force.sum() - total) <= abs(force.sum() - total) * (1 + 1e-9) + 1e-9
     assert (found.deviation <= spread * (1 + 1e-12)).all()

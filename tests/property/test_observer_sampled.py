@@ -1,9 +1,8 @@
-"""Gains that correct once a sample, xhat+ = e^(TA) xhat + T phi(TA) B u + K (y - C xhat - D u), by independent roads."""
+"""Gains that correct once a sample, xhat+ = e^(TA) xhat + T phi(TA) B u + K (y - C xhat - D u), by independent ways."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,10 +11,10 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from estimators import Flag, GainSchedule, LpvVelocityObserver
+from estimators.arrays import FloatArray
 from estimators.velocity import SwitchedVelocityObserver, with_constant_gain
 from tests.unit.schedule_content import PUBLISHED, schedule_content, with_matrix
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 FEW, MANY = (4,), (7, 4)  # plain numbers, arrays
 SIZES = pytest.mark.parametrize("shape", [FEW, MANY], ids=["few", "many"])
 T = 0.005
@@ -41,13 +40,13 @@ class Random:
             with_matrix(content, key, *(matrix.tolist() for matrix in coefficients))
         self.schedule = GainSchedule.from_content(content)
 
-    def at(self, key: str, p: float) -> Array:
+    def at(self, key: str, p: float) -> FloatArray:
         return np.asarray(sum(matrix * p**k for k, matrix in enumerate(self.powers[key])))
 
-    def gain(self, p: float) -> Array:
+    def gain(self, p: float) -> FloatArray:
         return np.array([np.interp(p, POINTS, column) for column in self.table.T])
 
-    def textbook(self, x: Array, u: float, y: float, p: float, coast: bool) -> tuple[Array, float]:
+    def textbook(self, x: FloatArray, u: float, y: float, p: float, coast: bool) -> tuple[FloatArray, float]:
         """The state one sample later, and the innovation; e^(TA) and T phi(TA) B are blocks of one exponential."""
         block = np.zeros((3, 3))
         block[:2, :2], block[:2, 2:] = T * self.at("A", p), T * self.at("B", p)
@@ -121,13 +120,13 @@ def test_coasting_is_a_gain_of_zero(shape: tuple[int, ...]) -> None:
     assert steps[1].used.all()
 
 
-def course(steps: int) -> tuple[Array, Array]:
+def course(steps: int) -> tuple[FloatArray, FloatArray]:
     """An input that never rests, and a wheel speed that moves at the rates of the box (800 rad/s^2)."""
     k = np.arange(steps)
     return 20.0 * np.sin(0.3 * k) + 8.0 * np.sin(1.1 * k), 75.0 + 60.0 * np.sin(0.06 * k)
 
 
-def errors(schedule: GainSchedule, shape: tuple[int, ...], moving: bool, steps: int = 400) -> tuple[Array, float]:
+def errors(schedule: GainSchedule, shape: tuple[int, ...], moving: bool, steps: int = 400) -> tuple[FloatArray, float]:
     """The error of every sample relative to the size of the plant's states, which an exact plant runs in parallel.
 
     The tire of P1: z' = -kappa R w z + v, v' = u, y = (sigma0 - sigma1 kappa R w) z + (sigma1 + sigma2) v.

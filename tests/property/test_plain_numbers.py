@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from estimators import GainSchedule, LpvVelocityObserver
+from estimators.arrays import FloatArray
 from estimators.filters import KalmanFilter
 from estimators.filters.scalar import ScalarKalmanFilter
 from estimators.filters.three_states import informed
@@ -27,7 +28,6 @@ CAR = VehicleParameters.published_suv()
 BAD = st.sampled_from([math.nan, math.inf, -math.inf, 1e150])
 SIZED = st.floats(-20, 20, width=32)
 ANY = SIZED | SIZED | BAD | st.just(0.0)
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def same(one: Any, many: Any, entry: Any, rtol: float = 1e-9, atol: float = 1e-9) -> None:
@@ -44,7 +44,7 @@ def remembers_the_same(one: Any, many: Any, entry: Any) -> None:
 
 @settings(max_examples=100, deadline=None)
 @given(arrays(np.float64, (3, 3), elements=st.floats(-3, 3)), arrays(np.float64, (4, 3), elements=st.floats(-30, 30)))
-def test_information_added_to_three_states(root: Array, C: Array) -> None:
+def test_information_added_to_three_states(root: FloatArray, C: FloatArray) -> None:
     """Start from the inverse: P^-1 and C'C are added, and inverted by numpy."""
     lower = np.tril_indices(3)
     P, G = root @ root.T + 0.01 * np.eye(3), C.T @ C
@@ -69,7 +69,7 @@ def test_one_bad_entry_is_found_whatever_the_size(shape: tuple[int, ...], bad: f
 @pytest.mark.parametrize("shape", [(), (1, 2)])
 @settings(max_examples=25, deadline=None)
 @given(arrays(np.float64, (12, 12), elements=ANY), st.floats(-0.5, 0.5))
-def test_lateral_forces(shape: tuple[int, ...], gate: float | None, signals: Array, steer: float) -> None:
+def test_lateral_forces(shape: tuple[int, ...], gate: float | None, signals: FloatArray, steer: float) -> None:
     few, many = (LateralForceEstimator(CAR, TIME, batch, "linear", gate=gate) for batch in (shape, (FEW + 1,)))
     assert isinstance(few.filter, LateralFew)
     assert isinstance(many.filter, KalmanFilter)
@@ -88,7 +88,7 @@ def test_lateral_forces(shape: tuple[int, ...], gate: float | None, signals: Arr
 
 @settings(max_examples=40, deadline=None)
 @given(arrays(np.float64, (12, 9), elements=ANY))
-def test_attitude(signals: Array) -> None:
+def test_attitude(signals: FloatArray) -> None:
     one, many = AttitudeObserver(TIME), AttitudeObserver(TIME, (2,))
     for k, row in enumerate(signals):
         if k == 6:
@@ -103,7 +103,7 @@ def test_attitude(signals: Array) -> None:
 @pytest.mark.parametrize("dynamic", [True, False])
 @settings(max_examples=30, deadline=None)
 @given(arrays(np.float64, (12, 5), elements=ANY))
-def test_loads(dynamic: bool, signals: Array) -> None:
+def test_loads(dynamic: bool, signals: FloatArray) -> None:
     one, many = (VerticalLoads(CAR, TIME, shape, dynamic) for shape in ((), (2,)))
     for k, row in enumerate(signals):
         if k == 6:
@@ -117,7 +117,7 @@ def test_loads(dynamic: bool, signals: Array) -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(arrays(np.float64, (12, 2), elements=ANY))
-def test_body_response(signals: Array) -> None:
+def test_body_response(signals: FloatArray) -> None:
     one, many = BodyResponse(TIME), BodyResponse(TIME, (2,))
     for row in signals:
         np.testing.assert_allclose(one.step(row), many.step(np.tile(row, (2, 1)))[0], rtol=1e-12, atol=1e-12)
@@ -126,7 +126,7 @@ def test_body_response(signals: Array) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(arrays(np.float64, (12, 3, 4), elements=ANY), arrays(np.bool_, (12, 4)))
-def test_wheel_forces(signals: Array, fresh: Any) -> None:
+def test_wheel_forces(signals: FloatArray, fresh: Any) -> None:
     """The linear road of the wheel force filter is the unscented one, with every fault and interval."""
     linear, unscented = (WheelForceFilter(CAR, TIME, method=m) for m in ("linear", "unscented"))  # type: ignore[arg-type]
     for k in range(12):
@@ -136,7 +136,7 @@ def test_wheel_forces(signals: Array, fresh: Any) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(arrays(np.float64, (10, 2), elements=SIZED | st.just(math.nan)), st.floats(0.5, 1.0), st.floats(-2, 2))
-def test_scalar_filter(y: Array, a: float, c: float) -> None:
+def test_scalar_filter(y: FloatArray, a: float, c: float) -> None:
     scalar, matrix = (kind(np.zeros((2, 1)), np.eye(1)) for kind in (ScalarKalmanFilter, KalmanFilter))
     for row in y:
         scalar.predict(a, 0.3)
@@ -176,7 +176,7 @@ def test_switched_gains(lost: list[tuple[int, float, float]], push: float) -> No
 @pytest.mark.parametrize("states", [2, 3])
 @settings(max_examples=30, deadline=None)
 @given(arrays(np.float64, (14, 4), elements=ANY), arrays(np.bool_, (14,)))
-def test_time_varying_kalman(states: Any, signals: Array, high: Any) -> None:
+def test_time_varying_kalman(states: Any, signals: FloatArray, high: Any) -> None:
     few, many = (LtvKalmanObserver(BristleTire(), TIME, shape, states=states) for shape in ((2,), (9, 2)))
     for k, row in enumerate(signals):
         if k == 7:

@@ -10,12 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from estimators.arrays import FloatArray
 from estimators.vehicle import GRAVITY
 from studies.truth import simulate, varied
-from studies.truth.layout import DEFLECTION, GIVE, GIVE_RATE, JACK, STATES, B, W
-from studies.truth.plant import Controls, Forces, Plant, Turned
+from studies.truth.layout import COMPLIANCE, COMPLIANCE_RATE, DEFLECTION, JACK, STATES, B, W
+from studies.truth.plant import Controls, Forces, Plant, SteerAngles
 from studies.truth.road import Zone
-from tests.unit.truth_cases import TIRES, Array, course, plant_of, suv
+from tests.unit.truth_cases import TIRES, course, plant_of, suv
 
 SCALES = {"vx": 12.0, "vy": 3.0, "heave": 0.02, "roll": 0.02, "pitch": 0.02}
 SCALES |= {"heave_rate": 0.1, "roll_speed": 0.1, "pitch_speed": 0.1}
@@ -27,24 +28,24 @@ def plant(tire: str) -> Plant:
     return plant_of(course(tire=tire), suv())[0]
 
 
-def state_of(draw: Array) -> Array:
+def state_of(draw: FloatArray) -> FloatArray:
     size = np.ones(STATES)
     for name, value in SCALES.items():
         size[B[name]] = value
-    size[W["wheel_speed"]], size[DEFLECTION], size[GIVE], size[GIVE_RATE] = 40.0, 1e-3, 2e-3, 0.05
+    size[W["wheel_speed"]], size[DEFLECTION], size[COMPLIANCE], size[COMPLIANCE_RATE] = 40.0, 1e-3, 2e-3, 0.05
     state = (size * draw[:STATES])[:, None]
     w = state[W["wheel_speed"]]
     state[W["wheel_speed"]] = np.where(np.abs(w) < 0.1, 0.5, w)  # dry friction needs a direction
     return state
 
 
-def controls_of(draw: Array) -> Controls:
+def controls_of(draw: FloatArray) -> Controls:
     rest = draw[STATES:, None]
     brake, friction = 800.0 * np.abs(rest[8:12]), np.full((4, 1), 0.8)
     return Controls(0.3 * rest[0:4], 1000.0 * rest[4:8], brake, friction, 0.1 * rest[12], 0.1 * rest[13])
 
 
-def energy(one: Plant, s: Array) -> float:
+def energy(one: Plant, s: FloatArray) -> float:
     """J of the moving body, wheels, springs, bars and compliant links; gravity cancels the static spring forces."""
     car = one.fleet
     lift = s[B["heave"]] + car.y * s[B["roll"]] + car.x * s[B["pitch"]]
@@ -53,19 +54,19 @@ def energy(one: Plant, s: Array) -> float:
     kinetic += car.pitch_inertia * s[B["pitch_speed"]] ** 2
     spin = (car.wheel_inertia * s[W["wheel_speed"]] ** 2).sum(axis=0)
     springs = (car.spring * lift**2).sum(axis=0) + (car.bar * car.track).sum(axis=0) * s[B["roll"]] ** 2
-    links = (car.give_stiffness * s[GIVE] ** 2 + car.unsprung * s[GIVE_RATE] ** 2).sum(axis=0)
+    links = (car.compliance_stiffness * s[COMPLIANCE] ** 2 + car.unsprung * s[COMPLIANCE_RATE] ** 2).sum(axis=0)
     return float(0.5 * (kinetic + spin + springs + links)[0])
 
 
-def power(one: Plant, s: Array, controls: Controls, forces: Forces) -> float:
+def power(one: Plant, s: FloatArray, controls: Controls, forces: Forces) -> float:
     """W: drive and brakes, less tires, rolling resistance, drag, dampers and gravity along the road."""
     car, w = one.fleet, s[W["wheel_speed"]]
     rolling = np.sign(w) * car.radius * car.rolling_resistance * forces.load
     torque = controls.drive - np.sign(w) * controls.brake
     out = (torque * (w + s[B["pitch_speed"]]) - rolling * w).sum()
-    out -= (forces.tire * one.slide(s, Turned(np.sin(controls.steer), np.cos(controls.steer))).slip).sum()
+    out -= (forces.tire * one.slide(s, SteerAngles(np.sin(controls.steer), np.cos(controls.steer))).slip).sum()
     rate = s[B["heave_rate"]] + car.y * s[B["roll_speed"]] + car.x * s[B["pitch_speed"]]
-    out -= (car.damper * rate**2).sum() + (car.give_damping * s[GIVE_RATE] ** 2).sum()
+    out -= (car.damper * rate**2).sum() + (car.compliance_damping * s[COMPLIANCE_RATE] ** 2).sum()
     vx, vy, up = s[B["vx"]][0], s[B["vy"]][0], s[B["heave_rate"]][0]
     grade, bank, weight = controls.grade[0], controls.bank[0], car.mass[0] * GRAVITY
     out -= car.drag[0] * abs(vx) ** 3
@@ -93,7 +94,7 @@ def test_power_balance_at_any_instant(draw: list[float], tire: str) -> None:
 SIGNS = {"yaw", "y", "vy", "yaw_rate", "roll", "roll_speed", "jack_front", "jack_rear"}
 
 
-def mirrored(state: Array) -> Array:
+def mirrored(state: FloatArray) -> FloatArray:
     """The same state seen in a mirror along the car: left is right."""
     out = state.copy()
     for name in SIGNS:

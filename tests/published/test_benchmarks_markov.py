@@ -68,10 +68,10 @@ def test_two_unstable_modes_are_mean_square_stable_together() -> None:
     assert mean_square_lmi(staying).verdict is Verdict.REFUTED
 
 
-@pytest.mark.parametrize("road", ["riccati", "lmi"])
-def test_sinopoli_scalar(road: str) -> None:
+@pytest.mark.parametrize("method", ["riccati", "lmi"])
+def test_sinopoli_scalar(method: str) -> None:
     """Sinopoli et al. 2004: A = -1.25 gives 1 - 1/1.25^2 = 0.36 for both bounds."""
-    found = static_critical_arrival([[-1.25]], [[1.0]], road=road)  # type: ignore[arg-type]
+    found = static_critical_arrival([[-1.25]], [[1.0]], method=method)  # type: ignore[arg-type]
     assert found.verdict is Verdict.CERTIFIED
     assert (found.lower, found.upper) == pytest.approx((0.36, 0.36), rel=1e-6)
     assert kalman_critical_arrival([[-1.25]], [[1.0]]).lower == pytest.approx(0.36, rel=1e-12)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from analysis.norms import hinf_norm
-from studies.claim import Verdict
+from studies.claim import ClaimVerdict
 from studies.papers.corner_estimation.hinf_design import OMEGA, fitted, optima, schedule, signed_model, velocity_floor
 from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, Corner
 from studies.papers.corner_estimation.sigma_points import filter_lag
@@ -109,12 +109,12 @@ def test_a_layer_that_hands_over_something_else_is_found_out() -> None:
         coarse = replace(last, values=last.values.astype(np.float32).astype(float))
         return one_by_one(replace(relaxed, sampled=(*relaxed.sampled[:-1], coarse)))
 
-    assert solve_size(10).verdict is Verdict.DERIVED
-    assert solve_size(5).verdict is Verdict.NOT_REPRODUCED  # 5 points have fewer rows than the exact relaxation
+    assert solve_size(10).verdict is ClaimVerdict.DERIVED
+    assert solve_size(5).verdict is ClaimVerdict.NOT_REPRODUCED  # 5 points have fewer rows than the exact relaxation
     for layer in (forgetful, rounding):
         found = solve_size(10, layer=layer)
         assert not found.computed["layer_hands_over_the_same_problem"]
-        assert found.verdict is Verdict.NOT_REPRODUCED
+        assert found.verdict is ClaimVerdict.NOT_REPRODUCED
 
 
 def test_no_clock_decides_what_a_solve_costs(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 from scipy.optimize import minimize
 
-from studies.claim import Verdict
+from studies.claim import ClaimVerdict
 from studies.papers.corner_estimation.inputs import CORNERS
 from studies.papers.corner_estimation.quadratic_stability import diagonal_proof
 from tests.unit.p1_findings import PRINT, RADIUS, finding
@@ -90,7 +90,7 @@ def test_multi_convexity_in_fractions() -> None:
             computed[direction]["eigenvalues"]["primal"], [float(m11) / 2 - root, float(m11) / 2 + root], rtol=1e-9
         )
         assert computed[direction]["determinant_as_printed"] == pytest.approx(-float(m12 * m12), rel=1e-12)
-    assert finding("P1-mc").verdict is Verdict.NOT_REPRODUCED
+    assert finding("P1-mc").verdict is ClaimVerdict.NOT_REPRODUCED
     assert computed["longitudinal"]["eigenvalues"]["adjugate"] == pytest.approx([-1.5e-3, 350.5], rel=0.03)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from studies.claim import Finding, Verdict
+from studies.claim import ClaimVerdict, Finding
 from studies.papers.longitudinal_speed import (
     accuracy,
     model,
@@ -29,22 +29,22 @@ def without_the_worse_cells() -> Finding:
     return accuracy.force_table(rows)
 
 
-CONTROLS: dict[str, tuple[Callable[[], Finding], Verdict]] = {
-    "P2-19M": (lambda: model.descriptor_form(((1, 0, 0), (0, 1, 0), (0, 1, 1))), Verdict.NOT_REPRODUCED),
-    "P2-kappa": (lambda: model.patch_constant("7/(6 L)"), Verdict.REPRODUCED),
-    "P2-Re": (lambda: model.effective_radius({"table": 0.33, "text": 0.33}), Verdict.REPRODUCED),
-    "P2-O3": (lambda: observability.rank_over_the_region((1, "-5")), Verdict.REPRODUCED),
-    "P2-test1": (lambda: stochastic_observability.time_of_test_1({"one reading": 0.015}), Verdict.NOT_REPRODUCED),
+CONTROLS: dict[str, tuple[Callable[[], Finding], ClaimVerdict]] = {
+    "P2-19M": (lambda: model.descriptor_form(((1, 0, 0), (0, 1, 0), (0, 1, 1))), ClaimVerdict.NOT_REPRODUCED),
+    "P2-kappa": (lambda: model.patch_constant("7/(6 L)"), ClaimVerdict.REPRODUCED),
+    "P2-Re": (lambda: model.effective_radius({"table": 0.33, "text": 0.33}), ClaimVerdict.REPRODUCED),
+    "P2-O3": (lambda: observability.rank_over_the_region((1, "-5")), ClaimVerdict.REPRODUCED),
+    "P2-test1": (lambda: stochastic_observability.time_of_test_1({"one reading": 0.015}), ClaimVerdict.NOT_REPRODUCED),
     # a wheel at rest leaves an integrator that no sample sees
     "P2-test2": (
-        lambda: stochastic_observability.bound_of_test_2({"standing": constant(0.0, 60)}), Verdict.NOT_REPRODUCED,
+        lambda: stochastic_observability.bound_of_test_2({"standing": constant(0.0, 60)}), ClaimVerdict.NOT_REPRODUCED,
     ),
-    "P2-A": (lambda: steady_filter.appendix(noise_share=0.5), Verdict.NOT_REPRODUCED),
-    "P2-uio": (lambda: unknown_input_observer.theorem_1(claimed_gain=1.5), Verdict.NOT_REPRODUCED),
+    "P2-A": (lambda: steady_filter.appendix(noise_share=0.5), ClaimVerdict.NOT_REPRODUCED),
+    "P2-uio": (lambda: unknown_input_observer.theorem_1(claimed_gain=1.5), ClaimVerdict.NOT_REPRODUCED),
     "P2-29": (
-        lambda: slip_threshold.slip_threshold(slip_threshold.CORRECTED_WIDTH), Verdict.REPRODUCED,
+        lambda: slip_threshold.slip_threshold(slip_threshold.CORRECTED_WIDTH), ClaimVerdict.REPRODUCED,
     ),
-    "P2-tab2": (without_the_worse_cells, Verdict.REPRODUCED),
+    "P2-tab2": (without_the_worse_cells, ClaimVerdict.REPRODUCED),
 }  # fmt: skip
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from studies.claim import Claim, Verdict
+from studies.claim import Claim, ClaimVerdict
 from studies.papers.published import published_claims
 from studies.papers.resilient_velocity.inputs import PACKAGE
 from studies.papers.resilient_velocity.study import STUDY
@@ -55,7 +55,7 @@ def test_every_claim_is_computed_once_and_can_be_stored() -> None:
     assert sorted(computed) == sorted(listed) and len(set(computed)) == len(computed) == 26
     for claim in claims().values():
         assert json.loads(json.dumps(claim.row(), allow_nan=False))["reading"].endswith(".")
-        assert isinstance(claim.finding.verdict, Verdict)
+        assert isinstance(claim.finding.verdict, ClaimVerdict)
 
 
 def test_every_figure_and_table_stands_alone() -> None:
@@ -214,7 +214,7 @@ def test_symmetric_part_from_the_quadratic_formula() -> None:
         root = mp.findroot(lambda w: largest(w) - 108750, (30, 36), solver="anderson")
         low, high = found("P3-ex1-sym")["speeds_that_round_to_print_rad_per_s"]
         assert low < root < high
-    assert claims()["P3-ex1-sym"].finding.verdict is Verdict.NOT_REPRODUCED
+    assert claims()["P3-ex1-sym"].finding.verdict is ClaimVerdict.NOT_REPRODUCED
 
 
 @pytest.mark.parametrize("direction", PRINT)
@@ -247,7 +247,7 @@ def test_no_gain_goes_below_the_floor() -> None:
             det = -a * (n["s1"] + n["s2"]) - (n["s0"] - n["s1"] * a)
             v = (a * n["s1"] + (n["s0"] - n["s1"] * a)) / det
             assert -float(v) == pytest.approx(value, abs=1e-15)
-    assert claims()["P3-hinf-floor"].finding.verdict is Verdict.DERIVED
+    assert claims()["P3-hinf-floor"].finding.verdict is ClaimVerdict.DERIVED
 
 
 def test_deviations_from_the_quadratic_formula() -> None:
@@ -269,7 +269,7 @@ def test_deviations_from_the_quadratic_formula() -> None:
             np.testing.assert_allclose(pair, expected, rtol=1e-6, atol=1e-9)
             worst = max(abs(margin(w, **{names[constant]: f}) / margin(w) - 1) for w in range(141) for f in (0.8, 1.2))
             assert ours["largest_relative_margin_deviation"][constant] == pytest.approx(worst, rel=1e-6)
-    assert claims()["P3-fig345"].finding.verdict is Verdict.PARTLY
+    assert claims()["P3-fig345"].finding.verdict is ClaimVerdict.PARTLY
 
 
 def test_common_decay_fails_in_exact_rationals() -> None:
@@ -290,7 +290,7 @@ def test_common_decay_fails_in_exact_rationals() -> None:
         det1, det2 = (M[0][0] * M[1][1] - M[0][1] * M[1][0] for M in (A1, A2))
         trace = sum(A1[i][j] * A2[j][i] for i in (0, 1) for j in (0, 1))
         assert (trace < 0 and trace**2 >= 4 * det1 * det2) is not exists
-    assert claims()["P3-20"].finding.verdict is Verdict.NOT_REPRODUCED
+    assert claims()["P3-20"].finding.verdict is ClaimVerdict.NOT_REPRODUCED
 
 
 def sampled(direction: str, speed: float, gain: tuple[str, str] | None = None) -> np.ndarray:
@@ -325,7 +325,7 @@ def test_markov_margins_by_the_printed_operator_and_by_all_paths() -> None:
     vector = np.concatenate([0.5 * np.outer(start, start).ravel()] * 2)
     vector = np.linalg.matrix_power(np.kron(P.T, np.eye(4)) @ D, steps) @ vector
     np.testing.assert_allclose(moments.ravel(), vector, rtol=1e-10)
-    assert claims()["P3-fig6"].finding.verdict is Verdict.REPRODUCED
+    assert claims()["P3-fig6"].finding.verdict is ClaimVerdict.REPRODUCED
 
 
 def test_critical_probability_in_40_digits() -> None:
@@ -369,7 +369,7 @@ def test_any_pattern_by_all_products_up_to_length_11() -> None:
     for speed, grows in ((start - 0.01, True), (start + 0.01, False)):  # A0^n -> [1/a, 1]' e2'
         a = 8.1 * 0.33 * speed
         assert (abs(float(sampled("longitudinal", speed)[1] @ [1 / a, 1.0])) > 1.0) is grows
-    assert claims()["P3-ex3-arb"].finding.verdict is Verdict.PARTLY
+    assert claims()["P3-ex3-arb"].finding.verdict is ClaimVerdict.PARTLY
 
 
 def test_loads_of_a_leaning_car_by_numbers() -> None:
@@ -386,4 +386,4 @@ def test_loads_of_a_leaning_car_by_numbers() -> None:
         outcome[1.0] - left, rel=1e-9
     )
     assert found("P3-26")["static_front_rear_N"][0] == pytest.approx(2330 * 9.81 * 1.43 / 2.85, rel=1e-13)
-    assert claims()["P3-26"].finding.verdict is Verdict.ERRATUM
+    assert claims()["P3-26"].finding.verdict is ClaimVerdict.ERRATUM

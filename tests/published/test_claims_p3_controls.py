@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from studies.claim import Verdict
+from studies.claim import ClaimVerdict
 from studies.papers.resilient_velocity import (
     boundedness,
     discretisation,
@@ -46,35 +46,35 @@ def with_vehicle(**values: float) -> Setting:
 
 
 FLIPS = [
-    ("P3-ex1-eig", boundedness.eigenvalue, with_gain((1.18, 385.0)), Verdict.NOT_REPRODUCED),
-    ("P3-ex1-eig", boundedness.eigenvalue, with_tire("longitudinal", sigma1=1.001), Verdict.NOT_REPRODUCED),
-    ("P3-ex1-sym", boundedness.symmetric, replace(PRINTED, example_speed=33.5293), Verdict.REPRODUCED),
-    ("P3-ex1-T", boundedness.transformed, replace(PRINTED, example_speed=30.0), Verdict.REPRODUCED),
-    ("P3-ex1-Topt", boundedness.best_transform, with_gain((0.1, 387.0)), Verdict.NOT_REPRODUCED),
-    ("P3-prop1-young", boundedness.young, with_gain((-1.18, -387.0)), Verdict.NOT_REPRODUCED),
-    ("P3-fig2-x", norms.longitudinal, with_tire("longitudinal", sigma2=2.0), Verdict.NOT_REPRODUCED),
-    ("P3-fig2-y", norms.lateral, with_gain(lateral=(1.21, 2.0)), Verdict.NOT_REPRODUCED),
-    ("P3-fig2-nonexp", norms.non_expansive, with_gain((1.18, 1e5), (1.21, 5e3)), Verdict.REPRODUCED),
-    ("P3-fig345", sensitivity.small_deviations, with_gain(lateral=(1.4, 16.8)), Verdict.NOT_REPRODUCED),
-    ("P3-obs", sensitivity.rank_of_observability, with_tire("lateral", sigma1=0.2), Verdict.REPRODUCED),
-    ("P3-20", switching.common_decay, replace(PRINTED, high_slip=(1.18, 380.0)), Verdict.REPRODUCED),
-    ("P3-ex2-arb", switching.arbitrary_switching, replace(PRINTED, high_slip=(0.22, 1.0)), Verdict.NOT_REPRODUCED),
-    ("P3-fig6", switching.markov_margin, replace(PRINTED, high_slip=(-0.22, -0.1)), Verdict.NOT_REPRODUCED),
-    ("P3-kron", switching.orientation, with_gain((0.0, 0.0)), Verdict.NOT_REPRODUCED),
-    ("P3-ex3", example_3.twenty_percent, replace(PRINTED, example_drop=0.8), Verdict.UNDER_SPECIFIED),
-    ("P3-ex3-arb", example_3.any_pattern, with_gain((0.3, 1.0)), Verdict.REPRODUCED),
-    ("P3-pcr", drops.critical_probability, replace(PRINTED, example_drop=0.6), Verdict.NOT_REPRODUCED),
-    ("P3-pcr", drops.critical_probability, with_gain((-1.18, -387.0)), Verdict.NOT_REPRODUCED),
-    ("P3-rem4", drops.detectable_mixture, with_gain((0.3, 387.0)), Verdict.NOT_REPRODUCED),
-    ("P3-zoh", discretisation.zero_order_hold_reading, replace(PRINTED, sample_time=1e-4), Verdict.REPRODUCED),
-    ("P3-susp", vehicle.modes, with_vehicle(suspension_damping=3e4), Verdict.NOT_REPRODUCED),
+    ("P3-ex1-eig", boundedness.eigenvalue, with_gain((1.18, 385.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-ex1-eig", boundedness.eigenvalue, with_tire("longitudinal", sigma1=1.001), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-ex1-sym", boundedness.symmetric, replace(PRINTED, example_speed=33.5293), ClaimVerdict.REPRODUCED),
+    ("P3-ex1-T", boundedness.transformed, replace(PRINTED, example_speed=30.0), ClaimVerdict.REPRODUCED),
+    ("P3-ex1-Topt", boundedness.best_transform, with_gain((0.1, 387.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-prop1-young", boundedness.young, with_gain((-1.18, -387.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-fig2-x", norms.longitudinal, with_tire("longitudinal", sigma2=2.0), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-fig2-y", norms.lateral, with_gain(lateral=(1.21, 2.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-fig2-nonexp", norms.non_expansive, with_gain((1.18, 1e5), (1.21, 5e3)), ClaimVerdict.REPRODUCED),
+    ("P3-fig345", sensitivity.small_deviations, with_gain(lateral=(1.4, 16.8)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-obs", sensitivity.rank_of_observability, with_tire("lateral", sigma1=0.2), ClaimVerdict.REPRODUCED),
+    ("P3-20", switching.common_decay, replace(PRINTED, high_slip=(1.18, 380.0)), ClaimVerdict.REPRODUCED),
+    ("P3-ex2-arb", switching.arbitrary_switching, replace(PRINTED, high_slip=(0.22, 1.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-fig6", switching.markov_margin, replace(PRINTED, high_slip=(-0.22, -0.1)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-kron", switching.orientation, with_gain((0.0, 0.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-ex3", example_3.twenty_percent, replace(PRINTED, example_drop=0.8), ClaimVerdict.UNDER_SPECIFIED),
+    ("P3-ex3-arb", example_3.any_pattern, with_gain((0.3, 1.0)), ClaimVerdict.REPRODUCED),
+    ("P3-pcr", drops.critical_probability, replace(PRINTED, example_drop=0.6), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-pcr", drops.critical_probability, with_gain((-1.18, -387.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-rem4", drops.detectable_mixture, with_gain((0.3, 387.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-zoh", discretisation.zero_order_hold_reading, replace(PRINTED, sample_time=1e-4), ClaimVerdict.REPRODUCED),
+    ("P3-susp", vehicle.modes, with_vehicle(suspension_damping=3e4), ClaimVerdict.NOT_REPRODUCED),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("claim", "setting", "verdict"), [row[1:] for row in FLIPS], ids=[f"{row[0]}-{k}" for k, row in enumerate(FLIPS)]
 )
-def test_a_changed_input_changes_the_verdict(claim: Any, setting: Setting, verdict: Verdict) -> None:
+def test_a_changed_input_changes_the_verdict(claim: Any, setting: Setting, verdict: ClaimVerdict) -> None:
     assert claim().verdict is not verdict
     assert claim(setting).verdict is verdict
 
@@ -83,30 +83,30 @@ def test_a_changed_formula_changes_the_verdict(monkeypatch: pytest.MonkeyPatch) 
     """Claims without an input that could break them: break the statement instead."""
     other = with_tire("longitudinal", sigma2=3.0)
     other.__dict__["models"] = PRINTED.models  # the floor of one tire, the norm of another
-    assert norms.any_gain(other).verdict is Verdict.NOT_REPRODUCED
+    assert norms.any_gain(other).verdict is ClaimVerdict.NOT_REPRODUCED
     flat = np.ones(10**6)
     flat[0] = 0.0
-    assert experiments.normalised_errors({"longitudinal": flat, "lateral": flat}).verdict is Verdict.REPRODUCED
+    assert experiments.normalised_errors({"longitudinal": flat, "lateral": flat}).verdict is ClaimVerdict.REPRODUCED
     with monkeypatch.context() as patch:
         patch.setattr(drops, "FIG8_DROPS", (0.2, 0.2))
-        assert drops.radius_under_drops().verdict is Verdict.REPRODUCED
+        assert drops.radius_under_drops().verdict is ClaimVerdict.REPRODUCED
         patch.setattr(drops, "bisected", lambda A0, A1: np.full(len(A0), 0.7))
-        assert drops.exact_critical_probability().verdict is Verdict.NOT_REPRODUCED
+        assert drops.exact_critical_probability().verdict is ClaimVerdict.NOT_REPRODUCED
         patch.setattr(vehicle, "residual", lambda formula: (sp.S(0),) * 3)
-        assert vehicle.loads().verdict is Verdict.REPRODUCED
+        assert vehicle.loads().verdict is ClaimVerdict.REPRODUCED
         patch.setattr(tire, "PRINTED_UNITS", tire.CORRECTED_UNITS)
-        assert tire.steady_curve().verdict is Verdict.NOT_REPRODUCED
+        assert tire.steady_curve().verdict is ClaimVerdict.NOT_REPRODUCED
         patch.setattr(sensitivity, "CHANGE", 3.0)
-        assert sensitivity.small_deviations().verdict is Verdict.REPRODUCED
+        assert sensitivity.small_deviations().verdict is ClaimVerdict.REPRODUCED
 
 
 def test_the_comparisons_behind_the_verdicts() -> None:
-    assert erratum(True, False) is Verdict.REPRODUCED  # a printed form that holds is no erratum
-    assert erratum(False, False) is Verdict.NOT_REPRODUCED  # nor is one whose correction fails
-    assert derived(False) is Verdict.NOT_REPRODUCED
-    assert among_readings([0.9, 1.1], 1.0, 0.05) is Verdict.UNDER_SPECIFIED
-    assert among_readings([1.0, 1.01], 1.0, 0.05) is Verdict.REPRODUCED
-    assert among_readings([0.9, 0.8], 1.0, 0.05) is Verdict.NOT_REPRODUCED
-    assert among_readings([float("nan")], 1.0, 0.05) is not Verdict.REPRODUCED
-    assert open_choice([[1.0, 2.0], [1.0, 2.0]], 0.0) is Verdict.REPRODUCED
-    assert open_choice([[1.0, 2.0], [1.0, 2.1]], 0.05) is Verdict.UNDER_SPECIFIED
+    assert erratum(True, False) is ClaimVerdict.REPRODUCED  # a printed form that holds is no erratum
+    assert erratum(False, False) is ClaimVerdict.NOT_REPRODUCED  # nor is one whose correction fails
+    assert derived(False) is ClaimVerdict.NOT_REPRODUCED
+    assert among_readings([0.9, 1.1], 1.0, 0.05) is ClaimVerdict.UNDER_SPECIFIED
+    assert among_readings([1.0, 1.01], 1.0, 0.05) is ClaimVerdict.REPRODUCED
+    assert among_readings([0.9, 0.8], 1.0, 0.05) is ClaimVerdict.NOT_REPRODUCED
+    assert among_readings([float("nan")], 1.0, 0.05) is not ClaimVerdict.REPRODUCED
+    assert open_choice([[1.0, 2.0], [1.0, 2.0]], 0.0) is ClaimVerdict.REPRODUCED
+    assert open_choice([[1.0, 2.0], [1.0, 2.1]], 0.05) is ClaimVerdict.UNDER_SPECIFIED

@@ -12,7 +12,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from estimators.sideslip import FourWheelModel
-from studies.claim import Finding, Verdict
+from studies.claim import ClaimVerdict, Finding
 from studies.papers.ekf_ukf_lateral.accuracy import TABLE_1, below_eight_percent
 from studies.papers.ekf_ukf_lateral.inputs import (
     LOADS,
@@ -74,7 +74,7 @@ def test_claims_are_those_of_the_reference() -> None:
 class TestObservability:
     def test_rank_seven_and_six(self) -> None:
         found = finding("P4-obs")
-        assert found.verdict is Verdict.NOT_REPRODUCED
+        assert found.verdict is ClaimVerdict.NOT_REPRODUCED
         assert (found.computed["rank"], found.computed["rank_upper_bound"]) == (7, 7)
         assert (found.computed["rank_at_zero_steering"], found.computed["rank_steering_through_zero"]) == (6, 7)
         assert found.computed["hidden_directions"] == ["force_rl - force_rr"]
@@ -89,7 +89,7 @@ class TestObservability:
     @pytest.mark.parametrize("model", [printed_output_model, rear_difference_model])
     def test_verdict_flips_when_the_rear_split_is_seen(self, model) -> None:  # type: ignore[no-untyped-def]
         found = rank_of_the_model(model())
-        assert (found.computed["rank"], found.verdict) == (8, Verdict.REPRODUCED)
+        assert (found.computed["rank"], found.verdict) == (8, ClaimVerdict.REPRODUCED)
 
     def test_two_integrated_motions_measure_the_same(self) -> None:
         """Recomputed: the symbolic model by an adaptive integrator, two rear splits; the split decays with the distance."""
@@ -141,17 +141,17 @@ class TestEquations:
         assert lateral == pytest.approx(right, abs=1e-4)
         printed = right + (x[5] - x[7]) * np.sin(0.08) / car.mass
         assert abs(printed - lateral) > 0.02
-        assert finding("P4-y4").verdict is Verdict.ERRATUM
+        assert finding("P4-y4").verdict is ClaimVerdict.ERRATUM
 
     def test_output_verdict_follows_from_the_form(self) -> None:
-        assert lateral_output(corrected_model()).verdict is Verdict.REPRODUCED
+        assert lateral_output(corrected_model()).verdict is ClaimVerdict.REPRODUCED
 
     def test_sign_of_the_tire_force(self) -> None:
         found = finding("P4-dugoff")
-        assert found.verdict is Verdict.ERRATUM
+        assert found.verdict is ClaimVerdict.ERRATUM
         np.testing.assert_allclose(found.computed["poles_printed_1_s"], [3.0621, 4.0469], atol=1e-4)
         np.testing.assert_allclose(found.computed["poles_corrected_1_s"], [-3.8848, -3.2242], atol=1e-4)
-        assert tire_sign(printed_sign=1).verdict is Verdict.REPRODUCED
+        assert tire_sign(printed_sign=1).verdict is ClaimVerdict.REPRODUCED
 
     @pytest.mark.parametrize("sign", [1, -1])
     def test_poles_in_exact_numbers(self, sign: int) -> None:
@@ -183,7 +183,7 @@ class TestEquations:
 class TestTable1:
     def test_two_rows_exceed_the_limit(self) -> None:
         found = finding("P4-tab1")
-        assert found.verdict is Verdict.NOT_REPRODUCED
+        assert found.verdict is ClaimVerdict.NOT_REPRODUCED
         assert found.computed["rows_above_limit"] == ["F_y12 front right", "sideslip"]
         exact = sum(Fraction(text) for text in ("5.02", "9.32", "7.55", "5.07", "10.20")) / 5
         assert exact == Fraction(3716, 500) and found.computed["ukf_average_percent"] == pytest.approx(float(exact))
@@ -191,7 +191,7 @@ class TestTable1:
 
     def test_verdict_flips_when_every_row_is_below(self) -> None:
         rows = [replace(row, mean={**row.mean, "ukf": min(row.mean["ukf"], 7.9)}) for row in TABLE_1]
-        assert below_eight_percent(rows).verdict is Verdict.REPRODUCED
+        assert below_eight_percent(rows).verdict is ClaimVerdict.REPRODUCED
 
 
 def test_study_is_complete() -> None:

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from analysis.bounds_sliding_mode import PUBLISHED, SlidingModeGains
 from estimators.sideslip import CorneringModel, SlidingModeObserver
-from studies.claim import Finding, Verdict
+from studies.claim import ClaimVerdict, Finding
 from studies.papers.published import published_claims
 from studies.papers.smo_ekf_sideslip import (
     force_observer,
@@ -85,7 +85,7 @@ def test_claims_are_those_of_the_reference() -> None:
     largest = numbers(reference["P5-tabs"]["computed"])
     assert largest[0] == finding("P5-tabs").computed["largest_mean_percent"] == 5.2
     assert finding("P5-tabs").computed["largest_deviation_percent"] == 3.9
-    assert "underestimated" in reference["P5-orl"]["computed"] and finding("P5-orl").verdict is Verdict.ERRATUM
+    assert "underestimated" in reference["P5-orl"]["computed"] and finding("P5-orl").verdict is ClaimVerdict.ERRATUM
 
 
 @pytest.mark.shared
@@ -106,21 +106,21 @@ def test_sampling_agrees_with_the_reference() -> None:
 class TestGains:
     def test_front_gain_in_exact_numbers(self) -> None:
         found = finding("P5-gains")
-        assert found.verdict is Verdict.NOT_REPRODUCED
+        assert found.verdict is ClaimVerdict.NOT_REPRODUCED
         assert Fraction(found.computed["omega5_exact"]) == Fraction(146, 112) * 40000 == Fraction(365000, 7)
         assert found.computed["residual_Nm_s"] == 160.0
         assert SlidingModeObserver(published_car()).condition_residual == pytest.approx(160.0)
 
     def test_verdict_flips_with_the_exact_gain(self) -> None:
-        assert force_observer.gain_condition(changed(5, 52142.857)).verdict is Verdict.REPRODUCED
+        assert force_observer.gain_condition(changed(5, 52142.857)).verdict is ClaimVerdict.REPRODUCED
 
     def test_dominance_is_local(self) -> None:
         found = finding("P5-A4")
-        assert found.verdict is Verdict.REPRODUCED
+        assert found.verdict is ClaimVerdict.REPRODUCED
         assert found.computed["yaw_moment_limit_Nm"] == 30_000.0
         assert found.computed["worst_start_Nm"] == pytest.approx(1.12 * 6282 + 1.46 * 3663)
-        assert force_observer.dominance(changed(1, 4.0)).verdict is Verdict.NOT_REPRODUCED  # 12 kN m limit
-        assert force_observer.dominance(changed(12, -1.0)).verdict is Verdict.NOT_REPRODUCED
+        assert force_observer.dominance(changed(1, 4.0)).verdict is ClaimVerdict.NOT_REPRODUCED  # 12 kN m limit
+        assert force_observer.dominance(changed(12, -1.0)).verdict is ClaimVerdict.NOT_REPRODUCED
 
     def test_printed_sign_of_a4_is_no_condition(self) -> None:
         """L_1 x_2 + L_2 x_3 = 0, yet the yaw error grows at 1 rad/s^2, by the right-hand side and by simulation."""
@@ -131,7 +131,7 @@ class TestGains:
 
     def test_split_decay_in_exact_numbers_and_simulated(self) -> None:
         found = finding("P5-A12")
-        assert found.verdict is Verdict.REPRODUCED
+        assert found.verdict is ClaimVerdict.REPRODUCED
         assert Fraction(found.computed["decay_rate_exact"]) == Fraction(86, 25)
         assert found.computed["simulated_decay_1_s"] == pytest.approx(3.44, rel=1e-3)
 
@@ -153,16 +153,16 @@ class TestGains:
     def test_verdict_flips_when_the_split_does_not_follow(self, gains: SlidingModeGains) -> None:
         found = force_observer.split_decay(gains)
         exact, simulated = found.computed["decay_rate_1_s"], found.computed["simulated_decay_1_s"]
-        assert (found.verdict is Verdict.REPRODUCED) == (exact > 0 and abs(simulated / exact - 1.0) < 1e-3)
+        assert (found.verdict is ClaimVerdict.REPRODUCED) == (exact > 0 and abs(simulated / exact - 1.0) < 1e-3)
         if exact < 0:
-            assert found.verdict is Verdict.NOT_REPRODUCED
+            assert found.verdict is ClaimVerdict.NOT_REPRODUCED
 
 
 class TestSampling:
     def test_verdict_follows_from_the_readings(self) -> None:
-        assert finding("P5-100Hz").verdict is Verdict.UNDER_SPECIFIED
-        assert linear_zones.sampled_switching((WIDE, (0.3, 2.0, 2.0))).verdict is Verdict.REPRODUCED
-        assert linear_zones.sampled_switching((NARROW,)).verdict is Verdict.NOT_REPRODUCED
+        assert finding("P5-100Hz").verdict is ClaimVerdict.UNDER_SPECIFIED
+        assert linear_zones.sampled_switching((WIDE, (0.3, 2.0, 2.0))).verdict is ClaimVerdict.REPRODUCED
+        assert linear_zones.sampled_switching((NARROW,)).verdict is ClaimVerdict.NOT_REPRODUCED
 
     def test_radius_is_that_of_the_runtime(self) -> None:
         observer = SlidingModeObserver(published_car(), widths=WIDE)
@@ -203,7 +203,7 @@ class TestSampling:
 class TestObservability:
     def test_force_model(self) -> None:
         found = finding("P5-obs")
-        assert found.verdict is Verdict.REPRODUCED
+        assert found.verdict is ClaimVerdict.REPRODUCED
         assert (found.computed["rank"], found.computed["rank_with_rear_longitudinal_force"]) == (4, 4)
         outputs = np.array([[1, 0, 0, 0], [0, 1, 1, 0], [0, 0, 0, 1], [0, 1.12, -1.46, 0]]) / [
             [1],
@@ -217,11 +217,11 @@ class TestObservability:
     def test_verdict_flips_with_the_rear_longitudinal_force(self) -> None:
         found = observability.force_model(axle_force_model(rear_longitudinal_force=True))
         assert (found.computed["rank"], found.computed["states"]) == (4, 5)
-        assert found.verdict is Verdict.NOT_REPRODUCED
+        assert found.verdict is ClaimVerdict.NOT_REPRODUCED
 
     def test_sideslip_model(self) -> None:
         found = finding("P5-ekf-obs")
-        assert found.verdict is Verdict.REPRODUCED
+        assert found.verdict is ClaimVerdict.REPRODUCED
         computed = found.computed
         assert (computed["generic_rank"], computed["rank_of_outputs_alone"]) == (3, 2)
         assert (
@@ -258,7 +258,7 @@ class TestObservability:
 class TestTables:
     def test_below_six_percent(self) -> None:
         found = finding("P5-tabs")
-        assert found.verdict is Verdict.REPRODUCED
+        assert found.verdict is ClaimVerdict.REPRODUCED
         assert found.computed["mean_by_mass_percent"]["F_y2"] == [2.2, 10.4]
         assert found.computed["mean_by_mass_percent"]["beta_2"] == [4.4, 5.4]
 
@@ -270,18 +270,18 @@ class TestTables:
         for key in place[:-1]:
             entry = entry[key]
         entry[place[-1]] = value  # type: ignore[assignment]
-        assert printed_tables.force_tables(tables).verdict is Verdict.NOT_REPRODUCED
+        assert printed_tables.force_tables(tables).verdict is ClaimVerdict.NOT_REPRODUCED
 
 
 class TestFixedStiffness:
     def test_errors_have_opposite_signs(self) -> None:
         found = finding("P5-orl")
         low, exact, high = found.computed["simulated_rear_sideslip_ratio"]
-        assert found.verdict is Verdict.ERRATUM
+        assert found.verdict is ClaimVerdict.ERRATUM
         assert low > 1.5 and high < 0.8 and exact == pytest.approx(1.0, abs=0.03)
 
     def test_verdict_follows_from_the_settings(self) -> None:
-        assert sideslip_settings.fixed_stiffness((0.5, 0.7)).verdict is Verdict.REPRODUCED  # both too soft
+        assert sideslip_settings.fixed_stiffness((0.5, 0.7)).verdict is ClaimVerdict.REPRODUCED  # both too soft
 
     def test_steady_state_by_hand(self) -> None:
         """Second road: in a steady turn the rear force is fixed by speed and yaw rate, so the slip is as 1 / factor."""

@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from estimators.arrays import FloatArray
 from synthesis.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import solve
-from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial
+from synthesis.polynomials.matrix import MatrixPolynomial
 from tests.unit.lmi_cases import (
     SLACK,
     capped,
@@ -303,7 +304,7 @@ def test_reference_problem(kind: Relaxation, degree: int) -> None:
 
 
 @pytest.mark.parametrize(("kind", "degree"), [("exact", 1), ("exact", 2), ("exact", 3), ("grid", 2)])
-def test_reference_problem_by_the_second_road(kind: Relaxation, degree: int) -> None:
+def test_reference_problem_by_the_second_backend(kind: Relaxation, degree: int) -> None:
     """cvxpy canonicalises by itself; the verdict is ours."""
     model = corner("corner-estimation", "longitudinal", 140.0)[0]
     found = design_observer(model, reference_design(degree, kind, "cvxpy:CLARABEL"))

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from estimators.arrays import FloatArray
 from estimators.filters import SigmaWeights
 from estimators.forces import (
     LateralForceEstimator,
@@ -29,7 +30,6 @@ from estimators.vehicle import VehicleParameters
 TIME = 0.005
 CAR = VehicleParameters.published_suv()
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def test_pid_error_matrix_is_hurwitz_with_the_poles_of_the_printed_gains() -> None:
@@ -138,7 +138,7 @@ shared = [
 ]
 
 
-def drive(name: str) -> dict[str, Array]:
+def drive(name: str) -> dict[str, FloatArray]:
     with (DATA / f"ocd_suv_{FILES[name]}_200hz.csv").open() as file:
         header = file.readline().strip().split(",")
         table = np.loadtxt(file, delimiter=",")
@@ -148,7 +148,7 @@ def drive(name: str) -> dict[str, Array]:
     return columns
 
 
-def sensed(truth: dict[str, Array], seeds: int) -> dict[str, Array]:
+def sensed(truth: dict[str, FloatArray], seeds: int) -> dict[str, FloatArray]:
     rng, n = np.random.default_rng(20), len(truth["ax"])
     white, scale = rng.standard_normal, 1.0 + 0.01 * rng.standard_normal((3, seeds))
     bias = rng.standard_normal((3, seeds)) * np.array([[0.15], [0.15], [0.002]])
@@ -164,14 +164,14 @@ def sensed(truth: dict[str, Array], seeds: int) -> dict[str, Array]:
     }
 
 
-def nrms(value: Array, reference: Array) -> Array:
+def nrms(value: FloatArray, reference: FloatArray) -> FloatArray:
     """P1 (46) in %, (seeds, corners), from (n, seeds, corners) and (n, corners); NaN where the force never tops 1 kN."""
     peak = np.abs(reference).max(axis=0)
     error = 100 * np.sqrt(np.nanmean((value - reference[:, None]) ** 2, axis=0))
     return error / np.where(peak > 1000.0, peak, np.nan)
 
 
-def estimated(name: str) -> dict[str, Array]:
+def estimated(name: str) -> dict[str, FloatArray]:
     """NRMS in % of every estimate, (seeds, corners or axles)."""
     truth, batch = drive(name), (SEEDS, 4)
     seen = sensed(truth, SEEDS)
@@ -180,7 +180,7 @@ def estimated(name: str) -> dict[str, Array]:
     slope, turn = FilteredDerivative(TIME, 0.005, batch), FilteredDerivative(TIME, 0.02, (SEEDS,))
     uio, ukf, pid = (make(SUV, TIME, batch) for make in (UnknownInputForceObserver, WheelForceFilter, PidForceObserver))
     lateral = LateralForceEstimator(SUV, TIME, (SEEDS,), "linear", measurement_deviation=(0.3, 0.1, 0.3))
-    rows: dict[str, list[Array]] = {}
+    rows: dict[str, list[FloatArray]] = {}
     front = np.zeros(SEEDS)
     for k in range(len(truth["t_s"])):
         ax, ay, omega, torque = seen["ax"][k], seen["ay"][k], seen["omega"][k], seen["T"][k]
@@ -212,7 +212,7 @@ def estimated(name: str) -> dict[str, Array]:
 
 
 @pytest.fixture(scope="module")
-def results() -> dict[str, dict[str, Array]]:
+def results() -> dict[str, dict[str, FloatArray]]:
     found = {name: estimated(name) for name in FILES}
     for name, result in found.items():  # seen with -s: the table of the report
         for key, value in result.items():
@@ -221,7 +221,7 @@ def results() -> dict[str, dict[str, Array]]:
     return found
 
 
-def largest_mean(value: Array) -> float:
+def largest_mean(value: FloatArray) -> float:
     """The worst corner's mean over the runs."""
     return float(value.mean(axis=0).max())
 

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from estimators.arrays import FloatArray
 from studies.papers.corner_estimation.inputs import CORNERS
 from studies.papers.corner_estimation.printed_lyapunov import Certificate, Reading, certificate, convexity
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.models.catalogue.corner import Direction
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray
-from synthesis.printed import judge
+from synthesis.published_certificate import check_certificate
 from synthesis.stability import Form, GainBox, affine_quadratic_stability
 from tests.unit.lmi_cases import corner
 
@@ -111,8 +111,8 @@ def test_a_constant_diagonal_matrix_is_enough(name: str, direction: Direction, w
     model, published = corner(name, direction)
     assert published.gains is not None
     gains = [[str(gain)] for gain in published.gains]
-    assert judge(model, gains, [[[weight, "0"], ["0", "1"]]]).everywhere
-    assert judge(model, gains, [[["1", "0"], ["0", "1"]]]).everywhere is False
+    assert check_certificate(model, gains, [[[weight, "0"], ["0", "1"]]]).everywhere
+    assert check_certificate(model, gains, [[["1", "0"], ["0", "1"]]]).everywhere is False
 
 
 @pytest.mark.parametrize("direction", DIRECTIONS)
@@ -183,7 +183,7 @@ VALID: dict[tuple[Direction, Reading], tuple[tuple[float, float], ...]] = {
 @pytest.mark.parametrize(("direction", "reading"), list(VALID))
 def test_printed_matrices_hold_exactly_where_the_notes_say(direction: Direction, reading: Reading) -> None:
     model, gains, matrix, form = printed(direction, reading)
-    found = judge(model, gains, matrix, form)
+    found = check_certificate(model, gains, matrix, form)
     expected = VALID[direction, reading]
     assert len(found.intervals) == len(expected)
     for (low, high), ends in zip(found.intervals, expected, strict=True):
@@ -195,7 +195,7 @@ def test_printed_matrices_hold_exactly_where_the_notes_say(direction: Direction,
 def test_printed_longitudinal_matrix_in_the_primal_reading_far_outside() -> None:
     """Claim P1-29-primal: negative definite only for omega in (302.9196, 302.9330), outside the stated range."""
     model, gains, matrix, form = printed("longitudinal", "primal")
-    ((low, high),) = judge(model, gains, matrix, form, search=(0.0, 400.0)).intervals
+    ((low, high),) = check_certificate(model, gains, matrix, form, search=(0.0, 400.0)).intervals
     assert abs(low - 302.9196) <= 0.5e-4
     assert abs(high - 302.9330) <= 0.5e-4
 
@@ -203,7 +203,7 @@ def test_printed_longitudinal_matrix_in_the_primal_reading_far_outside() -> None
 def test_the_absolute_value_must_be_kept() -> None:
     """P1 notes 11 item 2: without |omega| the longitudinal dual test fails below -81 rad/s."""
     model, gains, matrix, form = printed("longitudinal", "dual")
-    ((low, high),) = judge(model, gains, matrix, form, search=(-180.0, 0.0)).intervals
+    ((low, high),) = check_certificate(model, gains, matrix, form, search=(-180.0, 0.0)).intervals
     assert high == 0.0
     assert abs(low + 81.0) <= 0.5
 
@@ -224,7 +224,7 @@ def test_by_how_much_the_primal_reading_fails(direction: Direction, omega: float
 def test_validity_agrees_with_dense_eigenvalues(case: tuple[Direction, Reading], omega: float) -> None:
     """Independently: numpy eigenvalues at any wheel speed that is not right at an end of an interval."""
     model, gains, matrix, form = printed(*case)
-    intervals = judge(model, gains, matrix, form).intervals
+    intervals = check_certificate(model, gains, matrix, form).intervals
     if any(abs(omega - end) < 1e-3 for interval in intervals for end in interval):
         return
     inside = any(low < omega < high for low, high in intervals)

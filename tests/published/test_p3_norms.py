@@ -59,7 +59,7 @@ def test_fig_2_lateral() -> None:
 
 
 def test_the_norm_is_the_static_gain_matrix() -> None:
-    """Second road: all four channels peak at zero frequency, where a 2 x 2 inverse gives the norm."""
+    """Independent check: all four channels peak at zero frequency, where a 2 x 2 inverse gives the norm."""
     for direction in ("longitudinal", "lateral"):
         model, gain = observer(direction)
         A_e, B_e = model.on(SPEEDS).error_dynamics(gain)

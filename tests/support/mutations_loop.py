@@ -12,7 +12,7 @@ from fractions import Fraction
 import numpy as np
 
 from tests.support.mutations_blind import FACTORS, Content, changed, pick
-from tests.support.schedule_road import SHAPES, Road
+from tests.support.schedule_oracle import SHAPES, Oracle
 
 HOSTILE = ("9**9**9", "1e1000000000", "(" * 120 + "1" + ")" * 120, "__import__('os')", "1/0", "lambda: 1", "1e-3*1e3")
 
@@ -149,9 +149,9 @@ def ordered(data: Content, rng: np.random.Generator) -> str:
 
 def rebuild(data: Content) -> None:
     """The stored plant from formulas and constants, correctly rounded."""
-    road = Road(data)
+    oracle = Oracle(data)
     for key, (rows, columns) in SHAPES.items():
-        cells = [[_to_chebyshev(series) for series in row] for row in road.formulas_exact[key]]
+        cells = [[_to_chebyshev(series) for series in row] for row in oracle.formulas_exact[key]]
         shape = (len(data["model"][rows]), len(data["model"][columns]))
         count = max((len(series) for row in cells for series in row), default=1)
         coefficients = np.zeros((count, *shape))

@@ -1,4 +1,4 @@
-"""Is what `gainsmith certify` prints of a file true of that file? Judged by `tests.support.schedule_road`.
+"""Is what `gainsmith certify` prints of a file true of that file? Judged by `tests.support.schedule_oracle`.
 
 A statement is read from its words, as a person would read it; its level is loosened by `LOOSE`, so that rounding in float64 is no
 violation. Two ways for everything: attempts to break it without P (frozen parameters, frequencies, random motions), and its
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pint
 
-from tests.support.schedule_road import SHAPES, Road
+from tests.support.schedule_oracle import SHAPES, Oracle
 
 LOOSE = 1e-6
 ROUNDING = 1e-9  # of a normalised matrix
@@ -63,45 +63,47 @@ class Judge:
     """Judges the statements about one content."""
 
     def __init__(self, content: Mapping[str, Any], seed: int = 0) -> None:
-        self.road = Road(content)
+        self.oracle = Oracle(content)
         self.rng = np.random.default_rng(seed)
         self.units = {
             s["name"]: s["unit"]
             for key in ("states", "inputs", "outputs", "disturbances")
             for s in content["model"][key]
         }
-        self.p = self.road.grid()
-        self.paths = self.road.walks(self.rng, 6, 60)
+        self.p = self.oracle.grid()
+        self.paths = self.oracle.walks(self.rng, 6, 60)
 
     @cached_property
     def equation(self) -> tuple[np.ndarray, np.ndarray]:
         """The error equation on the grid."""
-        return self.road.equation(self.p)
+        return self.oracle.equation(self.p)
 
     @cached_property
     def update(self) -> dict[str, np.ndarray]:
         """The update on the grid."""
-        return self.road.update(self.p)
+        return self.oracle.update(self.p)
 
     @cached_property
     def moving(self) -> dict[str, np.ndarray]:
         """The update along the random motions."""
-        found = self.road.update(self.paths.ravel())
+        found = self.oracle.update(self.paths.ravel())
         return {key: m.reshape(*self.paths.shape, *m.shape[1:]) for key, m in found.items()}
 
     def plant(self) -> list[str]:
         """The stored plant is that of the formulas, at random parameters."""
-        p, wrong = self.rng.uniform(self.road.low, self.road.high, 7), []
+        p, wrong = self.rng.uniform(self.oracle.low, self.oracle.high, 7), []
         for key in SHAPES:
-            stored, size = self.road.stored(key, p)
-            if stored.size and not (np.abs(stored - self.road.matrix(key, p)) <= 1e-13 * size).all():
+            stored, size = self.oracle.stored(key, p)
+            if stored.size and not (np.abs(stored - self.oracle.matrix(key, p)) <= 1e-13 * size).all():
                 wrong.append(f"plant.{key} is not that of the formulas")
         return wrong
 
     def dimensions(self) -> list[str]:
         """Every formula, worked out with quantities in their units, gives the number that is used."""
-        model, wrong = self.road.content["model"], []
-        named = {self.road.parameter["name"]: (0.5 * (self.road.low + self.road.high), self.road.parameter["unit"])}
+        model, wrong = self.oracle.content["model"], []
+        named = {
+            self.oracle.parameter["name"]: (0.5 * (self.oracle.low + self.oracle.high), self.oracle.parameter["unit"])
+        }
         named |= {name: (entry["value"], entry["unit"]) for name, entry in model["constants"].items()}
         if all(unit == "1" for unit in (*self.units.values(), *(unit for _, unit in named.values()))):
             return []
@@ -116,9 +118,9 @@ class Judge:
 
     def unit(self, s: Statement) -> list[str]:
         """Names exist; the unit of the level, and of sizes, are those of the signals."""
-        group = self.road.names["states" if s.words == "update: gain of motion" else "disturbances"]
+        group = self.oracle.names["states" if s.words == "update: gain of motion" else "disturbances"]
         wrong = [f"'{name}' is no input" for name in s.inputs if name not in group]
-        wrong += [f"'{name}' is no state" for name in s.errors if name not in self.road.names["states"]]
+        wrong += [f"'{name}' is no state" for name in s.errors if name not in self.oracle.names["states"]]
         if wrong:
             return wrong
         per = "/s" if s.words == "update: gain of motion" else ""
@@ -134,7 +136,7 @@ class Judge:
     def truth(self, s: Statement) -> list[str]:
         """What speaks against a statement that is called proved."""
         found = [f"{s.words}: {what}" for what in self._attempts(s, self.p, LOOSE)]
-        rates = (self.road.parameter["rate_min"], self.road.parameter["rate_max"])
+        rates = (self.oracle.parameter["rate_min"], self.oracle.parameter["rate_max"])
         for rate in np.linspace(float(rates[0]), float(rates[1]), 5):
             for what, matrix in self._inequalities(s, rate):
                 found += [f"{s.words}: {what} > 0 fails"] if not _positive(matrix) else []
@@ -142,13 +144,13 @@ class Judge:
 
     def broken(self, s: Statement, place: float) -> bool:
         """Whether the frozen loop breaks a statement that is called refuted, near the printed place."""
-        near = place + (self.road.high - self.road.low) * 1e-5 * np.linspace(-1.0, 1.0, 9)
-        return bool(self._attempts(s, np.clip(near, self.road.low, self.road.high), -LOOSE))
+        near = place + (self.oracle.high - self.oracle.low) * 1e-5 * np.linspace(-1.0, 1.0, 9)
+        return bool(self._attempts(s, np.clip(near, self.oracle.low, self.oracle.high), -LOOSE))
 
     def remarks(self, lines: Sequence[str]) -> list[str]:
         """What a parameter that moves inside a sample adds, against the plant in short pieces beside the frozen one."""
-        road, model, wrong, pieces = self.road, self.road.content["model"], [], 24
-        states, inputs = road.names["states"], [signal["name"] for signal in model["inputs"]]
+        oracle, model, wrong, pieces = self.oracle, self.oracle.content["model"], [], 24
+        states, inputs = oracle.names["states"], [signal["name"] for signal in model["inputs"]]
         said = np.zeros((len(states), len(states) + len(inputs)))
         for line in lines:
             state, rest = re.fullmatch(r"a parameter moving .* error of (\w+) by at most (.*)", line).groups()  # type: ignore[union-attr]
@@ -156,14 +158,14 @@ class Judge:
                 bound, unit, name = re.fullmatch(r"(\S+) (.+) \|(\w+)\|", part).groups()  # type: ignore[union-attr]
                 said[states.index(state), [*states, *inputs].index(name)] = float(bound)
                 wrong += [] if _same(unit, f"({self.units[state]})/({self.units[name]})") else [f"remark in {unit}"]
-        for rate in (float(road.parameter["rate_min"]), float(road.parameter["rate_max"])):
-            start = self.rng.uniform(road.low, road.high, 5)
-            start[:2] = road.low, road.high
-            way = np.clip(start + rate * road.period, road.low, road.high) - start
+        for rate in (float(oracle.parameter["rate_min"]), float(oracle.parameter["rate_max"])):
+            start = self.rng.uniform(oracle.low, oracle.high, 5)
+            start[:2] = oracle.low, oracle.high
+            way = np.clip(start + rate * oracle.period, oracle.low, oracle.high) - start
             moved, frozen = None, None
             for k in range(pieces):
-                piece = road.driven(start + way * (k + 0.5) / pieces, road.period / pieces)
-                still = road.driven(start, road.period / pieces)
+                piece = oracle.driven(start + way * (k + 0.5) / pieces, oracle.period / pieces)
+                still = oracle.driven(start, oracle.period / pieces)
                 moved, frozen = (b if a is None else b @ a for a, b in ((moved, piece), (frozen, still)))
             assert moved is not None and frozen is not None
             off = np.abs(moved - frozen)[:, : len(states)].max(0)
@@ -173,10 +175,10 @@ class Judge:
 
     def _attempts(self, s: Statement, p: np.ndarray, loose: float) -> list[str]:
         """Frozen parameters (and frequencies) that break the statement, its level loosened."""
-        road, level = self.road, s.level * (1.0 - loose if _from_below(s) else 1.0 + loose)
+        oracle, level = self.oracle, s.level * (1.0 - loose if _from_below(s) else 1.0 + loose)
         slack = 1e-12 * np.sign(loose)
         if s.words.startswith("error equation"):
-            A, B = self.equation if p is self.p else road.equation(p)
+            A, B = self.equation if p is self.p else oracle.equation(p)
             poles = np.linalg.eigvals(A).real
             if s.words.endswith("decay rate"):
                 return _over(poles.max(-1), -level + slack * np.abs(poles).max(), p, "frozen pole")
@@ -185,10 +187,10 @@ class Judge:
             found = _over(poles.max(-1), slack * np.abs(poles).max(), p, "frozen pole")
             omega = np.concatenate([[0.0], np.geomspace(1e-3, 1e4, 40)])
             return found + _over(_gain(1j * omega, A, B, *self._picked(s)), level, p, "frozen gain")
-        update = self.update if p is self.p else road.update(p)
+        update = self.update if p is self.p else oracle.update(p)
         radius = np.abs(np.linalg.eigvals(update["A"])).max(-1)
         if "decay" in s.words:
-            return _over(radius, np.exp(-level * road.period) + slack, p, "frozen radius")
+            return _over(radius, np.exp(-level * oracle.period) + slack, p, "frozen radius")
         found = _over(radius, 1.0 + slack, p, "frozen radius")
         if s.inputs:
             B = update["motion"] if "motion" in s.words else update["B"]
@@ -201,29 +203,29 @@ class Judge:
 
     def _picked(self, s: Statement) -> tuple[np.ndarray, np.ndarray]:
         """Sizes of inputs (columns) and chosen errors (rows)."""
-        group = self.road.names["states" if s.words == "update: gain of motion" else "disturbances"]
+        group = self.oracle.names["states" if s.words == "update: gain of motion" else "disturbances"]
         W = np.array([[s.inputs[name] * (name == other) for name in s.inputs] for other in group])
-        return W, np.array([[float(name == error) for name in self.road.names["states"]] for error in s.errors])
+        return W, np.array([[float(name == error) for name in self.oracle.names["states"]] for error in s.errors])
 
     def _inequalities(self, s: Statement, rate: float) -> list[tuple[str, np.ndarray]]:
-        road, p, level = self.road, self.p, s.level * (1.0 - LOOSE if _from_below(s) else 1.0 + LOOSE)
-        P, out = road.lyapunov(s.P, p), []
+        oracle, p, level = self.oracle, self.p, s.level * (1.0 - LOOSE if _from_below(s) else 1.0 + LOOSE)
+        P, out = oracle.lyapunov(s.P, p), []
         out.append(("P", P))
         if s.words.startswith("error equation"):
             A, B = self.equation
-            P_dot, S = road.lyapunov(s.P, p, True) * rate, P @ A + _turned(P @ A)
+            P_dot, S = oracle.lyapunov(s.P, p, True) * rate, P @ A + _turned(P @ A)
             if s.words.endswith("decay rate"):
                 return [*out, ("decay", -(S + P_dot + 2.0 * level * P))]
             if s.words.endswith("fastest pole"):
                 return [*out, ("pole", S + 2.0 * level * P)]
             W, Z = self._picked(s)
             return [*out, ("gain", _block(-(S + P_dot + Z.T @ Z), -P @ B @ W, level**2))]
-        later = road.lyapunov(s.P, np.clip(p + rate * road.period, road.low, road.high))
+        later = oracle.lyapunov(s.P, np.clip(p + rate * oracle.period, oracle.low, oracle.high))
         update = self.update
         A = update["A"]
         fallen = _turned(A) @ later @ A
         if "decay" in s.words:
-            return [*out, ("decay", np.exp(-2.0 * level * road.period) * P - fallen)]
+            return [*out, ("decay", np.exp(-2.0 * level * oracle.period) * P - fallen)]
         if s.inputs:
             W, Z = self._picked(s)
             BW = (update["motion"] if "motion" in s.words else update["B"]) @ W
@@ -234,12 +236,12 @@ class Judge:
 
     def _motions(self, s: Statement) -> list[str]:
         """Random motions of the parameter from sample to sample, batched; everything exact over a sample."""
-        road, p = self.road, self.paths
+        oracle, p = self.oracle, self.paths
         if s.words.startswith("error equation"):
             return []
         (samples, count), level = p.shape, s.level * (1.0 - LOOSE if _from_below(s) else 1.0 + LOOSE)
         flat = self.moving
-        P = road.lyapunov(s.P, p.ravel()).reshape(*p.shape, *flat["A"].shape[-2:])
+        P = oracle.lyapunov(s.P, p.ravel()).reshape(*p.shape, *flat["A"].shape[-2:])
         n = P.shape[-1]
         if s.inputs:
             B = flat["motion"] if "motion" in s.words else flat["B"]
@@ -252,7 +254,7 @@ class Judge:
                 e = np.einsum("cij,cj->ci", flat["A"][k], e) + np.einsum("cij,cj->ci", B[k] @ W, w[k])
             return [f"{s.words}: a motion has more"] if (heard > level**2 * put).any() else []
         X = np.broadcast_to(np.eye(n), (count, n, n))
-        kept = np.exp(-2.0 * level * road.period) if "decay" in s.words else 1.0
+        kept = np.exp(-2.0 * level * oracle.period) if "decay" in s.words else 1.0
         for k in range(samples - 1):
             before = np.trace(P[k] @ X, axis1=-2, axis2=-1)
             moved = flat["A"][k] @ X @ _turned(flat["A"][k])

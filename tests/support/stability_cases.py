@@ -1,4 +1,4 @@
-"""Random cases for `affine_quadratic_stability`, near the boundary of stability on purpose, and their judgement by `exact_road`.
+"""Random cases for `affine_quadratic_stability`, near the boundary of stability on purpose, checked by `exact_stability`.
 
 `python -m tests.support.stability_cases 10000` prints counts by family and verdict, and violations (there must be none).
 """
@@ -20,7 +20,7 @@ from synthesis.lmi.settings import LmiSettings
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
 from synthesis.stability import GainBox, StabilityResult, _scale, affine_quadratic_stability
-from tests.support import exact_road as road
+from tests.support import exact_stability as oracle
 
 NONE = Fraction(0)
 ONE = (Fraction(1),)
@@ -75,7 +75,7 @@ class Case:
         for k, factor in enumerate(self.below):
             for i in range(n):
                 closed[k][i][i] += factor * decay
-        return road.stable_on_range(closed)
+        return oracle.stable_on_range(closed)
 
     @property
     def model(self) -> LpvModel:
@@ -313,7 +313,7 @@ def lyapunov_proves(case: Case, result: StabilityResult) -> bool:
     finite = [rate for rate in case.rates if np.isfinite(rate)] if case.has_parameter else [0.0]
     speeds = [Fraction(repr(rate)) / case.half for rate in finite] or [NONE]
     decay = Fraction(repr(case.decay))
-    return road.lyapunov_on_range(case.closed, P, case.below, speeds, decay, case.form == "dual")
+    return oracle.lyapunov_on_range(case.closed, P, case.below, speeds, decay, case.form == "dual")
 
 
 def lyapunov_in_v(case: Case, result: StabilityResult) -> list[list[list[Fraction]]]:

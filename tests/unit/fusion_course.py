@@ -5,27 +5,26 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity import FusionStep, VelocityFusion
 
 CAR = VehicleParameters.published_suv()
 STEP = 0.005
 COMPLIANCE = 0.04  # slip per unit of mu, within the prior of the fusion
-Array = npt.NDArray[np.float64]
 
 
 class Course(NamedTuple):
     """n samples of clean signals on a straight road, and the true speed."""
 
-    speed: Array
-    ax: Array
-    wheel_speed: Array  # (n, 4)
-    force: Array  # (n, 4) F_x/F_z
+    speed: FloatArray
+    ax: FloatArray
+    wheel_speed: FloatArray  # (n, 4)
+    force: FloatArray  # (n, 4) F_x/F_z
 
 
-def course(acceleration: Array, start: float = 0.0) -> Course:
+def course(acceleration: FloatArray, start: float = 0.0) -> Course:
     """All wheels drive and brake alike: mu = a/g, slip COMPLIANCE mu."""
     speed = start + STEP * np.concatenate([[0.0], np.cumsum(acceleration[1:])])
     mu = np.repeat(acceleration[:, None] / GRAVITY, 4, axis=1)
@@ -33,7 +32,7 @@ def course(acceleration: Array, start: float = 0.0) -> Course:
     return Course(speed, acceleration, surface / CAR.radius, mu)
 
 
-def phases(*parts: tuple[float, float]) -> Array:
+def phases(*parts: tuple[float, float]) -> FloatArray:
     """Accelerations from (seconds, m/s^2)."""
     return np.concatenate([np.full(round(seconds / STEP), a) for seconds, a in parts])
 
@@ -41,12 +40,12 @@ def phases(*parts: tuple[float, float]) -> Array:
 class Signals(NamedTuple):
     """What the sensors say; change it at will."""
 
-    wheel_speed: Array
-    steer: Array
-    ax: Array
-    ay: Array
-    yaw_rate: Array
-    force: Array
+    wheel_speed: FloatArray
+    steer: FloatArray
+    ax: FloatArray
+    ay: FloatArray
+    yaw_rate: FloatArray
+    force: FloatArray
 
 
 def sensed(drive: Course, seed: int = 0, bias: float = 0.0) -> Signals:
@@ -58,7 +57,9 @@ def sensed(drive: Course, seed: int = 0, bias: float = 0.0) -> Signals:
     return Signals(wheels, np.zeros((n, 4)), drive.ax + bias + noise[0], noise[1], noise[2], drive.force.copy())
 
 
-def driven(signals: Signals, fusion: VelocityFusion | None = None, **options: Any) -> tuple[list[FusionStep], Array]:
+def driven(
+    signals: Signals, fusion: VelocityFusion | None = None, **options: Any
+) -> tuple[list[FusionStep], FloatArray]:
     """All steps, and V_x."""
     runner = VelocityFusion(CAR, STEP) if fusion is None else fusion
     steps = [runner.step(*sample, **{k: v[i] for k, v in options.items()}) for i, sample in enumerate(zip(*signals))]  # noqa: B905

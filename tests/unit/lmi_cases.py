@@ -9,6 +9,7 @@ import numpy as np
 import sympy as sp
 from flint import fmpq, fmpq_poly
 
+from estimators.arrays import FloatArray
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult
 from synthesis.lmi.scaling import observer_scale
@@ -16,7 +17,7 @@ from synthesis.models.catalogue.corner import Direction, corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
 from synthesis.models.parameter_set import Published, load_parameter_set
-from synthesis.polynomials.matrix import FloatArray, MatrixPolynomial, symmetric_block
+from synthesis.polynomials.matrix import MatrixPolynomial, symmetric_block
 from synthesis.polynomials.rational import first_failure, rational
 
 

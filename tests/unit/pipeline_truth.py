@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from estimators.forces import vertical_loads
-from estimators.interpolate import FloatArray
 from estimators.pipeline import EstimationPipeline, PipelineStep, VehicleSignals
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity import FusionSettings

@@ -6,7 +6,7 @@ import json
 import re
 from typing import Any
 
-from studies.claim import Verdict
+from studies.claim import ClaimVerdict
 from studies.plots import Figure
 from studies.plots.draw import draw
 from studies.study import Part, PartResult, Study
@@ -42,7 +42,7 @@ def check_result(result: PartResult) -> None:
         json.dumps([list(row) for row in table.rows])
     for claim in result.claims:
         row = json.loads(json.dumps(claim.row()))
-        assert row["reading"] and row["computed"] and row["verdict"] in set(Verdict)
+        assert row["reading"] and row["computed"] and row["verdict"] in set(ClaimVerdict)
 
 
 def _bottom(axis: Any) -> bool:

@@ -1,4 +1,4 @@
-"""Corner observers of any constants, integrated plainly: the second road to the drives of many designs."""
+"""Corner observers of any constants, integrated plainly: the independent check of the drives of many designs."""
 
 from __future__ import annotations
 

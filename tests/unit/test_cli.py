@@ -20,7 +20,7 @@ from estimators.schedule import read_content, write_content
 from studies.cli import main
 from studies.schedules import run_spec
 from studies.spec import shipped_specs
-from synthesis.lmi.clarabel_road import RawAnswer, solve_with_clarabel
+from synthesis.lmi.clarabel_backend import RawAnswer, solve_with_clarabel
 from synthesis.lmi.conic import ConicData
 
 ROOT = Path(__file__).parents[2]
@@ -139,7 +139,7 @@ def test_committed_schedules_do_not_drift(capsys: pytest.CaptureFixture[str]) ->
         ("degree = 1", "degree = 12", "degree 12"),
         ("wheel_speed_maximum = 140.0", "wheel_speed_maximum = -1.0", "wheel_speed_maximum"),
         ('parameters = "corner-estimation"', 'parameters = "corner-estimaton"', "did you mean corner-estimation"),
-        ('parameters = "corner-estimation"', 'parameters = "absent.toml"', "no such parameter file"),
+        ('parameters = "corner-estimation"', 'parameters = "absent.toml"', "absent.toml: cannot be read"),
         ('id = "corner-velocity-longitudinal"', 'id = "corner-velocity"', "did you mean corner-velocity-l"),
         ('disturbances = ["friction"]', 'disturbances = ["frictoin"]', "did you mean friction"),
         ("[deploy]", "[deploy", "Expected"),

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from estimators.arrays import FloatArray
 from synthesis.lmi.conic import assemble, gram_matrices, structural_zeros, triangle
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.relaxation import relax
 from synthesis.lmi.settings import LmiSettings
-from synthesis.polynomials.matrix import FloatArray, symmetric_block, variable
+from synthesis.polynomials.matrix import symmetric_block, variable
 from tests.unit.lmi_cases import gain_problem, parameter
 
 A = np.array([[[-1.0, 2.0], [0.0, -3.0]], [[0.5, 0.0], [1.0, 0.25]]])

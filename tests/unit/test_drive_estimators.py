@@ -22,11 +22,10 @@ from estimators.pipeline.corner_kinds import CornerKind
 from estimators.schedule import write_content
 from estimators.velocity import BristleTire, LtvKalmanObserver, SwitchedVelocityObserver
 from studies.drives.chain import pipeline_of
-from studies.drives.corner_observers import corner_observer
 from studies.drives.drive_file import DriveFile, read_drive
-from studies.drives.judge import judge
+from studies.drives.evaluation import evaluate
 from studies.drives.run import replay_drive
-from studies.drives.schedules import load_schedule
+from studies.drives.schedules import corner_observer, load_schedule
 from synthesis.errors import SpecError
 from tests.drives.synthetic_drive import DRIVE, TORQUES, columns, write_drive, write_log
 from tests.unit.schedule_content import EFFECTIVE_RADIUS, PUBLISHED, schedule_content
@@ -210,7 +209,7 @@ def test_every_corner_observer_finds_the_velocity_of_the_closed_form(tmp_path: P
     error = np.abs(data.replay.velocity - data.log.reference["vx"])[data.log.time > 0.5]
     assert error.max() < 5e-3
     assert not data.replay.flags.any()
-    assert judge(data)["pipeline"]["estimators"]["corner_velocity"] == name
+    assert evaluate(data)["pipeline"]["estimators"]["corner_velocity"] == name
 
 
 def test_a_schedule_without_a_tire_is_refused_before_the_log_is_read(tmp_path: Path) -> None:

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.drives.drive_file import read_drive
-from studies.drives.drive_tables import Vehicle
+from studies.drives.drive_file import Vehicle, read_drive
 from studies.drives.quantities import factor_to, to_si
 from synthesis.errors import SpecError
 from tests.drives.synthetic_drive import DRIVE, TORQUES

@@ -7,7 +7,7 @@ import pytest
 
 from studies.drives import corner_inputs as ci
 from studies.drives.baselines import held, integrated_acceleration, mean_over
-from studies.drives.judge import slip_ratio
+from studies.drives.evaluation import slip_ratio
 
 CAR = {
     "mass": 2000.0,

@@ -10,11 +10,11 @@ import polars as pl
 import pytest
 
 from estimators.schedule import write_content
+from studies.commands.run import remarks, summary_rows
 from studies.drives import plots
-from studies.drives.judge import DriveData, judge
+from studies.drives.evaluation import DriveData, evaluate
 from studies.drives.quantities import CORNERS
 from studies.drives.run import RunResult, estimate_columns, replay_drive, run_drive
-from studies.drives.summary import remarks, summary_rows
 from studies.plots import Figure, Line, colours
 from tests.drives.synthetic_drive import DRIVE, FRONT, MASS, REAR, TORQUES, TRACK, columns, write_drive, write_log
 from tests.unit.schedule_content import EFFECTIVE_RADIUS, schedule_content
@@ -86,7 +86,7 @@ def pulsed() -> dict[str, Any]:
 
 
 def test_the_total_force_obeys_the_rule_beside_it_and_has_a_baseline(tmp_path: Path) -> None:
-    found = judge(replayed(tmp_path, with_total("ax_true"), pulsed()))["pipeline"]
+    found = evaluate(replayed(tmp_path, with_total("ax_true"), pulsed()))["pipeline"]
     rows, table = found["signals"]["total_force_x"], pulsed()
     counted = int(np.count_nonzero(MASS * table["ax_true"] > 1000.0))
     assert 0 < counted < table["t"].size
@@ -109,7 +109,7 @@ def test_a_total_force_that_is_judged_against_its_own_input_says_so(tmp_path: Pa
     shares = with_total("ax").replace(TORQUES, "")
     assert (
         "its forces are shares of it"
-        in judge(replayed(tmp_path, shares, pulsed()))["pipeline"]["notes"]["total_force_x"]
+        in evaluate(replayed(tmp_path, shares, pulsed()))["pipeline"]["notes"]["total_force_x"]
     )
     other = run_drive([log], write_drive(tmp_path, with_total("ax_true")), tmp_path / "out")
     assert not any("(*)" in line for line in (*remarks(other), *(row[0] for row in summary_rows(other))))

@@ -9,8 +9,8 @@ import pytest
 
 from studies.drives.csv_log import read_columns
 from studies.drives.drive_file import DriveFile, read_drive
-from studies.drives.errors import LogError
 from studies.drives.log import DriveLog, read_log
+from studies.errors import LogError
 from tests.drives.synthetic_drive import DRIVE, columns, write_log
 from tests.unit.schedule_content import EFFECTIVE_RADIUS
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studies.drives.errors import LogError
 from studies.drives.log import read_log
+from studies.errors import LogError
 from tests.drives.synthetic_drive import DRIVE, columns, write_log
 from tests.unit.test_drive_log import HEADER, drive, read, rows
 

@@ -8,8 +8,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from studies.drives.errors import LogError
 from studies.drives.output import check_folder, ready_folder, whole_file, write_csv, write_json
+from studies.errors import LogError
 
 
 def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:

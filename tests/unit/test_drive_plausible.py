@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from studies.drives.drive_file import read_drive
-from studies.drives.errors import LogError
 from studies.drives.log import DriveLog, read_log
 from studies.drives.plausible import LIMITS
 from studies.drives.quantities import CORNERS, SIGNALS, factor_to
 from studies.drives.run import run_drive
+from studies.errors import LogError
 from tests.drives.synthetic_drive import DRIVE, TORQUES, columns, write_drive, write_log
 
 EXTRA = {

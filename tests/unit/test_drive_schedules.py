@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from estimators.schedule import write_content
-from studies.drives.judge import judge
+from studies.commands.run import remarks
+from studies.drives.evaluation import evaluate
 from studies.drives.run import replay_drive, run_drive
-from studies.drives.summary import remarks
 from synthesis.errors import SpecError
 from tests.drives.synthetic_drive import DRIVE, columns, write_drive, write_log
 from tests.unit.schedule_content import EFFECTIVE_RADIUS, schedule_content
@@ -98,7 +98,7 @@ def test_two_schedules_of_one_car_need_no_word(tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", columns(0.1))
     data = replay_drive([log], prepare(tmp_path, BOTH, 0.33, 0.3301))
     assert data.assumptions == ()
-    assert not [line for line in judge(data)["assumptions"] if "schedule" in line]
+    assert not [line for line in evaluate(data)["assumptions"] if "schedule" in line]
     data = replay_drive([log], prepare(tmp_path, BOTH, 0.33, 0.333))
     assert [line.split(" is for")[0] for line in data.assumptions] == ["lateral schedule 'side.json'"]
 

@@ -13,7 +13,7 @@ from analysis.dropout_cells import Cells, cell_updates, curvature
 from analysis.dropout_modes import schedule_drop_modes
 from analysis.dropout_schedule import frozen_critical_probability
 from analysis.errors import AnalysisError
-from analysis.mean_square_schedule import certified_drop_probability, design, judge, mean_square_schedule
+from analysis.mean_square_schedule import certified_drop_probability, check_mean_square, design, mean_square_schedule
 from estimators import GainSchedule
 from synthesis.lmi.result import Verdict
 from tests.unit.schedule_content import schedule_content, with_matrix
@@ -140,7 +140,7 @@ def test_a_bound_that_proves_nothing_is_large_and_finite() -> None:
     assert np.isfinite(bound).all()
     assert bound[1, 0] > 1e40
     assert (
-        judge(schedule, 0.0, schedule.breakpoints, np.tile(np.eye(2), (4, 1, 1)), np.eye(2)).verdict
+        check_mean_square(schedule, 0.0, schedule.breakpoints, np.tile(np.eye(2), (4, 1, 1)), np.eye(2)).verdict
         is Verdict.INCONCLUSIVE
     )
 
@@ -184,11 +184,11 @@ def test_certified_below_and_refuted_above_the_frozen_value(schedule: GainSchedu
 
 def test_spoiled_matrices_are_refused() -> None:
     nodes, P, scale = design(SHIPPED, 0.6, 1)
-    assert judge(SHIPPED, 0.6, nodes, P, scale).verdict is Verdict.CERTIFIED
+    assert check_mean_square(SHIPPED, 0.6, nodes, P, scale).verdict is Verdict.CERTIFIED
     for spoiled in (P * np.where(np.arange(len(P)) == 3, 0.1, 1.0)[:, None, None], -P, 0.0 * P):
-        assert judge(SHIPPED, 0.6, nodes, spoiled, scale).verdict is Verdict.INCONCLUSIVE
+        assert check_mean_square(SHIPPED, 0.6, nodes, spoiled, scale).verdict is Verdict.INCONCLUSIVE
     # The same matrices do not prove more drops than there is room for.
-    assert judge(SHIPPED, 0.74, nodes, P, scale).verdict is Verdict.INCONCLUSIVE
+    assert check_mean_square(SHIPPED, 0.74, nodes, P, scale).verdict is Verdict.INCONCLUSIVE
 
 
 def test_frozen_stability_is_not_taken_for_stability_in_motion() -> None:

@@ -25,7 +25,7 @@ def motion(steer: Any, force_x: Any, force_y: Any) -> tuple[Any, ...]:
 
 
 def test_model_is_newton_and_euler_on_the_four_contact_points() -> None:
-    """The second road: sums of force vectors and of moments x F_y - y F_x about the centre of gravity."""
+    """The independent check: sums of force vectors and of moments x F_y - y F_x about the centre of gravity."""
     rng = np.random.default_rng(1)
     steer, fx, fy = rng.normal(0, 0.3, 50), rng.normal(0, 3e3, (50, 4)), rng.normal(0, 3e3, (50, 4))
     angle = np.stack((steer, steer, 0 * steer, 0 * steer), axis=-1)

@@ -12,6 +12,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.signal import lfilter
 
+from estimators.arrays import FloatArray
 from estimators.errors import EstimatorError
 from estimators.faults import Flag
 from estimators.filters import KalmanFilter
@@ -23,7 +24,6 @@ from estimators.vehicle import VehicleParameters
 TIME = 0.005
 CAR = VehicleParameters.published_suv()
 ROLLING = replace(CAR, rolling_resistance=0.012, effective_radius=(0.33, 0.34))
-Array = np.ndarray[Any, np.dtype[np.float64]]
 Step = Callable[..., WheelForceStep]
 
 
@@ -45,7 +45,9 @@ def stepper(kind: str, car: VehicleParameters = CAR, shape: tuple[int, ...] = (4
 KINDS = ["uio", "pid", "ukf", "kf"]
 
 
-def rolled(force: Array, torque: Array, car: VehicleParameters, load: Array, start: float = 40.0) -> Array:
+def rolled(
+    force: FloatArray, torque: FloatArray, car: VehicleParameters, load: FloatArray, start: float = 40.0
+) -> FloatArray:
     """Wheel speeds (n, 4) under forces and torques (n, 4) held over each interval; the first torque acts before row 0."""
     push = torque[1:] - car.radius * (force[1:] + car.rolling_resistance * load)
     return start + np.concatenate((np.zeros((1, 4)), np.cumsum(push / car.wheel_inertia * TIME, axis=0)))
@@ -66,7 +68,7 @@ def test_unknown_input_observer_is_a_first_order_lag_of_the_force() -> None:
 
 
 def test_unknown_input_observer_follows_its_differential_equation() -> None:
-    """The second road: what itself, integrated as (1), (2) of P2 with a gain K_p, by matrix exponential."""
+    """The independent check: what itself, integrated as (1), (2) of P2 with a gain K_p, by matrix exponential."""
     lag, nominal = 0.03, 500.0
     inertia, radius = CAR.wheel_inertia, 0.33
     gain = inertia / lag

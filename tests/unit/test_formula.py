@@ -55,7 +55,7 @@ def test_numbers_are_exact(text: str, wanted: Fraction) -> None:
 
 
 def test_every_formula_is_what_sympy_makes_of_it() -> None:
-    """A second road, on sums of products of random depth."""
+    """An independent check, on sums of products of random depth."""
     import numpy as np
 
     rng = np.random.default_rng(3)

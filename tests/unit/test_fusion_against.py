@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from estimators.arrays import FloatArray
 from estimators.faults import Flag
 from estimators.velocity import VelocityFusion
-from tests.unit.fusion_course import CAR, STEP, Array, Course, Signals, course, driven, phases, sensed
+from tests.unit.fusion_course import CAR, STEP, Course, Signals, course, driven, phases, sensed
 
 FAULT = slice(200, 500)
 FORGOTTEN = FAULT.stop + 300  # 1.5 s behind the fault
@@ -16,7 +17,7 @@ STEPS = [
 ]  # a_x points to the side to which it leads the estimate
 
 
-def told(drive: Course, reading: Array, seed: int = 3) -> Signals:
+def told(drive: Course, reading: FloatArray, seed: int = 3) -> Signals:
     """No torques: forces are shares of a_x."""
     signals = sensed(drive, seed, bias=0.1)
     signals.ax[FAULT] += (reading - drive.ax)[FAULT]

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from estimators.arrays import FloatArray
 from estimators.faults import Flag
 from estimators.pipeline import EstimationPipeline
 from estimators.velocity import FusionStep, VelocityFusion
 from tests.unit import pipeline_truth
-from tests.unit.fusion_course import CAR, STEP, Array, Course, Signals, course, driven, phases, sensed
+from tests.unit.fusion_course import CAR, STEP, Course, Signals, course, driven, phases, sensed
 
 ROLLING = course(phases((1.0, 0.0), (2.0, 1.0), (1.0, -2.0)), start=20.0)
 LATEST = 1.4  # s: one of rolling wheels, and the filter that differentiates them
@@ -90,7 +91,7 @@ def test_only_the_lost_car_of_a_batch_starts_again() -> None:
     assert np.abs(vx[-1] - ROLLING.speed[-1]).max() < 0.1
 
 
-def pulsed(n: int, locked: float) -> Array:
+def pulsed(n: int, locked: float) -> FloatArray:
     """Share of the car's speed that a wheel keeps under an anti-lock brake: 0.3 s a stroke."""
     phase = (np.arange(n) % 60) / 60
     return np.interp(phase, [0.0, 0.2, 0.2 + locked, 1.0], [1.0, 0.0, 0.0, 1.0])

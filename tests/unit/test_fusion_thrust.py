@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from estimators.arrays import FloatArray
 from estimators.faults import Flag
 from estimators.forces import vertical_loads
 from estimators.vehicle import GRAVITY
 from estimators.velocity import FusionStep, VelocityFusion
-from tests.unit.fusion_course import CAR, COMPLIANCE, STEP, Array, Course, Signals, course, driven, phases, sensed
+from tests.unit.fusion_course import CAR, COMPLIANCE, STEP, Course, Signals, course, driven, phases, sensed
 
 FROM = 200  # sample at which the fault begins, 1 s
 SETTLED = 100  # samples behind the fault, 0.5 s
@@ -23,34 +24,34 @@ class Fault(NamedTuple):
     """A drive and what becomes of a_x on it."""
 
     drive: Course
-    change: Callable[[Array], Array]
+    change: Callable[[FloatArray], FloatArray]
     samples: int
 
 
-def changing(acceleration: float, change: Callable[[Array], Array], seconds: float) -> Fault:
+def changing(acceleration: float, change: Callable[[FloatArray], FloatArray], seconds: float) -> Fault:
     """A second at constant speed, then `acceleration` as the fault begins; what is left of 5 s without a fault."""
     return Fault(course(phases((1.0, 0.0), (4.0, acceleration)), start=26.0), change, round(seconds / STEP))
 
 
-def steady(acceleration: float, change: Callable[[Array], Array], seconds: float = 1.5) -> Fault:
+def steady(acceleration: float, change: Callable[[FloatArray], FloatArray], seconds: float = 1.5) -> Fault:
     """The same acceleration for 5 s."""
     start = 10.0 if acceleration >= 0.0 else 10.0 - 5.0 * acceleration
     return Fault(course(phases((5.0, acceleration)), start=start), change, round(seconds / STEP))
 
 
-def missing(ax: Array) -> Array:
+def missing(ax: FloatArray) -> FloatArray:
     return np.full_like(ax, np.nan)
 
 
-def frozen(ax: Array) -> Array:
+def frozen(ax: FloatArray) -> FloatArray:
     return np.full_like(ax, ax[0])
 
 
-def wrong_sign(ax: Array) -> Array:
+def wrong_sign(ax: FloatArray) -> FloatArray:
     return -ax
 
 
-def off_by(step: float) -> Callable[[Array], Array]:
+def off_by(step: float) -> Callable[[FloatArray], FloatArray]:
     return lambda ax: ax + step
 
 
@@ -69,7 +70,7 @@ def told(fault: Fault, force: bool, seed: int = NO_SEED) -> Signals:
     return signals if force else signals._replace(force=np.full_like(signals.force, np.nan))
 
 
-def followed(cases: list[tuple[Fault, bool]]) -> tuple[list[FusionStep], Array, Array]:
+def followed(cases: list[tuple[Fault, bool]]) -> tuple[list[FusionStep], FloatArray, FloatArray]:
     """Steps of all in one batch, errors of V_x (n, cases), and how far the mean wheel speed is off, likewise."""
     signals = Signals(*(np.stack(parts, axis=1) for parts in zip(*(told(*case) for case in cases), strict=True)))
     steps, vx = driven(signals, VelocityFusion(CAR, STEP, (len(cases),)))

@@ -11,18 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from estimators.errors import GainsmithError
 from studies.commands.identify import run_identify
+from studies.errors import IdentifyError
 from studies.identify.autocorrelation import correlation_time, effective_stretches
-from studies.identify.errors import IdentifyError
-from studies.identify.estimate import Rules, estimate
+from studies.identify.estimate import Rules, Unknown, estimate
 from studies.identify.identify import identify_drive
 from studies.identify.parameters import tire_parameters
 from studies.identify.prefilter import Prefilter, first_order_lag, pitched
 from studies.identify.settings import IdentifySettings
-from studies.identify.unknowns import Unknown
 from studies.spec import load_spec
 from synthesis.deploy import deploy
-from synthesis.errors import GainsmithError
 from synthesis.hinf_observer import design_observer
 from synthesis.models.parameter_set import load_parameter_set
 from tests.drives.synthetic_drive import DRIVE, KAPPA, SIGMA0, SLIP, TORQUES, columns, write_drive, write_log

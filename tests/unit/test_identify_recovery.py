@@ -6,9 +6,9 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
+from estimators.arrays import FloatArray
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.quantities import CORNERS
@@ -16,7 +16,6 @@ from studies.identify.identify import Identification, identify_log
 from studies.identify.parameters import Identified, tire_parameters, vehicle_parameters
 from synthesis.models.parameter_set import load_parameter_set
 
-Array = npt.NDArray[np.float64]
 STEP, FINE = 0.005, 0.0005
 MASS, FRONT, REAR, HEIGHT, TRACK, RADIUS, INERTIA, YAW = 1800.0, 1.3, 1.5, 0.5, 1.55, 0.33, 1.4, 2600.0
 GRAVITY, FRICTION = 9.80665, 1.0
@@ -56,12 +55,12 @@ def drive(**changes: Any) -> DriveFile:
     return DriveFile.model_validate({**table, **changes})
 
 
-def bristle_rate(z: Array, relative: Array, rolling: Array, sigma0: float, kappa: float) -> Array:
+def bristle_rate(z: FloatArray, relative: FloatArray, rolling: FloatArray, sigma0: float, kappa: float) -> FloatArray:
     """P1 (18) with theta g = FRICTION."""
     return relative - (kappa * rolling + sigma0 * np.abs(relative) / FRICTION) * z
 
 
-def heun(rate: Any, x: Array, steps: int) -> Array:
+def heun(rate: Any, x: FloatArray, steps: int) -> FloatArray:
     """States (n, k) every STEP, by Heun's rule at FINE."""
     out = [x]
     for k in range(round(steps * STEP / FINE)):
@@ -89,7 +88,7 @@ def pulsed(t: float) -> float:
 @cache
 def straight(
     seconds: float = 12.0, scale: float = 1.0, start: float = 12.0, damping: float = 0.0, push: Any = torque
-) -> dict[str, Array]:
+) -> dict[str, FloatArray]:
     """Torques on the front wheels, a third at the rear ones; loads quasi-static with the pitch lag 0."""
     tire = LONGITUDINAL
     sigma0, sigma2 = tire["C"] * tire["kappa"], 0.0016
@@ -97,7 +96,7 @@ def straight(
     radius = RADIUS * np.array([tire["radius_front"], tire["radius_rear"]])
     share = np.array([1.0, 1.0 / 3.0])
 
-    def forces(x: Array) -> tuple[Array, Array, float]:
+    def forces(x: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         v, w, z = x[0], x[1:3], x[3:5]
         relative = radius * w - v
         dz = bristle_rate(z, relative, radius * np.abs(w), sigma0, tire["kappa"])
@@ -108,7 +107,7 @@ def straight(
         load = MASS / base * np.array([REAR * GRAVITY - HEIGHT * a, FRONT * GRAVITY + HEIGHT * a]) / 2
         return mu * load, dz, float(a)
 
-    def rate(t: float, x: Array) -> Array:
+    def rate(t: float, x: FloatArray) -> FloatArray:
         force, dz, a = forces(x)
         spin = (scale * push(t) * share - radius * force) / INERTIA
         return np.concatenate([[a], spin, dz])
@@ -130,14 +129,14 @@ def steering(t: float) -> float:
 
 
 @cache
-def steered(seconds: float = 12.0, speed: float = 6.0) -> dict[str, Array]:
+def steered(seconds: float = 12.0, speed: float = 6.0) -> dict[str, FloatArray]:
     """Two axles at constant V_x, LuGre, side forces shared by load; slow: at speed relaxation and damping look alike."""
     sigma0 = LATERAL["C"] * LATERAL["kappa"]
     sigma1 = 0.81 / 181.5 * sigma0  # the damping time of the base set, which a slow drive cannot tell
     arms = np.array([FRONT, -REAR])
     load = MASS * GRAVITY * np.array([REAR, FRONT]) / (FRONT + REAR)
 
-    def forces(t: float, x: Array) -> tuple[Array, Array]:
+    def forces(t: float, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         vy, r, z = x[0], x[1], x[2:4]
         d = np.array([steering(t), 0.0])
         ends = vy + r * arms
@@ -146,7 +145,7 @@ def steered(seconds: float = 12.0, speed: float = 6.0) -> dict[str, Array]:
         dz = bristle_rate(z, relative, rolling, sigma0, LATERAL["kappa"])
         return (sigma0 * z + sigma1 * dz + 0.001 * relative) * load * np.cos(d), dz
 
-    def rate(t: float, x: Array) -> Array:
+    def rate(t: float, x: FloatArray) -> FloatArray:
         side, dz = forces(t, x)
         # the outer wheel has most of the side force of the steered axle, and pulls it back
         outward = -HEIGHT * side.sum() / (MASS * GRAVITY) * side[0] * np.tan(steering(t))
@@ -165,7 +164,7 @@ def steered(seconds: float = 12.0, speed: float = 6.0) -> dict[str, Array]:
 NOISE = {"wheel_speed": 0.05, "torque": 5.0, "ax": 0.05, "ay": 0.05, "yaw_rate": 0.002, "steering": 0.002, "v": 0.02}
 
 
-def measured(table: dict[str, Array], seed: int) -> DriveLog:
+def measured(table: dict[str, FloatArray], seed: int) -> DriveLog:
     rng = np.random.default_rng(seed)
     noisy = {}
     for name, value in table.items():
@@ -176,7 +175,7 @@ def measured(table: dict[str, Array], seed: int) -> DriveLog:
     return DriveLog(time=table["t"], signals=signals, reference=reference, report={})
 
 
-def identified(table: dict[str, Array], seed: int) -> Identification:
+def identified(table: dict[str, FloatArray], seed: int) -> Identification:
     return identify_log(measured(table, seed), drive(), BASE, ("synthetic.csv",))
 
 

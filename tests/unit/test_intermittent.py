@@ -1,4 +1,4 @@
-"""Critical arrival rates: closed forms, the two roads to the static gain, and the Kalman filter beyond it."""
+"""Critical arrival rates: closed forms, the two methods for the static gain, and the Kalman filter beyond it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from analysis.errors import AnalysisError
 from analysis.intermittent import (
-    judge_static_gain,
+    certify_static_gain,
     kalman_critical_arrival,
     lmi_gain,
     static_critical_arrival,
@@ -28,12 +28,12 @@ def test_scalar_rate_is_one_minus_inverse_square(a: float) -> None:
     assert found.static.lower - 1e-9 <= expected <= found.static.upper <= expected + 2e-9
 
 
-@pytest.mark.parametrize("road", ["riccati", "lmi"])
-def test_one_output_needs_the_product_of_unstable_eigenvalues(road: str) -> None:
-    """Static gain, one output: 1 - prod |lambda_u|^-2 (Elia 2005; Schenato et al. 2007), on both roads."""
+@pytest.mark.parametrize("method", ["riccati", "lmi"])
+def test_one_output_needs_the_product_of_unstable_eigenvalues(method: str) -> None:
+    """Static gain, one output: 1 - prod |lambda_u|^-2 (Elia 2005; Schenato et al. 2007), by both methods."""
     A = np.array([[1.3, 0.3, 0.3], [0.0, 1.2, 0.3], [0.0, 0.0, 0.5]])
     expected = 1 - 1 / (1.3 * 1.2) ** 2
-    found = static_critical_arrival(A, [[1.0, 0.4, 0.2]], tolerance=1e-5, road=road)  # type: ignore[arg-type]
+    found = static_critical_arrival(A, [[1.0, 0.4, 0.2]], tolerance=1e-5, method=method)  # type: ignore[arg-type]
     assert found.lower <= expected + 1e-8 and expected <= found.upper + 1e-8
     assert found.upper - found.lower < 1e-4
     assert static_gain_radius(A, [[1.0, 0.4, 0.2]], found.gain, found.upper) < 1.0
@@ -67,23 +67,23 @@ def test_between_the_two_rates_the_kalman_covariance_stays_and_a_static_one_grow
         P = A @ P @ A.T + np.eye(2)
         levels.append(np.trace(P, axis1=1, axis2=2).mean())
     assert np.mean(levels[60:]) < 10.0 * np.mean(levels[20:40])  # heavy tails: the mean settles slowly
-    refused = judge_static_gain(A, C, rate)
+    refused = certify_static_gain(A, C, rate)
     assert refused.verdict is Verdict.REFUTED
     best = minimize(
         lambda K: float(static_gain_radius(A, C, K[:, None], rate)), refused.gain[:, 0], method="Nelder-Mead"
     )
     assert best.fun**40 > 40.0  # what the best static gain makes of 40 more samples
     # Below the lower bound the gaps alone diverge.
-    assert 0.7 * 1.69 > 1.0 and judge_static_gain(A, C, 0.3).verdict is Verdict.REFUTED
+    assert 0.7 * 1.69 > 1.0 and certify_static_gain(A, C, 0.3).verdict is Verdict.REFUTED
 
 
-@pytest.mark.parametrize("road", ["riccati", "lmi"])
-def test_verdicts_turn_at_the_rate(road: str) -> None:
+@pytest.mark.parametrize("method", ["riccati", "lmi"])
+def test_verdicts_turn_at_the_rate(method: str) -> None:
     exact = 1 - 1 / 1.56**2
-    above, below = (judge_static_gain(*TWO, exact + d, road) for d in (1e-3, -1e-3))  # type: ignore[arg-type]
+    above, below = (certify_static_gain(*TWO, exact + d, method) for d in (1e-3, -1e-3))  # type: ignore[arg-type]
     assert above.verdict is Verdict.CERTIFIED and above.radius < 1.0
     assert below.verdict is Verdict.REFUTED
-    # No gain does it below the rate: random ones, and the best of both roads.
+    # No gain does it below the rate: random ones, and the best of both methods.
     draw = np.random.default_rng(0)
     gains = above.gain + draw.normal(0, 0.5, (500, 2, 1))
     assert (static_gain_radius(*TWO, gains, exact - 1e-3) >= 1.0).all()
@@ -126,11 +126,11 @@ def test_bad_plants_are_refused(A: object, C: object, words: str) -> None:
         kalman_critical_arrival(A, C)  # type: ignore[arg-type]
 
 
-def test_bad_rates_and_roads_are_refused() -> None:
+def test_bad_rates_and_methods_are_refused() -> None:
     with pytest.raises(AnalysisError, match="outside"):
-        judge_static_gain(*TWO, 1.2)
-    with pytest.raises(AnalysisError, match="unknown road 'lmy'; did you mean lmi"):
-        judge_static_gain(*TWO, 0.5, "lmy")  # type: ignore[arg-type]
+        certify_static_gain(*TWO, 1.2)
+    with pytest.raises(AnalysisError, match="unknown method 'lmy'; did you mean lmi"):
+        certify_static_gain(*TWO, 0.5, "lmy")  # type: ignore[arg-type]
     with pytest.raises(AnalysisError, match="tolerance"):
         static_critical_arrival(*TWO, tolerance=0.0)
     with pytest.raises(AnalysisError, match="gain has the shape"):

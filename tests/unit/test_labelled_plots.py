@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from analysis.labelled import Axis, LabelledArray
+from estimators.errors import GainsmithError
 from studies.plots.labelled import plot_labelled
-from synthesis.errors import GainsmithError
 
 SPEED = Axis("wheel_speed", np.linspace(0.0, 140.0, 15), "rad/s")
 WORDS = Axis("parameter", np.array(["sigma0", "sigma1", "kappa"]))

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import RegularGridInterpolator
 from scipy.linalg import expm
 
+from estimators.arrays import FloatArray
 from synthesis.certificate.claims import Claim, ClaimChannel
 from synthesis.certificate.inside_sample import inside_sample
 from synthesis.certificate.refute import refuting_place, undetectable_place
@@ -23,7 +24,6 @@ from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
 from synthesis.polynomials.enclosure import PolynomialMatrix
-from synthesis.polynomials.matrix import FloatArray
 from synthesis.polynomials.rational import decimal, rational
 from tests.unit.lmi_cases import parameter, small_model
 
@@ -112,7 +112,7 @@ def test_two_parameters_are_proved_by_cells(update: str, kind: str) -> None:
     search = search_of(loop, model)
     claim, outcome = search.prove(Wish(kind, 0.3))
     assert claim is not None, outcome
-    # An independent road: poles of the frozen loop on a dense grid stay behind the level, and V falls along random walks.
+    # An independent way: poles of the frozen loop on a dense grid stay behind the level, and V falls along random walks.
     between = RegularGridInterpolator(LINES, gains.reshape(3, 2, -1))
     for place in product(np.linspace(-1.0, 3.0, 9), np.linspace(100.0, 101.0, 5)):
         plant = model.on(np.array([place]))

@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from synthesis.errors import GainsmithError, ModelError
+from estimators.errors import GainsmithError
+from synthesis.errors import ModelError
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Constant, SchedulingParameter, Signal
 from tests.unit.lmi_cases import corner, parameter, small_model

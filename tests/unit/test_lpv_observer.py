@@ -9,6 +9,7 @@ import pytest
 from scipy.linalg import expm
 
 from estimators import EstimatorError, Flag, GainSchedule, LpvVelocityObserver, RangeError, ScheduleError
+from estimators.arrays import FloatArray
 from tests.unit.schedule_content import schedule_content, with_matrix
 
 SCHEDULE = GainSchedule.from_content(schedule_content(gains=[(0.9, 210.0), (0.8, 183.1), (0.7, 100.0), (0.5, 60.0)]))
@@ -19,7 +20,7 @@ def observer(shape: tuple[int, ...] = (4,), **options: Any) -> LpvVelocityObserv
     return LpvVelocityObserver(SCHEDULE, shape, **options)
 
 
-def full(shape: tuple[int, ...], value: float) -> np.ndarray[Any, np.dtype[np.float64]]:
+def full(shape: tuple[int, ...], value: float) -> FloatArray:
     return np.full(shape, value)
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from studies.drives.metrics import deviation
+from studies.drives.evaluation import deviation
 
 
 def test_by_hand() -> None:
@@ -39,7 +40,7 @@ def test_missing_samples_are_not_compared() -> None:
 def test_nothing_to_compare_is_not_zero() -> None:
     found = deviation(np.array([np.nan]), np.array([1.0]), "N")
     assert found.samples == 0
-    assert json.loads(json.dumps(found.as_dict(), allow_nan=False))["rms"] is None
+    assert json.loads(json.dumps(asdict(found), allow_nan=False))["rms"] is None
 
 
 def test_reference_at_rest_has_no_nrms() -> None:

@@ -1,4 +1,4 @@
-"""Norms against closed forms, independent roads and negative controls."""
+"""Norms against closed forms, independent ways and negative controls."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from analysis.errors import AnalysisError
 from analysis.hamiltonian import crosses_level
 from analysis.norms import hinf_norm, stability_margin
 from analysis.norms_h2 import h2_norm
-from synthesis.errors import GainsmithError
+from estimators.errors import GainsmithError
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.parameter_set import load_parameter_set
 
@@ -135,7 +135,7 @@ def test_stability_margin_is_negative_for_stable_systems() -> None:
     assert stability_margin(np.diag([0.5, -0.9]), discrete=True) == pytest.approx(-0.1)
 
 
-def test_h2_norm_closed_form_and_two_roads() -> None:
+def test_h2_norm_closed_form_and_two_ways() -> None:
     w, z = np.array([0.1, 3.0, 500.0]), np.array([1e-3, 0.2, 0.9])
     np.testing.assert_allclose(h2_norm(*oscillator(w, z)), np.sqrt(w / (4.0 * z)), rtol=1e-10)
     rng = np.random.default_rng(5)
@@ -206,7 +206,7 @@ def test_unknown_signals_and_wrong_gains_are_refused() -> None:
 
 
 def test_a_resonance_over_a_plateau_is_not_missed() -> None:
-    """c + oscillator: the level just above the plateau c is crossed far from the peak. Second road: a dense sweep."""
+    """c + oscillator: the level just above the plateau c is crossed far from the peak. Independent check: a dense sweep."""
     rng = np.random.default_rng(11)
     w, z = 10.0 ** rng.uniform(-1, 3, 300), 10.0 ** rng.uniform(-4, -0.5, 300)
     A, B, C = oscillator(w, z)

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from estimators import Flag
+from estimators.arrays import FloatArray
 from estimators.faults import DRIVING
-from estimators.interpolate import FloatArray
 from estimators.pipeline import Check, EstimationPipeline, PipelineStep
 from estimators.signals import TickSpeed
 from tests.unit.pipeline_truth import BIAS, CAR, TIME, Truth, finite, noisy, run, sample, straight

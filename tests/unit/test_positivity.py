@@ -133,7 +133,7 @@ def test_proofs_agree_with_dense_sampling(seed: int, v: int, n: int) -> None:
 @SMALL
 @given(st.lists(st.integers(-8, 8), min_size=1, max_size=5), st.integers(-4, 4))
 def test_floating_point_proofs_agree_with_exact_ones(coefficients: list[int], shift: int) -> None:
-    """Second road: the same polynomial on [-1, 1], moved to [0, 1], decided in rational arithmetic."""
+    """Independent check: the same polynomial on [-1, 1], moved to [0, 1], decided in rational arithmetic."""
     whole = [coefficients[0] + shift, *coefficients[1:]]
     exact = fmpq_poly(whole)(fmpq_poly([-1, 2]))
     failure = first_failure([[exact]], depth=40)

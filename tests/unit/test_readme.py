@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from studies.cli import parser
-from studies.drives.drive_tables import Estimators
+from studies.drives.drive_file import Estimators
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "README.md").read_text()

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synthesis.errors import GainsmithError
+from estimators.errors import GainsmithError
 from synthesis.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.solve import solve
 from synthesis.models.param import Constant, SchedulingParameter, Signal
-from synthesis.printed import judge
+from synthesis.published_certificate import check_certificate
 from synthesis.stability import affine_quadratic_stability
 from tests.unit.lmi_cases import parameter, small_model
 
@@ -51,15 +51,15 @@ BAD = {
     "channel no errors": lambda: design_observer(
         small_model([[p - 3]], [[1]], E=[[1]], F=[[1]]), ObserverDesign((Channel(("d1",), ()),))
     ),
-    "judge gains shape": lambda: judge(m, [[1, 2]], [[["1", "0"], ["0", "1"]]]),
-    "judge matrix shape": lambda: judge(m, [[1], [2]], [[["1"]]]),
-    "judge not a number": lambda: judge(m, [["1x"], [2]], [[["1", "0"], ["0", "1"]]]),
-    "judge nan": lambda: judge(m, [[float("nan")], [2]], [[["1", "0"], ["0", "1"]]]),
-    "judge infinite rate": lambda: judge(
+    "judge gains shape": lambda: check_certificate(m, [[1, 2]], [[["1", "0"], ["0", "1"]]]),
+    "judge matrix shape": lambda: check_certificate(m, [[1], [2]], [[["1"]]]),
+    "judge not a number": lambda: check_certificate(m, [["1x"], [2]], [[["1", "0"], ["0", "1"]]]),
+    "judge nan": lambda: check_certificate(m, [[float("nan")], [2]], [[["1", "0"], ["0", "1"]]]),
+    "judge infinite rate": lambda: check_certificate(
         small_model([[0, 1], [-4 - p, -1]], [[1, 0]], (parameter(rate=np.inf),)), [[1], [2]], [[["1", "0"], ["0", "1"]]]
     ),
-    "judge not symmetric": lambda: judge(m, [[1], [2]], [[["1", "9"], ["0", "1"]]]),
-    "judge bad form": lambda: judge(m, [[1], [2]], [[["1", "0"], ["0", "1"]]], "dula"),
+    "judge not symmetric": lambda: check_certificate(m, [[1], [2]], [[["1", "9"], ["0", "1"]]]),
+    "judge bad form": lambda: check_certificate(m, [[1], [2]], [[["1", "0"], ["0", "1"]]], "dula"),
 }
 
 

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
 from synthesis.lmi import solve as solve_module
-from synthesis.lmi.clarabel_road import RawAnswer
+from synthesis.lmi.clarabel_backend import RawAnswer
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.scaling import error_scale
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import margins_of, solve
-from synthesis.polynomials.matrix import FloatArray
 from tests.unit.lmi_cases import confirmed, corner, gain_problem, lyapunov_problem, parameter, within
 
 STABLE = np.array([[[-1.0, 0.0], [0.0, -2.0]], [[0.0, 0.5], [-0.5, 0.0]]])

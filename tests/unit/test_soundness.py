@@ -16,7 +16,7 @@ from synthesis.models.param import SchedulingParameter
 from synthesis.polynomials.matrix import MatrixPolynomial
 from synthesis.polynomials.positivity import prove_positive
 from synthesis.polynomials.rational import is_positive_definite
-from synthesis.printed import judge
+from synthesis.published_certificate import check_certificate
 from synthesis.stability import affine_quadratic_stability
 from tests.published.test_lpv_benchmarks import DIGITS, PARAMETERS, REFERENCE, rolmip
 from tests.unit.lmi_cases import corner, gain_problem, parameter, reference_problem, small_model, within
@@ -36,7 +36,7 @@ def test_nan_is_refused() -> None:
 
 def test_judge_touching_zero() -> None:
     model = small_model([[-1]], [[p]], (SchedulingParameter("p", "1", 0.0, 1.0, 0.0, 0.0),))
-    found = judge(model, [[0.0]], [[["1"]], [["-6"]], [["9"]]])  # M = (3p - 1)^2 is singular at 1/3
+    found = check_certificate(model, [[0.0]], [[["1"]], [["-6"]], [["9"]]])  # M = (3p - 1)^2 is singular at 1/3
     assert not found.everywhere
     assert len(found.intervals) == 2
 

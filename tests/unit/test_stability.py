@@ -11,7 +11,7 @@ from synthesis.errors import ProblemError
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.polynomials.rational import polynomial_matrix
-from synthesis.printed import judge, leading_minors
+from synthesis.published_certificate import check_certificate, leading_minors
 from synthesis.stability import GainBox, StabilityResult, affine_quadratic_stability
 from tests.unit.lmi_cases import parameter, small_model
 
@@ -46,7 +46,7 @@ def test_a_decay_rate_is_proved_up_to_the_true_one(decay: float, verdict: Verdic
 @pytest.mark.parametrize("form", ["primal", "dual"])
 @pytest.mark.parametrize("degree", [0, 1, 2])
 def test_the_lyapunov_function_falls_along_simulated_errors(form: str, degree: int) -> None:
-    """Second road: integrate e' = A_e(p(t)) e with p swinging at the largest allowed rate and watch V."""
+    """Independent check: integrate e' = A_e(p(t)) e with p swinging at the largest allowed rate and watch V."""
     gain = np.array([[1.5], [0.5]])
     result = affine_quadratic_stability(SPRING, gain, degree, form, EXACT)  # type: ignore[arg-type]
     assert result.verdict is Verdict.CERTIFIED
@@ -157,12 +157,12 @@ def test_two_parameters(kind: Relaxation) -> None:
 def test_judge_finds_the_exact_end_of_validity() -> None:
     """e' = (p - 2) e, M = 1 + m p with |rate| <= 1: M > 0 for p > -1/m, and 2 (2 - p)(1 + m p) > |m|."""
     m = 0.5
-    found = judge(SCALAR, [[2]], [[["1"]], [["0.5"]]], "primal", search=(-4.0, 4.0))
+    found = check_certificate(SCALAR, [[2]], [[["1"]], [["0.5"]]], "primal", search=(-4.0, 4.0))
     roots = np.sort(np.roots([-2 * m, 4 * m - 2, 4 - m]).real)  # where it becomes an equality
     assert not found.everywhere
     (interval,) = found.intervals
     assert interval == pytest.approx((max(roots[0], -1 / m), roots[1]), abs=1e-9)
-    inside = judge(SCALAR, [[2]], [[["1"]], [["0.5"]]], "primal")
+    inside = check_certificate(SCALAR, [[2]], [[["1"]], [["0.5"]]], "primal")
     assert inside.everywhere
     assert inside.intervals == ((-1.0, 1.0),)
 
@@ -172,19 +172,19 @@ def test_judge_tells_primal_from_dual() -> None:
     model = small_model([[0, 10], [0, 0]], [[1, 0], [0, 1]], (parameter("p"),), E=[[p], [0]])
     gains = [["1", "0"], ["0", "1"]]
     P, Q = [[["1", "0"], ["0", "30"]]], [[["30", "0"], ["0", "1"]]]
-    assert judge(model, gains, P, "primal").everywhere
-    assert judge(model, gains, Q, "dual").everywhere
-    assert judge(model, gains, P, "dual").intervals == ()
-    assert judge(model, gains, Q, "primal").intervals == ()
+    assert check_certificate(model, gains, P, "primal").everywhere
+    assert check_certificate(model, gains, Q, "dual").everywhere
+    assert check_certificate(model, gains, P, "dual").intervals == ()
+    assert check_certificate(model, gains, Q, "primal").intervals == ()
 
 
 def test_judge_refuses_indefinite_matrices_and_unsuitable_models() -> None:
-    assert judge(SCALAR, [[2]], [[["-1"]]]).intervals == ()
-    assert judge(SCALAR, [["1"]], [[["1"]]]).everywhere is False  # on the boundary at p = 1: not strict
+    assert check_certificate(SCALAR, [[2]], [[["-1"]]]).intervals == ()
+    assert check_certificate(SCALAR, [["1"]], [[["1"]]]).everywhere is False  # on the boundary at p = 1: not strict
     with pytest.raises(ProblemError, match="only polynomial models of one parameter"):
-        judge(small_model([[1 / (2 + p)]], [[1]]), [[2]], [[["1"]]])
+        check_certificate(small_model([[1 / (2 + p)]], [[1]]), [[2]], [[["1"]]])
     with pytest.raises(ProblemError, match="only polynomial models of one parameter"):
-        judge(small_model([[p + q]], [[1]], (parameter("p"), parameter("q"))), [[2]], [[["1"]]])
+        check_certificate(small_model([[p + q]], [[1]], (parameter("p"), parameter("q"))), [[2]], [[["1"]]])
 
 
 def test_leading_minors_are_determinants() -> None:

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from estimators.errors import GainsmithError
 from studies.cli import main
 from studies.commands.study import run_study
-from synthesis.errors import GainsmithError
 from tests.unit.study_fakes.registry import REGISTRY
 from tests.unit.study_fakes.trace import VARIABLE
 
@@ -24,8 +24,8 @@ ROOT = Path(__file__).parents[2]
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["drop-tolerence"], "study 'drop-tolerence' does not exist; there are: drop-tolerance"),
-        (["--all", "qqqq"], "corner-estimation, longitudinal-speed"),
+        (["drop-tolerence"], "unknown study 'drop-tolerence'; did you mean drop-tolerance"),
+        (["--all", "qqqq"], "unknown study 'qqqq'; known: corner-estimation, drop-tolerance"),
         ([], "name a study or give --all"),
         (["friction-floor", "--workers", "0"], "--workers 0"),
         (["friction-floor", "--seeds", "1"], "--seeds 1"),

@@ -18,7 +18,7 @@ from studies.papers.resilient_velocity.compliance_trial import (
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, PRINTED
 from studies.papers.resilient_velocity.tire import steady
 from studies.study import PartResult
-from studies.truth import Measured, Truth, draw, drive, load_manoeuvre, load_vehicle
+from studies.truth import Measured, Truth, draw, load_manoeuvre, load_vehicle, simulate_manoeuvres
 from studies.truth.sensors import PERFECT
 from tests.unit.study_checks import check_result
 
@@ -54,7 +54,7 @@ def trial() -> ComplianceTrial:
     launch = load_manoeuvre(TESTS[0].manoeuvre)
     launch = launch.model_copy(update={"duration": 1.8})
     car = launch.truth_vehicle()
-    truth = drive([launch, launch], [car, car.changed(suspension=RIGID)])
+    truth = simulate_manoeuvres([launch, launch], [car, car.changed(suspension=RIGID)])
     return run_trial(draw(truth, PERFECT, range(2)))
 
 

@@ -25,7 +25,7 @@ def test_share_is_a_half_where_slip_is_friction_over_stiffness() -> None:
 
 
 def test_resting_force_is_where_the_bristle_equation_ends() -> None:
-    """Second road: P1 (18) integrated until it rests."""
+    """Independent check: P1 (18) integrated until it rests."""
     speed, slip, friction = 40.0, 0.03, 0.35
     relative = slip * RADIUS * speed
 

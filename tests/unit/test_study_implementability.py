@@ -1,4 +1,4 @@
-"""Break rates of discretised observers: closed forms, Jury's conditions on a second road, and runs of the runtime."""
+"""Break rates of discretised observers: closed forms, Jury's conditions on an independent check, and runs of the runtime."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def at(design: Design, speed: float) -> tuple[np.ndarray, np.ndarray, np.ndarray
 @pytest.mark.parametrize("design", [P1X, P1Y, P3X, shipped_designs()[1]], ids=lambda d: d.name)
 @pytest.mark.parametrize("speed", [0.0, 37.0, 140.0])
 def test_updates_are_what_they_say(design: Design, speed: float) -> None:
-    """Second road: scipy's matrix exponential and its discretisations of the closed loop."""
+    """Independent check: scipy's matrix exponential and its discretisations of the closed loop."""
     A, L, C = at(design, speed)
     T, closed, none = 0.004, A - L @ C, np.zeros((2, 1))
     for scheme, method in (

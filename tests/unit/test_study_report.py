@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from studies.claim import Verdict
+from studies.claim import ClaimVerdict
 from studies.report.html.pictures import LARGEST_SVG, picture
 from studies.report.html.text import alignments, brief, cell, label, number, prose
 from studies.report.scoreboard import MARKS, MEANINGS, scoreboard
@@ -134,30 +134,30 @@ def test_figures_carry_no_date(out: Path, name: str) -> None:
     assert "<dc:date>" not in (out / "alpha" / "figures" / f"{name}.svg").read_text()
 
 
-def claim(paper: str, index: int, verdict: Verdict) -> dict[str, Any]:
+def claim(paper: str, index: int, verdict: ClaimVerdict) -> dict[str, Any]:
     return {"id": f"{paper}-{index} <&", "paper": paper, "verdict": str(verdict)}
 
 
 def test_scoreboard_counts_by_paper_and_verdict() -> None:
-    claims = [claim(paper, i, verdict) for paper in ("P5", "P1/P2", "P1") for i, verdict in enumerate(Verdict)]
-    board = scoreboard([*claims, claim("P5", 9, Verdict.ERRATUM)], {"P1": "corner-estimation"})
+    claims = [claim(paper, i, verdict) for paper in ("P5", "P1/P2", "P1") for i, verdict in enumerate(ClaimVerdict)]
+    board = scoreboard([*claims, claim("P5", 9, ClaimVerdict.ERRATUM)], {"P1": "corner-estimation"})
     assert [(paper.paper, paper.name, len(paper.claims)) for paper in board.papers] == [
         ("P1", "corner-estimation", 12), ("P5", "", 7)
     ]  # fmt: skip
-    assert board.total == 19 and board.count(Verdict.ERRATUM) == 4
-    assert board.papers[1].count(Verdict.ERRATUM) == 2
-    assert set(MARKS) == set(MEANINGS) == set(Verdict) and len(set(MARKS.values())) == len(Verdict)
+    assert board.total == 19 and board.count(ClaimVerdict.ERRATUM) == 4
+    assert board.papers[1].count(ClaimVerdict.ERRATUM) == 2
+    assert set(MARKS) == set(MEANINGS) == set(ClaimVerdict) and len(set(MARKS.values())) == len(ClaimVerdict)
 
 
 @pytest.mark.parametrize("most", [0, 1, 69, 130])
 def test_scoreboard_picture_has_a_square_for_each_claim_inside_its_frame(most: int) -> None:
-    verdicts = list(Verdict)
+    verdicts = list(ClaimVerdict)
     claims = [claim("P3" if i % 3 else "P1", i, verdicts[i % 6]) for i in range(most)]
     root = ElementTree.fromstring(scoreboard_svg(scoreboard(claims, {})))
     width, height = float(root.attrib["width"]), float(root.attrib["height"])
     frame, *squares = root.iter(f"{SVG}rect")
     assert float(frame.attrib["width"]) == width - 1
-    assert len(squares) == most + len(Verdict)
+    assert len(squares) == most + len(ClaimVerdict)
     places = [(float(s.attrib["x"]), float(s.attrib["y"])) for s in squares]
     side = float(squares[0].attrib["width"])
     assert all(0 < x < width - side and 0 < y < height - side for x, y in places)

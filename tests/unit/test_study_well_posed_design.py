@@ -132,7 +132,7 @@ class TestSweeps:
 
 class TestAchieved:
     def test_printed_gains_of_p1_at_one_wheel_speed(self) -> None:
-        """Second road: poles by hand, static noise gain a / (sigma0 + sigma2 a), H2 norm by the Lyapunov equation."""
+        """Independent check: poles by hand, static noise gain a / (sigma0 + sigma2 a), H2 norm by the Lyapunov equation."""
         from scipy.linalg import solve_continuous_lyapunov
 
         grid = np.array([140.0])

@@ -1,4 +1,4 @@
-"""The velocity error on a drive: the runtime's own replay, and a plain integration of every corner, as second roads."""
+"""The velocity error on a drive: the runtime's own replay, and a plain integration of every corner, as independent checks."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from estimators import GainSchedule
 from estimators.pipeline import ScheduledCorners
 from estimators.schedule import write_content
 from studies.drives.drive_file import read_drive
-from studies.drives.errors import LogError
+from studies.drives.evaluation import deviation
 from studies.drives.log import read_log
-from studies.drives.metrics import deviation
 from studies.drives.prepare import CornerInputs, corner_inputs_of
 from studies.drives.replay import replay
 from studies.drives.run import replay_drive
+from studies.errors import LogError
 from studies.sweeps.engine import run_sweep
 from studies.sweeps.executors import Serial
 from studies.sweeps.measure import Measure
 from studies.sweeps.spec import MEASURES, build_sweep
-from studies.sweeps.strict import read_table
 from studies.sweeps.subject import Batch, Subject
 from studies.sweeps.subject_spec import SubjectSpec
 from studies.sweeps.tables import compute
 from studies.trials.sensors import TEST_CAR
-from studies.truth import draw, drive, load_manoeuvre, write_drive
+from studies.truth import draw, load_manoeuvre, simulate_manoeuvres, write_drive
 from synthesis.errors import SpecError
+from synthesis.toml_file import read_table
 from tests.drives.synthetic_drive import DRIVE, TORQUES, columns, write_log
 from tests.drives.synthetic_drive import write_drive as write_drive_file
 from tests.unit.schedule_content import schedule_content
@@ -161,7 +161,7 @@ def driven(pull: Path) -> Measure:
 
 
 def test_manoeuvre_is_the_drive_that_one_would_write_and_run(subject: Subject, pull: Path, driven: Measure) -> None:
-    truth = drive([load_manoeuvre(pull / "pull.toml")])
+    truth = simulate_manoeuvres([load_manoeuvre(pull / "pull.toml")])
     log, description = write_drive(pull / "written", draw(truth, TEST_CAR, [3]), longitudinal=NAME)
     data = replay_drive([log], description)
     driven.check(subject)
@@ -186,9 +186,9 @@ def test_workers_are_given_the_drive_and_the_bytes_are_the_same(
 
     def once(*given: Any) -> Any:
         counted.append(given)
-        return drive(*given)
+        return simulate_manoeuvres(*given)
 
-    monkeypatch.setattr(studies.truth, "drive", once)
+    monkeypatch.setattr(studies.truth, "simulate_manoeuvres", once)
     summary = run_sweep(whole, tmp_path / "here", Serial()).summary
     assert len(counted) == 1
     worst = summary.of(NAME, "nrms", "worst")

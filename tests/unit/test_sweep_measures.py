@@ -1,4 +1,4 @@
-"""Every measure against a second road, and what becomes of designs that cannot be computed."""
+"""Every measure against an independent check, and what becomes of designs that cannot be computed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Similarity bounds, common Lyapunov functions and the joint spectral radius against closed forms and second roads."""
+"""Similarity bounds, common Lyapunov functions and the joint spectral radius against closed forms and independent checks."""
 
 from __future__ import annotations
 

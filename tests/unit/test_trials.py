@@ -16,8 +16,8 @@ from studies.trials.driven import DRIVEN, LUGRE, MAGIC_FORMULA, driven, driven_p
 from studies.trials.histories import backgrounds, dot_heights, error_dots, history
 from studies.trials.play import baselines, believed, measured, play, run_of
 from studies.trials.velocities import USED, side_slip_curve
-from studies.truth import PERFECT, Truth, drive, load_manoeuvre
-from studies.truth.kept import read_truth, write_truth
+from studies.truth import PERFECT, Truth, load_manoeuvre, simulate_manoeuvres
+from studies.truth.record import read_truth, write_truth
 from synthesis.errors import SpecError
 
 SHORT = Scope(quick=True, seeds=2)
@@ -73,7 +73,9 @@ def test_prepared_drives_are_those_that_are_driven_alone(tmp_path: Path, monkeyp
 
 def test_a_full_drive_is_not_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[float] = []
-    monkeypatch.setattr("studies.trials.driven.drive", lambda runs: asked.extend(m.duration for m in runs))
+    monkeypatch.setattr(
+        "studies.trials.driven.simulate_manoeuvres", lambda runs: asked.extend(m.duration for m in runs)
+    )
     driven(NAMES, LUGRE, Scope(), 0.5)
     driven(NAMES, LUGRE, SHORT, 0.5)
     assert asked == [load_manoeuvre(name).duration for name in NAMES] + [0.5, 0.5]
@@ -120,7 +122,9 @@ def test_baselines_follow_their_formulas(truth: Truth) -> None:
 
 
 def test_runs_of_different_cars_are_not_played_together() -> None:
-    both = drive([load_manoeuvre(n).model_copy(update={"duration": 0.05}) for n in ("p1-launch-split", "p4-bends-dry")])
+    both = simulate_manoeuvres(
+        [load_manoeuvre(n).model_copy(update={"duration": 0.05}) for n in ("p1-launch-split", "p4-bends-dry")]
+    )
     with pytest.raises(SpecError, match="p1-launch-split, p4-bends-dry drive different cars"):
         believed(measured(both, range(1), PERFECT))
     with pytest.raises(SpecError, match="manoeuvre 'p9' was not driven"):

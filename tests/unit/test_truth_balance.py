@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from estimators.arrays import FloatArray
 from estimators.vehicle import GRAVITY
 from studies.truth import Truth
 from studies.truth.road import Zone
-from tests.unit.truth_cases import TIRES, Array, course, ramp, run
+from tests.unit.truth_cases import TIRES, course, ramp, run
 
 STEP = 0.001
 
@@ -31,7 +32,7 @@ def drive(request: pytest.FixtureRequest) -> Truth:
     return run(one, step=STEP, record_time=STEP)
 
 
-def body_forces(truth: Truth) -> tuple[Array, Array]:
+def body_forces(truth: Truth) -> tuple[FloatArray, FloatArray]:
     """(n, 4) N along and across the car."""
     fx, fy, angle = truth["force_x"][0], truth["force_y"][0], truth["steer"][0]
     return fx * np.cos(angle) - fy * np.sin(angle), fx * np.sin(angle) + fy * np.cos(angle)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy.integrate import solve_ivp
 
+from estimators.arrays import FloatArray
 from studies.truth.course import Course
 from studies.truth.layout import B, W, rolling
 from studies.truth.profile import GRID
@@ -16,7 +16,6 @@ from studies.truth.road import Zone
 from studies.truth.simulate import STEP
 from tests.unit.truth_cases import TIRES, course, plant_of, ramp, run, suv
 
-Array = npt.NDArray[np.float64]
 AT = 0.05 * np.arange(1, 10)
 PATCH = Zone(0.3, (True, False, True, False), from_place=3.0, to_place=7.0)
 CASES = {
@@ -33,12 +32,12 @@ def case(tire: str, name: str) -> Course:
 
 
 @cache
-def reference(tire: str, name: str) -> Array:
+def reference(tire: str, name: str) -> FloatArray:
     """(STATES, times) of LSODA at tight tolerances."""
     one = case(tire, name)
     plant, controls = plant_of(one, suv())
 
-    def slope(time: float, y: Array) -> Array:
+    def slope(time: float, y: FloatArray) -> FloatArray:
         state = y[:, None]
         return np.asarray(plant.derivative(state, controls(state, time))[0][:, 0])
 

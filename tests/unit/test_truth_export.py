@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from studies.drives.drive_file import read_drive
-from studies.drives.judge import judge
+from studies.drives.evaluation import evaluate
 from studies.drives.log import read_log
 from studies.drives.run import replay_drive
 from studies.truth import PERFECT, Channel, Drops, Measured, Sensors, draw, simulate, write_drive
@@ -39,7 +39,7 @@ def test_the_log_reads_back(measured: Measured, tmp_path: Path) -> None:
 def test_the_drive_replays(measured: Measured, tmp_path: Path) -> None:
     log, drive = write_drive(tmp_path, measured)
     data = replay_drive([log], drive)
-    velocity = judge(data)["velocity"]
+    velocity = evaluate(data)["velocity"]
     assert velocity["pipeline"]["nrms_percent"] < 2.0
     assert velocity["pipeline"]["reference_peak"] == pytest.approx(float(np.abs(measured.truth["vx"]).max()))
     assert data.chain is not None and np.abs(data.chain.vy - measured.truth["vy"][0]).max() < 0.3

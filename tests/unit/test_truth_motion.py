@@ -9,8 +9,7 @@ from estimators.forces import levelled
 from estimators.vehicle import GRAVITY
 from studies.truth import Assist, Drivetrain, Truth, load_vehicle, simulate
 from studies.truth.course import Course
-from studies.truth.path import PathPiece, curvature
-from studies.truth.profile import GRID
+from studies.truth.profile import GRID, PathPiece, curvature
 from synthesis.errors import SpecError
 from tests.unit.truth_cases import TIRES, course, ramp, run, suv
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from studies.truth.course import PATH_GRID, Courses
+from studies.truth.course import Courses
 from studies.truth.driver import Driver
 from studies.truth.fleet import Fleet, tires_of
 from studies.truth.layout import B, rolling
-from studies.truth.path import PathPiece, curvature
-from studies.truth.plant import Plant, Turned
-from studies.truth.profile import GRID, Piece, sampled, to_si
+from studies.truth.plant import Plant, SteerAngles
+from studies.truth.profile import GRID, PATH_GRID, PathPiece, Piece, curvature, sampled, to_si
 from studies.truth.road import Roads, Zone
 from tests.unit.truth_cases import course, ramp, run, suv
 
@@ -124,6 +123,6 @@ def test_a_step_takes_the_road_at_its_middle() -> None:
     driver = Driver(Courses([course(speed=10.0, duration=1.0, zones=(edge,))]), fleet)
     state = rolling([10.0], fleet.radius)
     state[B["distance"]] = 5.0 - fleet.x[0] - 0.05
-    still = Turned(np.zeros((4, 1)), np.ones((4, 1)))
+    still = SteerAngles(np.zeros((4, 1)), np.ones((4, 1)))
     moving = Plant(fleet, tires_of("lugre", [suv()])).slide(state, still)
     assert driver.act(state, moving, 0.4, 0.01).friction[:, 0] == pytest.approx([0.6, 0.6, 1.0, 1.0])

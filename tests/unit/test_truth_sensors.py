@@ -7,7 +7,7 @@ import pytest
 
 from estimators.pipeline import EstimationPipeline
 from studies.truth import PERFECT, Channel, Drops, Sensors, Ticks, Truth, draw, simulate
-from studies.truth.measure import SOURCES
+from studies.truth.sensors import SOURCES
 from synthesis.errors import SpecError
 from tests.unit.truth_cases import course, ramp, suv
 
@@ -71,7 +71,7 @@ def test_bursts_are_gilberts_chain(share: float, burst: float) -> None:
 
 
 def test_elliotts_bad_state_lets_some_through() -> None:
-    lost = Drops(0.2, 10.0, kept_in_bad=0.4).lost(rng(), 60000, ())
+    lost = Drops(0.2, 10.0, received_in_bad=0.4).lost(rng(), 60000, ())
     assert lost.mean() == pytest.approx(0.2, rel=0.1)
     assert lost[1:][lost[:-1]].mean() == pytest.approx(0.9 * 0.6, abs=0.04)
 
@@ -127,7 +127,7 @@ def test_the_pipeline_takes_what_is_measured(truth: Truth) -> None:
     [
         (lambda: Drops(1.2), "share in"),
         (lambda: Drops(0.9, 2.0), "cannot be so frequent"),
-        (lambda: Drops(0.5, 5.0, kept_in_bad=0.6), "below 1 - kept_in_bad"),
+        (lambda: Drops(0.5, 5.0, received_in_bad=0.6), "below 1 - received_in_bad"),
         (lambda: Channel(noise=-1.0), "sensor.noise"),
         (lambda: Channel(dropped="gone"), "write missing or hold"),
         (lambda: Ticks(0), "at least 1"),

@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from studies.truth import load_vehicle
-from studies.truth.bristle import held
 from studies.truth.lugre import LuGreParameters, LuGreTire
 from studies.truth.magic_formula import MagicFormulaParameters, MagicFormulaTire
+from studies.truth.stepper import stepped_deflection
 from synthesis.models.parameter_set import load_parameter_set
 
 LOAD = 5500.0
@@ -115,7 +115,7 @@ def test_slip_lag_is_the_relaxation_length() -> None:
         h = sigma / speed / 200
         for _ in range(200):
             a, push = tire.rates(z, slide, way, way, corners(1.0))
-            z = held(z, push, a, h)[0]
+            z = stepped_deflection(z, push, a, h)[0]
         assert z[1] == pytest.approx(1e-4 * (1.0 - np.exp(-1.0)), rel=1e-3)
 
 
@@ -126,7 +126,7 @@ def test_a_sliding_tire_lets_go_within_its_elastic_travel() -> None:
     slide = corners(0.1, 0.0)
     while z[0, 0, 0] < 0.0:
         a, push = tire.rates(z, slide, still, still, corners(1.0))
-        z = held(z, push, a, h)[0]
+        z = stepped_deflection(z, push, a, h)[0]
         way += 0.1 * h
     elastic = 0.25 * 1.21 / 1.1 / 21.51
     assert elastic < way < 2.0 * elastic
@@ -136,7 +136,7 @@ def test_a_sliding_tire_lets_go_within_its_elastic_travel() -> None:
 def test_the_held_step_is_exact(rate: float) -> None:
     z0, v, h = 2e-3, -0.4, 1e-3
     one = np.array([z0])
-    after, mean, slope = held(one, np.array([v]), np.array([rate]), h)
+    after, mean, slope = stepped_deflection(one, np.array([v]), np.array([rate]), h)
     done = solve_ivp(lambda _t, y: [v - rate * y[0], y[0]], (0.0, h), [z0, 0.0], "Radau", rtol=1e-11, atol=1e-15).y[
         :, -1
     ]

@@ -46,7 +46,7 @@ def test_loads_sum_to_the_vertical_specific_force() -> None:
 
 
 def test_axles_balance_moments_about_the_ground() -> None:
-    """Independent road: moments of inertia force and weight about the axles, and about the wheel contacts of the car."""
+    """Independent way: moments of inertia force and weight about the axles, and about the wheel contacts of the car."""
     ax, ay = 2.0, 4.0
     fl, fr, rl, rr = vertical_loads(CAR, ax, ay)
     m, h, base = CAR.mass, CAR.cg_height, CAR.wheelbase

@@ -7,18 +7,17 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from studies.truth import Truth, TruthVehicle, load_vehicle, simulate
 from studies.truth.course import Course, Courses
 from studies.truth.driver import Driver
 from studies.truth.fleet import Fleet, tires_of
-from studies.truth.plant import Controls, Plant, Turned
+from studies.truth.plant import Controls, Plant, SteerAngles
 from studies.truth.profile import GRID
 from studies.truth.road import Zone
 
-Array = npt.NDArray[np.float64]
-Profile = Callable[[Array], Array]
+Profile = Callable[[FloatArray], FloatArray]
 TIRES = ("lugre", "magic-formula")
 
 
@@ -55,14 +54,14 @@ def run(one: Course, vehicle: TruthVehicle | None = None, step: float = 0.001, r
     return simulate([one], [vehicle or suv()], step=step, record_time=record_time)
 
 
-def plant_of(one: Course, vehicle: TruthVehicle) -> tuple[Plant, Callable[[Array, float], Controls]]:
+def plant_of(one: Course, vehicle: TruthVehicle) -> tuple[Plant, Callable[[FloatArray, float], Controls]]:
     """The equations of one car, and its controls as a function of state and time (no path, no assists)."""
     fleet = Fleet([vehicle])
     plant, driver = Plant(fleet, tires_of(one.tire, [vehicle])), Driver(Courses([one]), fleet)
     nothing = np.zeros((4, 1))
 
-    def controls(state: Array, time: float) -> Controls:
-        return driver.act(state, plant.slide(state, Turned(nothing, nothing + 1.0)), time, 0.0)
+    def controls(state: FloatArray, time: float) -> Controls:
+        return driver.act(state, plant.slide(state, SteerAngles(nothing, nothing + 1.0)), time, 0.0)
 
     return plant, controls
 

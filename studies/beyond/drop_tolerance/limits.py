@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 from scipy.linalg import expm
 
-from analysis.intermittent import judge_static_gain, kalman_critical_arrival
+from analysis.intermittent import certify_static_gain, kalman_critical_arrival
 from estimators import GainSchedule, LpvVelocityObserver
 from studies.beyond.drop_tolerance.observers import PACKAGE, observer
 from studies.beyond.drop_tolerance.population import START
@@ -36,7 +36,7 @@ def any_gain(_: Scope) -> PartResult:
     for tested, speed in product([observer(name) for name in SHIPPED], SPEEDS):
         plant = tested.schedule.plant_at(np.array(speed))
         A = expm(tested.schedule.sample_time * plant.A)
-        found = judge_static_gain(A, plant.C, RARE)
+        found = certify_static_gain(A, plant.C, RARE)
         kalman = kalman_critical_arrival(A, plant.C, tolerance=1e-2)
         proved += found.verdict is Verdict.CERTIFIED
         limit = float(critical(tested.schedule, speed))

@@ -19,8 +19,8 @@ from studies.trials.accuracy import Spread, nrms, spread
 from studies.trials.play import Reading, baselines, measured, play, run_of
 from studies.trials.sensors import TEST_CAR
 from studies.trials.velocities import corner_observers
-from studies.truth import Truth, drive, load_manoeuvre
-from studies.truth.road_table import Road
+from studies.truth import Truth, load_manoeuvre, simulate_manoeuvres
+from studies.truth.road import Road
 from synthesis.models.parameter_set import load_parameter_set
 
 Array = npt.NDArray[np.float64]
@@ -63,7 +63,7 @@ def launched(quick: bool = False) -> Truth:
             "name": name_of(friction), "road": Road(friction=friction), "torque": pieces, "duration": share * base.duration,
         }  # fmt: skip
         runs.append(base.model_copy(update=changes))
-    return drive(runs)
+    return simulate_manoeuvres(runs)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from studies.study import Cell, PartResult, Scope, Table
 from synthesis.models.catalogue.corner import Direction
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.matrix import FloatArray
-from synthesis.printed import Judgement, judge
+from synthesis.published_certificate import CertifiedRange, check_certificate
 from synthesis.stability import Form
 
 TOPIC = Topic(PACKAGE)
@@ -47,9 +47,9 @@ class Certificate:
     matrix: Coefficients
     form: Form
 
-    def validity(self, end: float = STATED_SPEED) -> Judgement:
+    def validity(self, end: float = STATED_SPEED) -> CertifiedRange:
         """Where on 0..`end` rad/s it proves stability, in exact arithmetic."""
-        return judge(self.model, self.gains, self.matrix, self.form, (0.0, end))
+        return check_certificate(self.model, self.gains, self.matrix, self.form, (0.0, end))
 
     def at(self, omega: FloatArray) -> tuple[FloatArray, FloatArray]:
         """M (g, 2, 2) and its inequality at both rate bounds (2, g, 2, 2), to be negative: (28), (40) or the dual."""
@@ -151,11 +151,11 @@ TOPIC.claim("P1-41-primal")(partial(primal, "lateral"))
 TOPIC.claim("P1-41-dual")(partial(dual, "lateral"))
 
 
-def _words(found: Judgement) -> str:
+def _words(found: CertifiedRange) -> str:
     return " and ".join(f"({low:.7g}, {high:.7g})" for low, high in found.intervals) or "no part"
 
 
-def _listed(found: Judgement) -> list[list[float]]:
+def _listed(found: CertifiedRange) -> list[list[float]]:
     return [list(interval) for interval in found.intervals]
 
 

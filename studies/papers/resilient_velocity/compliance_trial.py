@@ -24,7 +24,7 @@ from studies.papers.resilient_velocity.tire import stribeck
 from studies.papers.resilient_velocity.vehicle import table_of_estimator
 from studies.trials.play import Reading, believed, play
 from studies.truth import Measured
-from studies.truth.bristle import held
+from studies.truth.stepper import stepped_deflection
 
 Array = npt.NDArray[np.float64]
 WITHOUT, PRINTED_WAY, INSIDE = "without", "as (15) is printed", "in the observer's input"
@@ -185,6 +185,6 @@ def model_force(drawn: Measured, slip: Array) -> Array:
     rate = kappa * rolling + sigma0 * np.abs(slip) / (road * stribeck(PRINTED, slip))
     out, z = np.empty_like(slip), np.zeros_like(slip[..., 0, :, :])
     for k in range(slip.shape[-3]):
-        z, mean, speed = held(z, slip[..., k, :, :], rate[..., k, :, :], drawn.sample_time)
+        z, mean, speed = stepped_deflection(z, slip[..., k, :, :], rate[..., k, :, :], drawn.sample_time)
         out[..., k, :, :] = sigma0 * mean + sigma1 * speed
     return np.asarray(out + sigma2 * slip)

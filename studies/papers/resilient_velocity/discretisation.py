@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from analysis.second_moment import spectral_radius
-from studies.claim import Finding, JsonValue, Verdict, judged
+from studies.claim import ClaimVerdict, Finding, JsonValue, judged
 from studies.papers.plain import by_speed
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, PACKAGE, PRINTED, SPEEDS, Setting, printed_gain
 from studies.papers.topic import Topic
@@ -68,7 +68,9 @@ def zero_order_hold_reading(setting: Setting = PRINTED) -> Finding:
     good, bad = (", ".join(name for name, ok in stable.items() if ok is wanted) for wanted in (True, False))
     return Finding(
         computed,
-        judged(all(stable.values()), Verdict.UNDER_SPECIFIED if any(stable.values()) else Verdict.NOT_REPRODUCED),
+        judged(
+            all(stable.values()), ClaimVerdict.UNDER_SPECIFIED if any(stable.values()) else ClaimVerdict.NOT_REPRODUCED
+        ),
         f"At {1.0 / T:g} Hz the printed longitudinal gain is stable as: {good or 'nothing'}; unstable as: {bad or 'nothing'}. "
         f"Held innovation, which is (10) word for word, has the radius {computed['innovation_held']['0']:.2f} at standstill; "
         "the closed loop must be discretised, exp((A - L C) T).",

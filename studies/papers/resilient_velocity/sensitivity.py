@@ -14,7 +14,7 @@ from analysis.observability_modes import frozen_modes, hautus_test
 from analysis.perturbed import PerturbedModel, error_measure
 from analysis.rank_loss import rank_loss
 from analysis.sensitivity import OneAtATime, one_at_a_time
-from studies.claim import Finding, JsonValue, Verdict, judged
+from studies.claim import ClaimVerdict, Finding, JsonValue, judged
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, FINE, PACKAGE, PRINTED, SPEED_AXIS, SPEEDS, Setting
 from studies.papers.topic import Topic
 from studies.plots import DASHES, Figure, Level, Line, Mark, Panel
@@ -83,7 +83,7 @@ def small_deviations(setting: Setting = PRINTED) -> Finding:
             worst |= {f"{direction} {kind}, {constant}": size for constant, size in sizes.items()}
     large = {name: value for name, value in worst.items() if value > CHANGE}
     rest = max(value for name, value in worst.items() if not name.endswith("sigma1"))
-    verdict = judged(stable and not large, Verdict.PARTLY if stable else Verdict.NOT_REPRODUCED)
+    verdict = judged(stable and not large, ClaimVerdict.PARTLY if stable else ClaimVerdict.NOT_REPRODUCED)
     return Finding(
         computed,
         verdict,

@@ -16,7 +16,7 @@ from analysis.bounds_sliding_mode import (
     sampled_radius,
     smallest_zone_widths,
 )
-from studies.claim import Finding, Verdict
+from studies.claim import ClaimVerdict, Finding
 from studies.papers.smo_ekf_sideslip.force_observer import RATE, error_motion
 from studies.papers.smo_ekf_sideslip.inputs import CAR, LARGEST, PACKAGE, PRINTED, SAMPLE_TIME, WHEELBASE
 from studies.papers.topic import Topic
@@ -75,7 +75,13 @@ def sampled_switching(readings: Sequence[Sequence[float]] = (WIDE, NARROW)) -> F
         "least_widths": list(LEAST),
     }  # fmt: skip
     stable = [zone["spectral_radius"] < 1.0 for zone in zones]
-    verdict = Verdict.REPRODUCED if all(stable) else Verdict.UNDER_SPECIFIED if any(stable) else Verdict.NOT_REPRODUCED
+    verdict = (
+        ClaimVerdict.REPRODUCED
+        if all(stable)
+        else ClaimVerdict.UNDER_SPECIFIED
+        if any(stable)
+        else ClaimVerdict.NOT_REPRODUCED
+    )
     reading = (
         f"The bare sign chatters at 100 Hz by up to {high[0]:.3f} rad/s and by force peaks that depend on the start (front up "
         f"to {high[1]:.0f} N, longitudinal {low[3]:.0f} to {high[3]:.0f} N). The widths of the linear zones are not printed "

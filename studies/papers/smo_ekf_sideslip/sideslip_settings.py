@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from studies.claim import Finding, Verdict, judged
+from studies.claim import ClaimVerdict, Finding, judged
 from studies.papers.smo_ekf_sideslip.inputs import MASS_SETTINGS, PACKAGE, STIFFNESS_SETTINGS, WHEELBASE, published_car
 from studies.papers.smo_ekf_sideslip.observers import Estimates, estimates
 from studies.papers.smo_ekf_sideslip.saturating_car import LINEAR, SimulatedRun, simulate, with_noise
@@ -37,7 +37,7 @@ def fixed_stiffness(settings: tuple[float, ...] = STIFFNESS_SETTINGS) -> Finding
         "stiffness_factors": list(settings), "simulated_rear_sideslip_ratio": ratio,
         "steady_state_ratio": [1.0 / factor for factor in settings],
     }  # fmt: skip
-    otherwise = Verdict.ERRATUM if low > 0 > high else Verdict.NOT_REPRODUCED
+    otherwise = ClaimVerdict.ERRATUM if low > 0 > high else ClaimVerdict.NOT_REPRODUCED
     verdict = judged(low > 0 and high > 0, otherwise)
     reading = (
         "The measured force fixes C beta: sideslip comes out as 1/factor. Reduced stiffness overestimates it (factor "

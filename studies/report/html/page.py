@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from studies.claim import JsonValue, Verdict
+from studies.claim import ClaimVerdict, JsonValue
 from studies.report.html.pictures import picture
 from studies.report.html.text import alignments, anchor, brief, cell, fits, label, number, prose
 from studies.report.scoreboard import MARKS, MEANINGS, Scoreboard
@@ -30,7 +30,7 @@ def environment() -> Environment:
     )
     made.filters |= {"number": number, "cell": cell, "brief": brief, "prose": prose, "anchor": anchor, "label": label}
     made.filters["slug"] = slug
-    made.globals |= {"verdicts": list(Verdict), "marks": MARKS, "meanings": MEANINGS}
+    made.globals |= {"verdicts": list(ClaimVerdict), "marks": MARKS, "meanings": MEANINGS}
     made.globals |= {"picture": picture, "alignments": alignments, "fits": fits}
     return made
 

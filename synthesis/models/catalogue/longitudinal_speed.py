@@ -6,7 +6,8 @@ import math
 
 import sympy as sp
 
-from synthesis.errors import ModelError, unknown
+from estimators.errors import unknown
+from synthesis.errors import ModelError
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
 from synthesis.models.parameter_set import ParameterSet, quantities

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import sympy as sp
 
-from synthesis.errors import ModelError, unknown
+from estimators.errors import unknown
+from synthesis.errors import ModelError
 from synthesis.models.nonlinear import NonlinearModel
 from synthesis.models.param import Constant, Signal
 

@@ -7,18 +7,18 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
-from studies.claim import Claim, Finding, Verdict
+from studies.claim import Claim, ClaimVerdict, Finding
 from studies.papers.published import published_claims
 from studies.study import Drawing, Part, PartResult, Scope, Study, Table
 from tests.unit.study_fakes.trace import computed
 
 VALUES = {
-    "P1-root": (math.sqrt(2.0), Verdict.REPRODUCED, "positive root"),
-    "P1-pair": ({"omega=0": np.float64(0.5), "omega=40": [1, 2.5]}, Verdict.PARTLY, "only at `omega=0`"),
-    "P1-wrong": (float("nan"), Verdict.NOT_REPRODUCED, 'tags <b>& quotes" stay text'),
-    "P1-sign": ("L1*p1 - 1", Verdict.ERRATUM, "the sign must be minus"),
-    "P1-open": (float("inf"), Verdict.UNDER_SPECIFIED, ""),
-    "P1-extra": (True, Verdict.DERIVED, "needed for `P1-root`"),
+    "P1-root": (math.sqrt(2.0), ClaimVerdict.REPRODUCED, "positive root"),
+    "P1-pair": ({"omega=0": np.float64(0.5), "omega=40": [1, 2.5]}, ClaimVerdict.PARTLY, "only at `omega=0`"),
+    "P1-wrong": (float("nan"), ClaimVerdict.NOT_REPRODUCED, 'tags <b>& quotes" stay text'),
+    "P1-sign": ("L1*p1 - 1", ClaimVerdict.ERRATUM, "the sign must be minus"),
+    "P1-open": (float("inf"), ClaimVerdict.UNDER_SPECIFIED, ""),
+    "P1-extra": (True, ClaimVerdict.DERIVED, "needed for `P1-root`"),
 }
 
 

@@ -1,4 +1,4 @@
-"""A second road to stability over a range, in rational numbers alone: nothing of `synthesis` is imported here.
+"""An independent check of stability over a range, in rational numbers alone: nothing of `synthesis` is imported here.
 
 Matrices are polynomials in v in [-1, 1], lists of coefficient matrices (rows of Fractions). All eigenvalues strictly left of the
 axis: Routh's array at a point; on the whole range Hurwitz' determinants, as polynomials in v, without a root in [-1, 1] by

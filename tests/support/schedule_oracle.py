@@ -1,4 +1,4 @@
-"""A schedule file by another road: json, sympy for its formulas, numpy and scipy for its loop. Shares no code with the prover.
+"""A schedule file read independently: json, sympy for its formulas, numpy and scipy for its loop; no code of the prover.
 
 Everything is for one scheduling parameter p; arrays carry the points of p in front.
 """
@@ -22,7 +22,7 @@ SHAPES = {
 }  # fmt: skip
 
 
-class Road:
+class Oracle:
     """What a content says, in float64; polynomials are expanded exactly around the middle of the range first."""
 
     def __init__(self, content: Mapping[str, Any]) -> None:

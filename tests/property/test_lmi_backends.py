@@ -1,4 +1,4 @@
-"""Two roads to one answer: our conic data and cvxpy, floating-point verdicts and exact rational proofs."""
+"""Two back ends, one answer: our conic data and cvxpy, floating-point verdicts and exact rational proofs."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from estimators.arrays import FloatArray
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import solve
-from synthesis.polynomials.matrix import FloatArray
 from tests.unit.lmi_cases import SLACK, confirmed, gain_problem, held, lyapunov_problem, parameter, within
 
 SMALL = settings(deadline=None, max_examples=12)
@@ -89,7 +89,7 @@ def test_certified_means_certified(seed: int, shift: float, kind: Relaxation) ->
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("kind", ["grid", "vertex", "exact"])
 def test_cvxpy_comes_to_the_same_answer(seed: int, kind: Relaxation) -> None:
-    """The same optimum, and a gain 1 % above it is proved on both roads."""
+    """The same optimum, and a gain 1 % above it is proved with both back ends."""
     A, B, C = random_plant(seed, 1.5)
     answers, proofs = [], []
     for solver in ("CLARABEL", "cvxpy:CLARABEL"):

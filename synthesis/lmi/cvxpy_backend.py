@@ -1,4 +1,4 @@
-"""Second road: the same relaxed problem as one sparse affine map per block in cvxpy, for any of its solvers."""
+"""The second back end: the same relaxed problem as one sparse affine map per block in cvxpy, for any of its solvers."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from time import perf_counter
 import cvxpy as cp
 import numpy as np
 
-from synthesis.errors import ProblemError, unknown
-from synthesis.lmi.clarabel_road import RawAnswer
+from estimators.errors import unknown
+from synthesis.errors import ProblemError
+from synthesis.lmi.clarabel_backend import RawAnswer
 from synthesis.lmi.conic import gram_matrices, structural_zeros, triangle
 from synthesis.lmi.relaxation import RelaxedProblem
 from synthesis.lmi.settings import LmiSettings
 
 
 def solve_with_cvxpy(relaxed: RelaxedProblem, solver: str, settings: LmiSettings) -> RawAnswer:
-    """Solve with the named cvxpy solver. Shares no assembly with the first road: cvxpy canonicalises by itself."""
+    """Solve with the named cvxpy solver. Shares no assembly with the first back end: cvxpy canonicalises by itself."""
     if solver not in cp.installed_solvers():
         raise ProblemError(unknown("cvxpy solver", solver, cp.installed_solvers()))
     x = cp.Variable(len(relaxed.cost))

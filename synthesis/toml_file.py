@@ -1,38 +1,84 @@
-"""Turn what pydantic reports into one line that names the key, what is wrong and the nearest known key."""
+"""TOML files that people write: one strict base of their tables, one reader, and one line for what is wrong in them.
+
+A refusal names the file, the key, what is wrong there, and what would be right: the nearest known key, an example with its
+unit, the bound that was broken.
+"""
 
 from __future__ import annotations
 
 import json
 import tomllib
 import typing
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from synthesis.errors import SpecError, unknown
+from estimators.errors import unknown
+from synthesis.errors import SpecError
+
+
+class StrictTable(BaseModel):
+    """A table that is read once and stays as it is: no unknown key, no number in quotes, no infinity."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
 
 _Step = int | str
-_Model = typing.TypeVar("_Model", bound=BaseModel)
+_Table = typing.TypeVar("_Table", bound=BaseModel)
 
 
-def read_toml(path: Path, model: type[_Model], what: str) -> _Model:
-    """The content of a TOML file; ``what`` it is, for the message.
+def shipped_files(package: str, folder: str) -> dict[str, Path]:
+    """The TOML files that come with a package, by name."""
+    found = Path(str(resources.files(package) / folder))
+    return {path.stem: path for path in sorted(found.glob("*.toml"))}
 
-    Raises SpecError, one line: file, key, what is wrong, what would be right.
-    """
+
+def find_toml(name: str | Path, shipped: Mapping[str, Path], what: str) -> Path:
+    """A path that ends with .toml as it is, else the shipped file of that name. Raises SpecError for an unknown name."""
+    path = Path(name)
+    if path.suffix == ".toml":
+        return path
+    if str(name) not in shipped:
+        raise SpecError(unknown(what, str(name), shipped) + "; a file of your own ends with .toml")
+    return shipped[str(name)]
+
+
+def read_toml(path: Path, what: str) -> dict[str, typing.Any]:
+    """The content of a TOML file; ``what`` it is, for the message. Raises SpecError, one line."""
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise SpecError(f"{path.name}: cannot be read ({error.strerror}); give the path of a {what} file") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise SpecError(f"{path.name}: not a TOML file: {error}") from error
+
+
+def load_toml(path: Path, model: type[_Table], what: str) -> _Table:
+    """A TOML file as ``model``. Raises SpecError, one line: file, key, what is wrong, what would be right."""
+    return read_table(model, read_toml(path, what), path.name)
+
+
+def read_table(model: type[_Table], data: object, where: str) -> _Table:
+    """One table. Raises SpecError, one line, that starts with ``where`` it stands."""
+    if not isinstance(data, dict):
+        raise SpecError(f"{where}: is {data!r}; give a table")
     try:
-        return model.model_validate(content)
+        return model.model_validate(data)
     except ValidationError as error:
-        raise SpecError(f"{path.name}: {first_error(error, model)}") from error
+        raise SpecError(f"{where}: {first_error(error, model)}") from error
+
+
+def read_kind(kinds: Mapping[str, type[_Table]], key: str, data: object, where: str) -> _Table:
+    """One table of several kinds, told apart by `key`."""
+    if not isinstance(data, dict) or not isinstance(data.get(key), str):
+        raise SpecError(f"{where}: needs {key} = one of {', '.join(kinds)}")
+    if data[key] not in kinds:
+        raise SpecError(f"{where}: {unknown(where.rstrip('0123456789[]').rstrip('s'), data[key], kinds)}")
+    return read_table(kinds[data[key]], data, where)
 
 
 def first_error(error: ValidationError, model: type[BaseModel]) -> str:

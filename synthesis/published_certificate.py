@@ -1,4 +1,4 @@
-"""Judge a given Lyapunov matrix exactly: over which parameter values does it prove what it is said to prove?"""
+"""Check a Lyapunov matrix exactly, such as a published one: over which parameter values does it prove what it should?"""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Any, get_args
 
 from flint import fmpq, fmpq_poly
 
-from synthesis.errors import ProblemError, unknown
+from estimators.errors import unknown
+from synthesis.errors import ProblemError
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.enclosure import PolynomialMatrix
 from synthesis.polynomials.rational import (
@@ -27,20 +28,20 @@ from synthesis.stability import Form
 
 
 @dataclass(frozen=True)
-class Judgement:
+class CertifiedRange:
     """Open intervals of the parameter on which every inequality holds; `everywhere` on the whole range asked for."""
 
     intervals: tuple[tuple[float, float], ...]
     everywhere: bool
 
 
-def judge(
+def check_certificate(
     model: LpvModel,
     gains: Sequence[Sequence[float | str]],
     lyapunov: Sequence[Any],
     form: Form = "primal",
     search: tuple[float, float] | None = None,
-) -> Judgement:
+) -> CertifiedRange:
     """Where M > 0 and its Lyapunov inequality hold, for both bounds of the rate, in exact arithmetic.
 
     `lyapunov` holds the coefficients of M(p) as numbers or printed decimals; the inequality is A_e'M + M A_e + q M' < 0
@@ -49,7 +50,7 @@ def judge(
     Raises ProblemError for a model with several parameters or a rational one.
     """
     if len(model.parameters) != 1 or not model.polynomial.is_polynomial:
-        raise ProblemError(f"model '{model.name}': only polynomial models of one parameter can be judged exactly")
+        raise ProblemError(f"model '{model.name}': only polynomial models of one parameter can be checked exactly")
     (parameter,) = model.parameters
     if form not in get_args(Form):
         raise ProblemError(unknown("form", form, get_args(Form)))
@@ -117,7 +118,7 @@ def _determinant(matrix: Matrix) -> fmpq_poly:
     return total
 
 
-def _intervals(minors: list[fmpq_poly], low: fmpq, high: fmpq) -> Judgement:
+def _intervals(minors: list[fmpq_poly], low: fmpq, high: fmpq) -> CertifiedRange:
     """Cut [low, high] at every root and keep the pieces on which all minors are positive."""
     cuts = {low, high}
     for minor in minors:
@@ -137,4 +138,4 @@ def _intervals(minors: list[fmpq_poly], low: fmpq, high: fmpq) -> Judgement:
     everywhere = (
         len(pieces) == 1 and pieces[0] == (low, high) and all(minor(x) > 0 for minor in minors for x in (low, high))
     )
-    return Judgement(tuple((float(a), float(b)) for a, b in pieces), everywhere)
+    return CertifiedRange(tuple((float(a), float(b)) for a, b in pieces), everywhere)

@@ -1,4 +1,4 @@
-"""First road: conic data straight into Clarabel."""
+"""The first back end: conic data straight into Clarabel."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
+from estimators.arrays import FloatArray
 from synthesis.lmi.conic import ConicData, triangle
 from synthesis.lmi.settings import LmiSettings
-from synthesis.polynomials.matrix import FloatArray
 
 PROJECTIONS = 50
 
