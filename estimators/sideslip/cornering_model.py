@@ -35,7 +35,7 @@ class CorneringModel(NamedTuple):
     def slip_angles(self, beta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """beta_1 and beta_2 of (11)."""
         v, turn = self.vehicle, self.yaw_rate / self.speed
-        return self.steering - beta - v.front_lever * turn, -beta + v.rear_lever * turn
+        return self.steering - beta - v.front_axle_distance * turn, -beta + v.rear_axle_distance * turn
 
     def stiffness(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """C_1 + dC_1 and C_2 + dC_2, (...) each."""

@@ -100,13 +100,13 @@ class SlidingModeObserver:
     @property
     def condition_residual(self) -> float:
         """L_2 Omega_8 - L_1 Omega_5 in N m/s, zero by (7) and (A.8); +160 with the printed gains (harmless)."""
-        return self.vehicle.rear_lever * self.gains.rear - self.vehicle.front_lever * self.gains.front
+        return self.vehicle.rear_axle_distance * self.gains.rear - self.vehicle.front_axle_distance * self.gains.front
 
     @property
     def split_rate(self) -> float:
         """Decay rate in 1/s of the error L_1 x_2 - L_2 x_3 on the sliding surface, Omega_4 (L1+L2) / (Omega_1 I_z), (A.12)."""
         v = self.vehicle
-        return self.gains.split * (v.front_lever + v.rear_lever) / (self.gains.yaw * v.yaw_inertia)
+        return self.gains.split * (v.front_axle_distance + v.rear_axle_distance) / (self.gains.yaw * v.yaw_inertia)
 
     @property
     def moment_limit(self) -> float:
@@ -186,7 +186,7 @@ def wheel_axes(state: FloatArray, steering: FloatArray) -> FloatArray:
 def _matrices(vehicle: SingleTrack, gains: SlidingGains) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Model (4, 4), outputs (3, 4) and injection (4, 3) of P5 (1)-(6)."""
     model, outputs, injection = np.zeros((4, 4)), np.zeros((3, 4)), np.zeros((4, 3))
-    model[0, 1:3] = vehicle.front_lever / vehicle.yaw_inertia, -vehicle.rear_lever / vehicle.yaw_inertia
+    model[0, 1:3] = vehicle.front_axle_distance / vehicle.yaw_inertia, -vehicle.rear_axle_distance / vehicle.yaw_inertia
     outputs[0, 0] = 1.0
     outputs[1, 1:3] = outputs[2, 3] = 1.0 / vehicle.mass
     injection[:3, 0] = gains.yaw, gains.split, -gains.split

@@ -6,14 +6,13 @@ import math
 from dataclasses import dataclass, fields
 
 from estimators.errors import EstimatorError
-
-GRAVITY = 9.81  # m/s^2
+from estimators.vehicle import GRAVITY
 
 _UNITS = {
     "mass": "kg",
     "yaw_inertia": "kg m^2",
-    "front_lever": "m",
-    "rear_lever": "m",
+    "front_axle_distance": "m",
+    "rear_axle_distance": "m",
     "track": "m",
     "front_stiffness": "N/rad",
     "rear_stiffness": "N/rad",
@@ -34,8 +33,8 @@ class SingleTrack:
 
     mass: float
     yaw_inertia: float
-    front_lever: float
-    rear_lever: float
+    front_axle_distance: float
+    rear_axle_distance: float
     front_stiffness: float
     rear_stiffness: float
 
@@ -53,8 +52,8 @@ class FourWheel:
 
     mass: float
     yaw_inertia: float
-    front_lever: float
-    rear_lever: float
+    front_axle_distance: float
+    rear_axle_distance: float
     track: float
     front_stiffness: float
     rear_stiffness: float
@@ -68,8 +67,8 @@ class FourWheel:
     @property
     def static_loads(self) -> tuple[float, float, float, float]:
         """Loads at rest on level ground in N: front left, front right, rear left, rear right."""
-        weight = self.mass * GRAVITY / (2 * (self.front_lever + self.rear_lever))
-        front, rear = weight * self.rear_lever, weight * self.front_lever
+        weight = self.mass * GRAVITY / (2 * (self.front_axle_distance + self.rear_axle_distance))
+        front, rear = weight * self.rear_axle_distance, weight * self.front_axle_distance
         return front, front, rear, rear
 
 

@@ -89,13 +89,13 @@ def vehicle_of(drive: DriveFile) -> tuple[VehicleParameters, tuple[str, ...]]:
         assumptions.append("yaw inertia is not given: taken as m L_f L_r")
     vehicle = VehicleParameters(
         mass=car.mass,
-        yaw_inertia=car.yaw_inertia or car.mass * car.front_axle_to_cg * car.rear_axle_to_cg,
+        yaw_inertia=car.yaw_inertia or car.mass * car.front_axle_distance * car.rear_axle_distance,
         wheel_inertia=car.wheel_inertia or WHEEL_INERTIA,
-        front_axle_distance=car.front_axle_to_cg,
-        rear_axle_distance=car.rear_axle_to_cg,
+        front_axle_distance=car.front_axle_distance,
+        rear_axle_distance=car.rear_axle_distance,
         cg_height=car.cg_height,
-        front_track=car.track_front,
-        rear_track=car.track_rear,
+        front_track=car.front_track,
+        rear_track=car.rear_track,
         effective_radius=(car.effective_radius_front, car.effective_radius_rear),
         rolling_resistance=car.rolling_resistance,
     )

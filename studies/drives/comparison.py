@@ -63,7 +63,7 @@ def reference_sideslip(log: DriveLog) -> Array:
 
 def quasi_static_axle_forces(log: DriveLog, drive: DriveFile) -> Array:
     """F_y of each axle (n, 2), N, of a car that does not yaw: the share of m a_y that its distance from the CG gives it."""
-    front, rear = drive.vehicle.front_axle_to_cg, drive.vehicle.rear_axle_to_cg
+    front, rear = drive.vehicle.front_axle_distance, drive.vehicle.rear_axle_distance
     ay = log.signals.get("ay", np.zeros_like(log.time))
     return np.outer(drive.vehicle.mass * ay, np.array([rear, front]) / (front + rear))
 
@@ -94,7 +94,14 @@ def forces(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: DriveFile) 
     reference, found, car = log.reference, {}, drive.vehicle
     ax, ay = log.signals["ax"], log.signals.get("ay", np.zeros_like(log.time))
     quasi_z = vertical_loads(
-        ax, ay, car.mass, car.front_axle_to_cg, car.rear_axle_to_cg, car.cg_height, car.track_front, car.track_rear
+        ax,
+        ay,
+        car.mass,
+        car.front_axle_distance,
+        car.rear_axle_distance,
+        car.cg_height,
+        car.front_track,
+        car.rear_track,
     )
     none = np.zeros(4, dtype=np.bool_)
     quasi_x = shared_forces(ax, quasi_z, car.mass, np.zeros_like(quasi_z), none)

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from estimators.vehicle import GRAVITY
+
 Array = npt.NDArray[np.float64]
-GRAVITY = 9.80665
-"""Standard acceleration of free fall, m/s^2: what a level accelerometer reads upwards at rest."""
 LEAST_LOAD = 0.05
 """Share of the static load below which a wheel counts as lifted and its normalised force as unknown."""
 
@@ -37,22 +37,22 @@ def vertical_loads(
     ax: Array,
     ay: Array,
     mass: float,
-    front_axle_to_cg: float,
-    rear_axle_to_cg: float,
+    front_axle_distance: float,
+    rear_axle_distance: float,
     cg_height: float,
-    track_front: float,
-    track_rear: float,
+    front_track: float,
+    rear_track: float,
 ) -> Array:
     """Quasi-static wheel loads (n, 4), N, from accelerations (n,), m/s^2, of a level car: P1 (14)-(17) at zero angles.
 
     Fz_f = m (L_r g - h a_x)/L,  Fz_r = m (L_f g + h a_x)/L,  Fz_iL,R = Fz_i (1/2 -+ h a_y/(g T_i)),  L = L_f + L_r.
     Leaves out roll and pitch dynamics (their overshoot, about 0.1 to 0.3 s after a step) and road grade.
     """
-    base = front_axle_to_cg + rear_axle_to_cg
-    front = mass / base * (rear_axle_to_cg * GRAVITY - cg_height * ax)
-    rear = mass / base * (front_axle_to_cg * GRAVITY + cg_height * ax)
-    shift_front = cg_height * ay / (GRAVITY * track_front)
-    shift_rear = cg_height * ay / (GRAVITY * track_rear)
+    base = front_axle_distance + rear_axle_distance
+    front = mass / base * (rear_axle_distance * GRAVITY - cg_height * ax)
+    rear = mass / base * (front_axle_distance * GRAVITY + cg_height * ax)
+    shift_front = cg_height * ay / (GRAVITY * front_track)
+    shift_rear = cg_height * ay / (GRAVITY * rear_track)
     return np.stack(
         [
             front * (0.5 - shift_front),
@@ -107,11 +107,11 @@ def normalised_forces(force: Array, vertical_load: Array, static_load: float) ->
 
 
 def corner_positions(
-    front_axle_to_cg: float, rear_axle_to_cg: float, track_front: float, track_rear: float
+    front_axle_distance: float, rear_axle_distance: float, front_track: float, rear_track: float
 ) -> tuple[Array, Array]:
     """x_c and y_c (4,) of the wheel centres from the centre of gravity, m: x_f = L_f, x_r = -L_r, y_L = +T/2."""
-    x = np.array([front_axle_to_cg, front_axle_to_cg, -rear_axle_to_cg, -rear_axle_to_cg])
-    y = np.array([track_front, -track_front, track_rear, -track_rear]) / 2
+    x = np.array([front_axle_distance, front_axle_distance, -rear_axle_distance, -rear_axle_distance])
+    y = np.array([front_track, -front_track, rear_track, -rear_track]) / 2
     return x, y
 
 

@@ -81,11 +81,11 @@ class Vehicle(Table):
     """Rigid-body and wheel data, SI. Lengths are to the centre of gravity; tracks are wheel centre to wheel centre."""
 
     mass: Mass = Field(examples=["1600 kg"])
-    front_axle_to_cg: Length = Field(examples=["1.4 m"])
-    rear_axle_to_cg: Length = Field(examples=["1.5 m"])
+    front_axle_distance: Length = Field(examples=["1.4 m"])
+    rear_axle_distance: Length = Field(examples=["1.5 m"])
     cg_height: Length = Field(examples=["0.55 m"])
-    track_front: Length = Field(examples=["1.6 m"])
-    track_rear: Length = Field(examples=["1.6 m"])
+    front_track: Length = Field(examples=["1.6 m"])
+    rear_track: Length = Field(examples=["1.6 m"])
     effective_radius_front: Length = Field(examples=["0.34 m"])
     effective_radius_rear: Length = Field(examples=["0.34 m"])
     wheel_inertia: Inertia | None = None

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from estimators.vehicle import GRAVITY
 from studies.drives import corner_inputs
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
@@ -68,9 +69,16 @@ def corner_inputs_of(log: DriveLog, drive: DriveFile) -> CornerInputs:
     yaw_rate, vy = measured("yaw_rate", "yaw rate"), measured("vy", "lateral velocity")
     steer = _steer(log, drive, assumptions)
     wheel_acceleration = rate(wheel_speed)
-    geometry = (car.front_axle_to_cg, car.rear_axle_to_cg, car.track_front, car.track_rear)
+    geometry = (car.front_axle_distance, car.rear_axle_distance, car.front_track, car.rear_track)
     load = corner_inputs.vertical_loads(
-        ax, ay, car.mass, car.front_axle_to_cg, car.rear_axle_to_cg, car.cg_height, car.track_front, car.track_rear
+        ax,
+        ay,
+        car.mass,
+        car.front_axle_distance,
+        car.rear_axle_distance,
+        car.cg_height,
+        car.front_track,
+        car.rear_track,
     )
     force, sources = _forces(log, drive, wheel_speed, wheel_acceleration, load, radius)
     x, y = corner_inputs.corner_positions(*geometry)
@@ -82,7 +90,7 @@ def corner_inputs_of(log: DriveLog, drive: DriveFile) -> CornerInputs:
         wheel_acceleration=wheel_acceleration,
         vertical_load=load,
         force=force,
-        normalised_force=corner_inputs.normalised_forces(force, load, car.mass * corner_inputs.GRAVITY / 4),
+        normalised_force=corner_inputs.normalised_forces(force, load, car.mass * GRAVITY / 4),
         free=free,
         per_speed=per_speed,
         steer=steer,

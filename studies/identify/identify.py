@@ -122,7 +122,7 @@ def yaw_inertia_prior(drive: DriveFile) -> float:
     """Of the drive file if it has one, else m L_f L_r, kg m^2: a dynamic index of one, cars lie between 0.8 and 1.1."""
     given = getattr(drive.vehicle, "yaw_inertia", None)
     car = drive.vehicle
-    return float(given) if given is not None else car.mass * car.front_axle_to_cg * car.rear_axle_to_cg
+    return float(given) if given is not None else car.mass * car.front_axle_distance * car.rear_axle_distance
 
 
 def _silent(_done: float) -> None:

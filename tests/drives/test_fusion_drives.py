@@ -62,13 +62,13 @@ def vehicle_of(name: str) -> VehicleParameters:
     car = read_drive(HERE / f"{name}.toml").vehicle
     return VehicleParameters(
         mass=car.mass,
-        yaw_inertia=3900.0 if name.startswith("ocd") else car.mass * car.front_axle_to_cg * car.rear_axle_to_cg,
+        yaw_inertia=3900.0 if name.startswith("ocd") else car.mass * car.front_axle_distance * car.rear_axle_distance,
         wheel_inertia=car.wheel_inertia or 1.0,
-        front_axle_distance=car.front_axle_to_cg,
-        rear_axle_distance=car.rear_axle_to_cg,
+        front_axle_distance=car.front_axle_distance,
+        rear_axle_distance=car.rear_axle_distance,
         cg_height=car.cg_height,
-        front_track=car.track_front,
-        rear_track=car.track_rear,
+        front_track=car.front_track,
+        rear_track=car.rear_track,
         effective_radius=(car.effective_radius_front, car.effective_radius_rear),
         rolling_resistance=car.rolling_resistance,
     )

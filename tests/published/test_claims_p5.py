@@ -275,7 +275,8 @@ class TestFixedStiffness:
         """Second road: in a steady turn the rear force is fixed by speed and yaw rate, so the slip is as 1 / factor."""
         drive = axle_drive(steady_turn, seconds=8.0, friction=1e9)
         car = published_car()
-        rear = car.mass * drive.speed[-1] * drive.yaw_rate[-1] * car.front_lever / (car.front_lever + car.rear_lever)
+        base = car.front_axle_distance + car.rear_axle_distance
+        rear = car.mass * drive.speed[-1] * drive.yaw_rate[-1] * car.front_axle_distance / base
         assert drive.rear_sideslip[-1] == pytest.approx(rear / car.rear_stiffness, rel=0.01)
         run = run_chain(drive, [published_car(stiffness_factor=factor) for factor in (0.5, 1.5)], adaptive=False)
         np.testing.assert_allclose(run.rear_sideslip[-1] / drive.rear_sideslip[-1], [2.0, 2.0 / 3.0], rtol=0.04)
@@ -287,7 +288,7 @@ def test_drive_obeys_its_equations() -> None:
     car = published_car()
     body = drive.body_forces()
     turn = np.gradient(drive.yaw_rate, 0.01)
-    moment = car.front_lever * body[:, 0] - car.rear_lever * body[:, 1]
+    moment = car.front_axle_distance * body[:, 0] - car.rear_axle_distance * body[:, 1]
     np.testing.assert_allclose(moment[5:-5], car.yaw_inertia * turn[5:-5], atol=20.0)
     lateral = drive.speed * np.sin(drive.sideslip)
     across = np.gradient(lateral, 0.01) + drive.yaw_rate * drive.speed * np.cos(drive.sideslip)

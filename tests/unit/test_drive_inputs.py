@@ -5,17 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from estimators.vehicle import GRAVITY
 from studies.drives import corner_inputs as ci
 from studies.drives.baselines import held, integrated_acceleration, mean_over
 from studies.drives.judge import slip_ratio
 
 CAR = {
     "mass": 2000.0,
-    "front_axle_to_cg": 1.2,
-    "rear_axle_to_cg": 1.6,
+    "front_axle_distance": 1.2,
+    "rear_axle_distance": 1.6,
     "cg_height": 0.6,
-    "track_front": 1.5,
-    "track_rear": 1.6,
+    "front_track": 1.5,
+    "rear_track": 1.6,
 }
 RNG = np.random.default_rng(7)
 
@@ -24,7 +25,7 @@ def test_loads_carry_the_car_and_balance_its_moments() -> None:
     ax, ay = RNG.uniform(-8, 8, 50), RNG.uniform(-8, 8, 50)
     load = ci.vertical_loads(ax, ay, **CAR)
     m, h = CAR["mass"], CAR["cg_height"]
-    np.testing.assert_allclose(load.sum(axis=1), m * ci.GRAVITY)
+    np.testing.assert_allclose(load.sum(axis=1), m * GRAVITY)
     pitch = load[:, :2].sum(axis=1) * 1.2 - load[:, 2:].sum(axis=1) * 1.6
     np.testing.assert_allclose(pitch, -m * ax * h, atol=1e-6)
     roll = (load[:, 1] - load[:, 0]) * 0.75 + (load[:, 3] - load[:, 2]) * 0.8

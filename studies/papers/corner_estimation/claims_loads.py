@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.loads import GRAVITY, Loads, vertical_loads
+from analysis.loads import Loads, vertical_loads
 from studies.claim import ClaimFunction, Finding, judged
-from studies.papers.corner_estimation.inputs import parameters
+from studies.papers.corner_estimation.inputs import PRINTED_GRAVITY, parameters
 from synthesis.models.parameter_set import ParameterSet
 
 TOLERANCE = 1e-4  # N
@@ -36,13 +36,15 @@ def balance(assumed: ParameterSet, true: ParameterSet) -> Balance:
     F_zf + F_zr = m a_z,  L_f F_zf - L_r F_zr = -m h a_x,  (F_R - F_L) T_i/2 = m_i h a_y with m_i = F_zi / g.
     """
     size = {name: entry.value for name, entry in true.vehicle.items()}
-    ax, ay, az = (g.ravel() for g in np.meshgrid(np.linspace(-8, 8, 9), np.linspace(-8, 8, 9), [8.0, GRAVITY, 11.0]))
-    found = vertical_loads(assumed, ax, ay, az)
+    ax, ay, az = (
+        g.ravel() for g in np.meshgrid(np.linspace(-8, 8, 9), np.linspace(-8, 8, 9), [8.0, PRINTED_GRAVITY, 11.0])
+    )
+    found = vertical_loads(assumed, ax, ay, az, gravity=PRINTED_GRAVITY)
     mass, height = size["mass"], size["cg_height"]
     vertical = found.front + found.rear - mass * az
     pitch = size["front_axle_distance"] * found.front - size["rear_axle_distance"] * found.rear + mass * height * ax
     roll = [
-        (right - left) * size[track] / 2.0 - axle / GRAVITY * height * ay
+        (right - left) * size[track] / 2.0 - axle / PRINTED_GRAVITY * height * ay
         for axle, left, right, track in (
             (found.front, found.front_left, found.front_right, "front_track"),
             (found.rear, found.rear_left, found.rear_right, "rear_track"),
@@ -53,7 +55,7 @@ def balance(assumed: ParameterSet, true: ParameterSet) -> Balance:
 
 def sign_conflict(vehicle: ParameterSet) -> dict[str, float]:
     """A car at rest on a bank of 3 degrees: (11) says that it reads a_y = +g sin(phi); (16) must give zero, in m/s^2."""
-    read = GRAVITY * np.sin(BANK), GRAVITY * np.cos(BANK)
+    read = PRINTED_GRAVITY * np.sin(BANK), PRINTED_GRAVITY * np.cos(BANK)
     across = {side: float(read[0] * np.cos(angle) + read[1] * np.sin(angle)) for side, angle in
               (("printed", BANK), ("angles_reversed", -BANK))}  # fmt: skip
     size = vehicle.vehicle
@@ -64,7 +66,8 @@ def sign_conflict(vehicle: ParameterSet) -> dict[str, float]:
 def load_formulas(assumed: ParameterSet | None = None) -> Finding:
     """Static loads, transfer per unit of acceleration, balances of the level car, and the sign of (14), (16)."""
     car = parameters() if assumed is None else assumed
-    rest, driving, turning = (vertical_loads(car, *a) for a in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+    motions = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
+    rest, driving, turning = (vertical_loads(car, *a, gravity=PRINTED_GRAVITY) for a in motions)
     residual, conflict = balance(car, parameters()), sign_conflict(car)
     computed = {
         "static_N": {"front": float(rest.front), "rear": float(rest.rear), **corners(rest)},

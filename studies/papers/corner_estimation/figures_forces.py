@@ -9,7 +9,7 @@ from analysis.bounds import force_observer_bound
 from analysis.loads import vertical_loads
 from studies.papers.corner_estimation.claims_filter import SIZES, STEER, determinants
 from studies.papers.corner_estimation.claims_forces import DISTURBANCE_RATE, STEP, force_errors
-from studies.papers.corner_estimation.inputs import FORCE_GAINS, parameters
+from studies.papers.corner_estimation.inputs import FORCE_GAINS, PRINTED_GRAVITY, parameters
 from studies.papers.corner_estimation.sigma_points import weights
 from studies.report.canvas import DASHES, canvas, grid, label, legend
 from studies.report.colours import BLUE, CURVES, GREY, RED
@@ -128,7 +128,7 @@ def load_figure() -> Drawing:
     zero = np.zeros_like(acceleration)
     names = ("front left", "front right", "rear left", "rear right")
     for ax, motion, axis in zip(axes[0], ((acceleration, zero), (zero, acceleration)), "xy", strict=True):
-        found = vertical_loads(parameters(), *motion)
+        found = vertical_loads(parameters(), *motion, gravity=PRINTED_GRAVITY)
         for name, colour, dash in zip(names, CURVES, DASHES, strict=False):
             ax.plot(
                 acceleration, getattr(found, name.replace(" ", "_")) / 1e3, color=colour, linestyle=dash, label=name

@@ -19,6 +19,7 @@ PARAMETERS = "corner-estimation"
 DIRECTIONS: tuple[Direction, ...] = ("longitudinal", "lateral")
 STATED_SPEED = 180.0  # rad/s, P1 section 6: the range that the stability claims name
 DESIGN_SPEED = 140.0  # rad/s, P1 section 6.2: the range that the gains are designed on
+PRINTED_GRAVITY = 9.81  # m/s^2, of the load examples
 FORCE_GAINS = (1.8, 11.4, 50.6)  # eta_1 [N s], eta_2 [N m], eta_3 [1/s], P1 section 2
 
 # The parameter sets with printed gains that the stability claims are about: (name, direction).

@@ -148,8 +148,8 @@ def substitute_car() -> FourWheel:
     return FourWheel(
         mass=value["mass"],
         yaw_inertia=value["yaw_inertia"],
-        front_lever=value["front_axle_distance"],
-        rear_lever=value["rear_axle_distance"],
+        front_axle_distance=value["front_axle_distance"],
+        rear_axle_distance=value["rear_axle_distance"],
         track=value["track"],
         front_stiffness=value["front_stiffness"],
         rear_stiffness=value["rear_stiffness"],

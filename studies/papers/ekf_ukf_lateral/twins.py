@@ -11,6 +11,7 @@ from studies.papers.ekf_ukf_lateral.observability import substitute_car
 from synthesis.polynomials.matrix import FloatArray
 
 STEP = 0.001  # s
+PRINTED_GRAVITY = 9.81  # m/s^2, of the loads at rest
 SPLIT = 800.0  # N, by which the twins differ at the start, to each side
 
 
@@ -36,7 +37,9 @@ def twins(seconds: float = 1.5, front: bool = False, steered: bool = True) -> Tw
     x[1, left], x[1, left + 1] = SPLIT, -SPLIT
     time = np.arange(0.0, seconds, STEP)
     steering = np.radians(3.0) * np.sin(2.0 * np.pi * 0.7 * time) * steered
-    loads = np.broadcast_to(car.static_loads, (2, 4))
+    weight = car.mass * PRINTED_GRAVITY / (2 * (car.front_axle_distance + car.rear_axle_distance))
+    ahead, behind = weight * car.rear_axle_distance, weight * car.front_axle_distance
+    loads = np.broadcast_to((ahead, ahead, behind, behind), (2, 4))
     states, outputs = np.empty((len(time), 2, 8)), np.empty((len(time), 2, 4))
     for k, angle in enumerate(steering):
         model = FourWheelModel.at(car, STEP, np.full(2, angle), loads, 1.0)

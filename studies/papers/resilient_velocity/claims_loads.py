@@ -6,7 +6,6 @@ import math
 
 import sympy as sp
 
-from analysis.loads import GRAVITY as STANDARD
 from analysis.loads import vertical_loads
 from studies.claim import ClaimFunction, Finding, agrees
 from studies.papers.resilient_velocity.leaning import (
@@ -32,19 +31,20 @@ def loads(setting: Setting = PRINTED) -> Finding:
     """P3-26: sums, lever rule and transfer hold; leaning at rest the printed roll sign and arm fail, the corrected ones hold."""
     v = {name: q.value for name, q in setting.parameters.vehicle.items()}
     base = v["front_axle_distance"] + v["rear_axle_distance"]
-    rest, driving, turning = (vertical_loads(setting.parameters, *a) for a in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+    g, motions = setting.gravity, ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
+    rest, driving, turning = (vertical_loads(setting.parameters, *a, gravity=g) for a in motions)
     front, rear = float(rest.front), float(rest.rear)
     longitudinal = float(driving.rear) - rear
     lateral = float(turning.front_right - rest.front_right)
     lever = (
-        agrees(front, v["mass"] * STANDARD * v["rear_axle_distance"] / base, 1e-9 * front)
+        agrees(front, v["mass"] * g * v["rear_axle_distance"] / base, 1e-9 * front)
         and agrees(longitudinal, v["mass"] * v["cg_height"] / base, 1e-9 * longitudinal)
-        and agrees(lateral, front / STANDARD * v["cg_height"] / v["front_track"], 1e-9 * lateral)
+        and agrees(lateral, front / g * v["cg_height"] / v["front_track"], 1e-9 * lateral)
     )
     sums = axle_sum(AS_PRINTED) == 0 and axle_sum(CORRECTED) == 0
     printed, corrected = residual(AS_PRINTED), residual(CORRECTED)
     at = {
-        ROLL: LEAN, GRAVITY: STANDARD, AXLE_MASS: front / STANDARD, HEIGHT: v["cg_height"], ROLL_HEIGHT: v["roll_center_height"],
+        ROLL: LEAN, GRAVITY: g, AXLE_MASS: front / g, HEIGHT: v["cg_height"], ROLL_HEIGHT: v["roll_center_height"],
         TRACK: v["front_track"],
     }  # fmt: skip
     off = [float(sp.N(e.subs(at))) for e in printed]

@@ -32,6 +32,7 @@ class Setting:
     parameters: ParameterSet
     gains: Mapping[Direction, Gain]
     high_slip: Gain  # Example 2, longitudinal
+    gravity: float = 9.81  # m/s^2, of the load examples
     sample_time: float = 0.005  # s, 200 Hz
     similarity: float = 9000.0  # gamma of T = diag(gamma, 1), Example 1
     example_speed: float = 40.0  # rad/s, Example 1

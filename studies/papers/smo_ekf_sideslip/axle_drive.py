@@ -14,7 +14,7 @@ from synthesis.models.catalogue.single_track import PEUGEOT_307
 from synthesis.polynomials.matrix import FloatArray
 
 SAMPLE_TIME = 0.01  # s
-GRAVITY = 9.81  # m/s^2
+PRINTED_GRAVITY = 9.81  # m/s^2, of the limits of the axles
 LINEAR = 1e9  # friction so large that the axles are linear: an observer with the right stiffness has no model error
 Steering = Callable[[float], float]
 
@@ -93,13 +93,13 @@ def axle_drive(
     P5 (10), (11) and (1) with the front forces turned into body axes. A large `friction` makes the axles linear.
     """
     car = published_car()
-    weight = car.mass * GRAVITY / (car.front_lever + car.rear_lever)
-    limit = friction * weight * np.array([car.rear_lever, car.front_lever])
+    weight = car.mass * PRINTED_GRAVITY / (car.front_axle_distance + car.rear_axle_distance)
+    limit = friction * weight * np.array([car.rear_axle_distance, car.front_axle_distance])
     stiffness = np.array([car.front_stiffness, car.rear_stiffness])
 
     def forces(angle: Any, beta: Any, yaw: Any) -> tuple[FloatArray, FloatArray, Any]:
         """Slips (..., 2), lateral forces (..., 2), and the drive force for which V' = 0."""
-        front, rear = angle - beta - car.front_lever * yaw / speed, -beta + car.rear_lever * yaw / speed
+        front, rear = angle - beta - car.front_axle_distance * yaw / speed, -beta + car.rear_axle_distance * yaw / speed
         slips = np.stack([front, rear], axis=-1)
         across = limit * np.tanh(stiffness * slips / limit)
         turned = angle - beta
@@ -112,7 +112,7 @@ def axle_drive(
         turned = angle - x[0]
         lateral = drive * np.sin(turned) + across[0] * np.cos(turned) + across[1] * np.cos(x[0])
         front = across[0] * np.cos(angle) + drive * np.sin(angle)
-        turn = (car.front_lever * front - car.rear_lever * across[1]) / car.yaw_inertia
+        turn = (car.front_axle_distance * front - car.rear_axle_distance * across[1]) / car.yaw_inertia
         return [lateral / (car.mass * speed) - x[1], turn]
 
     time = np.arange(0.0, seconds, SAMPLE_TIME)

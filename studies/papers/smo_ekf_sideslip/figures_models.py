@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from matplotlib.figure import Figure
 
-from studies.papers.smo_ekf_sideslip.axle_drive import GRAVITY, SAMPLE_TIME, AxleDrive, published_car
+from studies.papers.smo_ekf_sideslip.axle_drive import PRINTED_GRAVITY, SAMPLE_TIME, AxleDrive, published_car
 from studies.papers.smo_ekf_sideslip.observer_chain import ChainRun
 from studies.report.colours import BLUE, GREEN, ORANGE, PURPLE, RED
 from studies.study import Drawing
@@ -40,7 +40,7 @@ def zone_of(slip: FloatArray, force: FloatArray, threshold: float = THRESHOLD) -
 def lateral_models() -> Drawing:
     """Fig. 9: linear, linear adaptive and Burckhardt."""
     car = published_car()
-    load = car.mass * GRAVITY * car.rear_lever / (car.front_lever + car.rear_lever)
+    load = car.mass * PRINTED_GRAVITY * car.rear_axle_distance / (car.front_axle_distance + car.rear_axle_distance)
     slip = np.radians(np.linspace(0.0, 12.0, 241))
     figure = Figure(figsize=(7.2, 4.0), layout="constrained")
     axis = figure.subplots()
@@ -90,7 +90,7 @@ def zones(drive: AxleDrive, run: ChainRun) -> Drawing:
     car = published_car()
     turn = drive.yaw_rate / drive.speed
     # beta_1 of the estimate from its beta_2: by (11) the two differ by measured quantities alone.
-    slip = run.rear_sideslip[:, 0] + drive.steering - (car.front_lever + car.rear_lever) * turn
+    slip = run.rear_sideslip[:, 0] + drive.steering - (car.front_axle_distance + car.rear_axle_distance) * turn
     force = run.forces[:, 0, 0] * np.cos(drive.steering) - run.forces[:, 0, 2] * np.sin(drive.steering)
     stiffness = run.stiffness[:, 0, 0] / 1e3
     kind = zone_of(slip, force)
