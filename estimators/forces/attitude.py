@@ -13,11 +13,11 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import LIMIT, any_missing, batch, bounded, mask, number, pair, quiet, setting
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.interpolate import FloatArray
-from estimators.signals.checks import LIMIT, any_missing, batch, bounded, mask, number, pair, quiet, setting
+from estimators.memory import Renewable
 from estimators.signals.held import Held
-from estimators.signals.renewable import Renewable
 from estimators.vehicle import GRAVITY
 
 STEEPEST = math.sin(math.radians(60.0))

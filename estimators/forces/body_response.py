@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import batch, mask, setting
 from estimators.errors import EstimatorError
 from estimators.interpolate import FloatArray
-from estimators.phi import phi
-from estimators.signals.checks import batch, mask, setting
+from estimators.memory import Memory
+from estimators.phi import phi_of
 from estimators.signals.held import Held
-from estimators.signals.memory import Memory
 
 PITCH = (1.4, 0.4)
 """Hz, damping ratio."""
@@ -114,8 +113,7 @@ class BodyResponse(Memory):
         self.starts = self.starts | chosen
         self._any_start = bool(self.starts.any())
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        super()._take(saved)
+    def _recall(self) -> None:
         self._any_start = bool(self.starts.any())
 
 
@@ -129,10 +127,7 @@ def _moved(mode: _Mode[Number], x: Number, speed: Number, force: Number) -> tupl
 def _mode(stiffness: float, damping: float, time: float) -> _Mode[float]:
     """e^(A Ts) by rows, int e^(A t) dt (0, 1)', K and C of x'' = a - C x' - K x, from e^M = 1 + M phi(M)."""
     M = time * np.array([[0.0, 1.0], [-stiffness, -damping]])
-    mean = 0.5 * float(M[0, 0] + M[1, 1])
-    N = M - mean * np.eye(2)
-    alpha, beta = phi(mean, float((N @ N)[0, 0]))
-    integral = alpha * np.eye(2) + beta * N
+    integral = phi_of(M)
     a, b, c, d = (np.eye(2) + M @ integral).reshape(-1).tolist()
     e, f = (time * integral[:, 1]).tolist()
     return a, b, c, d, e, f, stiffness, damping

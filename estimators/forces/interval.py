@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import mask
 from estimators.faults import BoolArray
 from estimators.forces.wheel import WheelForceStep, WheelInputs, WheelSignals
 from estimators.interpolate import FloatArray
-from estimators.signals.checks import mask
-from estimators.signals.memory import Memory
+from estimators.memory import Memory
 from estimators.vehicle import VehicleParameters
 
 
@@ -80,10 +79,6 @@ class SpeedInterval(Memory):
         self.start = np.where(chosen, np.nan, self.start)
         self.torque, self.samples = np.where(chosen, 0.0, self.torque), np.where(chosen, 0.0, self.samples)
         self.closed = False
-
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        super()._take(saved)
-        self.closed = bool(saved["closed"])
 
 
 class IntervalObserver(Memory):

@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import any_missing, batch, entries, mask, quiet, setting
 from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.filters import FilterStep, KalmanFilter, UnscentedKalmanFilter
@@ -15,10 +16,9 @@ from estimators.filters.step import gate_threshold
 from estimators.forces.lateral_few import FEW, KILO, LateralFew
 from estimators.forces.planar import PlanarModel, planar_model
 from estimators.interpolate import FloatArray
+from estimators.memory import Renewable
 from estimators.signals import limits
-from estimators.signals.checks import any_missing, batch, entries, mask, quiet, setting
 from estimators.signals.held import Held
-from estimators.signals.renewable import Renewable
 from estimators.vehicle import VehicleParameters
 
 PUBLISHED_PROCESS = 0.13

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
+from estimators.arguments import setting
 from estimators.faults import BoolArray
 from estimators.forces.interval import IntervalObserver, MeanForce
 from estimators.forces.wheel import WheelForceStep, WheelSignals
 from estimators.interpolate import FloatArray
-from estimators.signals.checks import setting
 from estimators.vehicle import VehicleParameters
 
 

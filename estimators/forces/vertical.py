@@ -17,13 +17,13 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import any_missing, batch, mask, number, pair
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.forces.body_response import PITCH, ROLL, BodyResponse
 from estimators.interpolate import FloatArray
+from estimators.memory import Renewable
 from estimators.signals import limits
-from estimators.signals.checks import any_missing, batch, mask, number, pair
 from estimators.signals.held import Held
-from estimators.signals.renewable import Renewable
 from estimators.vehicle import GRAVITY, VehicleParameters
 
 LEAST_GRAVITY = 0.1 * GRAVITY

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from estimators.arguments import setting
 from estimators.errors import EstimatorError
 from estimators.faults import BoolArray
 from estimators.filters import UnscentedKalmanFilter
@@ -14,7 +15,6 @@ from estimators.filters.scalar import ScalarKalmanFilter, ScalarStep
 from estimators.forces.interval import IntervalObserver, MeanForce
 from estimators.forces.wheel import WheelForceStep, WheelSignals
 from estimators.interpolate import FloatArray
-from estimators.signals.checks import setting
 from estimators.vehicle import VehicleParameters
 
 METHODS = ("unscented", "linear")

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import batch, entries, mask, setting
+from estimators.arithmetic import Number, arithmetic
+from estimators.memory import Memory
 from estimators.pipeline.result import Check, Consistency
-from estimators.signals.checks import batch, entries, mask, setting
-from estimators.signals.memory import Memory
 from estimators.vehicle import GRAVITY, VehicleParameters
-from estimators.velocity.arithmetic import Number, arithmetic, kept_signals
 
 BALANCE = 0.6
 """m/s^2 that sum of F/m and acceleration may stay apart: 0.15 of bias, 2 % of torque at 0.5 g, drag at 30 m/s (0.3)."""
@@ -102,6 +101,3 @@ class CrossChecks(Memory):
         """Forgets the gaps of the entries `where` (bool mask; None: all)."""
         chosen = self._kit.own(mask(where, self.batch_shape, "where"))
         self.gaps = [self._kit.where(chosen, 0.0, gap) for gap in self.gaps]
-
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        self.gaps = list(kept_signals(saved["gaps"], math.prod(self.batch_shape) == 1))

@@ -11,11 +11,11 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import batch, mask
 from estimators.faults import BoolArray, FlagArray
 from estimators.interpolate import FloatArray
+from estimators.memory import Memory
 from estimators.schedule import GainSchedule
-from estimators.signals.checks import batch, mask
-from estimators.signals.memory import Memory
 from estimators.velocity.high_slip import HighSlipDetector, HighSlipSettings
 from estimators.velocity.lpv import LpvVelocityObserver
 from estimators.velocity.ltv_kalman import LtvKalmanObserver
@@ -70,7 +70,6 @@ class ScheduledCorners(Memory):
     """
 
     parts = ("observer",)
-    unknowns = ("raw", "measurement")
     judges_slip = False
 
     def __init__(self, schedule: GainSchedule, batch_shape: tuple[int, ...] = (4,)) -> None:

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import batch, entries, mask
+from estimators.arithmetic import Number, Signals, arithmetic
 from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray
 from estimators.interpolate import FloatArray
+from estimators.memory import Memory
 from estimators.pipeline.corner_kinds import CornerKind, CornerSample, ScheduledCorners
 from estimators.schedule import GainSchedule
 from estimators.signals import FilteredDerivative, limits
-from estimators.signals.checks import batch, entries, mask
-from estimators.signals.memory import Memory
 from estimators.vehicle import VehicleParameters
-from estimators.velocity.arithmetic import Number, Signals, arithmetic, kept_signals
 from estimators.velocity.corners import rotated, tire_motion
 from estimators.velocity.mapping import SlipWeights, weighed
 from estimators.velocity.slip import slips
@@ -211,11 +210,6 @@ class CornerObservers(Memory):
         self.slip, self.angle = kit.each(
             lambda slip, angle: (kit.where(here, 0.0, slip), kit.where(here, 0.0, angle)), self.slip, self.angle
         )
-
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        super()._take(saved)
-        self.vx, self.vy = (self._kit.own(saved[name].copy()) for name in ("vx", "vy"))
-        self.slip, self.angle = (kept_signals(saved[name], self._count == 1) for name in ("slip", "angle"))
 
     def _observer(self, given: GainSchedule | CornerKind) -> CornerKind:
         """A schedule becomes its observer; one that is given must fit."""

@@ -8,15 +8,15 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import mask, setting
+from estimators.arithmetic import Number, arithmetic
 from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray
 from estimators.interpolate import FloatArray
+from estimators.memory import Memory
 from estimators.pipeline.corner_set import CornerObservers, CornerSetStep
 from estimators.pipeline.parts import check_parts
 from estimators.signals import limits
-from estimators.signals.checks import mask, setting
-from estimators.signals.memory import Memory
-from estimators.velocity.arithmetic import Number, arithmetic
 from estimators.velocity.corners import rotated
 from estimators.velocity.kinematic import KinematicKalman
 from estimators.velocity.slip import slips

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import batch, entries, mask, setting
+from estimators.arithmetic import Arithmetic, Number, arithmetic
 from estimators.faults import BoolArray, Flag, FlagArray
 from estimators.forces import (
     LateralForceEstimator,
@@ -19,17 +20,15 @@ from estimators.forces import (
     without_gravity,
 )
 from estimators.interpolate import FloatArray
+from estimators.memory import Memory
 from estimators.pipeline.checks import CrossChecks
 from estimators.pipeline.parts import CORNER_PARTS, check_parts
 from estimators.pipeline.readings import WheelReadings
 from estimators.pipeline.result import PipelineStep
 from estimators.pipeline.signals import VehicleSignals
 from estimators.signals import FilteredDerivative, limits
-from estimators.signals.checks import batch, entries, mask, setting
-from estimators.signals.memory import Memory
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity import VelocityFusion
-from estimators.velocity.arithmetic import Arithmetic, Number, arithmetic, kept_signals
 from estimators.velocity.slip import LEAST_SPEED
 
 REAL_SENSORS = (0.3, 0.1, 0.3)
@@ -233,13 +232,6 @@ class EstimationPipeline(Memory):
         self.speed = [choose(here, 0.0, value) for value in self.speed]
         self.front, self.angle = choose(here, 0.0, self.front), choose(here, 0.0, self.angle)
         self.drive = choose(here, math.nan, self.drive)
-
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        super()._take(saved)
-        for name in ("bias", "speed"):
-            setattr(self, name, list(kept_signals(saved[name], self._single)))
-        for name in ("front", "angle", "drive"):
-            setattr(self, name, self._kit.own(saved[name].copy()))
 
     def _late(self, elapsed: npt.ArrayLike | None) -> Number:
         """Where the sample came so early or late that a difference quotient over it is no derivative."""

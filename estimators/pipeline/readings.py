@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from estimators.faults import BoolArray
 from estimators.interpolate import FloatArray
-from estimators.signals.memory import Memory
+from estimators.memory import Memory
 
 
 class WheelReadings(Memory):

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from estimators.interpolate import FloatArray
+from estimators.memory import Memory
 from estimators.sideslip import (
     AdaptiveStiffnessObserver,
     FixedStiffnessObserver,
@@ -22,7 +23,6 @@ from estimators.sideslip import (
 )
 from estimators.sideslip.four_wheel import FourWheelStep
 from estimators.sideslip.stiffness import StiffnessStep
-from estimators.signals.memory import Memory
 
 
 class FourWheelSideslip(Memory):

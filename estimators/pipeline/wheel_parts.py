@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy.typing as npt
 
+from estimators.arguments import batch
 from estimators.forces.pid import PUBLISHED_GAINS, PidForceObserver
 from estimators.forces.wheel import WheelForceStep
+from estimators.memory import Memory
 from estimators.signals import FilteredDerivative
-from estimators.signals.checks import batch
-from estimators.signals.memory import Memory
 from estimators.vehicle import VehicleParameters
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from estimators.faults import BoolArray
 from estimators.interpolate import FloatArray
-from estimators.sideslip.vehicle import SingleTrack
+from estimators.vehicle import SingleTrack
 
 REST_TIME = 0.1  # s, with which sideslip fades away at standstill
 

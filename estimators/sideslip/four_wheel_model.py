@@ -14,7 +14,7 @@ from estimators.faults import BoolArray
 from estimators.filters.workspace import Workspace
 from estimators.interpolate import FloatArray
 from estimators.sideslip.dugoff import LEAST_KNEE, dugoff_force, dugoff_slope
-from estimators.sideslip.vehicle import FourWheel
+from estimators.vehicle import FourWheel
 
 STATES = (
     ("yaw_rate", "rad/s"),

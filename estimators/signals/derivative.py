@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import batch, entries, mask, quiet, setting
 from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.interpolate import FloatArray
-from estimators.signals.checks import batch, entries, mask, quiet, setting
+from estimators.memory import Memory
 from estimators.signals.freshness import Freshness
-from estimators.signals.memory import Memory
 
 
 class DerivativeStep(NamedTuple):
@@ -130,7 +129,3 @@ class FilteredDerivative(Memory):
         self.elapsed = np.where(chosen, 0, self.elapsed)
         self.starts = self.starts | chosen
         self.flowing = False
-
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        super()._take(saved)
-        self.flowing = bool(saved["flowing"])

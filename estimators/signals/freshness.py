@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import batch, bounded, entries, mask
 from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.interpolate import FloatArray
-from estimators.signals.checks import batch, bounded, entries, mask
-from estimators.signals.memory import Memory
+from estimators.memory import Memory
 
 
 class FreshStep(NamedTuple):

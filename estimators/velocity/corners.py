@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arithmetic import Number
 from estimators.interpolate import FloatArray
 from estimators.vehicle import VehicleParameters
-from estimators.velocity.arithmetic import Number
 
 
 class CornerVectors(NamedTuple):

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import batch, mask, setting
+from estimators.arithmetic import Number, Signals, arithmetic
 from estimators.errors import EstimatorError
 from estimators.faults import Flag
-from estimators.signals.checks import batch, mask, setting
-from estimators.signals.memory import Memory
+from estimators.memory import Memory
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity import lateral_fusion as lateral
 from estimators.velocity import longitudinal_fusion as longitudinal
-from estimators.velocity.arithmetic import Number, Signals, arithmetic, kept_signals
 from estimators.velocity.fusion_adrift import FusionAdrift
 from estimators.velocity.fusion_against import FusionAgainst
 from estimators.velocity.fusion_lost import FusionLost
@@ -176,11 +174,6 @@ class VelocityFusion(Memory):
         start = [self._kit.where(chosen, new, old) for new, old in zip(asked, self.start, strict=True)]
         self.start = self._kit.stacked(start)
         self._forget(chosen)
-
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        super()._take(saved)
-        self.start = kept_signals(saved["start"], self._count == 1)
-        self.new, self.renewed = (self._kit.own(saved[name].copy()) for name in ("new", "renewed"))
 
     def _elapsed(self, elapsed: npt.ArrayLike | None) -> tuple[Number, Number]:
         """Seconds, and where they were unusable and replaced by the sample time."""

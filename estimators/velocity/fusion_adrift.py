@@ -7,8 +7,8 @@ again from what they see. What is known of sensors and tires stays.
 
 from __future__ import annotations
 
-from estimators.velocity.arithmetic import Number, Signals, arithmetic
-from estimators.velocity.cars_memory import CarsMemory
+from estimators.arithmetic import Number, Signals, arithmetic
+from estimators.memory import CarsMemory
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.lateral_fusion import AxleVerdict, LateralFusion
 

@@ -9,8 +9,8 @@ these are unknown, forces are shares of a_x, and an a_x that points to the wrong
 
 from __future__ import annotations
 
-from estimators.velocity.arithmetic import Number, Signals, arithmetic
-from estimators.velocity.cars_memory import CarsMemory
+from estimators.arithmetic import Number, Signals, arithmetic
+from estimators.memory import CarsMemory
 from estimators.velocity.fusion_screen import Screened
 from estimators.velocity.longitudinal_fusion import SLIP, SPEED, LongitudinalFusion
 

@@ -13,8 +13,8 @@ stands beyond doubt for `lost_time` while its estimate moves is lost too; a slid
 
 from __future__ import annotations
 
-from estimators.velocity.arithmetic import Number, Signals, arithmetic
-from estimators.velocity.cars_memory import CarsMemory
+from estimators.arithmetic import Number, Signals, arithmetic
+from estimators.memory import CarsMemory
 from estimators.velocity.fusion_screen import Screened
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.longitudinal_fusion import WheelVerdict

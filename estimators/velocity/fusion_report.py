@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimators.arithmetic import Arithmetic, Number, Signals
 from estimators.faults import Flag
 from estimators.velocity import lateral_fusion as lateral
 from estimators.velocity import longitudinal_fusion as longitudinal
-from estimators.velocity.arithmetic import Arithmetic, Number, Signals
 from estimators.velocity.fusion_screen import Screened
 from estimators.velocity.fusion_step import FusionStep
 from estimators.velocity.longitudinal_fusion import BIAS, GRADE

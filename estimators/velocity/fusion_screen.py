@@ -10,15 +10,12 @@ inertial signal that is missing is held for a while, and then counts as zero: he
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy.typing as npt
-
+from estimators.arithmetic import Number, Signals, arithmetic
 from estimators.faults import Flag
+from estimators.memory import CarsMemory
 from estimators.signals import limits
-from estimators.signals.memory import Memory
-from estimators.velocity.arithmetic import Number, Signals, arithmetic, kept_signals
 from estimators.velocity.fusion_settings import FusionSettings
 
 _LONGEST_RUN = 40.0  # samples a signal may repeat before it counts as stale; its noise grows no further
@@ -44,7 +41,7 @@ class Screened(NamedTuple):
     wheel_flags: Signals
 
 
-class FusionScreen(Memory):
+class FusionScreen(CarsMemory):
     """Remembers the last good values of `count` cars."""
 
     memory = ("inertial", "run", "wheel_speed", "age", "steer", "slope", "swing", "slip_left")
@@ -64,23 +61,6 @@ class FusionScreen(Memory):
         wheels = kit.each(lambda v: (v + zero, v + zero, v + zero, v + zero, v + zero + math.nan), four)
         self.steer, self.age, self.slope, self.slip_left, self.wheel_speed = wheels
         self.swing: Number = zero  # filtered yaw acceleration, rad/s^2
-
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        for name in self.memory:
-            if name == "swing":
-                self.swing = self.kit.own(saved[name].copy())
-            else:
-                setattr(self, name, kept_signals(saved[name], self.count == 1))
-
-    def forget(self, where: Number) -> None:
-        """Starts the cars `where` afresh."""
-        choose = self.kit.where
-        for name in self.memory:
-            nothing, value = math.nan if name in self.unknowns else 0.0, getattr(self, name)
-            if name == "swing":
-                self.swing = choose(where, 0.0, value)
-            else:
-                setattr(self, name, self.kit.each(lambda v, n=nothing: (choose(where, n, v),), value)[0])
 
     def __call__(self, inertial: Signals, wheel_speed: Signals, steer: Signals, elapsed: Number) -> Screened:
         """Raw signals, which may be anything; `elapsed` s, above zero."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from estimators.velocity.arithmetic import Number, Signals, arithmetic
-from estimators.velocity.cars_memory import CarsMemory
+from estimators.arithmetic import Number, Signals, arithmetic
+from estimators.memory import CarsMemory
 from estimators.velocity.fusion_screen import Screened
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.lateral_fusion import YAW_BIAS, LateralFusion

@@ -21,10 +21,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from estimators.arithmetic import Number, Signals, arithmetic
+from estimators.memory import CarsMemory
 from estimators.signals import limits
 from estimators.vehicle import GRAVITY, VehicleParameters
-from estimators.velocity.arithmetic import Number, Signals, arithmetic
-from estimators.velocity.cars_memory import CarsMemory
 from estimators.velocity.fusion_screen import Screened
 from estimators.velocity.longitudinal_fusion import BIAS, SCALE, LongitudinalFusion
 

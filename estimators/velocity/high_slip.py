@@ -16,11 +16,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import batch, entries, mask
 from estimators.errors import EstimatorError
 from estimators.faults import BoolArray
 from estimators.interpolate import FloatArray
-from estimators.signals.checks import batch, entries, mask
-from estimators.signals.memory import Memory
+from estimators.memory import Memory
 
 
 @dataclass(frozen=True)

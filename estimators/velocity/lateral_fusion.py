@@ -19,9 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimators.arithmetic import Number, Signals, arithmetic
 from estimators.signals import limits
 from estimators.vehicle import GRAVITY, VehicleParameters
-from estimators.velocity.arithmetic import Number, Signals, arithmetic
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.speed_filter_few import speed_filter
 

@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimators.arithmetic import Number, Signals, arithmetic
 from estimators.vehicle import GRAVITY
-from estimators.velocity.arithmetic import Number, Signals, arithmetic
 from estimators.velocity.fusion_screen import Screened
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.speed_filter_few import speed_filter

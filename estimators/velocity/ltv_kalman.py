@@ -14,12 +14,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import batch, entries, mask, quiet, setting
 from estimators.errors import EstimatorError
 from estimators.faults import BoolArray, Flag, FlagArray, raise_flag
 from estimators.filters import KalmanFilter
 from estimators.interpolate import FloatArray
-from estimators.signals.checks import batch, entries, mask, quiet, setting
-from estimators.signals.renewable import Renewable
+from estimators.memory import Renewable
 from estimators.velocity.ltv_few import FEW, LARGEST_SPREAD, LtvFew
 from estimators.velocity.ltv_model import BristleTire, sampled
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arithmetic import Arithmetic, Number
 from estimators.interpolate import FloatArray
-from estimators.velocity.arithmetic import Arithmetic, Number
 
 LEAST_SPEED = 0.5
 """m/s by which slips are divided at least: below, a velocity error of sensor size would read as full slip."""

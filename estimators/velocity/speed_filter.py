@@ -21,9 +21,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from estimators.arithmetic import Number, Signals
 from estimators.interpolate import FloatArray
-from estimators.signals.memory import Memory
-from estimators.velocity.arithmetic import Number, Signals
+from estimators.memory import Memory
 
 Columns = tuple[tuple[int, ...], ...]
 """Of each channel, the states that it sees: as many of each."""

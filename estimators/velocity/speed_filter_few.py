@@ -6,8 +6,7 @@ L is of the size of the channels, four at most: its inverse is found with plain 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -30,10 +29,6 @@ class SpeedFilterFew(SpeedFilter):
         self._floor = self.prior.copy()
         self._floor[0] = self._floor[:, 0] = 0.0
         self._sensitivities: dict[int, tuple[FloatArray, npt.NDArray[np.int64], Columns]] = {}
-
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
-        super()._take(saved)
-        self.mean, self.waiting, self.waited = (saved[name].tolist() for name in ("mean", "waiting", "waited"))
 
     @property
     def state(self) -> FloatArray:

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from estimators import GainSchedule, LpvVelocityObserver
+from estimators.arguments import quiet
 from estimators.filters import KalmanFilter
 from estimators.filters.scalar import ScalarKalmanFilter
 from estimators.filters.three_states import informed
 from estimators.forces import AttitudeObserver, BodyResponse, LateralForceEstimator, VerticalLoads, WheelForceFilter
 from estimators.forces.lateral_few import FEW, LateralFew
-from estimators.signals.checks import quiet
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import BristleTire, LtvKalmanObserver, SwitchedVelocityObserver
 from tests.unit.schedule_content import schedule_content

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimators.phi import phi_of
 from estimators.velocity import LpvVelocityObserver
 from studies.beyond.implementability.designs import WHEEL_SPEED, Design, with_sample_time
-from studies.beyond.implementability.updates import held
 from synthesis.polynomials.matrix import FloatArray
 
 LARGEST = 1e12  # a diverging estimate is followed up to here
@@ -25,12 +25,12 @@ def _euler(x: FloatArray, A: FloatArray, L: FloatArray, C: FloatArray, uy: Float
 
 def _sampled(x: FloatArray, A: FloatArray, L: FloatArray, C: FloatArray, uy: FloatArray, T: float) -> FloatArray:
     """The open loop over a sample, driven by B u and the held correction L (y - C x)."""
-    return np.asarray(x + T * held(T * A) @ (A @ x + B * uy[0] + L * (uy[1] - C @ x)))
+    return np.asarray(x + T * phi_of(T * A) @ (A @ x + B * uy[0] + L * (uy[1] - C @ x)))
 
 
 def _predict(x: FloatArray, A: FloatArray, L: FloatArray, C: FloatArray, uy: FloatArray, T: float) -> FloatArray:
     """The open loop over a sample, then T L (y - C x)."""
-    return np.asarray(x + T * held(T * A) @ (A @ x + B * uy[0]) + T * L * (uy[1] - C @ x))
+    return np.asarray(x + T * phi_of(T * A) @ (A @ x + B * uy[0]) + T * L * (uy[1] - C @ x))
 
 
 def _tustin(x: FloatArray, A: FloatArray, L: FloatArray, C: FloatArray, uy: FloatArray, T: float) -> FloatArray:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimators.phi import Phi
+from estimators.phi import phi_of
 from synthesis.polynomials.matrix import FloatArray
 
 Update = Callable[[FloatArray, FloatArray, FloatArray, ArrayLike], FloatArray]
@@ -18,17 +18,6 @@ Update = Callable[[FloatArray, FloatArray, FloatArray, ArrayLike], FloatArray]
 
 def _time(sample_time: ArrayLike) -> FloatArray:
     return np.asarray(sample_time, float)[..., None, None]
-
-
-def held(M: FloatArray) -> FloatArray:
-    r"""phi(M) = int_0^1 e^{M s} ds of 2 x 2 matrices (..., 2, 2), by the runtime's own closed form; e^M = I + M phi(M)."""
-    flat = np.asarray(M, float).reshape(-1, 2, 2)
-    mean = 0.5 * np.trace(flat, axis1=-2, axis2=-1)
-    N = flat - mean[:, None, None] * np.eye(2)
-    delta = N[:, 0, 0] ** 2 + N[:, 0, 1] * N[:, 1, 0]
-    alpha, beta = np.empty(len(flat)), np.empty(len(flat))
-    Phi(len(flat)).into(mean, delta, alpha, beta)
-    return np.asarray((alpha[:, None, None] * np.eye(2) + beta[:, None, None] * N).reshape(M.shape))
 
 
 def forward_euler(A: FloatArray, L: FloatArray, C: FloatArray, sample_time: ArrayLike) -> FloatArray:
@@ -39,13 +28,13 @@ def forward_euler(A: FloatArray, L: FloatArray, C: FloatArray, sample_time: Arra
 def sampled_innovation(A: FloatArray, L: FloatArray, C: FloatArray, sample_time: ArrayLike) -> FloatArray:
     r"""e^{A T} - int_0^T e^{A s} ds L C: the open loop exactly, the innovation computed once and held (P3 (10), literally)."""
     T = _time(sample_time)
-    return np.asarray(np.eye(2) + T * (held(T * A) @ (A - L @ C)), dtype=np.float64)
+    return np.asarray(np.eye(2) + T * (phi_of(T * A) @ (A - L @ C)), dtype=np.float64)
 
 
 def predict_then_correct(A: FloatArray, L: FloatArray, C: FloatArray, sample_time: ArrayLike) -> FloatArray:
     r"""e^{A T} - T L C: the open loop exactly, then the correction T L times the innovation."""
     T = _time(sample_time)
-    return np.asarray(np.eye(2) + T * (held(T * A) @ A - L @ C), dtype=np.float64)
+    return np.asarray(np.eye(2) + T * (phi_of(T * A) @ A - L @ C), dtype=np.float64)
 
 
 def tustin(A: FloatArray, L: FloatArray, C: FloatArray, sample_time: ArrayLike) -> FloatArray:
@@ -62,7 +51,7 @@ def backward_euler(A: FloatArray, L: FloatArray, C: FloatArray, sample_time: Arr
 def exact_closed_loop(A: FloatArray, L: FloatArray, C: FloatArray, sample_time: ArrayLike) -> FloatArray:
     r"""e^{(A - L C) T}: the observer integrated inside the sample, as the runtime does (P1 section 9)."""
     M = _time(sample_time) * (A - L @ C)
-    return np.asarray(np.eye(2) + M @ held(M), dtype=np.float64)
+    return np.asarray(np.eye(2) + M @ phi_of(M), dtype=np.float64)
 
 
 BREAKABLE: dict[str, Update] = {
