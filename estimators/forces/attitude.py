@@ -124,7 +124,8 @@ class AttitudeObserver(Renewable):
             turn = choose(known[2], turn, self.yaw_rate)
             road = [choose(good, new, old) for good, new, old in zip(known[3:], road, self.road, strict=True)]
         self.yaw_rate, self.road = turn, kit.stacked(road)
-        sines = (side - across) / GRAVITY, (ahead - along) / GRAVITY
+        with np.errstate(invalid="ignore", over="ignore"):
+            sines = (side - across) / GRAVITY, (ahead - along) / GRAVITY
         used = [abs(value) <= LIMIT for value in sines]
         roll, pitch = self.angle
         up = kit.sqrt(1.0 - kit.minimum(roll * roll + pitch * pitch, 1.0))
