@@ -9,6 +9,7 @@ import numpy as np
 
 from analysis.checks import as_stack
 from analysis.errors import AnalysisError
+from estimators.forces import levelled
 from estimators.vehicle import GRAVITY
 from synthesis.models.parameter_set import ParameterSet
 from synthesis.polynomials.matrix import FloatArray
@@ -71,11 +72,11 @@ def vertical_loads(
             raise
         shapes = ", ".join(f"{k} {np.shape(v)}" for k, v in given.items())
         raise AnalysisError(f"accelerations and angles do not broadcast: {shapes}") from None
-    along, above = ax * np.cos(pitch) + az * np.sin(pitch), az * np.cos(pitch) - ax * np.sin(pitch)
+    along, _, above = levelled(ax, ay, az, -pitch, 0.0 * roll)
     base = front_arm + rear_arm
     front = -m / base * (height * along - rear_arm * above)
     rear = m / base * (height * along + front_arm * above)
-    across, upright = ay * np.cos(roll) + az * np.sin(roll), az * np.cos(roll) - ay * np.sin(roll)
+    _, across, upright = levelled(ax, ay, az, 0.0 * pitch, -roll)
     corners = []
     for load, track in zip((front, rear), tracks, strict=True):
         for side in (-1.0, 1.0):

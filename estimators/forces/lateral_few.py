@@ -146,11 +146,11 @@ class LateralFew(CovarianceFilter):
             raise EstimatorError("the correction is not finite; check the accelerations and forces")
         front, back, difference = KILO * x1, KILO * x2, KILO * x3
         left = left_share(load[2], load[3]) * back
-        told = [value if -LIMIT <= value <= LIMIT else math.nan for value in nu[:3]]
+        outputs = [value if -LIMIT <= value <= LIMIT else math.nan for value in nu[:3]]
         return [
             *(front, back, 0.5 * (front - difference), 0.5 * (front + difference), left, back - left),
             *(KILO * math.sqrt(p11), KILO * math.sqrt(p22), KILO * math.sqrt(p33)),
-            *(*told, x1, x2, x3, p11, p21, p31, p21, p22, p32, p31, p32, p33),
+            *(*outputs, x1, x2, x3, p11, p21, p31, p21, p22, p32, p31, p32, p33),
         ], used[:3]
 
 

@@ -152,8 +152,10 @@ class LateralForceEstimator(Renewable):
             unseen = any_missing(missing[..., 1:], shape)
         self._flag_renewed(flags)
         if isinstance(self.filter, LateralFew):
-            told, used = self.filter.step(y, angle, force_x, load, unseen, self._threshold)
-            return LateralForceStep(told[..., :2], told[..., 2:6], told[..., 6:9], told[..., 9:12], used, flags)
+            outputs, used = self.filter.step(y, angle, force_x, load, unseen, self._threshold)
+            return LateralForceStep(
+                outputs[..., :2], outputs[..., 2:6], outputs[..., 6:9], outputs[..., 9:12], used, flags
+            )
         found = self._filtered(self.filter, y, planar_model(self.vehicle, angle, force_x), load, unseen)
         forces = found.state * KILO
         deviation: FloatArray = KILO * np.sqrt(found.covariance[..., _DIAGONAL, _DIAGONAL])

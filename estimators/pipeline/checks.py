@@ -93,9 +93,9 @@ class CrossChecks(Memory):
         failed = 0
         for bit, bad in zip(_BITS, found, strict=True):
             failed = failed | choose(bad, bit, 0)
-        told = kit.table(((gaps[0], gaps[1], load_gap, gaps[2]),), shape)
+        outputs = kit.table(((gaps[0], gaps[1], load_gap, gaps[2]),), shape)
         sums = np.asarray(failed, dtype=np.int32).reshape(shape)
-        return Consistency(told[..., 0], told[..., 1], told[..., 2], told[..., 3], sums)
+        return Consistency(outputs[..., 0], outputs[..., 1], outputs[..., 2], outputs[..., 3], sums)
 
     def reset(self, where: npt.ArrayLike | None = None) -> None:
         """Forgets the gaps of the entries `where` (bool mask; None: all)."""

@@ -1,4 +1,4 @@
-"""The papers' corner observers in one dress: what `CornerObservers` and a replay put at the four corners of a car.
+"""The papers' corner observers behind one interface: what `CornerObservers` and a replay put at the four corners of a car.
 
 A kind has `batch_shape`, which ends with the four corners, `sample_time`, `judges_slip` (whether it looks at the slip ratios
 and the accelerations of the car), `step(CornerSample) -> CornerStep` and `reset(where)`; `save` and `restore` as `Memory`.

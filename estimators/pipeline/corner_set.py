@@ -43,7 +43,7 @@ class CornerObservers(Memory):
     """A longitudinal observer at every corner, a lateral one where one is given, and their mapping to the car.
 
     u_x = R_e w' - v_xt', u_y = -v_yt' with the velocities of the last step in the accelerations, P1 section 6. Without a
-    lateral observer V_y is what `step` is told. Axles are weighed by slip (`SlipWeights`), or equally. One car runs on
+    lateral observer V_y is what `step` is given. Axles are weighed by slip (`SlipWeights`), or equally. One car runs on
     plain numbers, several on arrays, by the same formulas (`arithmetic`). What no car measures (`signals.limits`) is missing;
     a missing steering angle or yaw rate is held and flagged MISSING_INPUT at the corners concerned, a missing
     acceleration counts as zero.
@@ -126,7 +126,7 @@ class CornerObservers(Memory):
             speed = kit.rows(w, 4)
         rate = self.slope.step(raw)
         held, slope = kit.rows(rate.value, 9), kit.rows(rate.derivative, 9)
-        turn, swing = held[8], slope[8]
+        turn, yaw_acceleration = held[8], slope[8]
         left = self.vy if self.across is not None else kit.car(vy, shape, "vy")
         vx = self._started(held)
         given = kit.car(ax, shape, "ax"), kit.car(ay, shape, "ay")
@@ -139,7 +139,7 @@ class CornerObservers(Memory):
             """Sine and cosine of the steering, v_yt, and the inputs of both observers (`corner_acceleration`)."""
             sine, cosine = kit.sin(angle), kit.cos(angle)
             velocity = vx - turn * y, left + turn * x
-            acceleration = forward - swing * y, leftward + swing * x
+            acceleration = forward - yaw_acceleration * y, leftward + yaw_acceleration * x
             _, beside, pull_x, pull_y = tire_motion(velocity, acceleration, sine, cosine, swivel)
             return sine, cosine, beside, R * w_slope - pull_x, -pull_y
 
@@ -183,12 +183,12 @@ class CornerObservers(Memory):
         self.vx, self.vy = choose(kit.known(found_x), found_x, vx), choose(kit.known(found_y), found_y, left)
         if self.weights is not None or self._judged:
             self.slip, self.angle = kit.each(self._slips, held[:4], ahead, beside, radius)
-        told = kit.table(((self.vx, self.vy), seen_x, seen_y), shape)
+        outputs = kit.table(((self.vx, self.vy), seen_x, seen_y), shape)
         if not calm:
             no_angle = np.logical_not(good[..., 4:8] & good[..., 8:])
             flags = flags | np.where(no_angle, np.int32(Flag.MISSING_INPUT), np.int32(0))
-        corners = told[..., 2:6], told[..., 6:], relative, along.innovation, along.used
-        return CornerSetStep(told[..., 0], told[..., 1], *corners, flags, along.high_slip)
+        corners = outputs[..., 2:6], outputs[..., 6:], relative, along.innovation, along.used
+        return CornerSetStep(outputs[..., 0], outputs[..., 1], *corners, flags, along.high_slip)
 
     def reset(self, where: npt.ArrayLike | None = None, vx: npt.ArrayLike = math.nan, vy: npt.ArrayLike = 0.0) -> None:
         """Starts the entries `where` (bool mask of the batch shape; None: all) afresh, without relative velocity.

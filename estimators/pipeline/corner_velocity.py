@@ -116,7 +116,7 @@ class CornerVelocity(Memory):
             ahead, beside = rotated(vx - turn * y, vy + turn * x, kit.sin(angle), kit.cos(angle))
             return slips(kit, radius * w, ahead, beside)
 
-        told = kit.table(kit.each(mapped, held[:4], held[4:8], *self._wheels), shape)
+        outputs = kit.table(kit.each(mapped, held[:4], held[4:8], *self._wheels), shape)
         pulls = kit.car(ax, shape, "ax"), kit.car(ay, shape, "ay")
         lost = kit.no(abs(kit.car(yaw_rate, shape, "yaw_rate")) <= limits.YAW_RATE)
         for value in pulls:
@@ -129,8 +129,8 @@ class CornerVelocity(Memory):
             vy_deviation=moved.vy_deviation,
             yaw_rate=np.asarray(turn).reshape(shape),
             sensor_bias=moved.sensor_bias,
-            slip=told[..., :4],
-            slip_angle=told[..., 4:],
+            slip=outputs[..., :4],
+            slip_angle=outputs[..., 4:],
             innovation=found.innovation,
             used=used,
             high_slip=found.high_slip,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +11,7 @@ from estimators.arguments import batch, entries, mask, setting
 from estimators.arithmetic import Arithmetic, Number, arithmetic
 from estimators.faults import BoolArray, Flag, FlagArray
 from estimators.forces import (
+    AttitudeStep,
     LateralForceEstimator,
     UnknownInputForceObserver,
     VerticalLoads,
@@ -22,7 +22,17 @@ from estimators.forces import (
 from estimators.interpolate import FloatArray
 from estimators.memory import Memory
 from estimators.pipeline.checks import CrossChecks
-from estimators.pipeline.parts import CORNER_PARTS, check_parts
+from estimators.pipeline.parts import (
+    CORNER_PARTS,
+    AttitudePart,
+    CornerPart,
+    LateralForcePart,
+    LoadPart,
+    LongitudinalForcePart,
+    SideslipPart,
+    VelocityPart,
+    check_parts,
+)  # fmt: skip
 from estimators.pipeline.readings import WheelReadings
 from estimators.pipeline.result import PipelineStep
 from estimators.pipeline.signals import VehicleSignals
@@ -48,14 +58,7 @@ class EstimationPipeline(Memory):
     5. F_y of both axles from planar dynamics; front split from the model, rear split by load; before 4 where 4 asks for it;
     6. corner observers and a sideslip part (optional), beside the chain: for comparison and cross-check.
 
-    Each part is replaced by any object with the same `step`; one with `reset`, `save` and `restore` takes part in these of
-    the pipeline, one without counts as stateless. Their signatures: `longitudinal_force.step(wheel_speed, torque,
-    vertical_load, fresh=)` as `UnknownInputForceObserver`, `WheelForceFilter` and `DifferentiatedPid`, of shape (..., 4);
-    `loads.step(ax, ay, az, pitch, roll)` as `VerticalLoads`; `attitude.step(...)` as `AttitudeObserver`;
-    `lateral_force.step(ax, ay, yaw_acceleration, steer, force_x, force_z)` as `LateralForceEstimator`; `velocity.step(
-    wheel_speed, steer, ax, ay, yaw_rate, normalised_force, elapsed)` as `VelocityFusion`, with `lateral_use=` as
-    `CornerVelocity` where it has `uses_lateral_force`; `corner_observers.step(...)` as `CornerObservers`; `sideslip.step(...)`
-    as in `sideslip_parts`.
+    Each part is replaced by any object that follows its protocol (`parts`).
 
     Estimates are finite whatever comes in; what was wrong is in the flags, and what does not fit together in
     `consistency`. A wheel speed that repeats bit for bit is the old one read again, for up to `repeat_time`.
@@ -81,13 +84,13 @@ class EstimationPipeline(Memory):
         vehicle: VehicleParameters,
         sample_time: float,
         batch_shape: tuple[int, ...] = (),
-        longitudinal_force: Any = None,
-        loads: Any = None,
-        attitude: Any = None,
-        lateral_force: Any = None,
-        velocity: Any = None,
-        corner_observers: Any = None,
-        sideslip: Any = None,
+        longitudinal_force: LongitudinalForcePart | None = None,
+        loads: LoadPart | None = None,
+        attitude: AttitudePart | None = None,
+        lateral_force: LateralForcePart | None = None,
+        velocity: VelocityPart | None = None,
+        corner_observers: CornerPart | None = None,
+        sideslip: SideslipPart | None = None,
         acceleration_deviation: float = 0.15,
         repeat_time: float = 0.025,
     ) -> None:
@@ -95,12 +98,14 @@ class EstimationPipeline(Memory):
         shape = self.batch_shape
         time = self.sample_time = setting(sample_time, "sample_time", "s")
         four = (*shape, 4)
-        self.longitudinal_force = longitudinal_force or UnknownInputForceObserver(vehicle, time, four)
-        self.loads = loads or VerticalLoads(vehicle, time, shape)
-        self.lateral_force = lateral_force or LateralForceEstimator(
+        self.longitudinal_force: LongitudinalForcePart = longitudinal_force or UnknownInputForceObserver(
+            vehicle, time, four
+        )
+        self.loads: LoadPart = loads or VerticalLoads(vehicle, time, shape)
+        self.lateral_force: LateralForcePart = lateral_force or LateralForceEstimator(
             vehicle, time, shape, "linear", measurement_deviation=REAL_SENSORS
         )
-        self.velocity = velocity or VelocityFusion(vehicle, time, shape)
+        self.velocity: VelocityPart = velocity or VelocityFusion(vehicle, time, shape)
         self.attitude, self.corner_observers, self.sideslip = attitude, corner_observers, sideslip
         self.yaw_slope = FilteredDerivative(time, 0.02, shape)
         self.checks = CrossChecks(vehicle, time, shape)
@@ -151,14 +156,14 @@ class EstimationPipeline(Memory):
         use = self._normalised(agreed.force, loads.load, unknown)
         if tilt is None:  # untouched: the velocity part tells the impossible from the missing
             free_x, free_y = ax, ay
-        swing = self.yaw_slope.step(choose(late, math.nan, turned) if delayed else turned).derivative
-        swing = choose(abs(turned) < math.inf, kit.own(swing), math.nan)
-        lateral = self.lateral_force.step(own_x, own_y, swing, angle, agreed.force, loads.load)
+        yaw_acceleration = self.yaw_slope.step(choose(late, math.nan, turned) if delayed else turned).derivative
+        yaw_acceleration = choose(abs(turned) < math.inf, kit.own(yaw_acceleration), math.nan)
+        lateral = self.lateral_force.step(own_x, own_y, yaw_acceleration, angle, agreed.force, loads.load)
         across = self._normalised(lateral.corner_force, loads.load, None) if self._use_across else None
         more = {"lateral_use": across} if self._lateral_first else {}
         moved = self.velocity.step(w, steer, free_x, free_y, turn, use, signals.elapsed, **more)
         corners = None
-        if self.corner_observers is not None:
+        if self.corner_observers is not None and across is not None:
             corners = self.corner_observers.step(w, steer, own_x, own_y, turn, use, across, moved.vy)
         beside = None
         if self.sideslip is not None:
@@ -252,7 +257,7 @@ class EstimationPipeline(Memory):
 
     def _tilted(
         self, signals: VehicleSignals, ax: Number, ay: Number, turn: Number
-    ) -> tuple[Any, Number, Number, Number, Number]:
+    ) -> tuple[AttitudeStep | None, Number, Number, Number, Number]:
         """The attitude step, a_x and a_y level with the road (forces), and without gravity (velocities), m/s^2."""
         if self.attitude is None:
             return None, ax, ay, ax, ay

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from estimators.faults import FlagArray
+from estimators.forces import AttitudeStep, LateralForceStep, LoadStep, Reconciled, WheelForceStep
 from estimators.interpolate import FloatArray
 
 
@@ -61,11 +62,11 @@ class PipelineStep(NamedTuple):
     consistency: Consistency
     flags: FlagArray  # (...) sums of `Flag` over the car's signals
     wheel_flags: FlagArray  # (..., 4) of the wheels' signals
-    wheels: Any  # the step of each part: innovation, what was used, and why not (`WheelForceStep`)
-    reconciled: Any  # `Reconciled`
-    loads: Any  # `LoadStep`
-    lateral: Any  # `LateralForceStep`
+    wheels: WheelForceStep  # the step of each part: innovation, what was used, and why not
+    reconciled: Reconciled
+    loads: LoadStep
+    lateral: LateralForceStep
     velocity: Any  # `FusionStep`, or `CornerVelocityStep`
-    attitude: Any  # `AttitudeStep`, None without that part
+    attitude: AttitudeStep | None  # None without that part
     corners: Any  # `CornerSetStep`, None without that part
     sideslip_step: Any  # of the sideslip part, None without one

@@ -1,4 +1,4 @@
-"""The force observer that needs a wheel acceleration, in the dress of those that do not."""
+"""The force observer that needs a wheel acceleration, behind the interface of those that do not."""
 
 from __future__ import annotations
 

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from estimators.velocity.corners import (
         CornerVectors,
         corner_acceleration,
+        corner_acceleration_by_speed,
         corner_velocity,
         tire_frame,
         vehicle_frame,
@@ -53,6 +54,7 @@ _HOME = {
     "VelocityFusion": "fusion",
     "adaptive_threshold": "high_slip",
     "corner_acceleration": "corners",
+    "corner_acceleration_by_speed": "corners",
     "corner_velocity": "corners",
     "side_slip_angle": "slip",
     "slip_ratio": "slip",
@@ -96,6 +98,7 @@ __all__ = [
     "VelocityFusion",
     "adaptive_threshold",
     "corner_acceleration",
+    "corner_acceleration_by_speed",
     "corner_velocity",
     "side_slip_angle",
     "slip_ratio",

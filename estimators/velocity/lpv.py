@@ -16,7 +16,7 @@ from estimators.interpolate import FloatArray
 from estimators.memory import Renewable, Saved
 from estimators.schedule import GainSchedule
 from estimators.velocity.exact_update import ExactUpdate, refuse_explosive
-from estimators.velocity.screening import FEW, Screen, Screened
+from estimators.velocity.input_monitor import FEW, InputMonitor, MonitoredInputs
 
 _CHUNK = 4096  # entries worked on at once: what lies between the operations stays in the cache
 
@@ -46,7 +46,7 @@ class TwoStateObserver(Renewable):
     """
 
     memory = ("_state", "samples", "renewed")
-    parts: tuple[str, ...] = ("screen",)
+    parts: tuple[str, ...] = ("monitor",)
 
     def __init__(
         self,
@@ -70,7 +70,7 @@ class TwoStateObserver(Renewable):
         super().__init__(batch(batch_shape))
         self.schedule, count = schedules[0], math.prod(self.batch_shape)
         self._updates = tuple(ExactUpdate(schedule) for schedule in schedules)
-        self.screen = Screen(
+        self.monitor = InputMonitor(
             self.schedule.parameter, self.schedule.sample_time, count, outside == "refuse", stale_after
         )
         self._state: FloatArray = np.zeros((2, count))
@@ -96,7 +96,7 @@ class TwoStateObserver(Renewable):
         u = entries(held_input, shape, "input").reshape(-1)
         y = entries(measurement, shape, "measurement").reshape(-1)
         p = entries(parameter, shape, "parameter").reshape(-1)
-        seen = self.screen(u, y, p, self.samples, shape)
+        seen = self.monitor(u, y, p, self.samples, shape)
         innovation = self._advance(seen, second)
         self.samples += 1
         flags = self._no_flags if seen.flags is None else seen.flags.reshape(shape)
@@ -112,7 +112,7 @@ class TwoStateObserver(Renewable):
         used = self._all_used if seen.coast is None else ~seen.coast.reshape(shape)
         return LpvStep(self.state, innovation.reshape(shape), used, flags, seen.parameter.reshape(shape))
 
-    def _advance(self, seen: Screened, second: BoolArray | None) -> FloatArray:
+    def _advance(self, seen: MonitoredInputs, second: BoolArray | None) -> FloatArray:
         """Moves `_state` by one sample; returns the innovations (n,)."""
         count = seen.parameter.size
         used = None if seen.coast is None else ~seen.coast
@@ -121,9 +121,9 @@ class TwoStateObserver(Renewable):
             modes = [False] * count if second is None else second.tolist()
             columns = (*self._state, seen.held_input, seen.measurement, seen.parameter)
             rows = zip(modes, *(column.tolist() for column in columns), masks, strict=True)
-            first, other, told = zip(*(self._updates[mode].advance(*entry) for mode, *entry in rows), strict=True)
+            first, other, outputs = zip(*(self._updates[mode].advance(*entry) for mode, *entry in rows), strict=True)
             self._state = np.array((first, other))
-            return np.array(told)
+            return np.array(outputs)
         innovation: FloatArray = np.empty(count)
         if second is None:
             groups: list[tuple[ExactUpdate, Any]] = [
@@ -150,7 +150,7 @@ class TwoStateObserver(Renewable):
         chosen = mask(where, self.batch_shape, "where")
         full, flat = finite(state, (*self.batch_shape, 2), "state"), chosen.reshape(-1)
         self._state[:, flat] = full.reshape(-1, 2)[flat].T
-        self.screen.forget(flat)
+        self.monitor.forget(flat)
         self._renew(chosen)
 
 

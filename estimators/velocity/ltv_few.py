@@ -54,10 +54,10 @@ class LtvFew(CovarianceFilter):
         columns = (self._mean.reshape(-1, n), self._spread.reshape(-1, n, n), mu.reshape(-1), noise.reshape(-1, 2))
         cars = zip(inputs, *(column.tolist() for column in columns), strict=True)
         found = [self._one(x, P, force, u, w, dw, q, r) for (u, w, dw), x, P, force, (q, r) in cars]
-        states, spreads, told, used = zip(*found, strict=True)
+        states, spreads, outputs, used = zip(*found, strict=True)
         self._mean = np.array(states)[:, :n].reshape(*shape, n)
         self._spread = np.array(spreads)[:, :n, :n].reshape(*shape, n, n)
-        return np.array(told)[:, : 2 + n].reshape(*shape, 2 + n), np.array(used).reshape(shape)
+        return np.array(outputs)[:, : 2 + n].reshape(*shape, 2 + n), np.array(used).reshape(shape)
 
     def _one(
         self, x: _Row, P: list[_Row], mu: float, u: float, w: float, dw: float, q: float, r: float

@@ -126,9 +126,9 @@ class LtvKalmanObserver(Renewable):
         self._flag_renewed(flags)
         noise = self._noise[high.astype(np.intp)]
         if isinstance(self.filter, LtvFew):
-            told, used = self.filter.step(self.seen, mu, noise)
+            outputs, used = self.filter.step(self.seen, mu, noise)
             state = self.filter.state
-            return LtvStep(state, state[..., 1], told[..., 0], told[..., 1], told[..., 2:], used, flags)
+            return LtvStep(state, state[..., 1], outputs[..., 0], outputs[..., 1], outputs[..., 2:], used, flags)
         u, w, dw = self.seen
         q, r = noise[..., 0], noise[..., 1]
         C = self.tire.output(w, self.states)

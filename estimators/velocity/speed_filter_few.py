@@ -47,7 +47,7 @@ class SpeedFilterFew(SpeedFilter):
     def move(
         self,
         elapsed: float,
-        pace: float,
+        magnitude: float,
         columns: tuple[int, ...],
         coupling: tuple[float, ...],
         shift: float,
@@ -67,7 +67,7 @@ class SpeedFilterFew(SpeedFilter):
         P[0] = P[:, 0] = first
         self.mean = [speed, *x[1:]]
         time, way = self.waiting
-        self.waiting = [time + elapsed, way + elapsed * pace]
+        self.waiting = [time + elapsed, way + elapsed * magnitude]
         self.waited += 1
         if self.waited >= self.every:
             self._forget()

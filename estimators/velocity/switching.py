@@ -92,7 +92,7 @@ class SwitchedVelocityObserver(TwoStateObserver):
         ScheduleError: gains whose error grows beyond all bounds within a sample.
     """
 
-    parts = ("switch", "screen")
+    parts = ("switch", "monitor")
 
     def __init__(
         self,

@@ -7,9 +7,10 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from estimators.forces import vertical_loads
 from studies.drives.baselines import held, integrated_acceleration
 from studies.drives.chain import Chain
-from studies.drives.corner_inputs import shared_forces, vertical_loads
+from studies.drives.corner_inputs import shared_forces
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.metrics import deviation
@@ -93,16 +94,7 @@ def forces(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: DriveFile) 
     """F_x and F_z of each corner, F_y of each axle, and the total F_x against m a_x; quasi-static ones always beside."""
     reference, found, car = log.reference, {}, drive.vehicle
     ax, ay = log.signals["ax"], log.signals.get("ay", np.zeros_like(log.time))
-    quasi_z = vertical_loads(
-        ax,
-        ay,
-        car.mass,
-        car.front_axle_distance,
-        car.rear_axle_distance,
-        car.cg_height,
-        car.front_track,
-        car.rear_track,
-    )
+    quasi_z = vertical_loads(car.parameters, ax, ay)
     none = np.zeros(4, dtype=np.bool_)
     quasi_x = shared_forces(ax, quasi_z, car.mass, np.zeros_like(quasi_z), none)
     for k, corner in enumerate(CORNERS):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Literal
+from functools import cached_property
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from estimators.vehicle import VehicleParameters
 from studies.drives.quantities import (
     AngularSpeed,
     Duration,
@@ -77,6 +79,10 @@ class LogFile(Table):
         return self.max_gap if self.max_gap is not None else 5.0 / self.rate
 
 
+WHEEL_INERTIA = 1.0
+"""kg m^2 where the drive has none: without torques it has nothing to act on."""
+
+
 class Vehicle(Table):
     """Rigid-body and wheel data, SI. Lengths are to the centre of gravity; tracks are wheel centre to wheel centre."""
 
@@ -95,6 +101,27 @@ class Vehicle(Table):
     cornering_stiffness_front: Stiffness | None = None  # of the axle, both wheels
     cornering_stiffness_rear: Stiffness | None = None
     relaxation_length: Length | None = None
+
+    @cached_property
+    def parameters(self) -> VehicleParameters:
+        """The car as the estimators know it; yaw inertia m L_f L_r and wheel inertia 1 kg m^2 where not given."""
+        return VehicleParameters(
+            mass=self.mass,
+            yaw_inertia=self.yaw_inertia or self.mass * self.front_axle_distance * self.rear_axle_distance,
+            wheel_inertia=self.wheel_inertia or WHEEL_INERTIA,
+            front_axle_distance=self.front_axle_distance,
+            rear_axle_distance=self.rear_axle_distance,
+            cg_height=self.cg_height,
+            front_track=self.front_track,
+            rear_track=self.rear_track,
+            effective_radius=(self.effective_radius_front, self.effective_radius_rear),
+            rolling_resistance=self.rolling_resistance,
+        )
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        _ = self.parameters
+        return self
 
 
 class Observer(Table):

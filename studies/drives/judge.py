@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from estimators import Flag, GainSchedule
 from estimators.pipeline import Check
+from estimators.velocity import slip_ratio
 from studies.drives import comparison
 from studies.drives.baselines import integrated_acceleration, mean_wheel_speed
 from studies.drives.chain import Chain
@@ -75,14 +76,13 @@ class DriveData:
 
 def _slip_at(inputs: CornerInputs, velocity: Array) -> Array:
     gain, shift = centre_map(inputs)
-    return slip_ratio(inputs.surface_speed, (velocity[:, None] - shift) / gain)
+    return moving_slip(inputs.surface_speed, (velocity[:, None] - shift) / gain)
 
 
-def slip_ratio(surface_speed: Array, wheel_velocity: Array) -> Array:
-    """lambda = (R_e w - v_xt)/max(|R_e w|, |v_xt|), P1 section 1; NaN below 2 m/s. Positive when driving."""
-    size = np.maximum(np.abs(surface_speed), np.abs(wheel_velocity))
-    slow = ~(size >= LEAST_SPEED)
-    return np.where(slow, np.nan, (surface_speed - wheel_velocity) / np.where(slow, 1.0, size))
+def moving_slip(surface_speed: Array, wheel_velocity: Array) -> Array:
+    """`slip_ratio`, NaN below 2 m/s."""
+    moves = np.maximum(np.abs(surface_speed), np.abs(wheel_velocity)) >= LEAST_SPEED
+    return np.where(moves, slip_ratio(surface_speed, wheel_velocity), np.nan)
 
 
 def judge(data: DriveData) -> dict[str, Any]:

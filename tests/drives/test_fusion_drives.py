@@ -15,12 +15,12 @@ import numpy.typing as npt
 import pytest
 
 from estimators.faults import Flag
+from estimators.forces import vertical_loads
 from estimators.interpolate import FloatArray
 from estimators.schedule import GainSchedule
 from estimators.vehicle import CORNERS, VehicleParameters
 from estimators.velocity import LpvVelocityObserver, VelocityFusion, corner_acceleration, to_centre, vehicle_frame
 from estimators.velocity.corners import CornerVectors
-from studies.drives.corner_inputs import vertical_loads
 from studies.drives.drive_file import read_drive
 from studies.drives.log import DriveLog, read_log
 
@@ -120,16 +120,7 @@ def normalised_forces(runs: Runs, car: VehicleParameters, slope: FloatArray) -> 
     """F_x/F_z from wheel dynamics and quasi-static loads; NaN while a wheel stands: a stopped brake says nothing."""
     load = np.empty_like(runs.wheel_speed)
     for place in np.ndindex(runs.ax.shape[:2]):
-        load[place] = vertical_loads(
-            runs.ax[place],
-            runs.ay[place],
-            car.mass,
-            car.front_axle_distance,
-            car.rear_axle_distance,
-            car.cg_height,
-            car.front_track,
-            car.rear_track,
-        )
+        load[place] = vertical_loads(car, runs.ax[place], runs.ay[place])
     force = (runs.torque - car.wheel_inertia * slope) / car.radius
     force -= car.rolling_resistance * load * np.sign(runs.wheel_speed)
     stopped = np.abs(runs.wheel_speed) < 1.0

@@ -85,7 +85,7 @@ def test_bad_savings_are_refused_and_change_nothing() -> None:
     before = runner.save()
     other = GainSchedule.from_content(schedule_content("lateral"))
     bad: list[tuple[dict[str, Any], str]] = [
-        ({key: value for key, value in before.items() if key != "screen.gap"}, "lacks 'screen.gap'"),
+        ({key: value for key, value in before.items() if key != "monitor.gap"}, "lacks 'monitor.gap'"),
         ({**before, "state": np.zeros((2, 5))}, r"'state' is float64 \(2, 5\), expected float64 \(2, 4\)"),
         ({**before, "state": np.full((2, 4), np.nan)}, "'state' is not finite"),
         (LpvVelocityObserver(other).save(), "saved with another schedule than 'test-longitudinal'"),

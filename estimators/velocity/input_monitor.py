@@ -17,7 +17,7 @@ FEW = 12  # entries up to which plain numbers are faster than arrays
 _SLACK = 1.0 + 1e-9  # the difference quotient of a ramp at the bound itself is not a violation
 
 
-class Screened(NamedTuple):
+class MonitoredInputs(NamedTuple):
     """Arrays of shape (n,); `coast` and `flags` are None where nothing is wrong with any entry."""
 
     held_input: FloatArray
@@ -28,7 +28,7 @@ class Screened(NamedTuple):
     flags: FlagArray | None
 
 
-class Screen(Memory):
+class InputMonitor(Memory):
     """Remembers the last good values of `count` entries."""
 
     memory = ("input", "raw", "gap", "measurement", "run")
@@ -58,7 +58,9 @@ class Screen(Memory):
     def _recall(self) -> None:
         self.gaps = bool(self.gap.any())
 
-    def __call__(self, u: FloatArray, y: FloatArray, p: FloatArray, sample: int, shape: tuple[int, ...]) -> Screened:
+    def __call__(
+        self, u: FloatArray, y: FloatArray, p: FloatArray, sample: int, shape: tuple[int, ...]
+    ) -> MonitoredInputs:
         """Replaces what cannot be used; `sample` and `shape` are for the message of a refusal.
 
         Raises:
@@ -81,7 +83,7 @@ class Screen(Memory):
             self.measurement[:] = y
         self.input[:] = u
         self.raw[:] = p
-        return Screened(u, y, value, None, None, None)
+        return MonitoredInputs(u, y, value, None, None, None)
 
     def _calm(self, u: FloatArray, y: FloatArray, p: FloatArray, value: FloatArray) -> bool:
         """Whether nothing at all is wrong; comparisons with NaN are false, so NaN never passes."""
@@ -112,15 +114,19 @@ class Screen(Memory):
                 missing.append(place)
         return missing
 
-    def _without(self, missing: list[int], u: FloatArray, y: FloatArray, p: FloatArray, value: FloatArray) -> Screened:
+    def _without(
+        self, missing: list[int], u: FloatArray, y: FloatArray, p: FloatArray, value: FloatArray
+    ) -> MonitoredInputs:
         """What is left when the measurements `missing` are all that is wrong."""
         self.input[:], self.raw[:] = u, p
         coast: BoolArray = np.zeros(u.size, dtype=np.bool_)
         coast[missing] = True
         flags = coast * np.int32(Flag.MISSING_MEASUREMENT)
-        return Screened(u, np.where(coast, 0.0, y), value, coast, coast, flags)
+        return MonitoredInputs(u, np.where(coast, 0.0, y), value, coast, coast, flags)
 
-    def _repaired(self, u: FloatArray, y: FloatArray, p: FloatArray, sample: int, shape: tuple[int, ...]) -> Screened:
+    def _repaired(
+        self, u: FloatArray, y: FloatArray, p: FloatArray, sample: int, shape: tuple[int, ...]
+    ) -> MonitoredInputs:
         """The careful road; nothing is remembered before every refusal has been considered."""
         flags: FlagArray = np.zeros(p.size, dtype=np.int32)
         missing = ~(np.absolute(y) <= LIMIT)
@@ -139,7 +145,7 @@ class Screen(Memory):
         self.gap = np.where(unknown & ~np.isnan(raw), self.gap + 1, 0)
         self.gaps = bool(self.gap.any())
         self.raw[:] = raw
-        return Screened(
+        return MonitoredInputs(
             held,
             np.where(missing, 0.0, y),
             value,
