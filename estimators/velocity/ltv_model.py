@@ -11,16 +11,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import TypeVar
 
 import numpy as np
 
+from estimators.arithmetic import Arithmetic, ManyCars, Number
 from estimators.errors import EstimatorError
 from estimators.interpolate import FloatArray
 
 _SERIES_BELOW = 0.5  # a T below which the quotients lose digits and the series has converged
 _TERMS = [(1.0 / math.factorial(n + 2), (n + 1.0) / math.factorial(n + 3)) for n in reversed(range(16))]
-Number = TypeVar("Number", float, FloatArray)
 
 
 @dataclass(frozen=True)
@@ -61,33 +60,37 @@ def sampled(
     With E = e^(-a T), p_k = int_0^T e^(-a (T - s)) s^k/k! ds:  z gains p_0 V_r + p_1 u;  z' gains, beside E z' + p_0 u,
     -a' (T E z + q_1 V_r + q_2 u) with q_k the same integral of the bristle's own response.
     """
-    direction = np.sign(wheel_speed)
-    decay = tire.kappa * tire.radius * np.absolute(wheel_speed)
-    E = np.exp(-decay * time)
-    p0, p1, q1, q2 = _integrals(decay * time)
-    p0, p1, q1, q2 = time * p0, time**2 * p1, time**2 * q1, time**3 * q2
+    kit = ManyCars(wheel_speed.shape)
+    E, p0, p1, d1, d2, b3 = sampled_entries(kit, tire, wheel_speed, wheel_acceleration, time)
     A = np.zeros((*wheel_speed.shape, states, states))
     B = np.empty((*wheel_speed.shape, states))
     A[..., 0, 0], A[..., 0, 1], A[..., 1, 1] = E, p0, 1.0
     B[..., 0], B[..., 1] = p1, time
     if states == 3:
-        rise = tire.kappa * tire.radius * direction * wheel_acceleration
-        A[..., 2, 0], A[..., 2, 1], A[..., 2, 2] = -rise * time * E, -rise * q1, E
-        B[..., 2] = p0 - rise * q2
+        A[..., 2, 0], A[..., 2, 1], A[..., 2, 2] = d1, d2, E
+        B[..., 2] = b3
     return A, B
 
 
-def integrals(x: float) -> tuple[float, float, float, float]:
+def sampled_entries(
+    kit: Arithmetic, tire: BristleTire, wheel_speed: Number, wheel_acceleration: Number, time: float
+) -> tuple[Number, Number, Number, Number, Number, Number]:
+    """A11 (= A33), A12, B1, A31, A32 and B3 of `sampled`; the others are 0, 1 and T."""
+    x = tire.kappa * tire.radius * abs(wheel_speed) * time
+    p0, p1, q1, q2 = integrals(x)
+    E, once = kit.exp(-x), time * p0
+    rise = tire.kappa * tire.radius * kit.sign(wheel_speed) * wheel_acceleration
+    return E, once, time * time * p1, -rise * time * E, -rise * time * time * q1, once - rise * time**3 * q2
+
+
+def integrals(x: Number) -> tuple[Number, Number, Number, Number]:
     """For x = a T >= 0, per unit of T:
 
     p_0 = (1 - e^-x)/x,    p_1 = (1 - p_0)/x = sum (-x)^n/(n+2)!,
     q_1 = (p_0 - e^-x)/x,    q_2 = (p_1 - q_1)/x = sum (n+1) (-x)^n/(n+3)!.
     """
-    return _series(x) if x < _SERIES_BELOW else _quotients(x, math.exp(-x), math.expm1(-x))
-
-
-def _integrals(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """`integrals` of an array."""
+    if not isinstance(x, np.ndarray):
+        return _series(x) if x < _SERIES_BELOW else _quotients(x, math.exp(-x), math.expm1(-x))
     near = x < _SERIES_BELOW
     far = np.where(near, 1.0, x)
     small, large = _series(np.where(near, x, 0.0)), _quotients(far, np.exp(-far), np.expm1(-far))
