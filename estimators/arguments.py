@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -166,3 +168,19 @@ def setting(value: float, what: str, unit: str, low: float = 0.0, low_allowed: b
         bound = "at least" if low_allowed else "above"
         raise EstimatorError(f"{what} = {number:g} {unit} must be finite and {bound} {low:g} {unit}")
     return number
+
+
+def positive_fields(settings: Any, what: str) -> None:
+    """Every field of a dataclass is a finite number above zero.
+
+    Raises:
+        EstimatorError: names all that are not.
+    """
+    values = {entry.name: getattr(settings, entry.name) for entry in fields(settings)}
+    bad = [
+        f"{name} = {value!r}"
+        for name, value in values.items()
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf
+    ]
+    if bad:
+        raise EstimatorError(f"{what} must be finite and above zero: {', '.join(bad)}")

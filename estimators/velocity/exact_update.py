@@ -20,7 +20,7 @@ from estimators.phi import phi
 from estimators.schedule import GainSchedule
 
 _MOST_GROWTH = 50.0  # exponent of growth in one sample; from e^700 on float64 overflows
-_LARGEST_STEP = 1e50  # of the numbers in T A, T L C: their products meet states of up to 1e100 (screening.LIMIT)
+_LARGEST_STEP = 1e50  # of the numbers in T A, T L C: their products meet states of up to 1e100 (arguments.LIMIT)
 _LOOKS = 65  # places between which growth may hide: it has room from e^50 to e^700
 
 

@@ -35,7 +35,7 @@ class LpvStep(NamedTuple):
 
 
 class TwoStateObserver(Renewable):
-    """What observers of two states, one input and one output share: screening, the exact update of each entry, memory.
+    """What observers of two states, one input and one output share: checks of their inputs, the exact update, memory.
 
     Args:
         schedules: over one plant; each entry moves by one of them.

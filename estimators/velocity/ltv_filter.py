@@ -19,7 +19,7 @@ from estimators.filters.step import all_bounded, quiet
 from estimators.interpolate import FloatArray
 from estimators.velocity.ltv_model import BristleTire, sampled_entries
 
-FEW = 16  # corners up to which plain numbers are faster than arrays
+FEW = 16  # corners up to which plain numbers are faster than arrays: 3 times for four
 LARGEST_SPREAD = 50.0  # m/s of standard deviation: an entry without a measurement for long knows nothing
 
 
@@ -83,13 +83,10 @@ class LtvFilter(CovarianceFilter):
         choose: Any = kit.where
         if three:
             x1, x2, x3, p11, p12, p22, p13, p23, p33, q, r, mu, u, w, dw = given
-            c1, c2, c3 = tire.sigma0, tire.sigma2, tire.sigma1
         else:
             x1, x2, p11, p12, p22, q, r, mu, u, w, dw = given
             x3 = p13 = p23 = p33 = 0.0
-            decay = tire.kappa * tire.radius * abs(w)
-            c1, c2, c3 = tire.sigma0 - tire.sigma1 * decay, tire.sigma1 + tire.sigma2, 0.0
-
+        c1, c2, c3 = tire.row(w, self.size)
         h1, h2, h3 = p11 * c1 + p12 * c2 + p13 * c3, p12 * c1 + p22 * c2 + p23 * c3, p13 * c1 + p23 * c2 + p33 * c3
         total = c1 * h1 + c2 * h2 + c3 * h3 + r
         nu = mu - c1 * x1 - c2 * x2 - c3 * x3

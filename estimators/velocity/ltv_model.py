@@ -10,12 +10,12 @@ decay at a (P2 sheet, section 10 item 11), where the two-state form is observabl
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
+from estimators.arguments import positive_fields
 from estimators.arithmetic import Arithmetic, ManyCars, Number
-from estimators.errors import EstimatorError
 from estimators.interpolate import FloatArray
 
 _SERIES_BELOW = 0.5  # a T below which the quotients lose digits and the series has converged
@@ -37,19 +37,18 @@ class BristleTire:
     radius: float = 0.33  # R_e, m: Table I (the text has 0.35)
 
     def __post_init__(self) -> None:
-        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
-        bad = [f"{name} = {value!r}" for name, value in values.items() if not (math.isfinite(value) and value > 0)]
-        if bad:
-            raise EstimatorError(f"tire constants must be finite and above zero: {', '.join(bad)}")
+        positive_fields(self, "tire constants")
+
+    def row(self, wheel_speed: Number, states: int) -> tuple[Number, float, float]:
+        """C, with a zero behind that of two states."""
+        if states == 3:
+            return self.sigma0, self.sigma2, self.sigma1
+        return self.sigma0 - self.sigma1 * (self.kappa * self.radius * abs(wheel_speed)), self.sigma1 + self.sigma2, 0.0
 
     def output(self, wheel_speed: FloatArray, states: int) -> FloatArray:
         """C (..., 1, states), normalised force per state."""
-        if states == 3:
-            return np.broadcast_to([[self.sigma0, self.sigma2, self.sigma1]], (*wheel_speed.shape, 1, 3))
-        decay = self.kappa * self.radius * np.absolute(wheel_speed)
-        C = np.empty((*wheel_speed.shape, 1, 2))
-        C[..., 0, 0], C[..., 0, 1] = self.sigma0 - self.sigma1 * decay, self.sigma1 + self.sigma2
-        return C
+        row = np.broadcast_arrays(*self.row(wheel_speed, states)[:states], wheel_speed)[:states]
+        return np.stack(row, axis=-1)[..., None, :]
 
 
 def sampled(
