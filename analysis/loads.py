@@ -10,12 +10,13 @@ import numpy as np
 from analysis.checks import as_stack
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
+from estimators.forces import levelled
+from estimators.vehicle import GRAVITY
 from synthesis.models.parameter_set import ParameterSet
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-GRAVITY = 9.81
 NEEDED = (
     "mass", "front_axle_distance", "rear_axle_distance", "cg_height", "roll_center_height", "front_track", "rear_track",
 )  # fmt: skip
@@ -37,11 +38,12 @@ def vertical_loads(
     vehicle: ParameterSet,
     longitudinal: ArrayLike,
     lateral: ArrayLike,
-    normal: ArrayLike = GRAVITY,
+    normal: ArrayLike | None = None,
     pitch: ArrayLike = 0.0,
     roll: ArrayLike = 0.0,
+    gravity: float = GRAVITY,
 ) -> Loads:
-    r"""Loads for IMU accelerations [m/s^2] (specific force, normal = +g at rest) and body pitch and roll [rad].
+    r"""Loads for IMU accelerations [m/s^2] (specific force, normal = +g at rest, taken if None) and body pitch and roll [rad].
 
     a_tx = a_x cos p + a_z sin p, a_tz = a_z cos p - a_x sin p                                     (P1 (14))
     F_zf = -m (h a_tx - L_r a_tz) / (L_f + L_r), F_zr = m (h a_tx + L_f a_tz) / (L_f + L_r)       (P1 (15), P3 (26))
@@ -55,7 +57,14 @@ def vertical_loads(
     if missing:
         raise AnalysisError(f"parameter set '{vehicle.id}' has no vehicle.{', vehicle.'.join(missing)}; add it")
     m, front_arm, rear_arm, height, roll_height, *tracks = (vehicle.vehicle[name].value for name in NEEDED)
-    given = {"longitudinal": longitudinal, "lateral": lateral, "normal": normal, "pitch": pitch, "roll": roll}
+    normal = gravity if normal is None else normal
+    given = {
+        "longitudinal": longitudinal,
+        "lateral": lateral,
+        "normal": normal,
+        "pitch": pitch,
+        "roll": roll,
+    }
     try:
         ax, ay, az, pitch, roll = np.broadcast_arrays(*(as_stack(k, v, ndim=0) for k, v in given.items()))
     except ValueError as error:
@@ -63,14 +72,14 @@ def vertical_loads(
             raise
         shapes = ", ".join(f"{k} {np.shape(v)}" for k, v in given.items())
         raise AnalysisError(f"accelerations and angles do not broadcast: {shapes}") from None
-    along, above = ax * np.cos(pitch) + az * np.sin(pitch), az * np.cos(pitch) - ax * np.sin(pitch)
+    along, _, above = levelled(ax, ay, az, -pitch, 0.0 * roll)
     base = front_arm + rear_arm
     front = -m / base * (height * along - rear_arm * above)
     rear = m / base * (height * along + front_arm * above)
-    across, upright = ay * np.cos(roll) + az * np.sin(roll), az * np.cos(roll) - ay * np.sin(roll)
+    _, across, upright = levelled(ax, ay, az, 0.0 * pitch, -roll)
     corners = []
     for load, track in zip((front, rear), tracks, strict=True):
         for side in (-1.0, 1.0):
             lever = upright * (track / 2 + side * roll_height * np.sin(roll)) + side * across * height
-            corners.append(load / GRAVITY / track * lever)
+            corners.append(load / gravity / track * lever)
     return Loads(front, rear, *corners)

@@ -14,7 +14,7 @@ import numpy as np
 from analysis.checks import square
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
-from estimators.phi import Phi
+from estimators.phi import phi
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -45,10 +45,8 @@ def _coefficients(matrix: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray
     mean = 0.5 * (M[..., 0, 0] + M[..., 1, 1])
     half = 0.5 * (M[..., 0, 0] - M[..., 1, 1])
     delta = half * half + M[..., 0, 1] * M[..., 1, 0]
-    alpha, beta = np.empty((2, mean.size))
-    if mean.size:
-        with np.errstate(over="ignore", invalid="ignore"):
-            Phi(mean.size).into(mean.ravel(), delta.ravel(), alpha, beta)
+    with np.errstate(over="ignore", invalid="ignore"):
+        alpha, beta = phi(np.atleast_1d(mean), np.atleast_1d(delta))
     return M, mean, delta, alpha.reshape(mean.shape), beta.reshape(mean.shape)
 
 

@@ -6,7 +6,7 @@ from bisect import bisect_right
 
 import numpy as np
 
-from estimators.arrays import BoolArray, FloatArray, IndexArray
+from estimators.arrays import FloatArray, IndexArray
 
 _MOST_BUCKETS = 65536
 
@@ -33,7 +33,8 @@ class PiecewiseLinear:
         self.rows[0] = breakpoints
         self.rows[1 : 1 + count] = values.T
         self.rows[1 + count :, :-1] = (np.diff(values, axis=0) / gaps[:, None]).T
-        self.columns: list[list[float]] = self.rows.T.tolist()
+        columns = self.rows.T.tolist()
+        self.columns = [(row[0], list(zip(row[1 : 1 + count], row[1 + count :], strict=True))) for row in columns]
         self.upper: FloatArray = np.append(breakpoints[1:], np.inf)
         self.inner: list[float] = breakpoints[1:].tolist()
         self.low = float(breakpoints[0])
@@ -44,41 +45,20 @@ class PiecewiseLinear:
         edges = self.low + np.arange(buckets + 1) / self.scale
         self.first: IndexArray = np.searchsorted(self.inner, edges, "right")
 
-    def workspace(self, count: int) -> tuple[FloatArray, IndexArray, BoolArray]:
-        """Scratch memory for `into` with `count` parameters."""
-        return np.empty((self.rows.shape[0], count)), np.empty(count, dtype=np.intp), np.empty(count, dtype=np.bool_)
-
-    def into(
-        self,
-        parameter: FloatArray,
-        workspace: tuple[FloatArray, IndexArray, BoolArray],
-        out: FloatArray,
-    ) -> None:
-        """Writes the values at `parameter` (m,), which must lie in the range, to `out` (k, m)."""
-        gathered, segment, above = workspace
-        offset, count = gathered[0], out.shape[0]
-        if self.searched:
-            segment[:] = self.upper.searchsorted(parameter, "right")
-        else:
-            np.subtract(parameter, self.low, offset)
-            np.multiply(offset, self.scale, offset)
-            np.copyto(segment, offset, casting="unsafe")
-            self.first.take(segment, None, segment, "clip")
-            self.upper.take(segment, None, offset, "clip")
-            np.greater_equal(parameter, offset, above)
-            np.add(segment, above, segment)
-        self.rows.take(segment, 1, gathered, "clip")
-        np.subtract(parameter, offset, offset)
-        np.multiply(gathered[1 + count :], offset, out)
-        np.add(out, gathered[1 : 1 + count], out)
-
     def __call__(self, parameter: FloatArray) -> FloatArray:
-        """The values at `parameter` (m,), shape (k, m)."""
-        out = np.empty(((self.rows.shape[0] - 1) // 2, parameter.size))
-        self.into(parameter, self.workspace(parameter.size), out)
+        """The values at `parameter` (m,), which must lie in the range, shape (k, m)."""
+        if self.searched:
+            segment = self.upper.searchsorted(parameter, "right")
+        else:
+            segment = self.first.take(((parameter - self.low) * self.scale).astype(np.intp), mode="clip")
+            segment += parameter >= self.upper.take(segment, mode="clip")
+        found = self.rows.take(segment, 1, mode="clip")
+        count = len(found) // 2
+        out: FloatArray = found[1 + count :] * (parameter - found[0]) + found[1 : 1 + count]
         return out
 
-    def column(self, parameter: float) -> list[float]:
-        """p - b_i, the k values v_i and the k slopes s_i of the segment of one parameter."""
-        found = self.columns[bisect_right(self.inner, parameter)]
-        return [parameter - found[0], *found[1:]]
+    def at(self, parameter: float) -> list[float]:
+        """The k values at one parameter."""
+        start, pairs = self.columns[bisect_right(self.inner, parameter)]
+        offset = parameter - start
+        return [value + slope * offset for value, slope in pairs]

@@ -16,11 +16,13 @@ the divided difference of (e^x - 1)/x; close together they are small, and the Ta
 from __future__ import annotations
 
 import math
+from typing import TypeVar
 
 import numpy as np
 
 from estimators.arrays import FloatArray
 
+Number = TypeVar("Number", float, FloatArray)
 _SERIES_LIMIT = 4.0  # |delta| up to which the series of sinh(r/2)/(r/2) below is exact to float64
 _SERIES = [1.0 / math.factorial(2 * k + 1) for k in range(9)]
 _WEAK, _TINY = 4e-3, 1e-5  # the quotients lose more than 2 to 3 digits up to |det M| = _WEAK m^2 + _TINY
@@ -28,8 +30,11 @@ _APART = 0.1  # r from which the eigenvalues are far enough apart for a divided 
 _TAYLOR = [1.0 / math.factorial(k) for k in range(13, 0, -1)]
 
 
-def phi(mean: float, delta: float) -> tuple[float, float]:
-    """alpha and beta of one matrix with m = `mean`."""
+def phi(mean: Number, delta: Number) -> tuple[Number, Number]:
+    """alpha and beta of the matrices with m = `mean`: of one, in plain numbers, or of many, in arrays."""
+    if isinstance(mean, np.ndarray):
+        alpha, beta = _arrays(mean.ravel(), delta.ravel())
+        return alpha.reshape(mean.shape), beta.reshape(mean.shape)
     square = mean * mean
     det = square - delta
     root = math.sqrt(abs(delta))
@@ -50,66 +55,44 @@ def phi(mean: float, delta: float) -> tuple[float, float]:
     return (mean * cosh - delta * sinch) / det, (mean * sinch - cosh) / det
 
 
-class Phi:
-    """alpha and beta of `count` matrices at once, with scratch memory that is reused."""
+def phi_of(matrices: FloatArray) -> FloatArray:
+    """phi(M) of 2 x 2 matrices (..., 2, 2); e^M = I + M phi(M)."""
+    M = np.asarray(matrices, dtype=np.float64)
+    mean = 0.5 * (M[..., 0, 0] + M[..., 1, 1])
+    N = M - mean[..., None, None] * np.eye(2)
+    alpha, beta = map(np.asarray, phi(mean, (N @ N)[..., 0, 0]))
+    out: FloatArray = alpha[..., None, None] * np.eye(2) + beta[..., None, None] * N
+    return out
 
-    def __init__(self, count: int) -> None:
-        self.count = count
-        self.quarter, self.sinch, self.growth, self.cosh, self.det = np.empty((5, count))
-        self.strong = np.empty(count, dtype=np.bool_)
 
-    def into(self, mean: FloatArray, delta: FloatArray, alpha: FloatArray, beta: FloatArray) -> None:
-        """Writes alpha and beta of the matrices with m = `mean`; all arrays of shape (count,)."""
-        sinch, cosh, det = self.sinch, self.cosh, self.det
-        np.absolute(delta, det)
-        if np.maximum.reduce(det) <= _SERIES_LIMIT:
-            self._series(mean, delta)
-        else:
-            cosh[:], sinch[:] = _hyperbolic(mean, delta)
-        np.multiply(mean, cosh, alpha)
-        np.multiply(delta, sinch, beta)
-        np.subtract(alpha, beta, alpha)
-        np.multiply(mean, sinch, beta)
-        np.subtract(beta, cosh, beta)
-        square, size = self.growth, self.quarter
-        np.multiply(mean, mean, square)
-        np.subtract(square, delta, det)
-        np.multiply(square, _WEAK, square)
-        np.add(square, _TINY, square)
-        np.absolute(det, size)
-        np.greater(size, square, self.strong)
-        if np.count_nonzero(self.strong) == self.count:
-            np.divide(alpha, det, alpha)
-            np.divide(beta, det, beta)
-            return
-        np.divide(alpha, det, alpha, where=self.strong)
-        np.divide(beta, det, beta, where=self.strong)
-        weak = np.flatnonzero(~self.strong)
-        alpha[weak], beta[weak] = _weak(mean[weak], delta[weak])
+def _arrays(mean: FloatArray, delta: FloatArray) -> tuple[FloatArray, FloatArray]:
+    small = np.maximum.reduce(np.absolute(delta), initial=0.0) <= _SERIES_LIMIT
+    cosh, sinch = (_series if small else _hyperbolic)(mean, delta)
+    square = mean * mean
+    det = square - delta
+    strong = np.absolute(det) > _WEAK * square + _TINY
+    if strong.all():
+        return (mean * cosh - delta * sinch) / det, (mean * sinch - cosh) / det
+    safe, weak = np.where(strong, det, 1.0), np.flatnonzero(~strong)
+    alpha, beta = (mean * cosh - delta * sinch) / safe, (mean * sinch - cosh) / safe
+    alpha[weak], beta[weak] = _weak(mean[weak], delta[weak])
+    return alpha, beta
 
-    def _series(self, mean: FloatArray, delta: FloatArray) -> None:
-        """`cosh` = e^m cosh(r) - 1 and `sinch` = e^m sinh(r)/r, from s = sinh(r/2)/(r/2) as a power series in delta/4.
 
-        cosh(r) - 1 = 2 sinh^2(r/2) and sinh(r)/r = s cosh(r/2) keep all digits where delta is small.
-        """
-        quarter, sinch, cosh, growth = self.quarter, self.sinch, self.cosh, self.growth
-        np.multiply(delta, 0.25, quarter)
-        np.multiply(quarter, _SERIES[-1], sinch)
-        for term in _SERIES[-2:0:-1]:
-            np.add(sinch, term, sinch)
-            np.multiply(sinch, quarter, sinch)
-        np.add(sinch, 1.0, sinch)
-        np.multiply(sinch, sinch, cosh)
-        np.multiply(cosh, quarter, cosh)  # sinh^2(r/2)
-        np.add(cosh, 1.0, growth)
-        np.sqrt(growth, growth)  # cosh(r/2), positive: where complex it is cos(|r|/2) with |r| <= 2
-        np.multiply(sinch, growth, sinch)
-        np.add(cosh, cosh, cosh)
-        np.expm1(mean, quarter)
-        np.add(quarter, 1.0, growth)
-        np.multiply(sinch, growth, sinch)
-        np.multiply(cosh, growth, cosh)
-        np.add(cosh, quarter, cosh)
+def _series(mean: FloatArray, delta: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """e^m cosh(r) - 1 and e^m sinh(r)/r, from s = sinh(r/2)/(r/2) as a power series in delta/4.
+
+    cosh(r) - 1 = 2 sinh^2(r/2) and sinh(r)/r = s cosh(r/2) keep all digits where delta is small; cosh(r/2) is positive,
+    for where it is cos(|r|/2), |r| <= 2.
+    """
+    quarter = delta * 0.25
+    s = quarter * _SERIES[-1]
+    for term in _SERIES[-2:0:-1]:
+        s = (s + term) * quarter
+    s = s + 1.0
+    square, risen = s * s * quarter, np.expm1(mean)  # sinh^2(r/2)
+    growth = risen + 1.0
+    return 2.0 * square * growth + risen, s * np.sqrt(square + 1.0) * growth
 
 
 def _hyperbolic(mean: FloatArray, delta: FloatArray) -> tuple[FloatArray, FloatArray]:

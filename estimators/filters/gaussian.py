@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import LIMIT, broadcast, mask, numbers
 from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.filters.step import LIMIT, broadcast, numbers
+from estimators.memory import Memory, Saved
 
 
-class GaussianFilter:
+class GaussianFilter(Memory):
     """Mean (..., n) and covariance (..., n, n) of a state; every batch entry has its own.
 
     Args:
@@ -57,35 +59,19 @@ class GaussianFilter:
         Raises:
             EstimatorError: a mask of another shape, or values that the constructor would refuse.
         """
-        mask = np.ones(self.batch_shape, dtype=np.bool_) if where is None else np.asarray(where)
-        if mask.dtype != np.bool_ or mask.shape != self.batch_shape:
-            raise EstimatorError(f"where: {mask.dtype} {mask.shape}, expected a bool mask of shape {self.batch_shape}")
+        chosen = mask(where, self.batch_shape, "where")
         mean = self._initial[0] if state is None else numbers(state, "state")
         spread = self._initial[1] if covariance is None else numbers(covariance, "covariance")
         if state is not None or covariance is not None:
             mean, spread = self._checked(mean, spread)
-        self._write(mask, mean, spread)
+        self._write(chosen, mean, spread)
 
-    def save(self) -> dict[str, FloatArray]:
+    def save(self) -> Saved:
         """Everything needed to continue later, as plain arrays."""
         return {key: array.copy() for key, array in self._memory().items()}
 
-    def restore(self, saved: Mapping[str, npt.ArrayLike]) -> None:
-        """Continues from `save`, bit for bit.
-
-        Raises:
-            EstimatorError: incomplete, of another shape or not finite; nothing is changed then.
-        """
-        memory = self._memory()
-        for key, own in memory.items():
-            if key not in saved:
-                raise EstimatorError(f"saved state lacks '{key}'")
-            array = numbers(saved[key], f"saved '{key}'")
-            if array.shape != own.shape:
-                raise EstimatorError(f"saved '{key}' has shape {array.shape}, expected {own.shape}")
-            if not (np.absolute(array) <= LIMIT).all():
-                raise EstimatorError(f"saved '{key}' is not finite")
-        for key, own in memory.items():
+    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+        for key, own in self._memory().items():
             own[...] = saved[key]
 
     def _checked(self, mean: FloatArray, spread: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -6,13 +6,12 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arguments import LIMIT, broadcast, numbers
+from estimators.arguments import quiet as all_bounded  # `quiet` is the decorator here
 from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
 from estimators.filters.chi_square import chi_square_quantile
-from estimators.signals.checks import LIMIT
-from estimators.signals.checks import quiet as all_bounded  # `quiet` is the decorator here
 
 __all__ = [
     "LIMIT",
@@ -56,33 +55,6 @@ def gate_threshold(gate: float | None) -> float | None:
     if not 0.0 < gate < 1.0:
         raise EstimatorError(f"gate = {gate!r} must be a probability inside (0, 1), such as 0.999, or None")
     return chi_square_quantile(gate, 1)
-
-
-def numbers(value: npt.ArrayLike, what: str) -> FloatArray:
-    """`value` as float64.
-
-    Raises:
-        EstimatorError: not numbers.
-    """
-    try:
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise EstimatorError(f"{what} is not an array of numbers: {error}") from error
-
-
-def broadcast(value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> FloatArray:
-    """`value` broadcast to `shape` (a read-only view).
-
-    Raises:
-        EstimatorError: names the shapes that do not fit.
-    """
-    array = numbers(value, what)
-    if array.shape == shape:
-        return array
-    try:
-        return np.broadcast_to(array, shape)
-    except ValueError as error:
-        raise EstimatorError(f"{what} has shape {array.shape}, expected {shape} or what broadcasts to it") from error
 
 
 def fits(shape: tuple[int, ...], batch: tuple[int, ...]) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 from estimators.arrays import FloatArray
 from estimators.errors import EstimatorError
 
-FEW = 48  # batch entries up to which LAPACK is faster
+FEW = 48  # batch entries up to which LAPACK is faster: 1.9 times for one; 4.8 times slower for 2000
 _TINY = 1e-150
 _SAFE = 1e-5  # relative pivot above which products lose less than a digit of eleven
 

@@ -8,22 +8,20 @@ rate about x: P1 (11), a_x = (vehicle part) + g sin(pitch), a_y = (vehicle part)
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import LIMIT, batch, mask, setting
+from estimators.arithmetic import Number, Signals, arithmetic
 from estimators.arrays import BoolArray, FlagArray, FloatArray
-from estimators.faults import Flag, raise_flag
-from estimators.signals.checks import LIMIT, any_missing, batch, bounded, mask, number, pair, quiet, setting
-from estimators.signals.held import Held
-from estimators.signals.renewable import Renewable
+from estimators.faults import Flag
+from estimators.memory import Renewable
 from estimators.vehicle import GRAVITY
 
 STEEPEST = math.sin(math.radians(60.0))
 """Sine of the largest tilt; beyond it a car lies on its side, and the difference of accelerations is an error."""
-Number = TypeVar("Number", float, FloatArray)
-_SIGNS = np.array([1.0, -1.0])  # roll grows with the rate about x, pitch falls with that about y
 
 
 class AttitudeStep(NamedTuple):
@@ -43,20 +41,6 @@ def without_gravity(
 ) -> tuple[FloatArray, FloatArray]:
     """P1 (11): a_x - g sin(theta_v + theta_r), a_y - g sin(phi_v + phi_r), m/s^2."""
     return ax - GRAVITY * np.sin(total_pitch), ay - GRAVITY * np.sin(total_roll)
-
-
-class _Read(NamedTuple):
-    """What the inertial unit reads, what of it is the motion of the car, and how the road lies."""
-
-    rate_x: npt.ArrayLike
-    rate_y: npt.ArrayLike
-    ay: npt.ArrayLike
-    ax: npt.ArrayLike
-    motion_y: npt.ArrayLike
-    motion_x: npt.ArrayLike
-    yaw_rate: npt.ArrayLike
-    bank: npt.ArrayLike
-    grade: npt.ArrayLike
 
 
 class AttitudeObserver(Renewable):
@@ -81,8 +65,7 @@ class AttitudeObserver(Renewable):
         EstimatorError: a setting that is not positive.
     """
 
-    memory = ("angle", "lagged", "renewed")
-    parts = ("yaw_rate", "road")
+    memory = ("angle", "lagged", "yaw_rate", "road", "renewed")
 
     def __init__(
         self,
@@ -96,11 +79,11 @@ class AttitudeObserver(Renewable):
         self.gain = 0.5 / self.time_constant if gain is None else setting(gain, "gain", "1/s")
         super().__init__(batch(batch_shape))
         self._keep = math.exp(-self.sample_time / self.time_constant)
-        self.yaw_rate = Held(self.batch_shape, "yaw_rate")
-        self.road = Held((*self.batch_shape, 2), "bank and grade")
-        self.angle: FloatArray = np.zeros((*self.batch_shape, 2))  # sin of roll and pitch, against the horizon
-        self.lagged: FloatArray = np.zeros((*self.batch_shape, 2))  # F(s) (stationary - estimate)
-        self._single = math.prod(self.batch_shape) == 1
+        self._kit = kit = arithmetic(self.batch_shape)
+        self.angle: Signals = kit.stacked([kit.full(0.0)] * 2)  # sin of roll and pitch, against the horizon
+        self.lagged: Signals = kit.stacked([kit.full(0.0)] * 2)  # F(s) (stationary - estimate)
+        self.yaw_rate: Number = kit.full(0.0)  # the last known ones
+        self.road: Signals = kit.stacked([kit.full(0.0)] * 2)  # bank and grade
 
     def step(
         self,
@@ -126,18 +109,42 @@ class AttitudeObserver(Renewable):
         Raises:
             EstimatorError: another shape, or not numbers.
         """
-        shape = self.batch_shape
-        flags: FlagArray = np.zeros(shape, dtype=np.int32)
+        shape, kit, choose = self.batch_shape, self._kit, self._kit.where
+        names = ("rate_x", "rate_y", "ay", "ax", "yaw_rate", "bank", "grade")
+        given = (rate_x, rate_y, ay, ax, yaw_rate, bank, grade)
+        p, q, side, ahead, turn, *road = (kit.car(value, shape, name) for value, name in zip(given, names, strict=True))
+        across, along = (
+            kit.full(math.nan) if value is None else kit.car(value, shape, name)
+            for value, name in ((motion_y, "motion_y"), (motion_x, "motion_x"))
+        )
+        known = [abs(value) <= LIMIT for value in (p, q, turn, *road)]  # False for NaN
+        complete = known[0] & known[1] & known[2] & known[3] & known[4]
+        if kit.some(kit.no(complete)):
+            p, q = choose(known[0], p, 0.0), choose(known[1], q, 0.0)
+            turn = choose(known[2], turn, self.yaw_rate)
+            road = [choose(good, new, old) for good, new, old in zip(known[3:], road, self.road, strict=True)]
+        self.yaw_rate, self.road = turn, kit.stacked(road)
+        with np.errstate(invalid="ignore", over="ignore"):
+            sines = (side - across) / GRAVITY, (ahead - along) / GRAVITY
+        used = [abs(value) <= LIMIT for value in sines]
+        roll, pitch = self.angle
+        up = kit.sqrt(1.0 - kit.minimum(roll * roll + pitch * pitch, 1.0))
+        moved = [
+            self._followed(*entry)
+            for entry in zip(
+                self.angle, self.lagged, (p * up - turn * pitch, turn * roll - q * up), sines, used, strict=True
+            )
+        ]
+        self.angle, self.lagged = (kit.stacked(values) for values in zip(*moved, strict=True))
+        total = np.arcsin(kit.table((self.angle,), shape))
+        body, counts = total - kit.table((self.road,), shape), kit.table((used,), shape)
+        innovation = np.where(counts, kit.table((self.lagged,), shape), np.nan)
+        reasons = choose(complete, 0, int(Flag.MISSING_INPUT)) | choose(
+            used[0] & used[1], 0, int(Flag.MISSING_MEASUREMENT)
+        )
+        flags: FlagArray = np.array(reasons, dtype=np.int32).reshape(shape)
         self._flag_renewed(flags)
-        across, along = np.nan if motion_y is None else motion_y, np.nan if motion_x is None else motion_x
-        read = _Read(rate_x, rate_y, ay, ax, across, along, yaw_rate, bank, grade)
-        used = self._one(read, flags) if self._single else None
-        if used is None:
-            used = self._many(read, flags)
-        total = np.arcsin(self.angle)
-        body = total - self.road.last
-        innovation = np.where(used, self.lagged, np.nan)
-        return AttitudeStep(body[..., 0], body[..., 1], total[..., 0], total[..., 1], innovation, used, flags)
+        return AttitudeStep(body[..., 0], body[..., 1], total[..., 0], total[..., 1], innovation, counts, flags)
 
     def reset(self, where: npt.ArrayLike | None = None, roll: float = 0.0, pitch: float = 0.0) -> None:
         """Sets the entries `where` (bool mask; None: all) to the given angles against the horizon, rad; flagged RESET next.
@@ -147,79 +154,23 @@ class AttitudeObserver(Renewable):
         """
         chosen = mask(where, self.batch_shape, "where")
         start = [setting(roll, "roll", "rad", low=-math.inf), setting(pitch, "pitch", "rad", low=-math.inf)]
-        self.angle = np.where(chosen[..., None], np.clip(np.sin(start), -STEEPEST, STEEPEST), self.angle)
-        self.lagged = np.where(chosen[..., None], 0.0, self.lagged)
-        self.yaw_rate.forget(chosen)
-        self.road.forget(chosen[..., None])
+        kit, here = self._kit, self._kit.own(chosen)
+        starts = [min(max(math.sin(value), -STEEPEST), STEEPEST) for value in start]
+        self.angle = kit.stacked([kit.where(here, new, old) for new, old in zip(starts, self.angle, strict=True)])
+        self.lagged, self.road = kit.replaced(here, 0.0, self.lagged), kit.replaced(here, 0.0, self.road)
+        self.yaw_rate = kit.replaced(here, 0.0, self.yaw_rate)
         self._renew(chosen)
 
-    def _many(self, read: _Read, flags: FlagArray) -> BoolArray:
-        """Moves `angle` and `lagged` by one sample and flags what is missing; returns `used`.
-
-        The direction of gravity u = (sin pitch, sin roll, up) turns with u' = -w x u.
-        """
-        shape = self.batch_shape
-        turn, no_turn = self.yaw_rate(read.yaw_rate)
-        _, no_road = self.road(pair(read.bank, read.grade, shape, "bank", "grade"))
-        for lost in (no_turn, no_road):
-            if lost is not None:
-                raise_flag(flags, any_missing(lost, shape), Flag.MISSING_INPUT)
-        gyro = pair(read.rate_x, read.rate_y, shape, "rate_x", "rate_y")
-        with np.errstate(invalid="ignore", over="ignore"):
-            tilt = pair(read.ay, read.ax, shape, "ay", "ax")
-            tilt = (tilt - pair(read.motion_y, read.motion_x, shape, "motion_y", "motion_x")) / GRAVITY
-        used: BoolArray = np.ones((*shape, 2), dtype=np.bool_)
-        if not quiet(tilt):
-            used = bounded(tilt)
-            tilt = np.where(used, tilt, 0.0)
-            raise_flag(flags, any_missing(~used, shape), Flag.MISSING_MEASUREMENT)
-        if not quiet(gyro):
-            spins = bounded(gyro)
-            gyro = np.where(spins, gyro, 0.0)
-            raise_flag(flags, any_missing(~spins, shape), Flag.MISSING_INPUT)
-        angle = self.angle
-        up = np.sqrt(1.0 - np.minimum((angle * angle).sum(axis=-1), 1.0))
-        spin = gyro * up[..., None] * _SIGNS + turn[..., None] * (_SIGNS * angle)[..., ::-1]
-        moved, self.lagged = self._followed(angle, self.lagged, spin, _limited(tilt), used)
-        self.angle = _limited(moved)
-        return used
-
-    def _one(self, read: _Read, flags: FlagArray) -> BoolArray | None:
-        """`_many` for one car, in plain numbers; None, and nothing done, where a gyro or the road is missing."""
-        shape = self.batch_shape
-        p, q, side, ahead, across, along, turn, bank, grade = (
-            number(value, shape, name) for name, value in zip(_Read._fields, read, strict=True)
-        )
-        if not abs(p) + abs(q) + abs(turn) + abs(bank) + abs(grade) <= LIMIT:
-            return None
-        self.yaw_rate.last, self.road.last = np.full(shape, turn), np.array((bank, grade)).reshape(*shape, 2)
-        side, ahead = (side - across) / GRAVITY, (ahead - along) / GRAVITY
-        used = [-LIMIT <= value <= LIMIT for value in (side, ahead)]
-        if not (used[0] and used[1]):
-            flags |= int(Flag.MISSING_MEASUREMENT)
-        angles = self.angle.reshape(2).tolist()
-        roll, pitch = angles
-        up = math.sqrt(1.0 - min(roll * roll + pitch * pitch, 1.0))
-        rates = p * up - turn * pitch, turn * roll - q * up
-        moved, lags = [], []
-        for angle, lagged, spin, sine, good in zip(
-            angles, self.lagged.reshape(2).tolist(), rates, (side, ahead), used, strict=True
-        ):
-            stationary = min(max(sine, -STEEPEST), STEEPEST) if good else 0.0
-            new, lag = self._followed(angle, lagged, spin, stationary, good)
-            moved.append(min(max(new, -STEEPEST), STEEPEST))
-            lags.append(lag)
-        self.angle, self.lagged = np.array(moved).reshape(*shape, 2), np.array(lags).reshape(*shape, 2)
-        return np.array(used).reshape(*shape, 2)
-
     def _followed(
-        self, angle: Number, lagged: Number, spin: Number, stationary: Number, used: Any
+        self, angle: Number, lagged: Number, spin: Number, sine: Number, used: Number
     ) -> tuple[Number, Number]:
-        """`angle` and `lagged` one sample on, of numbers or of arrays; `spin` is what the gyros make of the angle, 1/s."""
+        """Sine and lagged difference of an angle, one sample on.
+
+        The direction of gravity u = (sin pitch, sin roll, up) turns with u' = -w x u; `spin` is what the gyros make of that,
+        1/s, `sine` the stationary one.
+        """
+        kit = self._kit
+        stationary = kit.where(used, kit.minimum(kit.maximum(sine, -STEEPEST), STEEPEST), 0.0)
         lagged = self._keep * lagged + used * ((1.0 - self._keep) * (stationary - angle))
-        return angle + self.sample_time * (spin + used * (self.gain * lagged)), lagged
-
-
-def _limited(sine: FloatArray) -> FloatArray:
-    limited: FloatArray = np.minimum(np.maximum(sine, -STEEPEST), STEEPEST)
-    return limited
+        moved = angle + self.sample_time * (spin + used * (self.gain * lagged))
+        return kit.minimum(kit.maximum(moved, -STEEPEST), STEEPEST), lagged

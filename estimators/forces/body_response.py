@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, TypeVar
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arrays import AnyArray, FloatArray
+from estimators.arguments import LIMIT, batch, entries, mask, setting
+from estimators.arithmetic import Number, Signals, arithmetic
+from estimators.arrays import FloatArray
 from estimators.errors import EstimatorError
-from estimators.phi import phi
-from estimators.signals.checks import batch, mask, setting
-from estimators.signals.held import Held
-from estimators.signals.memory import Memory
+from estimators.memory import Memory
+from estimators.phi import phi_of
 
 PITCH = (1.4, 0.4)
 """Hz, damping ratio."""
 ROLL = (1.7, 0.3)
 """Hz, damping ratio."""
 
-Number = TypeVar("Number", float, FloatArray)
-_Mode = tuple[Number, Number, Number, Number, Number, Number, Number, Number]
+_Mode = tuple[float, float, float, float, float, float, float, float]
 
 
 class BodyResponse(Memory):
@@ -46,8 +44,7 @@ class BodyResponse(Memory):
         EstimatorError: a number that is not positive, no modes.
     """
 
-    memory = ("deflection", "speed", "starts")
-    parts = ("input",)
+    memory = ("input", "deflection", "speed", "starts")
 
     def __init__(
         self,
@@ -61,16 +58,13 @@ class BodyResponse(Memory):
             raise EstimatorError("modes is empty: give frequency and damping of each acceleration")
         w = 2.0 * math.pi * np.array([setting(f, "frequency", "Hz") for f, _ in modes])
         zeta = np.array([setting(z, "damping", "(no unit)") for _, z in modes])
-        self._stiffness, self._damping = w * w, 2.0 * zeta * w
-        self._modes = [_mode(float(k), float(c), time) for k, c in zip(self._stiffness, self._damping, strict=True)]
-        self._all: _Mode[Any] = tuple(np.array(self._modes).T)
-        self._single = math.prod(self.batch_shape) == 1
-        shape = (*self.batch_shape, len(modes))
-        self.input = Held(shape, "acceleration")
-        self.deflection: FloatArray = np.zeros(shape)
-        self.speed: FloatArray = np.zeros(shape)
-        self.starts = np.ones(self.batch_shape, dtype=np.bool_)
-        self._any_start = True
+        self._modes = [_mode(float(k), float(c), time) for k, c in zip(w * w, 2.0 * zeta * w, strict=True)]
+        self._kit = kit = arithmetic(self.batch_shape)
+        nothing = kit.stacked([kit.full(0.0)] * len(modes))
+        self.input: Signals = nothing  # the last known accelerations
+        self.deflection: Signals = nothing
+        self.speed: Signals = nothing
+        self.starts: Number = kit.full(True)
 
     def step(self, acceleration: npt.ArrayLike) -> FloatArray:
         """The accelerations (..., modes) that the wheel loads answer to; the first sample is taken as settled.
@@ -80,59 +74,44 @@ class BodyResponse(Memory):
         Raises:
             EstimatorError: another shape, or not numbers.
         """
-        before = self.input.last
-        value, _ = self.input(acceleration)
-        if self._any_start:
-            fresh = self.starts[..., None]
-            before = np.where(fresh, value, before)
-            self.deflection = np.where(fresh, value / self._stiffness, self.deflection)
-            self.speed = np.where(fresh, 0.0, self.speed)
-            self.starts, self._any_start = np.zeros(self.batch_shape, dtype=np.bool_), False
-        if self._single:
-            return np.array(self._advance(before.reshape(-1).tolist())).reshape(value.shape)
-        self.deflection, self.speed, out = _moved(self._all, self.deflection, self.speed, before)
-        return out
+        kit, shape, count = self._kit, self.batch_shape, len(self._modes)
+        given = kit.rows(entries(acceleration, (*shape, count), "acceleration"), count)
+        held = [kit.where(abs(new) <= LIMIT, new, old) for new, old in zip(given, self.input, strict=True)]
+        return kit.table((self.follow(held),), shape)
 
-    def one(self, acceleration: list[float]) -> list[float]:
-        """`step` for a single car, on finite plain numbers."""
-        if self._any_start:
-            return self.step(np.reshape(acceleration, self.input.shape)).reshape(-1).tolist()
-        before = self.input.last.reshape(-1).tolist()
-        self.input.last = np.array(acceleration).reshape(self.input.shape)
-        return self._advance(before)
-
-    def _advance(self, before: list[float]) -> list[float]:
-        columns = (self._modes, self.deflection.reshape(-1).tolist(), self.speed.reshape(-1).tolist(), before)
-        x, v, out = zip(*map(_moved, *columns), strict=True)
-        self.deflection, self.speed = np.array(x).reshape(self.input.shape), np.array(v).reshape(self.input.shape)
+    def follow(self, acceleration: Sequence[Number]) -> list[Number]:
+        """`step` on finite numbers."""
+        kit, before, x, speed = self._kit, self.input, self.deflection, self.speed
+        if kit.some(self.starts):
+            first = self.starts
+            before = [kit.where(first, new, old) for new, old in zip(acceleration, before, strict=True)]
+            rest = [new / mode[6] for new, mode in zip(acceleration, self._modes, strict=True)]
+            x = [kit.where(first, new, old) for new, old in zip(rest, x, strict=True)]
+            speed = [kit.where(first, 0.0, old) for old in speed]
+            self.starts = kit.full(False)
+        x, speed, out = zip(*map(_moved, self._modes, x, speed, before), strict=True)
+        self.input = kit.stacked(list(acceleration))
+        self.deflection, self.speed = kit.stacked(list(x)), kit.stacked(list(speed))
         return list(out)
 
     def reset(self, where: npt.ArrayLike | None = None) -> None:
         """Starts the entries `where` (bool mask; None: all) afresh: the next sample is taken as settled."""
-        chosen = mask(where, self.batch_shape, "where")
-        self.input.forget(chosen[..., None])
-        self.starts = self.starts | chosen
-        self._any_start = bool(self.starts.any())
-
-    def _take(self, saved: Mapping[str, AnyArray]) -> None:
-        super()._take(saved)
-        self._any_start = bool(self.starts.any())
+        here = self._kit.own(mask(where, self.batch_shape, "where"))
+        self.input = self._kit.replaced(here, 0.0, self.input)
+        self.starts = self.starts | here
 
 
-def _moved(mode: _Mode[Number], x: Number, speed: Number, force: Number) -> tuple[Number, Number, Number]:
-    """x and x' at the end of the sample, and K x + C x' there; of numbers or of arrays."""
+def _moved(mode: _Mode, x: Number, speed: Number, force: Number) -> tuple[Number, Number, Number]:
+    """x and x' at the end of the sample, and K x + C x' there."""
     a, b, c, d, e, f, stiffness, damping = mode
     x, speed = a * x + b * speed + e * force, c * x + d * speed + f * force
     return x, speed, stiffness * x + damping * speed
 
 
-def _mode(stiffness: float, damping: float, time: float) -> _Mode[float]:
+def _mode(stiffness: float, damping: float, time: float) -> _Mode:
     """e^(A Ts) by rows, int e^(A t) dt (0, 1)', K and C of x'' = a - C x' - K x, from e^M = 1 + M phi(M)."""
     M = time * np.array([[0.0, 1.0], [-stiffness, -damping]])
-    mean = 0.5 * float(M[0, 0] + M[1, 1])
-    N = M - mean * np.eye(2)
-    alpha, beta = phi(mean, float((N @ N)[0, 0]))
-    integral = alpha * np.eye(2) + beta * N
+    integral = phi_of(M)
     a, b, c, d = (np.eye(2) + M @ integral).reshape(-1).tolist()
     e, f = (time * integral[:, 1]).tolist()
     return a, b, c, d, e, f, stiffness, damping

@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import any_missing, batch, entries, mask, quiet, setting
 from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
 from estimators.faults import Flag, raise_flag
@@ -15,10 +16,9 @@ from estimators.filters import FilterStep, KalmanFilter, UnscentedKalmanFilter
 from estimators.filters.step import gate_threshold
 from estimators.forces.lateral_few import FEW, KILO, LateralFew
 from estimators.forces.planar import PlanarModel, planar_model
+from estimators.memory import Renewable
 from estimators.signals import limits
-from estimators.signals.checks import any_missing, batch, entries, mask, quiet, setting
 from estimators.signals.held import Held
-from estimators.signals.renewable import Renewable
 from estimators.vehicle import VehicleParameters
 
 PUBLISHED_PROCESS = 0.13
@@ -152,8 +152,10 @@ class LateralForceEstimator(Renewable):
             unseen = any_missing(missing[..., 1:], shape)
         self._flag_renewed(flags)
         if isinstance(self.filter, LateralFew):
-            told, used = self.filter.step(y, angle, force_x, load, unseen, self._threshold)
-            return LateralForceStep(told[..., :2], told[..., 2:6], told[..., 6:9], told[..., 9:12], used, flags)
+            outputs, used = self.filter.step(y, angle, force_x, load, unseen, self._threshold)
+            return LateralForceStep(
+                outputs[..., :2], outputs[..., 2:6], outputs[..., 6:9], outputs[..., 9:12], used, flags
+            )
         found = self._filtered(self.filter, y, planar_model(self.vehicle, angle, force_x), load, unseen)
         forces = found.state * KILO
         deviation: FloatArray = KILO * np.sqrt(found.covariance[..., _DIAGONAL, _DIAGONAL])

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arrays import AnyArray, BoolArray, FloatArray
+from estimators.arguments import entries, mask, setting
+from estimators.arrays import FloatArray
 from estimators.errors import EstimatorError
 from estimators.faults import Flag, raise_flag
 from estimators.forces.wheel import WheelForceStep, WheelInputs, WheelSignals
-from estimators.phi import phi
-from estimators.signals.checks import entries, mask, setting
+from estimators.memory import Memory
+from estimators.phi import phi_of
 from estimators.signals.held import Held
-from estimators.signals.memory import Memory
 from estimators.vehicle import VehicleParameters
 
 PUBLISHED_GAINS = (1.8, 11.4, 50.6)
@@ -134,6 +132,7 @@ class PidForceObserver(Memory):
 
     def _calm(self, signals: WheelSignals, rate: FloatArray) -> WheelForceStep:
         """The step where everything is there: the same equations, without the choices."""
+        # twice as fast for one car
         time, (eta1, _, eta3) = self.inputs.sample_time, self.gains
         m = (signals.torque - self.inputs.inertia * rate) / self.inputs.radius
         virtual = self.speed + time * rate
@@ -157,11 +156,7 @@ class PidForceObserver(Memory):
         self.starts = self.starts | chosen
         self.flowing = False
 
-    def _take(self, saved: Mapping[str, AnyArray]) -> None:
-        super()._take(saved)
-        self.flowing = bool(saved["flowing"])
-
-    def _move_speed(self, speed: FloatArray, rate: FloatArray, error: FloatArray, again: BoolArray) -> None:
+    def _move_speed(self, speed: FloatArray, rate: FloatArray, error: FloatArray, again: npt.NDArray[np.bool_]) -> None:
         """what at the end of the sample: (5) over one sample, exactly."""
         both = np.stack((np.where(again, 0.0, self.speed_integral), error), axis=-1)
         moved = np.einsum("cij,...cj->...ci", self._move, both)
@@ -173,8 +168,5 @@ class PidForceObserver(Memory):
 def _transition(gains: tuple[float, ...], radius: float, inertia: float, time: float) -> FloatArray:
     """e^(K Ts) of (int e_w, e_w), K of (7), from Cayley-Hamilton: e^M = 1 + M phi(M)."""
     M = time * np.array([[0.0, 1.0], [-gains[1] / inertia, -radius * gains[0] / inertia]])
-    mean = 0.5 * float(M[0, 0] + M[1, 1])
-    N = M - mean * np.eye(2)
-    alpha, beta = phi(mean, float((N @ N)[0, 0]))
-    moved: FloatArray = np.eye(2) + M @ (alpha * np.eye(2) + beta * N)
+    moved: FloatArray = np.eye(2) + M @ phi_of(M)
     return moved

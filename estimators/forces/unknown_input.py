@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from estimators.arguments import setting
 from estimators.arrays import BoolArray, FloatArray
 from estimators.forces.interval import IntervalObserver, MeanForce
 from estimators.forces.wheel import WheelForceStep, WheelSignals
-from estimators.signals.checks import setting
 from estimators.vehicle import VehicleParameters
 
 

@@ -11,25 +11,22 @@ takes the lateral transfer of its own mass share), anti-dive.
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import batch, mask
+from estimators.arithmetic import Arithmetic, ManyCars, Number, Signals, arithmetic
 from estimators.arrays import BoolArray, FlagArray, FloatArray
-from estimators.faults import Flag, raise_flag
+from estimators.faults import Flag
 from estimators.forces.body_response import PITCH, ROLL, BodyResponse
+from estimators.memory import Renewable
 from estimators.signals import limits
-from estimators.signals.checks import any_missing, batch, mask, number, pair
-from estimators.signals.held import Held
-from estimators.signals.renewable import Renewable
 from estimators.vehicle import GRAVITY, VehicleParameters
 
 LEAST_GRAVITY = 0.1 * GRAVITY
 """m/s^2: below this vertical specific force the car flies, and lateral transfer no longer has the meaning of (17)."""
-
-Number = TypeVar("Number", float, FloatArray)
 
 
 class LoadStep(NamedTuple):
@@ -47,15 +44,15 @@ def levelled(
 
     a_x' = a_x cos(pitch) - a_z sin(pitch), a_z' = a_z cos(pitch) + a_x sin(pitch); the same with a_y, a_z' and roll.
     """
-    return _levelled(ax, ay, az, np.sin(pitch), np.cos(pitch), np.sin(roll), np.cos(roll))
+    return _levelled(ManyCars(np.shape(ax)), ax, ay, az, pitch, roll)
 
 
 def _levelled(
-    ax: Number, ay: Number, az: Number, sin_p: Number, cos_p: Number, sin_r: Number, cos_r: Number
+    kit: Arithmetic, ax: Number, ay: Number, az: Number, pitch: Number, roll: Number
 ) -> tuple[Number, Number, Number]:
-    """`levelled` of numbers or of arrays, from the sines and cosines of pitch and roll."""
-    up = az * cos_p + ax * sin_p
-    return ax * cos_p - az * sin_p, ay * cos_r - up * sin_r, up * cos_r + ay * sin_r
+    sine, cosine, sin_r, cos_r = kit.sin(pitch), kit.cos(pitch), kit.sin(roll), kit.cos(roll)
+    up = az * cosine + ax * sine
+    return ax * cosine - az * sine, ay * cos_r - up * sin_r, up * cos_r + ay * sin_r
 
 
 def vertical_loads(
@@ -78,30 +75,21 @@ def vertical_loads(
     given = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (ax, ay, az, pitch, roll)))
     a_x, a_y, a_z = levelled(*given)
     lean = vehicle.roll_center_height * np.sin(given[4]) + vehicle.cg_height * a_y / np.maximum(a_z, LEAST_GRAVITY)
-    return _Transfer(vehicle)(a_x, lean, a_z)
+    return np.stack(_transferred(_wheels(vehicle), a_x, lean, a_z), axis=-1)
 
 
-class _Transfer:
+def _wheels(vehicle: VehicleParameters) -> list[tuple[float, float, float]]:
+    """Of each wheel: share of m a_z, N per m/s^2 of a_x, and +-1/T."""
+    mass, base = vehicle.mass, vehicle.wheelbase
+    front, rear = mass / base * vehicle.rear_axle_distance, mass / base * vehicle.front_axle_distance
+    along = mass / base * vehicle.cg_height
+    ahead, behind = 1.0 / vehicle.front_track, 1.0 / vehicle.rear_track
+    return [(front, -along, -ahead), (front, -along, ahead), (rear, along, -behind), (rear, along, behind)]
+
+
+def _transferred(wheels: list[tuple[float, float, float]], ax: Number, lean: Number, az: Number) -> list[Number]:
     """Loads from road-frame accelerations and the lateral shift `lean` of the centre of pressure, m."""
-
-    def __init__(self, vehicle: VehicleParameters) -> None:
-        mass, base = vehicle.mass, vehicle.wheelbase
-        front, rear = mass / base * vehicle.rear_axle_distance, mass / base * vehicle.front_axle_distance
-        self.up = np.array([front, front, rear, rear])
-        self.along = mass / base * vehicle.cg_height * np.array([-1.0, -1.0, 1.0, 1.0])
-        tracks = np.array([vehicle.front_track, vehicle.front_track, vehicle.rear_track, vehicle.rear_track])
-        self.across = np.array([-1.0, 1.0, -1.0, 1.0]) / tracks
-
-        self._wheels = list(zip(self.up.tolist(), self.along.tolist(), self.across.tolist(), strict=True))
-
-    def __call__(self, ax: FloatArray, lean: FloatArray, az: FloatArray) -> FloatArray:
-        load: FloatArray = self.up * az[..., None] + self.along * ax[..., None]
-        load *= 0.5 + self.across * lean[..., None]
-        return load
-
-    def of(self, ax: float, lean: float, az: float) -> list[float]:
-        """The same of one car's numbers."""
-        return [(up * az + along * ax) * (0.5 + across * lean) for up, along, across in self._wheels]
+    return [(up * az + along * ax) * (0.5 + across * lean) for up, along, across in wheels]
 
 
 def without_negative(load: FloatArray) -> FloatArray:
@@ -130,7 +118,8 @@ class VerticalLoads(Renewable):
         EstimatorError: a setting that is not positive.
     """
 
-    parts = ("along", "up", "angles", "response")
+    memory = ("felt", "angles", "renewed")
+    parts = ("response",)
 
     def __init__(
         self,
@@ -144,13 +133,13 @@ class VerticalLoads(Renewable):
         super().__init__(batch(batch_shape))
         self.vehicle, self.dynamic = vehicle, dynamic
         self.response = BodyResponse(sample_time, self.batch_shape, (pitch, roll))
-        self.along = Held((*self.batch_shape, 2), "ax and ay", limit=limits.ACCELERATION)
-        self.up = Held(self.batch_shape, "az", GRAVITY, limits.ACCELERATION)
-        self.angles = Held((*self.batch_shape, 2), "pitch and roll", limit=limits.ANGLE)
-        self._transfer = _Transfer(vehicle)
-        self._level = np.full(self.batch_shape, GRAVITY)
+        self._wheels, self._kit = _wheels(vehicle), arithmetic(self.batch_shape)
+        self.felt: Signals = self._at_rest()  # the last known a_x, a_y, a_z
+        self.angles: Signals = self._kit.stacked([self._kit.full(0.0)] * 2)  # and pitch, roll
         self._nowhere: BoolArray = np.zeros((*self.batch_shape, 4), dtype=np.bool_)
-        self._single = math.prod(self.batch_shape) == 1
+
+    def _at_rest(self) -> Signals:
+        return self._kit.stacked([self._kit.full(value) for value in (0.0, 0.0, GRAVITY)])
 
     def step(
         self,
@@ -167,62 +156,39 @@ class VerticalLoads(Renewable):
         Raises:
             EstimatorError: another shape, or not numbers.
         """
-        shape = self.batch_shape
-        flags: FlagArray = np.zeros(shape, dtype=np.int32)
-        if self._single and not self._any_renewed:
-            calm = self._calm(ax, ay, az, pitch, roll)
-            if calm is not None:
-                load = np.array(calm).reshape(*shape, 4)
-                return LoadStep(load, self._nowhere.copy(), flags) if min(calm) >= 0.0 else self._limited(load, flags)
-        both, missing = self.along(pair(ax, ay, shape, "ax", "ay"))
-        if missing is not None:
-            raise_flag(flags, any_missing(missing, shape), Flag.MISSING_MEASUREMENT)
-        a_z = self._level
-        if az is not None:
-            a_z, lost = self.up(az)
-            if lost is not None:
-                raise_flag(flags, lost, Flag.MISSING_MEASUREMENT)
-        sway: FloatArray | None = None
+        shape, kit = self.batch_shape, self._kit
+        given = (ax, ay) if az is None else (ax, ay, az)
+        felt, lost = self._held(given, ("ax", "ay", "az"), self.felt, limits.ACCELERATION)
+        self.felt = kit.stacked([*felt, *self.felt[len(felt) :]])
+        reasons = kit.where(lost, int(Flag.MISSING_MEASUREMENT), 0)
+        along, across, up = (*felt, kit.full(GRAVITY))[:3]
+        sway: Number = 0.0
         if pitch is not None or roll is not None:
-            zero = 0.0
-            angles, missing = self.angles(pair(zero if pitch is None else pitch, zero if roll is None else roll, shape))
-            if missing is not None:
-                raise_flag(flags, any_missing(missing, shape), Flag.MISSING_INPUT)
-            a_x, a_y, a_z = levelled(both[..., 0], both[..., 1], a_z, angles[..., 0], angles[..., 1])
-            both = np.stack((a_x, a_y), axis=-1)
-            sway = self.vehicle.roll_center_height * np.sin(angles[..., 1])
+            given = (0.0 if pitch is None else pitch, 0.0 if roll is None else roll)
+            angles, lost = self._held(given, ("pitch", "roll"), self.angles, limits.ANGLE)
+            self.angles = kit.stacked(angles)
+            reasons = reasons | kit.where(lost, int(Flag.MISSING_INPUT), 0)
+            along, across, up = _levelled(kit, along, across, up, *angles)
+            sway = self.vehicle.roll_center_height * kit.sin(angles[1])
+        if self.dynamic:
+            along, across = self.response.follow([along, across])
+        lean = self.vehicle.cg_height * across / kit.maximum(up, LEAST_GRAVITY) + sway
+        load = kit.table((_transferred(self._wheels, along, lean, up),), shape)
+        flags: FlagArray = np.array(reasons, dtype=np.int32).reshape(shape)
         self._flag_renewed(flags)
-        if self.dynamic:
-            both = self.response.step(both)
-        lean = self.vehicle.cg_height * both[..., 1] / np.maximum(a_z, LEAST_GRAVITY)
-        return self._limited(self._transfer(both[..., 0], lean if sway is None else lean + sway, a_z), flags)
+        return self._limited(load, flags)
 
-    def _calm(
-        self,
-        ax: npt.ArrayLike,
-        ay: npt.ArrayLike,
-        az: npt.ArrayLike | None,
-        pitch: npt.ArrayLike | None,
-        roll: npt.ArrayLike | None,
-    ) -> list[float] | None:
-        """The loads of one car, in plain numbers and not limited; None where something is missing."""
-        shape = self.batch_shape
-        along, across = number(ax, shape, "ax"), number(ay, shape, "ay")
-        up = GRAVITY if az is None else number(az, shape, "az")
-        nose, lean = (0.0 if angle is None else number(angle, shape, "angle") for angle in (pitch, roll))
-        if not (abs(along) + abs(across) + abs(up) <= limits.ACCELERATION and abs(nose) + abs(lean) <= limits.ANGLE):
-            return None
-        self.along.last = np.array((along, across)).reshape(*shape, 2)
-        if az is not None:
-            self.up.last = np.full(shape, up)
-        if pitch is not None or roll is not None:
-            self.angles.last = np.array((nose, lean)).reshape(*shape, 2)
-        sine = math.sin(lean)
-        along, across, up = _levelled(along, across, up, math.sin(nose), math.cos(nose), sine, math.cos(lean))
-        if self.dynamic:
-            along, across = self.response.one([along, across])
-        shift = self.vehicle.cg_height * across / max(up, LEAST_GRAVITY) + self.vehicle.roll_center_height * sine
-        return self._transfer.of(along, shift, up)
+    def _held(
+        self, given: tuple[npt.ArrayLike, ...], names: tuple[str, ...], last: Signals, limit: float
+    ) -> tuple[list[Number], Number]:
+        """The signals, at their last known values where missing; and where any of them is."""
+        kit, lost, held = self._kit, self._kit.full(False), []
+        for value, name, old in zip(given, names, last, strict=False):
+            new = kit.car(value, self.batch_shape, name)
+            good = abs(new) <= limit  # False for NaN
+            held.append(kit.where(good, new, old))
+            lost = lost | kit.no(good)
+        return held, lost
 
     def _limited(self, load: FloatArray, flags: FlagArray) -> LoadStep:
         if np.minimum.reduce(load, None) >= 0.0:
@@ -232,8 +198,10 @@ class VerticalLoads(Renewable):
     def reset(self, where: npt.ArrayLike | None = None) -> None:
         """Starts the entries `where` (bool mask of the batch shape; None: all) afresh; flagged RESET at the next step."""
         chosen = mask(where, self.batch_shape, "where")
-        self.along.forget(chosen[..., None])
-        self.up.forget(chosen)
-        self.angles.forget(chosen[..., None])
+        kit, here = self._kit, self._kit.own(chosen)
+        self.felt = kit.stacked(
+            [kit.where(here, new, old) for new, old in zip(self._at_rest(), self.felt, strict=True)]
+        )
+        self.angles = kit.replaced(here, 0.0, self.angles)
         self.response.reset(chosen)
         self._renew(chosen)

@@ -10,18 +10,17 @@ F_x along the wheel plane, forward positive; T drive minus brake; w positive for
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.arguments import batch, mask, setting
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.faults import Flag, raise_flag
+from estimators.memory import Renewable
 from estimators.signals import limits
-from estimators.signals.checks import batch, mask, setting
 from estimators.signals.held import Held
-from estimators.signals.renewable import Renewable
 from estimators.vehicle import VehicleParameters
 
 
@@ -140,6 +139,6 @@ class WheelInputs(Renewable):
         self._renew(chosen)
         return chosen
 
-    def _take(self, saved: Mapping[str, AnyArray]) -> None:
-        super()._take(saved)
+    def _recall(self) -> None:
+        super()._recall()
         self._any_slow = bool(self.slow.any())

@@ -7,13 +7,13 @@ from typing import Literal
 
 import numpy as np
 
+from estimators.arguments import setting
 from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
 from estimators.filters import UnscentedKalmanFilter
 from estimators.filters.scalar import ScalarKalmanFilter, ScalarStep
 from estimators.forces.interval import IntervalObserver, MeanForce
 from estimators.forces.wheel import WheelForceStep, WheelSignals
-from estimators.signals.checks import setting
 from estimators.vehicle import VehicleParameters
 
 METHODS = ("unscented", "linear")

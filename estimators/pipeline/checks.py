@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arrays import AnyArray
+from estimators.arguments import batch, entries, mask, setting
+from estimators.arithmetic import Number, arithmetic
+from estimators.memory import Memory
 from estimators.pipeline.result import Check, Consistency
-from estimators.signals.checks import batch, entries, mask, setting
-from estimators.signals.memory import Memory
 from estimators.vehicle import GRAVITY, VehicleParameters
-from estimators.velocity.arithmetic import Number, arithmetic, kept_signals
 
 BALANCE = 0.6
 """m/s^2 that sum of F/m and acceleration may stay apart: 0.15 of bias, 2 % of torque at 0.5 g, drag at 30 m/s (0.3)."""
@@ -95,14 +93,11 @@ class CrossChecks(Memory):
         failed = 0
         for bit, bad in zip(_BITS, found, strict=True):
             failed = failed | choose(bad, bit, 0)
-        told = kit.table(((gaps[0], gaps[1], load_gap, gaps[2]),), shape)
+        outputs = kit.table(((gaps[0], gaps[1], load_gap, gaps[2]),), shape)
         sums = np.asarray(failed, dtype=np.int32).reshape(shape)
-        return Consistency(told[..., 0], told[..., 1], told[..., 2], told[..., 3], sums)
+        return Consistency(outputs[..., 0], outputs[..., 1], outputs[..., 2], outputs[..., 3], sums)
 
     def reset(self, where: npt.ArrayLike | None = None) -> None:
         """Forgets the gaps of the entries `where` (bool mask; None: all)."""
         chosen = self._kit.own(mask(where, self.batch_shape, "where"))
         self.gaps = [self._kit.where(chosen, 0.0, gap) for gap in self.gaps]
-
-    def _take(self, saved: Mapping[str, AnyArray]) -> None:
-        self.gaps = list(kept_signals(saved["gaps"], math.prod(self.batch_shape) == 1))

@@ -1,4 +1,4 @@
-"""The papers' corner observers in one dress: what `CornerObservers` and a replay put at the four corners of a car.
+"""The papers' corner observers behind one interface: what `CornerObservers` and a replay put at the four corners of a car.
 
 A kind has `batch_shape`, which ends with the four corners, `sample_time`, `judges_slip` (whether it looks at the slip ratios
 and the accelerations of the car), `step(CornerSample) -> CornerStep` and `reset(where)`; `save` and `restore` as `Memory`.
@@ -11,10 +11,10 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import batch, mask
 from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.memory import Memory
 from estimators.schedule import GainSchedule
-from estimators.signals.checks import batch, mask
-from estimators.signals.memory import Memory
 from estimators.velocity.high_slip import HighSlipDetector, HighSlipSettings
 from estimators.velocity.lpv import LpvVelocityObserver
 from estimators.velocity.ltv_kalman import LtvKalmanObserver
@@ -69,7 +69,6 @@ class ScheduledCorners(Memory):
     """
 
     parts = ("observer",)
-    unknowns = ("raw", "measurement")
     judges_slip = False
 
     def __init__(self, schedule: GainSchedule, batch_shape: tuple[int, ...] = (4,)) -> None:

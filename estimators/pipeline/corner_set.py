@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.arguments import batch, entries, mask
+from estimators.arithmetic import Number, Signals, arithmetic
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
 from estimators.faults import Flag
+from estimators.memory import Memory
 from estimators.pipeline.corner_kinds import CornerKind, CornerSample, ScheduledCorners
 from estimators.schedule import GainSchedule
 from estimators.signals import FilteredDerivative, limits
-from estimators.signals.checks import batch, entries, mask
-from estimators.signals.memory import Memory
 from estimators.vehicle import VehicleParameters
-from estimators.velocity.arithmetic import Number, Signals, arithmetic, kept_signals
 from estimators.velocity.corners import rotated, tire_motion
 from estimators.velocity.mapping import SlipWeights, weighed
 from estimators.velocity.slip import slips
@@ -44,7 +43,7 @@ class CornerObservers(Memory):
     """A longitudinal observer at every corner, a lateral one where one is given, and their mapping to the car.
 
     u_x = R_e w' - v_xt', u_y = -v_yt' with the velocities of the last step in the accelerations, P1 section 6. Without a
-    lateral observer V_y is what `step` is told. Axles are weighed by slip (`SlipWeights`), or equally. One car runs on
+    lateral observer V_y is what `step` is given. Axles are weighed by slip (`SlipWeights`), or equally. One car runs on
     plain numbers, several on arrays, by the same formulas (`arithmetic`). What no car measures (`signals.limits`) is missing;
     a missing steering angle or yaw rate is held and flagged MISSING_INPUT at the corners concerned, a missing
     acceleration counts as zero.
@@ -127,7 +126,7 @@ class CornerObservers(Memory):
             speed = kit.rows(w, 4)
         rate = self.slope.step(raw)
         held, slope = kit.rows(rate.value, 9), kit.rows(rate.derivative, 9)
-        turn, swing = held[8], slope[8]
+        turn, yaw_acceleration = held[8], slope[8]
         left = self.vy if self.across is not None else kit.car(vy, shape, "vy")
         vx = self._started(held)
         given = kit.car(ax, shape, "ax"), kit.car(ay, shape, "ay")
@@ -140,7 +139,7 @@ class CornerObservers(Memory):
             """Sine and cosine of the steering, v_yt, and the inputs of both observers (`corner_acceleration`)."""
             sine, cosine = kit.sin(angle), kit.cos(angle)
             velocity = vx - turn * y, left + turn * x
-            acceleration = forward - swing * y, leftward + swing * x
+            acceleration = forward - yaw_acceleration * y, leftward + yaw_acceleration * x
             _, beside, pull_x, pull_y = tire_motion(velocity, acceleration, sine, cosine, swivel)
             return sine, cosine, beside, R * w_slope - pull_x, -pull_y
 
@@ -184,12 +183,12 @@ class CornerObservers(Memory):
         self.vx, self.vy = choose(kit.known(found_x), found_x, vx), choose(kit.known(found_y), found_y, left)
         if self.weights is not None or self._judged:
             self.slip, self.angle = kit.each(self._slips, held[:4], ahead, beside, radius)
-        told = kit.table(((self.vx, self.vy), seen_x, seen_y), shape)
+        outputs = kit.table(((self.vx, self.vy), seen_x, seen_y), shape)
         if not calm:
             no_angle = np.logical_not(good[..., 4:8] & good[..., 8:])
             flags = flags | np.where(no_angle, np.int32(Flag.MISSING_INPUT), np.int32(0))
-        corners = told[..., 2:6], told[..., 6:], relative, along.innovation, along.used
-        return CornerSetStep(told[..., 0], told[..., 1], *corners, flags, along.high_slip)
+        corners = outputs[..., 2:6], outputs[..., 6:], relative, along.innovation, along.used
+        return CornerSetStep(outputs[..., 0], outputs[..., 1], *corners, flags, along.high_slip)
 
     def reset(self, where: npt.ArrayLike | None = None, vx: npt.ArrayLike = math.nan, vy: npt.ArrayLike = 0.0) -> None:
         """Starts the entries `where` (bool mask of the batch shape; None: all) afresh, without relative velocity.
@@ -211,11 +210,6 @@ class CornerObservers(Memory):
         self.slip, self.angle = kit.each(
             lambda slip, angle: (kit.where(here, 0.0, slip), kit.where(here, 0.0, angle)), self.slip, self.angle
         )
-
-    def _take(self, saved: Mapping[str, AnyArray]) -> None:
-        super()._take(saved)
-        self.vx, self.vy = (self._kit.own(saved[name].copy()) for name in ("vx", "vy"))
-        self.slip, self.angle = (kept_signals(saved[name], self._count == 1) for name in ("slip", "angle"))
 
     def _observer(self, given: GainSchedule | CornerKind) -> CornerKind:
         """A schedule becomes its observer; one that is given must fit."""

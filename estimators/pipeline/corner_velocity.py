@@ -8,15 +8,15 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import mask, setting
+from estimators.arithmetic import Number, arithmetic
 from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
 from estimators.faults import Flag
+from estimators.memory import Memory
 from estimators.pipeline.corner_set import CornerObservers, CornerSetStep
 from estimators.pipeline.parts import check_parts
 from estimators.signals import limits
-from estimators.signals.checks import mask, setting
-from estimators.signals.memory import Memory
-from estimators.velocity.arithmetic import Number, arithmetic
 from estimators.velocity.corners import rotated
 from estimators.velocity.kinematic import KinematicKalman
 from estimators.velocity.slip import slips
@@ -116,7 +116,7 @@ class CornerVelocity(Memory):
             ahead, beside = rotated(vx - turn * y, vy + turn * x, kit.sin(angle), kit.cos(angle))
             return slips(kit, radius * w, ahead, beside)
 
-        told = kit.table(kit.each(mapped, held[:4], held[4:8], *self._wheels), shape)
+        outputs = kit.table(kit.each(mapped, held[:4], held[4:8], *self._wheels), shape)
         pulls = kit.car(ax, shape, "ax"), kit.car(ay, shape, "ay")
         lost = kit.no(abs(kit.car(yaw_rate, shape, "yaw_rate")) <= limits.YAW_RATE)
         for value in pulls:
@@ -129,8 +129,8 @@ class CornerVelocity(Memory):
             vy_deviation=moved.vy_deviation,
             yaw_rate=np.asarray(turn).reshape(shape),
             sensor_bias=moved.sensor_bias,
-            slip=told[..., :4],
-            slip_angle=told[..., 4:],
+            slip=outputs[..., :4],
+            slip_angle=outputs[..., 4:],
             innovation=found.innovation,
             used=used,
             high_slip=found.high_slip,

@@ -1,11 +1,194 @@
-"""Whether the parts of a pipeline fit to it."""
+"""The parts of a pipeline: what each must be able to do, and whether it fits.
+
+A part with `reset`, `save` and `restore` takes part in these of the pipeline; one without counts as stateless.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
+import numpy.typing as npt
+
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
+from estimators.forces import AttitudeStep, LateralForceStep, LoadStep, WheelForceStep
+from estimators.pipeline.corner_set import CornerSetStep
+
+
+class LongitudinalForcePart(Protocol):
+    """F_x of the wheels: `UnknownInputForceObserver`, `WheelForceFilter`, `DifferentiatedPid`; of shape (..., 4)."""
+
+    def step(
+        self,
+        wheel_speed: npt.ArrayLike,
+        torque: npt.ArrayLike,
+        vertical_load: npt.ArrayLike | None = None,
+        fresh: npt.ArrayLike | None = None,
+    ) -> WheelForceStep:
+        """One sample: rad/s, N m, N; `fresh` marks new wheel speeds, None: all."""
+
+
+class LoadPart(Protocol):
+    """F_z of the wheels: `VerticalLoads`."""
+
+    def step(
+        self,
+        ax: npt.ArrayLike,
+        ay: npt.ArrayLike,
+        az: npt.ArrayLike | None = None,
+        pitch: npt.ArrayLike | None = None,
+        roll: npt.ArrayLike | None = None,
+    ) -> LoadStep:
+        """One sample: m/s^2, rad."""
+
+
+class AttitudePart(Protocol):
+    """Roll and pitch: `AttitudeObserver`."""
+
+    def step(
+        self,
+        rate_x: npt.ArrayLike,
+        rate_y: npt.ArrayLike,
+        ax: npt.ArrayLike,
+        ay: npt.ArrayLike,
+        motion_x: npt.ArrayLike | None = None,
+        motion_y: npt.ArrayLike | None = None,
+        yaw_rate: npt.ArrayLike = 0.0,
+        grade: npt.ArrayLike = 0.0,
+        bank: npt.ArrayLike = 0.0,
+    ) -> AttitudeStep:
+        """One sample: rad/s, m/s^2, rad."""
+
+
+class LateralForcePart(Protocol):
+    """F_y of the axles: `LateralForceEstimator`."""
+
+    def step(
+        self,
+        acceleration_x: npt.ArrayLike,
+        acceleration_y: npt.ArrayLike,
+        yaw_acceleration: npt.ArrayLike,
+        steer: npt.ArrayLike,
+        longitudinal_force: npt.ArrayLike,
+        vertical_load: npt.ArrayLike | None = None,
+    ) -> LateralForceStep:
+        """One sample: m/s^2, rad/s^2, rad, N."""
+
+
+class VelocityResult(Protocol):
+    """What the pipeline reads of the step of a velocity part; see `FusionStep` for units and shapes."""
+
+    @property
+    def vx(self) -> FloatArray:
+        """(...) m/s at the centre of gravity."""
+
+    @property
+    def vy(self) -> FloatArray:
+        """(...) m/s, to the left."""
+
+    @property
+    def vx_deviation(self) -> FloatArray:
+        """(...) m/s."""
+
+    @property
+    def vy_deviation(self) -> FloatArray:
+        """(...) m/s."""
+
+    @property
+    def yaw_rate(self) -> FloatArray:
+        """(...) rad/s."""
+
+    @property
+    def sensor_bias(self) -> FloatArray:
+        """(..., 3) of a_x, a_y and r."""
+
+    @property
+    def slip(self) -> FloatArray:
+        """(..., 4) slip ratios."""
+
+    @property
+    def slip_angle(self) -> FloatArray:
+        """(..., 4) rad."""
+
+    @property
+    def used(self) -> BoolArray:
+        """(..., 4) wheels that support V_x."""
+
+    @property
+    def standing(self) -> BoolArray:
+        """(...) standstill was recognised."""
+
+    @property
+    def flags(self) -> FlagArray:
+        """(...) sums of `Flag`."""
+
+    @property
+    def wheel_flags(self) -> FlagArray:
+        """(..., 4)."""
+
+
+class VelocityPart(Protocol):
+    """V_x, V_y and slips: `VelocityFusion`, or `CornerVelocity`, which has `uses_lateral_force` and takes `lateral_use`, too."""
+
+    def step(
+        self,
+        wheel_speed: npt.ArrayLike,
+        steer: npt.ArrayLike,
+        ax: npt.ArrayLike,
+        ay: npt.ArrayLike,
+        yaw_rate: npt.ArrayLike,
+        normalised_force: npt.ArrayLike,
+        elapsed: npt.ArrayLike | None = None,
+    ) -> VelocityResult:
+        """One sample: rad/s, rad, m/s^2, rad/s, F_x/F_z, s."""
+
+
+class CornerPart(Protocol):
+    """Observers beside the chain: `CornerObservers`."""
+
+    def step(
+        self,
+        wheel_speed: npt.ArrayLike,
+        steer: npt.ArrayLike,
+        ax: npt.ArrayLike,
+        ay: npt.ArrayLike,
+        yaw_rate: npt.ArrayLike,
+        longitudinal_use: npt.ArrayLike,
+        lateral_use: npt.ArrayLike,
+        vy: npt.ArrayLike = 0.0,
+    ) -> CornerSetStep:
+        """One sample: rad/s, rad, m/s^2, rad/s, F_x/F_z and F_y/F_z, m/s."""
+
+
+class SideslipPart(Protocol):
+    """A sideslip observer of P4 or P5: `FourWheelSideslip`, `StiffnessSideslip`."""
+
+    def step(
+        self,
+        steer: FloatArray,
+        yaw_rate: FloatArray,
+        vx: FloatArray,
+        ax: FloatArray,
+        ay: FloatArray,
+        force_x: FloatArray,
+        force_z: FloatArray,
+        axle_force_y: FloatArray,
+    ) -> SideslipResult:
+        """One sample: rad of the front wheels, rad/s, m/s, m/s^2, (..., 4) N, (..., 4) N, (..., 2) N."""
+
+
+class SideslipResult(Protocol):
+    """What all sideslip parts return, among other things."""
+
+    @property
+    def sideslip(self) -> FloatArray:
+        """(...) rad."""
+
+    @property
+    def flags(self) -> FlagArray:
+        """(...) sums of `Flag`."""
+
 
 CORNER_PARTS = ("longitudinal_force", "readings")
 """Parts whose batch has the corners on a last axis."""

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.arguments import batch, entries, mask, setting
+from estimators.arithmetic import Arithmetic, Number, arithmetic
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.faults import Flag
 from estimators.forces import (
+    AttitudeStep,
     LateralForceEstimator,
     UnknownInputForceObserver,
     VerticalLoads,
@@ -19,17 +20,25 @@ from estimators.forces import (
     reconcile,
     without_gravity,
 )
+from estimators.memory import Memory
 from estimators.pipeline.checks import CrossChecks
-from estimators.pipeline.parts import CORNER_PARTS, check_parts
+from estimators.pipeline.parts import (
+    CORNER_PARTS,
+    AttitudePart,
+    CornerPart,
+    LateralForcePart,
+    LoadPart,
+    LongitudinalForcePart,
+    SideslipPart,
+    VelocityPart,
+    check_parts,
+)  # fmt: skip
 from estimators.pipeline.readings import WheelReadings
 from estimators.pipeline.result import PipelineStep
 from estimators.pipeline.signals import VehicleSignals
 from estimators.signals import FilteredDerivative, limits
-from estimators.signals.checks import batch, entries, mask, setting
-from estimators.signals.memory import Memory
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity import VelocityFusion
-from estimators.velocity.arithmetic import Arithmetic, Number, arithmetic, kept_signals
 from estimators.velocity.slip import LEAST_SPEED
 
 REAL_SENSORS = (0.3, 0.1, 0.3)
@@ -49,14 +58,7 @@ class EstimationPipeline(Memory):
     5. F_y of both axles from planar dynamics; front split from the model, rear split by load; before 4 where 4 asks for it;
     6. corner observers and a sideslip part (optional), beside the chain: for comparison and cross-check.
 
-    Each part is replaced by any object with the same `step`; one with `reset`, `save` and `restore` takes part in these of
-    the pipeline, one without counts as stateless. Their signatures: `longitudinal_force.step(wheel_speed, torque,
-    vertical_load, fresh=)` as `UnknownInputForceObserver`, `WheelForceFilter` and `DifferentiatedPid`, of shape (..., 4);
-    `loads.step(ax, ay, az, pitch, roll)` as `VerticalLoads`; `attitude.step(...)` as `AttitudeObserver`;
-    `lateral_force.step(ax, ay, yaw_acceleration, steer, force_x, force_z)` as `LateralForceEstimator`; `velocity.step(
-    wheel_speed, steer, ax, ay, yaw_rate, normalised_force, elapsed)` as `VelocityFusion`, with `lateral_use=` as
-    `CornerVelocity` where it has `uses_lateral_force`; `corner_observers.step(...)` as `CornerObservers`; `sideslip.step(...)`
-    as in `sideslip_parts`.
+    Each part is replaced by any object that follows its protocol (`parts`).
 
     Estimates are finite whatever comes in; what was wrong is in the flags, and what does not fit together in
     `consistency`. A wheel speed that repeats bit for bit is the old one read again, for up to `repeat_time`.
@@ -82,13 +84,13 @@ class EstimationPipeline(Memory):
         vehicle: VehicleParameters,
         sample_time: float,
         batch_shape: tuple[int, ...] = (),
-        longitudinal_force: Any = None,
-        loads: Any = None,
-        attitude: Any = None,
-        lateral_force: Any = None,
-        velocity: Any = None,
-        corner_observers: Any = None,
-        sideslip: Any = None,
+        longitudinal_force: LongitudinalForcePart | None = None,
+        loads: LoadPart | None = None,
+        attitude: AttitudePart | None = None,
+        lateral_force: LateralForcePart | None = None,
+        velocity: VelocityPart | None = None,
+        corner_observers: CornerPart | None = None,
+        sideslip: SideslipPart | None = None,
         acceleration_deviation: float = 0.15,
         repeat_time: float = 0.025,
     ) -> None:
@@ -96,12 +98,14 @@ class EstimationPipeline(Memory):
         shape = self.batch_shape
         time = self.sample_time = setting(sample_time, "sample_time", "s")
         four = (*shape, 4)
-        self.longitudinal_force = longitudinal_force or UnknownInputForceObserver(vehicle, time, four)
-        self.loads = loads or VerticalLoads(vehicle, time, shape)
-        self.lateral_force = lateral_force or LateralForceEstimator(
+        self.longitudinal_force: LongitudinalForcePart = longitudinal_force or UnknownInputForceObserver(
+            vehicle, time, four
+        )
+        self.loads: LoadPart = loads or VerticalLoads(vehicle, time, shape)
+        self.lateral_force: LateralForcePart = lateral_force or LateralForceEstimator(
             vehicle, time, shape, "linear", measurement_deviation=REAL_SENSORS
         )
-        self.velocity = velocity or VelocityFusion(vehicle, time, shape)
+        self.velocity: VelocityPart = velocity or VelocityFusion(vehicle, time, shape)
         self.attitude, self.corner_observers, self.sideslip = attitude, corner_observers, sideslip
         self.yaw_slope = FilteredDerivative(time, 0.02, shape)
         self.checks = CrossChecks(vehicle, time, shape)
@@ -152,14 +156,14 @@ class EstimationPipeline(Memory):
         use = self._normalised(agreed.force, loads.load, unknown)
         if tilt is None:  # untouched: the velocity part tells the impossible from the missing
             free_x, free_y = ax, ay
-        swing = self.yaw_slope.step(choose(late, math.nan, turned) if delayed else turned).derivative
-        swing = choose(abs(turned) < math.inf, kit.own(swing), math.nan)
-        lateral = self.lateral_force.step(own_x, own_y, swing, angle, agreed.force, loads.load)
+        yaw_acceleration = self.yaw_slope.step(choose(late, math.nan, turned) if delayed else turned).derivative
+        yaw_acceleration = choose(abs(turned) < math.inf, kit.own(yaw_acceleration), math.nan)
+        lateral = self.lateral_force.step(own_x, own_y, yaw_acceleration, angle, agreed.force, loads.load)
         across = self._normalised(lateral.corner_force, loads.load, None) if self._use_across else None
         more = {"lateral_use": across} if self._lateral_first else {}
         moved = self.velocity.step(w, steer, free_x, free_y, turn, use, signals.elapsed, **more)
         corners = None
-        if self.corner_observers is not None:
+        if self.corner_observers is not None and across is not None:
             corners = self.corner_observers.step(w, steer, own_x, own_y, turn, use, across, moved.vy)
         beside = None
         if self.sideslip is not None:
@@ -234,13 +238,6 @@ class EstimationPipeline(Memory):
         self.front, self.angle = choose(here, 0.0, self.front), choose(here, 0.0, self.angle)
         self.drive = choose(here, math.nan, self.drive)
 
-    def _take(self, saved: Mapping[str, AnyArray]) -> None:
-        super()._take(saved)
-        for name in ("bias", "speed"):
-            setattr(self, name, list(kept_signals(saved[name], self._single)))
-        for name in ("front", "angle", "drive"):
-            setattr(self, name, self._kit.own(saved[name].copy()))
-
     def _late(self, elapsed: npt.ArrayLike | None) -> Number:
         """Where the sample came so early or late that a difference quotient over it is no derivative."""
         if elapsed is None:
@@ -260,7 +257,7 @@ class EstimationPipeline(Memory):
 
     def _tilted(
         self, signals: VehicleSignals, ax: Number, ay: Number, turn: Number
-    ) -> tuple[Any, Number, Number, Number, Number]:
+    ) -> tuple[AttitudeStep | None, Number, Number, Number, Number]:
         """The attitude step, a_x and a_y level with the road (forces), and without gravity (velocities), m/s^2."""
         if self.attitude is None:
             return None, ax, ay, ax, ay

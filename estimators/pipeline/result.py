@@ -6,6 +6,7 @@ from enum import IntFlag
 from typing import Any, NamedTuple
 
 from estimators.arrays import FlagArray, FloatArray
+from estimators.forces import AttitudeStep, LateralForceStep, LoadStep, Reconciled, WheelForceStep
 
 
 class Check(IntFlag):
@@ -57,11 +58,11 @@ class PipelineStep(NamedTuple):
     consistency: Consistency
     flags: FlagArray  # (...) sums of `Flag` over the car's signals
     wheel_flags: FlagArray  # (..., 4) of the wheels' signals
-    wheels: Any  # the step of each part: innovation, what was used, and why not (`WheelForceStep`)
-    reconciled: Any  # `Reconciled`
-    loads: Any  # `LoadStep`
-    lateral: Any  # `LateralForceStep`
+    wheels: WheelForceStep  # the step of each part: innovation, what was used, and why not
+    reconciled: Reconciled
+    loads: LoadStep
+    lateral: LateralForceStep
     velocity: Any  # `FusionStep`, or `CornerVelocityStep`
-    attitude: Any  # `AttitudeStep`, None without that part
+    attitude: AttitudeStep | None  # None without that part
     corners: Any  # `CornerSetStep`, None without that part
     sideslip_step: Any  # of the sideslip part, None without one

@@ -1,8 +1,4 @@
-"""The papers' sideslip observers in one dress, to run beside the fusion.
-
-A sideslip part has `step(steer, yaw_rate, vx, ax, ay, force_x, force_z, axle_force_y)` with the front road-wheel angle
-(rad), rad/s, m/s, m/s^2, m/s^2, (..., 4) N, (..., 4) N and (..., 2) N, and returns something with `sideslip` (rad) and `flags`.
-"""
+"""The papers' sideslip observers behind one interface, to run beside the fusion."""
 
 from __future__ import annotations
 
@@ -12,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from estimators.arrays import FloatArray
+from estimators.memory import Memory
 from estimators.sideslip import (
     AdaptiveStiffnessObserver,
     FixedStiffnessObserver,
@@ -22,7 +19,6 @@ from estimators.sideslip import (
 )
 from estimators.sideslip.four_wheel import FourWheelStep
 from estimators.sideslip.stiffness import StiffnessStep
-from estimators.signals.memory import Memory
 
 
 class FourWheelSideslip(Memory):

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import entries
 from estimators.arrays import FloatArray
-from estimators.signals.checks import entries
 
 
 class VehicleSignals(NamedTuple):

@@ -1,14 +1,14 @@
-"""The force observer that needs a wheel acceleration, in the dress of those that do not."""
+"""The force observer that needs a wheel acceleration, behind the interface of those that do not."""
 
 from __future__ import annotations
 
 import numpy.typing as npt
 
+from estimators.arguments import batch
 from estimators.forces.pid import PUBLISHED_GAINS, PidForceObserver
 from estimators.forces.wheel import WheelForceStep
+from estimators.memory import Memory
 from estimators.signals import FilteredDerivative
-from estimators.signals.checks import batch
-from estimators.signals.memory import Memory
 from estimators.vehicle import VehicleParameters
 
 

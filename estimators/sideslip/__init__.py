@@ -6,7 +6,7 @@ from estimators.sideslip.four_wheel import FourWheelObserver, FourWheelStep
 from estimators.sideslip.four_wheel_model import FourWheelModel
 from estimators.sideslip.sliding_mode import SlidingGains, SlidingModeObserver, SlidingStep, wheel_axes
 from estimators.sideslip.stiffness import AdaptiveStiffnessObserver, FixedStiffnessObserver, StiffnessStep
-from estimators.sideslip.vehicle import FourWheel, SingleTrack
+from estimators.vehicle import FourWheel, SingleTrack
 
 __all__ = [
     "AdaptiveStiffnessObserver",

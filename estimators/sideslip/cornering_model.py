@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
-from estimators.sideslip.vehicle import SingleTrack
+from estimators.vehicle import SingleTrack
 
 REST_TIME = 0.1  # s, with which sideslip fades away at standstill
 
@@ -34,7 +34,7 @@ class CorneringModel(NamedTuple):
     def slip_angles(self, beta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """beta_1 and beta_2 of (11)."""
         v, turn = self.vehicle, self.yaw_rate / self.speed
-        return self.steering - beta - v.front_lever * turn, -beta + v.rear_lever * turn
+        return self.steering - beta - v.front_axle_distance * turn, -beta + v.rear_axle_distance * turn
 
     def stiffness(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """C_1 + dC_1 and C_2 + dC_2, (...) each."""

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.arguments import batch, broadcast, diagonal_noise, finite, mask, setting
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
 from estimators.faults import Flag, raise_flag
 from estimators.filters import ExtendedKalmanFilter, FilterStep, UnscentedKalmanFilter
 from estimators.filters.affine import Affine
-from estimators.filters.step import all_bounded, broadcast, diagonal
+from estimators.filters.step import all_bounded, diagonal
 from estimators.filters.workspace import Workspace
+from estimators.memory import Renewable
 from estimators.sideslip.dugoff import used_friction
 from estimators.sideslip.four_wheel_model import AFFINE_FROM, FourWheelModel
-from estimators.sideslip.inputs import HeldInput, check_saved, checked_noise
-from estimators.sideslip.vehicle import FourWheel, positive
 from estimators.signals import limits
+from estimators.signals.held import Clipped
+from estimators.vehicle import FourWheel
 
 # Not published; declared choices. Process noise per second: (rad/s)^2, (m/s)^2, rad^2, N^2 (tires), N^2 (drive).
 PROCESS = (1e-4, 1e-2, 1e-4, 1e5, 1e5, 1e5, 1e5, 1e7)
@@ -47,7 +48,7 @@ class FourWheelStep(NamedTuple):
     filter: FilterStep
 
 
-class FourWheelObserver:
+class FourWheelObserver(Renewable):
     """Yaw rate, speed, sideslip, four lateral forces and the front drive force from P4 (7)-(12).
 
     Normal forces are inputs, friction is known. Euler steps, T = 0.01 s in the source.
@@ -75,6 +76,8 @@ class FourWheelObserver:
         EstimatorError: an option that means nothing.
     """
 
+    parts = ("steering", "loads", "filters")
+
     def __init__(
         self,
         vehicle: FourWheel,
@@ -89,38 +92,36 @@ class FourWheelObserver:
     ) -> None:
         if kind not in ("unscented", "extended"):
             raise EstimatorError(f"kind = {kind!r} is not known; use 'unscented' or 'extended'")
-        self.vehicle, self.batch_shape, self.gate = vehicle, tuple(batch_shape), gate
-        self.sample_time = positive(sample_time, "sample_time", "s")
-        self.standstill_speed = positive(standstill_speed, "standstill_speed", "m/s")
+        super().__init__(batch(batch_shape))
+        self.vehicle, self.gate = vehicle, gate
+        self.sample_time = setting(sample_time, "sample_time", "s")
+        self.standstill_speed = setting(standstill_speed, "standstill_speed", "m/s")
         self._count = math.prod(self.batch_shape)
-        if self._count < 1:
-            raise EstimatorError(f"batch_shape = {batch_shape} holds no entries")
-        self._process = checked_noise(process_noise, PROCESS, "process_noise", True) * self.sample_time
-        self._sensor = checked_noise(measurement_noise, MEASUREMENT, "measurement_noise", False)
-        spread = checked_noise(initial_covariance, INITIAL, "initial_covariance", False)
+        self._process = diagonal_noise(process_noise, PROCESS, "process_noise", True) * self.sample_time
+        self._sensor = diagonal_noise(measurement_noise, MEASUREMENT, "measurement_noise", False)
+        spread = diagonal_noise(initial_covariance, INITIAL, "initial_covariance", False)
         self._most = _MOST * np.diag(spread)
         build = UnscentedKalmanFilter if kind == "unscented" else ExtendedKalmanFilter
         starts = range(0, self._count, _CHUNK)
         self._parts = [slice(start, min(start + _CHUNK, self._count)) for start in starts]
-        self._filters: list[UnscentedKalmanFilter | ExtendedKalmanFilter] = [
+        self.filters: list[UnscentedKalmanFilter | ExtendedKalmanFilter] = [
             build(np.zeros((part.stop - part.start, 8)), spread) for part in self._parts
         ]
         static = np.tile(vehicle.static_loads, (self._count, 1))
-        self._steering = HeldInput("steering", np.zeros(self._count), -STEERING_LIMIT, STEERING_LIMIT)
-        self._loads = HeldInput("loads", static, 0.0, limits.FORCE, axes=1)
-        self._renewed = np.zeros(self._count, dtype=np.bool_)
+        self.steering = Clipped("steering", np.zeros(self._count), -STEERING_LIMIT, STEERING_LIMIT)
+        self.loads = Clipped("loads", static, 0.0, limits.FORCE, axes=1)
         self._memory = Workspace()
         self._before: list[FourWheelModel] | None = None  # at the inputs of the previous sample
 
     @property
     def state(self) -> FloatArray:
         """A copy of the estimate, (..., 8)."""
-        return np.concatenate([each.state for each in self._filters]).reshape(*self.batch_shape, 8)
+        return np.concatenate([each.state for each in self.filters]).reshape(*self.batch_shape, 8)
 
     @property
     def covariance(self) -> FloatArray:
         """A copy of the covariance, (..., 8, 8)."""
-        return np.concatenate([each.covariance for each in self._filters]).reshape(*self.batch_shape, 8, 8)
+        return np.concatenate([each.covariance for each in self.filters]).reshape(*self.batch_shape, 8, 8)
 
     def step(self, steering: npt.ArrayLike, loads: npt.ArrayLike, measurement: npt.ArrayLike) -> FourWheelStep:
         """Predicts with the inputs of the previous sample, then corrects with the measurement of this one.
@@ -136,16 +137,16 @@ class FourWheelObserver:
         """
         shape, count = self.batch_shape, self._count
         flags: FlagArray = np.zeros(count, dtype=np.int32)
-        before = self._before or self._models(self._steering.value, self._loads.value)
+        before = self._before or self._models(self.steering.last, self.loads.last)
         measured = broadcast(measurement, (*shape, 4), "measurement").reshape(count, 4)
         if not (np.absolute(measured) <= _IMPOSSIBLE).all():  # False for NaN
             measured = np.where(np.absolute(measured) <= _IMPOSSIBLE, measured, np.nan)
         given = broadcast(steering, shape, "steering").reshape(count), broadcast(loads, (*shape, 4), "loads")
-        angle, load = self._steering(given[0], flags), self._loads(given[1].reshape(count, 4), flags)
+        angle, load = self.steering.within(given[0], flags), self.loads.within(given[1].reshape(count, 4), flags)
         rest = np.empty(count, dtype=np.bool_)
         found: list[FilterStep] = []
         now = self._before = self._models(angle, load)
-        for part, each, model, new in zip(self._parts, self._filters, before, now, strict=True):
+        for part, each, model, new in zip(self._parts, self.filters, before, now, strict=True):
             rest[part] = ~(each.state[:, 1] >= self.standstill_speed)
             old = model._replace(at_rest=rest[part] if rest[part].any() else None)
             if isinstance(each, UnscentedKalmanFilter):
@@ -161,15 +162,16 @@ class FourWheelObserver:
             lost = held | np.asarray((diagonal(result.covariance) > self._most).any(axis=-1))
             if lost.any():
                 each.reset(lost)
-                self._renewed[part] |= lost
+                where = np.zeros(count, dtype=np.bool_)
+                where[part] = lost
+                self._renew(where.reshape(shape))
                 result = result._replace(state=each.state, covariance=each.covariance)
             found.append(result)
         joined = found[0] if len(found) == 1 else _joined(found)
         if not all_bounded(joined.innovation):
             raise_flag(flags, np.asarray(np.isnan(joined.innovation).any(axis=-1)), Flag.MISSING_MEASUREMENT)
-        if self._renewed.any():
-            raise_flag(flags, self._renewed, Flag.RESET)
-            self._renewed[:] = False
+        flags = flags.reshape(shape)
+        self._flag_renewed(flags)
         forces = joined.state[:, 3:7]
         friction = used_friction(forces, load)
         shaped = _reshaped(joined, shape)
@@ -178,7 +180,7 @@ class FourWheelObserver:
             shaped.state[..., 2],
             shaped.state[..., 3:7],
             friction.reshape(*shape, 4),
-            flags.reshape(shape),
+            flags,
             rest.reshape(shape),
             shaped,
         )
@@ -198,50 +200,19 @@ class FourWheelObserver:
         Raises:
             EstimatorError: another shape, or a state that is not finite.
         """
-        mask = np.ones(self.batch_shape, dtype=np.bool_) if where is None else np.asarray(where)
-        if mask.dtype != np.bool_ or mask.shape != self.batch_shape:
-            raise EstimatorError(f"where: {mask.dtype} {mask.shape}, expected a bool mask of shape {self.batch_shape}")
-        full = broadcast(state, (*self.batch_shape, 8), "state").reshape(self._count, 8)
-        if not np.isfinite(full).all():
-            raise EstimatorError("state is not finite; reset to finite numbers")
-        chosen = mask.reshape(-1)
-        for part, each in zip(self._parts, self._filters, strict=True):
+        where = mask(where, self.batch_shape, "where")
+        full = finite(state, (*self.batch_shape, 8), "state").reshape(self._count, 8)
+        chosen = where.reshape(-1)
+        for part, each in zip(self._parts, self.filters, strict=True):
             each.reset(chosen[part], state=full[part])
-        self._steering.forget(chosen)
-        self._loads.forget(chosen)
+        self.steering.forget(chosen)
+        self.loads.forget(chosen[:, None])
         self._before = None
-        self._renewed |= chosen
+        self._renew(where)
 
-    def save(self) -> dict[str, AnyArray]:
-        """Everything needed to continue later, as plain arrays."""
-        saved: dict[str, AnyArray] = {
-            "steering": self._steering.value.copy(),
-            "loads": self._loads.value.copy(),
-            "renewed": self._renewed.copy(),
-        }
-        memories = [each.save() for each in self._filters]
-        return saved | {key: np.concatenate([memory[key] for memory in memories]) for key in memories[0]}
-
-    def restore(self, saved: Mapping[str, AnyArray]) -> None:
-        """Continues from `save`, bit for bit.
-
-        Raises:
-            EstimatorError: incomplete, of another shape, of another kind of filter or not finite; nothing is changed.
-        """
-        before = self.save()
-        check_saved(saved, before)
-        try:
-            self._restore_filters(saved)
-        except EstimatorError:  # of a later part: the earlier ones go back
-            self._restore_filters(before)
-            raise
-        self._steering.value, self._loads.value = np.array(saved["steering"]), np.array(saved["loads"])
+    def _recall(self) -> None:
+        super()._recall()
         self._before = None
-        self._renewed = np.array(saved["renewed"], dtype=np.bool_)
-
-    def _restore_filters(self, saved: Mapping[str, AnyArray]) -> None:
-        for part, each in zip(self._parts, self._filters, strict=True):
-            each.restore({key: saved[key][part] for key in each.save()})
 
 
 def _joined(steps: list[FilterStep]) -> FilterStep:

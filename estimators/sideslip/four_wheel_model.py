@@ -13,7 +13,7 @@ import numpy as np
 from estimators.arrays import BoolArray, FloatArray
 from estimators.filters.workspace import Workspace
 from estimators.sideslip.dugoff import LEAST_KNEE, dugoff_force, dugoff_slope
-from estimators.sideslip.vehicle import FourWheel
+from estimators.vehicle import FourWheel
 
 STATES = (
     ("yaw_rate", "rad/s"),
@@ -142,10 +142,10 @@ class FourWheelModel(NamedTuple):
         for k in range(8):
             F[k, k] = 1.0
         inertia = time / v.yaw_inertia
-        F[0, 3] = inertia * (v.front_lever * cosine + 0.5 * v.track * sine)
-        F[0, 4] = inertia * (v.front_lever * cosine - 0.5 * v.track * sine)
-        F[0, 5] = F[0, 6] = -inertia * v.rear_lever
-        F[0, 7] = inertia * v.front_lever * sine
+        F[0, 3] = inertia * (v.front_axle_distance * cosine + 0.5 * v.track * sine)
+        F[0, 4] = inertia * (v.front_axle_distance * cosine - 0.5 * v.track * sine)
+        F[0, 5] = F[0, 6] = -inertia * v.rear_axle_distance
+        F[0, 7] = inertia * v.front_axle_distance * sine
         inverse = time / v.mass
         F[1, 2] = inverse * (side * cb - along * sb)
         F[1, 3] = F[1, 4] = inverse * (cosine * sb - sine * cb)
@@ -226,8 +226,8 @@ class FourWheelModel(NamedTuple):
         along -= front
         np.subtract(forces[0], forces[1], moment)
         moment *= self.sine * (0.5 * v.track * time / v.yaw_inertia)
-        moment += lateral * (time / v.yaw_inertia * v.front_lever)
-        moment -= rear * (time / v.yaw_inertia * v.rear_lever)
+        moment += lateral * (time / v.yaw_inertia * v.front_axle_distance)
+        moment -= rear * (time / v.yaw_inertia * v.rear_axle_distance)
         # cos(beta - delta) and sin(beta - delta) of (11) expanded: forces in body axes, turned by beta
         lateral += rear
         lateral *= time / v.mass
@@ -246,7 +246,7 @@ class FourWheelModel(NamedTuple):
         np.add(speed, half, ahead[1, ...])
         np.maximum(ahead, self.slow, out=ahead)
         drift = speed * beta
-        side = yaw * self.vehicle.front_lever
+        side = yaw * self.vehicle.front_axle_distance
         side += drift
         # tan(delta - arctan(vy / vx)) = (sin(delta) vx - cos(delta) vy) / (cos(delta) vx + sin(delta) vy)
         below = ahead * self.cosine
@@ -256,7 +256,7 @@ class FourWheelModel(NamedTuple):
         np.multiply(ahead, self.sine, out[:2])
         out[:2] -= side
         out[:2] /= below
-        drift -= yaw * self.vehicle.rear_lever
+        drift -= yaw * self.vehicle.rear_axle_distance
         np.divide(drift, ahead, out[2:])
         np.negative(out[2:], out[2:])
 
@@ -281,12 +281,12 @@ class FourWheelModel(NamedTuple):
         ahead = np.stack((speed - half, speed + half))
         free = ahead > self.slow
         np.maximum(ahead, self.slow, out=ahead)
-        below = cosine * ahead + sine * (speed * beta + v.front_lever * yaw)
+        below = cosine * ahead + sine * (speed * beta + v.front_axle_distance * yaw)
         open_ = below > self.slow
         np.maximum(below, self.slow, out=below)
         slopes = np.empty((3, *out.shape))
         along = (free * np.array([-0.5, 0.5]).reshape(2, *(1,) * yaw.ndim) * v.track, free * moving, 0.0 * ahead)
-        across = ((v.front_lever, -v.rear_lever), (beta * moving,) * 2, (speed,) * 2)
+        across = ((v.front_axle_distance, -v.rear_axle_distance), (beta * moving,) * 2, (speed,) * 2)
         for k in range(3):
             top = sine * along[k] - cosine * across[k][0]
             slopes[k, :2] = (top - out[:2] * open_ * (cosine * along[k] + sine * across[k][0])) / below

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.arguments import batch, broadcast, finite, mask, setting
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
 from estimators.faults import Flag, raise_flag
-from estimators.filters.step import bounded, broadcast
-from estimators.sideslip.inputs import HeldInput, check_saved
-from estimators.sideslip.vehicle import SingleTrack, positive
+from estimators.memory import Renewable
 from estimators.signals import limits
+from estimators.signals.held import Clipped
+from estimators.vehicle import SingleTrack
 
 _STEERING_LIMIT = 1.0  # rad
 _IMPOSSIBLE = np.array([limits.YAW_RATE, limits.ACCELERATION, limits.ACCELERATION])  # of the measurement
@@ -33,7 +33,7 @@ class SlidingGains:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            positive(getattr(self, field.name), field.name, "rad/s^2" if field.name == "yaw" else "N/s")
+            setting(getattr(self, field.name), field.name, "rad/s^2" if field.name == "yaw" else "N/s")
 
 
 class SlidingStep(NamedTuple):
@@ -47,7 +47,7 @@ class SlidingStep(NamedTuple):
     flags: FlagArray  # (...) sums of `Flag`
 
 
-class SlidingModeObserver:
+class SlidingModeObserver(Renewable):
     """P5 (1)-(7), (9): constant-force model, corrected by s(e) = clip(e / width, -1, 1) of each innovation.
 
     Euler steps. `widths` are the half-widths of the linear zone of the switching function (not published; rad/s and
@@ -66,6 +66,9 @@ class SlidingModeObserver:
         EstimatorError: parameters without meaning; an unstable linear zone.
     """
 
+    memory = ("_state", "renewed")
+    parts = ("steering",)
+
     def __init__(
         self,
         vehicle: SingleTrack,
@@ -74,13 +77,14 @@ class SlidingModeObserver:
         gains: SlidingGains | None = None,
         widths: tuple[float, float, float] = (0.2, 1.0, 1.0),
     ) -> None:
-        self.vehicle, self.batch_shape = vehicle, tuple(batch_shape)
-        self.sample_time = positive(sample_time, "sample_time", "s")
+        super().__init__(batch(batch_shape))
+        self.vehicle = vehicle
+        self.sample_time = setting(sample_time, "sample_time", "s")
         self.gains = gains or SlidingGains()
         units = ("yaw rate width", "rad/s"), ("lateral width", "m/s^2"), ("longitudinal width", "m/s^2")
         if len(widths) != 3:
             raise EstimatorError(f"widths = {widths!r} must be three numbers")
-        self.widths = np.array([positive(width, *unit) for width, unit in zip(widths, units, strict=True)])
+        self.widths = np.array([setting(width, *unit) for width, unit in zip(widths, units, strict=True)])
         self._model, self._outputs, self._injection = _matrices(vehicle, self.gains)
         self.spectral_radius = float(np.absolute(np.linalg.eigvals(self.zone_matrix())).max())
         if not self.spectral_radius < 1:
@@ -89,8 +93,7 @@ class SlidingModeObserver:
                 f"{self.spectral_radius:.3g}): the observer would chatter; widen them or sample faster"
             )
         self._state = np.zeros((*self.batch_shape, 4))
-        self._steering = HeldInput("steering", np.zeros(self.batch_shape), -_STEERING_LIMIT, _STEERING_LIMIT)
-        self._renewed = np.zeros(self.batch_shape, dtype=np.bool_)
+        self.steering = Clipped("steering", np.zeros(self.batch_shape), -_STEERING_LIMIT, _STEERING_LIMIT)
 
     @property
     def state(self) -> FloatArray:
@@ -100,13 +103,13 @@ class SlidingModeObserver:
     @property
     def condition_residual(self) -> float:
         """L_2 Omega_8 - L_1 Omega_5 in N m/s, zero by (7) and (A.8); +160 with the printed gains (harmless)."""
-        return self.vehicle.rear_lever * self.gains.rear - self.vehicle.front_lever * self.gains.front
+        return self.vehicle.rear_axle_distance * self.gains.rear - self.vehicle.front_axle_distance * self.gains.front
 
     @property
     def split_rate(self) -> float:
         """Decay rate in 1/s of the error L_1 x_2 - L_2 x_3 on the sliding surface, Omega_4 (L1+L2) / (Omega_1 I_z), (A.12)."""
         v = self.vehicle
-        return self.gains.split * (v.front_lever + v.rear_lever) / (self.gains.yaw * v.yaw_inertia)
+        return self.gains.split * (v.front_axle_distance + v.rear_axle_distance) / (self.gains.yaw * v.yaw_inertia)
 
     @property
     def moment_limit(self) -> float:
@@ -128,7 +131,7 @@ class SlidingModeObserver:
         """
         flags: FlagArray = np.zeros(self.batch_shape, dtype=np.int32)
         measured = broadcast(measurement, (*self.batch_shape, 3), "measurement")
-        angle = self._steering(steering, flags)
+        angle = self.steering.within(steering, flags)
         used = np.absolute(measured) <= _IMPOSSIBLE  # False for NaN
         innovation = np.where(used, measured, 0.0) - self._state @ self._outputs.T
         switching = np.where(used, np.clip(innovation / self.widths, -1.0, 1.0), 0.0)
@@ -136,8 +139,7 @@ class SlidingModeObserver:
         drift[..., 0] = np.where(used[..., 0], drift[..., 0], 0.0)
         self._state = self._state + self.sample_time * (drift + switching @ self._injection.T)
         raise_flag(flags, np.logical_not(used.all(axis=-1)), Flag.MISSING_MEASUREMENT)
-        raise_flag(flags, self._renewed, Flag.RESET)
-        self._renewed[...] = False
+        self._flag_renewed(flags)
         innovation = np.where(used, innovation, np.nan)
         return SlidingStep(self.state, wheel_axes(self._state, angle), innovation, switching, used, flags)
 
@@ -147,33 +149,11 @@ class SlidingModeObserver:
         Raises:
             EstimatorError: another shape, or a state that is not finite.
         """
-        mask = np.ones(self.batch_shape, dtype=np.bool_) if where is None else np.asarray(where)
-        if mask.dtype != np.bool_ or mask.shape != self.batch_shape:
-            raise EstimatorError(f"where: {mask.dtype} {mask.shape}, expected a bool mask of shape {self.batch_shape}")
-        full = broadcast(state, (*self.batch_shape, 4), "state")
-        if not bounded(full).all():
-            raise EstimatorError("state is not finite; reset to finite numbers")
-        self._state[mask] = full[mask]
-        self._steering.forget(mask)
-        self._renewed |= mask
-
-    def save(self) -> dict[str, AnyArray]:
-        """Everything needed to continue later, as plain arrays."""
-        return {
-            "state": self._state.copy(),
-            "steering": np.array(self._steering.value),
-            "renewed": self._renewed.copy(),
-        }
-
-    def restore(self, saved: Mapping[str, AnyArray]) -> None:
-        """Continues from `save`, bit for bit.
-
-        Raises:
-            EstimatorError: incomplete, of another shape or not finite; nothing is changed then.
-        """
-        check_saved(saved, self.save())
-        self._state, self._steering.value = np.array(saved["state"]), np.array(saved["steering"])
-        self._renewed = np.array(saved["renewed"], dtype=np.bool_)
+        chosen = mask(where, self.batch_shape, "where")
+        full = finite(state, (*self.batch_shape, 4), "state")
+        self._state = np.where(chosen[..., None], full, self._state)
+        self.steering.forget(chosen)
+        self._renew(chosen)
 
 
 def wheel_axes(state: FloatArray, steering: FloatArray) -> FloatArray:
@@ -186,7 +166,7 @@ def wheel_axes(state: FloatArray, steering: FloatArray) -> FloatArray:
 def _matrices(vehicle: SingleTrack, gains: SlidingGains) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Model (4, 4), outputs (3, 4) and injection (4, 3) of P5 (1)-(6)."""
     model, outputs, injection = np.zeros((4, 4)), np.zeros((3, 4)), np.zeros((4, 3))
-    model[0, 1:3] = vehicle.front_lever / vehicle.yaw_inertia, -vehicle.rear_lever / vehicle.yaw_inertia
+    model[0, 1:3] = vehicle.front_axle_distance / vehicle.yaw_inertia, -vehicle.rear_axle_distance / vehicle.yaw_inertia
     outputs[0, 0] = 1.0
     outputs[1, 1:3] = outputs[2, 3] = 1.0 / vehicle.mass
     injection[:3, 0] = gains.yaw, gains.split, -gains.split

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.arguments import batch, broadcast, mask, setting
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
 from estimators.faults import Flag, raise_flag
 from estimators.filters import ExtendedKalmanFilter, FilterStep
-from estimators.filters.step import broadcast
+from estimators.memory import Renewable
 from estimators.sideslip.cornering_model import CorneringModel
-from estimators.sideslip.inputs import HeldInput, check_saved
-from estimators.sideslip.vehicle import SingleTrack, positive
 from estimators.signals import limits
+from estimators.signals.held import Clipped
+from estimators.vehicle import SingleTrack
 
 GOOD_NOISE = (0.1, 0.1, 0.1)  # zones 5, 6: N^2, N^2, (m/s^2)^2, per sample; P5 section 4
 POOR_NOISE = (1e6, 1e6, 1e6)  # zones 1 to 4
@@ -38,7 +38,7 @@ class StiffnessStep(NamedTuple):
     filter: FilterStep
 
 
-class AdaptiveStiffnessObserver:
+class AdaptiveStiffnessObserver(Renewable):
     """Extended Kalman filter on P5 (10)-(17): sideslip and the corrections of two axle stiffnesses.
 
     Zones in the (slip angle, force) plane of each axle: 1, 2 where beta_i F_yi < 0; 3, 4 where |F_yi| < `threshold`;
@@ -65,6 +65,7 @@ class AdaptiveStiffnessObserver:
         EstimatorError: an option that means nothing; a standstill speed at which Euler steps are unstable.
     """
 
+    parts = ("filter", "inputs")
     _states = 3
 
     def __init__(
@@ -80,33 +81,33 @@ class AdaptiveStiffnessObserver:
     ) -> None:
         if switching not in ("axle", "both"):
             raise EstimatorError(f"switching = {switching!r} is not known; use 'axle' or 'both'")
-        self.vehicle, self.batch_shape, self.switching, self.gate = vehicle, tuple(batch_shape), switching, gate
-        self.sample_time = positive(sample_time, "sample_time", "s")
-        self.standstill_speed = positive(standstill_speed, "standstill_speed", "m/s")
+        super().__init__(batch(batch_shape))
+        self.vehicle, self.switching, self.gate = vehicle, switching, gate
+        self.sample_time = setting(sample_time, "sample_time", "s")
+        self.standstill_speed = setting(standstill_speed, "standstill_speed", "m/s")
         rate = 2 * (vehicle.front_stiffness + vehicle.rear_stiffness) / (vehicle.mass * self.standstill_speed)
         if rate * self.sample_time > 1.5:
             raise EstimatorError(
                 f"standstill_speed = {standstill_speed} m/s is too low for Euler steps of {sample_time} s; use at least "
                 f"{rate * self.sample_time / 1.5 * self.standstill_speed:.3g} m/s"
             )
-        self.threshold = np.array([positive(value, "threshold", "N") for value in threshold])
-        spread = [positive(value, "initial_covariance", "") for value in initial_covariance[: self._states]]
-        self._filter = ExtendedKalmanFilter(np.zeros((*self.batch_shape, self._states)), np.diag(spread))
+        self.threshold = np.array([setting(value, "threshold", "N") for value in threshold])
+        spread = [setting(value, "initial_covariance", "") for value in initial_covariance[: self._states]]
+        self.filter = ExtendedKalmanFilter(np.zeros((*self.batch_shape, self._states)), np.diag(spread))
         names = ("steering", "yaw_rate", "speed", "drive_force")
-        self._inputs = [
-            HeldInput(name, np.zeros(self.batch_shape), *limits) for name, limits in zip(names, _LIMITS, strict=True)
+        self.inputs = [
+            Clipped(name, np.zeros(self.batch_shape), *limits) for name, limits in zip(names, _LIMITS, strict=True)
         ]
-        self._renewed = np.zeros(self.batch_shape, dtype=np.bool_)
 
     @property
     def state(self) -> FloatArray:
         """A copy of the estimate, (..., 3): rad, N/rad, N/rad."""
-        return self._filter.state
+        return self.filter.state
 
     @property
     def covariance(self) -> FloatArray:
         """A copy of the covariance, (..., 3, 3)."""
-        return self._filter.covariance
+        return self.filter.covariance
 
     def step(
         self,
@@ -125,23 +126,20 @@ class AdaptiveStiffnessObserver:
             EstimatorError: shapes that do not fit, not numbers.
         """
         flags: FlagArray = np.zeros(self.batch_shape, dtype=np.int32)
-        before = self._model([held.value for held in self._inputs])
+        before = self._model([held.last for held in self.inputs])
         given = (steering, yaw_rate, speed, drive_force)
         measured = broadcast(measurement, (*self.batch_shape, 3), "measurement")
-        shaped = [
-            broadcast(value, self.batch_shape, held.what) for held, value in zip(self._inputs, given, strict=True)
-        ]
-        model = self._model([held(value, flags) for held, value in zip(self._inputs, shaped, strict=True)])
+        shaped = [broadcast(value, self.batch_shape, held.what) for held, value in zip(self.inputs, given, strict=True)]
+        model = self._model([held.within(value, flags) for held, value in zip(self.inputs, shaped, strict=True)])
         present = np.absolute(measured) <= _MOST  # False for NaN
         excited = self._excited(model, measured, present)
-        self._filter.predict(before.transition, before.transition_jacobian, self._process(excited))
+        self.filter.predict(before.transition, before.transition_jacobian, self._process(excited))
         usable = np.where(present & ~model.at_rest[..., None], measured, np.nan)
         noise = np.where(self._good(excited), GOOD_NOISE, POOR_NOISE)[..., None] * np.eye(3)
-        step = self._filter.correct(usable, model.measurement, model.measurement_jacobian, noise, self.gate)
+        step = self.filter.correct(usable, model.measurement, model.measurement_jacobian, noise, self.gate)
         step = self._limited(step)
         raise_flag(flags, np.logical_not(present.all(axis=-1)), Flag.MISSING_MEASUREMENT)
-        raise_flag(flags, self._renewed, Flag.RESET)
-        self._renewed[...] = False
+        self._flag_renewed(flags)
         beta = step.state[..., 0]
         stiffness = np.stack(model.stiffness(step.state), axis=-1)
         return StiffnessStep(beta, model.slip_angles(beta)[1], stiffness, excited, flags, model.at_rest, step)
@@ -152,28 +150,11 @@ class AdaptiveStiffnessObserver:
         Raises:
             EstimatorError: another shape, or a state that is not finite.
         """
-        mask = np.ones(self.batch_shape, dtype=np.bool_) if where is None else np.asarray(where)
-        self._filter.reset(mask, state=broadcast(state, (*self.batch_shape, self._states), "state"))
-        for held in self._inputs:
-            held.forget(mask)
-        self._renewed |= mask
-
-    def save(self) -> dict[str, AnyArray]:
-        """Everything needed to continue later, as plain arrays."""
-        inputs = {held.what: np.array(held.value) for held in self._inputs}
-        return {**self._filter.save(), **inputs, "renewed": self._renewed.copy()}
-
-    def restore(self, saved: Mapping[str, AnyArray]) -> None:
-        """Continues from `save`, bit for bit.
-
-        Raises:
-            EstimatorError: incomplete, of another shape or not finite; nothing is changed then.
-        """
-        check_saved(saved, self.save())
-        self._filter.restore(saved)
-        for held in self._inputs:
-            held.value = np.array(saved[held.what])
-        self._renewed = np.array(saved["renewed"], dtype=np.bool_)
+        chosen = mask(where, self.batch_shape, "where")
+        self.filter.reset(chosen, state=broadcast(state, (*self.batch_shape, self._states), "state"))
+        for held in self.inputs:
+            held.forget(chosen)
+        self._renew(chosen)
 
     def _model(self, inputs: list[FloatArray]) -> CorneringModel:
         steering, yaw_rate, speed, drive = inputs
@@ -183,7 +164,7 @@ class AdaptiveStiffnessObserver:
 
     def _excited(self, model: CorneringModel, measured: FloatArray, present: BoolArray) -> BoolArray:
         """Axles in zone 5 or 6, (..., 2); the slip angles are those of the estimate before the step."""
-        slip = np.stack(model.slip_angles(self._filter.state[..., 0]), axis=-1)
+        slip = np.stack(model.slip_angles(self.filter.state[..., 0]), axis=-1)
         force = np.where(present[..., :2], measured[..., :2], 0.0)
         large = (slip * force > 0) & (np.absolute(force) >= self.threshold)
         return np.asarray(large & ~model.at_rest[..., None])
@@ -208,7 +189,7 @@ class AdaptiveStiffnessObserver:
         if np.array_equal(clipped, step.state):
             return step
         changed = (clipped != step.state).any(axis=-1)
-        self._filter.reset(np.asarray(changed), state=clipped, covariance=step.covariance)
+        self.filter.reset(np.asarray(changed), state=clipped, covariance=step.covariance)
         return step._replace(state=clipped)
 
 

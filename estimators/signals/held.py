@@ -1,13 +1,14 @@
-"""A signal that stays finite: what is missing is held at the last good value."""
+"""Signals that stay finite: what is missing is held at the last good value."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arrays import BoolArray, FloatArray
-from estimators.signals.checks import LIMIT, bounded, entries, quiet
-from estimators.signals.memory import Memory
+from estimators.arguments import LIMIT, bounded, broadcast, entries, quiet
+from estimators.arrays import BoolArray, FlagArray, FloatArray
+from estimators.faults import Flag, raise_flag
+from estimators.memory import Memory
 
 
 class Held(Memory):
@@ -44,3 +45,36 @@ class Held(Memory):
     def forget(self, where: BoolArray) -> None:
         """Back to the start value for the entries `where`."""
         self.last = np.where(where, self._start, self.last)
+
+
+class Clipped(Held):
+    """Holds a missing input likewise, and clips one that is outside `low` to `high`.
+
+    Args:
+        what: its name, for messages.
+        start: what is used as long as nothing finite was seen; shape (*batch, ...).
+        low, high: range beyond which a value is clipped.
+        axes: how many trailing axes belong to the input itself.
+    """
+
+    def __init__(self, what: str, start: FloatArray, low: float, high: float, axes: int = 0) -> None:
+        super().__init__(start.shape, what, start)
+        self.low, self.high, self._inner = low, high, tuple(range(-axes, 0))
+
+    def within(self, value: npt.ArrayLike, flags: FlagArray) -> FloatArray:
+        """The usable value; raises MISSING_INPUT and PARAMETER_OUT_OF_RANGE of the entries.
+
+        Raises:
+            EstimatorError: another shape, or not numbers.
+        """
+        array = broadcast(value, self.shape, self.what)
+        if np.minimum.reduce(array, None) >= self.low and np.maximum.reduce(array, None) <= self.high:  # False for NaN
+            self.last = array.copy()
+            return self.last
+        held, missing = self(array)
+        if missing is not None:
+            raise_flag(flags, np.asarray(missing.any(axis=self._inner)), Flag.MISSING_INPUT)
+        self.last = np.clip(held, self.low, self.high)
+        if not np.array_equal(self.last, held):
+            raise_flag(flags, np.asarray((self.last != held).any(axis=self._inner)), Flag.PARAMETER_OUT_OF_RANGE)
+        return self.last

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import batch, bounded, entries, mask, setting
 from estimators.arrays import BoolArray, FlagArray, FloatArray, IntArray
 from estimators.errors import EstimatorError
 from estimators.faults import Flag, raise_flag
-from estimators.signals.checks import batch, bounded, entries, mask, setting
-from estimators.signals.memory import Memory
+from estimators.memory import Memory
 
 
 class TickStep(NamedTuple):

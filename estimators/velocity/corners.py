@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arithmetic import Number
 from estimators.arrays import FloatArray
 from estimators.vehicle import VehicleParameters
-from estimators.velocity.arithmetic import Number
 
 
 class CornerVectors(NamedTuple):
@@ -88,12 +88,35 @@ def corner_acceleration(
         steer: (..., 4) rad.
         steer_rate: (..., 4) rad/s; 0 gives the paper's formula.
     """
-    a, b, turn, swing = (_cornered(value) for value in (ax, ay, yaw_rate, yaw_acceleration))
+    a, b, turn, yaw_acceleration = (_cornered(value) for value in (ax, ay, yaw_rate, yaw_acceleration))
     forward, left = _cornered(vx), _cornered(vy)
-    body = a + turn * left - swing * vehicle.corner_y, b - turn * forward + swing * vehicle.corner_x
+    body = (
+        a + turn * left - yaw_acceleration * vehicle.corner_y,
+        b - turn * forward + yaw_acceleration * vehicle.corner_x,
+    )
     angle, rate = np.asarray(steer, dtype=np.float64), np.asarray(steer_rate, dtype=np.float64)
     velocity = corner_velocity(vehicle, vx, vy, yaw_rate)
     return CornerVectors(*tire_motion(velocity, body, np.sin(angle), np.cos(angle), rate)[2:])
+
+
+def corner_acceleration_by_speed(
+    vehicle: VehicleParameters,
+    ax: npt.ArrayLike,
+    ay: npt.ArrayLike,
+    yaw_rate: npt.ArrayLike,
+    yaw_acceleration: npt.ArrayLike,
+    vy: npt.ArrayLike,
+    steer: npt.ArrayLike,
+    steer_rate: npt.ArrayLike,
+) -> tuple[FloatArray, FloatArray]:
+    """p and q (..., 4) of v_xt' = p + q V_x, `corner_acceleration` along the tire, where V_x is what an observer estimates.
+
+    Arguments as there.
+    """
+    free = corner_acceleration(vehicle, ax, ay, yaw_rate, yaw_acceleration, 0.0, vy, steer, steer_rate).x
+    angle, rate = np.asarray(steer, dtype=np.float64), np.asarray(steer_rate, dtype=np.float64)
+    unit = (1.0, 0.0), (0.0, -_cornered(yaw_rate))
+    return free, np.asarray(tire_motion(*unit, np.sin(angle), np.cos(angle), rate)[2])
 
 
 def _cornered(value: npt.ArrayLike) -> FloatArray:

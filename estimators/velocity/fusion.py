@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arrays import AnyArray
+from estimators.arguments import batch, mask, setting
+from estimators.arithmetic import Number, Signals, arithmetic
 from estimators.errors import EstimatorError
 from estimators.faults import Flag
-from estimators.signals.checks import batch, mask, setting
-from estimators.signals.memory import Memory
+from estimators.memory import CarsMemory, Memory
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity import lateral_fusion as lateral
 from estimators.velocity import longitudinal_fusion as longitudinal
-from estimators.velocity.arithmetic import Number, Signals, arithmetic, kept_signals
-from estimators.velocity.fusion_adrift import FusionAdrift
-from estimators.velocity.fusion_against import FusionAgainst
-from estimators.velocity.fusion_lost import FusionLost
-from estimators.velocity.fusion_report import Judged, reported
-from estimators.velocity.fusion_screen import FusionScreen, Screened
+from estimators.velocity.accelerometer_faults import AccelerationSource, SlipDirectionTest
+from estimators.velocity.consistency_reset import LateralReset, LongitudinalReset
+from estimators.velocity.fusion_inputs import ConditionedInputs, FusionInputs
 from estimators.velocity.fusion_settings import FusionSettings
-from estimators.velocity.fusion_standing import FusionStanding
-from estimators.velocity.fusion_step import FusionStep
-from estimators.velocity.fusion_thrust import FusionThrust
+from estimators.velocity.fusion_step import FusionStep, Outcome, fusion_step
+from estimators.velocity.zero_velocity import ZeroVelocityDetector
 
 _MISSING_INPUT, _RESET, _GATED = int(Flag.MISSING_INPUT), int(Flag.RESET), int(Flag.GATED)
 _FASTEST = 200.0  # m/s: an estimate beyond it is lost
@@ -39,8 +34,8 @@ class VelocityFusion(Memory):
     Which wheel to believe is decided at every sample from what its force explains (`longitudinal_fusion`); V_y comes
     from the kinematics and from the side slip that the axle forces demand (`lateral_fusion`). At standstill both
     speeds and the yaw rate are zero, which gives the biases. An a_x that is missing, frozen or contradicted by forces and
-    wheels is replaced (`fusion_thrust`, `fusion_against`). An estimate that rolling wheels contradict for long is
-    lost and starts again from them (`fusion_lost`). Wheel speeds are signed: backwards is negative.
+    wheels is replaced (`accelerometer_faults`). An estimate that rolling wheels contradict for long is
+    lost and starts again from them (`consistency_reset`). Wheel speeds are signed: backwards is negative.
 
     One car runs on plain numbers, several on arrays, by the same formulas (`arithmetic`).
 
@@ -55,7 +50,10 @@ class VelocityFusion(Memory):
     """
 
     memory = ("new", "renewed", "start")
-    parts = ("screen", "longitudinal_filter", "lateral_filter", "thrust", "against", "lost", "adrift", "standing")
+    parts = (
+        "inputs", "longitudinal_filter", "lateral_filter", "acceleration_source", "slip_direction", "longitudinal_reset",
+        "lateral_reset", "zero_velocity",
+    )  # fmt: skip
     unknowns = ("start",)
 
     def __init__(
@@ -78,12 +76,12 @@ class VelocityFusion(Memory):
         self._along = longitudinal.LongitudinalFusion(self._radius, self.settings, every, count)
         self._across = lateral.LateralFusion(vehicle, self.settings, every, count)
         self.longitudinal_filter, self.lateral_filter = self._along.filter, self._across.filter
-        self.screen = FusionScreen(self._radius, self.settings, count)
-        self.thrust = FusionThrust(vehicle, self._along, count)
-        self.against = FusionAgainst(self._along, count)
-        self.lost = FusionLost(self.settings, count)
-        self.adrift = FusionAdrift(self.settings, self._across, count)
-        self.standing = FusionStanding(self.settings, self._along, self._across, count)
+        self.inputs = FusionInputs(self._radius, self.settings, count)
+        self.acceleration_source = AccelerationSource(vehicle, self._along, count)
+        self.slip_direction = SlipDirectionTest(self._along, count)
+        self.longitudinal_reset = LongitudinalReset(self.settings, count)
+        self.lateral_reset = LateralReset(self.settings, self._across, count)
+        self.zero_velocity = ZeroVelocityDetector(self.settings, self._along, self._across, count)
         self.new: Number = kit.full(True)  # waits for a first wheel speed
         self.renewed: Number = kit.full(False)
         self.start: Signals = kit.stacked([kit.full(math.nan)] * 2)  # V_x, V_y asked for by `reset`
@@ -122,45 +120,49 @@ class VelocityFusion(Memory):
         named = ((ax, "ax"), (ay, "ay"), (yaw_rate, "yaw_rate"))
         inertial = kit.stacked([kit.car(value, shape, name) for value, name in named])
         dt, odd = self._elapsed(elapsed)
-        seen = self.screen(inertial, wheels, turned, dt)
+        seen = self.inputs(inertial, wheels, turned, dt)
         self._begin(seen)
         a, b, r = seen.inertial
         given = None if normalised_force is None else kit.wheels(normalised_force, shape, "normalised_force")
-        disproved = self.against.left > 0.0
-        pull = self.thrust(dt, seen, given, self.screen.slope, disproved)
+        disproved = self.slip_direction.left > 0.0
+        pull = self.acceleration_source(dt, seen, given, self.inputs.slope, disproved)
         a, noise, doubt, blind, unbelieved, mu = pull
         turn, before = across.yaw_rate(r), along.speed
         along.predict(dt, a, noise, turn, across.speed, doubt > 0.0)
         across.predict(dt, b, seen.noise[1], r, seen.noise[2], before)
-        swing, left, own = self.screen.swing, across.speed, along.acceleration(a) + turn * across.speed
+        yaw_acceleration, left, own = (
+            self.inputs.yaw_acceleration,
+            across.speed,
+            along.acceleration(a) + turn * across.speed,
+        )
 
         def moves(angle: Number, x: Number, y: Number) -> tuple[Number, ...]:
             sine, cosine = kit.sin(angle), kit.cos(angle)
-            return cosine, (left + turn * x) * sine - turn * y * cosine, own - swing * y, sine
+            return cosine, (left + turn * x) * sine - turn * y * cosine, own - yaw_acceleration * y, sine
 
         *course, sine = kit.each(moves, seen.steer, *self._places)
-        slipping = self.screen.slipping(course[2], seen.fresh, dt, doubt)
-        wheel = along.correct(dt, seen, slipping, mu, b / GRAVITY, longitudinal.WheelCourse(*course), blind)
-        self.against(dt, seen, wheel.innovation, mu)
-        standing, lost = self.standing(seen, a, turn, dt)
-        lost = lost | self.lost(dt, standing, seen, wheel, slipping, mu, self._radius)
+        slipping = self.inputs.slipping(course[2], seen.fresh, dt, doubt)
+        wheel = along.correct(dt, seen, slipping, mu, b / GRAVITY, longitudinal.WheelMotion(*course), blind)
+        self.slip_direction(dt, seen, wheel.innovation, mu)
+        standing, lost = self.zero_velocity(seen, a, turn, dt)
+        lost = lost | self.longitudinal_reset(dt, standing, seen, wheel, slipping, mu, self._radius)
         along.stand(standing)
         front = slipping[0] | slipping[1] | wheel.gated[0] | wheel.gated[1]
         rear = slipping[2] | slipping[3] | wheel.gated[2] | wheel.gated[3]
         usable = kit.stacked((seen.present & seen.steered & kit.no(front), seen.present & kit.no(rear)))
         fl, fr, rl, rr = seen.steer
         angles = kit.stacked((0.5 * (fl + fr), 0.5 * (rl + rr)))
-        axle = across.correct(dt, b, r, swing, angles, along.speed, a, usable)
-        adrift = self.adrift(dt, along.speed, axle, usable)
+        axle = across.correct(dt, b, r, yaw_acceleration, angles, along.speed, a, usable)
+        restarted = self.lateral_reset(dt, along.speed, axle, usable)
         across.blind(dt, seen.blind)
         across.stand(standing, r)
         flags = seen.flags | kit.where(odd, _MISSING_INPUT, 0) | kit.where(unbelieved, _GATED, 0)
-        flags = flags | kit.where(self.renewed | adrift, _RESET, 0)
+        flags = flags | kit.where(self.renewed | restarted, _RESET, 0)
         self.renewed = self._never
         self._guard(seen, lost)
-        judged = Judged(slipping, wheel, axle, standing, self.standing.stopped(seen.silent))
+        outcome = Outcome(slipping, wheel, axle, standing, self.zero_velocity.stopped(seen.silent))
         geometry = (sine, course[0], *self._places)
-        return reported(kit, shape, along, across, seen, geometry, judged, flags)
+        return fusion_step(kit, shape, along, across, seen, geometry, outcome, flags)
 
     def reset(self, where: npt.ArrayLike | None = None, vx: npt.ArrayLike = np.nan, vy: npt.ArrayLike = 0.0) -> None:
         """Forgets the entries `where` (mask of the batch shape; None: all) and starts them at `vx`, `vy`, m/s.
@@ -177,11 +179,6 @@ class VelocityFusion(Memory):
         self.start = self._kit.stacked(start)
         self._forget(chosen)
 
-    def _take(self, saved: Mapping[str, AnyArray]) -> None:
-        super()._take(saved)
-        self.start = kept_signals(saved["start"], self._count == 1)
-        self.new, self.renewed = (self._kit.own(saved[name].copy()) for name in ("new", "renewed"))
-
     def _elapsed(self, elapsed: npt.ArrayLike | None) -> tuple[Number, Number]:
         """Seconds, and where they were unusable and replaced by the sample time."""
         if elapsed is None:
@@ -190,7 +187,7 @@ class VelocityFusion(Memory):
         odd = self._kit.no((given > 0.0) & (given < 1e6))
         return self._kit.where(odd, self._usual, given), odd
 
-    def _begin(self, seen: Screened) -> None:
+    def _begin(self, seen: ConditionedInputs) -> None:
         """Cars that wait start from the middle of the wheel speeds, or from what `reset` asked for."""
         kit, choose = self._kit, self._kit.where
         if not kit.some(self.new):
@@ -206,7 +203,7 @@ class VelocityFusion(Memory):
         self.lateral_filter.renew(self.new, beside, unsure * unsure)
         self.new = blind
 
-    def _middle(self, seen: Screened) -> Number:
+    def _middle(self, seen: ConditionedInputs) -> Number:
         """Median surface speed of the fresh wheels, m/s: one that stands or spins alone does not count; 0 without any."""
         surfaces = [R * w for R, w in zip(self._radius, seen.wheel_speed, strict=True)]
         known = np.where(np.array(seen.fresh), np.array(surfaces), math.nan).reshape(4, -1)
@@ -214,11 +211,13 @@ class VelocityFusion(Memory):
         return middle.item() if self._count == 1 else middle
 
     def _forget(self, where: Number) -> None:
-        for part in (self.screen, self.thrust, self.against, self.lost, self.adrift, self.standing):
-            part.forget(where)
+        for name in self.parts:
+            part = getattr(self, name)
+            if isinstance(part, CarsMemory):
+                part.forget(where)
         self.new, self.renewed = self.new | where, self.renewed | where
 
-    def _guard(self, seen: Screened, lost: Number) -> None:
+    def _guard(self, seen: ConditionedInputs, lost: Number) -> None:
         """An estimate that is lost starts again at the next step, from the wheels; until then it is their middle."""
         kit, choose = self._kit, self._kit.where
         lost = lost | kit.no(abs(self._along.speed) + abs(self._across.speed) < _FASTEST)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
+from estimators.arguments import positive_fields
 from estimators.errors import EstimatorError
 
 
@@ -86,14 +86,7 @@ class FusionSettings:
     still_yaw_rate: float = 0.02  # rad/s
 
     def __post_init__(self) -> None:
-        bad = []
-        for entry in fields(self):
-            value = getattr(self, entry.name)
-            number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-            if not number or value <= 0:
-                bad.append(f"{entry.name} = {value!r}")
-        if bad:
-            raise EstimatorError(f"fusion settings must be finite numbers above zero: {', '.join(bad)}")
+        positive_fields(self, "fusion settings")
         if self.wrong_way_gate < self.gate:
             raise EstimatorError(
                 f"wrong_way_gate = {self.wrong_way_gate:g} is below gate = {self.gate:g}: slip never points against the "

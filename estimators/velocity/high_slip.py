@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import batch, entries, mask
 from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.signals.checks import batch, entries, mask
-from estimators.signals.memory import Memory
+from estimators.memory import Memory
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import any_missing, batch, entries, mask, setting
 from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.faults import Flag, raise_flag
 from estimators.filters import KalmanFilter
 from estimators.filters.step import broadcast
-from estimators.signals.checks import any_missing, batch, entries, mask, setting
-from estimators.signals.renewable import Renewable
+from estimators.memory import Renewable
 
 _LARGEST_SPREAD = 30.0  # m/s of standard deviation: more is no knowledge of a car's velocity
 

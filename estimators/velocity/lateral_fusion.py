@@ -19,9 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimators.arithmetic import Number, Signals, arithmetic
 from estimators.signals import limits
 from estimators.vehicle import GRAVITY, VehicleParameters
-from estimators.velocity.arithmetic import Number, Signals, arithmetic
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.speed_filter_few import speed_filter
 
@@ -32,7 +32,7 @@ _SEEN = tuple((SPEED, BIAS, YAW_BIAS, SCALE, TURN_SCALE, TIRES + 2 * axle, TIRES
 _STILL = ((SPEED, TURN_SCALE), (YAW_BIAS, TURN_SCALE))
 
 
-class AxleVerdict(NamedTuple):
+class AxleUpdate(NamedTuple):
     """What became of the two axle conditions (front, rear)."""
 
     innovation: Signals  # m/s
@@ -101,11 +101,11 @@ class LateralFusion:
         speed: Number,
         acceleration: Number,
         usable: Signals,
-    ) -> AxleVerdict:
+    ) -> AxleUpdate:
         """`steer` of the axles, rad; `acceleration` a_x, for the loads; `usable`: the tires of the axle do not slip."""
         s, x, kit = self.settings, self.filter.mean, self.kit
         largest, smallest = kit.maximum, kit.minimum
-        pace, turn, left = abs(speed), self.yaw_rate(yaw_rate), x[SPEED]
+        magnitude, turn, left = abs(speed), self.yaw_rate(yaw_rate), x[SPEED]
         own = measured * (1.0 - x[SCALE]) - x[BIAS]
         held = largest(1.0, 2.0 * s.side_error_memory / elapsed)
         sensed, one, gate = self._sensor * yaw_rate, kit.full(1.0), s.gate**2
@@ -125,13 +125,13 @@ class LateralFusion:
             mu = (share * own + spin * yaw_acceleration) / load
             mu = largest(smallest(mu, limits.FRICTION), -limits.FRICTION)
             square = mu * mu
-            side, linear = (c1 + c3 * square) * mu, pace * mu
-            innovation = speed * kit.tan(angle) - left - arm * turn - pace * side
-            steep = -pace * (c1 + 3.0 * c3 * square) * share / load
-            blur = pace * (s.side_floor + s.side_linear * abs(side)) + s.slip_speed
+            side, linear = (c1 + c3 * square) * mu, magnitude * mu
+            innovation = speed * kit.tan(angle) - left - arm * turn - magnitude * side
+            steep = -magnitude * (c1 + 3.0 * c3 * square) * share / load
+            sigma = magnitude * (s.side_floor + s.side_linear * abs(side)) + s.slip_speed
             white = turn_noise + speed * speed * steering_noise
             values = (one, steep, -arm * one, steep * measured, -arm * sensed, linear, linear * square)
-            return innovation, mu, blur * blur, white, *values
+            return innovation, mu, sigma * sigma, white, *values
 
         innovation, mu, model, white, *values = kit.each(predicted, steer, x[TIRES::2], x[TIRES + 1 :: 2], *self._axles)
 
@@ -144,7 +144,7 @@ class LateralFusion:
         explained = self.filter.expect(_SEEN, values)
         used, variance, excited = kit.each(judged, explained, innovation, model, white, values[5], usable)
         self.filter.weigh(innovation, variance, used)
-        return AxleVerdict(innovation, used, mu, excited[0] | excited[1])
+        return AxleUpdate(innovation, used, mu, excited[0] | excited[1])
 
     def blind(self, elapsed: Number, where: Number) -> None:
         """V_y near zero for the cars `where` that have no lateral motion sensor: nothing else is known."""

@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimators.arithmetic import Number, Signals, arithmetic
 from estimators.vehicle import GRAVITY
-from estimators.velocity.arithmetic import Number, Signals, arithmetic
-from estimators.velocity.fusion_screen import Screened
+from estimators.velocity.fusion_inputs import ConditionedInputs
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.speed_filter_few import speed_filter
 
@@ -30,7 +30,7 @@ _STILL = ((SPEED,),)
 _SEEN = tuple((SPEED, SLIP, RADIUS + wheel) for wheel in range(4))
 
 
-class WheelVerdict(NamedTuple):
+class WheelUpdate(NamedTuple):
     """What became of the four wheels of a sample."""
 
     innovation: Signals  # m/s, R w - prediction
@@ -38,7 +38,7 @@ class WheelVerdict(NamedTuple):
     gated: Signals  # present, but further from the estimate than its model explains
 
 
-class WheelCourse(NamedTuple):
+class WheelMotion(NamedTuple):
     """How the four wheels move: v_xt = along V_x + shift."""
 
     along: Signals
@@ -79,30 +79,30 @@ class LongitudinalFusion:
 
         A reading that is `doubted` teaches nothing about the sensor, nor about the road.
         """
-        blur, teaching, pull = elapsed * noise, elapsed, measured
+        sigma, teaching, pull = elapsed * noise, elapsed, measured
         if self.kit.some(doubted):
             teaching = self.kit.where(doubted, 0.0, elapsed)
             pull = self.kit.where(doubted, self.acceleration(measured), measured)
         shift = elapsed * (pull + yaw_rate * lateral)
         coupling = (-teaching, -teaching, -teaching * measured)
-        self.filter.move(elapsed, abs(self.speed), _MOVING, coupling, shift, blur * blur)
+        self.filter.move(elapsed, abs(self.speed), _MOVING, coupling, shift, sigma * sigma)
 
     def correct(
         self,
         elapsed: Number,
-        seen: Screened,
+        seen: ConditionedInputs,
         slipping: Signals,
         mu: Signals,
         across: Number,
-        course: WheelCourse,
+        course: WheelMotion,
         blind: Number,
-    ) -> WheelVerdict:
+    ) -> WheelUpdate:
         """`mu` F_x/F_z of the wheels; `across`: friction used sideways; `blind`: mu may be that of any braking car."""
         s, x, kit = self.settings, self.filter.mean, self.kit
         choose, largest = kit.where, kit.maximum
         speed, compliance = x[SPEED], x[SLIP]
-        pace, way = abs(speed), kit.sign(speed)
-        per_speed = s.tooth_pitch / largest(pace, s.dead_speed)
+        magnitude, way = abs(speed), kit.sign(speed)
+        per_speed = s.tooth_pitch / largest(magnitude, s.dead_speed)
         held = largest(1.0, 2.0 * s.error_memory / elapsed)
         wrong_way, gate, freely = s.wrong_way_gate**2, s.gate**2, s.free_rolling
         hidden = choose(blind, s.unseen_acceleration / GRAVITY, 0.0)
@@ -118,13 +118,13 @@ class LongitudinalFusion:
             error: Number,
         ) -> tuple[Number, ...]:
             surface, slip, late = radius * w, compliance * force, per_speed * pull
-            innovation = surface * (1.0 + error) - gain * speed - shift - pace * slip
-            strain = largest(abs(force), hidden)
-            share = s.slip_floor + (s.slip_linear + s.slip_cubic * strain * strain) * strain
-            blur = pace * share + s.slip_speed
-            model = blur * blur + late * late  # what slip compliance and pulse ring leave unexplained
+            innovation = surface * (1.0 + error) - gain * speed - shift - magnitude * slip
+            friction = largest(abs(force), hidden)
+            share = s.slip_floor + (s.slip_linear + s.slip_cubic * friction * friction) * friction
+            sigma = magnitude * share + s.slip_speed
+            model = sigma * sigma + late * late  # what slip compliance and pulse ring leave unexplained
             model = choose(silent, largest(model, s.dead_speed**2), model)
-            return innovation, model, gain + way * slip, pace * force, -surface
+            return innovation, model, gain + way * slip, magnitude * force, -surface
 
         innovation, model, *values = kit.each(
             predicted, seen.wheel_speed, seen.silent, mu, *course, self.radius, x[RADIUS:]
@@ -143,7 +143,7 @@ class LongitudinalFusion:
         )
         learning = free[0] & free[1] & free[2] & free[3] & (across * across < freely * freely) & kit.no(blind)
         self.filter.weigh(innovation, variance, used, learning)
-        return WheelVerdict(innovation, used, gated)
+        return WheelUpdate(innovation, used, gated)
 
     def stand(self, where: Number) -> None:
         """V_x = 0 for the cars `where`: what it takes to hold them there is bias or grade."""

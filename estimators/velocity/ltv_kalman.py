@@ -8,20 +8,18 @@ In high slip friction hides the slip velocity: there q and r change to values th
 
 from __future__ import annotations
 
-import math
 from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import batch, entries, mask, quiet, setting
 from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
 from estimators.faults import Flag, raise_flag
-from estimators.filters import KalmanFilter
-from estimators.signals.checks import batch, entries, mask, quiet, setting
-from estimators.signals.renewable import Renewable
-from estimators.velocity.ltv_few import FEW, LARGEST_SPREAD, LtvFew
-from estimators.velocity.ltv_model import BristleTire, sampled
+from estimators.memory import Renewable
+from estimators.velocity.ltv_filter import LtvFilter
+from estimators.velocity.ltv_model import BristleTire
 
 NORMAL = (2.5e-3, 1e-3)
 """q in (m/s)^2 a sample and r, P2 section IV."""
@@ -80,15 +78,10 @@ class LtvKalmanObserver(Renewable):
             for name, (q, r) in (("normal", normal), ("high_slip", high_slip))
         ]
         self._noise = np.array(pairs)
-        self._entry = np.outer([0.0, 1.0, 1.0][:states], [0.0, 1.0, 1.0][:states])
         wide = setting(spread, "spread", "m/s") ** 2
         # z follows V_r within a hundredth of a metre; z' is V_r while z is unknown
         self._initial = np.diag([1e-4, wide, wide][:states])
-        self.filter: KalmanFilter | LtvFew
-        if math.prod(self.batch_shape) <= FEW:
-            self.filter = LtvFew(self._initial, self.batch_shape, tire, self.sample_time)
-        else:
-            self.filter = KalmanFilter(np.zeros((*self.batch_shape, states)), self._initial)
+        self.filter = LtvFilter(self._initial, self.batch_shape, tire, self.sample_time)
         self.seen: FloatArray = np.zeros((3, *self.batch_shape))  # last finite u, w, w'
 
     def step(
@@ -125,21 +118,9 @@ class LtvKalmanObserver(Renewable):
             raise_flag(flags, ~np.isfinite(mu), Flag.MISSING_MEASUREMENT)
         self._flag_renewed(flags)
         noise = self._noise[high.astype(np.intp)]
-        if isinstance(self.filter, LtvFew):
-            told, used = self.filter.step(self.seen, mu, noise)
-            state = self.filter.state
-            return LtvStep(state, state[..., 1], told[..., 0], told[..., 1], told[..., 2:], used, flags)
-        u, w, dw = self.seen
-        q, r = noise[..., 0], noise[..., 1]
-        C = self.tire.output(w, self.states)
-        step = self.filter.correct(mu[..., None], C, r[..., None, None])
-        A, B = sampled(self.tire, w, dw, self.sample_time, self.states)
-        self.filter.predict(A, q[..., None, None] * self._entry, B[..., None], u[..., None])
-        self._bound(self.filter)
-        gain = (A @ step.gain)[..., 0]
+        outputs, used = self.filter.step(self.seen, mu, noise)
         state = self.filter.state
-        innovation, used = step.innovation[..., 0], step.used[..., 0]
-        return LtvStep(state, state[..., 1], innovation, step.innovation_covariance[..., 0, 0], gain, used, flags)
+        return LtvStep(state, state[..., 1], outputs[..., 0], outputs[..., 1], outputs[..., 2:], used, flags)
 
     def reset(self, where: npt.ArrayLike | None = None, state: npt.ArrayLike = 0.0) -> None:
         """Sets the entries `where` (mask of the batch shape; None: all) to `state` (n,) with the initial covariance.
@@ -151,9 +132,3 @@ class LtvKalmanObserver(Renewable):
         self.filter.reset(chosen, state=np.broadcast_to(np.asarray(state, dtype=np.float64), (self.states,)))
         self.seen[:, chosen] = 0.0
         self._renew(chosen)
-
-    def _bound(self, kalman: KalmanFilter) -> None:
-        """An entry that has coasted until nothing is known keeps its estimate with the initial covariance."""
-        lost = ~(kalman.covariance[..., 1, 1] < LARGEST_SPREAD**2)
-        if lost.any():
-            kalman.reset(lost, state=kalman.state, covariance=self._initial)

@@ -10,17 +10,16 @@ decay at a (P2 sheet, section 10 item 11), where the two-state form is observabl
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
-from typing import TypeVar
+from dataclasses import dataclass
 
 import numpy as np
 
+from estimators.arguments import positive_fields
+from estimators.arithmetic import Arithmetic, ManyCars, Number
 from estimators.arrays import FloatArray
-from estimators.errors import EstimatorError
 
 _SERIES_BELOW = 0.5  # a T below which the quotients lose digits and the series has converged
 _TERMS = [(1.0 / math.factorial(n + 2), (n + 1.0) / math.factorial(n + 3)) for n in reversed(range(16))]
-Number = TypeVar("Number", float, FloatArray)
 
 
 @dataclass(frozen=True)
@@ -38,19 +37,18 @@ class BristleTire:
     radius: float = 0.33  # R_e, m: Table I (the text has 0.35)
 
     def __post_init__(self) -> None:
-        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
-        bad = [f"{name} = {value!r}" for name, value in values.items() if not (math.isfinite(value) and value > 0)]
-        if bad:
-            raise EstimatorError(f"tire constants must be finite and above zero: {', '.join(bad)}")
+        positive_fields(self, "tire constants")
+
+    def row(self, wheel_speed: Number, states: int) -> tuple[Number, float, float]:
+        """C, with a zero behind that of two states."""
+        if states == 3:
+            return self.sigma0, self.sigma2, self.sigma1
+        return self.sigma0 - self.sigma1 * (self.kappa * self.radius * abs(wheel_speed)), self.sigma1 + self.sigma2, 0.0
 
     def output(self, wheel_speed: FloatArray, states: int) -> FloatArray:
         """C (..., 1, states), normalised force per state."""
-        if states == 3:
-            return np.broadcast_to([[self.sigma0, self.sigma2, self.sigma1]], (*wheel_speed.shape, 1, 3))
-        decay = self.kappa * self.radius * np.absolute(wheel_speed)
-        C = np.empty((*wheel_speed.shape, 1, 2))
-        C[..., 0, 0], C[..., 0, 1] = self.sigma0 - self.sigma1 * decay, self.sigma1 + self.sigma2
-        return C
+        row = np.broadcast_arrays(*self.row(wheel_speed, states)[:states], wheel_speed)[:states]
+        return np.stack(row, axis=-1)[..., None, :]
 
 
 def sampled(
@@ -61,33 +59,37 @@ def sampled(
     With E = e^(-a T), p_k = int_0^T e^(-a (T - s)) s^k/k! ds:  z gains p_0 V_r + p_1 u;  z' gains, beside E z' + p_0 u,
     -a' (T E z + q_1 V_r + q_2 u) with q_k the same integral of the bristle's own response.
     """
-    direction = np.sign(wheel_speed)
-    decay = tire.kappa * tire.radius * np.absolute(wheel_speed)
-    E = np.exp(-decay * time)
-    p0, p1, q1, q2 = _integrals(decay * time)
-    p0, p1, q1, q2 = time * p0, time**2 * p1, time**2 * q1, time**3 * q2
+    kit = ManyCars(wheel_speed.shape)
+    E, p0, p1, d1, d2, b3 = sampled_entries(kit, tire, wheel_speed, wheel_acceleration, time)
     A = np.zeros((*wheel_speed.shape, states, states))
     B = np.empty((*wheel_speed.shape, states))
     A[..., 0, 0], A[..., 0, 1], A[..., 1, 1] = E, p0, 1.0
     B[..., 0], B[..., 1] = p1, time
     if states == 3:
-        rise = tire.kappa * tire.radius * direction * wheel_acceleration
-        A[..., 2, 0], A[..., 2, 1], A[..., 2, 2] = -rise * time * E, -rise * q1, E
-        B[..., 2] = p0 - rise * q2
+        A[..., 2, 0], A[..., 2, 1], A[..., 2, 2] = d1, d2, E
+        B[..., 2] = b3
     return A, B
 
 
-def integrals(x: float) -> tuple[float, float, float, float]:
+def sampled_entries(
+    kit: Arithmetic, tire: BristleTire, wheel_speed: Number, wheel_acceleration: Number, time: float
+) -> tuple[Number, Number, Number, Number, Number, Number]:
+    """A11 (= A33), A12, B1, A31, A32 and B3 of `sampled`; the others are 0, 1 and T."""
+    x = tire.kappa * tire.radius * abs(wheel_speed) * time
+    p0, p1, q1, q2 = integrals(x)
+    E, once = kit.exp(-x), time * p0
+    rise = tire.kappa * tire.radius * kit.sign(wheel_speed) * wheel_acceleration
+    return E, once, time * time * p1, -rise * time * E, -rise * time * time * q1, once - rise * time**3 * q2
+
+
+def integrals(x: Number) -> tuple[Number, Number, Number, Number]:
     """For x = a T >= 0, per unit of T:
 
     p_0 = (1 - e^-x)/x,    p_1 = (1 - p_0)/x = sum (-x)^n/(n+2)!,
     q_1 = (p_0 - e^-x)/x,    q_2 = (p_1 - q_1)/x = sum (n+1) (-x)^n/(n+3)!.
     """
-    return _series(x) if x < _SERIES_BELOW else _quotients(x, math.exp(-x), math.expm1(-x))
-
-
-def _integrals(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """`integrals` of an array."""
+    if not isinstance(x, np.ndarray):
+        return _series(x) if x < _SERIES_BELOW else _quotients(x, math.exp(-x), math.expm1(-x))
     near = x < _SERIES_BELOW
     far = np.where(near, 1.0, x)
     small, large = _series(np.where(near, x, 0.0)), _quotients(far, np.exp(-far), np.expm1(-far))

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arithmetic import Arithmetic, ManyCars, Number, Signals
 from estimators.arrays import FloatArray
 from estimators.errors import EstimatorError
 from estimators.vehicle import VehicleParameters
-from estimators.velocity.arithmetic import Arithmetic, ManyCars, Number, Signals
 from estimators.velocity.corners import CornerVectors, corner_velocity, tire_frame
 from estimators.velocity.slip import side_slip_angle, slip_ratio
 

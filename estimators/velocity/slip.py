@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arithmetic import Arithmetic, Number
 from estimators.arrays import FloatArray
-from estimators.velocity.arithmetic import Arithmetic, Number
 
 LEAST_SPEED = 0.5
 """m/s by which slips are divided at least: below, a velocity error of sensor size would read as full slip."""
@@ -40,5 +40,5 @@ def side_slip_angle(along: npt.ArrayLike, across: npt.ArrayLike, least: float = 
 
 def slips(kit: Arithmetic, surface: Number, along: Number, across: Number) -> tuple[Number, Number]:
     """`slip_ratio` and `side_slip_angle` of one wheel, of numbers or of arrays."""
-    pace = kit.maximum(abs(along), LEAST_SPEED)
-    return (surface - along) / kit.maximum(pace, abs(surface)), kit.atan(across / pace)
+    magnitude = kit.maximum(abs(along), LEAST_SPEED)
+    return (surface - along) / kit.maximum(magnitude, abs(surface)), kit.atan(across / magnitude)

@@ -21,9 +21,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from estimators.arithmetic import Number, Signals
 from estimators.arrays import FloatArray
-from estimators.signals.memory import Memory
-from estimators.velocity.arithmetic import Number, Signals
+from estimators.memory import Memory
 
 Columns = tuple[tuple[int, ...], ...]
 """Of each channel, the states that it sees: as many of each."""
@@ -95,13 +95,13 @@ class SpeedFilter(Memory):
     def move(
         self,
         elapsed: Number,
-        pace: Number,
+        magnitude: Number,
         columns: tuple[int, ...],
         coupling: tuple[Number, ...],
         shift: Number,
         noise: Number,
     ) -> None:
-        """One sample on: `elapsed` s, `pace` m/s, `coupling` a_j of the states `columns`, `shift` u, `noise` Var w_0."""
+        """One sample on: `elapsed` s, `magnitude` m/s, `coupling` a_j of the states `columns`, `shift` u, `noise` Var w_0."""
         n, x, P = self.size, self.mean, self.spread
         first, speed = P[:n].copy(), x[0] + shift
         for place, value in zip(columns, coupling, strict=True):
@@ -112,7 +112,7 @@ class SpeedFilter(Memory):
             variance = variance + value * first[place]
         first[0] = variance
         P[:n], self.mean = first, np.concatenate((speed[None], x[1:]))
-        self.waiting = self.waiting + np.stack((elapsed, elapsed * pace))
+        self.waiting = self.waiting + np.stack((elapsed, elapsed * magnitude))
         self.waited = self.waited + 1
         if self.waited >= self.every:
             self._forget()

@@ -16,13 +16,13 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import any_missing, batch, entries, mask, setting
 from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
 from estimators.faults import Flag, raise_flag
-from estimators.phi import phi
+from estimators.memory import Memory
+from estimators.phi import phi_of
 from estimators.signals import limits
-from estimators.signals.checks import any_missing, batch, entries, mask, setting
-from estimators.signals.memory import Memory
 
 
 @dataclass(frozen=True)
@@ -110,8 +110,5 @@ class SuspensionCompliance(Memory):
 def _held(stiffness: float, damping: float, mass: float, time: float) -> tuple[FloatArray, FloatArray]:
     """A_d = I + M phi(M), B_d = T phi(M) b of M = T [0 1; -k/m -c/m], b = [0, 1/m]."""
     M = time * np.array([[0.0, 1.0], [-stiffness / mass, -damping / mass]])
-    mean = 0.5 * (M[0, 0] + M[1, 1])
-    N = M - mean * np.eye(2)
-    alpha, beta = phi(mean, float(N[0, 0] ** 2 + N[0, 1] * N[1, 0]))
-    integral = alpha * np.eye(2) + beta * N
+    integral = phi_of(M)
     return np.eye(2) + M @ integral, time * integral @ np.array([0.0, 1.0 / mass])

@@ -11,22 +11,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.arguments import batch, entries, mask
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
-from estimators.faults import Flag, raise_flag
+from estimators.memory import Memory
 from estimators.schedule import GainSchedule
-from estimators.signals.checks import any_missing, batch, entries, mask, quiet
-from estimators.signals.memory import Memory
-from estimators.signals.renewable import Renewable
-from estimators.velocity.exact_update import ExactUpdate, refuse_explosive
-from estimators.velocity.exact_update_few import ExactUpdateFew
-from estimators.velocity.screening import FEW, LIMIT, MEMORY, Screen, Screened
+from estimators.velocity.lpv import TwoStateObserver
 
 HIGH_SLIP_GAIN = (0.22, 0.1)
 """L_x of P3's second mode, m/s and m/s^2."""
@@ -70,18 +65,6 @@ class SlipSwitch(Memory):
         return self.high.copy()
 
 
-class _SavedScreen(Screen, Memory):
-    """A screen that saves what it remembers."""
-
-    memory = MEMORY
-    unknowns = ("raw", "measurement")
-
-    def restore(self, saved: Mapping[str, AnyArray]) -> None:
-        """Continues from `save`."""
-        super().restore(saved)
-        self.gaps = bool(self.gap.any())
-
-
 class SwitchedStep(NamedTuple):
     """As the step of `LpvVelocityObserver`, with the mode."""
 
@@ -92,7 +75,7 @@ class SwitchedStep(NamedTuple):
     high_slip: BoolArray  # (...) mode 2
 
 
-class SwitchedVelocityObserver(Renewable):
+class SwitchedVelocityObserver(TwoStateObserver):
     """Two-state observer of every corner with two gain schedules over one plant.
 
     Args:
@@ -108,8 +91,7 @@ class SwitchedVelocityObserver(Renewable):
         ScheduleError: gains whose error grows beyond all bounds within a sample.
     """
 
-    memory = ("state", "renewed")
-    parts = ("switch", "screen")
+    parts = ("switch", "monitor")
 
     def __init__(
         self,
@@ -121,23 +103,13 @@ class SwitchedVelocityObserver(Renewable):
         stale_after: int | None = None,
     ) -> None:
         second = with_constant_gain(normal) if high_slip is None else high_slip
-        for schedule in (normal, second):
-            if (len(schedule.states), len(schedule.inputs), len(schedule.outputs)) != (2, 1, 1):
-                raise EstimatorError(f"schedule '{schedule.name}' is not for two states, one input and one output")
-            refuse_explosive(schedule)
         if second.sample_time != normal.sample_time:
             raise EstimatorError(
                 f"schedules '{normal.name}' and '{second.name}' are for sample times {normal.sample_time:g} s and "
                 f"{second.sample_time:g} s; design both for one"
             )
-        super().__init__(batch(batch_shape))
+        super().__init__((normal, second), batch_shape, stale_after=stale_after)
         self.switch = SlipSwitch(self.batch_shape, limit, hysteresis)
-        count = math.prod(self.batch_shape)
-        self._updates = (ExactUpdate(normal), ExactUpdate(second))
-        self._few = (ExactUpdateFew(normal), ExactUpdateFew(second)) if count <= FEW else None
-        self.screen = _SavedScreen(normal.parameter, normal.sample_time, count, False, stale_after)
-        self._sample = 0
-        self.state: FloatArray = np.zeros((2, count))
 
     def step(
         self, held_input: npt.ArrayLike, measurement: npt.ArrayLike, parameter: npt.ArrayLike, slip: npt.ArrayLike
@@ -147,51 +119,8 @@ class SwitchedVelocityObserver(Renewable):
         Raises:
             EstimatorError: another shape.
         """
-        named = ((held_input, "input"), (measurement, "measurement"), (parameter, "parameter"))
-        u, y, p = (entries(value, self.batch_shape, name).reshape(-1) for value, name in named)
-        high = self.switch(entries(slip, self.batch_shape, "slip")).reshape(-1)
-        seen = self.screen(u, y, p, self._sample, self.batch_shape)
-        self._sample += 1
-        innovation = self._advance(seen, high)
-        flags: FlagArray = np.zeros(p.size, dtype=np.int32) if seen.flags is None else seen.flags
-        if not quiet(self.state):
-            gone = any_missing(~(np.absolute(self.state.T) <= LIMIT), (p.size,))
-            self.state[:, gone] = 0.0
-            raise_flag(flags, gone, Flag.RESET)
-        if self._any_renewed:
-            flags = flags.reshape(self.batch_shape)
-            self._flag_renewed(flags)
-            flags = flags.reshape(-1)
-        if seen.missing is not None:
-            innovation[seen.missing] = np.nan
-        used = np.ones(p.size, dtype=np.bool_) if seen.coast is None else ~seen.coast
-        shape = self.batch_shape
-        return SwitchedStep(
-            self.state.T.reshape(*shape, 2).copy(),
-            innovation.reshape(shape),
-            used.reshape(shape),
-            flags.reshape(shape),
-            high.reshape(shape),
-        )
-
-    def _advance(self, seen: Screened, high: BoolArray) -> FloatArray:
-        """Moves `state` by one sample, each entry with the gains of its mode; returns the innovations."""
-        innovation: FloatArray = np.empty(high.size)
-        if self._few is not None:
-            masks = [False] * high.size if seen.coast is None else seen.coast.tolist()
-            columns = (seen.held_input.tolist(), seen.measurement.tolist(), seen.parameter.tolist(), masks)
-            entries = zip(high.tolist(), *self.state.tolist(), *columns, strict=True)
-            moved = [self._few[mode].advance(x1, x2, u, y, p, mask) for mode, x1, x2, u, y, p, mask in entries]
-            self.state[0], self.state[1], innovation[:] = zip(*moved, strict=True)
-            return innovation
-        for update, chosen in zip(self._updates, (~high, high), strict=True):
-            if not chosen.any():
-                continue
-            part, told = self.state[:, chosen], np.empty(int(chosen.sum()))
-            coast = None if seen.coast is None else seen.coast[chosen]
-            update.advance(part, seen.held_input[chosen], seen.measurement[chosen], seen.parameter[chosen], coast, told)
-            self.state[:, chosen], innovation[chosen] = part, told
-        return innovation
+        high = self.switch(entries(slip, self.batch_shape, "slip"))
+        return SwitchedStep(*self._step(held_input, measurement, parameter, high.reshape(-1))[:4], high)
 
     def reset(self, where: npt.ArrayLike | None = None, state: npt.ArrayLike = 0.0) -> None:
         """Sets the entries `where` (mask of the batch shape; None: all) to `state` (2,), in mode 1.
@@ -199,11 +128,5 @@ class SwitchedVelocityObserver(Renewable):
         Raises:
             EstimatorError: another shape, or a state that is not finite.
         """
-        chosen = mask(where, self.batch_shape, "where").reshape(-1)
-        value = np.broadcast_to(np.asarray(state, dtype=np.float64), (2,))
-        if not np.isfinite(value).all():
-            raise EstimatorError("state is not finite; reset to finite numbers")
-        self.state[:, chosen] = value[:, None]
-        self.screen.forget(chosen)
-        self.switch.high[chosen.reshape(self.batch_shape)] = False
-        self._renew(chosen.reshape(self.batch_shape))
+        super().reset(where, state)
+        self.switch.high[mask(where, self.batch_shape, "where")] = False

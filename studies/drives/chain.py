@@ -41,8 +41,6 @@ from studies.errors import refused_at
 Progress = Callable[[float], None]
 """Called with the fraction done."""
 PROGRESS_STEPS = 50
-WHEEL_INERTIA = 1.0
-"""kg m^2 where the drive has none: without torques it has nothing to act on."""
 
 
 @dataclass(frozen=True)
@@ -68,26 +66,6 @@ class Chain:
     assumptions: tuple[str, ...]
 
 
-def vehicle_of(drive: DriveFile) -> tuple[VehicleParameters, tuple[str, ...]]:
-    """The car of the drive file for the estimators, and what had to be assumed of it."""
-    car, assumptions = drive.vehicle, []
-    if car.yaw_inertia is None:
-        assumptions.append("yaw inertia is not given: taken as m L_f L_r")
-    vehicle = VehicleParameters(
-        mass=car.mass,
-        yaw_inertia=car.yaw_inertia or car.mass * car.front_axle_to_cg * car.rear_axle_to_cg,
-        wheel_inertia=car.wheel_inertia or WHEEL_INERTIA,
-        front_axle_distance=car.front_axle_to_cg,
-        rear_axle_distance=car.rear_axle_to_cg,
-        cg_height=car.cg_height,
-        front_track=car.track_front,
-        rear_track=car.track_rear,
-        effective_radius=(car.effective_radius_front, car.effective_radius_rear),
-        rolling_resistance=car.rolling_resistance,
-    )
-    return vehicle, tuple(assumptions)
-
-
 @refused_at("estimators")
 def pipeline_of(
     drive: DriveFile, longitudinal: GainSchedule | CornerKind, lateral: GainSchedule | None = None
@@ -98,7 +76,8 @@ def pipeline_of(
 
     Raises SpecError, one line, on vehicle data that no car has.
     """
-    vehicle, assumptions = vehicle_of(drive)
+    vehicle, car = drive.vehicle.parameters, drive.vehicle
+    assumptions = () if car.yaw_inertia else ("yaw inertia is not given: taken as m L_f L_r",)
     time, chosen = drive.sample_time, drive.estimators
     forces: dict[str, Callable[..., Any]] = {
         "unknown-input": UnknownInputForceObserver,

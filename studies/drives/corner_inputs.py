@@ -10,8 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-GRAVITY = 9.80665
-"""Standard acceleration of free fall, m/s^2: what a level accelerometer reads upwards at rest."""
 LEAST_LOAD = 0.05
 """Share of the static load below which a wheel counts as lifted and its normalised force as unknown."""
 
@@ -31,37 +29,6 @@ def derivative(value: Array, sample_time: float, lag: float) -> Array:
         last = new if np.isnan(last) else a * last + (1.0 - a) * new
         out[k] = last
     return out
-
-
-def vertical_loads(
-    ax: Array,
-    ay: Array,
-    mass: float,
-    front_axle_to_cg: float,
-    rear_axle_to_cg: float,
-    cg_height: float,
-    track_front: float,
-    track_rear: float,
-) -> Array:
-    """Quasi-static wheel loads (n, 4), N, from accelerations (n,), m/s^2, of a level car: P1 (14)-(17) at zero angles.
-
-    Fz_f = m (L_r g - h a_x)/L,  Fz_r = m (L_f g + h a_x)/L,  Fz_iL,R = Fz_i (1/2 -+ h a_y/(g T_i)),  L = L_f + L_r.
-    Leaves out roll and pitch dynamics (their overshoot, about 0.1 to 0.3 s after a step) and road grade.
-    """
-    base = front_axle_to_cg + rear_axle_to_cg
-    front = mass / base * (rear_axle_to_cg * GRAVITY - cg_height * ax)
-    rear = mass / base * (front_axle_to_cg * GRAVITY + cg_height * ax)
-    shift_front = cg_height * ay / (GRAVITY * track_front)
-    shift_rear = cg_height * ay / (GRAVITY * track_rear)
-    return np.stack(
-        [
-            front * (0.5 - shift_front),
-            front * (0.5 + shift_front),
-            rear * (0.5 - shift_rear),
-            rear * (0.5 + shift_rear),
-        ],
-        axis=-1,
-    )
 
 
 def wheel_forces(
@@ -104,38 +71,3 @@ def normalised_forces(force: Array, vertical_load: Array, static_load: float) ->
     """mu = F_x/F_z (n, 4), P1 (13); NaN where a wheel carries less than 5 % of ``static_load``, N."""
     lifted = vertical_load < LEAST_LOAD * static_load
     return np.where(lifted, np.nan, force / np.where(lifted, 1.0, vertical_load))
-
-
-def corner_positions(
-    front_axle_to_cg: float, rear_axle_to_cg: float, track_front: float, track_rear: float
-) -> tuple[Array, Array]:
-    """x_c and y_c (4,) of the wheel centres from the centre of gravity, m: x_f = L_f, x_r = -L_r, y_L = +T/2."""
-    x = np.array([front_axle_to_cg, front_axle_to_cg, -rear_axle_to_cg, -rear_axle_to_cg])
-    y = np.array([track_front, -track_front, track_rear, -track_rear]) / 2
-    return x, y
-
-
-def corner_acceleration(
-    ax: Array,
-    ay: Array,
-    yaw_rate: Array,
-    yaw_acceleration: Array,
-    vy: Array,
-    steer: Array,
-    steer_rate: Array,
-    x: Array,
-    y: Array,
-) -> tuple[Array, Array]:
-    """Acceleration of the wheel centres along the tyre's x axis, m/s^2, as (n, 4) arrays p, q of p + q V_x.
-
-    P1 section 6 with the steering-rate term: d(v_xt)/dt = v'_xc cos d + v'_yc sin d + d' v_yt,
-    v'_xc = a_x + r V_y - r' y_c,  v'_yc = a_y - r V_x + r' x_c,  v_yt = -(V_x - r y_c) sin d + (V_y + r x_c) cos d.
-    The only unknown in it is V_x, which the observers estimate: hence the split. Accelerations are those of the
-    centre of gravity, without gravity; ``steer``, ``steer_rate`` (n, 4), the rest (n,); V_y is 0 where nobody knows it.
-    """
-    r, dr, v = yaw_rate[:, None], yaw_acceleration[:, None], vy[:, None]
-    sine, cosine = np.sin(steer), np.cos(steer)
-    along = ax[:, None] + r * v - dr * y
-    across = ay[:, None] + dr * x
-    free = along * cosine + across * sine + steer_rate * (r * y * sine + (v + r * x) * cosine)
-    return free, -(r + steer_rate) * sine

@@ -8,12 +8,14 @@ the observers run with. Every quantity carries its unit; nothing is guessed from
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from estimators.errors import unknown
+from estimators.vehicle import VehicleParameters
 from studies.drives.quantities import (
     CORNERS,
     REFERENCES,
@@ -30,6 +32,9 @@ from studies.drives.quantities import (
     factor_to,
 )
 from synthesis.toml_file import StrictTable, load_toml
+
+WHEEL_INERTIA = 1.0
+"""kg m^2 where the drive has none: without torques it has nothing to act on."""
 
 
 def _a_time(unit: str) -> str:
@@ -85,11 +90,11 @@ class Vehicle(StrictTable):
     """Rigid-body and wheel data, SI. Lengths are to the centre of gravity; tracks are wheel centre to wheel centre."""
 
     mass: Mass = Field(examples=["1600 kg"])
-    front_axle_to_cg: Length = Field(examples=["1.4 m"])
-    rear_axle_to_cg: Length = Field(examples=["1.5 m"])
+    front_axle_distance: Length = Field(examples=["1.4 m"])
+    rear_axle_distance: Length = Field(examples=["1.5 m"])
     cg_height: Length = Field(examples=["0.55 m"])
-    track_front: Length = Field(examples=["1.6 m"])
-    track_rear: Length = Field(examples=["1.6 m"])
+    front_track: Length = Field(examples=["1.6 m"])
+    rear_track: Length = Field(examples=["1.6 m"])
     effective_radius_front: Length = Field(examples=["0.34 m"])
     effective_radius_rear: Length = Field(examples=["0.34 m"])
     wheel_inertia: Inertia | None = None
@@ -99,6 +104,27 @@ class Vehicle(StrictTable):
     cornering_stiffness_front: Stiffness | None = None  # of the axle, both wheels
     cornering_stiffness_rear: Stiffness | None = None
     relaxation_length: Length | None = None
+
+    @cached_property
+    def parameters(self) -> VehicleParameters:
+        """The car as the estimators know it; yaw inertia m L_f L_r and wheel inertia 1 kg m^2 where not given."""
+        return VehicleParameters(
+            mass=self.mass,
+            yaw_inertia=self.yaw_inertia or self.mass * self.front_axle_distance * self.rear_axle_distance,
+            wheel_inertia=self.wheel_inertia or WHEEL_INERTIA,
+            front_axle_distance=self.front_axle_distance,
+            rear_axle_distance=self.rear_axle_distance,
+            cg_height=self.cg_height,
+            front_track=self.front_track,
+            rear_track=self.rear_track,
+            effective_radius=(self.effective_radius_front, self.effective_radius_rear),
+            rolling_resistance=self.rolling_resistance,
+        )
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        _ = self.parameters
+        return self
 
 
 class Observer(StrictTable):

@@ -12,10 +12,12 @@ import numpy as np
 
 from estimators import Flag, GainSchedule
 from estimators.arrays import FloatArray, IntArray
+from estimators.forces import vertical_loads
 from estimators.pipeline import Check
+from estimators.velocity import slip_ratio
 from studies.drives.baselines import held, integrated_acceleration, mean_over
 from studies.drives.chain import Chain
-from studies.drives.corner_inputs import shared_forces, vertical_loads
+from studies.drives.corner_inputs import shared_forces
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.prepare import CornerInputs
@@ -111,7 +113,7 @@ def reference_sideslip(log: DriveLog) -> FloatArray:
 
 def quasi_static_axle_forces(log: DriveLog, drive: DriveFile) -> FloatArray:
     """F_y of each axle (n, 2), N, of a car that does not yaw: the share of m a_y that its distance from the CG gives it."""
-    front, rear = drive.vehicle.front_axle_to_cg, drive.vehicle.rear_axle_to_cg
+    front, rear = drive.vehicle.front_axle_distance, drive.vehicle.rear_axle_distance
     ay = log.signals.get("ay", np.zeros_like(log.time))
     return np.outer(drive.vehicle.mass * ay, np.array([rear, front]) / (front + rear))
 
@@ -141,9 +143,7 @@ def forces(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: DriveFile) 
     """F_x and F_z of each corner, F_y of each axle, and the total F_x against m a_x; quasi-static ones always beside."""
     reference, found, car = log.reference, {}, drive.vehicle
     ax, ay = log.signals["ax"], log.signals.get("ay", np.zeros_like(log.time))
-    quasi_z = vertical_loads(
-        ax, ay, car.mass, car.front_axle_to_cg, car.rear_axle_to_cg, car.cg_height, car.track_front, car.track_rear
-    )
+    quasi_z = vertical_loads(car.parameters, ax, ay)
     none = np.zeros(4, dtype=np.bool_)
     quasi_x = shared_forces(ax, quasi_z, car.mass, np.zeros_like(quasi_z), none)
     for k, corner in enumerate(CORNERS):
@@ -222,14 +222,13 @@ class DriveData:
 
 def _slip_at(inputs: CornerInputs, velocity: FloatArray) -> FloatArray:
     gain, shift = centre_map(inputs)
-    return slip_ratio(inputs.surface_speed, (velocity[:, None] - shift) / gain)
+    return moving_slip(inputs.surface_speed, (velocity[:, None] - shift) / gain)
 
 
-def slip_ratio(surface_speed: FloatArray, wheel_velocity: FloatArray) -> FloatArray:
-    """lambda = (R_e w - v_xt)/max(|R_e w|, |v_xt|), P1 section 1; NaN below 2 m/s. Positive when driving."""
-    size = np.maximum(np.abs(surface_speed), np.abs(wheel_velocity))
-    slow = ~(size >= LEAST_SPEED)
-    return np.where(slow, np.nan, (surface_speed - wheel_velocity) / np.where(slow, 1.0, size))
+def moving_slip(surface_speed: FloatArray, wheel_velocity: FloatArray) -> FloatArray:
+    """`slip_ratio`, NaN below 2 m/s."""
+    moves = np.maximum(np.abs(surface_speed), np.abs(wheel_velocity)) >= LEAST_SPEED
+    return np.where(moves, slip_ratio(surface_speed, wheel_velocity), np.nan)
 
 
 def evaluate(data: DriveData) -> dict[str, Any]:

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimators.arrays import FloatArray
+from estimators.forces import vertical_loads
+from estimators.vehicle import GRAVITY
+from estimators.velocity import corner_acceleration_by_speed
 from studies.drives import corner_inputs
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
@@ -66,13 +69,11 @@ def corner_inputs_of(log: DriveLog, drive: DriveFile) -> CornerInputs:
     yaw_rate, vy = measured("yaw_rate", "yaw rate"), measured("vy", "lateral velocity")
     steer = _steer(log, drive, assumptions)
     wheel_acceleration = rate(wheel_speed)
-    geometry = (car.front_axle_to_cg, car.rear_axle_to_cg, car.track_front, car.track_rear)
-    load = corner_inputs.vertical_loads(
-        ax, ay, car.mass, car.front_axle_to_cg, car.rear_axle_to_cg, car.cg_height, car.track_front, car.track_rear
-    )
+    load = vertical_loads(car.parameters, ax, ay)
     force, sources = _forces(log, drive, wheel_speed, wheel_acceleration, load, radius)
-    x, y = corner_inputs.corner_positions(*geometry)
-    free, per_speed = corner_inputs.corner_acceleration(ax, ay, yaw_rate, rate(yaw_rate), vy, steer, rate(steer), x, y)
+    free, per_speed = corner_acceleration_by_speed(
+        car.parameters, ax, ay, yaw_rate, rate(yaw_rate), vy, steer, rate(steer)
+    )
     return CornerInputs(
         time=log.time,
         wheel_speed=wheel_speed,
@@ -80,7 +81,7 @@ def corner_inputs_of(log: DriveLog, drive: DriveFile) -> CornerInputs:
         wheel_acceleration=wheel_acceleration,
         vertical_load=load,
         force=force,
-        normalised_force=corner_inputs.normalised_forces(force, load, car.mass * corner_inputs.GRAVITY / 4),
+        normalised_force=corner_inputs.normalised_forces(force, load, car.mass * GRAVITY / 4),
         free=free,
         per_speed=per_speed,
         steer=steer,
@@ -88,8 +89,8 @@ def corner_inputs_of(log: DriveLog, drive: DriveFile) -> CornerInputs:
         ax=ax,
         ay=ay,
         vy=vy,
-        x=x,
-        y=y,
+        x=car.parameters.corner_x,
+        y=car.parameters.corner_y,
         force_sources=sources,
         assumptions=tuple(assumptions),
     )

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arithmetic import ManyCars, OneCar
 from estimators.pipeline import CornerSample
 from estimators.pipeline.corner_kinds import CornerKind
 from estimators.velocity import slip_ratio
+from estimators.velocity.mapping import weighed
 from studies.drives.baselines import held, mean_over
 from studies.drives.prepare import CornerInputs
 
@@ -73,8 +75,6 @@ def centre_map(inputs: CornerInputs) -> tuple[Array, Array]:
 
 def cg_velocity(corner: Array) -> Array:
     """V_x (...,) from the corners (..., 4): axles weigh 0.5 each, wheels of an axle alike, missing ones left out."""
-    if np.isfinite(corner).all():
-        return np.asarray(corner.mean(axis=-1))
-    rows = corner.reshape(-1, 4)
-    axles = np.stack([mean_over(rows[:, :2]), mean_over(rows[:, 2:])], axis=-1)
-    return mean_over(axles).reshape(corner.shape[:-1])
+    if corner.ndim == 1:
+        return np.asarray(weighed(OneCar(), corner.tolist(), 0.5)[0])
+    return np.asarray(weighed(ManyCars(corner.shape[:-1]), np.moveaxis(corner, -1, 0), 0.5)[0])

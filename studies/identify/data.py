@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
-from studies.drives.corner_inputs import GRAVITY
+from estimators.vehicle import GRAVITY
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.prepare import CornerInputs, corner_inputs_of

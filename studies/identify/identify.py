@@ -122,4 +122,4 @@ def _lateral_needs(data: DriveSignals, base: ParameterSet) -> dict[str, bool]:
 def yaw_inertia_prior(drive: DriveFile) -> float:
     """Of the drive file if it has one, else m L_f L_r, kg m^2: a dynamic index of one, cars lie between 0.8 and 1.1."""
     car = drive.vehicle
-    return car.yaw_inertia or car.mass * car.front_axle_to_cg * car.rear_axle_to_cg
+    return car.yaw_inertia or car.mass * car.front_axle_distance * car.rear_axle_distance

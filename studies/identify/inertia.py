@@ -19,6 +19,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
+from estimators.vehicle import GRAVITY
 from studies.identify.data import DriveSignals
 from studies.identify.estimate import Estimate, Rules, Unknown, estimate
 from studies.identify.settings import IdentifySettings
@@ -40,7 +41,7 @@ def fit_inertia(data: DriveSignals, prior: float, settings: IdentifySettings) ->
     spin = rate(np.sum(data.inputs.wheel_speed / radius, axis=1)) / mass
     drag = smooth(data.vx * np.abs(data.vx)) / mass
     felt = smooth(data.inputs.ax)
-    weight = car.rolling_resistance * 9.80665
+    weight = car.rolling_resistance * GRAVITY
 
     def balance(p: Mapping[str, float]) -> FloatArray:
         rest = p["torque_scale"] * (pull - p["torque_delay"] * late) - felt - p["wheel_inertia"] * spin

@@ -51,7 +51,7 @@ class LateralSlip:
             Unknown("axle_ratio", 0.0, axle, axle, (-1.0, 1.0), positive=False),
         )
         car, inputs = data.drive.vehicle, data.inputs
-        self.axles = np.array([car.front_axle_to_cg, car.rear_axle_to_cg])
+        self.axles = np.array([car.front_axle_distance, car.rear_axle_distance])
         base = self.axles.sum()
         steer = inputs.steer[:, :2].mean(axis=1)
         sine, cosine = np.sin(steer), np.cos(steer)

@@ -12,7 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
-from studies.drives.corner_inputs import GRAVITY, shared_forces, wheel_forces
+from estimators.vehicle import GRAVITY
+from studies.drives.corner_inputs import shared_forces, wheel_forces
 from studies.identify.bristle import slip_velocity, tire_unknowns
 from studies.identify.data import DriveSignals
 from studies.identify.estimate import Unknown
@@ -67,7 +68,9 @@ class LongitudinalSlip:
         self.viscous = tire.sigma2.value * (self.surface - self.along)
         self.mu = self.force / load - self.viscous
         car, g = data.drive.vehicle, GRAVITY
-        ends = np.array([car.rear_axle_to_cg, car.front_axle_to_cg]) / (car.front_axle_to_cg + car.rear_axle_to_cg)
+        ends = np.array([car.rear_axle_distance, car.front_axle_distance]) / (
+            car.front_axle_distance + car.rear_axle_distance
+        )
         self._static = np.repeat(ends * car.mass * g / 2, 2)
         self._least = 0.05 * car.mass * g / 4
         self.share = load / load.sum(axis=1, keepdims=True)

@@ -23,12 +23,12 @@ def parameter_file(found: Identification) -> str:
     front, rear = fitted["effective_radius_front"], fitted["effective_radius_rear"]
     given = {
         "mass": (car.mass, "kg"),
-        "wheel_base": (car.front_axle_to_cg + car.rear_axle_to_cg, "m"),
-        "front_axle_distance": (car.front_axle_to_cg, "m"),
-        "rear_axle_distance": (car.rear_axle_to_cg, "m"),
+        "wheel_base": (car.front_axle_distance + car.rear_axle_distance, "m"),
+        "front_axle_distance": (car.front_axle_distance, "m"),
+        "rear_axle_distance": (car.rear_axle_distance, "m"),
         "cg_height": (car.cg_height, "m"),
-        "front_track": (car.track_front, "m"),
-        "rear_track": (car.track_rear, "m"),
+        "front_track": (car.front_track, "m"),
+        "rear_track": (car.rear_track, "m"),
     }
     how = front.source if front.source == rear.source else f"front: {front.source}; rear: {rear.source}"
     lines = [

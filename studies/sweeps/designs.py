@@ -11,11 +11,11 @@ from pydantic import Field
 
 from analysis.errors import AnalysisError
 from analysis.sensitivity_designs import power_of_two
+from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from studies.sweeps.skip_ahead import BITS, latin_points, sobol_points
 from studies.sweeps.vary import Varied
 from synthesis.errors import SpecError
-from synthesis.polynomials.matrix import FloatArray
 from synthesis.toml_file import StrictTable
 
 Indices = NDArray[np.int64]

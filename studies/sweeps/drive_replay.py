@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.planar_exponential import planar_phi
+from estimators.arrays import FloatArray
 from studies.drives.baselines import held, mean_over
 from studies.drives.drive_file import read_drive
 from studies.drives.log import read_log
@@ -19,7 +20,6 @@ from studies.sweeps.plant import Grid
 from studies.sweeps.subject import Batch, Subject
 from studies.trials.accuracy import nrms as nrms_of_runs
 from synthesis.errors import SpecError
-from synthesis.polynomials.matrix import FloatArray
 
 POINTS = 500_000  # designs x corners x samples whose update matrices are held at once
 

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
 from analysis.sensitivity_worst import worst_case
+from estimators.arrays import FloatArray
 from studies.sweeps.designs import WorstCase
 from studies.sweeps.measure import Measure
 from studies.sweeps.plant import Grid
 from studies.sweeps.subject import Batch, Subject
 from studies.sweeps.sweep import Chunk, Sweep
 from synthesis.errors import ModelError, ProblemError
-from synthesis.polynomials.matrix import FloatArray
 
 VALID, INVALID, NOT_A_NUMBER = "valid", "invalid", "not a number"
 POINTS = 8192  # designs x grid points treated at once: small enough to stay in a processor's cache

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from studies.sweeps.designs import OneAtATime
 from studies.sweeps.evaluate import TIE
 from studies.sweeps.measure import Measure
 from studies.sweeps.rows import Rows
 from studies.sweeps.store import SweepFolder
 from studies.sweeps.tables import columns_of
-from synthesis.polynomials.matrix import FloatArray
 
 MOST_POINTS = 3000
 

@@ -10,9 +10,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from estimators.arrays import FloatArray
 from studies.sweeps.subject import Batch, Subject
 from synthesis.errors import SpecError
-from synthesis.polynomials.matrix import FloatArray
 
 
 def _anything_goes(_subject: Subject) -> None:

@@ -14,11 +14,11 @@ from analysis.dropout import critical_drop_probability, drop_radius
 from analysis.dropout_modes import DropPolicy
 from analysis.norms import hinf_norm
 from analysis.planar import planar_hinf_norm
+from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from studies.sweeps.measure import Measure
 from studies.sweeps.subject import Batch, Subject
 from synthesis.errors import SpecError
-from synthesis.polynomials.matrix import FloatArray
 from synthesis.toml_file import StrictTable
 
 

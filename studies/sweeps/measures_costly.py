@@ -12,6 +12,7 @@ from pydantic import Field
 
 from analysis.joint_spectral_radius import joint_spectral_radius
 from analysis.rank_loss_speeds import RankLossSpeeds
+from estimators.arrays import FloatArray
 from studies.spec import ScheduleSpec
 from studies.sweeps.measure import Measure
 from studies.sweeps.measures import MeasureSpec
@@ -21,7 +22,6 @@ from synthesis.deploy import claim_channel, deploy
 from synthesis.errors import SpecError
 from synthesis.lmi.result import Verdict
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray
 
 
 class JointSpectralRadius(MeasureSpec):

@@ -9,13 +9,13 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from estimators.arrays import FloatArray
 from studies.sweeps.drive_sources import DriveSource, LoggedDrive, TruthDrive
 from studies.sweeps.measure import Measure
 from studies.sweeps.measures import MeasureSpec
 from studies.sweeps.plant import ModelPlant
 from studies.sweeps.subject import Batch, Subject
 from synthesis.errors import SpecError
-from synthesis.polynomials.matrix import FloatArray
 
 MODEL_STATES = ("bristle_deflection", "relative_velocity")
 

@@ -10,12 +10,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from analysis.perturbed import Matrices, PerturbedModel
+from estimators.arrays import FloatArray
 from estimators.schedule import PlantPolynomial
 from synthesis.errors import SpecError
 from synthesis.models.extract import MATRICES
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Signal
-from synthesis.polynomials.matrix import FloatArray
 
 
 @dataclass(frozen=True)

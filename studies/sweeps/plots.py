@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from studies.plots import Axis, Band, Bars, ColouredDots, Figure, Level, Line, Map, Mark, Panel, Shade, Words, dots
 from studies.plots.colours import ABOVE, BELOW, BEST, DIVERGING, LOWER_END, MIDDLE, NOMINAL, UPPER_END, WORST
 from studies.plots.save import save_figure
@@ -16,7 +17,6 @@ from studies.sweeps.extracts import Bar, cloud, tornado, worst_map
 from studies.sweeps.extracts import Map as WorstMap
 from studies.sweeps.measure import Measure
 from studies.sweeps.rows import Rows
-from synthesis.polynomials.matrix import FloatArray
 
 VALUES = {"nominal": "o", "median": "s", "quantile 95 %": "^", "quantile 99 %": "D", "worst": "X"}
 """Figures of the comparison, with their markers."""

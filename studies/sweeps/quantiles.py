@@ -8,7 +8,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 DIGIT = 16  # bits settled in one pass
 PASSES = 64 // DIGIT

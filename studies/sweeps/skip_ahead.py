@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 Integers = NDArray[np.uint64]
 BITS = 30  # of a Sobol coordinate: what scipy's generator has, enough for 10^9 points

@@ -17,6 +17,7 @@ from analysis.perturbed import Matrices
 from analysis.planar import planar_margin
 from analysis.planar_exponential import planar_exponential
 from analysis.second_moment import spectral_radius
+from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from estimators.interpolate import PiecewiseLinear
 from estimators.schedule import Update
@@ -24,7 +25,6 @@ from studies.spec import ScheduleSpec
 from studies.sweeps.plant import Grid, ModelPlant, Parameter, Plant
 from synthesis.errors import SpecError
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray
 
 SAME = 1e-12  # relative: what a constant may differ by without being another
 

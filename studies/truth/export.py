@@ -105,11 +105,11 @@ def _vehicle(car: VehicleParameters) -> list[str]:
     front, rear = car.radii[0], car.radii[2]
     quantities = {
         "mass": (car.mass, "kg"),
-        "front_axle_to_cg": (car.front_axle_distance, "m"),
-        "rear_axle_to_cg": (car.rear_axle_distance, "m"),
+        "front_axle_distance": (car.front_axle_distance, "m"),
+        "rear_axle_distance": (car.rear_axle_distance, "m"),
         "cg_height": (car.cg_height, "m"),
-        "track_front": (car.front_track, "m"),
-        "track_rear": (car.rear_track, "m"),
+        "front_track": (car.front_track, "m"),
+        "rear_track": (car.rear_track, "m"),
         "effective_radius_front": (front, "m"),
         "effective_radius_rear": (rear, "m"),
         "wheel_inertia": (car.wheel_inertia, "kg*m^2"),

@@ -23,7 +23,7 @@ MEASURED = np.array([0.1, 20.0, 0.1, 1.5])
 STEERING = 0.03
 
 
-LEVERS = np.array([CAR.front_lever, CAR.front_lever, -CAR.rear_lever, -CAR.rear_lever])
+LEVERS = np.array([CAR.front_axle_distance, CAR.front_axle_distance, -CAR.rear_axle_distance, -CAR.rear_axle_distance])
 SIDES = np.array([-1.0, 1.0, -1.0, 1.0]) * CAR.track / 2
 STIFFNESS = np.array([CAR.front_stiffness] * 2 + [CAR.rear_stiffness] * 2)
 RELAXATION = np.array([CAR.front_relaxation] * 2 + [CAR.rear_relaxation] * 2)
@@ -44,7 +44,9 @@ def usual_transition(x: Any, dt: float) -> Any:
     along = drive * np.cos(angle) + front * np.sin(angle) + rear * np.sin(b)
     across = -drive * np.sin(angle) + front * np.cos(angle) + rear * np.cos(b)
     rate = np.zeros(8)
-    rate[0] = (CAR.front_lever * lateral - CAR.rear_lever * rear + CAR.track / 2 * difference) / CAR.yaw_inertia
+    rate[0] = (
+        CAR.front_axle_distance * lateral - CAR.rear_axle_distance * rear + CAR.track / 2 * difference
+    ) / CAR.yaw_inertia
     rate[1] = along / CAR.mass
     rate[2] = across / (CAR.mass * v) - r
     rate[3:7] = v / RELAXATION * (STIFFNESS * tangents * (2 - ratio) * ratio - forces)
@@ -62,7 +64,7 @@ def plain_transition(x: Any, dt: float) -> Any:
     """The model in plain numbers, the fastest that a loop can be given."""
     r, v, b, f11, f12, f21, f22, fx = x.tolist()
     sd, cd, sb, cb = math.sin(STEERING), math.cos(STEERING), math.sin(b - STEERING), math.cos(b - STEERING)
-    front, rear = v * b + CAR.front_lever * r, v * b - CAR.rear_lever * r
+    front, rear = v * b + CAR.front_axle_distance * r, v * b - CAR.rear_axle_distance * r
     left, right = v - CAR.track * r / 2, v + CAR.track * r / 2
     tangents = (
         math.tan(STEERING - math.atan(front / left)),
@@ -79,7 +81,7 @@ def plain_transition(x: Any, dt: float) -> Any:
         factor = (2 - knee / size) * knee / size if size > knee else 1.0
         forces.append(force + shares[k] * (stiffness[k] * tangents[k] * factor - force))
     lateral = (f11 + f12) * cd + fx * sd
-    moment = CAR.front_lever * lateral - CAR.rear_lever * (f21 + f22) + CAR.track / 2 * (f11 - f12) * sd
+    moment = CAR.front_axle_distance * lateral - CAR.rear_axle_distance * (f21 + f22) + CAR.track / 2 * (f11 - f12) * sd
     return np.array(
         [
             r + dt * moment / CAR.yaw_inertia,

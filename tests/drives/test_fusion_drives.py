@@ -15,11 +15,11 @@ import pytest
 
 from estimators.arrays import AnyArray, FloatArray
 from estimators.faults import Flag
+from estimators.forces import vertical_loads
 from estimators.schedule import GainSchedule
 from estimators.vehicle import CORNERS, VehicleParameters
 from estimators.velocity import LpvVelocityObserver, VelocityFusion, corner_acceleration, to_centre, vehicle_frame
 from estimators.velocity.corners import CornerVectors
-from studies.drives.corner_inputs import vertical_loads
 from studies.drives.drive_file import read_drive
 from studies.drives.log import DriveLog, read_log
 
@@ -61,13 +61,13 @@ def vehicle_of(name: str) -> VehicleParameters:
     car = read_drive(HERE / f"{name}.toml").vehicle
     return VehicleParameters(
         mass=car.mass,
-        yaw_inertia=3900.0 if name.startswith("ocd") else car.mass * car.front_axle_to_cg * car.rear_axle_to_cg,
+        yaw_inertia=3900.0 if name.startswith("ocd") else car.mass * car.front_axle_distance * car.rear_axle_distance,
         wheel_inertia=car.wheel_inertia or 1.0,
-        front_axle_distance=car.front_axle_to_cg,
-        rear_axle_distance=car.rear_axle_to_cg,
+        front_axle_distance=car.front_axle_distance,
+        rear_axle_distance=car.rear_axle_distance,
         cg_height=car.cg_height,
-        front_track=car.track_front,
-        rear_track=car.track_rear,
+        front_track=car.front_track,
+        rear_track=car.rear_track,
         effective_radius=(car.effective_radius_front, car.effective_radius_rear),
         rolling_resistance=car.rolling_resistance,
     )
@@ -119,16 +119,7 @@ def normalised_forces(runs: Runs, car: VehicleParameters, slope: FloatArray) -> 
     """F_x/F_z from wheel dynamics and quasi-static loads; NaN while a wheel stands: a stopped brake says nothing."""
     load = np.empty_like(runs.wheel_speed)
     for place in np.ndindex(runs.ax.shape[:2]):
-        load[place] = vertical_loads(
-            runs.ax[place],
-            runs.ay[place],
-            car.mass,
-            car.front_axle_distance,
-            car.rear_axle_distance,
-            car.cg_height,
-            car.front_track,
-            car.rear_track,
-        )
+        load[place] = vertical_loads(car, runs.ax[place], runs.ay[place])
     force = (runs.torque - car.wheel_inertia * slope) / car.radius
     force -= car.rolling_resistance * load * np.sign(runs.wheel_speed)
     stopped = np.abs(runs.wheel_speed) < 1.0

@@ -201,6 +201,6 @@ def test_a_schedule_of_either_update_may_stand_in_either_mode(shape: tuple[int, 
         slip = 0.3 if k % 3 == 0 else 0.0
         u, y, p = draw.normal(0, 3, shape), draw.normal(0, 0.3, shape), np.full(shape, 40.0 + k)
         for runner in plain.values():
-            runner.reset(state=switched.state.T.reshape(*shape, 2))
+            runner.reset(state=switched.state)
         step, expected = switched.step(u, y, p, np.full(shape, slip)), plain[slip].step(u, y, p)
         np.testing.assert_allclose(step.estimate, expected.estimate, rtol=1e-12, atol=1e-15)

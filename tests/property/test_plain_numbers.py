@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from estimators import GainSchedule, LpvVelocityObserver
+from estimators.arguments import quiet
 from estimators.arrays import FloatArray
 from estimators.filters import KalmanFilter
 from estimators.filters.scalar import ScalarKalmanFilter
 from estimators.filters.three_states import informed
 from estimators.forces import AttitudeObserver, BodyResponse, LateralForceEstimator, VerticalLoads, WheelForceFilter
 from estimators.forces.lateral_few import FEW, LateralFew
-from estimators.signals.checks import quiet
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import BristleTire, LtvKalmanObserver, SwitchedVelocityObserver
 from tests.unit.schedule_content import schedule_content
@@ -37,9 +37,10 @@ def same(one: Any, many: Any, entry: Any, rtol: float = 1e-9, atol: float = 1e-9
 
 
 def remembers_the_same(one: Any, many: Any, entry: Any) -> None:
-    there = many.save()
+    there, batch = many.save(), many.batch_shape
     for name, array in one.save().items():
-        np.testing.assert_allclose(array, there[name][entry], rtol=1e-9, atol=1e-9, err_msg=name)
+        kept = there[name] if there[name].shape[: len(batch)] == batch else np.moveaxis(there[name], 0, -1)  # signals
+        np.testing.assert_allclose(array, kept[entry], rtol=1e-9, atol=1e-9, err_msg=name)
 
 
 @settings(max_examples=100, deadline=None)
@@ -89,7 +90,7 @@ def test_lateral_forces(shape: tuple[int, ...], gate: float | None, signals: Flo
 @settings(max_examples=40, deadline=None)
 @given(arrays(np.float64, (12, 9), elements=ANY))
 def test_attitude(signals: FloatArray) -> None:
-    one, many = AttitudeObserver(TIME), AttitudeObserver(TIME, (2,))
+    one, many = AttitudeObserver(TIME), AttitudeObserver(TIME, (5,))
     for k, row in enumerate(signals):
         if k == 6:
             one.reset(roll=0.2)
@@ -104,7 +105,7 @@ def test_attitude(signals: FloatArray) -> None:
 @settings(max_examples=30, deadline=None)
 @given(arrays(np.float64, (12, 5), elements=ANY))
 def test_loads(dynamic: bool, signals: FloatArray) -> None:
-    one, many = (VerticalLoads(CAR, TIME, shape, dynamic) for shape in ((), (2,)))
+    one, many = (VerticalLoads(CAR, TIME, shape, dynamic) for shape in ((), (5,)))
     for k, row in enumerate(signals):
         if k == 6:
             one.reset()
@@ -118,9 +119,9 @@ def test_loads(dynamic: bool, signals: FloatArray) -> None:
 @settings(max_examples=30, deadline=None)
 @given(arrays(np.float64, (12, 2), elements=ANY))
 def test_body_response(signals: FloatArray) -> None:
-    one, many = BodyResponse(TIME), BodyResponse(TIME, (2,))
+    one, many = BodyResponse(TIME), BodyResponse(TIME, (5,))
     for row in signals:
-        np.testing.assert_allclose(one.step(row), many.step(np.tile(row, (2, 1)))[0], rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(one.step(row), many.step(np.tile(row, (5, 1)))[0], rtol=1e-12, atol=1e-12)
         remembers_the_same(one, many, 0)
 
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import partial
 
 import numpy as np
 import pytest
 
+from analysis import loads
 from analysis.errors import AnalysisError
-from analysis.loads import GRAVITY, vertical_loads
 from synthesis.models.parameter_set import load_parameter_set
 
+GRAVITY = 9.81  # m/s^2, with which the papers compute
+vertical_loads = partial(loads.vertical_loads, gravity=GRAVITY)
 P1 = load_parameter_set("corner-estimation")
 P2 = load_parameter_set("longitudinal-speed")
 P3 = load_parameter_set("resilient-velocity")

@@ -129,7 +129,7 @@ def test_front_difference_is_barely_seen_at_small_angles(steer: float, time_cons
 
 
 # The drives beside the checkout. Car as their README gives it; sensor errors drawn once a run (bias, scale) and white.
-SUV = VehicleParameters(2300.0, 3900.0, 1.6, 1.45, 1.50, 0.66, 1.64, 1.65, 0.36, rolling_resistance=0.012)
+SUV = VehicleParameters(2300.0, 3900.0, 1.45, 1.50, 1.6, 0.66, 1.64, 1.65, 0.36, rolling_resistance=0.012)
 FILES = {"launch": "launch_lowmu_patch", "brake": "brake_abs_like_mu08", "steer": "step_steer_22mps"}
 SEEDS = 20
 shared = [

@@ -61,13 +61,13 @@ class TestP4:
         """P4-dugoff: linear single track at 20 m/s with F = sign C alpha, alpha of (2)."""
         c = CAR_5
         front, rear, v = sign * c.front_stiffness, sign * c.rear_stiffness, 20.0
-        moment = c.front_lever * front - c.rear_lever * rear
+        moment = c.front_axle_distance * front - c.rear_axle_distance * rear
         A = np.array(
             [
                 [-(front + rear) / (c.mass * v), -1 - moment / (c.mass * v**2)],
                 [
                     -moment / c.yaw_inertia,
-                    -(c.front_lever**2 * front + c.rear_lever**2 * rear) / (c.yaw_inertia * v),
+                    -(c.front_axle_distance**2 * front + c.rear_axle_distance**2 * rear) / (c.yaw_inertia * v),
                 ],
             ]
         )
@@ -146,8 +146,8 @@ class TestP5:
     def test_adaptive_model_has_rank_three_where_both_axles_slip(self, slips: tuple[float, float], rank: int) -> None:
         """P5-ekf-obs: generic rank 3 (rank 2 from the outputs alone, the rest through the dynamics); 1 without slip."""
         beta, speed = -0.01, 20.0
-        yaw = (slips[1] + beta) * speed / CAR_5.rear_lever
-        steering = slips[0] + beta + CAR_5.front_lever * yaw / speed
+        yaw = (slips[1] + beta) * speed / CAR_5.rear_axle_distance
+        steering = slips[0] + beta + CAR_5.front_axle_distance * yaw / speed
         drive, rest = np.array(300.0), np.array(False)
         model = CorneringModel(CAR_5, 0.01, np.array(steering), np.array(yaw), np.array(speed), drive, rest)
         x = np.array([beta, 0.0, 0.0])

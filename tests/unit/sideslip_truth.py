@@ -38,9 +38,9 @@ def double_track(
         front = forces[0] + forces[1]
         ax = (drive * np.cos(delta) - front * np.sin(delta)) / car.mass
         ay = (front * np.cos(delta) + drive * np.sin(delta) + forces[2] + forces[3]) / car.mass
-        moment = car.front_lever * (front * np.cos(delta) + drive * np.sin(delta))
+        moment = car.front_axle_distance * (front * np.cos(delta) + drive * np.sin(delta))
         moment += 0.5 * car.track * (forces[0] - forces[1]) * np.sin(delta)
-        return ax, ay, (moment - car.rear_lever * (forces[2] + forces[3])) / car.yaw_inertia
+        return ax, ay, (moment - car.rear_axle_distance * (forces[2] + forces[3])) / car.yaw_inertia
 
     def rate(t: float, x: np.ndarray) -> list[float]:
         u, v, r = x[:3]
@@ -49,10 +49,10 @@ def double_track(
         out = [ax + r * v, ay - r * u, turn]
         for k, (px, py, angle, stiffness, sigma) in enumerate(
             [
-                (car.front_lever, 0.5, steer(t), car.front_stiffness, car.front_relaxation),
-                (car.front_lever, -0.5, steer(t), car.front_stiffness, car.front_relaxation),
-                (-car.rear_lever, 0.5, 0.0, car.rear_stiffness, car.rear_relaxation),
-                (-car.rear_lever, -0.5, 0.0, car.rear_stiffness, car.rear_relaxation),
+                (car.front_axle_distance, 0.5, steer(t), car.front_stiffness, car.front_relaxation),
+                (car.front_axle_distance, -0.5, steer(t), car.front_stiffness, car.front_relaxation),
+                (-car.rear_axle_distance, 0.5, 0.0, car.rear_stiffness, car.rear_relaxation),
+                (-car.rear_axle_distance, -0.5, 0.0, car.rear_stiffness, car.rear_relaxation),
             ]
         ):
             slip = angle - np.arctan2(v + px * r, u - py * car.track * r)
@@ -79,18 +79,18 @@ def single_track(
     steer: Callable[[float], float], speed: float, seconds: float, car: SingleTrack = AXLES, friction: float = 1e9
 ) -> dict[str, np.ndarray]:
     """Linear axles (saturating at `friction` times load by a tanh), constant speed, no drive force."""
-    weight = car.mass * 9.81 / (car.front_lever + car.rear_lever)
-    limits = friction * weight * np.array([car.rear_lever, car.front_lever])
+    weight = car.mass * 9.81 / (car.front_axle_distance + car.rear_axle_distance)
+    limits = friction * weight * np.array([car.rear_axle_distance, car.front_axle_distance])
 
     def forces(t: float, x: np.ndarray) -> tuple[float, float]:
-        slips = steer(t) - x[0] - car.front_lever * x[1] / speed, -x[0] + car.rear_lever * x[1] / speed
+        slips = steer(t) - x[0] - car.front_axle_distance * x[1] / speed, -x[0] + car.rear_axle_distance * x[1] / speed
         raw = car.front_stiffness * slips[0], car.rear_stiffness * slips[1]
         return tuple(limit * np.tanh(value / limit) for value, limit in zip(raw, limits, strict=True))  # type: ignore[return-value]
 
     def rate(t: float, x: np.ndarray) -> list[float]:
         front, rear = forces(t, x)
         lateral = front * np.cos(steer(t) - x[0]) + rear * np.cos(x[0])
-        turn = (car.front_lever * front * np.cos(steer(t)) - car.rear_lever * rear) / car.yaw_inertia
+        turn = (car.front_axle_distance * front * np.cos(steer(t)) - car.rear_axle_distance * rear) / car.yaw_inertia
         return [lateral / (car.mass * speed) - x[1], turn]
 
     t = np.arange(0, seconds, PERIOD)

@@ -36,7 +36,7 @@ def test_quantities_are_read_in_si(tmp_path: Path) -> None:
     path.write_text(DRIVE.replace('unit = "m/s"', 'unit = "km/h", sign = "negative", factor = 2.0'), encoding="utf-8")
     drive = read_drive(path)
     assert drive.sample_time == pytest.approx(0.005)
-    assert drive.vehicle.rear_axle_to_cg == pytest.approx(1.4)
+    assert drive.vehicle.rear_axle_distance == pytest.approx(1.4)
     assert drive.reference["vx"].scale("m/s") == pytest.approx(-2 / 3.6)
     assert drive.log[0].allowed_gap == pytest.approx(5 / 200)
 

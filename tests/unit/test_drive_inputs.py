@@ -4,27 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from studies.drives.judge import moving_slip
 
+from estimators.forces import vertical_loads
+from estimators.vehicle import GRAVITY, VehicleParameters
+from estimators.velocity import corner_acceleration_by_speed
 from studies.drives import corner_inputs as ci
 from studies.drives.baselines import held, integrated_acceleration, mean_over
-from studies.drives.evaluation import slip_ratio
 
-CAR = {
-    "mass": 2000.0,
-    "front_axle_to_cg": 1.2,
-    "rear_axle_to_cg": 1.6,
-    "cg_height": 0.6,
-    "track_front": 1.5,
-    "track_rear": 1.6,
-}
+CAR = VehicleParameters(
+    mass=2000.0, yaw_inertia=3500.0, wheel_inertia=1.0, front_axle_distance=1.2, rear_axle_distance=1.6, cg_height=0.6,
+    front_track=1.5, rear_track=1.6, effective_radius=0.33,
+)  # fmt: skip
 RNG = np.random.default_rng(7)
 
 
 def test_loads_carry_the_car_and_balance_its_moments() -> None:
     ax, ay = RNG.uniform(-8, 8, 50), RNG.uniform(-8, 8, 50)
-    load = ci.vertical_loads(ax, ay, **CAR)
-    m, h = CAR["mass"], CAR["cg_height"]
-    np.testing.assert_allclose(load.sum(axis=1), m * ci.GRAVITY)
+    load = vertical_loads(CAR, ax, ay)
+    m, h = CAR.mass, CAR.cg_height
+    np.testing.assert_allclose(load.sum(axis=1), m * GRAVITY)
     pitch = load[:, :2].sum(axis=1) * 1.2 - load[:, 2:].sum(axis=1) * 1.6
     np.testing.assert_allclose(pitch, -m * ax * h, atol=1e-6)
     roll = (load[:, 1] - load[:, 0]) * 0.75 + (load[:, 3] - load[:, 2]) * 0.8
@@ -34,9 +33,9 @@ def test_loads_carry_the_car_and_balance_its_moments() -> None:
 def test_signs_of_load_transfer() -> None:
     """Braking loads the front, a left turn (a_y > 0) the right wheels."""
     zero = np.zeros(1)
-    rest = ci.vertical_loads(zero, zero, **CAR)[0]
-    braking = ci.vertical_loads(zero - 5, zero, **CAR)[0]
-    left = ci.vertical_loads(zero, zero + 5, **CAR)[0]
+    rest = vertical_loads(CAR, zero, zero)[0]
+    braking = vertical_loads(CAR, zero - 5, zero)[0]
+    left = vertical_loads(CAR, zero, zero + 5)[0]
     assert (braking > rest).tolist() == [True, True, False, False]
     assert (left > rest).tolist() == [False, True, False, True]
 
@@ -111,10 +110,10 @@ def test_corner_acceleration_is_the_derivative_of_the_corner_velocity() -> None:
     dvx, dvy, dr = 2 * np.cos(t), -1.6 * np.sin(2 * t), 0.6 * np.cos(1.5 * t)
     steer = 0.2 * np.sin(3 * t)[:, None] * np.array([1.0, 0.9, 0.0, 0.0])
     rate = 0.6 * np.cos(3 * t)[:, None] * np.array([1.0, 0.9, 0.0, 0.0])
-    x, y = ci.corner_positions(1.2, 1.6, 1.5, 1.6)
+    x, y = CAR.corner_x, CAR.corner_y
     along, across = vx[:, None] - r[:, None] * y, vy[:, None] + r[:, None] * x
     v_xt = along * np.cos(steer) + across * np.sin(steer)
-    free, per_speed = ci.corner_acceleration(dvx - r * vy, dvy + r * vx, r, dr, vy, steer, rate, x, y)
+    free, per_speed = corner_acceleration_by_speed(CAR, dvx - r * vy, dvy + r * vx, r, dr, vy, steer, rate)
     found = free + per_speed * vx[:, None]
     np.testing.assert_allclose(found[1:-1], (v_xt[2:] - v_xt[:-2]) / (2 * h), atol=1e-6)
 
@@ -137,4 +136,4 @@ def test_slip_ratio_of_spinning_locked_and_reversing_wheels() -> None:
     nan = np.nan
     surface = np.array([[11.0, 0.0, -9.0, 1.0, nan]])
     ground = np.array([[10.0, 10.0, -10.0, 1.0, 10.0]])
-    np.testing.assert_allclose(slip_ratio(surface, ground), [[1 / 11, -1.0, 0.1, nan, nan]])
+    np.testing.assert_allclose(moving_slip(surface, ground), [[1 / 11, -1.0, 0.1, nan, nan]])

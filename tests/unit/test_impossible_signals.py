@@ -111,8 +111,8 @@ def test_a_refused_restore_changes_nothing() -> None:
     wheels = FourWheelObserver(FourWheel(*BODY, 1.59, 9e4, 9e4, 0.5, 0.5), batch_shape=(1500,))
     wheels.step(0.01, 4000.0, [0.0, 20.0, 0.0, 0.0])
     saved, before = wheels.save(), content(wheels)
-    saved["state"] = saved["state"] + 1.0
-    saved["factor"][1400] = 1e200
+    saved["filters.0.state"] = saved["filters.0.state"] + 1.0
+    saved["filters.1.factor"][400] = 1e200
     with pytest.raises(EstimatorError, match="not finite"):
         wheels.restore(saved)
     assert content(wheels) == before

@@ -203,7 +203,7 @@ def test_an_unstable_model_that_coasts_for_long_starts_again(shape: tuple[int, .
 
 @pytest.mark.parametrize("arguments", [(3, 4, 4), (4, 3, 4), (4, 4, 3)])
 def test_wrong_shapes_are_refused_with_both_shapes(arguments: tuple[int, ...]) -> None:
-    with pytest.raises(EstimatorError, match=r"has shape \(3,\), expected the batch shape \(4,\)"):
+    with pytest.raises(EstimatorError, match=r"has shape \(3,\), expected \(4,\) or one number"):
         observer().step(*(np.zeros(size) for size in arguments))
     with pytest.raises(EstimatorError, match="measurement is not an array of numbers"):
         observer().step(np.zeros(4), ["a", "b", "c", "d"], np.zeros(4))  # type: ignore[list-item]

@@ -71,7 +71,7 @@ def test_bad_resets_are_refused() -> None:
     for where, state, message in [
         (np.ones(3, dtype=bool), 0.0, r"where: bool \(3,\), expected a bool mask of shape \(4,\)"),
         (np.ones(4), 0.0, "where: float64"),
-        (None, np.zeros(3), r"state does not broadcast to \(4, 2\)"),
+        (None, np.zeros(3), r"state has shape \(3,\), expected \(4, 2\)"),
         (None, [0.0, np.nan], "state is not finite"),
     ]:
         with pytest.raises(EstimatorError, match=message):
@@ -85,8 +85,8 @@ def test_bad_savings_are_refused_and_change_nothing() -> None:
     before = runner.save()
     other = GainSchedule.from_content(schedule_content("lateral"))
     bad: list[tuple[dict[str, Any], str]] = [
-        ({key: value for key, value in before.items() if key != "gap"}, "lacks 'gap'"),
-        ({**before, "state": np.zeros((2, 5))}, r"'state' has shape \(2, 5\), expected \(2, 4\)"),
+        ({key: value for key, value in before.items() if key != "monitor.gap"}, "lacks 'monitor.gap'"),
+        ({**before, "state": np.zeros((2, 5))}, r"'state' is float64 \(2, 5\), expected float64 \(2, 4\)"),
         ({**before, "state": np.full((2, 4), np.nan)}, "'state' is not finite"),
         (LpvVelocityObserver(other).save(), "saved with another schedule than 'test-longitudinal'"),
         (LpvVelocityObserver(SAMPLED).save(), "saved with another schedule than 'test-longitudinal'"),

@@ -96,7 +96,7 @@ def test_transition_is_the_printed_model() -> None:
     """(11) term by term, with the angles as printed."""
     x = np.array([0.3, 21.0, 0.04, 900.0, 1500.0, 700.0, 1100.0, 800.0])
     delta, fz = 0.07, np.array([3000.0, 5000.0, 2200.0, 4000.0])
-    m, iz, l1, l2, e = CAR.mass, CAR.yaw_inertia, CAR.front_lever, CAR.rear_lever, CAR.track
+    m, iz, l1, l2, e = CAR.mass, CAR.yaw_inertia, CAR.front_axle_distance, CAR.rear_axle_distance, CAR.track
     r, v, b, f11, f12, f21, f22, fx = x
     sd, cd = np.sin(delta), np.cos(delta)
     from tests.unit.sideslip_truth import dugoff

@@ -17,7 +17,7 @@ def outputs(state: np.ndarray) -> np.ndarray:
 
 
 def test_converges_to_constant_forces_from_the_published_offset() -> None:
-    balance = 2000 * AXLES.front_lever / AXLES.rear_lever
+    balance = 2000 * AXLES.front_axle_distance / AXLES.rear_axle_distance
     truth = np.array([0.3, 2000.0, balance, 800.0])
     observer = SlidingModeObserver(AXLES)
     observer.reset(state=[0.5, 5448, 3663, 6181])

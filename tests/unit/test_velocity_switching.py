@@ -83,7 +83,7 @@ def test_saved_restored_and_reset() -> None:
         if k >= 30:
             np.testing.assert_array_equal(a.estimate, two.step(u, y, p, slip).estimate)
     one.reset(state=[0.0, 1.0])
-    np.testing.assert_array_equal(one.state[1], 1.0)
+    np.testing.assert_array_equal(one.state[..., 1], 1.0)
     assert not one.switch.high.any()
 
 

@@ -13,25 +13,20 @@ from estimators.errors import EstimatorError
 from estimators.faults import Flag
 from estimators.forces import BodyResponse, VerticalLoads, levelled, vertical_loads
 from estimators.vehicle import GRAVITY, VehicleParameters
-from studies.drives.corner_inputs import vertical_loads as offline_loads
 
 TIME = 0.005
 CAR = VehicleParameters.published_suv()
 
 
 def test_level_loads_are_the_quasi_static_ones() -> None:
+    """P1 (15), (17) at zero angles, written out: Fz_i = m (L g -+ h a_x)/L (1/2 -+ h a_y/(g T_i))."""
     rng = np.random.default_rng(1)
     ax, ay = rng.normal(0, 3, (2, 100))
-    expected = offline_loads(
-        ax,
-        ay,
-        CAR.mass,
-        CAR.front_axle_distance,
-        CAR.rear_axle_distance,
-        CAR.cg_height,
-        CAR.front_track,
-        CAR.rear_track,
-    )
+    front = CAR.mass / CAR.wheelbase * (CAR.rear_axle_distance * GRAVITY - CAR.cg_height * ax)
+    rear = CAR.mass / CAR.wheelbase * (CAR.front_axle_distance * GRAVITY + CAR.cg_height * ax)
+    shifts = (CAR.cg_height * ay / (GRAVITY * track) for track in (CAR.front_track, CAR.rear_track))
+    pairs = zip((front, rear), shifts, strict=True)
+    expected = np.stack([axle * (0.5 + sign * shift) for axle, shift in pairs for sign in (-1, 1)], axis=-1)
     np.testing.assert_allclose(vertical_loads(CAR, ax, ay), expected)
     np.testing.assert_allclose(vertical_loads(CAR, 0.0, 0.0), CAR.static_loads)
 

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from estimators import GainSchedule
+from estimators.arrays import FloatArray
 from studies.beyond.drop_tolerance.observers import NAMES, PACKAGE, QUICK, SPEED_LABEL, Observer, observer
 from studies.beyond.drop_tolerance.population import EVERY, START, simulate
 from studies.beyond.drop_tolerance.prediction import (
@@ -31,7 +32,6 @@ from studies.papers.topic import Topic
 from studies.plots import Axis, Band, ErrorBars, Figure, Line, Mark, Panel, Words, dots
 from studies.plots.colours import BLUE, GREEN, GREY, RED
 from studies.study import Cell, PartResult, Scope, Table
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 MISS = 1e-3  # probability that any interval of one observer misses by chance

@@ -9,6 +9,7 @@ from scipy.linalg import expm
 
 from analysis.intermittent import certify_static_gain, kalman_critical_arrival
 from estimators import GainSchedule, LpvVelocityObserver
+from estimators.arrays import FloatArray
 from studies.beyond.drop_tolerance.observers import PACKAGE, observer
 from studies.beyond.drop_tolerance.population import START
 from studies.beyond.drop_tolerance.prediction import critical, independent_drops, radius, system
@@ -18,7 +19,6 @@ from studies.plots import Axis, Figure, Line, Panel
 from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, RED
 from studies.study import Cell, PartResult, Scope, Table
 from synthesis.lmi.result import Verdict
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 SPEEDS = (0.0, 1.0, 20.0, 140.0)  # rad/s

@@ -13,6 +13,7 @@ from analysis.dropout_modes import schedule_drop_modes
 from analysis.dropout_schedule import FrozenDropProbability, frozen_critical_probability
 from analysis.mean_square_schedule import MeanSquareSchedule, mean_square_schedule
 from estimators import GainSchedule
+from estimators.arrays import FloatArray
 from studies.beyond.drop_tolerance.comparison import MISS
 from studies.beyond.drop_tolerance.observers import NAMES, PACKAGE, QUICK, Observer, observer
 from studies.beyond.drop_tolerance.population import START, evolve
@@ -21,7 +22,6 @@ from studies.plots import Axis, ErrorBars, Figure, Line, Mark, Panel
 from studies.plots.colours import BLUE, GREY, RED
 from studies.study import PartResult, Scope, Table
 from synthesis.lmi.result import Verdict
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 SHARES = (0.95, 0.85, 0.7)  # of the smallest frozen value, tried in turn

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators import GainSchedule, LpvVelocityObserver
+from estimators.arrays import FloatArray
 from studies.beyond.drop_tolerance.prediction import Channel, Norm
-from synthesis.polynomials.matrix import FloatArray
 
 EVERY = 4  # samples from one resampling to the next
 START = np.array([0.0, 1.0])  # m, m/s

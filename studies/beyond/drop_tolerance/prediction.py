@@ -16,7 +16,7 @@ from analysis.gilbert_elliott import critical_recovery_probability, gilbert_elli
 from analysis.markov import MarkovJumpSystem
 from analysis.second_moment import unpack
 from estimators import GainSchedule
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
 
 LONGEST_BURST = 300.0  # samples; 1.5 s at 200 Hz
 FAILURES = (1e-4, 1.0)  # failure probabilities of the boundary

@@ -10,13 +10,13 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from analysis.errors import AnalysisError
+from estimators.arrays import FloatArray
 from studies.beyond.implementability.designs import PAPER_RATE, WHEEL_SPEED, Design, printed_designs, shipped_designs
 from studies.beyond.implementability.updates import BREAKABLE, LASTING, UPDATES, Update, jury_margin
 from studies.papers.topic import Topic
 from studies.plots import DASHES, Axis, Figure, Level, Line, Mark, Panel, Words
 from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE, RED
 from studies.study import Cell, PartResult, Scope, Table
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic("studies.beyond.implementability")
 BISECTIONS = 50

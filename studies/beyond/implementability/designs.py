@@ -9,12 +9,12 @@ from typing import Literal
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule
 from studies.beyond.observers import PAPERS, SHIPPED, printed
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import load_parameter_set
-from synthesis.polynomials.matrix import FloatArray
 
 WHEEL_SPEED = (0.0, 140.0)  # rad/s, the range of P1 Figs. 3 and 4
 PAPER_RATE = 200.0  # Hz, P1 and P3

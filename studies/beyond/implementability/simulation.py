@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from estimators.arrays import FloatArray
+from estimators.phi import phi_of
 from estimators.velocity import LpvVelocityObserver
 from studies.beyond.implementability.break_rates import Curves, break_curve
 from studies.beyond.implementability.designs import (
@@ -18,12 +20,11 @@ from studies.beyond.implementability.designs import (
     shipped_designs,
     with_sample_time,
 )
-from studies.beyond.implementability.updates import BREAKABLE, held
+from studies.beyond.implementability.updates import BREAKABLE
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel
 from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE, RED
 from studies.study import Cell, PartResult, Scope, Table
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic("studies.beyond.implementability")
 STEP_AWAY = 0.03  # of the break rate, to either side
@@ -33,8 +34,8 @@ B = np.array([0.0, 1.0])
 Step = Callable[[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, float, float], ArrayLike]
 STEPS: dict[str, Step] = {
     "forward Euler": lambda x, A, L, C, u, y, T: x + T * (A @ x + u + L * (y - C @ x)),
-    "sampled innovation": lambda x, A, L, C, u, y, T: x + T * held(T * A) @ (A @ x + u + L * (y - C @ x)),
-    "predict, then T·L": lambda x, A, L, C, u, y, T: x + T * held(T * A) @ (A @ x + u) + T * L * (y - C @ x),
+    "sampled innovation": lambda x, A, L, C, u, y, T: x + T * phi_of(T * A) @ (A @ x + u + L * (y - C @ x)),
+    "predict, then T·L": lambda x, A, L, C, u, y, T: x + T * phi_of(T * A) @ (A @ x + u) + T * L * (y - C @ x),
     "Tustin": lambda x, A, L, C, u, y, T: np.linalg.solve(
         np.eye(2) - 0.5 * T * (A - np.outer(L, C)), x + 0.5 * T * (A - np.outer(L, C)) @ x + T * (u + L * y)
     ),

@@ -10,23 +10,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimators.phi import Phi
-from synthesis.polynomials.matrix import FloatArray
+from estimators.arrays import FloatArray
+from estimators.phi import phi_of
 
 Update = Callable[[FloatArray, FloatArray, FloatArray, ArrayLike], FloatArray]
 """M (..., 2, 2) from A (..., 2, 2), L (..., 2, 1), C (..., 1, 2) and sample times (...) in s."""
 EYE = np.eye(2)
-
-
-def held(M: FloatArray) -> FloatArray:
-    r"""phi(M) = int_0^1 e^{M s} ds of 2 x 2 matrices (..., 2, 2), by the runtime's own closed form; e^M = I + M phi(M)."""
-    flat = np.asarray(M, float).reshape(-1, 2, 2)
-    mean = 0.5 * np.trace(flat, axis1=-2, axis2=-1)
-    N = flat - mean[:, None, None] * np.eye(2)
-    delta = N[:, 0, 0] ** 2 + N[:, 0, 1] * N[:, 1, 0]
-    alpha, beta = np.empty(len(flat)), np.empty(len(flat))
-    Phi(len(flat)).into(mean, delta, alpha, beta)
-    return np.asarray((alpha[:, None, None] * np.eye(2) + beta[:, None, None] * N).reshape(M.shape))
 
 
 def _update(formula: Callable[[FloatArray, FloatArray, FloatArray], ArrayLike]) -> Update:
@@ -34,14 +23,14 @@ def _update(formula: Callable[[FloatArray, FloatArray, FloatArray], ArrayLike]) 
     return lambda A, L, C, sample_time: np.asarray(formula(A, L @ C, np.asarray(sample_time, float)[..., None, None]))
 
 
-exact_closed_loop = _update(lambda A, LC, T: EYE + (T * (A - LC)) @ held(T * (A - LC)))
+exact_closed_loop = _update(lambda A, LC, T: EYE + (T * (A - LC)) @ phi_of(T * (A - LC)))
 """e^{(A - L C) T}: the observer integrated inside the sample, as the runtime does (P1 section 9)."""
 BREAKABLE: dict[str, Update] = {
     "forward Euler": _update(lambda A, LC, T: EYE + T * (A - LC)),
     # e^{A T} - int_0^T e^{A s} ds L C: the open loop exactly, the innovation computed once and held (P3 (10), literally)
-    "sampled innovation": _update(lambda A, LC, T: EYE + T * (held(T * A) @ (A - LC))),
+    "sampled innovation": _update(lambda A, LC, T: EYE + T * (phi_of(T * A) @ (A - LC))),
     # e^{A T} - T L C: the open loop exactly, then the correction T L times the innovation
-    "predict, then T·L": _update(lambda A, LC, T: EYE + T * (held(T * A) @ A - LC)),
+    "predict, then T·L": _update(lambda A, LC, T: EYE + T * (phi_of(T * A) @ A - LC)),
 }
 LASTING: dict[str, Update] = {
     "Tustin": _update(lambda A, LC, T: np.linalg.solve(EYE - 0.5 * T * (A - LC), EYE + 0.5 * T * (A - LC))),

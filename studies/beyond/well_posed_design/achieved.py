@@ -9,9 +9,9 @@ import numpy as np
 
 from analysis.error_norms import error_hinf_norm, selection
 from analysis.norms_h2 import h2_norm
+from estimators.arrays import FloatArray
 from studies.beyond.well_posed_design.cases import VELOCITY, Case
 from studies.study import Cell
-from synthesis.polynomials.matrix import FloatArray
 
 COLUMNS = (
     "friction gain [1]", "force noise gain [m/s]", "H2 gain, white force noise [m/s sqrt(Hz)]", "acceleration gain [s]",

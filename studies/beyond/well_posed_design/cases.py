@@ -7,12 +7,12 @@ from functools import cache
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from studies.beyond.observers import PAPERS, printed
 from studies.spec import load_spec
 from synthesis.errors import SpecError
 from synthesis.hinf_observer import ObserverDesign
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray
 
 PACKAGE = "studies.beyond.well_posed_design"
 VELOCITY = ("relative_velocity",)

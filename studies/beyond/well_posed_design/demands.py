@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimators.faults import BoolArray
+from estimators.arrays import BoolArray, FloatArray
 from studies.beyond.well_posed_design.achieved import COLUMNS, Achieved, achieved, printed_achieved, short
 from studies.beyond.well_posed_design.cases import PACKAGE, VELOCITY, Case, p1_cases
 from studies.papers.topic import Topic
@@ -16,7 +16,6 @@ from studies.plots.colours import BLUE, GREEN, PURPLE, RED
 from studies.study import Cell, PartResult, Scope, Table
 from synthesis.errors import ProblemError
 from synthesis.hinf_observer import Channel, ObserverDesign, design_observer
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 MOST_TICKS = 7

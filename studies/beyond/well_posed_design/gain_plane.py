@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule
 from studies.beyond.well_posed_design.achieved import COLUMNS, Achieved, achieved, printed_achieved, short
 from studies.beyond.well_posed_design.cases import PACKAGE, Case, all_cases
@@ -14,7 +15,6 @@ from studies.papers.topic import Topic
 from studies.plots import Axis, Box, Contours, Figure, Line, Map, Mark, Panel, dots
 from studies.plots.colours import BLUE, GREEN, ORANGE, RED
 from studies.study import Cell, PartResult, Scope, Table
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 WHEEL_SPEEDS = 8

@@ -15,6 +15,7 @@ import sympy as sp
 
 from analysis.dc_floor import static_gain
 from analysis.error_norms import error_hinf_norm
+from estimators.arrays import FloatArray
 from studies.beyond.well_posed_design.cases import PACKAGE, Case, p1_cases
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel, Words
@@ -24,7 +25,6 @@ from synthesis.errors import ProblemError
 from synthesis.hinf_observer import Channel, ObserverDesign, ObserverGains, observer_problem, to_gamma
 from synthesis.lmi.scaling import observer_scale
 from synthesis.lmi.solve import solve
-from synthesis.polynomials.matrix import FloatArray
 from synthesis.well_posedness import energy_problem
 
 TOPIC = Topic(PACKAGE)

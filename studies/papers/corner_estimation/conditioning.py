@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from studies.claim import Finding, JsonValue
 from studies.papers.corner_estimation.inputs import DESIGNS, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner
 from studies.papers.topic import Topic
@@ -18,7 +19,6 @@ from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
-from synthesis.polynomials.matrix import FloatArray
 from synthesis.stability import physical
 
 TOPIC = Topic(PACKAGE)

@@ -6,6 +6,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
 
+from estimators.arrays import FloatArray
 from studies.claim import Finding
 from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner
 from studies.papers.topic import Topic
@@ -13,7 +14,6 @@ from studies.papers.verdicts import erratum
 from studies.plots import ZERO, Figure, Line, Mark, Panel, dots
 from studies.plots.colours import RED
 from studies.study import PartResult, Scope, Table
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 L1, L2, P1 = sp.symbols("L1 L2 p1")

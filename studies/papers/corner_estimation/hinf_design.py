@@ -22,6 +22,7 @@ import numpy as np
 import sympy as sp
 from scipy.linalg import solve_continuous_are
 
+from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule
 from studies.claim import Finding, JsonValue
 from studies.papers.corner_estimation.inputs import (
@@ -46,7 +47,6 @@ from synthesis.lmi.scaling import observer_scale
 from synthesis.lmi.solve import solve
 from synthesis.models.catalogue.corner import Direction
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray
 from synthesis.well_posedness import well_posedness
 
 TOPIC = Topic(PACKAGE)

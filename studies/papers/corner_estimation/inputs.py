@@ -10,6 +10,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
 
+from estimators.arrays import FloatArray
 from studies.plots import Axis
 from synthesis.errors import SpecError
 from synthesis.hinf_observer import Channel, ObserverDesign
@@ -17,7 +18,6 @@ from synthesis.lmi.settings import LmiSettings
 from synthesis.models.catalogue.corner import Direction, corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import ParameterSet, Published, load_parameter_set
-from synthesis.polynomials.matrix import FloatArray
 
 T = TypeVar("T")
 PACKAGE = "studies.papers.corner_estimation"
@@ -25,6 +25,7 @@ PARAMETERS = "corner-estimation"
 PAPER = {PARAMETERS: "P1", "resilient-velocity": "P3"}  # that prints a parameter set
 STATED_SPEED = 180.0  # rad/s: the range that the stability claims name, text before (29)
 DESIGN_SPEED = 140.0  # rad/s: the range that the gains are designed on, text after (32)
+PRINTED_GRAVITY = 9.81  # m/s^2, of the load examples
 POINTS = 140  # wheel speeds on the design range, text after (32)
 STATES = ("bristle_deflection", "relative_velocity")  # of the corner models
 SPEED_AXIS = Axis("wheel speed [rad/s]", 0.0, STATED_SPEED)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.loads import GRAVITY, Loads, vertical_loads
+from analysis.loads import Loads, vertical_loads
 from studies.claim import Finding, judged
-from studies.papers.corner_estimation.inputs import PACKAGE, parameters
+from studies.papers.corner_estimation.inputs import PACKAGE, PRINTED_GRAVITY, parameters
 from studies.papers.topic import Topic
 from studies.plots import DASHES, ZERO, Figure, Line, Panel
 from studies.plots.colours import CURVES
@@ -17,6 +17,7 @@ from synthesis.models.parameter_set import ParameterSet
 TOPIC = Topic(PACKAGE)
 WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
 TOLERANCE = 1e-4  # N
+MOTIONS = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # at rest, driving, turning: a_x and a_y in m/s^2
 BANK = np.deg2rad(3.0)  # a roll angle of everyday cornering
 
 
@@ -27,13 +28,14 @@ def residuals(assumed: ParameterSet, true: ParameterSet) -> dict[str, float]:
     F_zf + F_zr = m a_z,  L_f F_zf - L_r F_zr = -m h a_x,  (F_R - F_L) T_i/2 = m_i h a_y with m_i = F_zi / g.
     """
     size = {name: entry.value for name, entry in true.vehicle.items()}
-    ax, ay, az = (g.ravel() for g in np.meshgrid(np.linspace(-8, 8, 9), np.linspace(-8, 8, 9), [8.0, GRAVITY, 11.0]))
-    found = vertical_loads(assumed, ax, ay, az)
+    accelerations = np.linspace(-8, 8, 9), np.linspace(-8, 8, 9), [8.0, PRINTED_GRAVITY, 11.0]
+    ax, ay, az = (g.ravel() for g in np.meshgrid(*accelerations))
+    found = vertical_loads(assumed, ax, ay, az, gravity=PRINTED_GRAVITY)
     mass, height = size["mass"], size["cg_height"]
     vertical = found.front + found.rear - mass * az
     pitch = size["front_axle_distance"] * found.front - size["rear_axle_distance"] * found.rear + mass * height * ax
     roll = [
-        (right - left) * size[track] / 2.0 - axle / GRAVITY * height * ay
+        (right - left) * size[track] / 2.0 - axle / PRINTED_GRAVITY * height * ay
         for axle, left, right, track in (
             (found.front, found.front_left, found.front_right, "front_track"),
             (found.rear, found.rear_left, found.rear_right, "rear_track"),
@@ -45,7 +47,7 @@ def residuals(assumed: ParameterSet, true: ParameterSet) -> dict[str, float]:
 
 def sign_conflict(vehicle: ParameterSet) -> dict[str, float]:
     """A car at rest on a bank of 3 degrees: (11) says that it reads a_y = +g sin(phi); (16) must give zero, in m/s^2."""
-    across = {side: float(GRAVITY * np.sin(BANK) * np.cos(angle) + GRAVITY * np.cos(BANK) * np.sin(angle))
+    across = {side: float(PRINTED_GRAVITY * np.sin(BANK) * np.cos(angle) + PRINTED_GRAVITY * np.cos(BANK) * np.sin(angle))
               for side, angle in (("printed", BANK), ("angles_reversed", -BANK))}  # fmt: skip
     height, roll_center = (vehicle.vehicle[name].value for name in ("cg_height", "roll_center_height"))
     return {**across, "lever_printed_m": roll_center, "lever_of_the_lateral_shift_m": height - roll_center}
@@ -55,7 +57,7 @@ def sign_conflict(vehicle: ParameterSet) -> dict[str, float]:
 def load_formulas(assumed: ParameterSet | None = None) -> Finding:
     """Static loads, transfer per unit of acceleration, balances of the level car, and the sign of (14), (16)."""
     car = parameters() if assumed is None else assumed
-    rest, driving, turning = (vertical_loads(car, *a) for a in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+    rest, driving, turning = (vertical_loads(car, *a, gravity=PRINTED_GRAVITY) for a in MOTIONS)
     residual, conflict = residuals(car, parameters()), sign_conflict(car)
     computed = {
         "static_N": {"front": float(rest.front), "rear": float(rest.rear), **_corners(rest)},
@@ -102,7 +104,7 @@ def load_figure() -> Figure:
     zero = np.zeros_like(acceleration)
     panels = []
     for motion, axis, title in (((acceleration, zero), "ₓ", "longitudinal"), ((zero, acceleration), "ᵧ", "lateral")):
-        found = vertical_loads(parameters(), *motion)
+        found = vertical_loads(parameters(), *motion, gravity=PRINTED_GRAVITY)
         lines = [
             Line(acceleration, getattr(found, name) / 1e3, name.replace("_", " "), colour, dash)
             for name, colour, dash in zip(WHEELS, CURVES, DASHES, strict=False)

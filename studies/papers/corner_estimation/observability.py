@@ -9,6 +9,7 @@ import sympy as sp
 
 from analysis.observability import ObservabilityMatrix, observability_matrix, observability_of, rate_symbol
 from analysis.rank_loss import rank_loss
+from estimators.arrays import FloatArray
 from studies.claim import Finding, judged
 from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner, parameters
 from studies.papers.topic import Topic
@@ -16,7 +17,6 @@ from studies.plots import ZERO, Axis, Band, Figure, Line, Mark, Panel, Words, do
 from studies.plots.colours import RED
 from studies.study import PartResult, Scope
 from synthesis.models.catalogue.planar_force import planar_force_model
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 STEER = sp.Symbol("steering_angle")

@@ -10,6 +10,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
 
+from estimators.arrays import FloatArray
 from studies.claim import Finding, JsonValue, judged
 from studies.papers.corner_estimation.inputs import CORNERS, DESIGN_SPEED, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner
 from studies.papers.topic import Topic
@@ -19,7 +20,6 @@ from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, RED
 from studies.study import Cell, PartResult, Scope, Table
 from synthesis.models.catalogue.corner import Direction
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import FloatArray
 from synthesis.published_certificate import CertifiedRange, check_certificate
 from synthesis.stability import Form
 

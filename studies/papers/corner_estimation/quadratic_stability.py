@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 import sympy as sp
 
+from estimators.arrays import FloatArray
 from studies.claim import Finding, JsonValue, judged
 from studies.papers.corner_estimation.inputs import CORNERS, DESIGNS, PACKAGE, STATED_SPEED, Corner
 from studies.papers.topic import Topic
@@ -24,7 +25,6 @@ from studies.study import PartResult, Scope, Table
 from synthesis.lmi.result import Verdict as Proof
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.models.catalogue.corner import Direction
-from synthesis.polynomials.matrix import FloatArray
 from synthesis.stability import affine_quadratic_stability
 
 TOPIC = Topic(PACKAGE)

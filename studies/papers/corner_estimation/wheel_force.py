@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.bounds import force_observer_bound, wheel_error_is_hurwitz, wheel_error_matrix
+from estimators.arrays import FloatArray
 from studies.claim import Finding, agrees, judged
 from studies.papers.corner_estimation.inputs import PACKAGE, parameters
 from studies.papers.topic import Topic
@@ -12,7 +13,6 @@ from studies.plots import DASHES, Axis, Figure, Level, Line, Mark, Panel, Shade
 from studies.plots.colours import CURVES, GREY
 from studies.study import PartResult, Scope
 from synthesis.models.discretise import zero_order_hold
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 ETA1, ETA2, ETA3 = 1.8, 11.4, 50.6  # N s, N m, 1/s: P1 notes 1

@@ -29,8 +29,7 @@ LOADS: Mapping[str, Any] = {"load_fl": 3200, "load_fr": 4800, "load_rl": 2400, "
 
 def substitute_car() -> FourWheel:
     """The substitutes of the model (P4 notes 1) as the runtime takes them."""
-    renamed = {"front_axle_distance": "front_lever", "rear_axle_distance": "rear_lever"}
-    return FourWheel(**{renamed.get(name, name): value for name, value in CAR.items()})
+    return FourWheel(**CAR)
 
 
 @cache

@@ -10,6 +10,7 @@ import sympy as sp
 from analysis.errors import AnalysisError
 from analysis.lie_rank import LieRankTest
 from analysis.lie_structure import GenericRank, generic_rank
+from estimators.arrays import FloatArray
 from estimators.sideslip import FourWheelModel
 from studies.claim import Finding, judged
 from studies.papers.ekf_ukf_lateral.inputs import (
@@ -29,7 +30,6 @@ from studies.plots import Axis, Dash, Figure, Level, Line, Map, Mark, Panel, Sha
 from studies.plots.colours import BLUE, GREEN, PURPLE, RED, TRUTH
 from studies.study import Cell, PartResult, Scope, Table
 from synthesis.models.nonlinear import NonlinearModel
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 ORDER = 4  # Lie derivatives taken; the rank is complete after the first

@@ -8,6 +8,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
 
+from estimators.arrays import FloatArray
 from estimators.sideslip import dugoff_force
 from studies.claim import Finding
 from studies.papers.ekf_ukf_lateral.inputs import CAR, PACKAGE, SUBSTITUTES_NOTE, in_numbers
@@ -18,7 +19,6 @@ from studies.plots.colours import BLUE, GREEN, ORANGE, RED, TRUTH
 from studies.study import PartResult, Scope
 from synthesis.models.catalogue.four_wheel import four_wheel_model
 from synthesis.models.discretise import zero_order_hold
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 SPEED = 20.0  # m/s

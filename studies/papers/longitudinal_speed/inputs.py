@@ -8,11 +8,11 @@ from functools import cache, cached_property
 import numpy as np
 
 from analysis.gramians import SampledSequence, sampled_sequence
+from estimators.arrays import FloatArray
 from studies.papers.published import printed_numbers
 from synthesis.models.catalogue.longitudinal_speed import longitudinal_speed_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
-from synthesis.polynomials.matrix import FloatArray
 
 PACKAGE = "studies.papers.longitudinal_speed"
 PARAMETERS = "longitudinal-speed"

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 
+from estimators.arrays import FloatArray
 from studies.claim import Finding
 from studies.papers.longitudinal_speed.inputs import PACKAGE, SAMPLE_TIME, constant, noise, structures
 from studies.papers.longitudinal_speed.stochastic_observability import STRUCTURES, both_tests
@@ -18,7 +19,6 @@ from studies.papers.verdicts import erratum
 from studies.plots import DASHES, Axis, Figure, Line, Panel
 from studies.plots.colours import BLUE, CURVES, ORANGE, RED
 from studies.study import Cell, PartResult, Scope, Table
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 SPEED = 40.0  # rad/s

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.bounds import sharp_unknown_input_bound, unknown_input_bound
+from estimators.arrays import FloatArray
 from studies.claim import Finding, judged
 from studies.papers.longitudinal_speed.inputs import PACKAGE
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel, dots
 from studies.plots.colours import GREY, RED
 from studies.study import PartResult, Scope
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 RUNS, STEPS, STEP = 200, 400, 2e-3

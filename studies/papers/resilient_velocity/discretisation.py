@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from analysis.second_moment import spectral_radius
+from estimators.arrays import FloatArray
 from studies.claim import ClaimVerdict, Finding, JsonValue, judged
 from studies.papers.plain import by_speed
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, PACKAGE, PRINTED, SPEEDS, Setting, printed_gain
@@ -17,7 +18,6 @@ from synthesis.models.catalogue.corner import Direction, corner_velocity_model
 from synthesis.models.discretise import zero_order_hold
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import load_parameter_set
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 SHOWN = np.array([0.0, 40.0, 140.0])

@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 
 from analysis.dropout import critical_drop_probability, drop_radius, mean_square_stable_intervals
 from analysis.markov import MarkovJumpSystem
+from estimators.arrays import FloatArray
 from studies.claim import Finding, JsonValue, agrees, judged
 from studies.papers.plain import by_speed
 from studies.papers.published import printed
@@ -29,7 +30,6 @@ from studies.plots import DASHES, Axis, Contours, Figure, Level, Line, Map, Mark
 from studies.plots.colours import CURVES, GREY, ORANGE
 from studies.study import PartResult, Scope, Table
 from synthesis.models.catalogue.corner import Direction
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 SLOW = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 25.0, 28.0)

@@ -7,6 +7,7 @@ import numpy as np
 from analysis.dropout import drop_radius
 from analysis.joint_spectral_radius import joint_spectral_radius
 from analysis.second_moment import spectral_radius
+from estimators.arrays import FloatArray
 from studies.claim import ClaimVerdict, Finding, judged
 from studies.papers.plain import by_speed, floats
 from studies.papers.resilient_velocity.drops import harmless_from, met_at, radius, updates
@@ -16,7 +17,6 @@ from studies.papers.verdicts import among_readings
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel
 from studies.plots.colours import GREY
 from studies.study import PartResult, Scope
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 HALF_DIGIT = 5e-5

@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from studies.claim import Finding
 from studies.papers.resilient_velocity.compliance_report import BOUNDS, TESTS, compliance_part
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, PACKAGE
@@ -17,7 +18,6 @@ from studies.trials.driven import LUGRE, MAGIC_FORMULA, driven_part
 from studies.trials.forces import Driven, differentiated_pid, force_part
 from studies.trials.motion import Moved, motion_part
 from studies.trials.velocities import Printed, corner_observers, velocity_part
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 HALF_DIGIT = 0.05  # %

@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
+from estimators.arrays import FloatArray
 from studies.plots import Axis
 from studies.plots.colours import BLUE, RED
 from synthesis.models.catalogue.corner import Direction, corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
-from synthesis.polynomials.matrix import FloatArray
 
 PACKAGE = "studies.papers.resilient_velocity"
 DIRECTIONS: tuple[Direction, Direction] = ("longitudinal", "lateral")
@@ -45,6 +45,7 @@ class Setting:
     similarity: float = 9000.0  # gamma of T = diag(gamma, 1), Example 1
     example_speed: float = 40.0  # rad/s, Example 1
     example_drop: float = 0.2  # Example 3
+    gravity: float = 9.81  # m/s^2, of the load examples
 
     @cached_property
     def models(self) -> Mapping[Direction, LpvModel]:

@@ -7,6 +7,7 @@ import sympy as sp
 
 from analysis.dc_floor import static_gain
 from analysis.error_norms import error_hinf_norm
+from estimators.arrays import FloatArray
 from studies.claim import Finding, JsonValue, judged
 from studies.papers.plain import by_speed
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, PACKAGE, PRINTED, SPEED_AXIS, SPEEDS, Setting
@@ -16,7 +17,6 @@ from studies.plots import Axis, Figure, Level, Line, Mark, Panel, Shade, Words, 
 from studies.plots.colours import BLUE, GREY, RED
 from studies.study import PartResult, Scope, Table
 from synthesis.models.catalogue.corner import Direction
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 SHOWN = np.array([0.0, 40.0, 80.0, 140.0])

@@ -14,6 +14,7 @@ from analysis.observability_modes import frozen_modes, hautus_test
 from analysis.perturbed import PerturbedModel, error_measure
 from analysis.rank_loss import rank_loss
 from analysis.sensitivity import OneAtATime, one_at_a_time
+from estimators.arrays import FloatArray
 from studies.claim import ClaimVerdict, Finding, JsonValue, judged
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, FINE, PACKAGE, PRINTED, SPEED_AXIS, SPEEDS, Setting
 from studies.papers.topic import Topic
@@ -21,7 +22,6 @@ from studies.plots import DASHES, Figure, Level, Line, Mark, Panel
 from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, RED
 from studies.study import Cell, PartResult, Scope, Table
 from synthesis.models.catalogue.corner import Direction
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 CONSTANTS = ("sigma0", "sigma1", "sigma2", "kappa")

@@ -12,6 +12,7 @@ from analysis.exact import Rational, rationals
 from analysis.markov import MarkovJumpSystem, second_moment_operator
 from analysis.second_moment import lifted, spectral_radius
 from analysis.switching import common_growth, diagonal_window, exact_pair_test, joint_spectral_radius, pair_margin
+from estimators.arrays import FloatArray
 from studies.claim import Finding, judged
 from studies.papers.plain import by_speed, floats
 from studies.papers.resilient_velocity.inputs import (
@@ -31,7 +32,6 @@ from studies.plots import DASHES, ZERO, Axis, Band, Figure, Level, Line, Mark, P
 from studies.plots.colours import BLUE, CURVES, GREY, RED
 from studies.study import PartResult, Scope, Table
 from synthesis.lmi.result import Verdict as Proof
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 Tenths = NDArray[np.int64]

@@ -9,6 +9,7 @@ import pint
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 
+from estimators.arrays import FloatArray
 from studies.claim import Finding
 from studies.papers.resilient_velocity import vehicle
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, PACKAGE, PRINTED, Setting
@@ -19,7 +20,6 @@ from studies.plots.colours import CURVES
 from studies.study import Cell, PartResult, Scope, Table
 from synthesis.models.catalogue.corner import Direction
 from synthesis.models.parameter_set import quantities
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 SPEED = 40.0  # rad/s

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 import sympy as sp
 
-from analysis.loads import GRAVITY as STANDARD
 from analysis.loads import vertical_loads
 from estimators.velocity import SuspensionCompliance, SuspensionParameters
 from studies.claim import Finding, agrees
@@ -98,18 +97,19 @@ def loads(setting: Setting = PRINTED) -> Finding:
         v["front_track"],
         v["front_axle_distance"] + v["rear_axle_distance"],
     )
-    rest, driving, turning = (vertical_loads(setting.parameters, *a) for a in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+    g, motions = setting.gravity, ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
+    rest, driving, turning = (vertical_loads(setting.parameters, *a, gravity=g) for a in motions)
     front, rear = float(rest.front), float(rest.rear)
     longitudinal, lateral = float(driving.rear) - rear, float(turning.front_right - rest.front_right)
     lever = (
-        agrees(front, mass * STANDARD * v["rear_axle_distance"] / base, 1e-9 * front)
+        agrees(front, mass * g * v["rear_axle_distance"] / base, 1e-9 * front)
         and agrees(longitudinal, mass * height / base, 1e-9 * longitudinal)
-        and agrees(lateral, front / STANDARD * height / track, 1e-9 * lateral)
+        and agrees(lateral, front / g * height / track, 1e-9 * lateral)
     )
     sums = axle_sum(AS_PRINTED) == 0 and axle_sum(CORRECTED) == 0
     printed, corrected = residual(AS_PRINTED), residual(CORRECTED)
     at = {
-        ROLL: ROLLED, GRAVITY: STANDARD, AXLE_MASS: front / STANDARD, HEIGHT: height, TRACK: track,
+        ROLL: ROLLED, GRAVITY: g, AXLE_MASS: front / g, HEIGHT: height, TRACK: track,
         ROLL_HEIGHT: v["roll_center_height"],
     }  # fmt: skip
     off = [float(sp.N(e.subs(at))) for e in printed]

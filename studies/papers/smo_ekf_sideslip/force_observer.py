@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from analysis.bounds_sliding_mode import PUBLISHED, SlidingModeGains, reaching_time, sliding_mode_convergence
+from estimators.arrays import FloatArray
 from studies.claim import Finding, agrees, judged
 from studies.papers.smo_ekf_sideslip.inputs import CAR, LARGEST, PACKAGE, SAMPLE_TIME
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel
 from studies.plots.colours import BLUE, GREEN, RED, TRUTH
 from studies.study import Cell, PartResult, Scope, Table
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 FRONT, REAR, INERTIA = Fraction("1.12"), Fraction("1.46"), Fraction(3000)  # m, m, kg m^2: exact

@@ -16,6 +16,7 @@ from analysis.bounds_sliding_mode import (
     sampled_radius,
     smallest_zone_widths,
 )
+from estimators.arrays import FloatArray
 from studies.claim import ClaimVerdict, Finding
 from studies.papers.smo_ekf_sideslip.force_observer import RATE, error_motion
 from studies.papers.smo_ekf_sideslip.inputs import CAR, LARGEST, PACKAGE, PRINTED, SAMPLE_TIME, WHEELBASE
@@ -23,7 +24,6 @@ from studies.papers.topic import Topic
 from studies.plots import Axis, Contours, Figure, Level, Line, Map, Mark, Panel, Words, dots
 from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, RED, TRUTH
 from studies.study import Cell, PartResult, Scope, Table
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 WIDE, NARROW = (0.2, 1.0, 1.0), (0.05, 0.1, 0.1)  # rad/s, m/s^2, m/s^2: two readings

@@ -12,6 +12,7 @@ import sympy as sp
 
 from analysis.lie_rank import LieRankTest
 from analysis.lie_structure import generic_rank
+from estimators.arrays import FloatArray
 from studies.claim import Finding, judged
 from studies.papers.smo_ekf_sideslip.inputs import PACKAGE, SAMPLE_TIME
 from studies.papers.smo_ekf_sideslip.saturating_car import LINEAR, SimulatedRun, simulate, slalom, steady_turn
@@ -21,7 +22,6 @@ from studies.plots.colours import BLUE, RED
 from studies.study import PartResult, Scope
 from synthesis.models.catalogue.single_track import adaptive_stiffness_model, axle_force_model
 from synthesis.models.nonlinear import NonlinearModel
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 RANGES = {

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from estimators.sideslip import (
     AdaptiveStiffnessObserver,
     FixedStiffnessObserver,
@@ -16,7 +17,6 @@ from estimators.sideslip import (
     wheel_axes,
 )
 from studies.papers.smo_ekf_sideslip.inputs import SAMPLE_TIME
-from synthesis.polynomials.matrix import FloatArray
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from studies.claim import Finding, judged
 from studies.papers.smo_ekf_sideslip.inputs import (
     CAR,
@@ -22,7 +23,6 @@ from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Line, Mark, Panel, dots
 from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE, RED, TRUTH
 from studies.study import Cell, PartResult, Scope, Table
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 LIMIT = 6.0  # %

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from estimators.arrays import FloatArray
 from studies.papers.smo_ekf_sideslip.inputs import CAR, PRINTED_GRAVITY, SAMPLE_TIME, WHEELBASE, published_car
 from studies.papers.smo_ekf_sideslip.observers import Signals
-from synthesis.polynomials.matrix import FloatArray
 
 LINEAR = 1e9  # friction so large that the axles are linear: an observer with the right stiffness has no model error
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from studies.claim import ClaimVerdict, Finding, judged
 from studies.papers.smo_ekf_sideslip.inputs import MASS_SETTINGS, PACKAGE, STIFFNESS_SETTINGS, WHEELBASE, published_car
 from studies.papers.smo_ekf_sideslip.observers import Estimates, estimates
@@ -14,7 +15,6 @@ from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, RED, TRUTH
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import sample_errors
 from studies.trials.histories import backgrounds, setting_lines, truth_line
-from synthesis.polynomials.matrix import FloatArray
 
 TOPIC = Topic(PACKAGE)
 MODEL_NOTE = (

@@ -7,8 +7,8 @@ import pytest
 
 from estimators.faults import Flag
 from estimators.velocity import FusionSettings, VelocityFusion
-from estimators.velocity.fusion_adrift import FusionAdrift
-from estimators.velocity.lateral_fusion import AxleVerdict
+from estimators.velocity.consistency_reset import LateralReset
+from estimators.velocity.lateral_fusion import AxleUpdate
 from tests.unit.fusion_course import CAR, STEP, Signals, course, driven, phases, sensed
 
 SETTINGS = FusionSettings()
@@ -50,7 +50,7 @@ def test_only_the_lost_car_of_a_batch_starts_again() -> None:
     np.testing.assert_allclose([s.vy[1] for s in steps], [s.vy for s in alone], rtol=1e-7, atol=1e-9)
 
 
-CALM = AxleVerdict((-1.5, -1.45), (False, False), (0.01, -0.02), False)
+CALM = AxleUpdate((-1.5, -1.45), (False, False), (0.01, -0.02), False)
 CASES = {
     "lost": (CALM, (True, True), True),
     "one axle carries a side force": (CALM._replace(friction=(0.01, 0.2)), (True, True), False),
@@ -67,19 +67,19 @@ def test_what_is_evidence(case: str, count: int) -> None:
     fusion = VelocityFusion(CAR, STEP, () if count == 1 else (count,))
     if count > 1:
         pairs = [[np.full(count, value) for value in pair] for pair in (*verdict[:3], usable)]
-        verdict, usable = AxleVerdict(*pairs[:3], np.full(count, False)), tuple(pairs[3])
-    clock: FusionAdrift = fusion.adrift
+        verdict, usable = AxleUpdate(*pairs[:3], np.full(count, False)), tuple(pairs[3])
+    clock: LateralReset = fusion.lateral_reset
     found = [bool(np.all(clock(STEP, 20.0, verdict, usable))) for _ in range(AFTER)]
     assert any(found) is expected
 
 
 def test_evidence_with_a_gap_starts_over() -> None:
-    clock = VelocityFusion(CAR, STEP).adrift
+    clock = VelocityFusion(CAR, STEP).lateral_reset
     for _ in range(3):
         assert not any(clock(STEP, 20.0, CALM, (True, True)) for _ in range(int(0.9 * SETTINGS.lost_time / STEP)))
         assert not clock(STEP, 20.0, CALM._replace(used=(True, True)), (True, True))
     saved = VelocityFusion(CAR, STEP)
     for _ in range(150):
         clock(STEP, 20.0, CALM, (True, True))
-    saved.adrift.restore(clock.save())
-    assert saved.adrift.astray == clock.astray > 0.7
+    saved.lateral_reset.restore(clock.save())
+    assert saved.lateral_reset.contradicted == clock.contradicted > 0.7

@@ -10,14 +10,12 @@ inertial signal that is missing is held for a while, and then counts as zero: he
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import NamedTuple
 
-from estimators.arrays import AnyArray
+from estimators.arithmetic import Number, Signals, arithmetic
 from estimators.faults import Flag
+from estimators.memory import CarsMemory
 from estimators.signals import limits
-from estimators.signals.memory import Memory
-from estimators.velocity.arithmetic import Number, Signals, arithmetic, kept_signals
 from estimators.velocity.fusion_settings import FusionSettings
 
 _LONGEST_RUN = 40.0  # samples a signal may repeat before it counts as stale; its noise grows no further
@@ -25,7 +23,7 @@ _MISSING_INPUT, _OUT_OF_RANGE = int(Flag.MISSING_INPUT), int(Flag.PARAMETER_OUT_
 _MISSING, _STALE = int(Flag.MISSING_MEASUREMENT), int(Flag.STALE_MEASUREMENT)
 
 
-class Screened(NamedTuple):
+class ConditionedInputs(NamedTuple):
     """Three inertial signals a_x, a_y, r, or four wheels."""
 
     inertial: Signals
@@ -43,10 +41,10 @@ class Screened(NamedTuple):
     wheel_flags: Signals
 
 
-class FusionScreen(Memory):
+class FusionInputs(CarsMemory):
     """Remembers the last good values of `count` cars."""
 
-    memory = ("inertial", "run", "wheel_speed", "age", "steer", "slope", "swing", "slip_left")
+    memory = ("inertial", "run", "wheel_speed", "age", "steer", "slope", "yaw_acceleration", "slip_left")
     unknowns = ("wheel_speed",)
 
     def __init__(self, radius: Signals, settings: FusionSettings, count: int) -> None:
@@ -62,26 +60,9 @@ class FusionScreen(Memory):
         # of the wheels: s since each last said something new, filtered derivative rad/s^2, s of high slip still believed
         wheels = kit.each(lambda v: (v + zero, v + zero, v + zero, v + zero, v + zero + math.nan), four)
         self.steer, self.age, self.slope, self.slip_left, self.wheel_speed = wheels
-        self.swing: Number = zero  # filtered yaw acceleration, rad/s^2
+        self.yaw_acceleration: Number = zero  # filtered yaw acceleration, rad/s^2
 
-    def _take(self, saved: Mapping[str, AnyArray]) -> None:
-        for name in self.memory:
-            if name == "swing":
-                self.swing = self.kit.own(saved[name].copy())
-            else:
-                setattr(self, name, kept_signals(saved[name], self.count == 1))
-
-    def forget(self, where: Number) -> None:
-        """Starts the cars `where` afresh."""
-        choose = self.kit.where
-        for name in self.memory:
-            nothing, value = math.nan if name in self.unknowns else 0.0, getattr(self, name)
-            if name == "swing":
-                self.swing = choose(where, 0.0, value)
-            else:
-                setattr(self, name, self.kit.each(lambda v, n=nothing: (choose(where, n, v),), value)[0])
-
-    def __call__(self, inertial: Signals, wheel_speed: Signals, steer: Signals, elapsed: Number) -> Screened:
+    def __call__(self, inertial: Signals, wheel_speed: Signals, steer: Signals, elapsed: Number) -> ConditionedInputs:
         """Raw signals, which may be anything; `elapsed` s, above zero."""
         kit, choose, no, some = self.kit, self.kit.where, self.kit.no, self.kit.some
         flags, blind, last = kit.full(0), kit.full(False), self.inertial[2]
@@ -105,7 +86,7 @@ class FusionScreen(Memory):
             (steer,) = kit.each(lambda good, angle, old: (choose(good, angle, old),), turned, steer, self.steer)
         self.steer = steer
         yaw_step = choose(knew & good[2], value[2] - last, 0.0) / elapsed
-        self.swing = self._smooth(self.swing, yaw_step, elapsed)
+        self.yaw_acceleration = self._smooth(self.yaw_acceleration, yaw_step, elapsed)
         self.inertial, self.run = value, run
 
         def wheel(new: Number, before: Number, age: Number, slope: Number, radius: Number) -> tuple[Number, ...]:
@@ -131,7 +112,7 @@ class FusionScreen(Memory):
         )
         wheels = (speed, fresh, gap, silent, self.steer)
         alive = good[0] & (run[0] < _LONGEST_RUN) & ((run[0] - 1.0) * elapsed < self.settings.slowest_unit)
-        return Screened(value, noise, *wheels, steered, present, alive, blind, flags, wheel_flags)
+        return ConditionedInputs(value, noise, *wheels, steered, present, alive, blind, flags, wheel_flags)
 
     def slipping(self, acceleration: Signals, fresh: Signals, elapsed: Number, doubt: Number) -> Signals:
         """Fresh wheels whose surface leaves the car, |R w' - a| too large, now or within the hold time.

@@ -1,4 +1,6 @@
-"""Is the estimate itself lost? Slip and a wrong estimate look alike: every wheel is far from the prediction.
+"""Consistency resets: an estimate that the wheels or the axles contradict for long starts again from them.
+
+**V_x.** Is the estimate itself lost? Slip and a wrong estimate look alike: every wheel is far from the prediction.
 
 They differ in what the wheels do. Wheels that roll agree with each other, gain the speed that the accelerometer says, and
 need no force; a wheel that slips far carries the friction of the road, on the side to which it slips. So an estimate is
@@ -9,29 +11,36 @@ explain the side to which they are off (beyond `unloaded`): four wheels may well
 
 A wheel that does not turn has no vote: four locked wheels agree as well, and are no evidence of anything. A car that
 stands beyond doubt for `lost_time` while its estimate moves is lost too; a sliding car decelerates.
+
+**V_y.** Is V_y lost? After a slide the axle conditions may stay gated for good: they are far from a V_y that is wrong.
+
+An axle that carries no side force does not slip far sideways, on any road. So V_y is lost when, for `lost_time`, both
+axles roll, both need less than `unloaded` of friction, both are gated, and both see V_y off by the same: then it starts
+again from what they see. What is known of sensors and tires stays.
 """
 
 from __future__ import annotations
 
-from estimators.velocity.arithmetic import Number, Signals, arithmetic
-from estimators.velocity.cars_memory import CarsMemory
-from estimators.velocity.fusion_screen import Screened
+from estimators.arithmetic import Number, Signals, arithmetic
+from estimators.memory import CarsMemory
+from estimators.velocity.fusion_inputs import ConditionedInputs
 from estimators.velocity.fusion_settings import FusionSettings
-from estimators.velocity.longitudinal_fusion import WheelVerdict
+from estimators.velocity.lateral_fusion import AxleUpdate, LateralFusion
+from estimators.velocity.longitudinal_fusion import WheelUpdate
 
-_PATIENCE = 0.1  # pace of the clock where the force could explain the wheels
+_PATIENCE = 0.1  # rate of the clock where the force could explain the wheels
 _FAR = 1e9
 
 
-class FusionLost(CarsMemory):
+class LongitudinalReset(CarsMemory):
     """Counts how long the wheels of `count` cars have contradicted the estimate as rolling wheels do."""
 
-    memory = ("astray", "since", "apart", "supported")
+    memory = ("contradicted", "since", "apart", "supported")
 
     def __init__(self, settings: FusionSettings, count: int) -> None:
         self.settings, self.kit = settings, arithmetic((count,))
         zero = self.kit.full(0.0)
-        self.astray: Number = zero  # s that count
+        self.contradicted: Number = zero  # s that count
         self.since: Number = zero  # s since it began
         self.apart: Number = zero  # m/s between the wheels and the prediction when it began
         self.supported: Number = zero  # s of standstill, or of wheels that turned and were used
@@ -40,8 +49,8 @@ class FusionLost(CarsMemory):
         self,
         elapsed: Number,
         standing: Number,
-        seen: Screened,
-        wheel: WheelVerdict,
+        seen: ConditionedInputs,
+        wheel: WheelUpdate,
         slipping: Signals,
         mu: Signals,
         radius: Signals,
@@ -53,11 +62,11 @@ class FusionLost(CarsMemory):
             self.supported = self.supported + choose(standing | used[0] | used[1] | used[2] | used[3], elapsed, 0.0)
         news = seen.fresh[0] | seen.fresh[1] | seen.fresh[2] | seen.fresh[3]
         if not kit.some(wheel.gated[0] | wheel.gated[1] | wheel.gated[2] | wheel.gated[3]):
-            self.astray = choose(news, 0.0, self.astray)
+            self.contradicted = choose(news, 0.0, self.contradicted)
             return kit.full(False)
         turning, against = 0, kit.full(False)
         low, high, force, surface, gap = _FAR, -_FAR, 0.0, 0.0, 0.0
-        told = (
+        outputs = (
             seen.fresh,
             seen.silent,
             wheel.innovation,
@@ -68,7 +77,7 @@ class FusionLost(CarsMemory):
             seen.gap,
             radius,
         )
-        for fresh, silent, off, far, slips, own, w, age, R in zip(*told, strict=True):
+        for fresh, silent, off, far, slips, own, w, age, R in zip(*outputs, strict=True):
             turns = fresh & no(silent)
             turning = turning + choose(turns, 1, 0)
             against = against | (turns & (slips | no(far)))
@@ -76,13 +85,40 @@ class FusionLost(CarsMemory):
             force = force + choose(turns, own, 0.0)
             surface = kit.maximum(surface, choose(turns, R * abs(w), 0.0))
             gap = kit.maximum(gap, choose(turns, age, 0.0))
-        off, gap, begins = 0.5 * (high + low), kit.minimum(gap, s.error_memory), self.astray == 0.0
+        off, gap, begins = 0.5 * (high + low), kit.minimum(gap, s.error_memory), self.contradicted == 0.0
         apart, since = choose(begins, off, self.apart), choose(begins, 0.0, self.since) + gap
         rolls = high - low <= s.agreement * surface + s.dead_speed
         rolls = rolls & (abs(off - apart) <= s.dead_speed + s.rolling * since)
         explained = (force * kit.sign(off) > s.unloaded * turning) & (self.supported >= s.lost_time)
-        time = self.astray + gap * choose(explained, _PATIENCE, 1.0)
-        astray = choose((turning >= 2) & no(against) & rolls, time, 0.0)
-        self.astray = choose(news, astray, self.astray)
+        time = self.contradicted + gap * choose(explained, _PATIENCE, 1.0)
+        contradicted = choose((turning >= 2) & no(against) & rolls, time, 0.0)
+        self.contradicted = choose(news, contradicted, self.contradicted)
         self.since, self.apart = choose(news, since, self.since), choose(news, apart, self.apart)
-        return self.astray > s.lost_time
+        return self.contradicted > s.lost_time
+
+
+class LateralReset(CarsMemory):
+    """Counts how long unloaded axles have contradicted V_y of `count` cars."""
+
+    memory = ("contradicted",)
+
+    def __init__(self, settings: FusionSettings, across: LateralFusion, count: int) -> None:
+        self.settings, self.across, self.kit = settings, across, arithmetic((count,))
+        self.contradicted: Number = self.kit.full(0.0)  # s
+
+    def __call__(self, elapsed: Number, speed: Number, axle: AxleUpdate, usable: Signals) -> Number:
+        """Sets V_y of the cars that are lost, and says which these are; `speed` V_x, `usable`: the axle does not slip."""
+        s, kit, (front, rear) = self.settings, self.kit, axle.innovation
+        gated = usable[0] & usable[1] & kit.no(axle.used[0] | axle.used[1])
+        if not kit.some(gated):
+            self.contradicted = kit.full(0.0)
+            return gated
+        calm = (abs(axle.friction[0]) < s.unloaded) & (abs(axle.friction[1]) < s.unloaded)
+        doubt = abs(speed) * (s.side_floor + 2.0 * s.side_compliance * s.unloaded) + s.slip_speed  # m/s, of either axle
+        contradicts = gated & calm & (abs(front - rear) <= doubt)
+        time = self.contradicted + kit.minimum(elapsed, s.error_memory)
+        lost = contradicts & (time > s.lost_time)
+        self.contradicted = kit.where(contradicts & kit.no(lost), time, 0.0)
+        if kit.some(lost):
+            self.across.filter.restart(lost, self.across.speed + 0.5 * (front + rear), doubt * doubt)
+        return lost

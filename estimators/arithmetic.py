@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from estimators.arguments import entries, number
 from estimators.arrays import AnyArray
-from estimators.signals.checks import entries, number
 
 Number = Any
 """A float, int or bool of one car, or an array of the batch shape."""
@@ -86,6 +86,10 @@ class Arithmetic:
         """The contrary of `rows`: (*shape, width), the groups side by side."""
         raise NotImplementedError
 
+    def replaced(self, where: Number, new: float, value: Any) -> Any:
+        """A number or signals with `new` for the cars `where`."""
+        raise NotImplementedError
+
 
 def _choose(condition: bool, yes: Any, otherwise: Any) -> Any:
     return yes if condition else otherwise
@@ -148,6 +152,12 @@ class OneCar(Arithmetic):
         array = np.array(list(chain.from_iterable(groups)))
         return array.reshape(*shape, -1) if shape else array
 
+    def replaced(self, where: Number, new: float, value: Any) -> Any:
+        """One number, or a list of them."""
+        if not isinstance(value, list | tuple):
+            return new if where else value
+        return [new] * len(value) if where else value
+
 
 class ManyCars(Arithmetic):
     """Arrays of `shape`."""
@@ -197,12 +207,11 @@ class ManyCars(Arithmetic):
         arrays = [group if isinstance(group, np.ndarray) else np.stack(group) for group in groups]
         return np.moveaxis(np.concatenate(arrays), 0, -1).reshape(*shape, -1)
 
+    def replaced(self, where: Number, new: float, value: Any) -> Any:
+        """The cars are the last axis."""
+        return np.where(where, new, value)
+
 
 def arithmetic(shape: tuple[int, ...]) -> Arithmetic:
     """Plain numbers for one car, arrays for more."""
     return OneCar() if math.prod(shape) == 1 else ManyCars(shape)
-
-
-def kept_signals(array: AnyArray, single: bool) -> Signals:
-    """Saved signals, of which the first axis counts the entries."""
-    return array.reshape(len(array)).tolist() if single else array.copy()

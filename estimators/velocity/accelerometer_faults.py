@@ -1,4 +1,6 @@
-"""Which acceleration moves the car: the one that is measured, or the one that the tire forces make?
+"""Accelerometer fault detection: by the tire forces, and by the side to which wheels slip.
+
+**Forces.** Which acceleration moves the car: the one that is measured, or the one that the tire forces make?
 
     a_F = g (s_f mu_f + s_r mu_r)/(1 + (h/L)(mu_f - mu_r)),      mu = F_x/F_z, mean of an axle, s its static load share
 
@@ -8,12 +10,20 @@ is wrong; the wheels decide: the middle of their surface accelerations follows t
 
     believed   a_x                    as long as it is there, alive and within `thrust_floor` + `thrust_linear` |a_F| of a_F
     pending    a_x, as unsure as the two are apart, until the wheels side with one of them
-    doubted    a_F, if the wheels side with it, or a_x is missing, frozen or disproved (`fusion_against`)
+    doubted    a_F, if the wheels side with it, or a_x is missing, frozen or disproved (slip direction)
     blind      what the wheels gain, +-`unseen_acceleration`, if the forces are not known either
 
 Reading a_F, the filter stays as sure as the forces are, unless the wheels leave to a side to which these cannot make them
 slip. An error of this kind stays: its deviation s counts (2 j - 1) s^2 in the j-th sample, up to `error_memory`. Nothing
 that is not believed teaches bias, scale or grade.
+
+**Slip direction.** Do all wheels slip against their force? Friction opposes slip, so no tire does: then the estimate is wrong.
+
+A braked wheel is never faster than the road, a driven one never slower. Which side is possible is known only where the
+wheel uses some friction (`unloaded`). When all wheels that turn, three at least, are off to the impossible side by more
+than the uncertainty of the estimate, their noise and their radii allow, it is a_x that has brought the estimate there:
+for `lost_time` it counts as missing, and forces or wheels take its place. This needs no torques: where
+these are unknown, forces are shares of a_x, and an a_x that points to the wrong side is found out all the same.
 """
 
 from __future__ import annotations
@@ -21,18 +31,18 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from estimators.arithmetic import Number, Signals, arithmetic
+from estimators.memory import CarsMemory
 from estimators.signals import limits
 from estimators.vehicle import GRAVITY, VehicleParameters
-from estimators.velocity.arithmetic import Number, Signals, arithmetic
-from estimators.velocity.cars_memory import CarsMemory
-from estimators.velocity.fusion_screen import Screened
-from estimators.velocity.longitudinal_fusion import BIAS, SCALE, LongitudinalFusion
+from estimators.velocity.fusion_inputs import ConditionedInputs
+from estimators.velocity.longitudinal_fusion import BIAS, SCALE, SLIP, SPEED, LongitudinalFusion
 
-STRONGEST = limits.FRICTION * GRAVITY  # m/s^2 of a car on its tires
+LARGEST_ACCELERATION = limits.FRICTION * GRAVITY  # m/s^2 of a car on its tires
 _UNDECIDED, _FORCES, _UNIT = 0.45, 0.35, 0.5  # how far from a_F towards a_x the wheels are: neither, with a_F, with a_x
 
 
-class Thrust(NamedTuple):
+class Acceleration(NamedTuple):
     """What moves the car over this sample."""
 
     reading: Number  # m/s^2, as a_x with its bias and scale error would read
@@ -43,7 +53,7 @@ class Thrust(NamedTuple):
     mu: Signals  # F_x/F_z of the wheels, of a size that a tire can have; shares of a_x where unknown
 
 
-class FusionThrust(CarsMemory):
+class AccelerationSource(CarsMemory):
     """Remembers how far a_x, forces and wheels of `count` cars are apart."""
 
     memory = ("gap", "apart", "since")
@@ -59,8 +69,8 @@ class FusionThrust(CarsMemory):
         self.since: Number = self._zero  # s since it began
 
     def __call__(
-        self, elapsed: Number, seen: Screened, given: Signals | None, slope: Signals, disproved: Number
-    ) -> Thrust:
+        self, elapsed: Number, seen: ConditionedInputs, given: Signals | None, slope: Signals, disproved: Number
+    ) -> Acceleration:
         """`given` F_x/F_z of the wheels, not finite where unknown, if any; `slope` of their speeds, rad/s^2.
 
         An a_x that is `disproved` counts as missing.
@@ -79,13 +89,13 @@ class FusionThrust(CarsMemory):
         wrong = kit.no(alive) | (abs(gap) > 0.5 * allowed)
         if not kit.some(wrong):
             self.since = self._zero
-            return Thrust(reading, noise, self._zero, self._never, self._never, mu)
+            return Acceleration(reading, noise, self._zero, self._never, self._never, mu)
 
         pulls = [R * rate for R, rate in zip(self.along.radius, slope, strict=True)]
         top, least = (pick(pick(pulls[0], pulls[1]), pick(pulls[2], pulls[3])) for pick in (kit.maximum, kit.minimum))
         middle = 0.5 * (sum(pulls) - top - least)
         recent = kit.minimum(kit.minimum(*seen.gap[:2]), kit.minimum(*seen.gap[2:])) < s.error_memory
-        middle = choose(recent, kit.maximum(kit.minimum(middle, STRONGEST), -STRONGEST), 0.0)
+        middle = choose(recent, kit.maximum(kit.minimum(middle, LARGEST_ACCELERATION), -LARGEST_ACCELERATION), 0.0)
         blind = kit.no(alive | known)
         votes = kit.no(alive) | (kit.minimum(abs(middle - force), abs(middle - unit)) < s.excess_acceleration)
         fresh = choose(alive, _UNDECIDED * gap, choose(known, 0.0, choose(disproved, middle, unit)))
@@ -103,12 +113,12 @@ class FusionThrust(CarsMemory):
         doubt = choose(with_force, 0.5 * allowed + 0.25 * abs(gap) + leaves, choose(pending, abs(gap), 0.0))
         doubt = choose(blind, s.unseen_acceleration, doubt)
         samples = kit.maximum(2.0 * self.since / elapsed - 1.0, 1.0)
-        told = (choose(blind, apart, force) + x[BIAS]) / (1.0 - x[SCALE])
-        told = choose(with_force | blind, told, reading)
+        outputs = (choose(blind, apart, force) + x[BIAS]) / (1.0 - x[SCALE])
+        outputs = choose(with_force | blind, outputs, reading)
         if kit.some(blind):
-            mu, _ = self._shares(given, told)
-        return Thrust(
-            told,
+            mu, _ = self._shares(given, outputs)
+        return Acceleration(
+            outputs,
             choose(doubt > 0.0, kit.maximum(doubt * kit.sqrt(samples), choose(alive, noise, 0.0)), noise),
             doubt,
             blind,
@@ -134,3 +144,41 @@ class FusionThrust(CarsMemory):
 
         mu, known = kit.each(limited, given)
         return mu, known[0] & known[1] & known[2] & known[3]
+
+
+_FAR = 1e9
+
+
+class SlipDirectionTest(CarsMemory):
+    """Remembers of `count` cars for how long a_x is not to be believed."""
+
+    memory = ("left",)
+
+    def __init__(self, along: LongitudinalFusion, count: int) -> None:
+        self.along, self.settings, self.kit = along, along.settings, arithmetic((count,))
+        self._zero = self.kit.full(0.0)
+        self.left: Number = self._zero  # s for which a_x is not believed
+
+    def __call__(self, elapsed: Number, seen: ConditionedInputs, innovation: Signals, mu: Signals) -> None:
+        """`innovation` of the wheels, m/s, from which slip as their forces `mu` make it has been taken."""
+        s, kit, choose, filter_ = self.settings, self.kit, self.kit.where, self.along.filter
+        speed = filter_.mean[SPEED]
+        usual, sure = abs(speed) * filter_.mean[SLIP], s.unloaded
+
+        def power(off: Number, force: Number) -> tuple[Number, ...]:
+            return ((off + usual * force) * force,)
+
+        (spent,) = kit.each(power, innovation, mu)  # by friction, per load: slip times force, never below zero
+        least = kit.minimum(kit.minimum(spent[0], spent[1]), kit.minimum(spent[2], spent[3]))
+        if not kit.some((least < -s.dead_speed * sure) | (self.left > 0.0)):
+            return
+        turning, least = 0, _FAR
+        for work, force, fresh, silent, age in zip(spent, mu, seen.fresh, seen.silent, seen.gap, strict=True):
+            turns = fresh & kit.no(silent) & (age < s.error_memory)  # one that repeats itself for longer is dead
+            turning = turning + choose(turns, 1, 0)
+            wrong = choose(abs(force) > sure, -work / kit.maximum(abs(force), sure), 0.0)  # m/s
+            least = kit.minimum(least, choose(turns, wrong, _FAR))
+        white = s.wheel_speed_noise * self.along.radius[0]
+        unsure = kit.sqrt(filter_.variance(SPEED) + white * white)
+        against = (turning >= 3) & (least > s.gate * unsure + s.agreement * abs(speed) + s.dead_speed)
+        self.left = choose(against, s.lost_time, kit.maximum(self.left - elapsed, 0.0))

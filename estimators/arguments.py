@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,16 +16,40 @@ LIMIT = 1e100  # a magnitude beyond it is treated as not finite: no physical qua
 _FEW, _SMALL = 6, 4096  # entries
 
 
+def numbers(value: npt.ArrayLike, what: str) -> FloatArray:
+    """`value` as float64.
+
+    Raises:
+        EstimatorError: not numbers.
+    """
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise EstimatorError(f"{what} is not an array of numbers: {error}") from error
+
+
+def broadcast(value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> FloatArray:
+    """`value` broadcast to `shape` (a read-only view).
+
+    Raises:
+        EstimatorError: names the shapes that do not fit.
+    """
+    array = numbers(value, what)
+    if array.shape == shape:
+        return array
+    try:
+        return np.broadcast_to(array, shape)
+    except ValueError as error:
+        raise EstimatorError(f"{what} has shape {array.shape}, expected {shape} or what broadcasts to it") from error
+
+
 def entries(value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> FloatArray:
     """`value` as float64 of `shape`; one number stands for all entries.
 
     Raises:
         EstimatorError: not numbers, or another shape.
     """
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise EstimatorError(f"{what} is not an array of numbers: {error}") from error
+    array = numbers(value, what)
     if array.shape == shape:
         return array
     if array.ndim == 0:
@@ -83,6 +109,34 @@ def quiet(value: FloatArray, limit: float = LIMIT) -> bool:
     return bool(np.minimum.reduce(value, None) >= -limit and np.maximum.reduce(value, None) <= limit)
 
 
+def diagonal_noise(value: npt.ArrayLike | None, default: tuple[float, ...], what: str, zero: bool) -> FloatArray:
+    """Variances of the states or channels as a diagonal matrix; `zero`: whether they may be zero.
+
+    Raises:
+        EstimatorError: another number of them, not finite, negative.
+    """
+    variances = numbers(default if value is None else value, what)
+    if variances.shape != (len(default),):
+        raise EstimatorError(f"{what} has shape {variances.shape}, expected {len(default)} variances")
+    good = np.isfinite(variances) & ((variances >= 0) if zero else (variances > 0))
+    if not good.all():
+        kind = "finite and not negative" if zero else "finite and positive"
+        raise EstimatorError(f"{what}[{int(np.argmin(good))}] = {variances[np.argmin(good)]:g} must be {kind}")
+    return np.diag(variances)
+
+
+def finite(value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> FloatArray:
+    """`broadcast` of finite numbers, for the state that a `reset` sets.
+
+    Raises:
+        EstimatorError: another shape, or not finite.
+    """
+    array = broadcast(value, shape, what)
+    if not bounded(array).all():
+        raise EstimatorError(f"{what} is not finite; reset to finite numbers")
+    return array
+
+
 def any_missing(missing: BoolArray, shape: tuple[int, ...]) -> BoolArray:
     """Which entries of `shape` miss any of their channels, all axes of `missing` beyond `shape`."""
     return np.asarray(missing.reshape(*shape, -1).any(axis=-1), dtype=np.bool_)
@@ -113,3 +167,19 @@ def setting(value: float, what: str, unit: str, low: float = 0.0, low_allowed: b
         bound = "at least" if low_allowed else "above"
         raise EstimatorError(f"{what} = {number:g} {unit} must be finite and {bound} {low:g} {unit}")
     return number
+
+
+def positive_fields(settings: Any, what: str) -> None:
+    """Every field of a dataclass is a finite number above zero.
+
+    Raises:
+        EstimatorError: names all that are not.
+    """
+    values = {entry.name: getattr(settings, entry.name) for entry in fields(settings)}
+    bad = [
+        f"{name} = {value!r}"
+        for name, value in values.items()
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf
+    ]
+    if bad:
+        raise EstimatorError(f"{what} must be finite and above zero: {', '.join(bad)}")

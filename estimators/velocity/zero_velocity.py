@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from estimators.velocity.arithmetic import Number, Signals, arithmetic
-from estimators.velocity.cars_memory import CarsMemory
-from estimators.velocity.fusion_screen import Screened
+from estimators.arithmetic import Number, Signals, arithmetic
+from estimators.memory import CarsMemory
+from estimators.velocity.fusion_inputs import ConditionedInputs
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.lateral_fusion import YAW_BIAS, LateralFusion
 from estimators.velocity.longitudinal_fusion import SPEED, LongitudinalFusion
 
 
-class FusionStanding(CarsMemory):
+class ZeroVelocityDetector(CarsMemory):
     """Counts how long `count` cars have been calm; the two filters say how calm is calm."""
 
     memory = ("calm",)
@@ -21,7 +21,7 @@ class FusionStanding(CarsMemory):
         self._zero, self._never = self.kit.full(0.0), self.kit.full(False)
         self.calm: Number = self._zero  # s of silent wheels and calm body
 
-    def __call__(self, seen: Screened, ax: Number, turn: Number, elapsed: Number) -> tuple[Number, Number]:
+    def __call__(self, seen: ConditionedInputs, ax: Number, turn: Number, elapsed: Number) -> tuple[Number, Number]:
         """Whether the car stands; and whether it does for so long that an estimate which moves must be lost."""
         s, kit, silent = self.settings, self.kit, seen.silent
         if not kit.some(silent[0] | silent[1] | silent[2] | silent[3]):
