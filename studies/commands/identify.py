@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from studies.commands.progress import progress_bar
-from studies.drives.output import check_folder
+from studies.execution.files import check_folder
 from studies.identify.identify import identify_drive
 from studies.identify.result import HEADER, content, rows, warnings
 from studies.identify.write import write_identification

@@ -11,17 +11,17 @@ from rich.console import Console
 from rich.table import Table
 
 from studies.commands.progress import progress_bar
+from studies.execution.cluster import Cluster
+from studies.execution.files import write_bytes
+from studies.execution.processes import Executor
 from studies.sweeps.baseline import Baseline, of_sweep, read_baseline, write_baseline
-from studies.sweeps.cluster import Cluster
 from studies.sweeps.engine import SweepResult, default_executor
 from studies.sweeps.engine import run_sweep as run
-from studies.sweeps.executors import Executor
 from studies.sweeps.figures import number
 from studies.sweeps.gate import Judged, comparable, judge, loss_text
 from studies.sweeps.reports import junit as junit_xml
 from studies.sweeps.reports import markdown
 from studies.sweeps.spec import load_sweep
-from studies.sweeps.store import write_whole
 from synthesis.errors import SpecError
 
 DONE, SHRUNK, REFUSED = 0, 1, 2
@@ -60,14 +60,14 @@ def run_sweep(
         bar.update(task, description="drawing", refresh=True)
         pictures = _draw(result, before, judged)
     report = markdown(result.summary, judged, pictures)
-    write_whole(folder / "report.md", report.encode())
+    write_bytes(folder / "report.md", report.encode())
     for path, data in (
         (junit, junit_xml(sweep.name, result.summary, judged)),
         (summary, markdown(result.summary, judged).encode()),
     ):
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(path, data)
+            write_bytes(path, data)
     if as_json:
         print(json.dumps(_content(result, judged), indent=1, allow_nan=False))
     else:

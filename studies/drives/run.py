@@ -14,11 +14,11 @@ from studies.drives.corner_observers import corner_observer
 from studies.drives.drive_file import read_drive
 from studies.drives.judge import DriveData, judge
 from studies.drives.log import read_log
-from studies.drives.output import check_folder, ready_folder, whole_file, write_csv, write_json
 from studies.drives.prepare import corner_inputs_of
 from studies.drives.quantities import CORNERS
 from studies.drives.replay import replay
 from studies.drives.schedules import check_radii, load_schedule
+from studies.execution.files import check_folder, ready_folder, whole_file, write_csv, write_json
 
 Progress = Callable[[float], None]
 

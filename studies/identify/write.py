@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from studies.drives.output import ready_folder, whole_file, write_json
+from studies.execution.files import ready_folder, whole_file, write_json
 from studies.identify.identify import Identification
 from studies.identify.parameter_file import parameter_file
 from studies.identify.result import content

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from studies.claim import JsonValue, Verdict
-from studies.running.record import PAPERS, paper_rank
+from studies.parts.record import PAPERS, paper_rank
 
 MARKS = {
     Verdict.REPRODUCED: "✓",

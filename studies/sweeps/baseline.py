@@ -10,8 +10,8 @@ from typing import Any
 
 from pydantic import Field
 
+from studies.execution.files import write_bytes
 from studies.sweeps.figures import Figure, Summary
-from studies.sweeps.store import write_whole
 from studies.sweeps.strict import Strict, read_table
 from studies.sweeps.sweep import Sweep
 from studies.sweeps.versions import versions
@@ -89,7 +89,7 @@ def write_baseline(path: Path, baseline: Baseline) -> None:
             lines += ["", f'[figures."{subject}"]']
         lines.append(f'"{_name(figure)}" = {_figure(figure)}')
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, ("\n".join(lines) + "\n").encode())
+    write_bytes(path, ("\n".join(lines) + "\n").encode(), sync=True)
 
 
 def read_baseline(path: Path) -> Baseline:

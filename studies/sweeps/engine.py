@@ -7,16 +7,19 @@ from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from itertools import chain
-from os import cpu_count
 from pathlib import Path
 
-from studies.sweeps.executors import Executor, Processes, Serial
+from studies.execution.files import json_bytes, write_bytes
+from studies.execution.processes import Executor, Processes, Serial, available_cores
 from studies.sweeps.figures import Summary
 from studies.sweeps.reports import markdown
-from studies.sweeps.store import SUMMARY, SweepFolder, json_bytes, locked_folder, write_whole
+from studies.sweeps.store import SUMMARY, SweepFolder, locked_folder
 from studies.sweeps.summary import summarise
 from studies.sweeps.sweep import Chunk, Sweep
+from studies.sweeps.tables import compute
+from synthesis.errors import SpecError
 
+IN_FLIGHT = 3  # chunks a worker has waiting: results are never held in numbers
 Progress = Callable[[int, int], None]
 
 
@@ -53,16 +56,16 @@ def run_sweep(
         summary_file = out / SUMMARY
         if computed or not summary_file.exists():
             summary = summarise(folder)
-            write_whole(out / "summary.md", markdown(summary).encode())
-            write_whole(summary_file, json_bytes(summary.content()))
+            write_bytes(out / "summary.md", markdown(summary).encode(), sync=True)
+            write_bytes(summary_file, json_bytes(summary.content()), sync=True)
         summary = Summary.of_content(json.loads(summary_file.read_text(encoding="utf-8")))
         return SweepResult(sweep, folder, summary, computed, seconds, reason)
 
 
 def default_executor(workers: int | None = None) -> Executor:
     """As many processes as there are cores, or as asked; one computes in this process."""
-    count = workers or cpu_count() or 1
-    return Serial() if count == 1 else Processes(count)
+    count = workers or available_cores()
+    return Serial() if count == 1 else Processes(count, IN_FLIGHT)
 
 
 def _fill(folder: SweepFolder, executor: Executor, progress: Progress | None) -> tuple[int, float, str]:
@@ -83,8 +86,14 @@ def _fill(folder: SweepFolder, executor: Executor, progress: Progress | None) ->
         return 0, 0.0, ""
     for measure in folder.sweep.measures:
         measure.prepare()
-    with closing(executor.run(folder.sweep, chain([first], left))) as results:
-        for result in results:
+    with closing(executor.run(compute, folder.sweep, chain([first], left))) as results:
+        for finished in results:
+            if finished.death:
+                raise SpecError(
+                    "a worker process was killed (out of memory?); finished chunks are kept: use fewer --workers or a "
+                    "smaller chunk, and continue with --resume"
+                )
+            result = finished.value
             folder.keep(result)
             done, seconds, reason = done + 1, seconds + result.seconds, reason or result.first_reason
             if progress is not None:

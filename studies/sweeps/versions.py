@@ -1,39 +1,23 @@
-"""What made a result: versions of the packages that compute, and a digest of our own code."""
+"""What made a result: versions of the packages that compute, and a fingerprint of our own code."""
 
 from __future__ import annotations
 
-import hashlib
 import platform
-from functools import lru_cache
-from importlib import resources
+from functools import cache
 from importlib.metadata import version
-from pathlib import Path
 
-PACKAGES = (
-    "analysis",
-    "estimators",
-    "studies.drives",
-    "studies.experiments",
-    "studies.sweeps",
-    "studies.truth",
-    "synthesis",
-)
+from studies.execution.fingerprint import Sources
+
+ROOTS = ("studies.sweeps.engine", "studies.sweeps.spec")  # all that a measure of a sweep file may use
 OTHERS = ("gainsmith", "numpy", "scipy", "sympy", "pyarrow")
 
 
-@lru_cache(maxsize=1)
+@cache
 def versions() -> dict[str, str]:
-    """By name; `code` is a digest of every module that a measure may use, so that an edit is never taken for a repeat."""
-    digest = hashlib.sha256()
-    for package in PACKAGES:
-        root = Path(str(resources.files(package)))
-        for path in sorted(root.rglob("*.py")):
-            digest.update(str(path.relative_to(root)).encode())
-            digest.update(path.read_bytes())
-    found = {name: version(name) for name in OTHERS}
+    """By name; `code` covers every module that a measure of a file may use, so that an edit is never taken for a repeat."""
     return {
-        "code": digest.hexdigest()[:16],
+        "code": Sources().fingerprint(None, ROOTS)[:16],
         "python": platform.python_version(),
         "machine": platform.machine(),
-        **found,
+        **{name: version(name) for name in OTHERS},
     }

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from estimators.vehicle import CORNERS, VehicleParameters
-from studies.drives.output import ready_folder, whole_file, write_csv
 from studies.drives.quantities import REFERENCES, SIGNALS
+from studies.execution.files import ready_folder, whole_file, write_csv
 from studies.truth.measure import Measured
 from synthesis.errors import SpecError
 

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import sys
-import threading
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import fields, replace
 from typing import Any
 from zlib import crc32
@@ -14,6 +10,7 @@ from zlib import crc32
 import numpy as np
 
 from estimators.vehicle import VehicleParameters
+from studies.execution.processes import in_order
 from studies.truth.course import Course
 from studies.truth.record import Truth
 from studies.truth.simulate import simulate
@@ -56,9 +53,7 @@ def simulate_in_processes(
     rows = [range(k * len(courses) // parts, (k + 1) * len(courses) // parts) for k in range(parts)]
     longest = max(c.duration for c in courses)
     work = [([courses[k] for k in r], [vehicles[k] for k in r], {**options, "until": longest}) for r in rows]
-    forks = sys.platform == "linux" and threading.active_count() == 1
-    with ProcessPoolExecutor(parts, mp_context=multiprocessing.get_context("fork" if forks else "spawn")) as pool:
-        done = list(pool.map(_work, work))
+    done = list(in_order(_work, work, parts))
     merged = {name: np.concatenate([part.signals[name] for part in done]) for name in done[0].signals}
     names = tuple(name for part in done for name in part.names)
     tires = tuple(tire for part in done for tire in part.tires)

@@ -14,9 +14,9 @@ from typing import Any
 
 import pytest
 
+from studies.execution.processes import Processes, Serial
 from studies.sweeps.engine import run_sweep
 from studies.sweeps.evaluate import VALID, evaluate_chunk
-from studies.sweeps.executors import Processes, Serial
 from studies.sweeps.spec import build_sweep
 from studies.sweeps.summary import summarise
 from studies.sweeps.sweep import Sweep

@@ -10,7 +10,7 @@ import pytest
 from studies.papers.claims_file import published_claims
 from studies.papers.corner_estimation.inputs import PACKAGE
 from studies.papers.corner_estimation.study import CLAIMS, STUDY
-from studies.running.drawing import drawing_style
+from studies.plots.save import drawing_style
 from studies.study import QUICK, PartResult
 from tests.unit.p1_findings import PRINT, finding
 from tests.unit.study_checks import check_result, check_study, desk_parts

@@ -11,7 +11,7 @@ from studies.papers.claims_file import published_claims
 from studies.papers.longitudinal_speed.inputs import PACKAGE, accelerating
 from studies.papers.longitudinal_speed.study import CLAIMS, STUDY
 from studies.papers.longitudinal_speed.unknown_start import both_tests
-from studies.running.drawing import drawing_style
+from studies.plots.save import drawing_style
 from studies.study import QUICK, PartResult
 from tests.unit.p2_findings import finding
 from tests.unit.study_checks import check_result, check_study, desk_parts

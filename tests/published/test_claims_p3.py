@@ -20,7 +20,7 @@ from scipy.linalg import expm
 from studies.claim import Claim, Verdict
 from studies.papers.claims_file import published_claims
 from studies.papers.resilient_velocity.study import PACKAGE, STUDY
-from studies.running.drawing import drawing_style
+from studies.plots.save import drawing_style
 from studies.study import QUICK
 from tests.unit.study_checks import desk_parts
 

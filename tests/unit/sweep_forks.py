@@ -22,9 +22,9 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from studies.cli import main as command
-from studies.sweeps import executors
+from studies.execution.processes import Executor, Processes, Serial
+from studies.sweeps import engine
 from studies.sweeps.engine import run_sweep
-from studies.sweeps.executors import Executor, Processes, Serial
 from studies.sweeps.spec import load_sweep
 from studies.sweeps.sweep import Sweep
 from studies.sweeps.tables import compute
@@ -55,7 +55,7 @@ def full_disk(spec: str, out: Path, limit: int) -> tuple[int, str]:
 
 
 def dead_worker(whole: Sweep, out: Path) -> str:
-    executors.compute = lambda *_: os._exit(9)
+    engine.compute = lambda *_: os._exit(9)
     try:
         run_sweep(whole, out, Processes(2))
     except SpecError as error:
@@ -111,7 +111,7 @@ def main(out: Path, spec: str) -> None:
         run_sweep(whole, out / f"workers{workers}", Processes(workers))
     largest = max(path.stat().st_size for path in (out / "serial" / "rows").rglob("*.parquet"))
     told["full"] = in_child(lambda: full_disk(spec, out / "full", largest - 1))
-    told["left"] = [path.name for path in (out / "full").rglob("*.part")]
+    told["left"] = [path.name for path in (out / "full").rglob(".unfinished-*")]
     run_sweep(whole, out / "full", Serial(), resume=True)
     told["dead"] = in_child(lambda: dead_worker(whole, out / "dead"))
     run_sweep(many, out / "straight", Serial())

@@ -32,8 +32,8 @@ from studies.beyond.drop_tolerance.prediction import (
 from studies.beyond.drop_tolerance.questions import questions
 from studies.beyond.drop_tolerance.study import STUDY
 from studies.beyond.drop_tolerance.trial import run_trial
+from studies.plots.save import drawing_style
 from studies.registry import load_study
-from studies.running.drawing import drawing_style
 from studies.study import QUICK
 from synthesis.lmi.result import Verdict
 

@@ -16,10 +16,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from studies.cli import main
-from studies.sweeps import cluster as cluster_module
-from studies.sweeps.cluster import Cluster
+from studies.execution import cluster as cluster_module
+from studies.execution.cluster import Cluster
+from studies.execution.processes import Serial
 from studies.sweeps.engine import run_sweep
-from studies.sweeps.executors import Serial
 from studies.sweeps.sweep import Sweep
 from synthesis.errors import SpecError
 from tests.unit.sweep_cases import contents, many_chunks

@@ -21,15 +21,14 @@ from studies.drives.metrics import deviation
 from studies.drives.prepare import CornerInputs, corner_inputs_of
 from studies.drives.replay import replay
 from studies.drives.run import replay_drive
+from studies.execution.processes import Finished, Serial
 from studies.experiments.sensors import TEST_CAR
 from studies.sweeps.engine import run_sweep
-from studies.sweeps.executors import Serial
 from studies.sweeps.measure import Measure
 from studies.sweeps.spec import MEASURES, build_sweep
 from studies.sweeps.strict import read_table
 from studies.sweeps.subject import Batch, Subject
 from studies.sweeps.subject_spec import SubjectSpec
-from studies.sweeps.tables import compute
 from studies.truth import draw, drive, load_manoeuvre, write_drive
 from synthesis.errors import SpecError
 from tests.drives.synthetic_drive import DRIVE, TORQUES, columns, write_log
@@ -195,9 +194,9 @@ def test_workers_are_given_the_drive_and_the_bytes_are_the_same(
     assert worst is not None and abs(worst.at["effective_radius"] / 0.33 - 1.0) == pytest.approx(0.05)
 
     class Elsewhere:
-        def run(self, given: Any, chunks: Any) -> Any:
+        def run(self, function: Any, given: Any, chunks: Any) -> Any:
             sent = pickle.loads(pickle.dumps(given))
-            return (compute(sent, chunk) for chunk in reversed(list(chunks)))
+            return (Finished(chunk, function(sent, chunk)) for chunk in reversed(list(chunks)))
 
     run_sweep(whole, tmp_path / "there", Elsewhere())
     assert contents(tmp_path / "there") == contents(tmp_path / "here") and len(counted) == 1

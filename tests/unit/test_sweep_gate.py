@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from estimators.schedule import SHIPPED, read_content, write_content
+from studies.execution.processes import Serial
 from studies.sweeps.baseline import Baseline, of_sweep, read_baseline, write_baseline
 from studies.sweeps.engine import run_sweep
-from studies.sweeps.executors import Serial
 from studies.sweeps.figures import UNPROVED, Summary
 from studies.sweeps.gate import Judged, judge
 from studies.sweeps.reports import junit, markdown

@@ -229,8 +229,8 @@ GAIN = np.array([[4.0, 0.1], [2.0, 5.0], [3.0, -0.2]])
 
 def test_a_models_own_sweep_over_two_scheduling_parameters(tmp_path: Path) -> None:
     """Three states, two outputs, two parameters: nothing is made for the corner models alone."""
+    from studies.execution.processes import Serial
     from studies.sweeps.engine import run_sweep
-    from studies.sweeps.executors import Serial
 
     own = model_subject("mass", MASS, GAIN, 0.01)
     channel = {"disturbances": ["force"], "errors": ["position"]}

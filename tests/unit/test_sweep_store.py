@@ -12,11 +12,10 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
+from studies.execution.processes import Finished, Serial
 from studies.sweeps.engine import run_sweep
-from studies.sweeps.executors import Serial
 from studies.sweeps.store import locked_folder
 from studies.sweeps.sweep import Sweep
-from studies.sweeps.tables import compute
 from synthesis.errors import SpecError
 from tests.unit.sweep_cases import contents, sweep
 
@@ -52,8 +51,8 @@ def done(whole: Sweep, tmp_path_factory: pytest.TempPathFactory) -> dict[str, by
 class Backwards:
     """The last chunk first, every chunk computed twice: what a cluster that loses results may do."""
 
-    def run(self, whole: Sweep, chunks: Any) -> Any:
-        return (compute(whole, chunk) for chunk in reversed(list(chunks)) for _ in range(2))
+    def run(self, function: Any, whole: Sweep, chunks: Any) -> Any:
+        return (Finished(chunk, function(whole, chunk)) for chunk in reversed(list(chunks)) for _ in range(2))
 
 
 def test_same_bytes_in_any_order(whole: Sweep, done: dict[str, bytes], tmp_path: Path) -> None:
@@ -115,7 +114,7 @@ def test_a_cut_chunk_is_computed_again_and_nothing_else(whole: Sweep, done: dict
     files = sorted(tmp_path.glob("rows/*/*/*.parquet"))
     files[2].write_bytes(files[2].read_bytes()[:-30])
     files[5].unlink()
-    (tmp_path / "rows" / ".left.part").write_bytes(b"half")
+    (tmp_path / "rows" / ".unfinished-abc.parquet").write_bytes(b"half")
     assert run_sweep(whole, tmp_path, Serial(), resume=True).computed == 2
     assert contents(tmp_path) == done
     assert run_sweep(whole, tmp_path, Serial(), resume=True).computed == 0
@@ -158,7 +157,7 @@ def test_two_runs_on_one_folder(whole: Sweep, tmp_path: Path) -> None:
         "print('held', flush=True); input()"
     )
     holder = subprocess.Popen(
-        [sys.executable, "-S", "-c", code, tmp_path / "lock"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [sys.executable, "-S", "-c", code, tmp_path / ".lock"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     assert holder.stdout is not None and holder.stdout.readline() == "held\n"
     with pytest.raises(SpecError, match="another sweep is writing"):

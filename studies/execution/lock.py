@@ -14,8 +14,8 @@ NAME = ".lock"
 
 
 @contextmanager
-def only_run(folder: Path) -> Iterator[None]:
-    """Hold ``folder`` for this process; SpecError when another process holds it.
+def only_run(folder: Path, busy: str = "another run writes here (process {holder})") -> Iterator[None]:
+    """Hold ``folder`` for this process; SpecError with the sentence ``busy`` when another process holds it.
 
     A record lock belongs to the process: the system takes it back however the process ends, and forked workers do not
     inherit it.
@@ -23,12 +23,10 @@ def only_run(folder: Path) -> Iterator[None]:
     with (folder / NAME).open("a+", encoding="ascii") as file:
         try:
             fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
+        except OSError as error:
             file.seek(0)
-            holder = file.read().strip() or "unknown"
-            raise SpecError(
-                f"{folder}: another run writes here (process {holder}); wait for it or give another --out"
-            ) from error
+            words = busy.format(holder=file.read().strip() or "unknown")
+            raise SpecError(f"{folder}: {words}; wait for it or give another --out") from error
         file.seek(0)
         file.truncate()
         file.write(str(os.getpid()))

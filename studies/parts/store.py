@@ -1,22 +1,25 @@
-"""A part's result on disk: written whole, read back only when it belongs to the same sources and scope."""
+"""Parts and preparations on disk: written whole, read back only when they belong to the same sources and scope."""
 
 from __future__ import annotations
 
 import json
 import re
+import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from studies.claim import JsonValue
-from studies.running.drawing import save_drawing
-from studies.running.plain import plain
-from studies.running.whole_folder import sweep, whole_folder
-from studies.study import PartResult
+from studies.execution.files import json_bytes, whole_folder
+from studies.execution.plain import plain
+from studies.plots.save import save_drawing
+from studies.study import PartResult, Preparation, Scope
 
 FOLDER = ".parts"
 FILE = "part.json"
+PREPARED = ".prepared"  # no study can have this name
+MARK = "fingerprint"
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
@@ -44,7 +47,7 @@ def write_part(folder: Path, result: PartResult, fingerprint: str) -> None:
     with whole_folder(folder) as beside:
         for drawing in result.drawings:
             save_drawing(drawing, beside)
-        (beside / FILE).write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        (beside / FILE).write_bytes(json_bytes(content))
 
 
 def content_of(result: PartResult, fingerprint: str) -> dict[str, Any]:
@@ -86,9 +89,29 @@ def read_part(folder: Path, fingerprint: str) -> StoredPart | None:
     return stored if all((folder / name).is_file() for name in names) else None
 
 
-def sweep_parts(out: Path, study: str) -> None:
-    """Remove what killed runs left unfinished among the parts of ``study``."""
-    sweep(out / FOLDER / study)
+def prepared_root(out: Path) -> Path:
+    """The folder that a part finds as ``scope.prepared``."""
+    return out / FOLDER / PREPARED
+
+
+def is_prepared(out: Path, name: str, fingerprint: str) -> bool:
+    """Whether the preparation is there and belongs to the same sources and scope."""
+    try:
+        return (prepared_root(out) / name / MARK).read_text(encoding="utf-8") == fingerprint
+    except (FileNotFoundError, NotADirectoryError, UnicodeDecodeError):
+        return False
+
+
+def prepare(preparation: Preparation, out: Path, scope: Scope, fingerprint: str) -> None:
+    """Run the preparation and store what it writes, whole or not at all."""
+    with whole_folder(prepared_root(out) / preparation.name) as beside:
+        preparation.run(scope, beside)
+        (beside / MARK).write_text(fingerprint, encoding="utf-8")
+
+
+def discard_prepared(out: Path) -> None:
+    """Remove all preparations: once every part is stored nobody reads them, and they are large."""
+    shutil.rmtree(prepared_root(out), ignore_errors=True)
 
 
 def check_names(what: str, names: Sequence[str]) -> None:

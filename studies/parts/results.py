@@ -10,10 +10,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from studies.claim import JsonValue
-from studies.drives.output import whole_file
-from studies.running.record import StudyRecord
-from studies.running.whole_folder import whole_folder
+from studies.execution.files import json_bytes, whole_folder
+from studies.parts.record import StudyRecord
 from synthesis.errors import SpecError
 
 SCHEMA = "gainsmith.study/1"
@@ -33,7 +31,7 @@ def write_study(record: StudyRecord, out: Path) -> None:
                 for kind in ("svg", "png"):
                     name = f"{drawing['name']}.{kind}"
                     shutil.copyfile(stored.folder / name, folder / "figures" / name)
-        dump(folder / RESULT, result_content(record))
+        (folder / RESULT).write_bytes(json_bytes(result_content(record), 2))
 
 
 def result_content(record: StudyRecord) -> dict[str, Any]:
@@ -88,20 +86,9 @@ def read_result(folder: Path) -> dict[str, Any] | None:
     return content if isinstance(content, dict) and content.get("schema") == SCHEMA else None
 
 
-def write_claims(path: Path, claims: Sequence[dict[str, JsonValue]]) -> None:
-    """``claims.json``: the list of all claims."""
-    with whole_file(path) as beside:
-        dump(beside, list(claims))
-
-
 def write_table(path: Path, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
     """Comma-separated, full precision, what is missing an empty cell, truth values ``true`` and ``false`` as in JSON."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows([json.dumps(value) if isinstance(value, bool) else value for value in row] for row in rows)
-
-
-def dump(path: Path, content: Any) -> None:
-    """Strict JSON, two spaces a level, a line end at the end."""
-    path.write_text(json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")

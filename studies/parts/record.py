@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from studies.claim import JsonValue
+from studies.parts.marks import Marks
+from studies.parts.store import StoredPart, check_names, part_folder, read_part
 from studies.registry import Registry
-from studies.running.store import StoredPart, check_names, part_folder, read_part
 from studies.study import Preparation, Scope, Study
 from synthesis.errors import SpecError
 
@@ -56,24 +57,27 @@ class StudyRecord:
 
 
 def record_study(
-    study: Study, registry: Registry, out: Path, scope: Scope, mark: str, failures: Mapping[str, str]
+    study: Study, registry: Registry, out: Path, marks: Marks, failures: Mapping[tuple[str, str], str]
 ) -> StudyRecord:
-    """Read the parts of ``study`` with fingerprint ``mark`` from ``out``; ``failures`` are messages by part name.
+    """Read the parts of ``study`` with their fingerprints from ``out``; ``failures`` are messages by (study, part).
 
     A part whose table, figure or claim has a name that an earlier part uses is a failure, as one would hide the other.
     """
     taken: set[tuple[str, str]] = set()
     parts: list[PartRecord] = []
-    chosen = study.chosen(scope)
+    chosen = study.chosen(marks.scope)
     for part in chosen:
-        stored = None if part.name in failures else read_part(part_folder(out, study.id, part.name), mark)
-        failure = failures.get(part.name, "" if stored else "it has no stored result")
+        failure = failures.get((study.id, part.name), "")
+        stored = None if failure else read_part(part_folder(out, study.id, part.name), marks.part(part))
+        failure = failure or ("" if stored else "it has no stored result")
         if stored is not None:
             names = _names(stored)
             failure = ", ".join(f"{what} '{name}' is already there" for what, name in names if (what, name) in taken)
             taken |= set(names)
         parts.append(PartRecord(part.name, part.title, None if failure else stored, failure))
-    record = StudyRecord(study.id, study.title, study.paper, study.summary, scope, mark, tuple(parts))
+    record = StudyRecord(
+        study.id, study.title, study.paper, study.summary, marks.scope, marks.study(study.id), tuple(parts)
+    )
     found = {str(claim["id"]) for claim in record.claims}
     missing = tuple(name for name in registry.claim_ids(study.id) if name not in found)
     left_out = tuple(part.title for part in study.parts if part not in chosen)

@@ -1,4 +1,4 @@
-"""Chunks on a Dask cluster by the address of its scheduler."""
+"""Tasks on a Dask cluster by the address of its scheduler."""
 
 from __future__ import annotations
 
@@ -8,20 +8,19 @@ from collections.abc import Generator, Iterable
 from itertools import islice
 from typing import Any
 
-from studies.sweeps.executors import IN_FLIGHT
-from studies.sweeps.sweep import Chunk, Sweep
-from studies.sweeps.tables import Done, compute
+from studies.execution.processes import Finished, Function
 from synthesis.errors import SpecError
 
 ANSWER = 4.0  # s that a scheduler has to answer
 OTHERS = (TypeError, LookupError, EOFError, MemoryError, struct.error)  # what comes of reading what a stranger says
-RETRIES = 3  # times that a chunk is given to another worker after one was lost with it
+RETRIES = 3  # times that a task is given to another worker after one was lost with it
+IN_FLIGHT = 3  # tasks a thread has waiting: results are never held in numbers
 
 
 class Cluster:
     """Workers of a Dask scheduler; they need the same gainsmith installed, and no shared folder.
 
-    A worker that is lost gives its chunks to the others. Raises SpecError for an address that does not answer or has no workers.
+    A worker that is lost gives its tasks to the others. Raises SpecError for an address that does not answer or has no workers.
     """
 
     def __init__(self, address: str) -> None:
@@ -42,45 +41,41 @@ class Cluster:
         except OTHERS:
             raise SpecError(f"--scheduler {self.address}: something answers there that is no Dask scheduler") from None
 
-    def run(self, sweep: Sweep, chunks: Iterable[Chunk]) -> Generator[Done, None, None]:
+    def run(self, function: Function, shared: Any, tasks: Iterable[Any]) -> Generator[Finished, None, None]:
         """In the order in which they are finished."""
         self.require()
         from distributed import Client, as_completed
         from distributed.scheduler import KilledWorker
 
+        untyped: Any = Client
+        completed: Any = as_completed
         with _quiet():
-            client = _client(Client, self.address)
+            client = untyped(self.address, timeout=ANSWER, set_as_default=False)
             try:
-                yield from self._run(client, as_completed, KilledWorker, sweep, chunks)
-            finally:
-                client.close(timeout=ANSWER)
+                threads = sum(client.nthreads().values())
+                if not threads:
+                    raise SpecError(
+                        f"--scheduler {self.address}: has no workers; start some with dask worker {self.address}"
+                    )
+                sent = client.submit(_same, shared, pure=False)  # once; made again if its worker is lost
+                left = iter(tasks)
 
-    def _run(
-        self, client: Any, as_completed: Any, killed: type[Exception], sweep: Sweep, chunks: Iterable[Chunk]
-    ) -> Generator[Done, None, None]:
-        threads = sum(client.nthreads().values())
-        if not threads:
-            raise SpecError(f"--scheduler {self.address}: has no workers; start some with dask worker {self.address}")
-        shared = client.submit(_same, sweep, pure=False)  # sent once; made again from its recipe if its worker is lost
-        left = iter(chunks)
-        running = as_completed(
-            [
-                client.submit(compute, shared, chunk, pure=False, retries=RETRIES)
-                for chunk in islice(left, threads * IN_FLIGHT)
-            ],
-            loop=client.loop,
-        )
-        for future in running:
-            try:
-                done: Done = future.result()
-            except killed as error:
+                def submit(task: Any) -> Any:
+                    return client.submit(_answer, function, sent, task, pure=False, retries=RETRIES)
+
+                running = completed([submit(t) for t in islice(left, threads * IN_FLIGHT)], loop=client.loop)
+                for future in running:
+                    task, value = future.result()
+                    future.release()
+                    yield Finished(task, value)
+                    for more in islice(left, 1):
+                        running.add(submit(more))
+            except KilledWorker as error:
                 raise SpecError(
                     f"--scheduler {self.address}: {error}; finished chunks are kept, use --resume"
                 ) from None
-            future.release()
-            yield done
-            for chunk in islice(left, 1):
-                running.add(client.submit(compute, shared, chunk, pure=False, retries=RETRIES))
+            finally:
+                client.close(timeout=ANSWER)
 
 
 async def _answers(address: str) -> None:
@@ -91,12 +86,12 @@ async def _answers(address: str) -> None:
     await comm.close()
 
 
-def _client(kind: Any, address: str) -> Any:
-    return kind(address, timeout=ANSWER, set_as_default=False)
+def _same(shared: Any) -> Any:
+    return shared
 
 
-def _same(sweep: Sweep) -> Sweep:
-    return sweep
+def _answer(function: Function, shared: Any, task: Any) -> Any:
+    return task, function(shared, task)
 
 
 class _quiet:  # noqa: N801  a context manager reads as a verb

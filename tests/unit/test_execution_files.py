@@ -8,8 +8,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from studies.drives.errors import LogError
-from studies.drives.output import check_folder, ready_folder, whole_file, write_csv, write_json
+from studies.execution.files import check_folder, ready_folder, whole_file, write_csv, write_json
+from synthesis.errors import SpecError
 
 
 def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
@@ -36,7 +36,7 @@ def test_a_folder_that_cannot_be_is_known_before_there_is_anything_to_write(tmp_
     (tmp_path / "mine").write_text("x")
     for out in (tmp_path / "mine", tmp_path / "mine" / "below"):
         with pytest.raises(
-            LogError, match=r"mine.*: cannot be a folder for results \(mine is a file\); give another --out"
+            SpecError, match=r"mine.*: cannot be a folder for results \(mine is a file\); give another --out"
         ):
             check_folder(out)
     check_folder(tmp_path / "new" / "below")
