@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
-from analysis.sensitivity_worst import worst_case
-from studies.sweeps.designs import WorstCase
+from analysis.sensitivity.worst import worst_case
+from studies.sweeps.designs import WorstCaseSearch
 from studies.sweeps.measure import Measure
 from studies.sweeps.plant import Grid
 from studies.sweeps.subject import Batch, Subject
@@ -53,14 +53,13 @@ class Envelope:
 def evaluate_chunk(sweep: Sweep, chunk: Chunk) -> Evaluated:
     """All measures at all designs of one chunk."""
     subject, stage = sweep.subjects[chunk.subject], sweep.stages[chunk.stage]
-    varied = sweep.varied[subject.name]
-    grid = sweep.grid(subject)
+    box, grid = sweep.boxes[subject.name], sweep.grid(subject)
     indices = np.arange(chunk.start, chunk.stop)
-    if isinstance(stage, WorstCase):
+    if isinstance(stage, WorstCaseSearch):
         values = np.stack([searched(sweep, subject, grid, stage, sweep.measures[int(i)]) for i in indices])
     else:
-        values = stage.values(indices, varied)
-    return evaluate(subject, sweep.measures, grid, {v.name: values[:, i] for i, v in enumerate(varied)})
+        values = stage.points(indices, box)
+    return evaluate(subject, sweep.measures, grid, box.columns(values))
 
 
 def evaluate(subject: Subject, measures: Sequence[Measure], grid: Grid, columns: Mapping[str, FloatArray]) -> Evaluated:
@@ -157,19 +156,18 @@ def _envelope(measure: Measure, values: FloatArray) -> Envelope:
     return Envelope(worst, row.astype(np.int64), best)
 
 
-def searched(sweep: Sweep, subject: Subject, grid: Grid, stage: WorstCase, measure: Measure) -> FloatArray:
+def searched(sweep: Sweep, subject: Subject, grid: Grid, stage: WorstCaseSearch, measure: Measure) -> FloatArray:
     """The parameters (d,) of the worst design that a search finds for one measure."""
-    varied = sweep.varied[subject.name]
-    nominal = {v.name: np.array([v.nominal]) for v in varied}
-    if np.isnan(evaluate(subject, [measure], grid, nominal).worst[measure.name]).any():
-        return np.array([v.nominal for v in varied])  # not a number already there: nothing to search
+    box = sweep.boxes[subject.name]
+    if np.isnan(evaluate(subject, [measure], grid, box.columns(box.nominal[None])).worst[measure.name]).any():
+        return box.nominal  # not a number already there: nothing to search
 
     def scalar(columns: Mapping[str, FloatArray]) -> FloatArray:
         worst = evaluate(subject, [measure], grid, columns).worst[measure.name]
         return np.where(np.isnan(worst), -measure.sign * np.inf, worst)  # designs without a value are no answer
 
     found = worst_case(
-        scalar, {v.name: (v.low, v.high) for v in varied}, measure.better == "smaller",
+        scalar, dict(zip(box.names, zip(box.low, box.high, strict=True), strict=True)), measure.better == "smaller",
         stage.samples, stage.generations, stage.seed,
     )  # fmt: skip
-    return np.array([found.parameters[v.name] for v in varied])
+    return np.array([found.parameters[name] for name in box.names])

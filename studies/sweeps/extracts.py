@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.sweeps.designs import OneAtATime
+from analysis.sensitivity.designs import OneAtATimeDesign
 from studies.sweeps.evaluate import TIE
 from studies.sweeps.measure import Measure
 from studies.sweeps.rows import Rows
@@ -60,7 +60,7 @@ def tornado(rows: Rows, measure: Measure) -> list[Bar]:
     """One bar a parameter, the longest first; empty without a one-at-a-time stage."""
     nominal: float | None = None
     values, at = [], []
-    alone = next((stage for stage in rows.stages if isinstance(stage, OneAtATime)), None)
+    alone = next((stage for stage in rows.stages if isinstance(stage, OneAtATimeDesign)), None)
     for stage, _, columns in rows.columns([*rows.varied, measure.name]):
         if nominal is None:
             nominal = float(columns[measure.name][0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from studies.sweeps.designs import Stage
+from analysis.sensitivity.designs import Design
 from studies.sweeps.measure import Measure
 from studies.sweeps.plant import Grid
 from studies.sweeps.store import SweepFolder
@@ -24,20 +24,20 @@ class Rows:
         self.grid: Grid = sweep.grid(self.subject)
         self.varied = [v.name for v in sweep.varied[self.subject.name]]
         self.measures: list[Measure] = list(sweep.measures)
-        self.stages: list[Stage] = list(sweep.stages)
+        self.stages: list[Design] = list(sweep.stages)
         self._chunks = [(self.stages[c.stage], folder.rows(c), c.design) for c in folder.of(subject)]
         values = [m.name for m in self.measures]
         names = ["outcome", *self.varied, *values, *(name + PLACE for name in values)]
         small = sweep.designs(self.subject) * len(names) <= HELD
         self._held = [columns_of(path, names) for _, path, _ in self._chunks] if small else None
 
-    def columns(self, names: Sequence[str], random: bool = False) -> Iterator[tuple[Stage, int, dict[str, Any]]]:
+    def columns(self, names: Sequence[str], random: bool = False) -> Iterator[tuple[Design, int, dict[str, Any]]]:
         """Stage, index of the first design, and the named columns of every chunk; `random`: of those that fill the box evenly."""
         for i, (stage, path, design) in enumerate(self._chunks):
             if not random or stage.random:
                 yield stage, design, columns_of(path, names) if self._held is None else self._held[i]
 
-    def all_columns(self) -> Iterator[tuple[Stage, int, dict[str, Any]]]:
+    def all_columns(self) -> Iterator[tuple[Design, int, dict[str, Any]]]:
         """Parameters, values and places of every chunk."""
         values = [m.name for m in self.measures]
         return self.columns([*self.varied, *values, *(name + PLACE for name in values)])

@@ -9,7 +9,8 @@ from typing import Any
 
 from pydantic import Field
 
-from studies.sweeps.designs import STAGES, Stage
+from analysis.sensitivity.designs import Design
+from studies.sweeps.designs import DESIGNS
 from studies.sweeps.measure import Measure
 from studies.sweeps.measures import FAST, MeasureSpec
 from studies.sweeps.measures_costly import COSTLY
@@ -133,5 +134,5 @@ def _measure(entry: Any, place: int, folder: Path) -> Measure:
     return table.beside(folder).build()
 
 
-def _stage(entry: Any, place: int) -> Stage:
-    return read_kind(STAGES, "kind", entry, f"designs[{place}]")
+def _stage(entry: Any, place: int) -> Design:
+    return read_kind(DESIGNS, "kind", entry, f"designs[{place}]")

@@ -16,7 +16,7 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
 
-Table = TypeVar("Table", bound=Strict)
+Table = TypeVar("Table", bound=BaseModel)
 
 
 def read_table(kind: type[Table], data: Any, where: str) -> Table:

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from studies.sweeps.designs import Saltelli
+from analysis.sensitivity.designs import Saltelli
+from analysis.sensitivity.quantiles import PASSES, RadixSearch, rank_of
 from studies.sweeps.figures import UNPROVED, Figure, Summary
 from studies.sweeps.measure import Measure
-from studies.sweeps.quantiles import PASSES, RadixSearch, rank_of
 from studies.sweeps.rows import Rows
 from studies.sweeps.store import SweepFolder
 from studies.sweeps.variance import Variance

@@ -9,7 +9,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from studies.sweeps.designs import Nominal, Stage
+import numpy as np
+
+from analysis.errors import AnalysisError
+from analysis.sensitivity.box import Box
+from analysis.sensitivity.designs import Design, Nominal
+from studies.sweeps.designs import WorstCaseSearch
 from studies.sweeps.measure import Measure
 from studies.sweeps.plant import Grid
 from studies.sweeps.subject import Subject
@@ -43,7 +48,7 @@ class Sweep:
     name: str
     subjects: Sequence[Subject]
     measures: Sequence[Measure]
-    stages: Sequence[Stage]
+    stages: Sequence[Design]
     vary: Mapping[str, Mapping[str, Vary]] | Mapping[str, Vary]
     points: int = 141
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -71,8 +76,11 @@ class Sweep:
                     raise SpecError(
                         f"sweep '{self.name}': measure '{measure.name}' has the name of a column; rename it"
                     )
-            for stage in self.stages:
-                stage.check(self.varied[subject.name])
+            try:
+                for stage in self.stages:
+                    stage.check(self.boxes[subject.name])
+            except AnalysisError as error:
+                raise SpecError(str(error)) from None
             self.grid(subject)
         for name in self.tolerances:
             if name not in {m.name for m in self.measures}:
@@ -83,6 +91,17 @@ class Sweep:
         """What is varied of each subject."""
         return {subject.name: resolve(subject, self._table(subject.name)) for subject in self.subjects}
 
+    @cached_property
+    def boxes(self) -> dict[str, Box]:
+        """The box in which each subject's designs lie."""
+        return {
+            name: Box(
+                tuple(v.name for v in own),
+                *(np.array([getattr(v, k) for v in own]) for k in ("low", "high", "nominal")),
+            )
+            for name, own in self.varied.items()
+        }
+
     def _table(self, subject: str) -> Mapping[str, Vary]:
         plain = {name: entry for name, entry in self.vary.items() if isinstance(entry, Vary)}
         own = self.vary.get(subject)
@@ -92,9 +111,9 @@ class Sweep:
         """The grid of one subject."""
         return subject.grid(self.points, self.bounds)
 
-    def rows(self, subject: Subject, stage: Stage) -> int:
+    def rows(self, subject: Subject, stage: Design) -> int:
         """Designs of one stage."""
-        return stage.rows(self.varied[subject.name], len(self.measures))
+        return len(self.measures) if isinstance(stage, WorstCaseSearch) else stage.count(self.boxes[subject.name])
 
     def designs(self, subject: Subject) -> int:
         """Designs of a subject."""
@@ -105,7 +124,7 @@ class Sweep:
         for s, subject in enumerate(self.subjects):
             number = design = 0
             for k, stage in enumerate(self.stages):
-                rows, step = self.rows(subject, stage), stage.step(self.chunk, self.varied[subject.name])
+                rows, step = self.rows(subject, stage), self._step(subject, stage)
                 for start in range(0, rows, step):
                     stop = min(start + step, rows)
                     yield Chunk(s, number, k, start, stop, design + start)
@@ -115,10 +134,15 @@ class Sweep:
     def chunk_count(self) -> int:
         """How many chunks there are."""
         return sum(
-            -(-self.rows(subject, stage) // stage.step(self.chunk, self.varied[subject.name]))
+            -(-self.rows(subject, stage) // self._step(subject, stage))
             for subject in self.subjects
             for stage in self.stages
         )
+
+    def _step(self, subject: Subject, stage: Design) -> int:
+        """Rows of a chunk: whole blocks; a search is work enough for one."""
+        block = stage.block(self.boxes[subject.name])
+        return 1 if isinstance(stage, WorstCaseSearch) else max(self.chunk // block, 1) * block
 
     @cached_property
     def definition(self) -> dict[str, Any]:

@@ -7,13 +7,11 @@ from typing import Any
 import numpy as np
 
 from analysis.errors import AnalysisError
-from analysis.sensitivity_moments import SaltelliSums
-from studies.sweeps.designs import Saltelli, Stage
+from analysis.sensitivity.designs import Design, Saltelli
+from analysis.sensitivity.indices import GROUPS, SaltelliSums
 from studies.sweeps.figures import Figure
 from studies.sweeps.measure import Measure
 from studies.sweeps.rows import Rows
-
-GROUPS = 32
 
 
 class Variance:
@@ -26,7 +24,7 @@ class Variance:
         self.block = 0
         self.refusal = ""
 
-    def show(self, stage: Stage, columns: dict[str, Any]) -> None:
+    def show(self, stage: Design, columns: dict[str, Any]) -> None:
         """One chunk of any stage; the first holds the nominal design, to which values are taken relative."""
         values = columns[self.measure.name]
         if self.centre is None:

@@ -9,7 +9,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from analysis.errors import AnalysisError
-from analysis.sensitivity_designs import around, bounds
+from analysis.sensitivity.box import Box, around
 from studies.sweeps.plant import Parameter
 from studies.sweeps.strict import Strict
 from studies.sweeps.subject import Subject
@@ -68,8 +68,8 @@ def _varied(subject: Subject, parameter: Parameter, vary: Vary) -> Varied:
         if vary.relative is not None:
             low, high = around({parameter.name: parameter.nominal}, vary.relative)[parameter.name]
         else:
-            _, lows, highs = bounds({parameter.name: vary.range or (0.0, 0.0)})
-            low, high = float(lows[0]), float(highs[0])
+            box = Box.of({parameter.name: vary.range or (0.0, 0.0)})
+            low, high = float(box.low[0]), float(box.high[0])
     except AnalysisError as error:
         raise SpecError(f"{where}: {error}") from None
     return Varied(parameter.name, parameter.unit, parameter.nominal, low, high, vary.relative is not None)

@@ -16,9 +16,9 @@ from analysis.dropout_schedule import frozen_critical_probability
 from analysis.error_norms import error_hinf_norm
 from analysis.mean_square_schedule import drop_radius
 from analysis.rank_loss_speeds import RankLossSpeeds
+from analysis.sensitivity.designs import Sobol
 from estimators import GainSchedule, LpvVelocityObserver
 from estimators.schedule import SHIPPED, read_content, write_content
-from studies.sweeps.designs import STAGES
 from studies.sweeps.evaluate import INVALID, NOT_A_NUMBER, VALID, evaluate
 from studies.sweeps.measure import Measure
 from studies.sweeps.spec import MEASURES
@@ -236,7 +236,7 @@ def test_a_models_own_sweep_over_two_scheduling_parameters(tmp_path: Path) -> No
     channel = {"disturbances": ["force"], "errors": ["position"]}
     sweep = Sweep(
         "own", [own], [measure("stability_margin"), measure("hinf_norm", name="norm", **channel)],
-        [STAGES["sobol"].model_validate({"kind": "sobol", "samples": 16})],
+        [Sobol(samples=16)],
         {"mass": Vary(range=(1.5, 3.0)), "gain_velocity_rate": Vary(relative=0.3)}, points=4,
     )  # fmt: skip
     result = run_sweep(sweep, tmp_path / "out", Serial())

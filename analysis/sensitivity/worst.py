@@ -9,8 +9,9 @@ import numpy as np
 from scipy.optimize import differential_evolution, minimize
 
 from analysis.errors import AnalysisError
-from analysis.sensitivity import Measure, evaluate
-from analysis.sensitivity_designs import Ranges, bounds, corners, sobol
+from analysis.sensitivity.box import Box, Ranges
+from analysis.sensitivity.designs import FullGrid, Sobol, require_power
+from analysis.sensitivity.measure import Measure, evaluate
 from synthesis.polynomials.matrix import FloatArray
 
 MOST_CORNERS = 12  # parameters; beyond, the search starts from samples alone
@@ -45,16 +46,16 @@ def worst_case(
     infinite value (an unstable model, say) ends the search: nothing is worse. Raises AnalysisError for bad ranges and
     measures that are not scalar.
     """
-    names, low, high = bounds(ranges)
+    box = Box.of(ranges)
     sign = -1.0 if largest else 1.0
     count = 0
-    box: Any = [(0.0, 1.0)] * len(names)  # scipy's own types are narrower than what it takes
+    unit = Box.of(dict.fromkeys(box.names, (0.0, 1.0)))
+    limits: Any = [(0.0, 1.0)] * len(box.names)  # scipy's own types are narrower than what it takes
 
-    def cost(unit: FloatArray) -> FloatArray:
+    def cost(place: FloatArray) -> FloatArray:
         """Unit coordinates (d, N) to sign * measure (N,)."""
         nonlocal count
-        points = low[:, None] + np.clip(unit, 0.0, 1.0) * (high - low)[:, None]
-        values = evaluate(measure, dict(zip(names, points, strict=True)))
+        values = evaluate(measure, box.columns(box.scaled(np.clip(place.T, 0.0, 1.0))))
         if values.ndim != 1:
             raise AnalysisError(
                 f"a worst case needs one number for each sample, not the shape {values.shape[1:]}; reduce it"
@@ -65,19 +66,19 @@ def worst_case(
     def single(x: FloatArray) -> float:
         return float(cost(x[:, None])[0])
 
-    unit_box = dict.fromkeys(names, (0.0, 1.0))
-    start = sobol(unit_box, samples, seed).samples
-    if len(names) <= MOST_CORNERS:
-        start = np.concatenate([corners(unit_box).samples, start])
+    require_power("samples", samples)
+    start = Sobol(samples=samples, seed=seed).everywhere(unit)
+    if len(box.names) <= MOST_CORNERS:
+        start = np.concatenate([FullGrid(levels=2).everywhere(unit), start])
     first = cost(start.T)
     place = int(np.argmin(first))
     best, where, how = float(first[place]), start[place], "samples"
     if np.isfinite(best):
-        order = np.argsort(first, kind="stable")[: max(8, 6 * len(names))]
+        order = np.argsort(first, kind="stable")[: max(8, 6 * len(box.names))]
         population: Any = cost
         if generations > 0 and len(order) >= 5:
             evolved = differential_evolution(
-                population, box, init=start[order], vectorized=True, updating="deferred", polish=False,
+                population, limits, init=start[order], vectorized=True, updating="deferred", polish=False,
                 maxiter=generations, rng=np.random.default_rng(seed), tol=1e-10,
             )  # fmt: skip
             if evolved.fun < best:
@@ -88,16 +89,16 @@ def worst_case(
             options: Any = {
                 "xatol": 1e-10,
                 "fatol": 1e-14,
-                "maxfev": 400 * len(names),
+                "maxfev": 400 * len(box.names),
                 "initial_simplex": _simplex(where),
             }
             polished = minimize(
-                single, where, method="Nelder-Mead", bounds=box,
+                single, where, method="Nelder-Mead", bounds=limits,
                 options=options,
             )  # fmt: skip
             if polished.fun < best:
                 best, where, how = float(polished.fun), np.asarray(polished.x), "descent"
-    parameters = {name: float(v) for name, v in zip(names, low + np.clip(where, 0.0, 1.0) * (high - low), strict=True)}
+    parameters = {k: float(v[0]) for k, v in box.columns(box.scaled(np.clip(where, 0.0, 1.0))[None]).items()}
     return WorstCase(sign * best, parameters, float(sign * first[place]), how, count)
 
 

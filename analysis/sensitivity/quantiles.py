@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from math import ceil
 
 import numpy as np
@@ -48,16 +48,6 @@ class RadixSearch:
     def found(self) -> FloatArray:
         """The numbers (k,), after PASSES passes."""
         return _numbers(np.array(self.prefix, np.uint64))
-
-
-def order_statistics(values: Callable[[], Iterator[FloatArray]], ranks: Sequence[int]) -> FloatArray:
-    """The numbers at `ranks`; `values()` streams all of them anew for each pass."""
-    search = RadixSearch(ranks)
-    for _ in range(PASSES):
-        for part in values():
-            search.show(part)
-        search.end_pass()
-    return search.found()
 
 
 def rank_of(share: float, count: int) -> int:

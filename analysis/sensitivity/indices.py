@@ -1,11 +1,14 @@
-r"""Sobol indices from sums: what a sweep keeps of samples that it cannot hold, with a confidence for each index.
+r"""Variance-based sensitivity: first-order and total Sobol indices with their confidence (Sobol 1993; Saltelli et al. 2010).
 
-The estimators are those of `analysis.sensitivity_indices` (Saltelli et al. 2010, Table 2 (b) and (f)),
+S_i = Var(E[Y | X_i]) / Var(Y): the share of the variance that X_i explains alone; T_i = 1 - Var(E[Y | X_others]) / Var(Y):
+its share with all interactions. Independent uniform parameters; sum S_i <= 1 <= sum T_i, equal for an additive measure.
+The estimators (Saltelli et al. 2010, Table 2 (b) and (f))
 
     S_i = mean((f_B - m) (f_ABi - f_A)) / V,    T_i = mean((f_A - f_ABi)^2) / (2 V),    m, V of f_A and f_B together,
 
-written in sums over samples. The sums are held for groups of samples; leaving out one group at a time gives the standard
-error of every index (jackknife; Efron, Stein 1981), and its half-width at 95 % from the normal distribution.
+are written in sums over samples, so that samples need not be held. The sums are kept for groups of samples; leaving out one
+group at a time gives the standard error of every index (jackknife; Efron, Stein 1981), and its half-width at 95 % from the
+normal distribution.
 """
 
 from __future__ import annotations
@@ -16,8 +19,13 @@ import numpy as np
 from scipy.special import ndtri
 
 from analysis.errors import AnalysisError
+from analysis.labelled import Axis, LabelledArray
+from analysis.sensitivity.box import Box, Ranges
+from analysis.sensitivity.designs import Saltelli, require_power
+from analysis.sensitivity.measure import Measure, evaluate, plain_axes
 from synthesis.polynomials.matrix import FloatArray, IndexArray
 
+GROUPS = 32
 HALF_WIDTH = float(ndtri(0.975))
 
 
@@ -76,6 +84,55 @@ class SaltelliSums:
             for values in (np.stack(column) for column in zip(*without, strict=True))
         ]
         return VarianceShares(*whole, HALF_WIDTH * errors[0], HALF_WIDTH * errors[1], int(count.sum()))
+
+
+@dataclass(frozen=True)
+class SobolIndices:
+    """Arrays with the axes (parameter, ...); NaN where the measure does not vary. `evaluations` of the measure."""
+
+    first_order: LabelledArray
+    total: LabelledArray
+    first_order_confidence: LabelledArray
+    total_confidence: LabelledArray
+    evaluations: int
+
+
+def variance_indices(
+    measure: Measure,
+    ranges: Ranges,
+    samples: int = 1024,
+    seed: int = 0,
+    axes: tuple[Axis, ...] = (),
+    name: str = "measure",
+) -> SobolIndices:
+    """Both indices from (d + 2) N evaluations on scrambled Sobol points A, B and A with one column of B.
+
+    `samples` N must be a power of two, at least 2. Raises AnalysisError for bad ranges and a measure that is infinite
+    somewhere: its variance has no meaning then; shrink the ranges.
+    """
+    box = Box.of(ranges)
+    require_power("samples", samples)
+    if samples < 2:
+        raise AnalysisError("samples = 1: Sobol indices need at least 2")
+    points = Saltelli(blocks=samples, seed=seed).everywhere(box)
+    values = evaluate(measure, box.columns(points))
+    sums = SaltelliSums(len(box.names), min(GROUPS, samples), values.shape[1:])
+    blocks = values.reshape(samples, -1, *values.shape[1:])
+    sums.add(blocks - blocks[0, 0], np.arange(samples) * len(sums.count) // samples)
+    lead = (Axis("parameter", np.array(box.names)), *(axes or plain_axes(values.shape[1:])))
+    notes = {"design": "saltelli", "seed": seed, "samples": samples, "ranges": {k: list(v) for k, v in ranges.items()}}
+    shares = sums.shares()
+
+    def labelled(what: str, array: FloatArray) -> LabelledArray:
+        return LabelledArray(f"{what} of {name}", array, lead, "1", notes)
+
+    return SobolIndices(
+        labelled("first-order index", shares.first_order),
+        labelled("total index", shares.total),
+        labelled("confidence of the first-order index", shares.first_order_confidence),
+        labelled("confidence of the total index", shares.total_confidence),
+        len(points),
+    )
 
 
 def _indices(count: float, plain: FloatArray, mixed: FloatArray) -> tuple[FloatArray, FloatArray]:

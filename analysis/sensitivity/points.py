@@ -19,7 +19,7 @@ ROUNDS = 4  # of the Feistel network
 
 
 def sobol_points(indices: NDArray[np.int64], dimensions: int, seed: int) -> FloatArray:
-    """Scrambled Sobol points (Owen 1998), the same as those of `analysis.sensitivity_designs.sobol`.
+    """Scrambled Sobol points (Owen 1998), the same as those of `scipy.stats.qmc.Sobol`.
 
     A scrambled Sobol sequence is affine over the two-element field in the bits of the index: x_n = x_0 XOR the sum over the
     set bits k of n of (x_(2^k) XOR x_0), so a few points, made once, give all others.

@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike
 from analysis.checks import as_stack
 from analysis.errors import AnalysisError
 from analysis.labelled import Axis, LabelledArray
-from analysis.sensitivity_designs import Design
+from analysis.sensitivity.box import Box, Ranges
+from analysis.sensitivity.designs import Design
 from synthesis.polynomials.matrix import FloatArray
 
 Measure: TypeAlias = Callable[[Mapping[str, FloatArray]], ArrayLike]
@@ -86,7 +87,7 @@ def one_at_a_time(
     for i in range(len(names)):
         samples[places[i], i] *= scale
     values = evaluate(measure, {key: samples[:, i] for i, key in enumerate(names)})
-    own = axes or _plain_axes(values.shape[1:])
+    own = axes or plain_axes(values.shape[1:])
     lead = (Axis("parameter", np.array(names)), Axis("factor", scale))
     notes = {"design": "one at a time", "nominal": dict(zip(names, start.tolist(), strict=True))}
     moved = values[places]
@@ -98,29 +99,44 @@ def one_at_a_time(
 
 
 def sample(
-    measure: Measure, design: Design, axes: tuple[Axis, ...] = (), name: str = "measure", unit: str = "1"
+    measure: Measure,
+    design: Design,
+    ranges: Ranges,
+    axes: tuple[Axis, ...] = (),
+    name: str = "measure",
+    unit: str = "1",
 ) -> LabelledArray:
-    """The measure over a design: a grid gives one axis for each parameter, other designs an axis `sample`.
+    """The measure over a design in the box of `ranges`, along an axis `sample`.
 
-    The samples of the latter are in the notes, column by column, so that a saved result can be read alone.
+    The samples are in the notes, column by column, so that a saved result can be read alone.
     """
-    values = evaluate(measure, design.columns())
-    own = axes or _plain_axes(values.shape[1:])
-    notes: dict[str, object] = {"design": design.kind, "seed": design.seed}
-    if design.kind == "grid":
-        lead = tuple(Axis(key, np.unique(column)) for key, column in design.columns().items())
-        if tuple(len(axis.labels) for axis in lead) == design.shape:
-            lead = tuple(Axis(key, _levels(design, i)) for i, key in enumerate(design.names))
-            return LabelledArray(name, values.reshape(*design.shape, *values.shape[1:]), (*lead, *own), unit, notes)
-    notes["samples"] = {key: column.tolist() for key, column in design.columns().items()}
-    return LabelledArray(name, values, (Axis("sample", np.arange(len(values), dtype=float)), *own), unit, notes)
+    box = Box.of(ranges)
+    columns = box.columns(design.everywhere(box))
+    values = evaluate(measure, columns)
+    notes = {**design.model_dump(), "samples": {key: column.tolist() for key, column in columns.items()}}
+    lead = Axis("sample", np.arange(len(values), dtype=float))
+    return LabelledArray(name, values, (lead, *(axes or plain_axes(values.shape[1:]))), unit, notes)
 
 
-def _levels(design: Design, column: int) -> FloatArray:
-    """The levels of one column in the order in which they were given."""
-    table = design.samples[:, column].reshape(design.shape)
-    return np.asarray(np.moveaxis(table, column, 0).reshape(design.shape[column], -1)[:, 0])
+def sample_grid(
+    measure: Measure,
+    levels: Mapping[str, ArrayLike],
+    axes: tuple[Axis, ...] = (),
+    name: str = "measure",
+    unit: str = "1",
+) -> LabelledArray:
+    """The measure at every combination of the given levels, with an axis for each parameter."""
+    if not levels:
+        raise AnalysisError("no parameter to vary; give at least one name with its levels")
+    lines = [as_stack(f"levels of {key}", given, ndim=1).ravel() for key, given in levels.items()]
+    mesh = np.meshgrid(*lines, indexing="ij")
+    values = evaluate(measure, {key: column.ravel() for key, column in zip(levels, mesh, strict=True)})
+    lead = [Axis(key, line) for key, line in zip(levels, lines, strict=True)]
+    own = axes or plain_axes(values.shape[1:])
+    shaped = values.reshape(*mesh[0].shape, *values.shape[1:])
+    return LabelledArray(name, shaped, (*lead, *own), unit, {"design": "grid"})
 
 
-def _plain_axes(shape: tuple[int, ...]) -> tuple[Axis, ...]:
+def plain_axes(shape: tuple[int, ...]) -> tuple[Axis, ...]:
+    """Numbered axes for a measure that names none."""
     return tuple(Axis(f"output_{i}", np.arange(size, dtype=float)) for i, size in enumerate(shape))
