@@ -1,4 +1,4 @@
-"""A sweep beside its baseline: what every figure won or lost."""
+"""A sweep beside its baseline: what every statistic won or lost."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ MARKS = dict(zip(VALUES, ("o", "s", "^", "D", "X"), strict=True))
 
 
 def draw_before_after(result: SweepResult, before: Baseline) -> Figure:
-    """One panel a measure, one row a subject: how much of its distance to worthlessness each figure won or lost."""
+    """One panel a measure, one row an observer: how much of its distance to worthlessness each statistic won or lost."""
     measures = list(result.sweep.measures)
-    figure, axes = panels(len(measures), 4.8, 1.0 + 0.42 * len(result.sweep.subjects))
+    figure, axes = panels(len(measures), 4.8, 1.0 + 0.42 * len(result.sweep.observers))
     for ax, measure in zip(axes, measures, strict=True):
         tolerance = 100.0 * result.sweep.tolerances.get(measure.name, result.sweep.tolerance)
         reach, marks = 2.0 * tolerance, []
-        for place, subject in enumerate(result.sweep.subjects):
+        for place, observer in enumerate(result.sweep.observers):
             for name in VALUES:
                 old, new = (
-                    before.summary.of(subject.name, measure.name, name),
-                    result.summary.of(subject.name, measure.name, name),
+                    before.summary.of(observer.name, measure.name, name),
+                    result.summary.of(observer.name, measure.name, name),
                 )
                 if old is None or new is None:
                     continue
@@ -42,8 +42,8 @@ def draw_before_after(result: SweepResult, before: Baseline) -> Figure:
         if reach > 10.0 * tolerance > 0.0:
             ax.set_xscale("symlog", linthresh=2.0 * tolerance, linscale=0.5)
         ax.set_xlim(-1.3 * reach, 1.3 * reach)
-        ax.set_ylim(len(result.sweep.subjects) - 0.5, -0.5)
-        ax.set_yticks(range(len(result.sweep.subjects)), [s.name for s in result.sweep.subjects], fontsize=7)
+        ax.set_ylim(len(result.sweep.observers) - 0.5, -0.5)
+        ax.set_yticks(range(len(result.sweep.observers)), [s.name for s in result.sweep.observers], fontsize=7)
         ax.set_xlabel("change against the baseline (%): left is worse")
         ax.set_title(f"{words(measure.name)}", loc="left", fontsize=9)
     handles: list[Line2D | Patch] = [

@@ -18,23 +18,23 @@ from studies.report.sweep_comparison_plot import draw_before_after
 from studies.report.sweep_panels import BEST, HIGH, LOW, NOMINAL, WORST, better, finished, panels, titled, words
 from studies.sweeps.baseline import Baseline
 from studies.sweeps.engine import SweepResult
-from studies.sweeps.extracts import Bar, Map, cloud, tornado, worst_map
-from studies.sweeps.figures import Figure as Number
 from studies.sweeps.measure import Measure
+from studies.sweeps.plot_data import Bar, Map, cloud, tornado, worst_map
 from studies.sweeps.rows import Rows
+from studies.sweeps.statistics import Statistic
 
 
 def plot_sweep(
-    result: SweepResult, folder: Path, before: Baseline | None = None, subjects: Collection[str] | None = None
+    result: SweepResult, folder: Path, before: Baseline | None = None, observers: Collection[str] | None = None
 ) -> list[Path]:
-    """The pictures of some subjects (default: all) and the comparison, as SVG and PNG; returns the files.
+    """The pictures of some observers (default: all) and the comparison, as SVG and PNG; returns the files.
 
     The same sweep gives the same pictures.
     """
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
     with mpl.rc_context(STYLE):
-        for name, figure in _figures(result, before, subjects):
+        for name, figure in _figures(result, before, observers):
             for suffix in ("svg", "png"):
                 path = folder / f"{name}.{suffix}"
                 figure.savefig(path, dpi=130, metadata={"Date": None} if suffix == "svg" else {})
@@ -43,22 +43,22 @@ def plot_sweep(
 
 
 def _figures(
-    result: SweepResult, before: Baseline | None, subjects: Collection[str] | None
+    result: SweepResult, before: Baseline | None, observers: Collection[str] | None
 ) -> Iterator[tuple[str, Figure]]:
-    for index, subject in enumerate(result.sweep.subjects):
-        if subjects is not None and subject.name not in subjects:
+    for index, observer in enumerate(result.sweep.observers):
+        if observers is not None and observer.name not in observers:
             continue
         rows = Rows(result.folder, index)
         bars = {m.name: tornado(rows, m) for m in rows.measures}
         if any(bars.values()):
-            yield f"{subject.name}-tornado", draw_tornado(rows, bars)
+            yield f"{observer.name}-tornado", draw_tornado(rows, bars)
         maps = {m.name: worst_map(result.folder, rows, index, m) for m in rows.measures}
         there = {name: found for name, found in maps.items() if found is not None}
         if there:
-            yield f"{subject.name}-map", draw_maps(result, rows, there)
-        drawn = draw_clouds(result, rows, bars) if len(rows.varied) > 1 else None
+            yield f"{observer.name}-map", draw_maps(result, rows, there)
+        drawn = draw_clouds(result, rows, bars) if len(rows.ranges) > 1 else None
         if drawn is not None:
-            yield f"{subject.name}-scatter", drawn
+            yield f"{observer.name}-scatter", drawn
     if before is not None:
         yield "before-after", draw_before_after(result, before)
 
@@ -66,7 +66,7 @@ def _figures(
 def draw_tornado(rows: Rows, bars: dict[str, list[Bar]]) -> Figure:
     """One panel a measure: how far it moves when one parameter alone goes through its range."""
     shown = [m for m in rows.measures if bars[m.name]]
-    figure, axes = panels(len(shown), 4.6, 0.5 + 0.42 * len(rows.varied) + 0.9)
+    figure, axes = panels(len(shown), 4.6, 0.5 + 0.42 * len(rows.ranges) + 0.9)
     for ax, measure in zip(axes, shown, strict=False):
         own = bars[measure.name][::-1]
         for place, bar in enumerate(own):
@@ -89,21 +89,21 @@ def draw_tornado(rows: Rows, bars: dict[str, list[Bar]]) -> Figure:
         Patch(color=HIGH, label="above"),
     ]
     handles.append(Line2D([], [], color=NOMINAL, lw=0.9, label="nominal"))
-    return finished(figure, f"{rows.subject.name}: one parameter at a time, worst over the grid", handles)
+    return finished(figure, f"{rows.observer.name}: one parameter at a time, worst over the grid", handles)
 
 
 def draw_maps(result: SweepResult, rows: Rows, maps: dict[str, Map]) -> Figure:
     """Nominal, worst and best design over the scheduling parameter; below it, which corner of the box the worst one sits in."""
     figure = Figure(
-        figsize=(4.7 * min(2, len(maps)), (2.5 + 0.22 * len(rows.varied)) * -(-len(maps) // 2) + 0.6),
+        figsize=(4.7 * min(2, len(maps)), (2.5 + 0.22 * len(rows.ranges)) * -(-len(maps) // 2) + 0.6),
         layout="constrained",
     )
     FigureCanvasAgg(figure)
     outer = figure.add_gridspec(-(-len(maps) // 2), min(2, len(maps)))
-    (box,) = rows.subject.plant.box
+    (box,) = rows.observer.plant.box
     measures = {m.name: m for m in rows.measures}
     for k, (name, found) in enumerate(maps.items()):
-        inner = outer[k // 2, k % 2].subgridspec(2, 1, height_ratios=(2.2, 0.24 * len(rows.varied)), hspace=0.08)
+        inner = outer[k // 2, k % 2].subgridspec(2, 1, height_ratios=(2.2, 0.24 * len(rows.ranges)), hspace=0.08)
         top = figure.add_subplot(inner[0])
         top.fill_between(found.points, _capped(found.worst, found), _capped(found.best, found), color="0.9", lw=0)
         top.plot(found.points, _finite(found.worst), color=WORST, lw=1.4, label="worst design")
@@ -121,9 +121,9 @@ def draw_maps(result: SweepResult, rows: Rows, maps: dict[str, Map]) -> Figure:
         strip = figure.add_subplot(inner[1], sharex=top)
         edges = _edges(found.points)
         strip.pcolormesh(
-            edges, np.arange(len(rows.varied) + 1), found.position, cmap="RdBu_r", vmin=0, vmax=1, rasterized=True
+            edges, np.arange(len(rows.ranges) + 1), found.position, cmap="RdBu_r", vmin=0, vmax=1, rasterized=True
         )
-        strip.set_yticks(np.arange(len(rows.varied)) + 0.5, [words(n) for n in rows.varied], fontsize=7)
+        strip.set_yticks(np.arange(len(rows.ranges)) + 0.5, [words(n) for n in rows.ranges], fontsize=7)
         strip.invert_yaxis()
         strip.grid(False)
         strip.set_xlabel(f"{words(box.name)} ({box.unit})")
@@ -134,9 +134,9 @@ def draw_maps(result: SweepResult, rows: Rows, maps: dict[str, Map]) -> Figure:
     for share, text in ((0.0, "parameter at its lower end"), (0.5, "in the middle"), (1.0, "at its upper end")):
         handles.append(Patch(facecolor=colours(share), edgecolor="0.6", lw=0.5))
         labels.append(text)
-    designs = result.sweep.designs(rows.subject)
+    designs = result.sweep.designs(rows.observer)
     return finished(
-        figure, f"{rows.subject.name}: worst of {designs} designs at every {words(box.name)}", handles, labels
+        figure, f"{rows.observer.name}: worst of {designs} designs at every {words(box.name)}", handles, labels
     )
 
 
@@ -151,7 +151,7 @@ def draw_clouds(result: SweepResult, rows: Rows, bars: dict[str, list[Bar]]) -> 
     if not found:
         return None
     figure, axes = panels(len(found), 4.4, 3.3)
-    units = {v.name: v.unit for v in result.sweep.varied[rows.subject.name]}
+    units = {v.name: v.unit for v in result.sweep.ranges[rows.observer.name]}
     for ax, (measure, points) in zip(axes, found, strict=False):
         order = np.argsort(measure.sign * points.values, kind="stable")  # the worst are drawn last, on top
         low, high = np.quantile(points.values, [0.005, 0.995])
@@ -163,18 +163,18 @@ def draw_clouds(result: SweepResult, rows: Rows, bars: dict[str, list[Bar]]) -> 
         for axis, name in ((ax.xaxis, points.names[0]), (ax.yaxis, points.names[1])):
             axis.set_label_text(f"{words(name)} ({units[name]})")
         ax.set_title(f"{words(measure.name)}: {better(measure)}", loc="left", fontsize=9)
-    return finished(figure, f"{rows.subject.name}: the two parameters that matter most (dark is worse)", [])
+    return finished(figure, f"{rows.observer.name}: the two parameters that matter most (dark is worse)", [])
 
 
 def _two(result: SweepResult, rows: Rows, measure: Measure, bars: list[Bar]) -> tuple[str, str]:
     """By total Sobol index, else by reach alone, else in order."""
-    totals: dict[str, Number] = {
+    totals: dict[str, Statistic] = {
         f.name.removeprefix("total index "): f
-        for f in result.summary.figures
-        if f.subject == rows.subject.name and f.measure == measure.name and f.name.startswith("total index ")
+        for f in result.summary.statistics
+        if f.observer == rows.observer.name and f.measure == measure.name and f.name.startswith("total index ")
     }
     ranked = (
-        sorted(totals, key=lambda name: -totals[name].value) or [bar.parameter for bar in bars] or list(rows.varied)
+        sorted(totals, key=lambda name: -totals[name].value) or [bar.parameter for bar in bars] or list(rows.ranges)
     )
     return ranked[0], ranked[1]
 

@@ -1,4 +1,4 @@
-"""The baseline: a small file in the repository, one line a figure, against which later sweeps are held."""
+"""The baseline: a small file in the repository, one line a statistic, against which later sweeps are held."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import Field
 
 from studies.execution.files import write_bytes
-from studies.sweeps.figures import Figure, Summary
+from studies.sweeps.statistics import Statistic, Summary
 from studies.sweeps.strict import Strict, read_table
 from studies.sweeps.sweep import Sweep
 from studies.sweeps.versions import versions
@@ -20,11 +20,11 @@ from synthesis.errors import SpecError
 SCHEMA = "gainsmith.sweep-baseline/1"
 DIGITS = 8
 HEAD = """\
-# The baseline of a sweep, one line a figure. Written by `gainsmith sweep --update-baseline`; review its diff like code.
+# The baseline of a sweep, one line a statistic. Written by `gainsmith sweep --update-baseline`; review its diff like code.
 """
 
 
-class _FigureLine(Strict):
+class _StatisticLine(Strict):
     value: float = Field(allow_inf_nan=True)
     unit: str = "1"
     kind: str = "value"
@@ -51,12 +51,12 @@ class _File(Strict):
     sha256: str
     made_with: dict[str, str]
     nominal: dict[str, _Nominal]
-    figures: dict[str, dict[str, _FigureLine]]
+    figures: dict[str, dict[str, _StatisticLine]]
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """What a sweep was once: its figures, the constants and gains it was run around, and the digest of what was asked."""
+    """What a sweep was once: its statistics, the constants and gains it was run around, and the digest of what was asked."""
 
     summary: Summary
     sha256: str
@@ -66,28 +66,28 @@ class Baseline:
 
 def of_sweep(sweep: Sweep, summary: Summary) -> Baseline:
     """The baseline that a finished sweep makes, its values rounded as they are written."""
-    figures = tuple(
-        replace(f, value=_rounded(f.value), at={k: _rounded(v) for k, v in f.at.items()}) for f in summary.figures
+    statistics = tuple(
+        replace(f, value=_rounded(f.value), at={k: _rounded(v) for k, v in f.at.items()}) for f in summary.statistics
     )
     made = {name: versions()[name] for name in ("gainsmith", "numpy", "scipy")}
-    return Baseline(replace(summary, figures=figures), sweep.digest, sweep.nominal, made)
+    return Baseline(replace(summary, statistics=statistics), sweep.digest, sweep.nominal, made)
 
 
 def write_baseline(path: Path, baseline: Baseline) -> None:
     """TOML, written beside and renamed."""
     lines = [HEAD, f'schema = "{SCHEMA}"', f'sweep = "{baseline.summary.sweep}"', f'form = "{baseline.summary.form}"']
     lines += [f'sha256 = "{baseline.sha256}"', f"made_with = {_inline(baseline.made_with)}"]
-    for subject, nominal in baseline.nominal.items():
-        lines += ["", f'[nominal."{subject}"]', f"breakpoints = {_list(nominal['breakpoints'])}", "gains = ["]
+    for observer, nominal in baseline.nominal.items():
+        lines += ["", f'[nominal."{observer}"]', f"breakpoints = {_list(nominal['breakpoints'])}", "gains = ["]
         lines += [f"  {_list(row)}," for row in nominal["gains"]]
-        lines += ["]", f'[nominal."{subject}".constants]']
+        lines += ["]", f'[nominal."{observer}".constants]']
         lines += [f"{_key(name)} = {_inline(entry)}" for name, entry in nominal["constants"].items()]
-    subject = ""
-    for figure in baseline.summary.figures:
-        if figure.subject != subject:
-            subject = figure.subject
-            lines += ["", f'[figures."{subject}"]']
-        lines.append(f'"{_name(figure)}" = {_figure(figure)}')
+    observer = ""
+    for statistic in baseline.summary.statistics:
+        if statistic.observer != observer:
+            observer = statistic.observer
+            lines += ["", f'[figures."{observer}"]']
+        lines.append(f'"{_name(statistic)}" = {_statistic(statistic)}')
     path.parent.mkdir(parents=True, exist_ok=True)
     write_bytes(path, ("\n".join(lines) + "\n").encode(), sync=True)
 
@@ -103,34 +103,34 @@ def read_baseline(path: Path) -> Baseline:
     if data.get("schema") != SCHEMA:
         raise SpecError(f"{path}: schema {data.get('schema')!r} is not '{SCHEMA}'")
     found = read_table(_File, data, str(path))
-    figures = []
-    for subject, entries in found.figures.items():
+    statistics = []
+    for observer, entries in found.figures.items():
         for name, line in entries.items():
             measure, _, rest = name.rpartition(" | ")
             kind: Any = line.kind
-            figures.append(
-                Figure(subject, measure, rest, line.value, line.unit, kind, line.at, line.confidence, line.design)
+            statistics.append(
+                Statistic(observer, measure, rest, line.value, line.unit, kind, line.at, line.confidence, line.design)
             )
     nominal = {name: entry.model_dump() for name, entry in found.nominal.items()}
-    return Baseline(Summary(found.sweep, found.form, tuple(figures), ()), found.sha256, nominal, found.made_with)
+    return Baseline(Summary(found.sweep, found.form, tuple(statistics), ()), found.sha256, nominal, found.made_with)
 
 
-def _name(figure: Figure) -> str:
-    return f"{figure.measure} | {figure.name}" if figure.measure else figure.name
+def _name(statistic: Statistic) -> str:
+    return f"{statistic.measure} | {statistic.name}" if statistic.measure else statistic.name
 
 
-def _figure(figure: Figure) -> str:
-    parts: dict[str, Any] = {"value": figure.value}
-    if figure.kind != "value":
-        parts["kind"] = figure.kind
-    if figure.unit != "1":
-        parts["unit"] = figure.unit
-    if figure.confidence is not None:
-        parts["confidence"] = _rounded(figure.confidence)
-    if figure.design is not None:
-        parts["design"] = figure.design
-    if figure.at:
-        parts["at"] = dict(figure.at)
+def _statistic(statistic: Statistic) -> str:
+    parts: dict[str, Any] = {"value": statistic.value}
+    if statistic.kind != "value":
+        parts["kind"] = statistic.kind
+    if statistic.unit != "1":
+        parts["unit"] = statistic.unit
+    if statistic.confidence is not None:
+        parts["confidence"] = _rounded(statistic.confidence)
+    if statistic.design is not None:
+        parts["design"] = statistic.design
+    if statistic.at:
+        parts["at"] = dict(statistic.at)
     return _inline(parts)
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from studies.execution.files import json_bytes, write_bytes
 from studies.execution.processes import Executor, Processes, Serial, available_cores
-from studies.sweeps.figures import Summary
 from studies.sweeps.reports import markdown
+from studies.sweeps.statistics import Summary
 from studies.sweeps.store import SUMMARY, SweepFolder, locked_folder
 from studies.sweeps.summary import summarise
 from studies.sweeps.sweep import Chunk, Sweep
@@ -25,7 +25,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class SweepResult:
-    """A complete sweep: its folder, its figures, the chunks computed by this run, and the seconds that their measures took."""
+    """A complete sweep: its folder, its statistics, the chunks computed by this run, and the seconds that their measures took."""
 
     sweep: Sweep
     folder: SweepFolder
@@ -35,8 +35,8 @@ class SweepResult:
     first_reason: str
 
     def count(self, name: str) -> int:
-        """Designs over all subjects: 'designs', 'invalid designs', 'designs without a number'."""
-        return int(sum(f.value for f in self.summary.figures if f.kind == "count" and f.name == name))
+        """Designs over all observers: 'designs', 'invalid designs', 'designs without a number'."""
+        return int(sum(f.value for f in self.summary.statistics if f.kind == "count" and f.name == name))
 
 
 def run_sweep(
@@ -46,7 +46,7 @@ def run_sweep(
     resume: bool = False,
     progress: Progress | None = None,
 ) -> SweepResult:
-    """Compute what is missing, then the figures.
+    """Compute what is missing, then the statistics.
 
     Raises SpecError for a folder in use or of another sweep, OSError if the disk is full.
     """

@@ -14,8 +14,8 @@ from analysis.errors import AnalysisError
 from analysis.sensitivity.worst import worst_case
 from studies.sweeps.designs import WorstCaseSearch
 from studies.sweeps.measure import Measure
+from studies.sweeps.observer import Batch, Observer
 from studies.sweeps.plant import Grid
-from studies.sweeps.subject import Batch, Subject
 from studies.sweeps.sweep import Chunk, Sweep
 from synthesis.errors import ModelError, ProblemError
 from synthesis.polynomials.matrix import FloatArray
@@ -52,17 +52,19 @@ class Envelope:
 
 def evaluate_chunk(sweep: Sweep, chunk: Chunk) -> Evaluated:
     """All measures at all designs of one chunk."""
-    subject, stage = sweep.subjects[chunk.subject], sweep.stages[chunk.stage]
-    box, grid = sweep.boxes[subject.name], sweep.grid(subject)
+    observer, stage = sweep.observers[chunk.observer], sweep.stages[chunk.stage]
+    box, grid = sweep.boxes[observer.name], sweep.grid(observer)
     indices = np.arange(chunk.start, chunk.stop)
     if isinstance(stage, WorstCaseSearch):
-        values = np.stack([searched(sweep, subject, grid, stage, sweep.measures[int(i)]) for i in indices])
+        values = np.stack([searched(sweep, observer, grid, stage, sweep.measures[int(i)]) for i in indices])
     else:
         values = stage.points(indices, box)
-    return evaluate(subject, sweep.measures, grid, box.columns(values))
+    return evaluate(observer, sweep.measures, grid, box.columns(values))
 
 
-def evaluate(subject: Subject, measures: Sequence[Measure], grid: Grid, columns: Mapping[str, FloatArray]) -> Evaluated:
+def evaluate(
+    observer: Observer, measures: Sequence[Measure], grid: Grid, columns: Mapping[str, FloatArray]
+) -> Evaluated:
     """All measures at the given designs; a design that cannot be computed keeps the reason, the others are not touched."""
     count = len(next(iter(columns.values())))
     outcome = np.full(count, VALID, dtype="U12")
@@ -72,13 +74,13 @@ def evaluate(subject: Subject, measures: Sequence[Measure], grid: Grid, columns:
     step = max(1, POINTS // len(grid))
     for start in range(0, count, step):
         rows = np.arange(start, min(start + step, count))
-        batches = _separate(partial(_batch, subject, grid, columns), rows)
+        batches = _separate(partial(_batch, observer, grid, columns), rows)
         for part, batch in batches:
             if isinstance(batch, str):
                 outcome[part], reason[part[0]] = INVALID, batch
                 continue
             for measure in measures:
-                _fill(measure, subject, grid, columns, part, batch, found[measure.name], outcome, reason, flat)
+                _fill(measure, observer, grid, columns, part, batch, found[measure.name], outcome, reason, flat)
     worst, place, envelopes = {}, {}, {}
     for measure in measures:
         values = found[measure.name]
@@ -93,7 +95,7 @@ def evaluate(subject: Subject, measures: Sequence[Measure], grid: Grid, columns:
 
 def _fill(
     measure: Measure,
-    subject: Subject,
+    observer: Observer,
     grid: Grid,
     columns: Mapping[str, FloatArray],
     rows: NDArray[np.int64],
@@ -106,7 +108,7 @@ def _fill(
     """Write one measure of some rows to `out`, NaN and the reason where it has no value."""
 
     def of(part: NDArray[np.int64]) -> FloatArray:
-        return measure(batch if len(part) == len(rows) else _batch(subject, grid, columns, part))
+        return measure(batch if len(part) == len(rows) else _batch(observer, grid, columns, part))
 
     for part, values in _separate(of, rows):
         if isinstance(values, str):
@@ -121,8 +123,8 @@ def _fill(
             reason[row] = f"{reason[row]}; {why}" if reason[row] else why
 
 
-def _batch(subject: Subject, grid: Grid, columns: Mapping[str, FloatArray], rows: NDArray[np.int64]) -> Batch:
-    return subject.at({name: column[rows] for name, column in columns.items()}, grid)
+def _batch(observer: Observer, grid: Grid, columns: Mapping[str, FloatArray], rows: NDArray[np.int64]) -> Batch:
+    return observer.at({name: column[rows] for name, column in columns.items()}, grid)
 
 
 def _separate(
@@ -156,14 +158,14 @@ def _envelope(measure: Measure, values: FloatArray) -> Envelope:
     return Envelope(worst, row.astype(np.int64), best)
 
 
-def searched(sweep: Sweep, subject: Subject, grid: Grid, stage: WorstCaseSearch, measure: Measure) -> FloatArray:
+def searched(sweep: Sweep, observer: Observer, grid: Grid, stage: WorstCaseSearch, measure: Measure) -> FloatArray:
     """The parameters (d,) of the worst design that a search finds for one measure."""
-    box = sweep.boxes[subject.name]
-    if np.isnan(evaluate(subject, [measure], grid, box.columns(box.nominal[None])).worst[measure.name]).any():
+    box = sweep.boxes[observer.name]
+    if np.isnan(evaluate(observer, [measure], grid, box.columns(box.nominal[None])).worst[measure.name]).any():
         return box.nominal  # not a number already there: nothing to search
 
     def scalar(columns: Mapping[str, FloatArray]) -> FloatArray:
-        worst = evaluate(subject, [measure], grid, columns).worst[measure.name]
+        worst = evaluate(observer, [measure], grid, columns).worst[measure.name]
         return np.where(np.isnan(worst), -measure.sign * np.inf, worst)  # designs without a value are no answer
 
     found = worst_case(

@@ -12,8 +12,7 @@ from pydantic import Field, model_validator
 from studies.sweeps.drive_sources import DriveSource, LoggedDrive, TruthDrive
 from studies.sweeps.measure import Measure
 from studies.sweeps.measures import MeasureSpec
-from studies.sweeps.plant import ModelPlant
-from studies.sweeps.subject import Batch, Subject
+from studies.sweeps.observer import Batch, Observer
 from synthesis.errors import SpecError
 from synthesis.polynomials.matrix import FloatArray
 
@@ -77,15 +76,15 @@ class EstimatorNrms(MeasureSpec):
         return TruthDrive(found, self.seed, Path(str(self.manoeuvre)).parent)
 
 
-def _fits(source: DriveSource, subject: Subject) -> None:
-    plant = subject.plant
-    model, inputs = (plant.model.name, len(plant.model.inputs)) if isinstance(plant, ModelPlant) else (subject.name, 1)
+def _fits(source: DriveSource, observer: Observer) -> None:
+    plant, model = observer.plant, observer.plant.model
+    title, inputs = (observer.name, 1) if model is None else (model.name, len(model.inputs))
     sizes = (inputs, len(plant.outputs), len(plant.box))
-    if tuple(s.name for s in plant.states) != MODEL_STATES or sizes != (1, 1, 1) or "lateral" in model:
-        raise SpecError(f"subject '{subject.name}': estimator_nrms is for longitudinal corner observers")
-    if abs(source.sample_time - subject.sample_time) > 1e-9:
+    if tuple(s.name for s in plant.states) != MODEL_STATES or sizes != (1, 1, 1) or "lateral" in title:
+        raise SpecError(f"subject '{observer.name}': estimator_nrms is for longitudinal corner observers")
+    if abs(source.sample_time - observer.sample_time) > 1e-9:
         raise SpecError(
-            f"subject '{subject.name}': its sample time is {subject.sample_time:g} s, that of the drive of estimator_nrms is "
+            f"subject '{observer.name}': its sample time is {observer.sample_time:g} s, that of the drive of estimator_nrms is "
             f"{source.sample_time:g} s; they must be the same"
         )
 

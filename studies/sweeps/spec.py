@@ -15,10 +15,10 @@ from studies.sweeps.measure import Measure
 from studies.sweeps.measures import FAST, MeasureSpec
 from studies.sweeps.measures_costly import COSTLY
 from studies.sweeps.measures_drive import DRIVE
+from studies.sweeps.observer_spec import ObserverSpec
+from studies.sweeps.ranges import RangeSpec
 from studies.sweeps.strict import Strict, read_kind, read_table
-from studies.sweeps.subject_spec import SubjectSpec
 from studies.sweeps.sweep import Sweep
-from studies.sweeps.vary import Vary
 from synthesis.errors import SpecError, unknown
 
 MEASURES: dict[str, type[MeasureSpec]] = {**FAST, **COSTLY, **DRIVE}
@@ -32,7 +32,7 @@ class GridSpec(Strict):
 
 
 class GateSpec(Strict):
-    """By how much of its distance to worthlessness a figure may fall behind the baseline; `measures` by measure name."""
+    """By how much of its distance to worthlessness a statistic may fall behind the baseline; `measures` by measure name."""
 
     tolerance: float = Field(default=0.01, ge=0)
     measures: dict[str, float] = Field(default_factory=dict)
@@ -92,12 +92,12 @@ def build_sweep(data: dict[str, Any], folder: Path, quick: bool = False) -> Swee
     if quick and spec.quick is None:
         raise SpecError("has no [quick] table; give it points and designs, or leave out --quick")
     small = spec.quick if quick else None
-    tables = [read_table(SubjectSpec, _named(entry), f"subjects[{i}]") for i, entry in enumerate(spec.subjects)]
-    subjects = [table.build(folder) for table in tables]
+    tables = [read_table(ObserverSpec, _named(entry), f"subjects[{i}]") for i, entry in enumerate(spec.subjects)]
+    observers = [table.build(folder) for table in tables]
     common = _vary(spec.vary, "vary")
     vary = {
-        subject.name: common if table.vary is None else table.vary
-        for subject, table in zip(subjects, tables, strict=True)
+        observer.name: common if table.vary is None else table.vary
+        for observer, table in zip(observers, tables, strict=True)
     }
     bounds: dict[str, tuple[float, float]] = {}
     for name, edges in spec.grid.range.items():
@@ -106,7 +106,7 @@ def build_sweep(data: dict[str, Any], folder: Path, quick: bool = False) -> Swee
         bounds[name] = (edges[0], edges[1])
     return Sweep(
         name=spec.name,
-        subjects=subjects,
+        observers=observers,
         measures=[_measure(entry, i, folder) for i, entry in enumerate(spec.measures)],
         stages=[_stage(entry, i) for i, entry in enumerate(small.designs if small else spec.designs)],
         vary=vary,
@@ -125,8 +125,8 @@ def _named(entry: Any) -> Any:
     return entry
 
 
-def _vary(table: dict[str, Any], where: str) -> dict[str, Vary]:
-    return {name: read_table(Vary, entry, f"{where}.{name}") for name, entry in table.items()}
+def _vary(table: dict[str, Any], where: str) -> dict[str, RangeSpec]:
+    return {name: read_table(RangeSpec, entry, f"{where}.{name}") for name, entry in table.items()}
 
 
 def _measure(entry: Any, place: int, folder: Path) -> Measure:

@@ -3,7 +3,7 @@
     manifest.json  what was asked (definition), around which values (nominal), and what made it (versions)
     rows/SUBJECT/0000/0000012.parquet       one row a design
     envelopes/SUBJECT/0000/0000012.parquet  worst and best over the designs at each grid point; written before its rows
-    summary.json, summary.md                the figures; there once the sweep is complete
+    summary.json, summary.md                the statistics; there once the sweep is complete
 
 Nothing in it depends on time, machine load, or the number and order of workers: one sweep gives one set of bytes.
 """
@@ -21,7 +21,7 @@ from studies.execution.files import discard_unfinished, json_bytes, write_bytes
 from studies.execution.lock import only_run
 from studies.sweeps.differences import differences
 from studies.sweeps.sweep import Chunk, Sweep
-from studies.sweeps.tables import Done
+from studies.sweeps.tables import ChunkResult
 from studies.sweeps.versions import versions
 from synthesis.errors import SpecError
 
@@ -63,7 +63,7 @@ class SweepFolder:
         return {
             "definition": self.sweep.definition, "sha256": self.sweep.digest, "nominal": self.sweep.nominal,
             "versions": versions(),
-            "designs": {s.name: self.sweep.designs(s) for s in self.sweep.subjects}, "chunks": self.sweep.chunk_count(),
+            "designs": {s.name: self.sweep.designs(s) for s in self.sweep.observers}, "chunks": self.sweep.chunk_count(),
         }  # fmt: skip
 
     def rows(self, chunk: Chunk) -> Path:
@@ -75,14 +75,14 @@ class SweepFolder:
         return self._file("envelopes", chunk)
 
     def _file(self, kind: str, chunk: Chunk) -> Path:
-        subject = self.sweep.subjects[chunk.subject].name
-        return self.path / kind / subject / f"{chunk.number // 1000:04d}" / f"{chunk.number:07d}.parquet"
+        observer = self.sweep.observers[chunk.observer].name
+        return self.path / kind / observer / f"{chunk.number // 1000:04d}" / f"{chunk.number:07d}.parquet"
 
     def has(self, chunk: Chunk) -> bool:
         """Whether both files of a chunk are there and whole."""
         return _ends_well(self.rows(chunk)) and _ends_well(self.envelope(chunk))
 
-    def keep(self, done: Done) -> None:
+    def keep(self, done: ChunkResult) -> None:
         """Store a chunk; its rows last, for they say that it is there."""
         made = differences(versions(), done.made_with)
         if made:
@@ -93,9 +93,9 @@ class SweepFolder:
             file.parent.mkdir(parents=True, exist_ok=True)
             write_bytes(file, data, sync=data is done.rows)
 
-    def of(self, subject: int) -> list[Chunk]:
-        """The chunks of one subject, in order."""
-        return [chunk for chunk in self.sweep.chunks() if chunk.subject == subject]
+    def of(self, observer: int) -> list[Chunk]:
+        """The chunks of one observer, in order."""
+        return [chunk for chunk in self.sweep.chunks() if chunk.observer == observer]
 
 
 @contextmanager

@@ -91,7 +91,7 @@ def test_chunks_cover_every_design_once_and_cut_no_block() -> None:
         chunks = list(found.chunks())
         assert [c.number for c in chunks] == list(range(len(chunks))) and len(chunks) == found.chunk_count()
         designs = [d for c in chunks for d in range(c.design, c.design + c.stop - c.start)]
-        assert designs == list(range(found.designs(found.subjects[0])))
+        assert designs == list(range(found.designs(found.observers[0])))
         saltelli = [c for c in chunks if found.stages[c.stage].kind == "saltelli"]
         assert all(c.start % 7 == 0 and c.stop % 7 == 0 for c in saltelli)
 

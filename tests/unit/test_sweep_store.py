@@ -59,7 +59,7 @@ def test_same_bytes_in_any_order(whole: Sweep, done: dict[str, bytes], tmp_path:
     run_sweep(whole, tmp_path / "out", Backwards())
     assert contents(tmp_path / "out") == done
     rows = sum(pq.read_metadata(p).num_rows for p in (tmp_path / "out").glob("rows/*/*/*"))
-    assert rows == whole.designs(whole.subjects[0])
+    assert rows == whole.designs(whole.observers[0])
 
 
 @pytest.fixture(scope="module")
@@ -87,19 +87,21 @@ def test_killed_at_random_moments_ends_with_the_same_bytes(
     forked: tuple[Path, dict[str, Any]], run: str, kills: int
 ) -> None:
     """In one process and with two workers; half-written files must never be taken for chunks (the control: a cut file)."""
-    folder, told = forked[0], forked[1][run]
-    assert told["killed"] == kills
-    assert told["there"] == sorted(told["there"])  # what was there is still there
-    assert 0 < told["computed"] <= told["all"] - told["there"][-1] < told["all"]  # it went on from where it was left
+    folder, report = forked[0], forked[1][run]
+    assert report["killed"] == kills
+    assert report["there"] == sorted(report["there"])  # what was there is still there
+    assert (
+        0 < report["computed"] <= report["all"] - report["there"][-1] < report["all"]
+    )  # it went on from where it was left
     assert contents(folder / run) == contents(folder / "straight")
 
 
 def test_a_full_disk_is_one_line_and_loses_nothing(forked: tuple[Path, dict[str, Any]]) -> None:
     """A limit on the size of files fails like a full disk, in the middle of a write."""
-    folder, told = forked
-    code, words = told["full"]
+    folder, report = forked
+    code, words = report["full"]
     assert code == 2 and "free space" in words and len(words.strip().splitlines()) == 1
-    assert told["left"] == []
+    assert report["left"] == []
     kept = {k: v for k, v in contents(folder / "full").items() if not k.startswith(("pictures", "report"))}
     assert kept == contents(folder / "serial")
 

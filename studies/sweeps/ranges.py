@@ -10,15 +10,15 @@ from pydantic import Field, model_validator
 
 from analysis.errors import AnalysisError
 from analysis.sensitivity.box import Box, around
+from studies.sweeps.observer import Observer
 from studies.sweeps.plant import Parameter
 from studies.sweeps.strict import Strict
-from studies.sweeps.subject import Subject
 from synthesis.errors import SpecError
 
 ALL = "constants"  # the name that stands for every parameter of the plant
 
 
-class Vary(Strict):
+class RangeSpec(Strict):
     """`relative` to the nominal value, or a `range` in the parameter's own unit, which `unit` may state to be checked."""
 
     relative: float | None = Field(default=None, gt=0)
@@ -33,7 +33,7 @@ class Vary(Strict):
 
 
 @dataclass(frozen=True)
-class Varied:
+class ParameterRange:
     """A parameter with the range it is swept over; `relative` ranges follow the nominal value when it changes."""
 
     name: str
@@ -44,24 +44,26 @@ class Varied:
     relative: bool
 
 
-def resolve(subject: Subject, table: Mapping[str, Vary]) -> tuple[Varied, ...]:
-    """The parameters of one subject, in the order of its own list. Raises SpecError for unknown names and bad ranges."""
+def parameter_ranges(observer: Observer, table: Mapping[str, RangeSpec]) -> tuple[ParameterRange, ...]:
+    """The parameters of one observer, in the order of its own list. Raises SpecError for unknown names and bad ranges."""
     if not table:
-        raise SpecError(f"subject '{subject.name}': nothing to vary; give [vary] at least one parameter")
-    chosen: dict[str, Vary] = {}
+        raise SpecError(f"subject '{observer.name}': nothing to vary; give [vary] at least one parameter")
+    chosen: dict[str, RangeSpec] = {}
     if ALL in table:
-        chosen = dict.fromkeys(subject.plant.parameters, table[ALL])
+        chosen = dict.fromkeys(observer.plant.parameters, table[ALL])
     for name, vary in table.items():
         if name != ALL:
-            subject.require(name)
+            observer.require(name)
             chosen[name] = vary
     return tuple(
-        _varied(subject, subject.parameters[name], chosen[name]) for name in subject.parameters if name in chosen
+        _parameter_range(observer, observer.parameters[name], chosen[name])
+        for name in observer.parameters
+        if name in chosen
     )
 
 
-def _varied(subject: Subject, parameter: Parameter, vary: Vary) -> Varied:
-    where = f"subject '{subject.name}': vary.{parameter.name}"
+def _parameter_range(observer: Observer, parameter: Parameter, vary: RangeSpec) -> ParameterRange:
+    where = f"subject '{observer.name}': vary.{parameter.name}"
     if vary.unit is not None and vary.unit != parameter.unit:
         raise SpecError(f"{where}: unit '{vary.unit}' is not '{parameter.unit}', in which the parameter is given")
     try:
@@ -72,4 +74,4 @@ def _varied(subject: Subject, parameter: Parameter, vary: Vary) -> Varied:
             low, high = float(box.low[0]), float(box.high[0])
     except AnalysisError as error:
         raise SpecError(f"{where}: {error}") from None
-    return Varied(parameter.name, parameter.unit, parameter.nominal, low, high, vary.relative is not None)
+    return ParameterRange(parameter.name, parameter.unit, parameter.nominal, low, high, vary.relative is not None)

@@ -61,35 +61,35 @@ def tornado(rows: Rows, measure: Measure) -> list[Bar]:
     nominal: float | None = None
     values, at = [], []
     alone = next((stage for stage in rows.stages if isinstance(stage, OneAtATimeDesign)), None)
-    for stage, _, columns in rows.columns([*rows.varied, measure.name]):
+    for stage, _, columns in rows.columns([*rows.ranges, measure.name]):
         if nominal is None:
             nominal = float(columns[measure.name][0])
-            centre = np.array([float(columns[name][0]) for name in rows.varied])
+            centre = np.array([float(columns[name][0]) for name in rows.ranges])
         if stage is alone:
             values.append(columns[measure.name])
-            at.append(np.stack([columns[name] for name in rows.varied], axis=1))
+            at.append(np.stack([columns[name] for name in rows.ranges], axis=1))
     if nominal is None or not values:
         return []
-    found, where = np.concatenate(values).reshape(len(rows.varied), -1), np.concatenate(at)
-    where = where.reshape(len(rows.varied), -1, len(rows.varied))
+    found, where = np.concatenate(values).reshape(len(rows.ranges), -1), np.concatenate(at)
+    where = where.reshape(len(rows.ranges), -1, len(rows.ranges))
     bars = [
         Bar(name, where[i, :, i] / centre[i] - 1.0 if centre[i] else where[i, :, i], found[i], nominal)
-        for i, name in enumerate(rows.varied)
+        for i, name in enumerate(rows.ranges)
         if not np.isnan(found[i]).any()
     ]
     return sorted(bars, key=lambda bar: -bar.reach)
 
 
-def worst_map(folder: SweepFolder, rows: Rows, subject: int, measure: Measure) -> Map | None:
+def worst_map(folder: SweepFolder, rows: Rows, observer: int, measure: Measure) -> Map | None:
     """None for a measure without place on the grid, or a grid of more than one parameter."""
-    grid = folder.sweep.grid(rows.subject)
+    grid = folder.sweep.grid(rows.observer)
     if len(grid.names) != 1:
         return None
     worst = np.full(len(grid), -np.inf)
     best = np.full(len(grid), np.inf)
     design = np.zeros(len(grid), np.int64)
     nominal: FloatArray | None = None
-    for chunk in folder.of(subject):
+    for chunk in folder.of(observer):
         columns = columns_of(folder.envelope(chunk), ("measure", "worst", "design", "best"))
         own = np.array([name == measure.name for name in columns["measure"]], bool)
         if not own.any():
@@ -109,12 +109,12 @@ def worst_map(folder: SweepFolder, rows: Rows, subject: int, measure: Measure) -
 
 def _positions(folder: SweepFolder, rows: Rows, designs: Any) -> FloatArray:
     """Where in their ranges the parameters of some designs are, (d, g)."""
-    varied = folder.sweep.varied[rows.subject.name]
-    out = np.full((len(varied), len(designs)), np.nan)
-    for _, first, columns in rows.columns(rows.varied):
-        count = len(columns[rows.varied[0]])
+    ranges = folder.sweep.ranges[rows.observer.name]
+    out = np.full((len(ranges), len(designs)), np.nan)
+    for _, first, columns in rows.columns(rows.ranges):
+        count = len(columns[rows.ranges[0]])
         inside = (designs >= first) & (designs < first + count)
-        for i, v in enumerate(varied):
+        for i, v in enumerate(ranges):
             out[i, inside] = (columns[v.name][designs[inside] - first] - v.low) / (v.high - v.low)
     return out
 

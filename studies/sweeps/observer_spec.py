@@ -1,4 +1,4 @@
-"""A subject as a table of a sweep file: a schedule, or a model of the catalogue with a constant gain."""
+"""An observer as a table of a sweep file: a schedule, or a model of the catalogue with a constant gain."""
 
 from __future__ import annotations
 
@@ -11,22 +11,21 @@ from pydantic import Field, ValidationError, model_validator
 from estimators.errors import EstimatorError
 from estimators.schedule import SHIPPED, GainSchedule, read_content
 from studies.spec import ScheduleSpec, explain
-from studies.sweeps.plant import Box, ModelPlant, Plant, PolynomialPlant
+from studies.sweeps.observer import Gains, Observer, model_observer
+from studies.sweeps.plant import model_plant, polynomial_plant
+from studies.sweeps.ranges import RangeSpec
 from studies.sweeps.strict import Strict
-from studies.sweeps.subject import Gains, Subject, model_subject
-from studies.sweeps.vary import Vary
 from synthesis.errors import SpecError, unknown
 from synthesis.models.catalogue import CATALOGUE
 from synthesis.models.lpv import LpvModel
-from synthesis.models.param import Signal
 from synthesis.models.parameter_set import ParameterSet, Quantity, load_parameter_set
 
 
-class SubjectSpec(Strict):
+class ObserverSpec(Strict):
     """`schedule` with or without today's `parameters`, or `model`, `parameters`, `gain` and `sample_time`.
 
     Files are looked for beside the sweep file. Without `parameters` a schedule is swept around the constants it was made with.
-    `vary` replaces the sweep's own table for this subject.
+    `vary` replaces the sweep's own table for this observer.
     """
 
     name: str | None = Field(default=None, pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
@@ -37,7 +36,7 @@ class SubjectSpec(Strict):
     sample_time: float | None = Field(default=None, gt=0, lt=1)
     wheel_speed_maximum: float = Field(default=140.0, gt=0)
     wheel_speed_rate: float = Field(default=800.0, ge=0)
-    vary: dict[str, Vary] | None = None
+    vary: dict[str, RangeSpec] | None = None
 
     @model_validator(mode="after")
     def _one_or_the_other(self) -> Self:
@@ -50,29 +49,28 @@ class SubjectSpec(Strict):
             raise ValueError("a model needs parameters, gain and sample_time")
         return self
 
-    def build(self, folder: Path) -> Subject:
-        """The subject. Raises SpecError that names the file and what is wrong with it."""
+    def build(self, folder: Path) -> Observer:
+        """The observer. Raises SpecError that names the file and what is wrong with it."""
         return self._of_schedule(folder) if self.schedule is not None else self._of_model(folder)
 
-    def _of_model(self, folder: Path) -> Subject:
-        assert (
-            self.model is not None and self.gain is not None and self.sample_time is not None
-        )  # the validator saw to it
-        parameters = _parameters(str(self.parameters), folder)
+    def _of_model(self, folder: Path) -> Observer:
+        name, parameters = str(self.model), _parameters(str(self.parameters), folder)
         try:
             gain = np.asarray(self.gain, float)
         except ValueError:
-            raise SpecError(f"subject '{self.model}': gain {self.gain} has rows of different lengths") from None
-        model = self._model(self.model, parameters)
-        return model_subject(self.name or self.model, model, gain, self.sample_time)
+            raise SpecError(f"subject '{name}': gain {self.gain} has rows of different lengths") from None
+        if name not in CATALOGUE:
+            raise SpecError(unknown("model", name, CATALOGUE))
+        limits = {"wheel_speed_maximum": self.wheel_speed_maximum, "wheel_speed_rate": self.wheel_speed_rate}
+        return model_observer(self.name or name, CATALOGUE[name](parameters, **limits), gain, self.sample_time or 0.0)
 
-    def _of_schedule(self, folder: Path) -> Subject:
+    def _of_schedule(self, folder: Path) -> Observer:
         content = schedule_content(str(self.schedule), folder)
         schedule = GainSchedule.from_content(content)
         name = content["model"]["id"]
         if name in CATALOGUE:
             given = None if self.parameters is None else _parameters(self.parameters, folder)
-            plant: Plant = ModelPlant(catalogue_model(content, given))
+            plant = model_plant(catalogue_model(content, given))
         elif self.parameters is None:
             plant = polynomial_plant(schedule)
         else:
@@ -80,17 +78,10 @@ class SubjectSpec(Strict):
         gains = Gains(schedule.table, schedule.breakpoints)
         origin = f"the schedule '{schedule.name}'"
         proved = {name: float(c["value"]) for name, c in content["model"]["constants"].items()}
-        return Subject(
+        return Observer(
             self.name or schedule.name, plant, gains, schedule.sample_time, origin, designed_from(content), proved,
             schedule.update,
         )  # fmt: skip
-
-    def _model(self, name: str, parameters: ParameterSet) -> LpvModel:
-        if name not in CATALOGUE:
-            raise SpecError(unknown("model", name, CATALOGUE))
-        return CATALOGUE[name](
-            parameters, wheel_speed_maximum=self.wheel_speed_maximum, wheel_speed_rate=self.wheel_speed_rate
-        )
 
 
 def schedule_content(name: str, folder: Path) -> dict[str, Any]:
@@ -122,16 +113,6 @@ def _recorded(content: dict[str, Any]) -> ParameterSet:
     vehicle = {"effective_radius": constants.pop("effective_radius")}
     tire: Any = {direction: {name: quantity.model_dump() for name, quantity in constants.items()}}
     return ParameterSet(id=content["name"], citation="the schedule file", vehicle=vehicle, tire=tire)
-
-
-def polynomial_plant(schedule: GainSchedule) -> PolynomialPlant:
-    """The plant that a schedule carries, whatever model it came from."""
-    p = schedule.parameter
-    signals = [
-        tuple(Signal(s.name, s.unit) for s in found)
-        for found in (schedule.states, schedule.outputs, schedule.disturbances)
-    ]
-    return PolynomialPlant(schedule.plant, (Box(p.name, p.unit, p.min, p.max),), *signals)
 
 
 def designed_from(content: dict[str, Any]) -> ScheduleSpec | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
@@ -20,9 +20,10 @@ from analysis.second_moment import spectral_radius
 from estimators.interpolate import PiecewiseLinear
 from estimators.schedule import Update
 from studies.spec import ScheduleSpec
-from studies.sweeps.plant import Grid, ModelPlant, Parameter, Plant
+from studies.sweeps.plant import Grid, Parameter, Plant, model_plant
 from synthesis.errors import SpecError, unknown
 from synthesis.models.lpv import LpvModel
+from synthesis.models.param import Signal
 from synthesis.polynomials.matrix import FloatArray
 
 SAME = 1e-12  # relative: what a constant may differ by without being another
@@ -49,7 +50,7 @@ class Gains:
 
 
 @dataclass(frozen=True, eq=False)
-class Subject:
+class Observer:
     """An observer of a plant with sample time `sample_time` in s, running one `update` of `estimators.velocity.exact_update`.
 
     "held" is x^' = A x^ + B u + L (y - C x^ - D u) with y held over a sample; the gains K of "sampled" correct once a sample.
@@ -81,14 +82,18 @@ class Subject:
     def parameters(self) -> dict[str, Parameter]:
         """All that can be varied, by name: parameters of the plant, and entries of the gain or factors on them."""
         found = dict(self.plant.parameters)
-        outputs = self.plant.outputs
-        for (i, state), (j, output) in product(enumerate(self.plant.states), enumerate(outputs)):
-            suffix = state.name if len(outputs) == 1 else f"{state.name}_{output.name}"
+        for i, j, state, output, suffix in self._gain_entries():
             if self.gains.constant:
                 unit = f"({state.unit}{'/s' if self.update == 'held' else ''})/({output.unit})"
                 found[f"gain_{suffix}"] = Parameter(f"gain_{suffix}", unit, float(self.gains.table[0, i, j]), "gain")
             found[f"gain_factor_{suffix}"] = Parameter(f"gain_factor_{suffix}", "1", 1.0, "gain factor")
         return found
+
+    def _gain_entries(self) -> Iterator[tuple[int, int, Signal, Signal, str]]:
+        """Row, column, state, output and name of every entry of the gain."""
+        outputs = self.plant.outputs
+        for (i, state), (j, output) in product(enumerate(self.plant.states), enumerate(outputs)):
+            yield i, j, state, output, state.name if len(outputs) == 1 else f"{state.name}_{output.name}"
 
     def require_error_equation(self) -> None:
         """Raises SpecError where there is no error equation e' = (A - L C) e, so no norm of it."""
@@ -104,7 +109,7 @@ class Subject:
             raise SpecError(f"subject '{self.name}': {unknown('parameter', name, self.parameters)}")
         return self.parameters[name]
 
-    def with_gains(self, gains: Gains) -> Subject:
+    def with_gains(self, gains: Gains) -> Observer:
         """The same with other gains."""
         return replace(self, gains=gains)
 
@@ -149,9 +154,7 @@ class Subject:
         if not chosen:
             return L
         L = np.repeat(L, len(columns[chosen[0]]), axis=0)
-        outputs = self.plant.outputs
-        for (i, state), (j, output) in product(enumerate(self.plant.states), enumerate(outputs)):
-            suffix = state.name if len(outputs) == 1 else f"{state.name}_{output.name}"
+        for i, j, _, _, suffix in self._gain_entries():
             if f"gain_{suffix}" in chosen:
                 L[:, :, i, j] = columns[f"gain_{suffix}"][:, None]
             if f"gain_factor_{suffix}" in chosen:
@@ -161,13 +164,13 @@ class Subject:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Some designs of a subject on its grid: what a measure is given.
+    """Some designs of an observer on its grid: what a measure is given.
 
     `columns` hold the parameter values (n,) by name; `matrices` and `gain` have the leading axes (n or 1, g). What several
     measures need is made once.
     """
 
-    subject: Subject
+    observer: Observer
     grid: Grid
     columns: dict[str, FloatArray]
     count: int
@@ -177,16 +180,16 @@ class Batch:
     @cached_property
     def error(self) -> tuple[FloatArray, FloatArray]:
         """A_e = A - L C (n, g, nx, nx) and B_e = E - L F (n, g, nx, nd). Raises SpecError for the update "sampled"."""
-        self.subject.require_error_equation()
+        self.observer.require_error_equation()
         A_e, B_e = self.matrices.error_dynamics(self.gain)
         return self._whole(A_e), self._whole(B_e)
 
     @cached_property
     def margin(self) -> FloatArray:
         """Growth of the error in 1/s (n, g): max Re lambda(A_e), or log(radius of a received sample)/T, which is the same."""
-        if self.subject.update == "sampled":
+        if self.observer.update == "sampled":
             with np.errstate(divide="ignore"):  # deadbeat: -inf
-                return np.asarray(np.log(spectral_radius(self.coast.received)) / self.subject.sample_time)
+                return np.asarray(np.log(spectral_radius(self.coast.received)) / self.observer.sample_time)
         A_e = self.error[0]
         return planar_margin(A_e) if A_e.shape[-1] == 2 else stability_margin(A_e)
 
@@ -195,29 +198,29 @@ class Batch:
         """What the runtime does with a dropped and with a received sample: e^{A T}, and e^{A_e T} or e^{A T} - K C."""
         if self.matrices.A.shape[-1] != 2:
             return self.modes("coast")
-        T = self.subject.sample_time
+        T = self.observer.sample_time
         dropped = planar_exponential(self._whole(self.matrices.A) * T)
-        if self.subject.update == "sampled":
+        if self.observer.update == "sampled":
             return DropModes(dropped, dropped - self.gain @ self.matrices.C, "coast")
         return DropModes(dropped, planar_exponential(self.error[0] * T), "coast")
 
     def modes(self, policy: DropPolicy) -> DropModes:
         """Both updates for any drop policy."""
         A, C, L = (self._whole(M) for M in (self.matrices.A, self.matrices.C, self.gain))
-        return runtime_drop_modes(A, C, L, self.subject.sample_time, policy, self.subject.update)
+        return runtime_drop_modes(A, C, L, self.observer.sample_time, policy, self.observer.update)
 
     def _whole(self, array: FloatArray) -> FloatArray:
         return np.broadcast_to(array, (self.count, len(self.grid), *array.shape[2:]))
 
 
-def model_subject(
+def model_observer(
     name: str,
     model: LpvModel,
     gain: FloatArray,
     sample_time: float,
     breakpoints: FloatArray | None = None,
     specification: ScheduleSpec | None = None,
-) -> Subject:
+) -> Observer:
     """An observer of any LpvModel: a constant gain (nx, ny), or a table (b, nx, ny) over `breakpoints` of its one parameter."""
     table = checked_gain(model, gain)
     places = np.empty(0) if breakpoints is None else np.asarray(breakpoints, float)
@@ -230,4 +233,4 @@ def model_subject(
     if not 0.0 < sample_time < 1.0:
         raise SpecError(f"subject '{name}': sample_time = {sample_time:g} s must lie between 0 and 1 s")
     whole = table if table.ndim == 3 else table[None]
-    return Subject(name, ModelPlant(model), Gains(whole, places), sample_time, "the gain", specification)
+    return Observer(name, model_plant(model), Gains(whole, places), sample_time, "the gain", specification)
