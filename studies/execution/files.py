@@ -20,10 +20,7 @@ UNFINISHED = ".unfinished-"
 
 
 def check_folder(out: Path) -> None:
-    """As :func:`ready_folder`, before there is anything to write: nothing is created.
-
-    Raises SpecError when ``out`` or a folder above it is a file or cannot be written.
-    """
+    """Raises SpecError when ``out`` cannot be a folder for results: it or one above is a file or cannot be written."""
     there = next(path for path in (out.absolute(), *out.absolute().parents) if path.exists())
     if not there.is_dir():
         raise SpecError(f"{out}: cannot be a folder for results ({there.name} is a file); give another --out")
@@ -32,13 +29,9 @@ def check_folder(out: Path) -> None:
 
 
 def ready_folder(out: Path) -> None:
-    """Create ``out`` if needed; SpecError when it is a file or cannot be written."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SpecError(f"{out}: cannot be a folder for results ({error.strerror}); give another --out") from error
-    if not os.access(out, os.W_OK):
-        raise SpecError(f"{out}: cannot be written; give another --out")
+    """Create ``out`` if needed. Raises SpecError as :func:`check_folder`."""
+    check_folder(out)
+    out.mkdir(parents=True, exist_ok=True)
 
 
 @contextmanager

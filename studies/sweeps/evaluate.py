@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +25,7 @@ TIE = 1e-9  # relative
 REFUSALS = (AnalysisError, ModelError, ProblemError, np.linalg.LinAlgError)
 
 Answer = TypeVar("Answer")
+Rows: TypeAlias = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -67,24 +67,39 @@ def evaluate(
 ) -> Evaluated:
     """All measures at the given designs; a design that cannot be computed keeps the reason, the others are not touched."""
     count = len(next(iter(columns.values())))
-    outcome = np.full(count, VALID, dtype="U12")
-    reason = [""] * count
+    outcome, reason = np.full(count, VALID, dtype="U12"), [""] * count
     found = {m.name: np.full((count, len(grid)), np.nan) for m in measures}
     flat: set[str] = set()
+
+    def batch_of(rows: Rows) -> Batch:
+        return observer.at({name: column[rows] for name, column in columns.items()}, grid)
+
+    def fill(measure: Measure, rows: Rows, batch: Batch) -> None:
+        """One measure of some rows, NaN and the reason where it has no value."""
+        out = found[measure.name]
+        for part, values in _separate(lambda some: measure(batch if len(some) == len(rows) else batch_of(some)), rows):
+            if isinstance(values, str):
+                bad, why = part, f"{measure.name}: {values}"
+            else:
+                if values.ndim == 1:
+                    flat.add(measure.name)
+                out[part] = values.reshape(len(part), -1)
+                bad, why = part[np.isnan(out[part]).any(axis=1)], f"{measure.name} is not a number"
+            for row in bad:
+                outcome[row] = NOT_A_NUMBER
+                reason[row] = f"{reason[row]}; {why}" if reason[row] else why
+
     step = max(1, POINTS // len(grid))
     for start in range(0, count, step):
-        rows = np.arange(start, min(start + step, count))
-        batches = _separate(partial(_batch, observer, grid, columns), rows)
-        for part, batch in batches:
+        for part, batch in _separate(batch_of, np.arange(start, min(start + step, count))):
             if isinstance(batch, str):
                 outcome[part], reason[part[0]] = INVALID, batch
                 continue
             for measure in measures:
-                _fill(measure, observer, grid, columns, part, batch, found[measure.name], outcome, reason, flat)
+                fill(measure, part, batch)
     worst, place, envelopes = {}, {}, {}
     for measure in measures:
-        values = found[measure.name]
-        name = measure.name
+        name, values = measure.name, found[measure.name]
         worst[name], place[name] = _worst(measure, values)
         if name in flat:
             place[name][:] = -1
@@ -93,43 +108,7 @@ def evaluate(
     return Evaluated(dict(columns), worst, place, envelopes, outcome, reason)
 
 
-def _fill(
-    measure: Measure,
-    observer: Observer,
-    grid: Grid,
-    columns: Mapping[str, FloatArray],
-    rows: NDArray[np.int64],
-    batch: Batch,
-    out: FloatArray,
-    outcome: NDArray[np.str_],
-    reason: list[str],
-    flat: set[str],
-) -> None:
-    """Write one measure of some rows to `out`, NaN and the reason where it has no value."""
-
-    def of(part: NDArray[np.int64]) -> FloatArray:
-        return measure(batch if len(part) == len(rows) else _batch(observer, grid, columns, part))
-
-    for part, values in _separate(of, rows):
-        if isinstance(values, str):
-            bad, why = part, f"{measure.name}: {values}"
-        else:
-            if values.ndim == 1:
-                flat.add(measure.name)
-            out[part] = values.reshape(len(part), -1)
-            bad, why = part[np.isnan(out[part]).any(axis=1)], f"{measure.name} is not a number"
-        for row in bad:
-            outcome[row] = NOT_A_NUMBER
-            reason[row] = f"{reason[row]}; {why}" if reason[row] else why
-
-
-def _batch(observer: Observer, grid: Grid, columns: Mapping[str, FloatArray], rows: NDArray[np.int64]) -> Batch:
-    return observer.at({name: column[rows] for name, column in columns.items()}, grid)
-
-
-def _separate(
-    function: Callable[[NDArray[np.int64]], Answer], rows: NDArray[np.int64]
-) -> list[tuple[NDArray[np.int64], Answer | str]]:
+def _separate(function: Callable[[Rows], Answer], rows: Rows) -> list[tuple[Rows, Answer | str]]:
     """function(rows) if it can be had at once; else in halves, down to single rows whose refusal is returned as text."""
     try:
         return [(rows, function(rows))]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -42,11 +42,18 @@ class MeasureSpec(Strict):
     def check(self, observer: Observer) -> None:
         """Raises SpecError for an observer that the measure does not fit."""
 
+    def definition(self) -> Mapping[str, Any]:
+        """What makes two measures the same."""
+        return self.model_dump(mode="json")
+
+    def prepare(self) -> None:
+        """Make what all chunks share."""
+
     def build(self) -> Measure:
         """The measure."""
         return Measure(
-            self.name or self.title, self.unit, self.better, self.values, self.limit, self.variance,
-            self.model_dump(mode="json"), self.check,
+            self.name or self.title, self.unit, self.better, self.values, self.limit, self.variance, self.definition(),
+            self.check, self.prepare,
         )  # fmt: skip
 
     def beside(self, folder: Path) -> MeasureSpec:

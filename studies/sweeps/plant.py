@@ -13,7 +13,7 @@ from analysis.perturbed import Matrices, PerturbedModel
 from estimators.schedule import GainSchedule, PlantPolynomial
 from synthesis.models.extract import MATRICES
 from synthesis.models.lpv import LpvModel
-from synthesis.models.param import Signal
+from synthesis.models.param import SchedulingParameter, Signal
 from synthesis.polynomials.matrix import FloatArray
 
 
@@ -45,22 +45,12 @@ class Grid:
         return {name: float(value) for name, value in zip(self.names, self.points[index], strict=True)}
 
 
-@dataclass(frozen=True)
-class Scheduling:
-    """A scheduling parameter with its range."""
-
-    name: str
-    unit: str
-    minimum: float
-    maximum: float
-
-
 @dataclass(frozen=True, eq=False)
 class Plant:
     """What can be varied by name, the scheduling parameters, and signals; matrices of a symbolic `model` or of `polynomials`."""
 
     parameters: Mapping[str, Parameter]
-    box: tuple[Scheduling, ...]
+    box: tuple[SchedulingParameter, ...]
     states: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
     disturbances: tuple[Signal, ...]
@@ -95,8 +85,7 @@ class Plant:
 def model_plant(model: LpvModel) -> Plant:
     """A symbolic model; its constants are the parameters."""
     constants = {name: Parameter(name, c.unit, float(c.value)) for name, c in model.constants.items()}
-    box = tuple(Scheduling(p.name, p.unit, p.minimum, p.maximum) for p in model.parameters)
-    return Plant(constants, box, model.states, model.outputs, model.disturbances, model)
+    return Plant(constants, model.parameters, model.states, model.outputs, model.disturbances, model)
 
 
 def polynomial_plant(schedule: GainSchedule) -> Plant:
@@ -115,5 +104,5 @@ def polynomial_plant(schedule: GainSchedule) -> Plant:
         tuple(Signal(s.name, s.unit) for s in found)
         for found in (schedule.states, schedule.outputs, schedule.disturbances)
     )
-    box = (Scheduling(p.name, p.unit, p.min, p.max),)
+    box = (SchedulingParameter(p.name, p.unit, p.min, p.max, p.rate_min, p.rate_max),)
     return Plant(entries, box, states, outputs, disturbances, polynomials=schedule.plant)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from analysis.errors import AnalysisError
@@ -42,6 +43,12 @@ class ParameterRange:
     low: float
     high: float
     relative: bool
+
+
+def box_of(ranges: Sequence[ParameterRange]) -> Box:
+    """The box of designs."""
+    low, high, nominal = np.array([(r.low, r.high, r.nominal) for r in ranges]).T
+    return Box(tuple(r.name for r in ranges), low, high, nominal)
 
 
 def parameter_ranges(observer: Observer, table: Mapping[str, RangeSpec]) -> tuple[ParameterRange, ...]:

@@ -9,8 +9,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from analysis.errors import AnalysisError
 from analysis.sensitivity.box import Box
 from analysis.sensitivity.designs import Design, Nominal
@@ -18,7 +16,7 @@ from studies.sweeps.designs import WorstCaseSearch
 from studies.sweeps.measure import Measure
 from studies.sweeps.observer import Observer
 from studies.sweeps.plant import Grid
-from studies.sweeps.ranges import ParameterRange, RangeSpec, parameter_ranges
+from studies.sweeps.ranges import ParameterRange, RangeSpec, box_of, parameter_ranges
 from synthesis.errors import SpecError
 
 SCHEMA = "gainsmith.sweep/1"
@@ -97,13 +95,7 @@ class Sweep:
     @cached_property
     def boxes(self) -> dict[str, Box]:
         """The box in which each observer's designs lie."""
-        return {
-            name: Box(
-                tuple(v.name for v in own),
-                *(np.array([getattr(v, k) for v in own]) for k in ("low", "high", "nominal")),
-            )
-            for name, own in self.ranges.items()
-        }
+        return {name: box_of(own) for name, own in self.ranges.items()}
 
     def _table(self, observer: str) -> Mapping[str, RangeSpec]:
         plain = {name: entry for name, entry in self.vary.items() if isinstance(entry, RangeSpec)}
@@ -123,11 +115,12 @@ class Sweep:
         return sum(self.rows(observer, stage) for stage in self.stages)
 
     def chunks(self) -> Iterator[Chunk]:
-        """All chunks in order; none crosses a stage or cuts a block."""
+        """All chunks in order; none crosses a stage or cuts a block. A search is work enough for one."""
         for s, observer in enumerate(self.observers):
             number = design = 0
             for k, stage in enumerate(self.stages):
-                rows, step = self.rows(observer, stage), self._step(observer, stage)
+                rows, block = self.rows(observer, stage), stage.block(self.boxes[observer.name])
+                step = 1 if isinstance(stage, WorstCaseSearch) else max(self.chunk // block, 1) * block
                 for start in range(0, rows, step):
                     stop = min(start + step, rows)
                     yield Chunk(s, number, k, start, stop, design + start)
@@ -136,16 +129,7 @@ class Sweep:
 
     def chunk_count(self) -> int:
         """How many chunks there are."""
-        return sum(
-            -(-self.rows(observer, stage) // self._step(observer, stage))
-            for observer in self.observers
-            for stage in self.stages
-        )
-
-    def _step(self, observer: Observer, stage: Design) -> int:
-        """Rows of a chunk: whole blocks; a search is work enough for one."""
-        block = stage.block(self.boxes[observer.name])
-        return 1 if isinstance(stage, WorstCaseSearch) else max(self.chunk // block, 1) * block
+        return sum(1 for _ in self.chunks())
 
     @cached_property
     def definition(self) -> dict[str, Any]:
