@@ -17,7 +17,7 @@ from studies.execution.processes import Executor
 from studies.sweeps.baseline import Baseline, of_sweep, read_baseline, write_baseline
 from studies.sweeps.engine import SweepResult, default_executor
 from studies.sweeps.engine import run_sweep as run
-from studies.sweeps.gate import Comparison, comparable, compare, loss_text
+from studies.sweeps.gate import HEADINGS, Comparison, comparable, compare, loss_text
 from studies.sweeps.reports import junit as junit_xml
 from studies.sweeps.reports import markdown
 from studies.sweeps.spec import load_sweep
@@ -125,9 +125,8 @@ def _print(result: SweepResult, compared: list[Comparison] | None, folder: Path)
                 for name in ("nominal", "median", "quantile 95 %", "quantile 99 %", "worst")
             ]
             worst = found[-1]
-            at = "" if worst is None else ", ".join(f"{k} {number(v, 4)}" for k, v in worst.at.items())
             cells = ["" if f is None else number(f.value) for f in found]
-            table.add_row(observer.name, measure.name, *cells, measure.unit, at)
+            table.add_row(observer.name, measure.name, *cells, measure.unit, worst.where() if worst else "")
     console.print(table)
     for note in result.summary.notes:
         console.print(note)
@@ -142,15 +141,10 @@ def _print_comparison(console: Console, compared: list[Comparison]) -> None:
         console.print(f"nothing shrank: {len(compared)} statistics within their tolerance of the baseline")
         return
     table = Table(title=f"{len(bad)} of {len(compared)} statistics shrank beyond their tolerance")
-    for i, heading in enumerate(("subject", "measure", "statistic", "from", "to", "loss", "at", "what did it")):
+    for i, heading in enumerate(HEADINGS):
         table.add_column(heading, justify="right" if 3 <= i <= 5 else "left")
-    for j in bad:
-        at = "" if j.after is None else ", ".join(f"{k} {number(v, 4)}" for k, v in j.after.at.items())
-        after = "gone" if j.after is None else number(j.after.value)
-        lost = loss_text(j.loss) if j.before.kind == "value" else ""
-        table.add_row(
-            j.before.observer, j.before.measure, j.before.name, number(j.before.value), after, lost, at, j.cause
-        )
+    for comparison in bad:
+        table.add_row(*comparison.cells)
     console.print(table)
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import struct
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import contextmanager
 from itertools import islice
 from typing import Any
 
@@ -94,15 +96,13 @@ def _answer(function: Function, shared: Any, task: Any) -> Any:
     return task, function(shared, task)
 
 
-class _quiet:  # noqa: N801  a context manager reads as a verb
+@contextmanager
+def _quiet() -> Iterator[None]:
     """Dask logs every lost connection with a traceback; what matters is said in one line."""
-
-    def __enter__(self) -> None:
-        import logging
-
-        self.logger = logging.getLogger("distributed")
-        self.level = self.logger.level
-        self.logger.setLevel(logging.CRITICAL + 1)
-
-    def __exit__(self, *_: object) -> None:
-        self.logger.setLevel(self.level)
+    logger = logging.getLogger("distributed")
+    level = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)

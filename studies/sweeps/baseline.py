@@ -11,10 +11,10 @@ from typing import Any
 from pydantic import Field
 
 from studies.execution.files import write_bytes
+from studies.sweeps.manifest import versions
 from studies.sweeps.statistics import Statistic, Summary
 from studies.sweeps.strict import Strict, read_table
 from studies.sweeps.sweep import Sweep
-from studies.sweeps.versions import versions
 from synthesis.errors import SpecError
 
 SCHEMA = "gainsmith.sweep-baseline/1"

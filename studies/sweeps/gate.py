@@ -12,6 +12,7 @@ from studies.sweeps.sweep import Sweep
 from synthesis.errors import SpecError
 
 SHRUNK, MOVED, GREW, SAME, MISSING = "shrunk", "moved", "grew", "same", "missing"
+HEADINGS = ("subject", "measure", "statistic", "from", "to", "loss", "at", "what did it")
 INDEX_TOLERANCE = 0.02  # of the whole variance, on top of both confidences
 
 
@@ -42,11 +43,18 @@ class Comparison:
         if now is None:
             return f"{head}: was {number(f.value)}, is not made any more"
         unit = "" if f.unit == "1" else f" {f.unit}"
-        at = ", ".join(f"{name} = {number(v, 5)}" for name, v in now.at.items())
-        place = f" at {at}" if at else ""
+        place = f" at {now.where(5)}" if now.at else ""
         lost = f" (loss {loss_text(self.loss)}, tolerance {100.0 * self.tolerance:g} %)" if f.kind == "value" else ""
         cause = f"; {self.cause}" if self.cause else ""
         return f"{head}: {number(f.value)} -> {number(now.value)}{unit}{lost}{place}{cause}"
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """What stands below `HEADINGS` in a table."""
+        f, now = self.before, self.after
+        after, at = ("gone", "") if now is None else (number(now.value), now.where())
+        lost = loss_text(self.loss) if f.kind == "value" else ""
+        return f.observer, f.measure, f.name, number(f.value), after, lost, at, self.cause
 
 
 def loss_text(loss: float) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
-from studies.sweeps.gate import GREW, MOVED, Comparison, loss_text
+from studies.sweeps.gate import GREW, HEADINGS, MOVED, Comparison
 from studies.sweeps.statistics import Statistic, Summary, number
 
 
@@ -31,15 +31,8 @@ def _verdict(compared: Sequence[Comparison]) -> list[str]:
             "",
         ]
     lines = [f"**{len(bad)} of {len(compared)} statistics shrank beyond their tolerance.** {others}", ""]
-    lines += [
-        "| subject | measure | statistic | from | to | loss | at | what did it |",
-        "|---|---|---|---:|---:|---:|---|---|",
-    ]
-    for j in bad:
-        after = "gone" if j.after is None else number(j.after.value)
-        lost = loss_text(j.loss) if j.before.kind == "value" else ""
-        cells = (j.before.observer, j.before.measure, j.before.name, number(j.before.value), after, lost)
-        lines.append("| " + " | ".join((*cells, _at(j.after) if j.after else "", j.cause)) + " |")
+    lines += ["| " + " | ".join(HEADINGS) + " |", "|---|---|---|---:|---:|---:|---|---|"]
+    lines += ["| " + " | ".join(j.cells) + " |" for j in bad]
     return [*lines, ""]
 
 
@@ -52,7 +45,7 @@ def _observer(summary: Summary, observer: str) -> list[str]:
     values = [f for f in own if f.kind == "value"]
     if values:
         lines += ["| measure | statistic | value | unit | at |", "|---|---|---:|---|---|"]
-        lines += [f"| {f.measure} | {f.name} | {number(f.value)} | {f.unit} | {_at(f)} |" for f in values]
+        lines += [f"| {f.measure} | {f.name} | {number(f.value)} | {f.unit} | {f.where()} |" for f in values]
         lines.append("")
     totals = [f for f in own if f.kind == "index" and f.name.startswith("total")]
     if totals:
@@ -63,10 +56,6 @@ def _observer(summary: Summary, observer: str) -> list[str]:
             lines.append(f"| {measure} | {', '.join(cells)} |")
         lines.append("")
     return lines
-
-
-def _at(statistic: Statistic) -> str:
-    return ", ".join(f"{name} = {number(value, 4)}" for name, value in statistic.at.items())
 
 
 def junit(sweep: str, summary: Summary, compared: Sequence[Comparison] | None) -> bytes:

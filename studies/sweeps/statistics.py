@@ -32,6 +32,10 @@ class Statistic:
         """Observer, measure and name: what makes two statistics the same."""
         return self.observer, self.measure, self.name
 
+    def where(self, digits: int = 4) -> str:
+        """The parameters at which it is taken, in words."""
+        return ", ".join(f"{name} = {number(value, digits)}" for name, value in self.at.items())
+
 
 @dataclass(frozen=True)
 class Summary:

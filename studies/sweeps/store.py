@@ -19,10 +19,9 @@ from typing import Any
 
 from studies.execution.files import discard_unfinished, json_bytes, write_bytes
 from studies.execution.lock import only_run
-from studies.sweeps.differences import differences
+from studies.sweeps.manifest import differences, versions
 from studies.sweeps.sweep import Chunk, Sweep
 from studies.sweeps.tables import ChunkResult
-from studies.sweeps.versions import versions
 from synthesis.errors import SpecError
 
 MAGIC = b"PAR1"

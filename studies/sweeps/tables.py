@@ -13,8 +13,8 @@ import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
 from studies.sweeps.evaluate import Evaluated, evaluate_chunk
+from studies.sweeps.manifest import versions
 from studies.sweeps.sweep import Chunk, Sweep
-from studies.sweeps.versions import versions
 
 WORDS = ("stage", "outcome", "reason", "measure")  # a dictionary of columns of numbers costs more than it saves
 PLACE = " place"  # column of the grid point at which a measure is at its worst
