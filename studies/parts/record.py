@@ -6,14 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from studies.claim import JsonValue
+from studies.claim import JsonValue, paper_rank
 from studies.parts.marks import Marks
 from studies.parts.store import StoredPart, check_names, part_folder, read_part
 from studies.registry import Registry
 from studies.study import Preparation, Scope, Study
 from synthesis.errors import SpecError
-
-PAPERS = ("P1", "P2", "P3", "P4", "P5")
 
 
 @dataclass(frozen=True)
@@ -119,8 +117,3 @@ def all_claims(records: Sequence[StudyRecord]) -> list[dict[str, JsonValue]]:
             raise SpecError(f"claim '{claim['id']}' is delivered by two studies; leave it to one")
         seen.add(str(claim["id"]))
     return sorted(claims, key=lambda claim: paper_rank(str(claim["paper"])))
-
-
-def paper_rank(paper: str) -> int:
-    """P1 before P5, ``P1/P2`` with P1, anything else last."""
-    return next((rank for rank, known in enumerate(PAPERS) if paper.startswith(known)), len(PAPERS))

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from studies.claim import JsonValue, Verdict
-from studies.parts.record import PAPERS, paper_rank
+from studies.claim import PAPERS, JsonValue, Verdict, paper_rank
 
 MARKS = {
     Verdict.REPRODUCED: "✓",

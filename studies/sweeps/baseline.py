@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +12,7 @@ from pydantic import Field
 from studies.execution.files import write_bytes
 from studies.sweeps.manifest import versions
 from studies.sweeps.statistics import Statistic, Summary
-from studies.sweeps.strict import Strict, read_table
+from studies.sweeps.strict import Strict, read_table, read_toml
 from studies.sweeps.sweep import Sweep
 from synthesis.errors import SpecError
 
@@ -78,8 +77,8 @@ def write_baseline(path: Path, baseline: Baseline) -> None:
     lines = [HEAD, f'schema = "{SCHEMA}"', f'sweep = "{baseline.summary.sweep}"', f'form = "{baseline.summary.form}"']
     lines += [f'sha256 = "{baseline.sha256}"', f"made_with = {_inline(baseline.made_with)}"]
     for observer, nominal in baseline.nominal.items():
-        lines += ["", f'[nominal."{observer}"]', f"breakpoints = {_list(nominal['breakpoints'])}", "gains = ["]
-        lines += [f"  {_list(row)}," for row in nominal["gains"]]
+        lines += ["", f'[nominal."{observer}"]', f"breakpoints = {nominal['breakpoints']}", "gains = ["]
+        lines += [f"  {row}," for row in nominal["gains"]]
         lines += ["]", f'[nominal."{observer}".constants]']
         lines += [f"{_key(name)} = {_inline(entry)}" for name, entry in nominal["constants"].items()]
     observer = ""
@@ -94,12 +93,7 @@ def write_baseline(path: Path, baseline: Baseline) -> None:
 
 def read_baseline(path: Path) -> Baseline:
     """Read and check. Raises SpecError, one line."""
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise SpecError(f"{path}: no such baseline; make it with --update-baseline") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise SpecError(f"{path}: {error}") from None
+    data = read_toml(path, "no such baseline; make it with --update-baseline")
     if data.get("schema") != SCHEMA:
         raise SpecError(f"{path}: schema {data.get('schema')!r} is not '{SCHEMA}'")
     found = read_table(_File, data, str(path))
@@ -107,10 +101,7 @@ def read_baseline(path: Path) -> Baseline:
     for observer, entries in found.figures.items():
         for name, line in entries.items():
             measure, _, rest = name.rpartition(" | ")
-            kind: Any = line.kind
-            statistics.append(
-                Statistic(observer, measure, rest, line.value, line.unit, kind, line.at, line.confidence, line.design)
-            )
+            statistics.append(Statistic(observer, measure, rest, **line.model_dump()))
     nominal = {name: entry.model_dump() for name, entry in found.nominal.items()}
     return Baseline(Summary(found.sweep, found.form, tuple(statistics), ()), found.sha256, nominal, found.made_with)
 
@@ -120,18 +111,11 @@ def _name(statistic: Statistic) -> str:
 
 
 def _statistic(statistic: Statistic) -> str:
-    parts: dict[str, Any] = {"value": statistic.value}
-    if statistic.kind != "value":
-        parts["kind"] = statistic.kind
-    if statistic.unit != "1":
-        parts["unit"] = statistic.unit
-    if statistic.confidence is not None:
-        parts["confidence"] = _rounded(statistic.confidence)
-    if statistic.design is not None:
-        parts["design"] = statistic.design
-    if statistic.at:
-        parts["at"] = dict(statistic.at)
-    return _inline(parts)
+    confidence = None if statistic.confidence is None else _rounded(statistic.confidence)
+    parts = {"kind": statistic.kind, "unit": statistic.unit, "confidence": confidence, "design": statistic.design}
+    usual = {"kind": "value", "unit": "1", "confidence": None, "design": None}
+    unusual = {key: value for key, value in parts.items() if value != usual[key]}
+    return _inline({"value": statistic.value, **unusual, **({"at": statistic.at} if statistic.at else {})})
 
 
 def _inline(table: Mapping[str, Any]) -> str:
@@ -146,10 +130,6 @@ def _value(value: Any) -> str:
     if isinstance(value, Mapping):
         return _inline(value)
     return f'"{value}"' if isinstance(value, str) else repr(value)  # repr of a float is TOML: 0.1, 1e-05, inf, nan
-
-
-def _list(values: Any) -> str:
-    return "[" + ", ".join(_list(v) if isinstance(v, list) else repr(v) for v in values) + "]"
 
 
 def _rounded(value: float) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from studies.sweeps.measures_costly import COSTLY
 from studies.sweeps.measures_drive import DRIVE
 from studies.sweeps.observer_spec import ObserverSpec
 from studies.sweeps.ranges import RangeSpec
-from studies.sweeps.strict import Strict, read_kind, read_table
+from studies.sweeps.strict import Strict, read_kind, read_table, read_toml
 from studies.sweeps.sweep import Sweep
 from synthesis.errors import SpecError, unknown
 
@@ -74,12 +73,7 @@ def load_sweep(name: str | Path, quick: bool = False) -> Sweep:
         if str(name) not in known:
             raise SpecError(unknown("sweep", str(name), known) + "; a file of your own ends with .toml")
         path = known[str(name)]
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise SpecError(f"{path}: no such sweep file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise SpecError(f"{path}: {error}") from None
+    data = read_toml(path, "no such sweep file")
     try:
         return build_sweep(data, path.parent, quick)
     except SpecError as error:

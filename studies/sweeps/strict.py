@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -17,6 +19,16 @@ class Strict(BaseModel):
 
 
 Table = TypeVar("Table", bound=BaseModel)
+
+
+def read_toml(path: Path, absent: str) -> dict[str, Any]:
+    """The content of a TOML file. Raises SpecError, one line; `absent` is what to say where there is none."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise SpecError(f"{path}: {absent}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise SpecError(f"{path}: {error}") from None
 
 
 def read_table(kind: type[Table], data: Any, where: str) -> Table:
