@@ -6,6 +6,7 @@ import ast
 import platform
 import re
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from functools import cache, partial
 from hashlib import sha256
 from importlib.metadata import requires, version
@@ -83,8 +84,9 @@ class Sources:
             found: set[str] = set()
             if (file := self._file(name)) is not None:
                 home = name if file.name == "__init__.py" else name.rpartition(".")[0]
-                for node in _running(ast.parse(file.read_bytes())):
-                    found.update(self._targets(node, home))
+                with suppress(SyntaxError):  # half-edited: its text counts, it imports nothing
+                    for node in _running(ast.parse(file.read_bytes())):
+                        found.update(self._targets(node, home))
             self._parsed[name] = frozenset(found)
         return self._parsed[name]
 

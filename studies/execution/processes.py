@@ -55,18 +55,19 @@ class Serial:
 class Processes:
     """Processes of this machine: forked where that is safe, else fresh interpreters. They end when their parent is gone.
 
-    A worker has up to ``ahead`` tasks waiting. With ``once`` every task has a process of its own, so that a crash or its memory
-    stays with it. ``watch`` is shown the tasks under way several times a second.
+    A worker has up to ``ahead`` tasks at once, so that it need not wait; results are never held in numbers. With ``once``
+    every task has a process of its own, so that a crash or its memory stays with it. ``watch`` is shown the tasks under way
+    several times a second.
     """
 
     def __init__(
         self,
         workers: int,
-        ahead: int = 1,
+        ahead: int = 3,
         once: bool = False,
         watch: Callable[[list[Any]], None] = lambda _: None,
     ) -> None:
-        self.workers, self.ahead, self.once, self.watch = workers, ahead, once, watch
+        self.workers, self.ahead, self.once, self.watch = workers, 1 if once else ahead, once, watch
 
     def run(self, function: Function, shared: Any, tasks: Iterable[Any]) -> Generator[Finished, None, None]:
         """In the order in which they are finished.
@@ -84,7 +85,7 @@ def in_order(function: Callable[[Task], Value], tasks: Sequence[Task], workers: 
     """function(task) of all tasks, in their order; the work is under way when this returns. SpecError if a process dies."""
     if min(workers, len(tasks)) < 2:
         return map(function, tasks)
-    return _sorted(Processes(workers).run(_numbered, function, enumerate(tasks)))
+    return _sorted(Processes(workers, ahead=1).run(_numbered, function, enumerate(tasks)))
 
 
 def available_cores() -> int:

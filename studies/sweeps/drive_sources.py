@@ -71,7 +71,7 @@ class LoggedDrive(DriveSource):
 class TruthDrive(DriveSource):
     """A manoeuvre of the truth vehicles, measured by the experiments' sensors with the errors of one seed.
 
-    The same as `studies.truth.write_drive` and `gainsmith run` on what it writes: the estimators are told the true car.
+    The same as `studies.truth.write_drive` and `gainsmith run` on what it writes: the estimators know the true car.
     """
 
     manoeuvre: Manoeuvre

@@ -19,7 +19,6 @@ from studies.sweeps.sweep import Chunk, Sweep
 from studies.sweeps.tables import compute
 from synthesis.errors import SpecError
 
-IN_FLIGHT = 3  # chunks a worker has waiting: results are never held in numbers
 Progress = Callable[[int, int], None]
 
 
@@ -65,7 +64,7 @@ def run_sweep(
 def default_executor(workers: int | None = None) -> Executor:
     """As many processes as there are cores, or as asked; one computes in this process."""
     count = workers or available_cores()
-    return Serial() if count == 1 else Processes(count, IN_FLIGHT)
+    return Serial() if count == 1 else Processes(count)
 
 
 def _fill(folder: SweepFolder, executor: Executor, progress: Progress | None) -> tuple[int, float, str]:

@@ -20,7 +20,7 @@ INDEX_TOLERANCE = 0.02  # of the whole variance, on top of both confidences
 class Comparison:
     """One statistic beside the baseline. `loss` is the share of its distance to worthlessness that it lost (won: negative).
 
-    `shrunk` and `missing` break the build; a Sobol index that `moved` beyond its confidence is told, and breaks nothing.
+    `shrunk` and `missing` break the build; a Sobol index that `moved` beyond its confidence is reported, and breaks nothing.
     """
 
     before: Statistic

@@ -42,7 +42,7 @@ def read_table(kind: type[Table], data: Any, where: str) -> Table:
 
 
 def read_kind(kinds: Mapping[str, type[Table]], key: str, data: Any, where: str) -> Table:
-    """One table of several kinds, told apart by `key`."""
+    """One table of several kinds, distinguished by `key`."""
     if not isinstance(data, dict) or not isinstance(data.get(key), str):
         raise SpecError(f"{where}: needs {key} = one of {', '.join(kinds)}")
     if data[key] not in kinds:

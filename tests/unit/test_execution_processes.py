@@ -29,7 +29,7 @@ def process_of(_: None, task: int) -> int:
     return os.getpid()
 
 
-@pytest.mark.parametrize("executor", [Serial(), Processes(2), Processes(3, ahead=3), Processes(2, once=True)])
+@pytest.mark.parametrize("executor", [Serial(), Processes(2), Processes(3, ahead=1), Processes(2, once=True)])
 def test_every_task_is_answered_once(executor: Serial | Processes) -> None:
     found = {finished.task: finished.value for finished in executor.run(shifted, 100, range(12))}
     assert found == {task: task + 100 for task in range(12)}
@@ -37,7 +37,7 @@ def test_every_task_is_answered_once(executor: Serial | Processes) -> None:
 
 @pytest.mark.parametrize("once", [True, False])
 def test_a_dead_worker_is_told_and_what_waited_for_it_is_computed(once: bool) -> None:
-    results = list(Processes(2, ahead=1 if once else 3, once=once).run(shifted, 0, [1, 2, 66, 3, 4, 5, 6]))
+    results = list(Processes(2, once=once).run(shifted, 0, [1, 2, 66, 3, 4, 5, 6]))
     assert sorted(finished.value for finished in results if not finished.death) == [1, 2, 3, 4, 5, 6]
     (dead,) = (finished for finished in results if finished.death)
     assert dead.task == 66 and "SIGKILL" in dead.death
