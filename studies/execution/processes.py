@@ -76,9 +76,9 @@ class Processes:
         is asked whenever a worker is free and may answer None: nothing yet, ask again once a task is finished. Leaving
         early ends the workers.
         """
-        pool = _Pool(self, function, shared, iter(tasks))
-        pool.hand_out()
-        return pool.results()
+        results = _Pool(self, function, shared, iter(tasks)).results()
+        next(results)  # from here on it ends its workers when it is closed
+        return results
 
 
 def in_order(function: Callable[[Task], Value], tasks: Sequence[Task], workers: int) -> Iterator[Value]:
@@ -146,6 +146,8 @@ class _Pool:
 
     def results(self) -> Generator[Finished, None, None]:
         try:
+            self.hand_out()
+            yield Finished(None)
             while busy := {worker.pipe: worker for worker in self.workers if worker.tasks}:
                 self.settings.watch([worker.tasks[0][0] for worker in busy.values()])
                 for pipe in wait(list(busy), TICK):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -73,16 +73,12 @@ def attribute(
             return here
         return here * change.before / change.after if change.after else change.before
 
-    cases = [set(), {c.name for c in found}, *({c.name} for c in found)]
-    values = []
     names = [n for n in observer.parameters if n in statistic.at or n in {c.name for c in constants}]
-    for since in cases:
-        owner = (
-            observer
-            if "gains" in since or not any(c.name == "gains" for c in found)
-            else observer.with_gains(old_gains)
-        )
-        columns = {name: np.array([value(name, since)]) for name in names} or _any_column(owner)
+    values = []
+    for since in (set[str](), {c.name for c in found}, *({c.name} for c in found)):
+        kept = "gains" in since or len(constants) == len(found)
+        owner = observer if kept else replace(observer, gains=old_gains)
+        columns = {name: np.array([value(name, since)]) for name in names or list(observer.parameters)[:1]}
         values.append(float(evaluate(owner, [measure], sweep.grid(owner), columns).worst[measure.name][0]))
     losses = [measure.loss(values[0], v) for v in values[1:]]
     worst = int(np.argmax(np.nan_to_num(losses[1:], nan=-np.inf)))
@@ -91,8 +87,3 @@ def attribute(
         return words + " does it"
     share = alone / together if np.isfinite([alone, together]).all() and together > 0.0 else np.nan
     return words + (f" alone does {number(100.0 * share, 3)} % of it" if np.isfinite(share) else " does most of it")
-
-
-def _any_column(observer: Observer) -> dict[str, Any]:
-    parameter = next(iter(observer.parameters.values()))
-    return {parameter.name: np.array([parameter.nominal])}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
 
@@ -102,16 +102,6 @@ class Observer:
                 f"subject '{self.name}': its gains correct once a sample (update '{self.update}'): it has no error equation in "
                 "continuous time; use sampled_radius, second_moment_radius or critical_drop_probability"
             )
-
-    def require(self, name: str) -> Parameter:
-        """The parameter of this name. Raises SpecError with the nearest names."""
-        if name not in self.parameters:
-            raise SpecError(f"subject '{self.name}': {unknown('parameter', name, self.parameters)}")
-        return self.parameters[name]
-
-    def with_gains(self, gains: Gains) -> Observer:
-        """The same with other gains."""
-        return replace(self, gains=gains)
 
     def grid(self, points: int, bounds: Mapping[str, tuple[float, float]] | None = None) -> Grid:
         """Every combination of `points` values of each scheduling parameter, over its range or narrower `bounds`."""

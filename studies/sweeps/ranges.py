@@ -14,7 +14,7 @@ from analysis.sensitivity.box import Box, around
 from studies.sweeps.observer import Observer
 from studies.sweeps.plant import Parameter
 from studies.sweeps.strict import Strict
-from synthesis.errors import SpecError
+from synthesis.errors import SpecError, unknown
 
 ALL = "constants"  # the name that stands for every parameter of the plant
 
@@ -60,7 +60,8 @@ def parameter_ranges(observer: Observer, table: Mapping[str, RangeSpec]) -> tupl
         chosen = dict.fromkeys(observer.plant.parameters, table[ALL])
     for name, vary in table.items():
         if name != ALL:
-            observer.require(name)
+            if name not in observer.parameters:
+                raise SpecError(f"subject '{observer.name}': {unknown('parameter', name, observer.parameters)}")
             chosen[name] = vary
     return tuple(
         _parameter_range(observer, observer.parameters[name], chosen[name])

@@ -29,6 +29,12 @@ def process_of(_: None, task: int) -> int:
     return os.getpid()
 
 
+def touched(folder: Path, task: str) -> None:
+    (folder / f"{task}.new").write_text(str(os.getpid()))
+    (folder / f"{task}.new").rename(folder / task)
+    time.sleep(600.0)
+
+
 @pytest.mark.parametrize("executor", [Serial(), Processes(2), Processes(3, ahead=1), Processes(2, once=True)])
 def test_every_task_is_answered_once(executor: Serial | Processes) -> None:
     found = {finished.task: finished.value for finished in executor.run(shifted, 100, range(12))}
@@ -61,6 +67,15 @@ def test_leaving_early_ends_the_workers() -> None:
     for pid in workers:
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
+
+
+def test_workers_are_there_at_once_and_end_with_results_that_nobody_asks_for(tmp_path: Path) -> None:
+    results = Processes(1).run(touched, tmp_path, ["file"])
+    while not (tmp_path / "file").exists():
+        time.sleep(0.01)
+    results.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "file").read_text()), 0)
 
 
 def test_tasks_may_wait_for_others() -> None:
