@@ -47,7 +47,8 @@ class RadixSearch:
 
     def found(self) -> FloatArray:
         """The numbers (k,), after PASSES passes."""
-        return _numbers(np.array(self.prefix, np.uint64))
+        keys = np.array(self.prefix, np.uint64)
+        return np.where(keys >> np.uint64(63) == 1, keys ^ np.uint64(1 << 63), ~keys).view(np.float64)
 
 
 def rank_of(share: float, count: int) -> int:
@@ -60,8 +61,3 @@ def sortable(values: FloatArray) -> NDArray[np.uint64]:
     bits = (np.ascontiguousarray(values) + 0.0).view(np.uint64)  # -0 becomes 0
     negative = bits >> np.uint64(63) == 1
     return np.where(negative, ~bits, bits | np.uint64(1 << 63))
-
-
-def _numbers(keys: NDArray[np.uint64]) -> FloatArray:
-    positive = keys >> np.uint64(63) == 1
-    return np.where(positive, keys ^ np.uint64(1 << 63), ~keys).view(np.float64)

@@ -3,18 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import Field
 from scipy.optimize import differential_evolution, minimize
 
 from analysis.errors import AnalysisError
 from analysis.sensitivity.box import Box, Ranges
-from analysis.sensitivity.designs import FullGrid, Sobol, require_power
+from analysis.sensitivity.designs import Design, FullGrid, Sobol, require_power
 from analysis.sensitivity.measure import Measure, evaluate
 from synthesis.polynomials.matrix import FloatArray
 
 MOST_CORNERS = 12  # parameters; beyond, the search starts from samples alone
+
+
+class WorstCaseSearch(Design):
+    """Settings of `worst_case`. As a design of several measures it has one point for each: the worst that is found."""
+
+    kind: Literal["worst case"] = "worst case"
+    samples: int = Field(default=256, ge=2)
+    generations: int = Field(default=30, ge=0)
+    seed: int = Field(default=0, ge=0)
+
+    def check(self, box: Box) -> None:
+        """Its samples are Sobol points."""
+        require_power("samples", self.samples)
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.claim import JsonValue
-from studies.execution.files import json_bytes, whole_folder
-from studies.execution.plain import plain
+from studies.execution.files import json_bytes, plain, whole_folder
 from studies.plots.save import save_drawing
 from studies.study import PartResult, Preparation, Scope
 

@@ -1,7 +1,7 @@
 """Sensitivity and robustness sweeps: designs in chunks, on one machine or many, gated by a committed baseline.
 
 - `spec`, `sweep`: a sweep as a TOML file, or built in Python; `observer`, `observer_spec`, `plant`: the observer that is swept
-- `ranges`, `designs`: which parameter values (`analysis.sensitivity`)
+- `ranges`: how far each parameter goes; the designs in that box are those of `analysis.sensitivity`
 - `measure`: what a measure is; `measures`, `measures_costly`, `measures_drive`: those that a file can name
 - `drive_sources`, `drive_replay`: drives from logs or truth vehicles, replayed by the observers of many designs at once
 - `evaluate`, `tables`: one chunk and its bytes; `engine`: all chunks (`studies.execution`); `store`, `manifest`: their folder

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
-from analysis.sensitivity.worst import worst_case
-from studies.sweeps.designs import WorstCaseSearch
+from analysis.sensitivity.worst import WorstCaseSearch, worst_case
 from studies.sweeps.measure import Measure
 from studies.sweeps.observer import Batch, Observer
 from studies.sweeps.plant import Grid

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field
 
-from analysis.sensitivity.designs import Design
-from studies.sweeps.designs import DESIGNS
-from studies.sweeps.measure import Measure
+from analysis.sensitivity.designs import Corners, Design, FullGrid, LatinHypercube, OneAtATimeDesign, Saltelli, Sobol
+from analysis.sensitivity.worst import WorstCaseSearch
 from studies.sweeps.measures import FAST, MeasureSpec
 from studies.sweeps.measures_costly import COSTLY
 from studies.sweeps.measures_drive import DRIVE
@@ -21,13 +20,17 @@ from studies.sweeps.sweep import Sweep
 from synthesis.errors import SpecError, unknown
 
 MEASURES: dict[str, type[MeasureSpec]] = {**FAST, **COSTLY, **DRIVE}
+DESIGNS: dict[str, type[Design]] = {
+    kind.model_fields["kind"].default: kind
+    for kind in (OneAtATimeDesign, FullGrid, Corners, LatinHypercube, Sobol, Saltelli, WorstCaseSearch)
+}
 
 
 class GridSpec(Strict):
     """`points` of every scheduling parameter, over the whole range or over a narrower one by name."""
 
     points: int = Field(default=141, ge=2)
-    range: dict[str, list[float]] = Field(default_factory=dict)
+    range: dict[str, Annotated[tuple[float, float], Field(strict=False)]] = Field(default_factory=dict)
 
 
 class GateSpec(Strict):
@@ -93,19 +96,16 @@ def build_sweep(data: dict[str, Any], folder: Path, quick: bool = False) -> Swee
         observer.name: common if table.vary is None else table.vary
         for observer, table in zip(observers, tables, strict=True)
     }
-    bounds: dict[str, tuple[float, float]] = {}
-    for name, edges in spec.grid.range.items():
-        if len(edges) != 2:
-            raise SpecError(f"grid.range.{name} = {edges}: give [minimum, maximum]")
-        bounds[name] = (edges[0], edges[1])
+    measures = [read_kind(MEASURES, "id", entry, f"measures[{i}]") for i, entry in enumerate(spec.measures)]
+    designs = small.designs if small else spec.designs
     return Sweep(
         name=spec.name,
         observers=observers,
-        measures=[_measure(entry, i, folder) for i, entry in enumerate(spec.measures)],
-        stages=[_stage(entry, i) for i, entry in enumerate(small.designs if small else spec.designs)],
+        measures=[measure.beside(folder).build() for measure in measures],
+        stages=[read_kind(DESIGNS, "kind", entry, f"designs[{i}]") for i, entry in enumerate(designs)],
         vary=vary,
         points=small.points if small else spec.grid.points,
-        bounds=bounds,
+        bounds=spec.grid.range,
         chunk=spec.chunk,
         tolerance=spec.gate.tolerance,
         tolerances=spec.gate.measures,
@@ -121,12 +121,3 @@ def _named(entry: Any) -> Any:
 
 def _vary(table: dict[str, Any], where: str) -> dict[str, RangeSpec]:
     return {name: read_table(RangeSpec, entry, f"{where}.{name}") for name, entry in table.items()}
-
-
-def _measure(entry: Any, place: int, folder: Path) -> Measure:
-    table = read_kind(MEASURES, "id", entry, f"measures[{place}]")
-    return table.beside(folder).build()
-
-
-def _stage(entry: Any, place: int) -> Design:
-    return read_kind(DESIGNS, "kind", entry, f"designs[{place}]")

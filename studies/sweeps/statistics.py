@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-from studies.execution.plain import plain
+from studies.execution.files import plain
 
 UNPROVED = "constants outside the certificate"  # today's constants that are not those the schedule was proved for
 Kind = Literal["value", "index", "count"]

@@ -12,7 +12,7 @@ from typing import Any
 from analysis.errors import AnalysisError
 from analysis.sensitivity.box import Box
 from analysis.sensitivity.designs import Design, Nominal
-from studies.sweeps.designs import WorstCaseSearch
+from analysis.sensitivity.worst import WorstCaseSearch
 from studies.sweeps.measure import Measure
 from studies.sweeps.observer import Observer
 from studies.sweeps.plant import Grid

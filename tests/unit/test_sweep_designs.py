@@ -11,7 +11,7 @@ from scipy.stats import qmc
 from analysis.sensitivity.box import Box
 from analysis.sensitivity.designs import Nominal
 from analysis.sensitivity.points import latin_points, sobol_points
-from studies.sweeps.designs import DESIGNS
+from studies.sweeps.spec import DESIGNS
 from synthesis.errors import SpecError
 from tests.unit.sweep_cases import sweep
 
