@@ -16,6 +16,7 @@ from typing import Any
 PACKAGES = ("estimators", "synthesis", "analysis", "studies")
 SOURCE_ROOT = Path(__file__).parents[2]
 DATA = (".toml", ".json")
+QUOTED = re.compile(r"""["'](\w+(?:\.\w+)+)["']""")
 BY_NAME = re.compile(r"\b(import_module|__import__)\b")
 
 
@@ -29,6 +30,7 @@ class Sources:
 
     def __init__(self, root: Path = SOURCE_ROOT, packages: Iterable[str] = PACKAGES) -> None:
         self.root, self.packages = root, tuple(packages)
+        self._file = cache(self._find)
         self._digests: dict[Path, str] = {}
         self._parsed: dict[str, frozenset[str]] = {}
 
@@ -60,7 +62,7 @@ class Sources:
         files = {file for name in seen if (file := self._file(name))}
         return files | {data for folder in {file.parent for file in files} for data in self._data(folder)}
 
-    def _file(self, name: str) -> Path | None:
+    def _find(self, name: str) -> Path | None:
         if name.partition(".")[0] not in self.packages:
             return None
         path = self.root.joinpath(*name.split("."))
@@ -83,32 +85,31 @@ class Sources:
         if name not in self._parsed:
             found: set[str] = set()
             if (file := self._file(name)) is not None:
+                text = file.read_text(encoding="utf-8")
+                found.update(named for named in QUOTED.findall(text) if self._file(named))
                 home = name if file.name == "__init__.py" else name.rpartition(".")[0]
                 with suppress(SyntaxError):  # half-edited: its text counts, it imports nothing
-                    for node in _running(ast.parse(file.read_bytes())):
+                    for node in _imports_of(ast.parse(text)):
                         found.update(self._targets(node, home))
             self._parsed[name] = frozenset(found)
         return self._parsed[name]
 
-    def _targets(self, node: ast.AST, home: str) -> Iterator[str]:
+    def _targets(self, node: ast.Import | ast.ImportFrom, home: str) -> Iterator[str]:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if self._file(alias.name))
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            if re.fullmatch(r"\w+(\.\w+)+", node.value) and self._file(node.value):
-                yield node.value
-        elif isinstance(node, ast.ImportFrom):
-            above = home.split(".")[: len(home.split(".")) + 1 - node.level] if node.level else []
-            source = ".".join([*above, *([node.module] if node.module else [])])
-            for alias in node.names:
-                if self._file(f"{source}.{alias.name}"):
-                    yield f"{source}.{alias.name}"
-                elif (file := self._file(source)) is not None:
-                    yield source
-                    if BY_NAME.search(file.read_text(encoding="utf-8")):
-                        yield from (
-                            ".".join(path.relative_to(self.root).with_suffix("").parts).removesuffix(".__init__")
-                            for path in file.parent.rglob("*.py")
-                        )
+            return
+        above = home.split(".")[: len(home.split(".")) + 1 - node.level] if node.level else []
+        source = ".".join([*above, *([node.module] if node.module else [])])
+        for alias in node.names:
+            if self._file(f"{source}.{alias.name}"):
+                yield f"{source}.{alias.name}"
+            elif (file := self._file(source)) is not None:
+                yield source
+                if BY_NAME.search(file.read_text(encoding="utf-8")):
+                    yield from (
+                        ".".join(path.relative_to(self.root).with_suffix("").parts).removesuffix(".__init__")
+                        for path in file.parent.rglob("*.py")
+                    )
 
 
 def traits(function: Callable[..., Any]) -> tuple[set[str], str]:
@@ -142,17 +143,18 @@ def traits(function: Callable[..., Any]) -> tuple[set[str], str]:
     return modules, " ".join(values)
 
 
-def _running(tree: ast.AST) -> Iterator[ast.AST]:
-    """The nodes that may say what is imported, without those for type checking alone."""
-    waiting = [tree]
+def _imports_of(tree: ast.Module) -> Iterator[ast.Import | ast.ImportFrom]:
+    """The import statements, also inside functions, but not those for type checking alone."""
+    waiting: list[Any] = [tree]
     while waiting:
         node = waiting.pop()
-        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
-            waiting += node.orelse
-            continue
-        if isinstance(node, ast.Import | ast.ImportFrom | ast.Constant):
+        if isinstance(node, ast.Import | ast.ImportFrom):
             yield node
-        waiting += ast.iter_child_nodes(node)
+        blocks: tuple[str, ...] = ("body", "orelse", "handlers", "finalbody", "cases")
+        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
+            blocks = ("orelse",)
+        for block in blocks:
+            waiting += getattr(node, block, ())
 
 
 @cache
