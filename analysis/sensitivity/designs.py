@@ -132,34 +132,29 @@ class Corners(Design):
             )
 
 
-class LatinHypercube(Design):
-    """`samples` points, one in each of as many slices of every parameter (McKay, Beckman, Conover 1979)."""
-
-    kind: Literal["latin hypercube"] = "latin hypercube"
+class _Samples(Design):
     samples: int = Field(ge=1)
     seed: int = Field(default=0, ge=0)
     random: ClassVar[bool] = True
 
     def count(self, box: Box) -> int:
-        """As asked."""
         return self.samples
+
+
+class LatinHypercube(_Samples):
+    """`samples` points, one in each of as many slices of every parameter (McKay, Beckman, Conover 1979)."""
+
+    kind: Literal["latin hypercube"] = "latin hypercube"
 
     def points(self, indices: IndexArray, box: Box) -> FloatArray:
         """Without holding the permutations."""
         return box.scaled(latin_points(indices, len(box.names), self.samples, self.seed))
 
 
-class Sobol(Design):
+class Sobol(_Samples):
     """`samples` scrambled Sobol points (Owen 1998), a power of two, on which their balance rests."""
 
     kind: Literal["sobol"] = "sobol"
-    samples: int = Field(ge=1)
-    seed: int = Field(default=0, ge=0)
-    random: ClassVar[bool] = True
-
-    def count(self, box: Box) -> int:
-        """As asked."""
-        return self.samples
 
     def points(self, indices: IndexArray, box: Box) -> FloatArray:
         """Those of `scipy.stats.qmc.Sobol`."""
