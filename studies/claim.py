@@ -12,6 +12,14 @@ JsonValue = Any
 """Numbers, texts, lists and dictionaries of them: what a JSON file can hold."""
 
 
+PAPERS = ("P1", "P2", "P3", "P4", "P5")
+
+
+def paper_rank(paper: str) -> int:
+    """P1 before P5, ``P1/P2`` with P1, anything else last."""
+    return next((rank for rank, known in enumerate(PAPERS) if paper.startswith(known)), len(PAPERS))
+
+
 class ClaimVerdict(StrEnum):
     """What became of a published claim."""
 

@@ -74,7 +74,9 @@ def parser() -> argparse.ArgumentParser:
     sweep.add_argument(
         "--out", type=Path, metavar="DIR", help="chunks, summary and pictures (default: out/sweep/NAME[-quick])"
     )
-    sweep.add_argument("--baseline", type=Path, metavar="FILE", help="fail when a figure shrank beyond its tolerance")
+    sweep.add_argument(
+        "--baseline", type=Path, metavar="FILE", help="fail when a statistic shrank beyond its tolerance"
+    )
     sweep.add_argument("--update-baseline", action="store_true", help="write the baseline instead of comparing")
     sweep.add_argument("--junit", type=Path, metavar="FILE", help="the gate as JUnit XML")
     sweep.add_argument("--summary", type=Path, metavar="FILE", help="the gate as Markdown")

@@ -8,14 +8,9 @@ not digits.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
-from multiprocessing import get_context
-from os import cpu_count
 from pathlib import Path
-from threading import active_count
 from time import perf_counter
 from typing import Any
 
@@ -23,6 +18,7 @@ import numpy as np
 
 from estimators.errors import GainsmithError
 from estimators.schedule import read_content
+from studies.execution.processes import available_cores, in_order
 from studies.spec import load_spec
 from synthesis.certificate.export import export, schedule_content
 from synthesis.certificate.frozen import frozen_gain
@@ -63,18 +59,9 @@ class ScheduleRun:
 def regenerate(names: Iterable[str], out: Path, check: bool = False) -> Iterator[ScheduleRun]:
     """Run the specifications on as many processes as there are cores; order as given.
 
-    The work is under way when this returns. A process without threads is forked, which saves every worker two seconds
-    of imports; anything else starts fresh interpreters.
+    The work is under way when this returns.
     """
-    work = [(name, out, check) for name in names]
-    workers = min(len(work), cpu_count() or 1)
-    if workers < 2:
-        return map(_run, work)
-    forks = sys.platform == "linux" and active_count() == 1
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("fork" if forks else "spawn"))
-    results = pool.map(_run, work)
-    pool.shutdown(wait=False)
-    return results
+    return in_order(_run, [(name, out, check) for name in names], available_cores())
 
 
 def _run(item: tuple[str, Path, bool]) -> ScheduleRun:

@@ -5,14 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from studies.claim import Claim
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Sheet
-
-    from studies.plots import Figure
+from studies.plots import Figure
 
 Cell = str | int | float | bool | None
 
@@ -43,25 +38,12 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Drawing:
-    """A figure with the caption that stands on its own; the runner writes it as SVG and PNG.
-
-    ``alternative`` is the text for readers who cannot see it.
-    """
-
-    name: str
-    caption: str
-    alternative: str
-    figure: Sheet
-
-
-@dataclass(frozen=True)
 class PartResult:
     """What one part found; ``notes`` are paragraphs of the report, ``measures`` single numbers for machines."""
 
     claims: Sequence[Claim] = ()
     tables: Sequence[Table] = ()
-    drawings: Sequence[Drawing | Figure] = ()
+    drawings: Sequence[Figure] = ()
     notes: Sequence[str] = ()
     measures: dict[str, float] = field(default_factory=dict)
 

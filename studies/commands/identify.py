@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from studies.commands.terminal import print_table, progress_bar
-from studies.drives.output import check_folder
+from studies.execution.files import check_folder
 from studies.identify.identify import identify_drive
 from studies.identify.result import HEADER, content, rows, warnings
 from studies.identify.write import write_identification

@@ -11,18 +11,18 @@ from rich.console import Console
 from rich.table import Table
 
 from studies.commands.terminal import progress_bar
+from studies.execution.cluster import Cluster
+from studies.execution.files import write_bytes
+from studies.execution.processes import Executor
 from studies.sweeps.baseline import Baseline, of_sweep, read_baseline, write_baseline
-from studies.sweeps.cluster import Cluster
 from studies.sweeps.engine import SweepResult, default_executor
 from studies.sweeps.engine import run_sweep as run
-from studies.sweeps.executors import Executor
-from studies.sweeps.figures import number
-from studies.sweeps.gate import Judged, comparable, judge, loss_text
+from studies.sweeps.gate import HEADINGS, Comparison, comparable, compare, loss_text
 from studies.sweeps.plots import plot_sweep
 from studies.sweeps.reports import junit as junit_xml
 from studies.sweeps.reports import markdown
 from studies.sweeps.spec import load_sweep
-from studies.sweeps.store import write_whole
+from studies.sweeps.statistics import number
 from synthesis.errors import SpecError
 
 DONE, SHRUNK, REFUSED = 0, 1, 2
@@ -53,26 +53,26 @@ def run_sweep(
     with progress_bar(threaded=False) as bar:  # its thread must not be there when workers are forked
         task = bar.add_task(f"sweeping {sweep.name}", total=None)
 
-        def told(done: int, total: int) -> None:
+        def advance(done: int, total: int) -> None:
             bar.update(task, completed=done, total=total, refresh=True)
 
-        result = run(sweep, folder, executor, resume, told)
-        judged = judge(sweep, result.summary, before) if before is not None else None
+        result = run(sweep, folder, executor, resume, advance)
+        compared = compare(sweep, result.summary, before) if before is not None else None
         bar.update(task, description="drawing", refresh=True)
-        pictures = _draw(result, before, judged)
-    report = markdown(result.summary, judged, pictures)
-    write_whole(folder / "report.md", report.encode())
+        pictures = _draw(result, before, compared)
+    report = markdown(result.summary, compared, pictures)
+    write_bytes(folder / "report.md", report.encode())
     for path, data in (
-        (junit, junit_xml(sweep.name, result.summary, judged)),
-        (summary, markdown(result.summary, judged).encode()),
+        (junit, junit_xml(sweep.name, result.summary, compared)),
+        (summary, markdown(result.summary, compared).encode()),
     ):
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(path, data)
+            write_bytes(path, data)
     if as_json:
-        print(json.dumps(_content(result, judged), indent=1, allow_nan=False))
+        print(json.dumps(_content(result, compared), indent=1, allow_nan=False))
     else:
-        _print(result, judged, folder)
+        _print(result, compared, folder)
     if result.count("designs without a number"):
         words = f"{result.count('designs without a number')} designs have a measure that is not a number"
         print(f"gainsmith: {words}{_first(result)}; they are listed in {folder / 'rows'}", file=sys.stderr)
@@ -83,7 +83,7 @@ def run_sweep(
     if update_baseline and baseline is not None:
         write_baseline(baseline, of_sweep(sweep, result.summary))
         print(f"baseline written to {baseline}", file=sys.stderr)
-    return SHRUNK if judged is not None and not all(j.good for j in judged) else DONE
+    return SHRUNK if compared is not None and not all(j.good for j in compared) else DONE
 
 
 def _executor(workers: int | None, scheduler: str | None) -> Executor:
@@ -98,10 +98,10 @@ def _executor(workers: int | None, scheduler: str | None) -> Executor:
     return default_executor(workers)
 
 
-def _draw(result: SweepResult, before: Baseline | None, judged: list[Judged] | None) -> list[str]:
-    """All pictures; of the quick form the comparison, and the subjects that something shrank of. Returns the SVG files' names."""
+def _draw(result: SweepResult, before: Baseline | None, compared: list[Comparison] | None) -> list[str]:
+    """All pictures; of the quick form the comparison, and observers that something shrank of. Returns the SVG files' names."""
     folder = result.folder.path
-    shrunk = {j.before.subject for j in judged or () if not j.good}
+    shrunk = {j.before.observer for j in compared or () if not j.good}
     if result.sweep.form != "full" and before is None:
         return []
     drawn = plot_sweep(result, folder / "pictures", before, None if result.sweep.form == "full" else shrunk)
@@ -112,54 +112,48 @@ def _first(result: SweepResult) -> str:
     return f" ({result.first_reason})" if result.first_reason else ""
 
 
-def _print(result: SweepResult, judged: list[Judged] | None, folder: Path) -> None:
+def _print(result: SweepResult, compared: list[Comparison] | None, folder: Path) -> None:
     console = Console(width=None if sys.stdout.isatty() else 200)
     table = Table(title=f"Sweep {result.sweep.name}: {result.count('designs')} designs")
     for i, heading in enumerate(("subject", "measure", "nominal", "median", "95 %", "99 %", "worst", "unit", "at")):
         table.add_column(heading, justify="right" if 2 <= i <= 6 else "left")
-    for subject in result.sweep.subjects:
+    for observer in result.sweep.observers:
         for measure in result.sweep.measures:
             found = [
-                result.summary.of(subject.name, measure.name, name)
+                result.summary.of(observer.name, measure.name, name)
                 for name in ("nominal", "median", "quantile 95 %", "quantile 99 %", "worst")
             ]
             worst = found[-1]
-            at = "" if worst is None else ", ".join(f"{k} {number(v, 4)}" for k, v in worst.at.items())
             cells = ["" if f is None else number(f.value) for f in found]
-            table.add_row(subject.name, measure.name, *cells, measure.unit, at)
+            table.add_row(observer.name, measure.name, *cells, measure.unit, worst.where() if worst else "")
     console.print(table)
     for note in result.summary.notes:
         console.print(note)
-    if judged is not None:
-        _print_judged(console, judged)
+    if compared is not None:
+        _print_comparison(console, compared)
     print(f"written to {folder}")
 
 
-def _print_judged(console: Console, judged: list[Judged]) -> None:
-    bad = [j for j in judged if not j.good]
+def _print_comparison(console: Console, compared: list[Comparison]) -> None:
+    bad = [j for j in compared if not j.good]
     if not bad:
-        console.print(f"nothing shrank: {len(judged)} figures within their tolerance of the baseline")
+        console.print(f"nothing shrank: {len(compared)} statistics within their tolerance of the baseline")
         return
-    table = Table(title=f"{len(bad)} of {len(judged)} figures shrank beyond their tolerance")
-    for i, heading in enumerate(("subject", "measure", "figure", "from", "to", "loss", "at", "what did it")):
+    table = Table(title=f"{len(bad)} of {len(compared)} statistics shrank beyond their tolerance")
+    for i, heading in enumerate(HEADINGS):
         table.add_column(heading, justify="right" if 3 <= i <= 5 else "left")
-    for j in bad:
-        at = "" if j.after is None else ", ".join(f"{k} {number(v, 4)}" for k, v in j.after.at.items())
-        after = "gone" if j.after is None else number(j.after.value)
-        lost = loss_text(j.loss) if j.before.kind == "value" else ""
-        table.add_row(
-            j.before.subject, j.before.measure, j.before.name, number(j.before.value), after, lost, at, j.cause
-        )
+    for comparison in bad:
+        table.add_row(*comparison.cells)
     console.print(table)
 
 
-def _content(result: SweepResult, judged: list[Judged] | None) -> dict[str, Any]:
-    content = result.summary.content() | {"chunks_computed": result.computed}
-    if judged is not None:
+def _content(result: SweepResult, compared: list[Comparison] | None) -> dict[str, Any]:
+    content: dict[str, Any] = result.summary.content() | {"chunks_computed": result.computed}
+    if compared is not None:
         content["baseline"] = [
-            {"subject": j.before.subject, "measure": j.before.measure, "figure": j.before.name, "state": j.state,
+            {"subject": j.before.observer, "measure": j.before.measure, "figure": j.before.name, "state": j.state,
              "from": number(j.before.value, 8), "to": None if j.after is None else number(j.after.value, 8),
              "loss": loss_text(j.loss), "at": dict(j.after.at) if j.after else {}, "cause": j.cause}
-            for j in judged
+            for j in compared
         ]  # fmt: skip
     return content

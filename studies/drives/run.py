@@ -14,12 +14,13 @@ from studies.drives.chain import Chain, Progress, pipeline_of, run_chain
 from studies.drives.drive_file import read_drive
 from studies.drives.evaluation import DriveData, evaluate
 from studies.drives.log import read_log
-from studies.drives.output import check_folder, ready_folder, write_csv, write_figures, write_json
 from studies.drives.plots import figures
 from studies.drives.prepare import corner_inputs_of
 from studies.drives.quantities import CORNERS
 from studies.drives.replay import replay
 from studies.drives.schedules import check_radii, corner_observer, load_schedule
+from studies.execution.files import check_folder, ready_folder, write_csv, write_json
+from studies.plots.save import write_figures
 
 Columns = dict[str, AnyArray]
 

@@ -6,11 +6,12 @@ import json
 import re
 from pathlib import Path
 
-from studies.drives.output import ready_folder, whole_file, write_figures, write_json
+from studies.execution.files import ready_folder, whole_file, write_json
 from studies.identify.identify import Identification
 from studies.identify.parameters import Identified, tire_parameters, vehicle_parameters
 from studies.identify.plots import figures
 from studies.identify.result import content
+from studies.plots.save import write_figures
 from synthesis.models.parameter_set import load_parameter_set
 
 CONSTANTS = ("sigma0", "sigma1", "sigma2", "kappa")

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from studies.execution.files import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Sheet
@@ -38,3 +41,17 @@ def save_sheet(sheet: Sheet, *paths: Path) -> None:
             dated = {".svg": "Date", ".pdf": "CreationDate"}.get(path.suffix)
             sheet.savefig(path, dpi=PNG_DPI, metadata={dated: None} if dated else None)
         sheet.clear()
+
+
+def write_figures(
+    figures: Sequence[Figure], out: Path, progress: Callable[[float], None] = lambda _done: None
+) -> list[Path]:
+    """Each figure as SVG and PNG under its name, whole or not at all; ``progress`` hears the share done."""
+    paths = []
+    for k, figure in enumerate(figures):
+        svg, png = (out / f"{figure.name}{suffix}" for suffix in (".svg", ".png"))
+        with whole_file(svg) as first, whole_file(png) as second:
+            save_as(figure, first, second)
+        paths += [svg, png]
+        progress((k + 1) / len(figures))
+    return paths

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from studies.claim import ClaimVerdict, JsonValue
-from studies.running.record import PAPERS, paper_rank
+from studies.claim import PAPERS, ClaimVerdict, JsonValue, paper_rank
 
 MARKS = {
     ClaimVerdict.REPRODUCED: "✓",

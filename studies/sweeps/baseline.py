@@ -1,8 +1,7 @@
-"""The baseline: a small file in the repository, one line a figure, against which later sweeps are held."""
+"""The baseline: a small file in the repository, one line a statistic, against which later sweeps are held."""
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,21 +9,21 @@ from typing import Any
 
 from pydantic import Field
 
-from studies.sweeps.figures import Figure, Summary
-from studies.sweeps.store import write_whole
+from studies.execution.files import write_bytes
+from studies.sweeps.manifest import versions
+from studies.sweeps.statistics import Statistic, Summary
 from studies.sweeps.sweep import Sweep
-from studies.sweeps.versions import versions
 from synthesis.errors import SpecError
-from synthesis.toml_file import StrictTable, read_table
+from synthesis.toml_file import StrictTable, read_table, read_toml
 
 SCHEMA = "gainsmith.sweep-baseline/1"
 DIGITS = 8
 HEAD = """\
-# The baseline of a sweep, one line a figure. Written by `gainsmith sweep --update-baseline`; review its diff like code.
+# The baseline of a sweep, one line a statistic. Written by `gainsmith sweep --update-baseline`; review its diff like code.
 """
 
 
-class _FigureLine(StrictTable):
+class _StatisticLine(StrictTable):
     value: float = Field(allow_inf_nan=True)
     unit: str = "1"
     kind: str = "value"
@@ -51,12 +50,12 @@ class _File(StrictTable):
     sha256: str
     made_with: dict[str, str]
     nominal: dict[str, _Nominal]
-    figures: dict[str, dict[str, _FigureLine]]
+    figures: dict[str, dict[str, _StatisticLine]]
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """What a sweep was once: its figures, the constants and gains it was run around, and the digest of what was asked."""
+    """What a sweep was once: its statistics, the constants and gains it was run around, and the digest of what was asked."""
 
     summary: Summary
     sha256: str
@@ -66,72 +65,57 @@ class Baseline:
 
 def of_sweep(sweep: Sweep, summary: Summary) -> Baseline:
     """The baseline that a finished sweep makes, its values rounded as they are written."""
-    figures = tuple(
-        replace(f, value=_rounded(f.value), at={k: _rounded(v) for k, v in f.at.items()}) for f in summary.figures
+    statistics = tuple(
+        replace(f, value=_rounded(f.value), at={k: _rounded(v) for k, v in f.at.items()}) for f in summary.statistics
     )
     made = {name: versions()[name] for name in ("gainsmith", "numpy", "scipy")}
-    return Baseline(replace(summary, figures=figures), sweep.digest, sweep.nominal, made)
+    return Baseline(replace(summary, statistics=statistics), sweep.digest, sweep.nominal, made)
 
 
 def write_baseline(path: Path, baseline: Baseline) -> None:
     """TOML, written beside and renamed."""
     lines = [HEAD, f'schema = "{SCHEMA}"', f'sweep = "{baseline.summary.sweep}"', f'form = "{baseline.summary.form}"']
     lines += [f'sha256 = "{baseline.sha256}"', f"made_with = {_inline(baseline.made_with)}"]
-    for subject, nominal in baseline.nominal.items():
-        lines += ["", f'[nominal."{subject}"]', f"breakpoints = {_list(nominal['breakpoints'])}", "gains = ["]
-        lines += [f"  {_list(row)}," for row in nominal["gains"]]
-        lines += ["]", f'[nominal."{subject}".constants]']
+    for observer, nominal in baseline.nominal.items():
+        lines += ["", f'[nominal."{observer}"]', f"breakpoints = {nominal['breakpoints']}", "gains = ["]
+        lines += [f"  {row}," for row in nominal["gains"]]
+        lines += ["]", f'[nominal."{observer}".constants]']
         lines += [f"{_key(name)} = {_inline(entry)}" for name, entry in nominal["constants"].items()]
-    subject = ""
-    for figure in baseline.summary.figures:
-        if figure.subject != subject:
-            subject = figure.subject
-            lines += ["", f'[figures."{subject}"]']
-        lines.append(f'"{_name(figure)}" = {_figure(figure)}')
+    observer = ""
+    for statistic in baseline.summary.statistics:
+        if statistic.observer != observer:
+            observer = statistic.observer
+            lines += ["", f'[figures."{observer}"]']
+        lines.append(f'"{_name(statistic)}" = {_statistic(statistic)}')
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, ("\n".join(lines) + "\n").encode())
+    write_bytes(path, ("\n".join(lines) + "\n").encode(), sync=True)
 
 
 def read_baseline(path: Path) -> Baseline:
     """Read and check. Raises SpecError, one line."""
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise SpecError(f"{path}: no such baseline; make it with --update-baseline") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise SpecError(f"{path}: {error}") from None
+    data = read_toml(path, "no such baseline; make it with --update-baseline")
     if data.get("schema") != SCHEMA:
         raise SpecError(f"{path}: schema {data.get('schema')!r} is not '{SCHEMA}'")
     found = read_table(_File, data, str(path))
-    figures = []
-    for subject, entries in found.figures.items():
+    statistics = []
+    for observer, entries in found.figures.items():
         for name, line in entries.items():
             measure, _, rest = name.rpartition(" | ")
-            kind: Any = line.kind
-            figures.append(
-                Figure(subject, measure, rest, line.value, line.unit, kind, line.at, line.confidence, line.design)
-            )
+            statistics.append(Statistic(observer, measure, rest, **line.model_dump()))
     nominal = {name: entry.model_dump() for name, entry in found.nominal.items()}
-    return Baseline(Summary(found.sweep, found.form, tuple(figures), ()), found.sha256, nominal, found.made_with)
+    return Baseline(Summary(found.sweep, found.form, tuple(statistics), ()), found.sha256, nominal, found.made_with)
 
 
-def _name(figure: Figure) -> str:
-    return f"{figure.measure} | {figure.name}" if figure.measure else figure.name
+def _name(statistic: Statistic) -> str:
+    return f"{statistic.measure} | {statistic.name}" if statistic.measure else statistic.name
 
 
-def _figure(figure: Figure) -> str:
-    parts: dict[str, Any] = {"value": figure.value}
-    if figure.kind != "value":
-        parts["kind"] = figure.kind
-    if figure.unit != "1":
-        parts["unit"] = figure.unit
-    if figure.confidence is not None:
-        parts["confidence"] = _rounded(figure.confidence)
-    if figure.design is not None:
-        parts["design"] = figure.design
-    if figure.at:
-        parts["at"] = dict(figure.at)
-    return _inline(parts)
+def _statistic(statistic: Statistic) -> str:
+    confidence = None if statistic.confidence is None else _rounded(statistic.confidence)
+    parts = {"kind": statistic.kind, "unit": statistic.unit, "confidence": confidence, "design": statistic.design}
+    usual = {"kind": "value", "unit": "1", "confidence": None, "design": None}
+    unusual = {key: value for key, value in parts.items() if value != usual[key]}
+    return _inline({"value": statistic.value, **unusual, **({"at": statistic.at} if statistic.at else {})})
 
 
 def _inline(table: Mapping[str, Any]) -> str:
@@ -146,10 +130,6 @@ def _value(value: Any) -> str:
     if isinstance(value, Mapping):
         return _inline(value)
     return f'"{value}"' if isinstance(value, str) else repr(value)  # repr of a float is TOML: 0.1, 1e-05, inf, nan
-
-
-def _list(values: Any) -> str:
-    return "[" + ", ".join(_list(v) if isinstance(v, list) else repr(v) for v in values) + "]"
 
 
 def _rounded(value: float) -> float:

@@ -16,8 +16,8 @@ from studies.drives.drive_file import read_drive
 from studies.drives.log import read_log
 from studies.drives.prepare import CornerInputs, corner_inputs_of
 from studies.drives.replay import centre_map, cg_velocity
+from studies.sweeps.observer import Batch, Observer
 from studies.sweeps.plant import Grid
-from studies.sweeps.subject import Batch, Subject
 from studies.trials.accuracy import nrms as nrms_of_runs
 from synthesis.errors import SpecError
 
@@ -68,8 +68,8 @@ def replay_batch(batch: Batch, drive: Recorded, part: slice) -> FloatArray:
     inputs = drive.inputs
     columns = {name: column[part] for name, column in batch.columns.items()}
     count = len(next(iter(columns.values())))
-    share = _radius(batch.subject, columns, count)
-    F, g, pull = _updates(batch.subject, columns, inputs, count)
+    share = _radius(batch.observer, columns, count)
+    F, g, pull = _updates(batch.observer, columns, inputs, count)
     gain, shift = centre_map(inputs)
     weights = _weights(inputs)
     # V_x = share rolled + offset - slipped v_r
@@ -101,31 +101,31 @@ def _weights(inputs: CornerInputs) -> FloatArray:
     return np.stack([cg_velocity(np.where(known, unit, np.nan)) for unit in np.eye(4)], axis=-1)
 
 
-def _radius(subject: Subject, columns: Mapping[str, FloatArray], count: int) -> FloatArray:
+def _radius(observer: Observer, columns: Mapping[str, FloatArray], count: int) -> FloatArray:
     """The radius of every design over the nominal one (n,)."""
-    nominal = subject.plant.parameters.get("effective_radius")
+    nominal = observer.plant.parameters.get("effective_radius")
     if nominal is None or nominal.name not in columns:
         return np.ones(count)
     return columns[nominal.name] / nominal.nominal
 
 
 def _updates(
-    subject: Subject, columns: Mapping[str, FloatArray], inputs: CornerInputs, count: int
+    observer: Observer, columns: Mapping[str, FloatArray], inputs: CornerInputs, count: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """F (2, 2, samples, n, 4), g and h y (2, samples, n, 4).
 
     Without a force the observer coasts, L = 0; a missing wheel speed is held, one outside the range of the schedule is clipped.
     """
-    (box,) = subject.plant.box
+    (box,) = observer.plant.box
     force = inputs.normalised_force.ravel()
     speed = np.abs(np.stack([held(wheel) for wheel in inputs.wheel_speed.T], axis=1).ravel())
     points = np.clip(speed, box.minimum, box.maximum)
-    whole = subject.at(columns, Grid((box.name,), (box.unit,), points[:, None]))
+    whole = observer.at(columns, Grid((box.name,), (box.unit,), points[:, None]))
     M = whole.matrices
     L = np.where(np.isfinite(force)[:, None, None], whole.gain, 0.0)
-    sampled = subject.update == "sampled"
+    sampled = observer.update == "sampled"
     closed = np.broadcast_to(M.A if sampled else M.A - L @ M.C, (count, len(points), 2, 2))
-    S = subject.sample_time * planar_phi(subject.sample_time * closed)
+    S = observer.sample_time * planar_phi(observer.sample_time * closed)
     jump = L if sampled else S @ L  # what the innovation moves, beside what it changes of F
     F = np.eye(2) + S @ closed - (L @ M.C if sampled else 0.0)
     g, pull = S @ M.B - jump @ M.D, jump * np.nan_to_num(force)[:, None, None]

@@ -6,12 +6,13 @@ Both are read or driven once, where the sweep is started, and travel with it: wo
 from __future__ import annotations
 
 import hashlib
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from studies.sweeps.sweep import canonical
 
@@ -20,43 +21,38 @@ if TYPE_CHECKING:
     from studies.truth import Manoeuvre
 
 
-class DriveSource(Protocol):
-    """A drive that is there when it is asked for."""
+class DriveSource(ABC):
+    """A drive that is there when it is asked for: `recorded` is made once, kept, and sent along."""
+
+    @property
+    @abstractmethod
+    def recorded(self) -> Recorded:
+        """The signals. Raises SpecError or LogError, one line, for what cannot be read or driven."""
+
+    @property
+    @abstractmethod
+    def definition(self) -> Mapping[str, Any]:
+        """What makes two drives the same."""
 
     @property
     def sample_time(self) -> float:
         """s, of the signals."""
-        ...
+        return self.recorded.sample_time
 
-    @property
-    def recorded(self) -> Recorded:
-        """The signals; made once and kept."""
-        ...
-
-    @property
-    def definition(self) -> Mapping[str, Any]:
-        """What makes two drives the same."""
-        ...
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "recorded": self.recorded}
 
 
 @dataclass(frozen=True, eq=False)
-class LoggedDrive:
+class LoggedDrive(DriveSource):
     """A drive file and its logs, as `gainsmith run` takes them."""
 
     drive: Path
     logs: tuple[Path, ...]
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "recorded": self.recorded}
-
-    @property
-    def sample_time(self) -> float:
-        """s, of the drive file."""
-        return self.recorded.sample_time
-
     @cached_property
     def recorded(self) -> Recorded:
-        """Raises SpecError or LogError, one line, for what cannot be read, or without a reference of V_x."""
+        """What is read; refused without a reference of V_x."""
         from studies.sweeps.drive_replay import read_recorded  # reading logs takes imports that other sweeps need not
 
         return read_recorded(self.drive, self.logs)
@@ -72,19 +68,16 @@ class LoggedDrive:
 
 
 @dataclass(frozen=True, eq=False)
-class TruthDrive:
+class TruthDrive(DriveSource):
     """A manoeuvre of the truth vehicles, measured by the experiments' sensors with the errors of one seed.
 
-    The same as `studies.truth.write_drive` and `gainsmith run` on what it writes: the estimators are told the true car.
+    The same as `studies.truth.write_drive` and `gainsmith run` on what it writes: the estimators know the true car.
     """
 
     manoeuvre: Manoeuvre
     seed: int
     folder: Path  # of the manoeuvre file, for a vehicle beside it
     sample_time: float = 0.005
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "recorded": self.recorded}
 
     @cached_property
     def recorded(self) -> Recorded:

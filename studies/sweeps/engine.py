@@ -7,22 +7,24 @@ from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from itertools import chain
-from os import cpu_count
 from pathlib import Path
 
-from studies.sweeps.executors import Executor, Processes, Serial
-from studies.sweeps.figures import Summary
+from studies.execution.files import json_bytes, write_bytes
+from studies.execution.processes import Executor, Processes, Serial, available_cores
 from studies.sweeps.reports import markdown
-from studies.sweeps.store import SUMMARY, SweepFolder, json_bytes, locked_folder, write_whole
+from studies.sweeps.statistics import Summary
+from studies.sweeps.store import SUMMARY, SweepFolder, locked_folder
 from studies.sweeps.summary import summarise
 from studies.sweeps.sweep import Chunk, Sweep
+from studies.sweeps.tables import compute
+from synthesis.errors import SpecError
 
 Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
 class SweepResult:
-    """A complete sweep: its folder, its figures, the chunks computed by this run, and the seconds that their measures took."""
+    """A complete sweep: its folder, its statistics, the chunks computed by this run, and the seconds that their measures took."""
 
     sweep: Sweep
     folder: SweepFolder
@@ -32,8 +34,8 @@ class SweepResult:
     first_reason: str
 
     def count(self, name: str) -> int:
-        """Designs over all subjects: 'designs', 'invalid designs', 'designs without a number'."""
-        return int(sum(f.value for f in self.summary.figures if f.kind == "count" and f.name == name))
+        """Designs over all observers: 'designs', 'invalid designs', 'designs without a number'."""
+        return int(sum(f.value for f in self.summary.statistics if f.kind == "count" and f.name == name))
 
 
 def run_sweep(
@@ -43,7 +45,7 @@ def run_sweep(
     resume: bool = False,
     progress: Progress | None = None,
 ) -> SweepResult:
-    """Compute what is missing, then the figures.
+    """Compute what is missing, then the statistics.
 
     Raises SpecError for a folder in use or of another sweep, OSError if the disk is full.
     """
@@ -53,15 +55,15 @@ def run_sweep(
         summary_file = out / SUMMARY
         if computed or not summary_file.exists():
             summary = summarise(folder)
-            write_whole(out / "summary.md", markdown(summary).encode())
-            write_whole(summary_file, json_bytes(summary.content()))
+            write_bytes(out / "summary.md", markdown(summary).encode(), sync=True)
+            write_bytes(summary_file, json_bytes(summary.content()), sync=True)
         summary = Summary.of_content(json.loads(summary_file.read_text(encoding="utf-8")))
         return SweepResult(sweep, folder, summary, computed, seconds, reason)
 
 
 def default_executor(workers: int | None = None) -> Executor:
     """As many processes as there are cores, or as asked; one computes in this process."""
-    count = workers or cpu_count() or 1
+    count = workers or available_cores()
     return Serial() if count == 1 else Processes(count)
 
 
@@ -83,8 +85,14 @@ def _fill(folder: SweepFolder, executor: Executor, progress: Progress | None) ->
         return 0, 0.0, ""
     for measure in folder.sweep.measures:
         measure.prepare()
-    with closing(executor.run(folder.sweep, chain([first], left))) as results:
-        for result in results:
+    with closing(executor.run(compute, folder.sweep, chain([first], left))) as results:
+        for finished in results:
+            if finished.death:
+                raise SpecError(
+                    "a worker process was killed (out of memory?); finished chunks are kept: use fewer --workers or a "
+                    "smaller chunk, and continue with --resume"
+                )
+            result = finished.value
             folder.keep(result)
             done, seconds, reason = done + 1, seconds + result.seconds, reason or result.first_reason
             if progress is not None:

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
-from analysis.sensitivity_worst import worst_case
+from analysis.sensitivity.worst import WorstCaseSearch, worst_case
 from estimators.arrays import FloatArray
-from studies.sweeps.designs import WorstCase
 from studies.sweeps.measure import Measure
+from studies.sweeps.observer import Batch, Observer
 from studies.sweeps.plant import Grid
-from studies.sweeps.subject import Batch, Subject
 from studies.sweeps.sweep import Chunk, Sweep
 from synthesis.errors import ModelError, ProblemError
 
@@ -26,6 +24,7 @@ TIE = 1e-9  # relative
 REFUSALS = (AnalysisError, ModelError, ProblemError, np.linalg.LinAlgError)
 
 Answer = TypeVar("Answer")
+Rows: TypeAlias = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -52,38 +51,54 @@ class Envelope:
 
 def evaluate_chunk(sweep: Sweep, chunk: Chunk) -> Evaluated:
     """All measures at all designs of one chunk."""
-    subject, stage = sweep.subjects[chunk.subject], sweep.stages[chunk.stage]
-    varied = sweep.varied[subject.name]
-    grid = sweep.grid(subject)
+    observer, stage = sweep.observers[chunk.observer], sweep.stages[chunk.stage]
+    box, grid = sweep.boxes[observer.name], sweep.grid(observer)
     indices = np.arange(chunk.start, chunk.stop)
-    if isinstance(stage, WorstCase):
-        values = np.stack([searched(sweep, subject, grid, stage, sweep.measures[int(i)]) for i in indices])
+    if isinstance(stage, WorstCaseSearch):
+        values = np.stack([searched(sweep, observer, grid, stage, sweep.measures[int(i)]) for i in indices])
     else:
-        values = stage.values(indices, varied)
-    return evaluate(subject, sweep.measures, grid, {v.name: values[:, i] for i, v in enumerate(varied)})
+        values = stage.points(indices, box)
+    return evaluate(observer, sweep.measures, grid, box.columns(values))
 
 
-def evaluate(subject: Subject, measures: Sequence[Measure], grid: Grid, columns: Mapping[str, FloatArray]) -> Evaluated:
+def evaluate(
+    observer: Observer, measures: Sequence[Measure], grid: Grid, columns: Mapping[str, FloatArray]
+) -> Evaluated:
     """All measures at the given designs; a design that cannot be computed keeps the reason, the others are not touched."""
     count = len(next(iter(columns.values())))
-    outcome = np.full(count, VALID, dtype="U12")
-    reason = [""] * count
+    outcome, reason = np.full(count, VALID, dtype="U12"), [""] * count
     found = {m.name: np.full((count, len(grid)), np.nan) for m in measures}
     flat: set[str] = set()
+
+    def batch_of(rows: Rows) -> Batch:
+        return observer.at({name: column[rows] for name, column in columns.items()}, grid)
+
+    def fill(measure: Measure, rows: Rows, batch: Batch) -> None:
+        """One measure of some rows, NaN and the reason where it has no value."""
+        out = found[measure.name]
+        for part, values in _separate(lambda some: measure(batch if len(some) == len(rows) else batch_of(some)), rows):
+            if isinstance(values, str):
+                bad, why = part, f"{measure.name}: {values}"
+            else:
+                if values.ndim == 1:
+                    flat.add(measure.name)
+                out[part] = values.reshape(len(part), -1)
+                bad, why = part[np.isnan(out[part]).any(axis=1)], f"{measure.name} is not a number"
+            for row in bad:
+                outcome[row] = NOT_A_NUMBER
+                reason[row] = f"{reason[row]}; {why}" if reason[row] else why
+
     step = max(1, POINTS // len(grid))
     for start in range(0, count, step):
-        rows = np.arange(start, min(start + step, count))
-        batches = _separate(partial(_batch, subject, grid, columns), rows)
-        for part, batch in batches:
+        for part, batch in _separate(batch_of, np.arange(start, min(start + step, count))):
             if isinstance(batch, str):
                 outcome[part], reason[part[0]] = INVALID, batch
                 continue
             for measure in measures:
-                _fill(measure, subject, grid, columns, part, batch, found[measure.name], outcome, reason, flat)
+                fill(measure, part, batch)
     worst, place, envelopes = {}, {}, {}
     for measure in measures:
-        values = found[measure.name]
-        name = measure.name
+        name, values = measure.name, found[measure.name]
         worst[name], place[name] = _worst(measure, values)
         if name in flat:
             place[name][:] = -1
@@ -92,43 +107,7 @@ def evaluate(subject: Subject, measures: Sequence[Measure], grid: Grid, columns:
     return Evaluated(dict(columns), worst, place, envelopes, outcome, reason)
 
 
-def _fill(
-    measure: Measure,
-    subject: Subject,
-    grid: Grid,
-    columns: Mapping[str, FloatArray],
-    rows: NDArray[np.int64],
-    batch: Batch,
-    out: FloatArray,
-    outcome: NDArray[np.str_],
-    reason: list[str],
-    flat: set[str],
-) -> None:
-    """Write one measure of some rows to `out`, NaN and the reason where it has no value."""
-
-    def of(part: NDArray[np.int64]) -> FloatArray:
-        return measure(batch if len(part) == len(rows) else _batch(subject, grid, columns, part))
-
-    for part, values in _separate(of, rows):
-        if isinstance(values, str):
-            bad, why = part, f"{measure.name}: {values}"
-        else:
-            if values.ndim == 1:
-                flat.add(measure.name)
-            out[part] = values.reshape(len(part), -1)
-            bad, why = part[np.isnan(out[part]).any(axis=1)], f"{measure.name} is not a number"
-        for row in bad:
-            outcome[row] = NOT_A_NUMBER
-            reason[row] = f"{reason[row]}; {why}" if reason[row] else why
-
-
-def _batch(subject: Subject, grid: Grid, columns: Mapping[str, FloatArray], rows: NDArray[np.int64]) -> Batch:
-    return subject.at({name: column[rows] for name, column in columns.items()}, grid)
-
-
-def _separate(
-    function: Callable[[NDArray[np.int64]], Answer], rows: NDArray[np.int64]
-) -> list[tuple[NDArray[np.int64], Answer | str]]:
+def _separate(function: Callable[[Rows], Answer], rows: Rows) -> list[tuple[Rows, Answer | str]]:
     """function(rows) if it can be had at once; else in halves, down to single rows whose refusal is returned as text."""
     try:
         return [(rows, function(rows))]
@@ -157,19 +136,18 @@ def _envelope(measure: Measure, values: FloatArray) -> Envelope:
     return Envelope(worst, row.astype(np.int64), best)
 
 
-def searched(sweep: Sweep, subject: Subject, grid: Grid, stage: WorstCase, measure: Measure) -> FloatArray:
+def searched(sweep: Sweep, observer: Observer, grid: Grid, stage: WorstCaseSearch, measure: Measure) -> FloatArray:
     """The parameters (d,) of the worst design that a search finds for one measure."""
-    varied = sweep.varied[subject.name]
-    nominal = {v.name: np.array([v.nominal]) for v in varied}
-    if np.isnan(evaluate(subject, [measure], grid, nominal).worst[measure.name]).any():
-        return np.array([v.nominal for v in varied])  # not a number already there: nothing to search
+    box = sweep.boxes[observer.name]
+    if np.isnan(evaluate(observer, [measure], grid, box.columns(box.nominal[None])).worst[measure.name]).any():
+        return box.nominal  # not a number already there: nothing to search
 
     def scalar(columns: Mapping[str, FloatArray]) -> FloatArray:
-        worst = evaluate(subject, [measure], grid, columns).worst[measure.name]
+        worst = evaluate(observer, [measure], grid, columns).worst[measure.name]
         return np.where(np.isnan(worst), -measure.sign * np.inf, worst)  # designs without a value are no answer
 
     found = worst_case(
-        scalar, {v.name: (v.low, v.high) for v in varied}, measure.better == "smaller",
+        scalar, dict(zip(box.names, zip(box.low, box.high, strict=True), strict=True)), measure.better == "smaller",
         stage.samples, stage.generations, stage.seed,
     )  # fmt: skip
-    return np.array([found.parameters[v.name] for v in varied])
+    return np.array([found.parameters[name] for name in box.names])

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimators.arrays import FloatArray
-from studies.sweeps.subject import Batch, Subject
+from studies.sweeps.observer import Batch, Observer
 from synthesis.errors import SpecError
 
 
-def _anything_goes(_subject: Subject) -> None:
+def _anything_goes(_observer: Observer) -> None:
     pass
 
 
@@ -27,12 +27,12 @@ def _nothing_to_make() -> None:
 class Measure:
     """`function(batch)` returns (designs, grid), or (designs,) for a number that belongs to no place of the grid.
 
-    The batch holds the designs' parameter values, the subject (model, gains, sample time) and the grid, with all matrices made.
+    The batch holds the designs' parameter values, the observer (model, gains, sample time) and the grid, with all matrices made.
     Infinite values are answers (an unstable design), NaN is an outcome of its own. A loss is measured relative to the distance
     from `limit`, at which the measure becomes worthless (a margin of 0, a radius of 1). `variance` says what Sobol indices
     speak of: the value, or its reciprocal for a measure that may be infinite. `definition` is what makes two measures the
-    same; `check` refuses a subject that the measure does not fit (SpecError). `prepare` makes what all chunks share, once, before
-    workers are started.
+    same; `check` refuses an observer that the measure does not fit (SpecError). `prepare` makes what all chunks share, once,
+    before workers are started.
     A function that must travel to other processes is one that a module defines, or a `functools.partial` of one.
     """
 
@@ -43,7 +43,7 @@ class Measure:
     limit: float = 0.0
     variance: Literal["value", "reciprocal"] = "value"
     definition: Mapping[str, Any] = field(default_factory=dict)
-    check: Callable[[Subject], None] = _anything_goes
+    check: Callable[[Observer], None] = _anything_goes
     prepare: Callable[[], None] = _nothing_to_make
 
     def __call__(self, batch: Batch) -> FloatArray:

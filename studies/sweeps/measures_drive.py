@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
+from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
 from estimators.arrays import FloatArray
 from studies.sweeps.drive_sources import DriveSource, LoggedDrive, TruthDrive
-from studies.sweeps.measure import Measure
 from studies.sweeps.measures import MeasureSpec
-from studies.sweeps.plant import ModelPlant
-from studies.sweeps.subject import Batch, Subject
+from studies.sweeps.observer import Batch, Observer
 from synthesis.errors import SpecError
 
 MODEL_STATES = ("bristle_deflection", "relative_velocity")
@@ -32,6 +30,7 @@ class EstimatorNrms(MeasureSpec):
     """
 
     id: Literal["estimator_nrms"]
+    unit: ClassVar[str] = "%"
     manoeuvre: str | None = None
     seed: int = Field(default=0, ge=0)
     seconds: float | None = Field(default=None, ge=0.1)
@@ -55,19 +54,17 @@ class EstimatorNrms(MeasureSpec):
         own = str(self.manoeuvre).endswith(".toml")
         return self.model_copy(update={"manoeuvre": str(folder / str(self.manoeuvre))}) if own else self
 
-    def build(self) -> Measure:
-        """The measure. Raises SpecError or LogError for what cannot be read, or has no reference."""
-        source = self._source()
-        name = self.name or f"estimator_nrms {Path(self.drive or str(self.manoeuvre)).stem}"
-        return Measure(
-            name, "%", "smaller", partial(_nrms, source), definition={"id": self.id, **source.definition},
-            check=partial(_fits, source), prepare=partial(_ready, source),
-        )  # fmt: skip
+    @property
+    def title(self) -> str:
+        """With the drive."""
+        return f"estimator_nrms {Path(self.drive or str(self.manoeuvre)).stem}"
 
-    def _source(self) -> DriveSource:
+    @cached_property
+    def source(self) -> DriveSource:
+        """The drive. Raises SpecError or LogError for what cannot be read, or has no reference."""
         if self.drive is not None and self.logs is not None:
             logged = LoggedDrive(Path(self.drive), tuple(Path(name) for name in self.logs))
-            _ready(logged)  # what is wrong with the files is said at once
+            logged.recorded  # noqa: B018  what is wrong with the files is said at once
             return logged
         from studies.truth import load_manoeuvre
 
@@ -76,28 +73,32 @@ class EstimatorNrms(MeasureSpec):
             found = found.model_copy(update={"duration": min(found.duration, self.seconds)})
         return TruthDrive(found, self.seed, Path(str(self.manoeuvre)).parent)
 
+    def definition(self) -> Mapping[str, Any]:
+        """The drive."""
+        return {"id": self.id, **self.source.definition}
 
-def _fits(source: DriveSource, subject: Subject) -> None:
-    plant = subject.plant
-    model, inputs = (plant.model.name, len(plant.model.inputs)) if isinstance(plant, ModelPlant) else (subject.name, 1)
-    sizes = (inputs, len(plant.outputs), len(plant.box))
-    if tuple(s.name for s in plant.states) != MODEL_STATES or sizes != (1, 1, 1) or "lateral" in model:
-        raise SpecError(f"subject '{subject.name}': estimator_nrms is for longitudinal corner observers")
-    if abs(source.sample_time - subject.sample_time) > 1e-9:
-        raise SpecError(
-            f"subject '{subject.name}': its sample time is {subject.sample_time:g} s, that of the drive of estimator_nrms is "
-            f"{source.sample_time:g} s; they must be the same"
-        )
+    def prepare(self) -> None:
+        """Drive or read once."""
+        self.source.recorded  # noqa: B018
 
+    def values(self, batch: Batch) -> FloatArray:
+        """One number a design."""
+        from studies.sweeps.drive_replay import nrms
 
-def _ready(source: DriveSource) -> None:
-    source.recorded  # noqa: B018  made once and kept
+        return nrms(self.source.recorded, batch)
 
-
-def _nrms(source: DriveSource, batch: Batch) -> FloatArray:
-    from studies.sweeps.drive_replay import nrms
-
-    return nrms(source.recorded, batch)
+    def check(self, observer: Observer) -> None:
+        """Longitudinal corner observers with the sample time of the drive."""
+        plant, model = observer.plant, observer.plant.model
+        title, inputs = (observer.name, 1) if model is None else (model.name, len(model.inputs))
+        sizes = (inputs, len(plant.outputs), len(plant.box))
+        if tuple(s.name for s in plant.states) != MODEL_STATES or sizes != (1, 1, 1) or "lateral" in title:
+            raise SpecError(f"subject '{observer.name}': estimator_nrms is for longitudinal corner observers")
+        if abs(self.source.sample_time - observer.sample_time) > 1e-9:
+            raise SpecError(
+                f"subject '{observer.name}': its sample time is {observer.sample_time:g} s, that of the drive of "
+                f"estimator_nrms is {self.source.sample_time:g} s; they must be the same"
+            )
 
 
 DRIVE: Mapping[str, type[MeasureSpec]] = {"estimator_nrms": EstimatorNrms}

@@ -13,34 +13,34 @@ from studies.plots.colours import ABOVE, BELOW, BEST, DIVERGING, LOWER_END, MIDD
 from studies.plots.save import save_figure
 from studies.sweeps.baseline import Baseline
 from studies.sweeps.engine import SweepResult
-from studies.sweeps.extracts import Bar, cloud, tornado, worst_map
-from studies.sweeps.extracts import Map as WorstMap
 from studies.sweeps.measure import Measure
+from studies.sweeps.plot_data import Bar, cloud, tornado, worst_map
+from studies.sweeps.plot_data import Map as WorstMap
 from studies.sweeps.rows import Rows
 
 VALUES = {"nominal": "o", "median": "s", "quantile 95 %": "^", "quantile 99 %": "D", "worst": "X"}
-"""Figures of the comparison, with their markers."""
+"""Statistics of the comparison, with their markers."""
 
 
 def plot_sweep(
-    result: SweepResult, folder: Path, before: Baseline | None = None, subjects: Collection[str] | None = None
+    result: SweepResult, folder: Path, before: Baseline | None = None, observers: Collection[str] | None = None
 ) -> list[Path]:
-    """The pictures of some subjects (default: all) and the comparison, as SVG and PNG; returns the files.
+    """The pictures of some observers (default: all) and the comparison, as SVG and PNG; returns the files.
 
     The same sweep gives the same pictures.
     """
     folder.mkdir(parents=True, exist_ok=True)
     names = []
-    for figure in figures(result, before, subjects):
+    for figure in figures(result, before, observers):
         save_figure(figure, folder)
         names.append(figure.name)
     return [folder / f"{name}.{suffix}" for name in names for suffix in ("svg", "png")]
 
 
-def figures(result: SweepResult, before: Baseline | None, subjects: Collection[str] | None) -> Iterator[Figure]:
+def figures(result: SweepResult, before: Baseline | None, observers: Collection[str] | None) -> Iterator[Figure]:
     """What `plot_sweep` writes."""
-    for index, subject in enumerate(result.sweep.subjects):
-        if subjects is not None and subject.name not in subjects:
+    for index, observer in enumerate(result.sweep.observers):
+        if observers is not None and observer.name not in observers:
             continue
         rows = Rows(result.folder, index)
         bars = {m.name: tornado(rows, m) for m in rows.measures}
@@ -49,7 +49,7 @@ def figures(result: SweepResult, before: Baseline | None, subjects: Collection[s
         maps = [(m, found) for m in rows.measures if (found := worst_map(result.folder, rows, index, m)) is not None]
         if maps:
             yield map_figure(result, rows, maps)
-        scatter = scatter_figure(result, rows, bars) if len(rows.varied) > 1 else None
+        scatter = scatter_figure(result, rows, bars) if len(rows.ranges) > 1 else None
         if scatter is not None:
             yield scatter
     if before is not None:
@@ -59,9 +59,9 @@ def figures(result: SweepResult, before: Baseline | None, subjects: Collection[s
 def tornado_figure(rows: Rows, bars: Mapping[str, list[Bar]]) -> Figure:
     """One panel a measure: how far it moves when one parameter alone goes through its range."""
     shown = [(m, bars[m.name][::-1]) for m in rows.measures if bars[m.name]]
-    title = f"{rows.subject.name}: one parameter at a time, worst over the grid"
-    panels, height = [_tornado(*each) for each in shown], 1.4 + 0.42 * len(rows.varied)
-    return _figure(f"{rows.subject.name}-tornado", title, panels, 4.6, height)
+    title = f"{rows.observer.name}: one parameter at a time, worst over the grid"
+    panels, height = [_tornado(*each) for each in shown], 1.4 + 0.42 * len(rows.ranges)
+    return _figure(f"{rows.observer.name}-tornado", title, panels, 4.6, height)
 
 
 def _tornado(measure: Measure, bars: Sequence[Bar]) -> Panel:
@@ -90,17 +90,17 @@ def _tornado(measure: Measure, bars: Sequence[Bar]) -> Panel:
 
 def map_figure(result: SweepResult, rows: Rows, maps: Sequence[tuple[Measure, WorstMap]]) -> Figure:
     """Nominal, worst and best design over the scheduling parameter; below it, which corner of the box the worst one sits in."""
-    (box,) = rows.subject.plant.box
-    d, across = len(rows.varied), min(2, len(maps))
+    (box,) = rows.observer.plant.box
+    d, across = len(rows.ranges), min(2, len(maps))
     grid: list[list[Panel]] = []
     for k in range(0, len(maps), across):
         pair = maps[k : k + across]
         grid.append([_envelope(measure, found) for measure, found in pair])
         grid.append([_position(rows, found, f"{_words(box.name)} ({box.unit})") for _, found in pair])
     heights = 2.5 + 0.22 * d
-    title = f"{rows.subject.name}: worst of {result.sweep.designs(rows.subject)} designs at every {_words(box.name)}"
+    title = f"{rows.observer.name}: worst of {result.sweep.designs(rows.observer)} designs at every {_words(box.name)}"
     return Figure(
-        f"{rows.subject.name}-map",
+        f"{rows.observer.name}-map",
         title,
         "Curves of the worst, best and nominal design, above a strip of colours for the place of each parameter.",
         grid,
@@ -131,19 +131,19 @@ def _envelope(measure: Measure, found: WorstMap) -> Panel:
 
 def _position(rows: Rows, found: WorstMap, label: str) -> Panel:
     """Where in its range the worst design has each parameter, as colours."""
-    d = len(rows.varied)
+    d = len(rows.ranges)
     marks: list[Mark] = [Map(found.points, np.arange(d), found.position, "", DIVERGING, 0.0, 1.0, smooth=False)]
     for name, colour in (
         ("parameter at its lower end", LOWER_END), ("in the middle", MIDDLE), ("at its upper end", UPPER_END),
     ):  # fmt: skip
         marks.append(dots([], [], name, colour, "s", 7.0, edge="0.6"))
     x = Axis(label, found.points[0], found.points[-1])
-    return Panel(marks, x, Axis("", d - 0.5, -0.5, ticks=dict(enumerate(map(_words, rows.varied)))), grid=False)
+    return Panel(marks, x, Axis("", d - 0.5, -0.5, ticks=dict(enumerate(map(_words, rows.ranges)))), grid=False)
 
 
 def scatter_figure(result: SweepResult, rows: Rows, bars: Mapping[str, list[Bar]]) -> Figure | None:
     """One panel a measure: random designs over the two parameters that matter most to it, coloured by the measure."""
-    units = {v.name: v.unit for v in result.sweep.varied[rows.subject.name]}
+    units = {v.name: v.unit for v in result.sweep.ranges[rows.observer.name]}
     panels = []
     for measure in rows.measures:
         found = cloud(rows, measure, _two(result, rows, measure, bars[measure.name]))
@@ -158,34 +158,34 @@ def scatter_figure(result: SweepResult, rows: Rows, bars: Mapping[str, list[Bar]
         panels.append(Panel(marks, across, up, _better(measure)))
     if not panels:
         return None
-    title = f"{rows.subject.name}: the two parameters that matter most (dark is worse)"
-    return _figure(f"{rows.subject.name}-scatter", title, panels, 4.4, 3.3)
+    title = f"{rows.observer.name}: the two parameters that matter most (dark is worse)"
+    return _figure(f"{rows.observer.name}-scatter", title, panels, 4.4, 3.3)
 
 
 def _two(result: SweepResult, rows: Rows, measure: Measure, bars: list[Bar]) -> tuple[str, str]:
     """By total Sobol index, else by reach alone, else in order."""
     totals = {
         f.name.removeprefix("total index "): f.value
-        for f in result.summary.figures
-        if f.subject == rows.subject.name and f.measure == measure.name and f.name.startswith("total index ")
+        for f in result.summary.statistics
+        if f.observer == rows.observer.name and f.measure == measure.name and f.name.startswith("total index ")
     }
-    ranked = sorted(totals, key=lambda name: -totals[name]) or [bar.parameter for bar in bars] or list(rows.varied)
+    ranked = sorted(totals, key=lambda name: -totals[name]) or [bar.parameter for bar in bars] or list(rows.ranges)
     return ranked[0], ranked[1]
 
 
 def before_after_figure(result: SweepResult, before: Baseline) -> Figure:
-    """One panel a measure, one row a subject: how much of its distance to worthlessness each figure won or lost."""
+    """One panel a measure, one row an observer: how much of its distance to worthlessness each statistic won or lost."""
     panels = [_changes(result, before, measure) for measure in result.sweep.measures]
     title = f"Sweep {result.sweep.name}: after, against the baseline"
-    return _figure("before-after", title, panels, 4.8, 1.0 + 0.42 * len(result.sweep.subjects))
+    return _figure("before-after", title, panels, 4.8, 1.0 + 0.42 * len(result.sweep.observers))
 
 
 def _changes(result: SweepResult, before: Baseline, measure: Measure) -> Panel:
     tolerance = 100.0 * result.sweep.tolerances.get(measure.name, result.sweep.tolerance)
     changes = []
-    for place, subject in enumerate(result.sweep.subjects):
+    for place, observer in enumerate(result.sweep.observers):
         for name in VALUES:
-            old, new = (s.of(subject.name, measure.name, name) for s in (before.summary, result.summary))
+            old, new = (s.of(observer.name, measure.name, name) for s in (before.summary, result.summary))
             if old is not None and new is not None:
                 changes.append((place, name, -100.0 * measure.loss(old.value, new.value)))
     reach = max([2.0 * tolerance, *(abs(change) for *_, change in changes if np.isfinite(change))])
@@ -202,7 +202,7 @@ def _changes(result: SweepResult, before: Baseline, measure: Measure) -> Panel:
             dots(shown, place, color=ABOVE if change < -tolerance else BELOW, marker=VALUES[name]),
         ]
     wide = reach > 10.0 * tolerance > 0.0
-    label, names = "change against the baseline (%): left is worse", [s.name for s in result.sweep.subjects]
+    label, names = "change against the baseline (%): left is worse", [s.name for s in result.sweep.observers]
     x = Axis(label, -1.3 * reach, 1.3 * reach, "symlog" if wide else "linear", linear=2.0 * tolerance)
     y = Axis("", len(names) - 0.5, -0.5, ticks=dict(enumerate(names)))
     return Panel(marks, x, y, _words(measure.name))

@@ -2,37 +2,40 @@
 
 from __future__ import annotations
 
-import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field
 
+from analysis.sensitivity.designs import Corners, Design, FullGrid, LatinHypercube, OneAtATimeDesign, Saltelli, Sobol
+from analysis.sensitivity.worst import WorstCaseSearch
 from estimators.errors import unknown
-from studies.sweeps.designs import STAGES, Stage
-from studies.sweeps.measure import Measure
 from studies.sweeps.measures import FAST, MeasureSpec
 from studies.sweeps.measures_costly import COSTLY
 from studies.sweeps.measures_drive import DRIVE
-from studies.sweeps.subject_spec import SubjectSpec
+from studies.sweeps.observer_spec import ObserverSpec
+from studies.sweeps.ranges import RangeSpec
 from studies.sweeps.sweep import Sweep
-from studies.sweeps.vary import Vary
 from synthesis.errors import SpecError
-from synthesis.toml_file import StrictTable, read_kind, read_table
+from synthesis.toml_file import StrictTable, read_kind, read_table, read_toml
 
 MEASURES: dict[str, type[MeasureSpec]] = {**FAST, **COSTLY, **DRIVE}
+DESIGNS: dict[str, type[Design]] = {
+    kind.model_fields["kind"].default: kind
+    for kind in (OneAtATimeDesign, FullGrid, Corners, LatinHypercube, Sobol, Saltelli, WorstCaseSearch)
+}
 
 
 class GridSpec(StrictTable):
     """`points` of every scheduling parameter, over the whole range or over a narrower one by name."""
 
     points: int = Field(default=141, ge=2)
-    range: dict[str, list[float]] = Field(default_factory=dict)
+    range: dict[str, Annotated[tuple[float, float], Field(strict=False)]] = Field(default_factory=dict)
 
 
 class GateSpec(StrictTable):
-    """By how much of its distance to worthlessness a figure may fall behind the baseline; `measures` by measure name."""
+    """By how much of its distance to worthlessness a statistic may fall behind the baseline; `measures` by measure name."""
 
     tolerance: float = Field(default=0.01, ge=0)
     measures: dict[str, float] = Field(default_factory=dict)
@@ -74,12 +77,7 @@ def load_sweep(name: str | Path, quick: bool = False) -> Sweep:
         if str(name) not in known:
             raise SpecError(unknown("sweep", str(name), known) + "; a file of your own ends with .toml")
         path = known[str(name)]
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise SpecError(f"{path}: no such sweep file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise SpecError(f"{path}: {error}") from None
+    data = read_toml(path, "no such sweep file")
     try:
         return build_sweep(data, path.parent, quick)
     except SpecError as error:
@@ -92,26 +90,23 @@ def build_sweep(data: dict[str, Any], folder: Path, quick: bool = False) -> Swee
     if quick and spec.quick is None:
         raise SpecError("has no [quick] table; give it points and designs, or leave out --quick")
     small = spec.quick if quick else None
-    tables = [read_table(SubjectSpec, _named(entry), f"subjects[{i}]") for i, entry in enumerate(spec.subjects)]
-    subjects = [table.build(folder) for table in tables]
+    tables = [read_table(ObserverSpec, _named(entry), f"subjects[{i}]") for i, entry in enumerate(spec.subjects)]
+    observers = [table.build(folder) for table in tables]
     common = _vary(spec.vary, "vary")
     vary = {
-        subject.name: common if table.vary is None else table.vary
-        for subject, table in zip(subjects, tables, strict=True)
+        observer.name: common if table.vary is None else table.vary
+        for observer, table in zip(observers, tables, strict=True)
     }
-    bounds: dict[str, tuple[float, float]] = {}
-    for name, edges in spec.grid.range.items():
-        if len(edges) != 2:
-            raise SpecError(f"grid.range.{name} = {edges}: give [minimum, maximum]")
-        bounds[name] = (edges[0], edges[1])
+    measures = [read_kind(MEASURES, "id", entry, f"measures[{i}]") for i, entry in enumerate(spec.measures)]
+    designs = small.designs if small else spec.designs
     return Sweep(
         name=spec.name,
-        subjects=subjects,
-        measures=[_measure(entry, i, folder) for i, entry in enumerate(spec.measures)],
-        stages=[_stage(entry, i) for i, entry in enumerate(small.designs if small else spec.designs)],
+        observers=observers,
+        measures=[measure.beside(folder).build() for measure in measures],
+        stages=[read_kind(DESIGNS, "kind", entry, f"designs[{i}]") for i, entry in enumerate(designs)],
         vary=vary,
         points=small.points if small else spec.grid.points,
-        bounds=bounds,
+        bounds=spec.grid.range,
         chunk=spec.chunk,
         tolerance=spec.gate.tolerance,
         tolerances=spec.gate.measures,
@@ -125,14 +120,5 @@ def _named(entry: Any) -> Any:
     return entry
 
 
-def _vary(table: dict[str, Any], where: str) -> dict[str, Vary]:
-    return {name: read_table(Vary, entry, f"{where}.{name}") for name, entry in table.items()}
-
-
-def _measure(entry: Any, place: int, folder: Path) -> Measure:
-    table = read_kind(MEASURES, "id", entry, f"measures[{place}]")
-    return table.beside(folder).build()
-
-
-def _stage(entry: Any, place: int) -> Stage:
-    return read_kind(STAGES, "kind", entry, f"designs[{place}]")
+def _vary(table: dict[str, Any], where: str) -> dict[str, RangeSpec]:
+    return {name: read_table(RangeSpec, entry, f"{where}.{name}") for name, entry in table.items()}

@@ -3,14 +3,13 @@
     manifest.json  what was asked (definition), around which values (nominal), and what made it (versions)
     rows/SUBJECT/0000/0000012.parquet       one row a design
     envelopes/SUBJECT/0000/0000012.parquet  worst and best over the designs at each grid point; written before its rows
-    summary.json, summary.md                the figures; there once the sweep is complete
+    summary.json, summary.md                the statistics; there once the sweep is complete
 
 Nothing in it depends on time, machine load, or the number and order of workers: one sweep gives one set of bytes.
 """
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 from collections.abc import Iterator
@@ -18,10 +17,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from studies.sweeps.differences import differences
+from studies.execution.files import discard_unfinished, json_bytes, write_bytes
+from studies.execution.lock import only_run
+from studies.sweeps.manifest import differences, versions
 from studies.sweeps.sweep import Chunk, Sweep
-from studies.sweeps.tables import Done
-from studies.sweeps.versions import versions
+from studies.sweeps.tables import ChunkResult
 from synthesis.errors import SpecError
 
 MAGIC = b"PAR1"
@@ -40,7 +40,7 @@ class SweepFolder:
         if not file.exists():
             if (self.path / "rows").exists():
                 raise SpecError(f"{self.path}: has chunks but no {MANIFEST}; give an empty folder")
-            write_whole(file, json_bytes(manifest))
+            write_bytes(file, json_bytes(manifest), sync=True)
             return
         if not resume:
             raise SpecError(f"{self.path}: holds a sweep already; continue it with --resume or give another --out")
@@ -55,15 +55,14 @@ class SweepFolder:
             found = differences(old.get(part), manifest[part])
             if found:
                 raise SpecError(f"{self.path}: cannot be resumed, {remedy}: {found[0]}; give another --out")
-        for left in self.path.rglob(".*.part"):
-            left.unlink()
+        discard_unfinished(self.path)
 
     def manifest(self) -> dict[str, Any]:
         """What is asked, around what, and with what."""
         return {
             "definition": self.sweep.definition, "sha256": self.sweep.digest, "nominal": self.sweep.nominal,
             "versions": versions(),
-            "designs": {s.name: self.sweep.designs(s) for s in self.sweep.subjects}, "chunks": self.sweep.chunk_count(),
+            "designs": {s.name: self.sweep.designs(s) for s in self.sweep.observers}, "chunks": self.sweep.chunk_count(),
         }  # fmt: skip
 
     def rows(self, chunk: Chunk) -> Path:
@@ -75,14 +74,14 @@ class SweepFolder:
         return self._file("envelopes", chunk)
 
     def _file(self, kind: str, chunk: Chunk) -> Path:
-        subject = self.sweep.subjects[chunk.subject].name
-        return self.path / kind / subject / f"{chunk.number // 1000:04d}" / f"{chunk.number:07d}.parquet"
+        observer = self.sweep.observers[chunk.observer].name
+        return self.path / kind / observer / f"{chunk.number // 1000:04d}" / f"{chunk.number:07d}.parquet"
 
     def has(self, chunk: Chunk) -> bool:
         """Whether both files of a chunk are there and whole."""
         return _ends_well(self.rows(chunk)) and _ends_well(self.envelope(chunk))
 
-    def keep(self, done: Done) -> None:
+    def keep(self, done: ChunkResult) -> None:
         """Store a chunk; its rows last, for they say that it is there."""
         made = differences(versions(), done.made_with)
         if made:
@@ -91,31 +90,21 @@ class SweepFolder:
             )
         for file, data in ((self.envelope(done.chunk), done.envelope), (self.rows(done.chunk), done.rows)):
             file.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(file, data, sync=data is done.rows)
+            write_bytes(file, data, sync=data is done.rows)
 
-    def of(self, subject: int) -> list[Chunk]:
-        """The chunks of one subject, in order."""
-        return [chunk for chunk in self.sweep.chunks() if chunk.subject == subject]
+    def of(self, observer: int) -> list[Chunk]:
+        """The chunks of one observer, in order."""
+        return [chunk for chunk in self.sweep.chunks() if chunk.observer == observer]
 
 
 @contextmanager
 def locked_folder(path: Path, sweep: Sweep) -> Iterator[SweepFolder]:
-    """The folder, made if it is missing, for one process alone. Raises SpecError if another one holds it.
-
-    The lock belongs to the process and goes with it, however it ends: a killed sweep leaves nothing to clean up.
-    """
+    """The folder, made if it is missing, for one process alone. Raises SpecError if another one holds it."""
     try:
         path.mkdir(parents=True, exist_ok=True)
-        file = (path / "lock").open("a+")
     except (FileExistsError, NotADirectoryError):
         raise SpecError(f"{path}: is not a folder; give another --out") from None
-    with file:
-        try:
-            fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise SpecError(
-                f"{path}: another sweep is writing to this folder; wait for it or give another --out"
-            ) from None
+    with only_run(path, "another sweep is writing to this folder"):
         yield SweepFolder(path, sweep)
 
 
@@ -126,23 +115,3 @@ def _ends_well(path: Path) -> bool:
             return file.read() == MAGIC
     except OSError:
         return False
-
-
-def write_whole(path: Path, data: bytes, sync: bool = True) -> None:
-    """Beside, then renamed: a reader finds all of it or nothing. `sync`: also after a power cut."""
-    beside = path.with_name(f".{path.name}.part")
-    try:
-        with beside.open("wb") as file:
-            file.write(data)
-            if sync:
-                file.flush()
-                os.fsync(file.fileno())
-        beside.replace(path)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise
-
-
-def json_bytes(content: Any) -> bytes:
-    """Strict JSON with one space a level."""
-    return (json.dumps(content, indent=1, allow_nan=False) + "\n").encode()

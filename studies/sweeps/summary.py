@@ -1,112 +1,164 @@
-"""From chunks to figures in six passes over the rows: counts, worst cases and variance in the first, quantiles in the others."""
+"""From chunks to statistics in six passes over the rows: counts, worst cases and variance first, then quantiles."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from studies.sweeps.designs import Saltelli
-from studies.sweeps.figures import UNPROVED, Figure, Summary
+from analysis.errors import AnalysisError
+from analysis.sensitivity.designs import Design, Saltelli
+from analysis.sensitivity.indices import GROUPS, SaltelliSums
+from analysis.sensitivity.quantiles import PASSES, RadixSearch, rank_of
 from studies.sweeps.measure import Measure
-from studies.sweeps.quantiles import PASSES, RadixSearch, rank_of
 from studies.sweeps.rows import Rows
+from studies.sweeps.statistics import UNPROVED, Statistic, Summary
 from studies.sweeps.store import SweepFolder
-from studies.sweeps.variance import Variance
 
 QUANTILES = {"median": 0.5, "quantile 95 %": 0.95, "quantile 99 %": 0.99}
 
 
-class _First:
-    """What the first pass gathers of one measure: nominal, worst (the earliest design wins a tie), and its random values."""
-
-    def __init__(self, measure: Measure) -> None:
-        self.measure = measure
-        self.nominal: Figure | None = None
-        self.worst: Figure | None = None
-        self.count = 0
-
-
 def summarise(folder: SweepFolder) -> Summary:
-    """All figures of a complete sweep. Memory does not grow with the number of designs."""
-    figures: list[Figure] = []
+    """All statistics of a complete sweep. Memory does not grow with the number of designs."""
+    statistics: list[Statistic] = []
     notes: list[str] = []
-    for index in range(len(folder.sweep.subjects)):
+    for index in range(len(folder.sweep.observers)):
         rows = Rows(folder, index)
-        figures += _counts(rows)
-        variances = [Variance(rows, m, s) for m in rows.measures for s in rows.stages if isinstance(s, Saltelli)]
-        firsts = _first_pass(rows, variances)
-        quantiles = _quantiles(rows, firsts)
-        for first in firsts:
-            extremes = (first.nominal, first.worst)
-            figures += [figure for figure in extremes if figure is not None and not np.isnan(figure.value)]
-            figures += quantiles[first.measure.name].values()
-            for variance in variances:
-                if variance.measure is first.measure:
-                    found, note = variance.figures()
-                    figures += found
-                    notes += note
-    return Summary(folder.sweep.name, folder.sweep.form, tuple(figures), tuple(notes))
+        statistics += _counts(rows)
+        measures = [_OfMeasure(rows, measure) for measure in rows.measures]
+        for stage, design, columns in rows.all_columns():
+            for measure in measures:
+                measure.show(stage, design, columns)
+        _find_quantiles(rows, [measure for measure in measures if measure.count])
+        for measure in measures:
+            statistics += measure.statistics()
+            notes += measure.notes
+    return Summary(folder.sweep.name, folder.sweep.form, tuple(statistics), tuple(notes))
 
 
-def _counts(rows: Rows) -> list[Figure]:
-    total = invalid = without = 0
+def _counts(rows: Rows) -> list[Statistic]:
+    counted = dict.fromkeys(("designs", "invalid designs", "designs without a number"), 0)
     for _, _, columns in rows.columns(["outcome"]):
         outcome = columns["outcome"]
-        total += len(outcome)
-        invalid += outcome.count("invalid")
-        without += outcome.count("not a number")
-    counted = {"designs": total, "invalid designs": invalid, "designs without a number": without}
-    if rows.subject.proved_for is not None:
-        counted[UNPROVED] = len(rows.subject.unproved())
-    return [Figure(rows.subject.name, "", key, float(count), kind="count") for key, count in counted.items()]
+        for name, found in zip(counted, (len(outcome), *map(outcome.count, ("invalid", "not a number"))), strict=True):
+            counted[name] += found
+    if rows.observer.proved_for is not None:
+        counted[UNPROVED] = len(rows.observer.unproved())
+    return [Statistic(rows.observer.name, "", key, float(count), kind="count") for key, count in counted.items()]
 
 
-def _first_pass(rows: Rows, variances: list[Variance]) -> list[_First]:
-    firsts = [_First(measure) for measure in rows.measures]
-    for stage, design, columns in rows.all_columns():
-        for first in firsts:
-            signed = first.measure.sign * columns[first.measure.name]
-            missing = np.isnan(signed)
-            if first.nominal is None:  # the first row of the first chunk
-                first.nominal = _figure(rows, first.measure, columns, design, "nominal", 0)
-            if stage.random:
-                first.count += int((~missing).sum())
-            if not missing.all():
-                row = int(np.nanargmax(signed))
-                if first.worst is None or signed[row] > first.measure.sign * first.worst.value:
-                    first.worst = _figure(rows, first.measure, columns, design, "worst", row)
-        for variance in variances:
-            variance.show(stage, columns)
-    return firsts
+class _OfMeasure:
+    """What is gathered of one measure: nominal, worst (the earliest design wins a tie), quantiles, Sobol indices."""
+
+    def __init__(self, rows: Rows, measure: Measure) -> None:
+        self.rows, self.measure = rows, measure
+        self.nominal: Statistic | None = None
+        self.worst: Statistic | None = None
+        self.count = 0  # of random designs with a value
+        self.quantiles: dict[str, Statistic] = {}
+        self.notes: list[str] = []
+        self.indices = [_Indices(rows, measure, stage) for stage in rows.stages if isinstance(stage, Saltelli)]
+
+    def signed(self, columns: dict[str, Any]) -> Any:
+        """The values of one chunk so that larger is worse."""
+        return self.measure.sign * columns[self.measure.name]
+
+    def at(self, columns: dict[str, Any], design: int, name: str, row: int) -> Statistic:
+        """One row of a chunk as a statistic."""
+        value, place = float(columns[self.measure.name][row]), self.rows.place(columns, row, self.measure)
+        return Statistic(
+            self.rows.observer.name, self.measure.name, name, value, self.measure.unit, "value", place, None, design + row
+        )  # fmt: skip
+
+    def show(self, stage: Design, design: int, columns: dict[str, Any]) -> None:
+        """One chunk of the first pass, in order."""
+        signed = self.signed(columns)
+        missing = np.isnan(signed)
+        if self.nominal is None:  # the first row of the first chunk
+            self.nominal = self.at(columns, design, "nominal", 0)
+        if stage.random:
+            self.count += int((~missing).sum())
+        if not missing.all():
+            row = int(np.nanargmax(signed))
+            if self.worst is None or signed[row] > self.measure.sign * self.worst.value:
+                self.worst = self.at(columns, design, "worst", row)
+        for indices in self.indices:
+            indices.show(stage, self.measure.spread(columns[self.measure.name]))
+
+    def statistics(self) -> Iterator[Statistic]:
+        """All of them; why there are no indices goes to the notes."""
+        yield from (s for s in (self.nominal, self.worst) if s is not None and not np.isnan(s.value))
+        yield from (self.quantiles[name] for name in QUANTILES if name in self.quantiles)
+        for indices in self.indices:
+            found = indices.statistics()
+            if isinstance(found, str):
+                self.notes.append(f"{self.rows.observer.name}, {self.measure.name}: no Sobol indices: {found}")
+            else:
+                yield from found
 
 
-def _quantiles(rows: Rows, firsts: list[_First]) -> dict[str, dict[str, Figure]]:
+def _find_quantiles(rows: Rows, measures: list[_OfMeasure]) -> None:
     """'quantile 95 %' is the value that 95 % of the random designs are at least as good as, and the first design that has it."""
-    found: dict[str, dict[str, Figure]] = {first.measure.name: {} for first in firsts}
-    measures = [first.measure for first in firsts if first.count]
-    searches = [RadixSearch([rank_of(s, first.count) for s in QUANTILES.values()]) for first in firsts if first.count]
     if not measures:
-        return found
+        return
+    searches = [RadixSearch([rank_of(share, m.count) for share in QUANTILES.values()]) for m in measures]
     for _ in range(PASSES):
-        for _, _, columns in rows.columns([m.name for m in measures], random=True):
+        for _, _, columns in rows.columns([m.measure.name for m in measures], random=True):
             for measure, search in zip(measures, searches, strict=True):
-                signed = measure.sign * columns[measure.name]
+                signed = measure.signed(columns)
                 search.show(signed[~np.isnan(signed)])
         for search in searches:
             search.end_pass()
-    values = [dict(zip(QUANTILES, search.found(), strict=True)) for search in searches]
+    values = [search.found() for search in searches]
     for stage, design, columns in rows.all_columns():
         for measure, wanted in zip(measures, values, strict=True):
-            own = found[measure.name]
-            for name, value in wanted.items() if stage.random and len(own) < len(QUANTILES) else ():
-                hits = np.flatnonzero(measure.sign * columns[measure.name] == value)
-                if name not in own and len(hits):
-                    own[name] = _figure(rows, measure, columns, design, name, int(hits[0]))
-    return {name: {key: own[key] for key in QUANTILES if key in own} for name, own in found.items()}
+            for name, value in zip(QUANTILES, wanted, strict=True):
+                if stage.random and name not in measure.quantiles:
+                    hits = np.flatnonzero(measure.signed(columns) == value)
+                    if len(hits):
+                        measure.quantiles[name] = measure.at(columns, design, name, int(hits[0]))
 
 
-def _figure(rows: Rows, measure: Measure, columns: dict[str, Any], design: int, name: str, row: int) -> Figure:
-    value = float(columns[measure.name][row])
-    at = rows.place(columns, row, measure)
-    return Figure(rows.subject.name, measure.name, name, value, measure.unit, "value", at, None, design + row)
+class _Indices:
+    """First-order and total index of every parameter on the worst value over the grid, from sums over a Saltelli stage."""
+
+    def __init__(self, rows: Rows, measure: Measure, stage: Saltelli) -> None:
+        self.rows, self.measure, self.stage = rows, measure, stage
+        self.sums = SaltelliSums(len(rows.ranges), min(GROUPS, stage.blocks))
+        self.centre: float | None = None
+        self.block = 0
+        self.refusal = ""
+
+    def show(self, stage: Design, values: Any) -> None:
+        """One chunk of any stage; the first holds the nominal design, to which values are taken relative."""
+        if self.centre is None:
+            self.centre = float(values[0]) if np.isfinite(values[0]) else 0.0
+        if stage is not self.stage or self.refusal:
+            return
+        blocks = values.reshape(-1, len(self.rows.ranges) + 2) - self.centre
+        group = (self.block + np.arange(len(blocks))) * len(self.sums.count) // self.stage.blocks
+        self.block += len(blocks)
+        try:
+            self.sums.add(blocks, group)
+        except AnalysisError as error:
+            self.refusal = str(error)
+
+    def statistics(self) -> list[Statistic] | str:
+        """The indices with their confidence, or why there are none."""
+        if self.refusal:
+            return self.refusal
+        shares = self.sums.shares()
+        if np.isnan(shares.total).any():
+            return "the measure does not vary over the box"
+        return [
+            Statistic(
+                self.rows.observer.name, self.measure.name, f"{name} {parameter}", float(value), "1", "index",
+                confidence=float(width),
+            )
+            for name, values, widths in (
+                ("first-order index", shares.first_order, shares.first_order_confidence),
+                ("total index", shares.total, shares.total_confidence),
+            )
+            for parameter, value, width in zip(self.rows.ranges, values, widths, strict=True)
+        ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""A sweep, complete: subjects, what is varied, measures, designs and grid. Built in Python, or read from a file (`spec`)."""
+"""A sweep, complete: observers, what is varied, measures, designs and grid. Built in Python, or read from a file (`spec`)."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from studies.sweeps.designs import Nominal, Stage
+from analysis.errors import AnalysisError
+from analysis.sensitivity.box import Box
+from analysis.sensitivity.designs import Design, Nominal
+from analysis.sensitivity.worst import WorstCaseSearch
 from studies.sweeps.measure import Measure
+from studies.sweeps.observer import Observer
 from studies.sweeps.plant import Grid
-from studies.sweeps.subject import Subject
-from studies.sweeps.vary import Varied, Vary, resolve
+from studies.sweeps.ranges import ParameterRange, RangeSpec, box_of, parameter_ranges
 from synthesis.errors import SpecError
 
 SCHEMA = "gainsmith.sweep/1"
@@ -22,9 +25,9 @@ RESERVED = {"design", "stage", "outcome", "reason"}
 
 @dataclass(frozen=True)
 class Chunk:
-    """Rows `start` .. `stop` of a stage of a subject; `number` counts chunks and `design` is the index of the first row."""
+    """Rows `start` .. `stop` of a stage of an observer; `number` counts chunks and `design` is the index of the first row."""
 
-    subject: int
+    observer: int
     number: int
     stage: int
     start: int
@@ -36,15 +39,15 @@ class Chunk:
 class Sweep:
     """Everything a worker must know. Raises SpecError for names that do not exist, ranges that are empty, and repeated names.
 
-    `vary` is one table for all subjects, or a table for each by subject name. `points` of every scheduling parameter make the
+    `vary` is one table for all observers, or a table for each by observer name. `points` of every scheduling parameter make the
     grid, over the whole range or over `bounds`. `chunk` designs are computed and stored at once.
     """
 
     name: str
-    subjects: Sequence[Subject]
+    observers: Sequence[Observer]
     measures: Sequence[Measure]
-    stages: Sequence[Stage]
-    vary: Mapping[str, Mapping[str, Vary]] | Mapping[str, Vary]
+    stages: Sequence[Design]
+    vary: Mapping[str, Mapping[str, RangeSpec]] | Mapping[str, RangeSpec]
     points: int = 141
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     chunk: int = 1000
@@ -54,7 +57,10 @@ class Sweep:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stages", (Nominal(), *(s for s in self.stages if not isinstance(s, Nominal))))
-        for what, names in (("subject", [s.name for s in self.subjects]), ("measure", [m.name for m in self.measures])):
+        for what, names in (
+            ("subject", [s.name for s in self.observers]),
+            ("measure", [m.name for m in self.measures]),
+        ):
             repeated = sorted({name for name in names if names.count(name) > 1})
             if not names or repeated:
                 raise SpecError(
@@ -64,48 +70,57 @@ class Sweep:
             raise SpecError(
                 f"sweep '{self.name}': chunk = {self.chunk} and points = {self.points} must be at least 1 and 2"
             )
-        for subject in self.subjects:
+        for observer in self.observers:
             for measure in self.measures:
-                measure.check(subject)
-                if measure.name in subject.parameters or measure.name in RESERVED:
+                measure.check(observer)
+                if measure.name in observer.parameters or measure.name in RESERVED:
                     raise SpecError(
                         f"sweep '{self.name}': measure '{measure.name}' has the name of a column; rename it"
                     )
-            for stage in self.stages:
-                stage.check(self.varied[subject.name])
-            self.grid(subject)
+            try:
+                for stage in self.stages:
+                    stage.check(self.boxes[observer.name])
+            except AnalysisError as error:
+                raise SpecError(str(error)) from None
+            self.grid(observer)
         for name in self.tolerances:
             if name not in {m.name for m in self.measures}:
                 raise SpecError(f"sweep '{self.name}': tolerance for '{name}', which is no measure of it")
 
     @cached_property
-    def varied(self) -> dict[str, tuple[Varied, ...]]:
-        """What is varied of each subject."""
-        return {subject.name: resolve(subject, self._table(subject.name)) for subject in self.subjects}
+    def ranges(self) -> dict[str, tuple[ParameterRange, ...]]:
+        """What is varied of each observer."""
+        return {observer.name: parameter_ranges(observer, self._table(observer.name)) for observer in self.observers}
 
-    def _table(self, subject: str) -> Mapping[str, Vary]:
-        plain = {name: entry for name, entry in self.vary.items() if isinstance(entry, Vary)}
-        own = self.vary.get(subject)
-        return own if own is not None and not isinstance(own, Vary) else plain
+    @cached_property
+    def boxes(self) -> dict[str, Box]:
+        """The box in which each observer's designs lie."""
+        return {name: box_of(own) for name, own in self.ranges.items()}
 
-    def grid(self, subject: Subject) -> Grid:
-        """The grid of one subject."""
-        return subject.grid(self.points, self.bounds)
+    def _table(self, observer: str) -> Mapping[str, RangeSpec]:
+        plain = {name: entry for name, entry in self.vary.items() if isinstance(entry, RangeSpec)}
+        own = self.vary.get(observer)
+        return own if own is not None and not isinstance(own, RangeSpec) else plain
 
-    def rows(self, subject: Subject, stage: Stage) -> int:
+    def grid(self, observer: Observer) -> Grid:
+        """The grid of one observer."""
+        return observer.grid(self.points, self.bounds)
+
+    def rows(self, observer: Observer, stage: Design) -> int:
         """Designs of one stage."""
-        return stage.rows(self.varied[subject.name], len(self.measures))
+        return len(self.measures) if isinstance(stage, WorstCaseSearch) else stage.count(self.boxes[observer.name])
 
-    def designs(self, subject: Subject) -> int:
-        """Designs of a subject."""
-        return sum(self.rows(subject, stage) for stage in self.stages)
+    def designs(self, observer: Observer) -> int:
+        """Designs of an observer."""
+        return sum(self.rows(observer, stage) for stage in self.stages)
 
     def chunks(self) -> Iterator[Chunk]:
-        """All chunks in order; none crosses a stage or cuts a block."""
-        for s, subject in enumerate(self.subjects):
+        """All chunks in order; none crosses a stage or cuts a block. A search is work enough for one."""
+        for s, observer in enumerate(self.observers):
             number = design = 0
             for k, stage in enumerate(self.stages):
-                rows, step = self.rows(subject, stage), stage.step(self.chunk, self.varied[subject.name])
+                rows, block = self.rows(observer, stage), stage.block(self.boxes[observer.name])
+                step = 1 if isinstance(stage, WorstCaseSearch) else max(self.chunk // block, 1) * block
                 for start in range(0, rows, step):
                     stop = min(start + step, rows)
                     yield Chunk(s, number, k, start, stop, design + start)
@@ -114,11 +129,7 @@ class Sweep:
 
     def chunk_count(self) -> int:
         """How many chunks there are."""
-        return sum(
-            -(-self.rows(subject, stage) // stage.step(self.chunk, self.varied[subject.name]))
-            for subject in self.subjects
-            for stage in self.stages
-        )
+        return sum(1 for _ in self.chunks())
 
     @cached_property
     def definition(self) -> dict[str, Any]:
@@ -127,21 +138,21 @@ class Sweep:
             "schema": SCHEMA,
             "name": self.name,
             "form": self.form,
-            "subjects": {subject.name: self._asked(subject) for subject in self.subjects},
+            "subjects": {observer.name: self._asked(observer) for observer in self.observers},
             "measures": [{"name": m.name, "unit": m.unit, "better": m.better, **m.definition} for m in self.measures],
             "designs": [stage.model_dump(mode="json") for stage in self.stages],
             "chunk": self.chunk,
         }
 
-    def _asked(self, subject: Subject) -> dict[str, Any]:
-        """Sample time, ranges (relative ones as such) and grid of one subject."""
+    def _asked(self, observer: Observer) -> dict[str, Any]:
+        """Sample time, ranges (relative ones as such) and grid of one observer."""
         ranges = {}
-        for v in self.varied[subject.name]:
+        for v in self.ranges[observer.name]:
             share = round(0.5 * abs((v.high - v.low) / v.nominal), 12) if v.relative else None
             ranges[v.name] = {"range": [v.low, v.high]} if share is None else {"relative": share}
-        edges = {p.name: self.bounds.get(p.name, (p.minimum, p.maximum)) for p in subject.plant.box}
-        grid = [[p.name, p.unit, *edges[p.name], self.points] for p in subject.plant.box]
-        return {"sample_time": subject.sample_time, "vary": ranges, "grid": grid}
+        edges = {p.name: self.bounds.get(p.name, (p.minimum, p.maximum)) for p in observer.plant.box}
+        grid = [[p.name, p.unit, *edges[p.name], self.points] for p in observer.plant.box]
+        return {"sample_time": observer.sample_time, "vary": ranges, "grid": grid}
 
     @property
     def digest(self) -> str:
@@ -150,16 +161,16 @@ class Sweep:
 
     @cached_property
     def nominal(self) -> dict[str, Any]:
-        """Today's constants, gains and units of each subject: what the sweep was run around."""
-        return {subject.name: nominal_of(subject) for subject in self.subjects}
+        """Today's constants, gains and units of each observer: what the sweep was run around."""
+        return {observer.name: nominal_of(observer) for observer in self.observers}
 
 
-def nominal_of(subject: Subject) -> dict[str, Any]:
-    """Constants with units, and the gain table, of one subject as plain data."""
+def nominal_of(observer: Observer) -> dict[str, Any]:
+    """Constants with units, and the gain table, of one observer as plain data."""
     return {
-        "constants": {p.name: {"value": p.nominal, "unit": p.unit} for p in subject.plant.parameters.values()},
-        "breakpoints": subject.gains.breakpoints.tolist(),
-        "gains": subject.gains.table.tolist(),
+        "constants": {p.name: {"value": p.nominal, "unit": p.unit} for p in observer.plant.parameters.values()},
+        "breakpoints": observer.gains.breakpoints.tolist(),
+        "gains": observer.gains.table.tolist(),
     }
 
 

@@ -2,51 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
-from studies.sweeps.evaluate import VALID, Evaluated, evaluate_chunk
+from studies.sweeps.evaluate import Evaluated, evaluate_chunk
+from studies.sweeps.manifest import versions
 from studies.sweeps.sweep import Chunk, Sweep
-from studies.sweeps.versions import versions
 
 WORDS = ("stage", "outcome", "reason", "measure")  # a dictionary of columns of numbers costs more than it saves
 PLACE = " place"  # column of the grid point at which a measure is at its worst
 
 
 @dataclass(frozen=True)
-class Done:
-    """A finished chunk as it goes to the folder: bytes of its two files, what became of its designs, and who made it."""
+class ChunkResult:
+    """A finished chunk as it goes to the folder: bytes of its two files, and who made it."""
 
     chunk: Chunk
     rows: bytes
     envelope: bytes
-    invalid: int
-    not_a_number: int
     first_reason: str
     made_with: dict[str, str]
     seconds: float
 
 
-def compute(sweep: Sweep, chunk: Chunk) -> Done:
+def compute(sweep: Sweep, chunk: Chunk) -> ChunkResult:
     """Evaluate a chunk and encode it: what a worker does."""
-    from time import perf_counter
-
     start = perf_counter()
     found = evaluate_chunk(sweep, chunk)
     seconds = perf_counter() - start
     names = [m.name for m in sweep.measures]
-    return Done(
+    return ChunkResult(
         chunk,
         encoded(row_table(found, chunk, sweep.stages[chunk.stage].kind, names)),
         encoded(envelope_table(found, chunk)),
-        int((found.outcome == "invalid").sum()),
-        int((found.outcome == "not a number").sum()),
         next((reason for reason in found.reason if reason), ""),
         versions(),
         seconds,
@@ -107,17 +102,3 @@ def _plain(column: Any) -> Any:
     if pa.types.is_floating(kind) or pa.types.is_integer(kind):
         return np.asarray(column)
     return column.to_pylist()
-
-
-def row_count(path: Path) -> int:
-    """Rows of a chunk, from its footer."""
-    return int(pq.read_metadata(path).num_rows)
-
-
-def stream(paths: Iterator[Path] | Sequence[Path], names: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Some columns, chunk by chunk."""
-    for path in paths:
-        yield columns_of(path, names)
-
-
-__all__ = ["PLACE", "VALID", "Done", "columns_of", "compute", "encoded", "row_count", "stream"]

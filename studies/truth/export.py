@@ -7,8 +7,8 @@ from pathlib import Path
 
 from estimators.arrays import FloatArray
 from estimators.vehicle import CORNERS, VehicleParameters
-from studies.drives.output import ready_folder, whole_file, write_csv
 from studies.drives.quantities import REFERENCES, SIGNALS
+from studies.execution.files import ready_folder, whole_file, write_csv
 from studies.truth.sensors import Measured
 from synthesis.errors import SpecError
 

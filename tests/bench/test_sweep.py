@@ -14,9 +14,9 @@ from typing import Any
 
 import pytest
 
+from studies.execution.processes import Processes, Serial
 from studies.sweeps.engine import run_sweep
 from studies.sweeps.evaluate import VALID, evaluate_chunk
-from studies.sweeps.executors import Processes, Serial
 from studies.sweeps.spec import build_sweep
 from studies.sweeps.summary import summarise
 from studies.sweeps.sweep import Sweep
@@ -93,7 +93,7 @@ def test_growth_with_designs(benchmark: Any) -> None:
 
 
 def test_folder_manifest_and_progress_against_bare_evaluation(benchmark: Any, tmp_path: Path) -> None:
-    """The same chunks, evaluated only, and run into a folder with progress; figures are counted apart."""
+    """The same chunks, evaluated only, and run into a folder with progress; statistics are counted apart."""
     whole = shipped_size(benchmark, 8000)
     chunks = list(whole.chunks())
     for chunk in chunks[:2]:
@@ -112,15 +112,15 @@ def test_folder_manifest_and_progress_against_bare_evaluation(benchmark: Any, tm
     )
     folder_cpu = process_time() - start
     start = process_time()
-    figures, summary = timed(summarise, result.folder)
-    figures_cpu = process_time() - start
+    statistics, summary = timed(summarise, result.folder)
+    statistics_cpu = process_time() - start
     assert seen[-1] == len(chunks) and summary == result.summary
     if benchmark.stats is not None:
         whole_s = benchmark.stats.stats.median
         benchmark.extra_info.update(
-            bare_s=bare, folder_s=whole_s, figures_s=figures, inside_measures_s=result.seconds,
-            overhead_percent=100.0 * (whole_s - figures - result.seconds) / result.seconds,
-            bare_cpu_s=bare_cpu, folder_cpu_s=folder_cpu, figures_cpu_s=figures_cpu,
+            bare_s=bare, folder_s=whole_s, statistics_s=statistics, inside_measures_s=result.seconds,
+            overhead_percent=100.0 * (whole_s - statistics - result.seconds) / result.seconds,
+            bare_cpu_s=bare_cpu, folder_cpu_s=folder_cpu, statistics_cpu_s=statistics_cpu,
         )  # fmt: skip
 
 

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import qmc
+from scipy.stats import qmc, sobol_indices
 
 from analysis.errors import AnalysisError
-from analysis.sensitivity_indices import variance_indices
-from analysis.sensitivity_moments import SaltelliSums
-from studies.sweeps.quantiles import order_statistics, rank_of, sortable
-from studies.sweeps.skip_ahead import permuted
+from analysis.sensitivity.indices import SaltelliSums, variance_indices
+from analysis.sensitivity.points import permuted
+from analysis.sensitivity.quantiles import PASSES, RadixSearch, rank_of, sortable
 
 NUMBERS = st.lists(st.floats(allow_nan=False), min_size=1, max_size=60)
 
@@ -23,8 +22,12 @@ def test_order_statistics_are_those_of_sorting(values: list[float], data: st.Dat
     ranks = data.draw(st.lists(st.integers(0, len(values) - 1), min_size=1, max_size=4))
     cuts = sorted(data.draw(st.lists(st.integers(0, len(values)), max_size=3)))
     parts = np.split(np.array(values), cuts)
-    found = order_statistics(lambda: iter(parts), ranks)
-    np.testing.assert_array_equal(found, np.sort(values)[ranks])
+    search = RadixSearch(ranks)
+    for _ in range(PASSES):
+        for part in parts:
+            search.show(part)
+        search.end_pass()
+    np.testing.assert_array_equal(search.found(), np.sort(values)[ranks])
 
 
 @settings(deadline=None)
@@ -60,8 +63,7 @@ def test_shares_from_sums_are_those_from_all_samples(seed: int, cuts: list[int],
         x = np.stack([columns[name] for name in "abc"], axis=1)
         return shift + x @ linear + np.einsum("ni,ij,nj->n", x, mixed, x)
 
-    ranges = dict.fromkeys("abc", (-1.0, 2.0))
-    wanted = variance_indices(measure, ranges, samples=64, seed=seed)
+    at_once = variance_indices(measure, dict.fromkeys("abc", (-1.0, 2.0)), samples=64, seed=seed)
     points = -1.0 + 3.0 * qmc.Sobol(6, rng=np.random.default_rng(seed)).random_base2(6)
     A, B = points[:, :3], points[:, 3:]
     rows = [A, B, *(np.where(np.arange(3) == i, B, A) for i in range(3))]
@@ -70,8 +72,14 @@ def test_shares_from_sums_are_those_from_all_samples(seed: int, cuts: list[int],
     for part in np.split(np.arange(64), sorted(set(cuts))):
         sums.add(blocks[part], part * 8 // 64)
     found = sums.shares()
-    np.testing.assert_allclose(found.first_order, wanted.first_order.values, rtol=1e-6, atol=1e-8)
-    np.testing.assert_allclose(found.total, wanted.total.values, rtol=1e-6, atol=1e-8)
+    f = {"f_A": blocks[:, :1].T, "f_B": blocks[:, 1:2].T, "f_AB": blocks[:, 2:].T[:, None]}
+    wanted = sobol_indices(func=f, n=64)
+    for first, total in (
+        (found.first_order, found.total),
+        (at_once.first_order.values, at_once.total.values),
+    ):
+        np.testing.assert_allclose(first, np.ravel(wanted.first_order), rtol=1e-6, atol=1e-8)
+        np.testing.assert_allclose(total, np.ravel(wanted.total_order), rtol=1e-6, atol=1e-8)
 
 
 def test_confidence_covers_the_known_shares() -> None:

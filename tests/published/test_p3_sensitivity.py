@@ -8,9 +8,7 @@ import pytest
 from analysis.labelled import Axis
 from analysis.norms import hinf_norm, stability_margin
 from analysis.perturbed import PerturbedModel, error_measure
-from analysis.sensitivity import one_at_a_time
-from analysis.sensitivity_designs import around
-from analysis.sensitivity_worst import worst_case
+from analysis.sensitivity import around, one_at_a_time, worst_case
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.parameter_set import load_parameter_set
 

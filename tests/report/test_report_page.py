@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.running.run import run_studies
+from studies.parts.run import run_studies
 from studies.study import QUICK
 from tests.report.browser import Page, find_chromium
 from tests.unit.study_fakes.registry import REGISTRY
@@ -38,7 +38,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("report")
-    run_studies(["alpha", "beta", "crash"], out, QUICK, 2, REGISTRY, sources=[])
+    run_studies(["alpha", "beta", "crash"], out, QUICK, 2, REGISTRY)
     return out / "report.html"
 
 

@@ -22,9 +22,9 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from studies.cli import main as command
-from studies.sweeps import executors
+from studies.execution.processes import Executor, Processes, Serial
+from studies.sweeps import engine
 from studies.sweeps.engine import run_sweep
-from studies.sweeps.executors import Executor, Processes, Serial
 from studies.sweeps.spec import load_sweep
 from studies.sweeps.sweep import Sweep
 from studies.sweeps.tables import compute
@@ -41,21 +41,21 @@ def in_child(work: Callable[[], Any]) -> Any:
         os._exit(0)
     os.close(writer)
     with os.fdopen(reader, "rb") as pipe:
-        told = pipe.read()
+        report = pipe.read()
     os.waitpid(child, 0)
-    return json.loads(told)
+    return json.loads(report)
 
 
 def full_disk(spec: str, out: Path, limit: int) -> tuple[int, str]:
     """Exit code and standard error of the command when no file may be longer than `limit` bytes."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-    with redirect_stderr(io.StringIO()) as told:
+    with redirect_stderr(io.StringIO()) as report:
         code = command(["sweep", spec, "--workers", "1", "--out", str(out)])
-    return code, told.getvalue()
+    return code, report.getvalue()
 
 
 def dead_worker(whole: Sweep, out: Path) -> str:
-    executors.compute = lambda *_: os._exit(9)
+    engine.compute = lambda *_: os._exit(9)
     try:
         run_sweep(whole, out, Processes(2))
     except SpecError as error:
@@ -67,12 +67,12 @@ def held_after(chunks: int) -> Callable[[int, int], None]:
     """A progress that lets a run keep so many chunks and then holds it: a fast run waits for its kill as a slow one does."""
     left = iter(range(chunks))
 
-    def told(done: int, total: int) -> None:
+    def report(done: int, total: int) -> None:
         if next(left, None) is None:
             while True:
                 signal.pause()
 
-    return told
+    return report
 
 
 def killed(whole: Sweep, folder: Path, kills: int, executor: Executor) -> dict[str, Any]:
@@ -105,19 +105,19 @@ def main(out: Path, spec: str) -> None:
     whole, many = load_sweep(spec), many_chunks()
     for sweep in (whole, many):
         compute(sweep, next(sweep.chunks()))  # everything is compiled before the first fork
-    told: dict[str, Any] = {}
+    report: dict[str, Any] = {}
     run_sweep(whole, out / "serial", Serial())
     for workers in (2, 3):
         run_sweep(whole, out / f"workers{workers}", Processes(workers))
     largest = max(path.stat().st_size for path in (out / "serial" / "rows").rglob("*.parquet"))
-    told["full"] = in_child(lambda: full_disk(spec, out / "full", largest - 1))
-    told["left"] = [path.name for path in (out / "full").rglob("*.part")]
+    report["full"] = in_child(lambda: full_disk(spec, out / "full", largest - 1))
+    report["left"] = [path.name for path in (out / "full").rglob(".unfinished-*")]
     run_sweep(whole, out / "full", Serial(), resume=True)
-    told["dead"] = in_child(lambda: dead_worker(whole, out / "dead"))
+    report["dead"] = in_child(lambda: dead_worker(whole, out / "dead"))
     run_sweep(many, out / "straight", Serial())
-    told["one"] = killed(many, out / "one", 22, Serial())
-    told["two"] = killed(many, out / "two", 4, Processes(2))
-    print(json.dumps(told))
+    report["one"] = killed(many, out / "one", 22, Serial())
+    report["two"] = killed(many, out / "two", 4, Processes(2))
+    print(json.dumps(report))
 
 
 if __name__ == "__main__":

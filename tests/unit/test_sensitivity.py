@@ -11,10 +11,20 @@ import sympy as sp
 from analysis.errors import AnalysisError
 from analysis.labelled import Axis, LabelledArray, load_labelled
 from analysis.perturbed import PerturbedModel, error_measure
-from analysis.sensitivity import evaluate, one_at_a_time, one_by_one, sample
-from analysis.sensitivity_designs import around, corners, grid, latin_hypercube, sobol
-from analysis.sensitivity_indices import variance_indices
-from analysis.sensitivity_worst import worst_case
+from analysis.sensitivity import (
+    Box,
+    Corners,
+    LatinHypercube,
+    Sobol,
+    around,
+    evaluate,
+    one_at_a_time,
+    one_by_one,
+    sample,
+    sample_grid,
+    variance_indices,
+    worst_case,
+)  # fmt: skip
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Constant, SchedulingParameter, Signal
@@ -56,28 +66,29 @@ def test_indices_of_an_additive_measure_with_several_outputs() -> None:
 
 def test_designs_fill_their_ranges() -> None:
     ranges = {"a": (2.0, 4.0), "b": (-1.0, 0.0)}
-    cube = latin_hypercube(ranges, 50, seed=1)
-    slices = np.floor((cube.samples - [2.0, -1.0]) / [2.0, 1.0] * 50).astype(int)
+    box = Box.of(ranges)
+    cube = LatinHypercube(samples=50, seed=1).everywhere(box)
+    slices = np.floor((cube - [2.0, -1.0]) / [2.0, 1.0] * 50).astype(int)
     assert (np.sort(slices, axis=0) == np.arange(50)[:, None]).all()  # one sample in every slice
-    points = sobol(ranges, 256, seed=1)
-    quarter = np.floor((points.samples - [2.0, -1.0]) / [2.0, 1.0] * 16).astype(int)
+    points = Sobol(samples=256, seed=1).everywhere(box)
+    quarter = np.floor((points - [2.0, -1.0]) / [2.0, 1.0] * 16).astype(int)
     assert (
         np.unique(quarter[:, 0] * 16 + quarter[:, 1], return_counts=True)[1] == 1
     ).all()  # balanced: one in each cell
     for design in (cube, points):
-        assert ((design.samples >= [2.0, -1.0]) & (design.samples <= [4.0, 0.0])).all()
-    np.testing.assert_array_equal(points.samples, sobol(ranges, 256, seed=1).samples)
-    assert corners(ranges).samples.tolist() == [[2, -1], [2, 0], [4, -1], [4, 0]]
+        assert ((design >= [2.0, -1.0]) & (design <= [4.0, 0.0])).all()
+    np.testing.assert_array_equal(points, Sobol(samples=256, seed=1).everywhere(box))
+    assert Corners().everywhere(box).tolist() == [[2, -1], [4, -1], [2, 0], [4, 0]]
     assert around({"k": -10.0}, 0.2) == {"k": (-12.0, -8.0)}
 
 
 def test_a_grid_keeps_its_axes() -> None:
-    found = sample(
-        lambda s: 10.0 * s["a"] + s["b"], grid({"a": [1.0, 2.0, 3.0], "b": [0.5, 0.25]}), name="sum", unit="m"
+    found = sample_grid(
+        lambda s: 10.0 * s["a"] + s["b"], {"a": [1.0, 2.0, 3.0], "b": [0.5, 0.25]}, name="sum", unit="m"
     )
     assert [axis.name for axis in found.axes] == ["a", "b"]
     assert found.at(a=2.0, b=0.25).item() == 20.25
-    cloud = sample(lambda s: np.stack([s["a"], -s["a"]], -1), latin_hypercube({"a": (0.0, 1.0)}, 7, seed=0))
+    cloud = sample(lambda s: np.stack([s["a"], -s["a"]], -1), LatinHypercube(samples=7), {"a": (0.0, 1.0)})
     assert cloud.values.shape == (7, 2)
     np.testing.assert_array_equal(cloud.notes["samples"]["a"], cloud.values[:, 0])
 
@@ -103,7 +114,7 @@ def test_the_worst_corner_is_found_where_sampling_misses_it() -> None:
     found = worst_case(spike, ranges, seed=0)
     assert found.value == pytest.approx(1000.0, rel=1e-9)
     assert list(found.parameters.values()) == pytest.approx([0, 1, 0, 1, 0, 1], abs=1e-9)
-    assert sample(spike, sobol(ranges, 4096, seed=0)).values.max() < 100.0
+    assert sample(spike, Sobol(samples=4096), ranges).values.max() < 100.0
 
 
 def test_a_narrow_interior_peak_is_climbed_and_the_smallest_found() -> None:
@@ -170,17 +181,23 @@ def test_labelled_arrays_refuse_what_does_not_fit() -> None:
         array.at(speed="fast")
 
 
+def first(s):
+    return s["a"]
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: sobol({"a": (0.0, 1.0)}, 100, seed=0), "64 or 128"),
-        (lambda: sobol({"a": (1.0, 0.0)}, 64, seed=0), "minimum < maximum"),
-        (lambda: latin_hypercube({}, 64, seed=0), "no parameter"),
-        (lambda: latin_hypercube({"a": (0.0, np.inf)}, 64, seed=0), "not finite"),
-        (lambda: latin_hypercube({"a": (0.0, 1.0)}, 0, seed=0), "positive whole"),
+        (lambda: sample(first, Sobol(samples=100), {"a": (0.0, 1.0)}), "64 or 128"),
+        (lambda: sample(first, Sobol(samples=64), {"a": (1.0, 0.0)}), "minimum < maximum"),
+        (lambda: sample(first, LatinHypercube(samples=64), {}), "no parameter"),
+        (lambda: sample(first, LatinHypercube(samples=64), {"a": (0.0, np.inf)}), "not finite"),
+        (lambda: sample_grid(first, {}), "no parameter"),
+        (lambda: worst_case(first, {"a": (0.0, 1.0)}, samples=0), "power of two, 1"),
+        (lambda: variance_indices(first, {"a": (0.0, 1.0)}, samples=1), "at least 2"),
         (lambda: around({"a": 0.0}), "no relative range"),
-        (lambda: corners({f"p{i}": (0.0, 1.0) for i in range(20)}), "corners"),
-        (lambda: one_at_a_time(lambda s: s["a"], {}), "nothing to vary"),
+        (lambda: sample(first, Corners(), {f"p{i}": (0.0, 1.0) for i in range(21)}), "corners"),
+        (lambda: one_at_a_time(first, {}), "nothing to vary"),
         (lambda: one_at_a_time(lambda s: np.ones(2), {"a": 1.0}), "first axis"),
         (lambda: one_at_a_time(lambda s: np.log(-s["a"] * np.nan), {"a": 1.0}), "not a number"),
         (lambda: variance_indices(lambda s: np.where(s["a"] > 0.5, np.inf, 0), {"a": (0.0, 1.0)}, 64), "infinite"),
@@ -190,6 +207,11 @@ def test_labelled_arrays_refuse_what_does_not_fit() -> None:
 def test_bad_questions_are_refused(call, words) -> None:
     with pytest.raises(AnalysisError, match=words):
         call()
+
+
+def test_designs_without_points_cannot_be() -> None:
+    with pytest.raises(ValueError, match="greater than or equal to 1"):
+        LatinHypercube(samples=0)
 
 
 def test_perturbed_models_check_names_ranges_and_denominators() -> None:

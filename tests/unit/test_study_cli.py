@@ -53,7 +53,6 @@ def fakes(out: Path, *studies: str, every: bool = False, as_json: bool = False) 
 def test_good_runs_end_with_zero_and_failed_parts_with_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("studies.running.run.fingerprint", lambda *_: "the same sources")
     assert fakes(tmp_path / "out", "alpha") == 0
     shown = capsys.readouterr()
     assert json.loads((tmp_path / "out" / "alpha" / "result.json").read_text())["scope"] == {"quick": True, "seeds": 7}

@@ -14,11 +14,11 @@ from xml.etree import ElementTree
 import pytest
 
 from studies.claim import ClaimVerdict
+from studies.parts.run import run_studies
 from studies.report.html.pictures import LARGEST_SVG, picture
 from studies.report.html.text import alignments, brief, cell, label, number, prose
 from studies.report.scoreboard import MARKS, MEANINGS, scoreboard
 from studies.report.scoreboard_picture import scoreboard_svg
-from studies.running.run import run_studies
 from studies.study import QUICK
 from tests.unit.study_fakes.registry import REGISTRY
 
@@ -54,7 +54,7 @@ class Elements(HTMLParser):
 @pytest.fixture(scope="module")
 def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("report")
-    run_studies(["alpha", "beta"], folder, QUICK, 2, REGISTRY, sources=[])
+    run_studies(["alpha", "beta"], folder, QUICK, 2, REGISTRY)
     return folder
 
 
@@ -115,7 +115,7 @@ def test_readers_who_cannot_see_it_are_told(page: Elements) -> None:
 
 
 def test_without_claims_there_is_no_scoreboard(tmp_path: Path) -> None:
-    run_studies(["crash"], tmp_path, QUICK, 2, REGISTRY, sources=[])
+    run_studies(["crash"], tmp_path, QUICK, 2, REGISTRY)
     shown = Elements((tmp_path / "report.html").read_text())
     ids = {attributes.get("id") for _, attributes in shown.tags}
     assert "Studies beyond the papers" in shown.text and not ids & {"scoreboard", "claims"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,16 +15,17 @@ from pathlib import Path
 
 import pytest
 
+from studies.execution.fingerprint import Sources
+from studies.parts.record import check_parts
+from studies.parts.run import RunSummary, run_studies
 from studies.registry import Registry
-from studies.running.fingerprint import PACKAGES, SOURCE_ROOT, fingerprint
-from studies.running.record import check_parts
-from studies.running.run import RunSummary, run_studies
 from studies.study import QUICK, Part, PartResult, Preparation, Scope, Study
 from synthesis.errors import SpecError
 from tests.unit.study_fakes.registry import REGISTRY
 from tests.unit.study_fakes.trace import VARIABLE
 
 ROOT = Path(__file__).parents[2]
+FAKES = Path(__file__).parent / "study_fakes"
 Run = Callable[..., RunSummary]
 
 
@@ -37,17 +39,16 @@ def trace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def sources(tmp_path: Path) -> Path:
-    """What the fingerprint is taken of, in place of packages that change while tests are written."""
+    """What the fingerprint is taken of, in place of packages that change while tests are written: a copy of the fakes."""
     folder = tmp_path / "sources"
-    folder.mkdir()
-    (folder / "model.py").write_text("A = 1\n")
+    shutil.copytree(FAKES, folder / FAKES.relative_to(ROOT))
     return folder
 
 
 @pytest.fixture
 def run(tmp_path: Path, sources: Path, trace: Path) -> Run:
     def start(*ids: str, out: str = "out", scope: Scope = QUICK) -> RunSummary:
-        return run_studies(ids, tmp_path / out, scope, 2, REGISTRY, sources=[sources])
+        return run_studies(ids, tmp_path / out, scope, 2, REGISTRY, sources=Sources(sources, ["tests"]))
 
     return start
 
@@ -56,6 +57,10 @@ def counts(trace: Path) -> dict[str, int]:
     """How often each part was computed."""
     names = [path.name.partition(".")[0] for path in trace.glob("*.*")]
     return {name: names.count(name) for name in names}
+
+
+def append(path: Path) -> None:
+    path.write_text(path.read_text() + "# changed\n")
 
 
 def tree(folder: Path) -> dict[str, bytes]:
@@ -102,16 +107,19 @@ def test_a_second_run_computes_nothing_and_a_fresh_one_gives_the_same_bytes(
     assert counts(trace) == {"alpha-numbers": 2, "alpha-curve": 2}
 
 
-@pytest.mark.parametrize("change", ["source", "data", "seeds", "damage"])
+@pytest.mark.parametrize("change", ["source", "imported", "data", "seeds", "damage"])
 def test_what_a_result_depends_on_is_computed_again(
     run: Run, trace: Path, sources: Path, tmp_path: Path, change: str
 ) -> None:
     run("beta")
     scope = QUICK
+    fakes = sources / FAKES.relative_to(ROOT)
     if change == "source":
-        (sources / "model.py").write_text("A = 2\n")
+        append(fakes / "beta" / "study.py")
+    elif change == "imported":
+        append(fakes / "trace.py")
     elif change == "data":
-        (sources / "gains.toml").write_text("gain = 2\n")
+        (fakes / "beta" / "gains.toml").write_text("gain = 2\n")
     elif change == "seeds":
         scope = Scope(quick=True, seeds=13)
     else:
@@ -121,19 +129,15 @@ def test_what_a_result_depends_on_is_computed_again(
     assert counts(trace)["beta-P2-sum"] == 2
 
 
-def test_the_fingerprint_covers_the_packages_and_not_the_looks(tmp_path: Path) -> None:
-    assert fingerprint(QUICK) == fingerprint(QUICK) != fingerprint(Scope())
-    assert all((SOURCE_ROOT / name / "__init__.py").exists() for name in PACKAGES)
-    package = tmp_path / "studies"
-    for name in ("report/html/style.css", "commands/study.py", "__pycache__/a.pyc", ".hidden/b.py", "study.py"):
-        (package / name).parent.mkdir(parents=True, exist_ok=True)
-        (package / name).write_text("1")
-    first = fingerprint(QUICK, [package])
-    for name in ("report/html/style.css", "commands/study.py", "__pycache__/a.pyc", ".hidden/b.py"):
-        (package / name).write_text("2")
-        assert fingerprint(QUICK, [package]) == first
-    (package / "study.py").write_text("2")
-    assert fingerprint(QUICK, [package]) != first
+def test_what_a_result_does_not_depend_on_is_not_computed_again(run: Run, trace: Path, sources: Path) -> None:
+    """A module that the study does not import, and data of another study: neither the part nor the study is another."""
+    run("beta")
+    fakes = sources / FAKES.relative_to(ROOT)
+    append(fakes / "alpha" / "study.py")
+    append(fakes / "registry.py")
+    (fakes / "alpha" / "gains.toml").write_text("gain = 2\n")
+    assert {o.part: o.state for o in run("beta").outcomes}["sum"] == "stored"
+    assert counts(trace)["beta-P2-sum"] == 1
 
 
 def test_a_part_that_raises_is_named_and_the_others_go_on(run: Run, trace: Path, tmp_path: Path) -> None:
@@ -204,7 +208,8 @@ def test_crashes_and_unfit_results_stay_with_their_part(run: Run, tmp_path: Path
 SCRIPT = """
 import sys
 from pathlib import Path
-from studies.running.run import run_studies
+from studies.execution.fingerprint import Sources
+from studies.parts.run import run_studies
 from studies.study import QUICK
 from tests.unit.study_fakes.registry import REGISTRY
 out, sources, study, limit = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3], int(sys.argv[4])
@@ -212,7 +217,7 @@ if limit:
     import resource
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 try:
-    run_studies([study], out, QUICK, 2, REGISTRY, sources=[sources])
+    run_studies([study], out, QUICK, 2, REGISTRY, sources=Sources(sources, ["tests"]))
 except OSError as error:
     sys.exit(f"{Path(error.filename).name}: {error.strerror}")
 """
@@ -293,7 +298,7 @@ def test_earlier_studies_stay_in_the_report_while_they_are_current(run: Run, sou
     summary = run("beta")
     assert [record.id for record in summary.records] == ["alpha", "beta"]
     assert len(json.loads((tmp_path / "out" / "claims.json").read_text())) == 7
-    (sources / "model.py").write_text("A = 2\n")
+    append(sources / FAKES.relative_to(ROOT) / "alpha" / "study.py")
     assert [record.id for record in run("beta").records] == ["beta"]
 
 
@@ -309,6 +314,6 @@ def test_nothing_that_is_not_ours_is_replaced(run: Run, tmp_path: Path) -> None:
 def test_claims_come_in_the_order_of_the_papers(tmp_path: Path, sources: Path, trace: Path) -> None:
     (trace / "mended").touch()
     turned = Registry(dict(reversed(REGISTRY.modules.items())))
-    run_studies(["beta", "alpha"], tmp_path / "out", QUICK, 2, turned, sources=[sources])
+    run_studies(["beta", "alpha"], tmp_path / "out", QUICK, 2, turned, sources=Sources(sources, ["tests"]))
     papers = [claim["paper"] for claim in json.loads((tmp_path / "out" / "claims.json").read_text())]
     assert papers == ["P1"] * 6 + ["P2"] * 2

@@ -67,8 +67,8 @@ def test_gate_end_to_end(spec: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
     drawn = {p.stem for p in (out / "second" / "pictures").iterdir()}
     assert drawn == {"before-after", "tire-map"}  # corners alone have no tornado and no cloud
     assert sweep(spec, out / "first", "--resume", "--quick") == 2  # the folder is of another tire
-    told = capsys.readouterr().err
-    assert "sigma1" in told and len(told.strip().splitlines()) == 1
+    report = capsys.readouterr().err
+    assert "sigma1" in report and len(report.strip().splitlines()) == 1
 
     assert sweep(spec, out / "second", "--resume", *gate, "--update-baseline") == 0
     assert sweep(spec, out / "second", "--resume", *gate) == 0
@@ -86,9 +86,9 @@ def test_full_form_draws_everything(spec: Path, tmp_path: Path) -> None:
 
 def test_quick_and_json(spec: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert sweep(spec, tmp_path / "out", "--quick", "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    counts = {f["name"]: f["value"] for f in told["figures"] if f["kind"] == "count"}
-    assert told["form"] == "quick" and counts["designs"] == 33 and counts["invalid designs"] == 0
+    report = json.loads(capsys.readouterr().out)
+    counts = {f["name"]: f["value"] for f in report["figures"] if f["kind"] == "count"}
+    assert report["form"] == "quick" and counts["designs"] == 33 and counts["invalid designs"] == 0
     assert not (tmp_path / "out" / "pictures").exists()
 
 
@@ -109,8 +109,8 @@ def test_bad_files_are_one_line_and_exit_2(
 ) -> None:
     spec.write_text(spec.read_text().replace(old, new))
     assert sweep(spec, tmp_path / "out") == 2
-    told = capsys.readouterr().err
-    assert words in told and "mine.toml" in told and len(told.strip().splitlines()) == 1
+    report = capsys.readouterr().err
+    assert words in report and "mine.toml" in report and len(report.strip().splitlines()) == 1
     assert not (tmp_path / "out").exists()
 
 
@@ -123,8 +123,8 @@ def test_bad_arguments_are_one_line_and_exit_2(spec: Path, tmp_path: Path, capsy
         (["sweep", str(spec), "--workers", "0"], "at least 1"),
     ):
         assert main(arguments) == 2
-        told = capsys.readouterr().err
-        assert words in told and len(told.strip().splitlines()) == 1
+        report = capsys.readouterr().err
+        assert words in report and len(report.strip().splitlines()) == 1
 
 
 def test_invalid_designs_are_told_and_nan_is_refused_at_the_end(
@@ -132,8 +132,8 @@ def test_invalid_designs_are_told_and_nan_is_refused_at_the_end(
 ) -> None:
     spec.write_text(spec.read_text().replace("vary.constants.relative = 0.2", "vary.sigma0.range = [-100.0, 700.0]"))
     assert sweep(spec, tmp_path / "invalid") == 0
-    told = capsys.readouterr().err
-    assert "designs are invalid (sigma0 = " in told and "sign" in told
+    report = capsys.readouterr().err
+    assert "designs are invalid (sigma0 = " in report and "sign" in report
     counts = {
         f["name"]: f["value"] for f in json.loads((tmp_path / "invalid" / "summary.json").read_text())["figures"][:3]
     }
@@ -146,8 +146,8 @@ def test_invalid_designs_are_told_and_nan_is_refused_at_the_end(
     monkeypatch.setattr(measures, "critical_drop_probability", lambda A, _: np.full(A.shape[:-2], np.nan))
     spec.write_text(SPEC.replace("PARAMETERS", 'parameters = "corner-estimation"'))
     assert sweep(spec, tmp_path / "nan") == 2
-    told = capsys.readouterr().err
-    assert "not a number" in told and len(told.strip().splitlines()) == 1
+    report = capsys.readouterr().err
+    assert "not a number" in report and len(report.strip().splitlines()) == 1
     assert (tmp_path / "nan" / "summary.json").exists()  # nothing is lost
     (tmp_path / "b.toml").write_text("old")
     assert sweep(spec, tmp_path / "nan", "--resume", "--baseline", str(tmp_path / "b.toml"), "--update-baseline") == 2
@@ -159,4 +159,4 @@ def test_shipped_sweeps_are_there() -> None:
     shipped = Path(__file__).parents[2] / "studies" / "sweeps" / "baselines"
     names = {p.name for p in shipped.glob("*.toml")}
     assert names == {f"{n}{form}.toml" for n in shipped_sweeps() for form in ("", ".quick")}
-    assert all(read_baseline(shipped / name).summary.figures for name in names)
+    assert all(read_baseline(shipped / name).summary.statistics for name in names)

@@ -16,10 +16,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from studies.cli import main
-from studies.sweeps import cluster as cluster_module
-from studies.sweeps.cluster import Cluster
+from studies.execution import cluster as cluster_module
+from studies.execution.cluster import Cluster
+from studies.execution.processes import Serial
 from studies.sweeps.engine import run_sweep
-from studies.sweeps.executors import Serial
 from studies.sweeps.sweep import Sweep
 from synthesis.errors import SpecError
 from tests.unit.sweep_cases import contents, many_chunks
@@ -90,17 +90,17 @@ def test_a_worker_killed_in_the_middle_loses_nothing_and_counts_nothing_twice(
     wait_for_workers(address, 2)
     killed: list[int] = []
 
-    def told(done: int, total: int) -> None:
+    def report(done: int, total: int) -> None:
         if done == 10:
             workers[0].send_signal(signal.SIGKILL)
             killed.append(workers[0].wait())
 
-    result = run_sweep(whole, tmp_path / "cluster", Cluster(address), progress=told)
+    result = run_sweep(whole, tmp_path / "cluster", Cluster(address), progress=report)
     assert killed == [-signal.SIGKILL] and workers[1].poll() is None
     assert result.computed == whole.chunk_count()
     files = sorted((tmp_path / "cluster").glob("rows/*/*/*.parquet"))
     designs = [d for file in files for d in pq.read_table(file).column("design").to_pylist()]
-    assert designs == list(range(whole.designs(whole.subjects[0])))
+    assert designs == list(range(whole.designs(whole.observers[0])))
     run_sweep(whole, tmp_path / "here", Serial())
     assert contents(tmp_path / "cluster") == contents(tmp_path / "here")
 
@@ -139,8 +139,8 @@ def test_a_stranger_that_answers_is_one_line(tmp_path: Path, capsys: pytest.Capt
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         assert main(["sweep", "gain-box", "--scheduler", address, "--out", str(tmp_path / "out")]) == 2
         thread.join()
-    told = capsys.readouterr().err
-    assert "no Dask scheduler" in told and len(told.strip().splitlines()) == 1
+    report = capsys.readouterr().err
+    assert "no Dask scheduler" in report and len(report.strip().splitlines()) == 1
     assert not (tmp_path / "out").exists()
 
 

@@ -2,34 +2,33 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
+from scipy.stats import qmc
 
-from analysis.sensitivity_designs import corners, grid, sobol
-from studies.sweeps.designs import STAGES, Nominal
-from studies.sweeps.skip_ahead import latin_points, sobol_points
-from studies.sweeps.vary import Varied
+from analysis.sensitivity.box import Box
+from analysis.sensitivity.designs import Nominal
+from analysis.sensitivity.points import latin_points, sobol_points
+from studies.sweeps.spec import DESIGNS
 from synthesis.errors import SpecError
 from tests.unit.sweep_cases import sweep
 
-VARIED = (
-    Varied("a", "m", 1.5, 1.0, 2.0, True),
-    Varied("b", "s", 0.0, -3.0, 5.0, False),
-    Varied("c", "1", 0.4, 0.2, 0.6, False),
-)
-RANGES = {v.name: (v.low, v.high) for v in VARIED}
+LOW, HIGH = np.array([1.0, -3.0, 0.2]), np.array([2.0, 5.0, 0.6])
+BOX = Box(("a", "b", "c"), LOW, HIGH, np.array([1.5, 0.0, 0.4]))
 
 
 def stage(kind: str, **options: object):
-    return STAGES[kind].model_validate({"kind": kind, **options})
+    return DESIGNS[kind].model_validate({"kind": kind, **options})
 
 
-def test_sobol_is_that_of_the_analysis_and_may_be_entered_anywhere() -> None:
-    whole = sobol(RANGES, 512, seed=7).samples
+def test_sobol_is_that_of_scipy_and_may_be_entered_anywhere() -> None:
+    whole = LOW + qmc.Sobol(3, rng=np.random.default_rng(7)).random_base2(9) * (HIGH - LOW)
     found = stage("sobol", samples=512, seed=7)
-    np.testing.assert_array_equal(found.values(np.arange(512), VARIED), whole)
-    np.testing.assert_array_equal(found.values(np.array([300, 4, 511]), VARIED), whole[[300, 4, 511]])
-    assert not np.array_equal(stage("sobol", samples=512, seed=8).values(np.arange(512), VARIED), whole)
+    np.testing.assert_array_equal(found.points(np.arange(512), BOX), whole)
+    np.testing.assert_array_equal(found.points(np.array([300, 4, 511]), BOX), whole[[300, 4, 511]])
+    assert not np.array_equal(stage("sobol", samples=512, seed=8).points(np.arange(512), BOX), whole)
 
 
 def test_sobol_far_out_needs_no_points_before_it() -> None:
@@ -56,29 +55,30 @@ def test_latin_hypercube_columns_are_independent_and_spread() -> None:
     assert abs(neighbours) < 5.0 / np.sqrt(4000)
 
 
-def test_grid_and_corners_are_those_of_the_analysis() -> None:
+def test_grid_and_corners_are_all_combinations() -> None:
     levels = {"a": 3, "b": 2, "c": 4}
-    whole = grid({v.name: np.linspace(v.low, v.high, levels[v.name]) for v in VARIED}).samples
+    lines = [np.linspace(low, high, n) for low, high, n in zip(LOW, HIGH, levels.values(), strict=True)]
+    whole = np.array(list(product(*lines)))
     found = stage("grid", levels=levels)
-    assert found.rows(VARIED, 1) == len(whole) == 24
-    np.testing.assert_allclose(found.values(np.arange(24), VARIED), whole, rtol=1e-15)
-    rows = stage("corners").values(np.arange(8), VARIED)
-    assert {tuple(r) for r in rows} == {tuple(r) for r in corners(RANGES).samples}
+    assert found.count(BOX) == len(whole) == 24
+    np.testing.assert_allclose(found.points(np.arange(24), BOX), whole, rtol=1e-15)
+    rows = stage("corners").points(np.arange(8), BOX)
+    assert {tuple(r) for r in rows} == set(product(*zip(LOW, HIGH, strict=True)))
 
 
 def test_one_at_a_time_moves_one_and_leaves_the_others() -> None:
-    rows = stage("one at a time", levels=5).values(np.arange(15), VARIED)
-    nominal = Nominal().values(np.arange(1), VARIED)[0]
+    rows = stage("one at a time", levels=5).points(np.arange(15), BOX)
+    nominal = Nominal().points(np.arange(1), BOX)[0]
     assert nominal.tolist() == [1.5, 0.0, 0.4]
-    for i, v in enumerate(VARIED):
+    for i in range(3):
         own = rows[5 * i : 5 * i + 5]
-        np.testing.assert_allclose(own[:, i], np.linspace(v.low, v.high, 5))
+        np.testing.assert_allclose(own[:, i], np.linspace(LOW[i], HIGH[i], 5))
         np.testing.assert_array_equal(np.delete(own, i, axis=1), np.delete(np.tile(nominal, (5, 1)), i, axis=1))
 
 
 def test_saltelli_blocks_swap_one_column() -> None:
     found = stage("saltelli", blocks=8, seed=2)
-    rows = found.values(np.arange(found.rows(VARIED, 1)), VARIED).reshape(8, 5, 3)
+    rows = found.points(np.arange(found.count(BOX)), BOX).reshape(8, 5, 3)
     A, B = rows[:, 0], rows[:, 1]
     for i in range(3):
         np.testing.assert_array_equal(rows[:, 2 + i, i], B[:, i])
@@ -91,7 +91,7 @@ def test_chunks_cover_every_design_once_and_cut_no_block() -> None:
         chunks = list(found.chunks())
         assert [c.number for c in chunks] == list(range(len(chunks))) and len(chunks) == found.chunk_count()
         designs = [d for c in chunks for d in range(c.design, c.design + c.stop - c.start)]
-        assert designs == list(range(found.designs(found.subjects[0])))
+        assert designs == list(range(found.designs(found.observers[0])))
         saltelli = [c for c in chunks if found.stages[c.stage].kind == "saltelli"]
         assert all(c.start % 7 == 0 and c.stop % 7 == 0 for c in saltelli)
 

@@ -21,13 +21,12 @@ from studies.drives.prepare import CornerInputs, corner_inputs_of
 from studies.drives.replay import replay
 from studies.drives.run import replay_drive
 from studies.errors import LogError
+from studies.execution.processes import Finished, Serial
 from studies.sweeps.engine import run_sweep
-from studies.sweeps.executors import Serial
 from studies.sweeps.measure import Measure
+from studies.sweeps.observer import Batch, Observer
+from studies.sweeps.observer_spec import ObserverSpec
 from studies.sweeps.spec import MEASURES, build_sweep
-from studies.sweeps.subject import Batch, Subject
-from studies.sweeps.subject_spec import SubjectSpec
-from studies.sweeps.tables import compute
 from studies.trials.sensors import TEST_CAR
 from studies.truth import draw, load_manoeuvre, simulate_manoeuvres, write_drive
 from synthesis.errors import SpecError
@@ -58,8 +57,8 @@ parameters = "corner-estimation"
 
 
 @pytest.fixture(scope="module")
-def subject() -> Subject:
-    return SubjectSpec(schedule=NAME, parameters="corner-estimation").build(Path())
+def observer() -> Observer:
+    return ObserverSpec(schedule=NAME, parameters="corner-estimation").build(Path())
 
 
 def measure(folder: Path, **options: Any) -> Measure:
@@ -96,22 +95,22 @@ def nrms(velocity: np.ndarray, reference: np.ndarray) -> float:
     return found
 
 
-def test_every_design_is_that_of_its_own_observers(subject: Subject, tmp_path: Path) -> None:
+def test_every_design_is_that_of_its_own_observers(observer: Observer, tmp_path: Path) -> None:
     log, description = uneven_log(tmp_path)
     found = measure(tmp_path, drive="drive.toml", logs=["log.csv"])
-    found.check(subject)
-    values = found(subject.at(DESIGNS, subject.grid(2)))
+    found.check(observer)
+    values = found(observer.at(DESIGNS, observer.grid(2)))
     inputs, reference = inputs_of(log, description)
     runtime = replay(inputs, ScheduledCorners(SCHEDULE)).velocity
     assert values[0] == pytest.approx(nrms(runtime, reference), rel=1e-9)
     for row in range(3):
-        constants = {name: p.nominal for name, p in subject.plant.parameters.items()}
+        constants = {name: p.nominal for name, p in observer.plant.parameters.items()}
         constants |= {name: float(column[row]) for name, column in DESIGNS.items()}
         own = replace(inputs, radius=inputs.radius * constants["effective_radius"] / 0.33)
         plain: Any = Integrated(constants)
         assert values[row] == pytest.approx(nrms(replay(own, plain).velocity, reference), rel=1e-8)
     assert len({round(v, 6) for v in values}) == 3
-    alone = found(subject.at({name: column[1:2] for name, column in DESIGNS.items()}, subject.grid(2)))
+    alone = found(observer.at({name: column[1:2] for name, column in DESIGNS.items()}, observer.grid(2)))
     assert alone[0] == pytest.approx(values[1], rel=1e-12)  # whoever else is in the batch
 
 
@@ -122,7 +121,7 @@ def test_gains_that_correct_once_a_sample_are_replayed_as_the_runtime_does(tmp_p
     )
     write_content(tmp_path / "own.json", content)
     found = measure(tmp_path, drive="drive.toml", logs=["log.csv"])
-    own = SubjectSpec(schedule="own.json", parameters="corner-estimation").build(tmp_path)
+    own = ObserverSpec(schedule="own.json", parameters="corner-estimation").build(tmp_path)
     found.check(own)
     values = found(own.at({"gain_factor_relative_velocity": np.array([1.0, 1.3])}, own.grid(2)))
     inputs, reference = inputs_of(log, description)
@@ -135,13 +134,13 @@ def test_gains_that_correct_once_a_sample_are_replayed_as_the_runtime_does(tmp_p
     assert values[0] != pytest.approx(values[1], rel=1e-3)
 
 
-def test_a_diverging_design_is_infinite_and_touches_no_other(subject: Subject, tmp_path: Path) -> None:
+def test_a_diverging_design_is_infinite_and_touches_no_other(observer: Observer, tmp_path: Path) -> None:
     write_log(tmp_path / "log.csv", columns(duration=1.0))
     write_drive_file(tmp_path)
     found = measure(tmp_path, drive="drive.toml", logs=["log.csv"])
     factors = np.array([1.0, -2e4])
-    values = found(subject.at({"gain_factor_relative_velocity": factors}, subject.grid(2)))
-    (alone,) = found(subject.at({"sigma0": np.array([632.1])}, subject.grid(2)))
+    values = found(observer.at({"gain_factor_relative_velocity": factors}, observer.grid(2)))
+    (alone,) = found(observer.at({"sigma0": np.array([632.1])}, observer.grid(2)))
     assert np.isinf(values[1]) and values[0] == pytest.approx(alone, rel=1e-9)
 
 
@@ -160,18 +159,18 @@ def driven(pull: Path) -> Measure:
     return found
 
 
-def test_manoeuvre_is_the_drive_that_one_would_write_and_run(subject: Subject, pull: Path, driven: Measure) -> None:
+def test_manoeuvre_is_the_drive_that_one_would_write_and_run(observer: Observer, pull: Path, driven: Measure) -> None:
     truth = simulate_manoeuvres([load_manoeuvre(pull / "pull.toml")])
     log, description = write_drive(pull / "written", draw(truth, TEST_CAR, [3]), longitudinal=NAME)
     data = replay_drive([log], description)
-    driven.check(subject)
-    (value,) = driven(subject.at({"kappa": np.array([8.32])}, subject.grid(2)))
+    driven.check(observer)
+    (value,) = driven(observer.at({"kappa": np.array([8.32])}, observer.grid(2)))
     assert value == pytest.approx(nrms(data.replay.velocity, data.log.reference["vx"]), rel=1e-9)
 
 
-def test_a_worse_radius_is_worse(subject: Subject, driven: Measure) -> None:
+def test_a_worse_radius_is_worse(observer: Observer, driven: Measure) -> None:
     radius = 0.33 * np.array([1.0, 1.02, 1.05, 1.1])
-    values = driven(subject.at({"effective_radius": radius}, subject.grid(2)))
+    values = driven(observer.at({"effective_radius": radius}, observer.grid(2)))
     assert (np.diff(values) > 1.0).all() and values[0] < 2.0
 
 
@@ -195,9 +194,9 @@ def test_workers_are_given_the_drive_and_the_bytes_are_the_same(
     assert worst is not None and abs(worst.at["effective_radius"] / 0.33 - 1.0) == pytest.approx(0.05)
 
     class Elsewhere:
-        def run(self, given: Any, chunks: Any) -> Any:
+        def run(self, function: Any, given: Any, chunks: Any) -> Any:
             sent = pickle.loads(pickle.dumps(given))
-            return (compute(sent, chunk) for chunk in reversed(list(chunks)))
+            return (Finished(chunk, function(sent, chunk)) for chunk in reversed(list(chunks)))
 
     run_sweep(whole, tmp_path / "there", Elsewhere())
     assert contents(tmp_path / "there") == contents(tmp_path / "here") and len(counted) == 1
@@ -250,16 +249,16 @@ def test_a_reference_at_rest_is_refused(tmp_path: Path) -> None:
         measure(tmp_path, drive="drive.toml", logs=["log.csv"])
 
 
-def test_other_observers_are_refused(subject: Subject, pull: Path) -> None:
+def test_other_observers_are_refused(observer: Observer, pull: Path) -> None:
     found = measure(pull, manoeuvre="pull.toml")
-    lateral = SubjectSpec(name="tire", schedule="corner-estimation-lateral", parameters="corner-estimation")
+    lateral = ObserverSpec(name="tire", schedule="corner-estimation-lateral", parameters="corner-estimation")
     with pytest.raises(SpecError, match="longitudinal corner observers"):
         found.check(lateral.build(Path()))
     with pytest.raises(SpecError, match=r"0\.01 s, that of the drive of estimator_nrms is 0\.005 s"):
-        found.check(replace(subject, sample_time=0.01))
+        found.check(replace(observer, sample_time=0.01))
 
 
-def test_a_batch_is_needed_for_nothing_but_its_columns(subject: Subject, driven: Measure) -> None:
+def test_a_batch_is_needed_for_nothing_but_its_columns(observer: Observer, driven: Measure) -> None:
     """The grid of the sweep does not enter: the drive has its own wheel speeds."""
-    batches: list[Batch] = [subject.at({"sigma0": np.array([600.0])}, subject.grid(n)) for n in (2, 9)]
+    batches: list[Batch] = [observer.at({"sigma0": np.array([600.0])}, observer.grid(n)) for n in (2, 9)]
     assert driven(batches[0])[0] == driven(batches[1])[0]

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 from estimators.schedule import SHIPPED, read_content, write_content
+from studies.execution.processes import Serial
 from studies.sweeps.baseline import Baseline, of_sweep, read_baseline, write_baseline
 from studies.sweeps.engine import run_sweep
-from studies.sweeps.executors import Serial
-from studies.sweeps.figures import UNPROVED, Summary
-from studies.sweeps.gate import Judged, judge
+from studies.sweeps.gate import Comparison, compare
 from studies.sweeps.reports import junit, markdown
 from studies.sweeps.spec import build_sweep, shipped_sweeps
+from studies.sweeps.statistics import UNPROVED, Summary
 from studies.sweeps.sweep import Sweep
 from synthesis.errors import SpecError
 from tests.unit.sweep_cases import small, sweep
@@ -56,33 +56,33 @@ def before(tmp_path_factory: pytest.TempPathFactory) -> Baseline:
     return read_baseline(folder / "baseline.toml")
 
 
-def against(before: Baseline, folder: Path, **changes: Any) -> list[Judged]:
+def against(before: Baseline, folder: Path, **changes: Any) -> list[Comparison]:
     whole, summary = run(folder, small(**changes))
-    return judge(whole, summary, before)
+    return compare(whole, summary, before)
 
 
-def subjects(parameters: str = "corner-estimation", schedule: str = NAME) -> list[dict[str, str]]:
+def observers(parameters: str = "corner-estimation", schedule: str = NAME) -> list[dict[str, str]]:
     return [{"schedule": schedule, "parameters": parameters, "name": NAME}]
 
 
 def test_nothing_shrinks_against_itself(before: Baseline, tmp_path: Path) -> None:
-    judged = against(before, tmp_path)
-    assert {j.state for j in judged} == {"same"} and len(judged) > 40
+    compared = against(before, tmp_path)
+    assert {j.state for j in compared} == {"same"} and len(compared) > 40
 
 
-def test_baseline_reads_back_and_is_one_line_a_figure(before: Baseline, tmp_path: Path) -> None:
+def test_baseline_reads_back_and_is_one_line_a_statistic(before: Baseline, tmp_path: Path) -> None:
     write_baseline(tmp_path / "again.toml", before)
     text = (tmp_path / "again.toml").read_text()
     again = read_baseline(tmp_path / "again.toml")
-    assert again == replace(before, summary=again.summary) and again.summary.figures == before.summary.figures
+    assert again == replace(before, summary=again.summary) and again.summary.statistics == before.summary.statistics
     lines = [line for line in text.splitlines() if "value = " in line and " | " in line]
-    assert len(lines) == sum(bool(f.measure) for f in before.summary.figures)
+    assert len(lines) == sum(bool(f.measure) for f in before.summary.statistics)
     assert 'sigma1 = { value = 0.76, unit = "s/m" }' in text
 
 
 def test_lower_sigma1_shrinks_the_margin_and_is_named(before: Baseline, tmp_path: Path) -> None:
-    judged = against(before, tmp_path, subjects=subjects(parameter_file(tmp_path, sigma1=0.9)))
-    bad = {(j.before.measure, j.before.name): j for j in judged if not j.good}
+    compared = against(before, tmp_path, subjects=observers(parameter_file(tmp_path, sigma1=0.9)))
+    bad = {(j.before.measure, j.before.name): j for j in compared if not j.good}
     margin = bad["stability_margin", "nominal"]
     assert "sigma1 0.76 -> 0.684 s/m (-10 %) does it" in margin.line
     assert margin.after is not None and margin.after.at["sigma1"] == pytest.approx(0.684)
@@ -92,7 +92,7 @@ def test_lower_sigma1_shrinks_the_margin_and_is_named(before: Baseline, tmp_path
 
 def test_of_two_changes_the_one_that_did_it_is_named(before: Baseline, tmp_path: Path) -> None:
     """kappa costs the norm, sigma2 next to nothing; and kappa by itself gives the same loss."""
-    both = against(before, tmp_path, subjects=subjects(parameter_file(tmp_path, kappa=1.1, sigma2=0.9)))
+    both = against(before, tmp_path, subjects=observers(parameter_file(tmp_path, kappa=1.1, sigma2=0.9)))
     norm = next(j for j in both if (j.before.measure, j.before.name) == ("noise_norm", "worst"))
     assert not norm.good
     share = re.search(r"kappa 8\.32 -> 9\.152 1/m \(\+10 %\) alone does ([0-9.]+) % of it", norm.cause)
@@ -104,40 +104,40 @@ def test_changed_gains_name_the_schedule(before: Baseline, tmp_path: Path) -> No
     for row in content["gain"]["table"]:
         row[1][0] *= 0.8
     write_content(tmp_path / "weak.json", content)
-    judged = against(before, tmp_path, subjects=subjects(schedule="weak.json"))
-    bad = [j for j in judged if j.state == "shrunk"]
+    compared = against(before, tmp_path, subjects=observers(schedule="weak.json"))
+    bad = [j for j in compared if j.state == "shrunk"]
     assert bad and all(j.cause == f"the schedule '{NAME}': its gains changed does it" for j in bad)
 
 
 def test_another_code_is_named_when_nothing_else_changed(before: Baseline, tmp_path: Path) -> None:
     worse = [
         replace(f, value=f.value * 1.5) if (f.measure, f.name) == ("stability_margin", "worst") else f
-        for f in before.summary.figures
+        for f in before.summary.statistics
     ]
-    judged = against(replace(before, summary=replace(before.summary, figures=tuple(worse))), tmp_path)
-    bad = [j for j in judged if not j.good]
+    compared = against(replace(before, summary=replace(before.summary, statistics=tuple(worse))), tmp_path)
+    bad = [j for j in compared if not j.good]
     assert len(bad) == 1 and "the code or its versions did" in bad[0].cause
 
 
-def test_missing_figures_and_new_outcomes_break_it(before: Baseline, tmp_path: Path) -> None:
+def test_missing_statistics_and_new_outcomes_break_it(before: Baseline, tmp_path: Path) -> None:
     whole, summary = run(tmp_path, small())
-    fewer = replace(summary, figures=tuple(f for f in summary.figures if f.name != "median"))
-    gone = [j for j in judge(whole, fewer, before) if not j.good]
+    fewer = replace(summary, statistics=tuple(f for f in summary.statistics if f.name != "median"))
+    gone = [j for j in compare(whole, fewer, before) if not j.good]
     assert len(gone) == 3 and all("not made any more" in j.line for j in gone)
-    more = tuple(replace(f, value=2.0) if f.name == "invalid designs" else f for f in summary.figures)
-    (new,) = [j for j in judge(whole, replace(summary, figures=more), before) if not j.good]
+    more = tuple(replace(f, value=2.0) if f.name == "invalid designs" else f for f in summary.statistics)
+    (new,) = [j for j in compare(whole, replace(summary, statistics=more), before) if not j.good]
     assert "invalid designs: 0 -> 2" in new.line
-    moved = tuple(replace(f, value=f.value + 0.6) if f.name == "total index kappa" else f for f in summary.figures)
-    told = judge(whole, replace(summary, figures=moved), before)
-    assert {j.state for j in told} == {"same", "moved"} and all(j.good for j in told)  # told, and breaks nothing
+    moved = tuple(replace(f, value=f.value + 0.6) if f.name == "total index kappa" else f for f in summary.statistics)
+    report = compare(whole, replace(summary, statistics=moved), before)
+    assert {j.state for j in report} == {"same", "moved"} and all(j.good for j in report)  # told, and breaks nothing
 
 
 def test_a_baseline_of_something_else_is_refused(before: Baseline, tmp_path: Path) -> None:
     whole, summary = run(tmp_path, small(vary={"constants": {"relative": 0.3}}))
     with pytest.raises(SpecError, match="another definition"):
-        judge(whole, summary, before)
+        compare(whole, summary, before)
     with pytest.raises(SpecError, match="is of sweep 'small'"):
-        judge(sweep(name="other"), summary, before)
+        compare(sweep(name="other"), summary, before)
     with pytest.raises(SpecError, match="--update-baseline"):
         read_baseline(tmp_path / "absent.toml")
     (tmp_path / "old.toml").write_text('schema = "gainsmith.sweep-baseline/0"')
@@ -146,20 +146,20 @@ def test_a_baseline_of_something_else_is_refused(before: Baseline, tmp_path: Pat
 
 
 def test_reports_say_the_same(before: Baseline, tmp_path: Path) -> None:
-    changed = small(subjects=subjects(parameter_file(tmp_path, sigma1=0.9)))
+    changed = small(subjects=observers(parameter_file(tmp_path, sigma1=0.9)))
     whole, summary = run(tmp_path, changed)
-    judged = judge(whole, summary, before)
-    bad = [j for j in judged if not j.good]
-    suite = ElementTree.fromstring(junit(whole.name, summary, judged))[0]
-    assert int(suite.get("tests", "")) == len(judged) and int(suite.get("failures", "")) == len(bad)
+    compared = compare(whole, summary, before)
+    bad = [j for j in compared if not j.good]
+    suite = ElementTree.fromstring(junit(whole.name, summary, compared))[0]
+    assert int(suite.get("tests", "")) == len(compared) and int(suite.get("failures", "")) == len(bad)
     failures = [f.get("message", "") for f in suite.iter("failure")]
     assert failures == [j.line for j in bad] and any("sigma1" in f for f in failures)
-    page = markdown(summary, judged)
-    assert f"**{len(bad)} of {len(judged)} figures shrank" in page and "sigma1 0.76 -> 0.684" in page
-    assert "Nothing shrank" in markdown(summary, [j for j in judged if j.good])
+    page = markdown(summary, compared)
+    assert f"**{len(bad)} of {len(compared)} statistics shrank" in page and "sigma1 0.76 -> 0.684" in page
+    assert "Nothing shrank" in markdown(summary, [j for j in compared if j.good])
 
 
-def test_figures_are_those_of_the_rows(tmp_path: Path) -> None:
+def test_statistics_are_those_of_the_rows(tmp_path: Path) -> None:
     """Worst and quantiles against all rows at once."""
     import pyarrow.parquet as pq
 
@@ -192,12 +192,12 @@ def test_sigma1_changed_by_ten_per_cent_breaks_the_shipped_baseline(tmp_path: Pa
     content = tomllib.loads(shipped_sweeps()["tire-vehicle"].read_text())
     baseline = read_baseline(BASELINES / "tire-vehicle.quick.toml")
     whole, summary = run(tmp_path, content, quick=True)
-    assert all(j.good for j in judge(whole, summary, baseline))
+    assert all(j.good for j in compare(whole, summary, baseline))
     content["subjects"][0]["parameters"] = parameter_file(tmp_path, sigma1=factor)
     (tmp_path / "changed").mkdir()
     changed = build_sweep(content, tmp_path, quick=True)
     summary = run_sweep(changed, tmp_path / "changed", Serial()).summary
-    bad = [j for j in judge(changed, summary, baseline) if not j.good]
-    assert bad and all("sigma1" in j.cause and j.before.subject == NAME for j in bad)
+    bad = [j for j in compare(changed, summary, baseline) if not j.good]
+    assert bad and all("sigma1" in j.cause and j.before.observer == NAME for j in bad)
     assert any(j.before.name == UNPROVED for j in bad)
     assert any(j.before.measure == "stability_margin" for j in bad) == (factor < 1.0)

@@ -16,16 +16,16 @@ from analysis.dropout_schedule import frozen_critical_probability
 from analysis.error_norms import error_hinf_norm
 from analysis.mean_square_schedule import drop_radius
 from analysis.rank_loss_speeds import RankLossSpeeds
+from analysis.sensitivity.designs import Sobol
 from estimators import GainSchedule, LpvVelocityObserver
 from estimators.schedule import SHIPPED, read_content, write_content
-from studies.sweeps.designs import STAGES
 from studies.sweeps.evaluate import INVALID, NOT_A_NUMBER, VALID, evaluate
 from studies.sweeps.measure import Measure
+from studies.sweeps.observer import Batch, Observer, model_observer
+from studies.sweeps.observer_spec import ObserverSpec, designed_from
+from studies.sweeps.ranges import RangeSpec
 from studies.sweeps.spec import MEASURES
-from studies.sweeps.subject import Batch, Subject, model_subject
-from studies.sweeps.subject_spec import SubjectSpec, designed_from
 from studies.sweeps.sweep import Sweep
-from studies.sweeps.vary import Vary
 from synthesis.errors import SpecError
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.lpv import LpvModel
@@ -44,16 +44,16 @@ DESIGNS = {"sigma1": np.array([0.76, 0.65, 0.9]), "kappa": np.array([8.32, 9.5, 
 
 
 @pytest.fixture(scope="module")
-def subject() -> Subject:
-    return SubjectSpec(schedule=NAME, parameters="corner-estimation").build(Path())
+def observer() -> Observer:
+    return ObserverSpec(schedule=NAME, parameters="corner-estimation").build(Path())
 
 
 @pytest.fixture(scope="module")
-def sampled(tmp_path_factory: pytest.TempPathFactory) -> Subject:
+def sampled(tmp_path_factory: pytest.TempPathFactory) -> Observer:
     """The same model with gains that correct once a sample, from a file."""
     folder = tmp_path_factory.mktemp("sampled")
     write_content(folder / "own.json", CONTENT)
-    return SubjectSpec(schedule="own.json", parameters="corner-estimation").build(folder)
+    return ObserverSpec(schedule="own.json", parameters="corner-estimation").build(folder)
 
 
 def measure(kind: str, **options: object) -> Measure:
@@ -69,8 +69,8 @@ def perturbed(row: int) -> LpvModel:
     return replace(MODEL, constants=changed)
 
 
-def test_margin_norm_and_radius_are_those_of_single_models(subject: Subject) -> None:
-    grid = subject.grid(6)
+def test_margin_norm_and_radius_are_those_of_single_models(observer: Observer) -> None:
+    grid = observer.grid(6)
     speeds = grid.points[:, 0]
     kinds = [
         measure("stability_margin"),
@@ -81,7 +81,7 @@ def test_margin_norm_and_radius_are_those_of_single_models(subject: Subject) -> 
             errors=["bristle_deflection", "relative_velocity"],
         ),
     ]  # fmt: skip
-    batch = subject.at(DESIGNS, grid)
+    batch = observer.at(DESIGNS, grid)
     margin, radius, noise, everything = (m(batch) for m in kinds)
     for row in range(3):
         model, gain = perturbed(row), SCHEDULE.gain(speeds)
@@ -96,9 +96,9 @@ def test_margin_norm_and_radius_are_those_of_single_models(subject: Subject) -> 
 
 
 @pytest.mark.parametrize("update", ["held", "sampled"])
-def test_updates_are_those_that_the_runtime_performs(update: str, subject: Subject, sampled: Subject) -> None:
+def test_updates_are_those_that_the_runtime_performs(update: str, observer: Observer, sampled: Observer) -> None:
     """One step of the real observer from unit errors, the plant at rest, with and without a measurement."""
-    own, schedule = (subject, SCHEDULE) if update == "held" else (sampled, SAMPLED)
+    own, schedule = (observer, SCHEDULE) if update == "held" else (sampled, SAMPLED)
     grid = own.grid(5)
     modes = own.at({"sigma1": np.array([0.76])}, grid).coast
     for measurement, matrices in ((0.0, modes.received[0]), (np.nan, modes.dropped[0])):
@@ -110,7 +110,7 @@ def test_updates_are_those_that_the_runtime_performs(update: str, subject: Subje
                 np.testing.assert_allclose(step.estimate[0], matrices[g, :, state], rtol=1e-9, atol=1e-12)
 
 
-def test_gains_that_correct_once_a_sample_are_measured_by_the_radius_of_their_update(sampled: Subject) -> None:
+def test_gains_that_correct_once_a_sample_are_measured_by_the_radius_of_their_update(sampled: Observer) -> None:
     """e^(TA) - K C of single models; the margin is its growth in 1/s, and there is no error equation to take a norm of."""
     grid = sampled.grid(6)
     speeds, T = grid.points[:, 0], SAMPLED.sample_time
@@ -138,7 +138,7 @@ def test_gains_that_correct_once_a_sample_are_measured_by_the_radius_of_their_up
 
 def test_units_of_a_constant_gain_are_those_of_the_update() -> None:
     for update, unit in (("held", "(m/s)/(m/s)"), ("sampled", "(m)/(m/s)")):
-        own = replace(model_subject("mass", MASS, GAIN, 0.01), update=update)
+        own = replace(model_observer("mass", MASS, GAIN, 0.01), update=update)
         assert own.parameters["gain_position_rate"].unit == unit
         grid = own.grid(2)
         modes = own.at({"mass": np.array([2.0])}, grid).coast  # three states: no closed form
@@ -148,10 +148,10 @@ def test_units_of_a_constant_gain_are_those_of_the_update() -> None:
         np.testing.assert_allclose(modes.received[0], expected, rtol=1e-9, atol=1e-12)
 
 
-def test_drop_measures_are_those_of_the_schedule(subject: Subject) -> None:
+def test_drop_measures_are_those_of_the_schedule(observer: Observer) -> None:
     frozen = frozen_critical_probability(SCHEDULE, points=29)
-    grid = subject.grid(29)
-    batch = subject.at({"sigma1": np.array([0.76])}, grid)
+    grid = observer.grid(29)
+    batch = observer.at({"sigma1": np.array([0.76])}, grid)
     shared = np.isin(frozen.points, grid.points[:, 0])
     np.testing.assert_allclose(
         measure("critical_drop_probability")(batch)[0], frozen.values[shared], rtol=1e-8, atol=1e-10
@@ -162,8 +162,8 @@ def test_drop_measures_are_those_of_the_schedule(subject: Subject) -> None:
     np.testing.assert_allclose(measure("second_moment_radius", drop_probability=0.3)(batch), wanted)
 
 
-def test_switching_bound_of_one_speed_is_its_radius(subject: Subject) -> None:
-    batch = subject.at(DESIGNS, subject.grid(3))
+def test_switching_bound_of_one_speed_is_its_radius(observer: Observer) -> None:
+    batch = observer.at(DESIGNS, observer.grid(3))
     bound = measure("joint_spectral_radius", speeds=1, tolerance=1e-3)(batch)
     radius = measure("sampled_radius")(batch)[:, 0]
     assert bound.shape == (3,)
@@ -172,9 +172,9 @@ def test_switching_bound_of_one_speed_is_its_radius(subject: Subject) -> None:
     assert (many >= measure("sampled_radius")(batch).max(axis=1) * (1.0 - 1e-9)).all()
 
 
-def test_designing_again_gives_the_design_bound_of_the_schedule(subject: Subject) -> None:
+def test_designing_again_gives_the_design_bound_of_the_schedule(observer: Observer) -> None:
     constants = {"sigma1": np.array([0.76, 0.68])}
-    gamma = measure("certified_gamma")(subject.at(constants, subject.grid(2)))
+    gamma = measure("certified_gamma")(observer.at(constants, observer.grid(2)))
     content = read_content(SHIPPED / f"{NAME}.json")
     spec = designed_from(content)
     assert spec is not None
@@ -185,20 +185,20 @@ def test_designing_again_gives_the_design_bound_of_the_schedule(subject: Subject
     assert 0.9 * gamma[0] < claimed < (1.0 + spec.deploy.interpolation_cost) * gamma[0]
     assert gamma[1] != pytest.approx(gamma[0], rel=1e-4)
     with pytest.raises(SpecError, match="is not one of"):
-        measure("certified_gamma", channel="friction").check(subject)
+        measure("certified_gamma", channel="friction").check(observer)
 
 
-def test_rank_loss_speed_of_a_subject(subject: Subject) -> None:
-    found = measure("rank_loss_speed")(subject.at(DESIGNS, subject.grid(2)))
+def test_rank_loss_speed_of_an_observer(observer: Observer) -> None:
+    found = measure("rank_loss_speed")(observer.at(DESIGNS, observer.grid(2)))
     np.testing.assert_array_equal(found, RankLossSpeeds(MODEL).lowest(DESIGNS))
 
 
 def test_schedule_of_an_unknown_model_is_swept_by_its_polynomials() -> None:
     """Without a catalogue model the entries of the plant are what can be varied; the nominal design is the same."""
-    from studies.sweeps.subject import Gains
-    from studies.sweeps.subject_spec import polynomial_plant
+    from studies.sweeps.observer import Gains
+    from studies.sweeps.plant import polynomial_plant
 
-    plain = Subject("x", polynomial_plant(SCHEDULE), Gains(SCHEDULE.table, SCHEDULE.breakpoints), SCHEDULE.sample_time)
+    plain = Observer("x", polynomial_plant(SCHEDULE), Gains(SCHEDULE.table, SCHEDULE.breakpoints), SCHEDULE.sample_time)
     grid = plain.grid(4)
     A_e = plain.at({"A_1_1": np.array([1.0, 1.2])}, grid).error[0]
     model = replace(MODEL, constants=MODEL.constants).on(grid.points[:, 0])
@@ -229,15 +229,15 @@ GAIN = np.array([[4.0, 0.1], [2.0, 5.0], [3.0, -0.2]])
 
 def test_a_models_own_sweep_over_two_scheduling_parameters(tmp_path: Path) -> None:
     """Three states, two outputs, two parameters: nothing is made for the corner models alone."""
+    from studies.execution.processes import Serial
     from studies.sweeps.engine import run_sweep
-    from studies.sweeps.executors import Serial
 
-    own = model_subject("mass", MASS, GAIN, 0.01)
+    own = model_observer("mass", MASS, GAIN, 0.01)
     channel = {"disturbances": ["force"], "errors": ["position"]}
     sweep = Sweep(
         "own", [own], [measure("stability_margin"), measure("hinf_norm", name="norm", **channel)],
-        [STAGES["sobol"].model_validate({"kind": "sobol", "samples": 16})],
-        {"mass": Vary(range=(1.5, 3.0)), "gain_velocity_rate": Vary(relative=0.3)}, points=4,
+        [Sobol(samples=16)],
+        {"mass": RangeSpec(range=(1.5, 3.0)), "gain_velocity_rate": RangeSpec(relative=0.3)}, points=4,
     )  # fmt: skip
     result = run_sweep(sweep, tmp_path / "out", Serial())
     worst = result.summary.of("mass", "norm", "worst")
@@ -250,7 +250,7 @@ def test_a_models_own_sweep_over_two_scheduling_parameters(tmp_path: Path) -> No
 
 
 def test_invalid_designs_keep_their_reason_and_touch_no_other() -> None:
-    own = model_subject("mass", MASS, GAIN, 0.01)
+    own = model_observer("mass", MASS, GAIN, 0.01)
     grid = own.grid(2)
     given = np.array([2.0, 1.0, 1.8, -1.0, 2.2])  # 1.0 divides by zero, -1.0 has another sign than the nominal mass
     found = evaluate(own, [measure("stability_margin")], grid, {"mass": given})
@@ -271,14 +271,14 @@ def _wrong_shape(batch: Batch) -> np.ndarray:
     return np.zeros(7)
 
 
-def test_nan_is_an_outcome_and_a_wrong_shape_is_refused(subject: Subject) -> None:
+def test_nan_is_an_outcome_and_a_wrong_shape_is_refused(observer: Observer) -> None:
     holes = Measure("holes", "s/m", "larger", partial(_holes, 0.8))
-    found = evaluate(subject, [holes, measure("stability_margin")], subject.grid(3), DESIGNS)
+    found = evaluate(observer, [holes, measure("stability_margin")], observer.grid(3), DESIGNS)
     assert found.outcome.tolist() == [VALID, VALID, NOT_A_NUMBER]
     assert found.reason[2] == "holes is not a number" and np.isnan(found.worst["holes"][2])
     assert np.isfinite(found.worst["stability_margin"]).all()
     with pytest.raises(SpecError, match="returned the shape"):
-        evaluate(subject, [Measure("bad", "1", "larger", _wrong_shape)], subject.grid(2), DESIGNS)
+        evaluate(observer, [Measure("bad", "1", "larger", _wrong_shape)], observer.grid(2), DESIGNS)
 
 
 def test_loss_is_relative_to_the_distance_from_worthlessness() -> None:

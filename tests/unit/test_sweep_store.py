@@ -12,11 +12,10 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
+from studies.execution.processes import Finished, Serial
 from studies.sweeps.engine import run_sweep
-from studies.sweeps.executors import Serial
 from studies.sweeps.store import locked_folder
 from studies.sweeps.sweep import Sweep
-from studies.sweeps.tables import compute
 from synthesis.errors import SpecError
 from tests.unit.sweep_cases import contents, sweep
 
@@ -52,15 +51,15 @@ def done(whole: Sweep, tmp_path_factory: pytest.TempPathFactory) -> dict[str, by
 class Backwards:
     """The last chunk first, every chunk computed twice: what a cluster that loses results may do."""
 
-    def run(self, whole: Sweep, chunks: Any) -> Any:
-        return (compute(whole, chunk) for chunk in reversed(list(chunks)) for _ in range(2))
+    def run(self, function: Any, whole: Sweep, chunks: Any) -> Any:
+        return (Finished(chunk, function(whole, chunk)) for chunk in reversed(list(chunks)) for _ in range(2))
 
 
 def test_same_bytes_in_any_order(whole: Sweep, done: dict[str, bytes], tmp_path: Path) -> None:
     run_sweep(whole, tmp_path / "out", Backwards())
     assert contents(tmp_path / "out") == done
     rows = sum(pq.read_metadata(p).num_rows for p in (tmp_path / "out").glob("rows/*/*/*"))
-    assert rows == whole.designs(whole.subjects[0])
+    assert rows == whole.designs(whole.observers[0])
 
 
 @pytest.fixture(scope="module")
@@ -88,19 +87,21 @@ def test_killed_at_random_moments_ends_with_the_same_bytes(
     forked: tuple[Path, dict[str, Any]], run: str, kills: int
 ) -> None:
     """In one process and with two workers; half-written files must never be taken for chunks (the control: a cut file)."""
-    folder, told = forked[0], forked[1][run]
-    assert told["killed"] == kills
-    assert told["there"] == sorted(told["there"])  # what was there is still there
-    assert 0 < told["computed"] <= told["all"] - told["there"][-1] < told["all"]  # it went on from where it was left
+    folder, report = forked[0], forked[1][run]
+    assert report["killed"] == kills
+    assert report["there"] == sorted(report["there"])  # what was there is still there
+    assert (
+        0 < report["computed"] <= report["all"] - report["there"][-1] < report["all"]
+    )  # it went on from where it was left
     assert contents(folder / run) == contents(folder / "straight")
 
 
 def test_a_full_disk_is_one_line_and_loses_nothing(forked: tuple[Path, dict[str, Any]]) -> None:
     """A limit on the size of files fails like a full disk, in the middle of a write."""
-    folder, told = forked
-    code, words = told["full"]
+    folder, report = forked
+    code, words = report["full"]
     assert code == 2 and "free space" in words and len(words.strip().splitlines()) == 1
-    assert told["left"] == []
+    assert report["left"] == []
     kept = {k: v for k, v in contents(folder / "full").items() if not k.startswith(("pictures", "report"))}
     assert kept == contents(folder / "serial")
 
@@ -115,7 +116,7 @@ def test_a_cut_chunk_is_computed_again_and_nothing_else(whole: Sweep, done: dict
     files = sorted(tmp_path.glob("rows/*/*/*.parquet"))
     files[2].write_bytes(files[2].read_bytes()[:-30])
     files[5].unlink()
-    (tmp_path / "rows" / ".left.part").write_bytes(b"half")
+    (tmp_path / "rows" / ".unfinished-abc.parquet").write_bytes(b"half")
     assert run_sweep(whole, tmp_path, Serial(), resume=True).computed == 2
     assert contents(tmp_path) == done
     assert run_sweep(whole, tmp_path, Serial(), resume=True).computed == 0
@@ -158,7 +159,7 @@ def test_two_runs_on_one_folder(whole: Sweep, tmp_path: Path) -> None:
         "print('held', flush=True); input()"
     )
     holder = subprocess.Popen(
-        [sys.executable, "-S", "-c", code, tmp_path / "lock"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [sys.executable, "-S", "-c", code, tmp_path / ".lock"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     assert holder.stdout is not None and holder.stdout.readline() == "held\n"
     with pytest.raises(SpecError, match="another sweep is writing"):

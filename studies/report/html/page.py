@@ -14,7 +14,7 @@ from studies.report.html.text import alignments, anchor, brief, cell, fits, labe
 from studies.report.scoreboard import MARKS, MEANINGS, Scoreboard
 
 if TYPE_CHECKING:
-    from studies.running.record import StudyRecord
+    from studies.parts.record import StudyRecord
 
 
 @cache

@@ -1,1 +1,0 @@
-"""Running studies: parts on worker processes, stored whole, resumed where they stopped, collected into results."""

@@ -1,0 +1,123 @@
+"""What a fingerprint is taken of: what a module really imports, and nothing else."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from studies.execution.fingerprint import PACKAGES, SOURCE_ROOT, Sources, traits
+from studies.parts.marks import Marks
+from studies.registry import MODULES, Registry
+from studies.study import QUICK, Part, PartResult, Scope
+from tests.unit.study_fakes.registry import REGISTRY
+
+TREE = {
+    "own/__init__.py": "",
+    "own/settings.json": "{}",
+    "own/part.py": """
+from typing import TYPE_CHECKING
+import numpy
+from own.model import curve
+from .data import limits
+if TYPE_CHECKING:
+    from own.drawing import Canvas
+
+def run(scope):
+    from own.late import solve
+    return read("own.tables")
+""",
+    "own/model/__init__.py": "from own.model.curve import shape\n",
+    "own/model/curve.py": "import own.model.base\n",
+    "own/model/base.py": "from own.model import curve\n",
+    "own/model/constants.toml": "a = 1\n",
+    "own/model/sets/one.toml": "a = 1\n",
+    "own/model/unused.py": "",
+    "own/data.py": "from own.door import gain\n",
+    "own/late.py": "",
+    "own/tables/__init__.py": "",
+    "own/tables/printed.toml": "a = 1\n",
+    "own/door/__init__.py": "from importlib import import_module\n",
+    "own/door/inside.py": "",
+    "own/drawing.py": "",
+    "own/other.py": "from own.part import run\n",
+    "own/notes.md": "",
+    "strange/__init__.py": "",
+}
+REACHED = {
+    "part.py", "model/__init__.py", "model/curve.py", "model/base.py", "model/constants.toml", "model/sets/one.toml",
+    "data.py", "late.py", "tables/__init__.py", "tables/printed.toml", "door/__init__.py", "door/inside.py", "settings.json",
+    "__init__.py",
+}  # fmt: skip
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> Path:
+    for name, text in TREE.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def mark(tree: Path, scope: Scope = QUICK) -> str:
+    return Sources(tree, ["own"]).fingerprint(scope, ["own.part", "numpy"])
+
+
+def test_reached_is_what_is_imported(tree: Path) -> None:
+    found = Sources(tree, ["own"]).reached(["own.part"])
+    assert {path.relative_to(tree / "own").as_posix() for path in found} == REACHED
+
+
+@pytest.mark.parametrize("name", sorted(TREE))
+def test_a_change_counts_where_it_is_imported_and_nowhere_else(tree: Path, name: str) -> None:
+    before = mark(tree)
+    assert mark(tree) == before
+    (tree / name).write_text(TREE[name] + ("\n# changed\n" if name.endswith(".py") else "\n"))
+    assert (mark(tree) != before) == (name.removeprefix("own/") in REACHED)
+
+
+def test_scope_and_place_of_the_tree(tree: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    (tree / "own").rename(elsewhere / "own")
+    there = mark(elsewhere)
+    (elsewhere / "own").rename(tree / "own")
+    assert mark(tree) == there != mark(tree, Scope())
+
+
+def test_modules_of_nobody_are_refused(tree: Path) -> None:
+    with pytest.raises(ValueError, match="none of the modules numpy is below"):
+        Sources(tree, ["own"]).reached(["numpy"])
+
+
+def bound(settings: dict[str, object], scope: Scope) -> PartResult:
+    """A part that is given values."""
+    return PartResult(notes=[str(settings), str(scope)])
+
+
+def test_what_a_part_is_bound_to_belongs_to_it() -> None:
+    modules, values = traits(partial(bound, {"limit": (1.5, Path("a"))}))
+    assert __name__ in modules and "1.5" in values and "'limit'" in values
+    marks = Marks(REGISTRY, QUICK)
+
+    def of(value: object) -> str:
+        return marks.part(Part("one", "One", partial(bound, {"limit": value})))
+
+    assert of(1.5) == of(1.5) != of(1.6)
+    assert of([1, (2, bound)]) == of([1, (2, bound)]) != of([1, (2, mark)])
+
+
+def test_the_shipped_studies_do_not_depend_on_how_they_are_shown() -> None:
+    """Every study has a fingerprint; pages, commands and other studies' claims are none of its business."""
+    sources = Sources()
+    assert all((SOURCE_ROOT / name / "__init__.py").exists() for name in PACKAGES)
+    for name, module in MODULES.items():
+        files = {path.relative_to(SOURCE_ROOT).as_posix() for path in sources.reached([module])}
+        assert module.replace(".", "/") + ".py" in files
+        assert not [
+            file for file in files if file.startswith(("studies/commands", "studies/report/html", "studies/sweeps"))
+        ]
+        assert "studies/papers/ekf_ukf_lateral/claims.toml" not in files or name == "ekf-ukf-lateral"
+    assert Marks(Registry(MODULES), QUICK).study("friction-floor") != Marks(Registry(MODULES), Scope()).study(
+        "friction-floor"
+    )
