@@ -10,22 +10,16 @@ from numpy.typing import ArrayLike
 from analysis.errors import AnalysisError
 from analysis.norms import HinfNorm, hinf_norm
 from estimators.arrays import FloatArray
-from estimators.errors import unknown
 from synthesis.models.lpv import LpvModel
+from synthesis.models.selection import selection as named
 
 
 def selection(model: LpvModel, disturbances: Sequence[str], errors: Sequence[str]) -> tuple[FloatArray, FloatArray]:
     """d (nd, k) that feeds the named disturbances and z (j, nx) that reads the named state errors, in that order."""
-    known = {"disturbance": [s.name for s in model.disturbances], "state": [s.name for s in model.states]}
     for what, names in (("disturbance", disturbances), ("state", errors)):
-        for name in names:
-            if name not in known[what]:
-                raise AnalysisError(f"model '{model.name}': {unknown(what, name, known[what])}")
         if not names:
             raise AnalysisError(f"model '{model.name}': name at least one {what}")
-    d = np.eye(len(model.disturbances))[:, [known["disturbance"].index(name) for name in disturbances]]
-    z = np.eye(len(model.states))[[known["state"].index(name) for name in errors]]
-    return d, z
+    return named(model, disturbances, errors, f"model '{model.name}'", AnalysisError)
 
 
 def error_hinf_norm(

@@ -43,7 +43,7 @@ class PartResult:
 
     claims: Sequence[Claim] = ()
     tables: Sequence[Table] = ()
-    drawings: Sequence[Figure] = ()
+    figures: Sequence[Figure] = ()
     notes: Sequence[str] = ()
     measures: dict[str, float] = field(default_factory=dict)
 

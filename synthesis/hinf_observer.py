@@ -22,7 +22,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from estimators.arrays import FloatArray
-from estimators.errors import unknown
 from synthesis.certificate.refute import undetectable_place
 from synthesis.certificate.rounding import round_down, round_up
 from synthesis.errors import ProblemError
@@ -34,6 +33,7 @@ from synthesis.lmi.solve import solve
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.observer import Update
 from synthesis.models.lpv import LpvModel
+from synthesis.models.selection import selection
 from synthesis.polynomials.matrix import symmetric_block
 
 
@@ -332,13 +332,7 @@ def observer_problem(
 
 def channel_matrices(model: LpvModel, channel: Channel) -> tuple[FloatArray, FloatArray]:
     """Selection (with weights) of disturbances (nd, k) and of errors (m, nx). Raises ProblemError for unknown names."""
-    disturbances, states = [d.name for d in model.disturbances], [s.name for s in model.states]
-    for name in channel.disturbances:
-        if name not in disturbances:
-            raise ProblemError(f"channel '{channel.name}': {unknown('disturbance', name, disturbances)}")
-    for name in channel.errors:
-        if name not in states:
-            raise ProblemError(f"channel '{channel.name}': {unknown('state', name, states)}")
+    d, z = selection(model, channel.disturbances, channel.errors, f"channel '{channel.name}'", ProblemError)
     weights = channel.weights or (1.0,) * len(channel.disturbances)
     if len(weights) != len(channel.disturbances):
         raise ProblemError(
@@ -346,5 +340,4 @@ def channel_matrices(model: LpvModel, channel: Channel) -> tuple[FloatArray, Flo
         )
     if not all(0.0 < weight < np.inf for weight in weights):
         raise ProblemError(f"channel '{channel.name}' has the weights {list(weights)}; give positive sizes")
-    d = np.eye(len(disturbances))[:, [disturbances.index(name) for name in channel.disturbances]] * np.array(weights)
-    return d, np.eye(len(states))[[states.index(name) for name in channel.errors]]
+    return d * np.array(weights), z

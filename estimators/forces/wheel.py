@@ -96,7 +96,7 @@ class WheelInputs(Renewable):
     def __call__(
         self, wheel_speed: npt.ArrayLike, torque: npt.ArrayLike, vertical_load: npt.ArrayLike | None
     ) -> WheelSignals:
-        """Screens one sample; `vertical_load` None: the last known one, at first the static one.
+        """Checks one sample; `vertical_load` None: the last known one, at first the static one.
 
         Raises:
             EstimatorError: another shape, or not numbers.

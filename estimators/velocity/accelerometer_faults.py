@@ -8,7 +8,7 @@ from sum F_x = m a and loads that shift by m a h/L. The accelerometer feels forc
 come from torques and wheel speeds, thus a_x has no part in a_F. Two sources that contradict each other leave it open which
 is wrong; the wheels decide: the middle of their surface accelerations follows the car, unless it leaves both.
 
-    believed   a_x                    as long as it is there, alive and within `thrust_floor` + `thrust_linear` |a_F| of a_F
+    believed   a_x                    as long as it is there, alive and within `force_gap_floor` + `force_gap_linear` |a_F| of a_F
     pending    a_x, as unsure as the two are apart, until the wheels side with one of them
     doubted    a_F, if the wheels side with it, or a_x is missing, frozen or disproved (slip direction)
     blind      what the wheels gain, +-`unseen_acceleration`, if the forces are not known either
@@ -54,7 +54,10 @@ class Acceleration(NamedTuple):
 
 
 class AccelerationSource(CarsMemory):
-    """Remembers how far a_x, forces and wheels of `count` cars are apart."""
+    """Compares a_x of `count` cars with what their tire forces make, and replaces it where it is at fault.
+
+    It remembers how far a_x, forces and wheels are apart.
+    """
 
     memory = ("gap", "apart", "since")
 
@@ -82,10 +85,10 @@ class AccelerationSource(CarsMemory):
         ahead, behind = 0.5 * (mu[0] + mu[1]), 0.5 * (mu[2] + mu[3])
         force = GRAVITY * (self._front * ahead + self._rear * behind) / (1.0 + self._lever * (ahead - behind))
         unit = reading * (1.0 - x[SCALE]) - x[BIAS]
-        kept = kit.exp(-elapsed / s.thrust_memory)
+        kept = kit.exp(-elapsed / s.force_gap_memory)
         self.gap = gap = choose(known & alive, kept * self.gap + (1.0 - kept) * (unit - force), 0.0)
         # steered front wheels pull backwards with their side force, about half of m a_y
-        allowed = s.thrust_floor + s.thrust_linear * abs(force) + abs(seen.inertial[1] * seen.steer[0])
+        allowed = s.force_gap_floor + s.force_gap_linear * abs(force) + abs(seen.inertial[1] * seen.steer[0])
         wrong = kit.no(alive) | (abs(gap) > 0.5 * allowed)
         if not kit.some(wrong):
             self.since = self._zero
@@ -113,12 +116,12 @@ class AccelerationSource(CarsMemory):
         doubt = choose(with_force, 0.5 * allowed + 0.25 * abs(gap) + leaves, choose(pending, abs(gap), 0.0))
         doubt = choose(blind, s.unseen_acceleration, doubt)
         samples = kit.maximum(2.0 * self.since / elapsed - 1.0, 1.0)
-        outputs = (choose(blind, apart, force) + x[BIAS]) / (1.0 - x[SCALE])
-        outputs = choose(with_force | blind, outputs, reading)
+        replacement = (choose(blind, apart, force) + x[BIAS]) / (1.0 - x[SCALE])
+        replacement = choose(with_force | blind, replacement, reading)
         if kit.some(blind):
-            mu, _ = self._shares(given, outputs)
+            mu, _ = self._shares(given, replacement)
         return Acceleration(
-            outputs,
+            replacement,
             choose(doubt > 0.0, kit.maximum(doubt * kit.sqrt(samples), choose(alive, noise, 0.0)), noise),
             doubt,
             blind,
@@ -150,14 +153,14 @@ _FAR = 1e9
 
 
 class SlipDirectionTest(CarsMemory):
-    """Remembers of `count` cars for how long a_x is not to be believed."""
+    """Finds an a_x at fault from slip against the force; remembers of `count` cars for how long it is not believed."""
 
-    memory = ("left",)
+    memory = ("remaining",)
 
     def __init__(self, along: LongitudinalFusion, count: int) -> None:
         self.along, self.settings, self.kit = along, along.settings, arithmetic((count,))
         self._zero = self.kit.full(0.0)
-        self.left: Number = self._zero  # s for which a_x is not believed
+        self.remaining: Number = self._zero  # s for which a_x is not believed
 
     def __call__(self, elapsed: Number, seen: ConditionedInputs, innovation: Signals, mu: Signals) -> None:
         """`innovation` of the wheels, m/s, from which slip as their forces `mu` make it has been taken."""
@@ -170,7 +173,7 @@ class SlipDirectionTest(CarsMemory):
 
         (spent,) = kit.each(power, innovation, mu)  # by friction, per load: slip times force, never below zero
         least = kit.minimum(kit.minimum(spent[0], spent[1]), kit.minimum(spent[2], spent[3]))
-        if not kit.some((least < -s.dead_speed * sure) | (self.left > 0.0)):
+        if not kit.some((least < -s.dead_speed * sure) | (self.remaining > 0.0)):
             return
         turning, least = 0, _FAR
         for work, force, fresh, silent, age in zip(spent, mu, seen.fresh, seen.silent, seen.gap, strict=True):
@@ -180,5 +183,5 @@ class SlipDirectionTest(CarsMemory):
             least = kit.minimum(least, choose(turns, wrong, _FAR))
         white = s.wheel_speed_noise * self.along.radius[0]
         unsure = kit.sqrt(filter_.variance(SPEED) + white * white)
-        against = (turning >= 3) & (least > s.gate * unsure + s.agreement * abs(speed) + s.dead_speed)
-        self.left = choose(against, s.lost_time, kit.maximum(self.left - elapsed, 0.0))
+        impossible = (turning >= 3) & (least > s.gate * unsure + s.agreement * abs(speed) + s.dead_speed)
+        self.remaining = choose(impossible, s.lost_time, kit.maximum(self.remaining - elapsed, 0.0))

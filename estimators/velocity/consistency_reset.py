@@ -64,7 +64,7 @@ class LongitudinalReset(CarsMemory):
         if not kit.some(wheel.gated[0] | wheel.gated[1] | wheel.gated[2] | wheel.gated[3]):
             self.contradicted = choose(news, 0.0, self.contradicted)
             return kit.full(False)
-        turning, against = 0, kit.full(False)
+        turning, dissent = 0, kit.full(False)
         low, high, force, surface, gap = _FAR, -_FAR, 0.0, 0.0, 0.0
         outputs = (
             seen.fresh,
@@ -80,7 +80,7 @@ class LongitudinalReset(CarsMemory):
         for fresh, silent, off, far, slips, own, w, age, R in zip(*outputs, strict=True):
             turns = fresh & no(silent)
             turning = turning + choose(turns, 1, 0)
-            against = against | (turns & (slips | no(far)))
+            dissent = dissent | (turns & (slips | no(far)))
             low, high = choose(turns, kit.minimum(low, off), low), choose(turns, kit.maximum(high, off), high)
             force = force + choose(turns, own, 0.0)
             surface = kit.maximum(surface, choose(turns, R * abs(w), 0.0))
@@ -91,7 +91,7 @@ class LongitudinalReset(CarsMemory):
         rolls = rolls & (abs(off - apart) <= s.dead_speed + s.rolling * since)
         explained = (force * kit.sign(off) > s.unloaded * turning) & (self.supported >= s.lost_time)
         time = self.contradicted + gap * choose(explained, _PATIENCE, 1.0)
-        contradicted = choose((turning >= 2) & no(against) & rolls, time, 0.0)
+        contradicted = choose((turning >= 2) & no(dissent) & rolls, time, 0.0)
         self.contradicted = choose(news, contradicted, self.contradicted)
         self.since, self.apart = choose(news, since, self.since), choose(news, apart, self.apart)
         return self.contradicted > s.lost_time

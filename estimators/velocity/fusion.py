@@ -32,10 +32,10 @@ class VelocityFusion(Memory):
     """Wheels, weighted by slip and innovation, correct an inertial model that learns its own errors.
 
     Which wheel to believe is decided at every sample from what its force explains (`longitudinal_fusion`); V_y comes
-    from the kinematics and from the side slip that the axle forces demand (`lateral_fusion`). At standstill both
-    speeds and the yaw rate are zero, which gives the biases. An a_x that is missing, frozen or contradicted by forces and
-    wheels is replaced (`accelerometer_faults`). An estimate that rolling wheels contradict for long is
-    lost and starts again from them (`consistency_reset`). Wheel speeds are signed: backwards is negative.
+    from the kinematics and from the side slip that the axle forces demand (`lateral_fusion`). At standstill a zero-velocity
+    update of both speeds and the yaw rate gives the biases (`zero_velocity`). An a_x that is missing, frozen or contradicted
+    by forces and wheels is replaced (`accelerometer_faults`). An estimate that rolling wheels contradict for long is lost,
+    and starts again from them (`consistency_reset`). Wheel speeds are signed: backwards is negative.
 
     One car runs on plain numbers, several on arrays, by the same formulas (`arithmetic`).
 
@@ -124,7 +124,7 @@ class VelocityFusion(Memory):
         self._begin(seen)
         a, b, r = seen.inertial
         given = None if normalised_force is None else kit.wheels(normalised_force, shape, "normalised_force")
-        disproved = self.slip_direction.left > 0.0
+        disproved = self.slip_direction.remaining > 0.0
         pull = self.acceleration_source(dt, seen, given, self.inputs.slope, disproved)
         a, noise, doubt, blind, unbelieved, mu = pull
         turn, before = across.yaw_rate(r), along.speed
@@ -146,7 +146,7 @@ class VelocityFusion(Memory):
         self.slip_direction(dt, seen, wheel.innovation, mu)
         standing, lost = self.zero_velocity(seen, a, turn, dt)
         lost = lost | self.longitudinal_reset(dt, standing, seen, wheel, slipping, mu, self._radius)
-        along.stand(standing)
+        along.zero_velocity_update(standing)
         front = slipping[0] | slipping[1] | wheel.gated[0] | wheel.gated[1]
         rear = slipping[2] | slipping[3] | wheel.gated[2] | wheel.gated[3]
         usable = kit.stacked((seen.present & seen.steered & kit.no(front), seen.present & kit.no(rear)))
@@ -155,7 +155,7 @@ class VelocityFusion(Memory):
         axle = across.correct(dt, b, r, yaw_acceleration, angles, along.speed, a, usable)
         restarted = self.lateral_reset(dt, along.speed, axle, usable)
         across.blind(dt, seen.blind)
-        across.stand(standing, r)
+        across.zero_velocity_update(standing, r)
         flags = seen.flags | kit.where(odd, _MISSING_INPUT, 0) | kit.where(unbelieved, _GATED, 0)
         flags = flags | kit.where(self.renewed | restarted, _RESET, 0)
         self.renewed = self._never

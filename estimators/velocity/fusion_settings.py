@@ -34,9 +34,9 @@ class FusionSettings:
     slowest_unit: float = 0.05  # s for which a live accelerometer may repeat itself: 20 Hz
     unseen_acceleration: float = 5.0  # m/s^2 of a car whose acceleration nothing tells: firm braking
     # what the tire forces say of a_x
-    thrust_floor: float = 0.8  # m/s^2 by which they may contradict: bias 0.15, drag 0.4 at 35 m/s, rolling 0.15
-    thrust_linear: float = 0.15  # the same per m/s^2: pads warm up, motors give 5 % less than they say
-    thrust_memory: float = 0.1  # s over which they are compared, above the lag of a force observer
+    force_gap_floor: float = 0.8  # m/s^2 by which they may contradict: bias 0.15, drag 0.4 at 35 m/s, rolling 0.15
+    force_gap_linear: float = 0.15  # the same per m/s^2: pads warm up, motors give 5 % less than they say
+    force_gap_memory: float = 0.1  # s over which they are compared, above the lag of a force observer
     # road
     grade: float = 0.02  # rad: rural roads
     bank: float = 0.01  # rad

@@ -127,7 +127,7 @@ class InputMonitor(Memory):
     def _repaired(
         self, u: FloatArray, y: FloatArray, p: FloatArray, sample: int, shape: tuple[int, ...]
     ) -> MonitoredInputs:
-        """The careful road; nothing is remembered before every refusal has been considered."""
+        """The slow path; nothing is remembered before every refusal has been considered."""
         flags: FlagArray = np.zeros(p.size, dtype=np.int32)
         missing = ~(np.absolute(y) <= LIMIT)
         raise_flag(flags, missing, Flag.MISSING_MEASUREMENT)

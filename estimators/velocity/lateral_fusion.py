@@ -153,7 +153,7 @@ class LateralFusion:
             self.filter.expect(((SPEED,),), ((1.0,),))
             self.filter.weigh([-self.speed], [variance], [where])
 
-    def stand(self, where: Number, yaw_rate: Number) -> None:
+    def zero_velocity_update(self, where: Number, yaw_rate: Number) -> None:
         """V_y = 0 and r = 0 for the cars `where`."""
         if not self.kit.some(where):
             return

@@ -145,7 +145,7 @@ class LongitudinalFusion:
         self.filter.weigh(innovation, variance, used, learning)
         return WheelUpdate(innovation, used, gated)
 
-    def stand(self, where: Number) -> None:
+    def zero_velocity_update(self, where: Number) -> None:
         """V_x = 0 for the cars `where`: what it takes to hold them there is bias or grade."""
         if self.kit.some(where):
             self.filter.expect(_STILL, ((1.0,),))

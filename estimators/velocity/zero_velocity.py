@@ -1,4 +1,7 @@
-"""Does the car stand? All wheels that speak are silent, and the body is calm, for long enough: a sliding car decelerates."""
+"""Detection of zero velocity: the car stands when its wheels and its body are at rest for long enough.
+
+All wheels with a reading hardly turn, and accelerations and yaw rate are those of a body at rest: a sliding car decelerates.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from estimators.velocity.longitudinal_fusion import SPEED, LongitudinalFusion
 
 
 class ZeroVelocityDetector(CarsMemory):
-    """Counts how long `count` cars have been calm; the two filters say how calm is calm."""
+    """Counts how long `count` cars have been at rest; the thresholds follow from the covariances of the two filters."""
 
     memory = ("calm",)
 

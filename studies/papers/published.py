@@ -9,8 +9,7 @@ from importlib import resources
 from types import MappingProxyType
 from typing import Any
 
-from studies.claim import Claim, ClaimFunction, JsonValue, Published
-from synthesis.errors import SpecError
+from studies.claim import JsonValue, Published
 
 
 @cache
@@ -34,12 +33,3 @@ def printed_numbers(package: str) -> Mapping[str, Any]:
 
 def _read(package: str, name: str) -> dict[str, Any]:
     return tomllib.loads((resources.files(package) / name).read_text(encoding="utf-8"))
-
-
-def computed_claims(package: str, functions: Mapping[str, ClaimFunction]) -> list[Claim]:
-    """Compute the claims of ``functions`` (by id). Raises SpecError for an id that ``claims.toml`` does not hold."""
-    published = published_claims(package)
-    unknown = sorted(set(functions) - set(published))
-    if unknown:
-        raise SpecError(f"{package}: no published claim {', '.join(unknown)} in claims.toml")
-    return [Claim(published[name], compute()) for name, compute in functions.items()]

@@ -85,7 +85,7 @@ def record_study(
 def _names(stored: StoredPart) -> list[tuple[str, str]]:
     return [
         *(("table", table["name"]) for table in stored.tables),
-        *(("figure", drawing["name"]) for drawing in stored.drawings),
+        *(("figure", figure["name"]) for figure in stored.figures),
         *(("claim", str(claim["id"])) for claim in stored.claims),
     ]
 

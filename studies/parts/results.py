@@ -21,15 +21,15 @@ RESULT = "result.json"
 def write_study(record: StudyRecord, out: Path) -> None:
     """Fill ``out/<id>`` anew, whole or not at all."""
     with whole_folder(out / record.id) as folder:
-        for kind, wanted in (("tables", "tables"), ("figures", "drawings")):
-            if any(getattr(stored, wanted) for stored in record.stored):
+        for kind in ("tables", "figures"):
+            if any(getattr(stored, kind) for stored in record.stored):
                 (folder / kind).mkdir()
         for stored in record.stored:
             for table in stored.tables:
                 write_table(folder / "tables" / f"{table['name']}.csv", table["columns"], table["rows"])
-            for drawing in stored.drawings:
+            for figure in stored.figures:
                 for kind in ("svg", "png"):
-                    name = f"{drawing['name']}.{kind}"
+                    name = f"{figure['name']}.{kind}"
                     shutil.copyfile(stored.folder / name, folder / "figures" / name)
         (folder / RESULT).write_bytes(json_bytes(result_content(record), 2))
 
@@ -58,8 +58,8 @@ def result_content(record: StudyRecord) -> dict[str, Any]:
                     for t in part.stored.tables
                 ],
                 "figures": [
-                    {**drawing, "files": [f"figures/{drawing['name']}.{kind}" for kind in ("svg", "png")]}
-                    for drawing in part.stored.drawings
+                    {**figure, "files": [f"figures/{figure['name']}.{kind}" for kind in ("svg", "png")]}
+                    for figure in part.stored.figures
                 ],
             }
             for part in record.parts if part.stored is not None

@@ -24,13 +24,13 @@ NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 @dataclass(frozen=True)
 class StoredPart:
-    """What a part left on disk, as JSON holds it; ``folder`` has ``<drawing>.svg`` and ``.png`` for each drawing."""
+    """What a part left on disk, as JSON holds it; ``folder`` has ``<figure>.svg`` and ``.png`` for each figure."""
 
     folder: Path
     fingerprint: str
     claims: list[dict[str, JsonValue]] = field(default_factory=list)
     tables: list[dict[str, Any]] = field(default_factory=list)
-    drawings: list[dict[str, str]] = field(default_factory=list)
+    figures: list[dict[str, str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     measures: dict[str, float | None] = field(default_factory=dict)
 
@@ -44,15 +44,15 @@ def write_part(folder: Path, result: PartResult, fingerprint: str) -> None:
     """Store ``result`` in ``folder``, whole or not at all. Raises ValueError or TypeError for what cannot be stored."""
     content = content_of(result, fingerprint)
     with whole_folder(folder) as beside:
-        for drawing in result.drawings:
-            save_figure(drawing, beside)
+        for figure in result.figures:
+            save_figure(figure, beside)
         (beside / FILE).write_bytes(json_bytes(content))
 
 
 def content_of(result: PartResult, fingerprint: str) -> dict[str, Any]:
     """``result`` as JSON; checks that names can be file names, differ, and that every row fills its columns."""
     check_names("table", [table.name for table in result.tables])
-    check_names("figure", [drawing.name for drawing in result.drawings])
+    check_names("figure", [figure.name for figure in result.figures])
     check_distinct("claim", [claim.published.id for claim in result.claims])
     for table in result.tables:
         for number, row in enumerate(table.rows, 1):
@@ -67,8 +67,8 @@ def content_of(result: PartResult, fingerprint: str) -> dict[str, Any]:
             {"name": t.name, "caption": t.caption, "columns": list(t.columns), "rows": plain(list(t.rows), t.name)}
             for t in result.tables
         ],
-        "drawings": [
-            {"name": d.name, "caption": d.caption, "alternative": d.alternative} for d in result.drawings
+        "figures": [
+            {"name": d.name, "caption": d.caption, "alternative": d.alternative} for d in result.figures
         ],
         "notes": list(result.notes),
         "measures": plain(result.measures, "measures"),
@@ -84,7 +84,7 @@ def read_part(folder: Path, fingerprint: str) -> StoredPart | None:
     if not isinstance(content, dict) or content.get("fingerprint") != fingerprint:
         return None
     stored = StoredPart(folder=folder, **content)
-    names = [f"{drawing['name']}.{kind}" for drawing in stored.drawings for kind in ("svg", "png")]
+    names = [f"{figure['name']}.{kind}" for figure in stored.figures for kind in ("svg", "png")]
     return stored if all((folder / name).is_file() for name in names) else None
 
 

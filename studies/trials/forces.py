@@ -84,7 +84,7 @@ def force_part(
     )  # fmt: skip
     columns = ("manoeuvre", "force", "place", "estimate", "peak [N]", "printed NRMS [%]", "NRMS [%]", "worst run [%]")
     drawings = [_history(name, truth, row, first) for row in rows]
-    return PartResult(tables=[Table(f"{name}-errors", caption, columns, table)], drawings=drawings, measures=measures)
+    return PartResult(tables=[Table(f"{name}-errors", caption, columns, table)], figures=drawings, measures=measures)
 
 
 def _true(truth: Truth, key: str, run: int) -> Array:

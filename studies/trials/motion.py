@@ -38,7 +38,7 @@ def motion_part(name: str, rows: Sequence[Moved], scope: Scope, tire: str = LUGR
     """Histories, diagrams and extremes of every manoeuvre; nothing is estimated."""
     truth = driven(tuple(row.manoeuvre for row in rows), tire, scope)
     drawings = [drawing for row in rows for drawing in motion_drawings(name, truth, row)]
-    return PartResult(tables=[extremes(f"{name}-extremes", truth, rows)], drawings=drawings)
+    return PartResult(tables=[extremes(f"{name}-extremes", truth, rows)], figures=drawings)
 
 
 def motion_drawings(name: str, truth: Truth, row: Moved) -> list[Figure]:

@@ -126,7 +126,7 @@ def velocity_part(name: str, rows: Sequence[Printed], parts: Parts, scope: Scope
         "car on real roads; manoeuvres, speeds and frictions are those that the paper names, everything else is ours."
     )
     drawings = [_dots(f"{name}-errors", rows, found), *(_history(name, drawn, row, estimates) for row in rows)]
-    return PartResult(tables=[Table(f"{name}-errors", caption, COLUMNS, table)], drawings=drawings, measures=measures)
+    return PartResult(tables=[Table(f"{name}-errors", caption, COLUMNS, table)], figures=drawings, measures=measures)
 
 
 def _dots(name: str, rows: Sequence[Printed], found: Mapping[str, Sequence[Mapping[str, Spread]]]) -> Figure:

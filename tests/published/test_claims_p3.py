@@ -59,7 +59,7 @@ def test_every_claim_is_computed_once_and_can_be_stored() -> None:
 
 
 def test_every_figure_and_table_stands_alone() -> None:
-    drawings = [d for result in results().values() for d in result.drawings]
+    drawings = [d for result in results().values() for d in result.figures]
     for prefix in ("fig-2-", "figs-3-4-", "fig-5-", "fig-6-", "fig-7-", "fig-8-"):
         assert any(d.name.startswith(prefix) for d in drawings), prefix
     for drawing in drawings:

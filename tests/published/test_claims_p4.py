@@ -207,4 +207,4 @@ def test_parts_stand_on_their_own(part) -> None:  # type: ignore[no-untyped-def]
 
 
 def test_map_of_the_observability_part() -> None:
-    check_result(PartResult(drawings=[rank_figure(21)]))
+    check_result(PartResult(figures=[rank_figure(21)]))

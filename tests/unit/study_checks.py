@@ -7,7 +7,6 @@ import re
 from typing import Any
 
 from studies.claim import ClaimVerdict
-from studies.plots import Figure
 from studies.plots.draw import draw
 from studies.study import Part, PartResult, Study
 
@@ -27,15 +26,15 @@ def desk_parts(study: Study) -> list[Part]:
 
 def check_result(result: PartResult) -> None:
     """Axes carry names and units, captions say something, rows fit their columns, claims are JSON."""
-    for drawing in result.drawings:
-        assert len(drawing.caption) > 120 and len(drawing.alternative) > 60, drawing.name
-        sheet = draw(drawing) if isinstance(drawing, Figure) else drawing.figure
+    for figure in result.figures:
+        assert len(figure.caption) > 120 and len(figure.alternative) > 60, figure.name
+        sheet = draw(figure)
         sheet.draw_without_rendering()
         for axis in sheet.axes:
             for label, wanted in ((axis.get_xlabel(), _bottom(axis)), (axis.get_ylabel(), _leftmost(axis))):
                 if wanted or label:
-                    assert label, f"{drawing.name}: an axis has no name"
-                    assert re.search(r"\[.+\]", label), f"{drawing.name}: no unit in '{label}'"
+                    assert label, f"{figure.name}: an axis has no name"
+                    assert re.search(r"\[.+\]", label), f"{figure.name}: no unit in '{label}'"
     for table in result.tables:
         assert len(table.caption) > 60 and table.rows, table.name
         assert all(len(row) == len(table.columns) for row in table.rows), table.name

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from studies.drives.judge import moving_slip
 
 from estimators.forces import vertical_loads
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity import corner_acceleration_by_speed
 from studies.drives import corner_inputs as ci
 from studies.drives.baselines import held, integrated_acceleration, mean_over
+from studies.drives.evaluation import moving_slip
 
 CAR = VehicleParameters(
     mass=2000.0, yaw_inertia=3500.0, wheel_inertia=1.0, front_axle_distance=1.2, rear_axle_distance=1.6, cg_height=0.6,

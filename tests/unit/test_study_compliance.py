@@ -84,7 +84,7 @@ def test_compliance_in_the_input_helps_where_suspensions_give_and_harms_where_th
 
 def test_table_and_figure_say_which_way_is_better(trial: ComplianceTrial) -> None:
     table, measures = residual_table("forces", trial, TESTS[:1])
-    check_result(PartResult(tables=[table], drawings=[residual_history("history", trial, TESTS[0])]))
+    check_result(PartResult(tables=[table], figures=[residual_history("history", trial, TESTS[0])]))
     worse, better = (table.columns.index(f"smaller by {way}") for way in ("(15)", "the input"))
     assert [(table.rows[k][worse], table.rows[k][better]) for k in GRIPPING] == [(False, True)] * 2
     assert measures["p3-launch-split fr without"] > measures["p3-launch-split fr in the observer's input"]

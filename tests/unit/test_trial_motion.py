@@ -50,7 +50,7 @@ def test_figures_stand_on_their_own_and_show_the_path(circle: Truth) -> None:
     assert [d.name for d in drawings] == [
         "motion-p4-bends-dry", "motion-course-p4-bends-dry", "motion-rear-p4-bends-dry"
     ]  # fmt: skip
-    check_result(PartResult(drawings=drawings))
+    check_result(PartResult(figures=drawings))
     line = drawings[1].rows[0][0].marks[0]  # type: ignore[union-attr]
     assert isinstance(line, Line)
     path = np.stack([line.x, line.y], axis=-1)

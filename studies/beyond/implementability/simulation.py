@@ -135,7 +135,7 @@ def confirmation(scope: Scope) -> PartResult:
 def acceleration(scope: Scope) -> PartResult:
     """A launch through the whole range at 200 Hz."""
     chosen = (printed_designs()[0], printed_designs()[2], shipped_designs()[0])
-    return PartResult(drawings=[launch_figure(chosen, 3.0 if scope.quick else 8.0)])
+    return PartResult(figures=[launch_figure(chosen, 3.0 if scope.quick else 8.0)])
 
 
 def confirmation_table(designs: Sequence[Design], curves: Curves, samples: int = 400) -> Table:

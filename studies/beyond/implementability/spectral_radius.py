@@ -44,7 +44,7 @@ def shipped(scope: Scope) -> PartResult:
 def lasting(scope: Scope) -> PartResult:
     """Schemes that never break."""
     chosen = (*printed_designs()[:3], shipped_designs()[0])
-    return PartResult(drawings=[lasting_figure(chosen, 41 if scope.quick else 121)])
+    return PartResult(figures=[lasting_figure(chosen, 41 if scope.quick else 121)])
 
 
 def radius_table(name: str, designs: Sequence[Design]) -> Table:

@@ -74,7 +74,7 @@ def observability(scope: Scope) -> PartResult:
         f"({lost * 0.33:.1f} m/s), inside the operating range; what is hidden there is the bristle deflection, "
         "which decays at kappa R_e |omega|, so the model stays detectable."
     )
-    return PartResult(TOPIC.found(), drawings=[force_figure(), velocity_figure()], notes=[note])
+    return PartResult(TOPIC.found(), figures=[force_figure(), velocity_figure()], notes=[note])
 
 
 def force_figure() -> Figure:

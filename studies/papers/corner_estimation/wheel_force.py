@@ -90,7 +90,7 @@ def force_bound(eta3: float = ETA3, rate: float = DISTURBANCE_RATE) -> Finding:
 @TOPIC.part("wheel-force", "Longitudinal force observer", 2.0)
 def wheel_force(scope: Scope) -> PartResult:
     """The longitudinal force observer."""
-    return PartResult(TOPIC.found(), drawings=[error_figure(), noise_figure()])
+    return PartResult(TOPIC.found(), figures=[error_figure(), noise_figure()])
 
 
 def error_figure() -> Figure:

@@ -162,7 +162,7 @@ def four_wheel_part(name: str, manoeuvre: str, printed: Sequence[Row], scope: Sc
         used_friction_history(f"{name}-used-friction", run),
     ]
     tables = [Table(f"{name}-errors", caption, columns, rows), _difference(name, run, printed)]
-    return PartResult(tables=tables, drawings=drawings, measures=measures)
+    return PartResult(tables=tables, figures=drawings, measures=measures)
 
 
 def _difference(name: str, run: FourWheelRun, printed: Sequence[Row]) -> Table:

@@ -60,7 +60,7 @@ def slip_threshold(printed: sp.Expr | None = None) -> Finding:
 @TOPIC.part("high-slip", "Adaptive slip threshold")
 def high_slip(scope: Scope) -> PartResult:
     """The adaptive slip threshold."""
-    return PartResult(TOPIC.found(), drawings=[threshold_figure()])
+    return PartResult(TOPIC.found(), figures=[threshold_figure()])
 
 
 def threshold_figure() -> Figure:

@@ -131,7 +131,7 @@ def speed_part(name: str, rows: Sequence[Drive], scope: Scope, tire: str = LUGRE
     )  # fmt: skip
     histories = [speed_history(f"{name}-{row.manoeuvre}", drawn, row, estimates) for row in rows]
     drawings = [dot_figure(f"{name}-errors", rows, found), *histories]
-    return PartResult(tables=[Table(f"{name}-errors", caption, columns, table)], drawings=drawings, measures=measures)
+    return PartResult(tables=[Table(f"{name}-errors", caption, columns, table)], figures=drawings, measures=measures)
 
 
 def dot_figure(name: str, rows: Sequence[Drive], found: Sequence[Mapping[str, Spread]]) -> Figure:

@@ -136,7 +136,7 @@ def appendix(noise_share: float = 1.0) -> Finding:
 @TOPIC.part("appendix", "Recursions of the appendix")
 def recursions(scope: Scope) -> PartResult:
     """The recursions of the appendix."""
-    return PartResult(TOPIC.found(), drawings=[recursion_figure()])
+    return PartResult(TOPIC.found(), figures=[recursion_figure()])
 
 
 def recursion_figure() -> Figure:
@@ -190,7 +190,7 @@ def covariances(scope: Scope) -> PartResult:
     caption = f"Steady Kalman filter at {SPEED:g} rad/s and 200 Hz for the readings of the printed scalar covariances, Q = q S."
     columns = ["S", "mode", "velocity gain [m/s]", "slowest time constant [s]"]
     table = Table("covariance-readings", caption, columns, rows)
-    return PartResult(tables=[table], drawings=[response_figure(10 if scope.quick else 28)])
+    return PartResult(tables=[table], figures=[response_figure(10 if scope.quick else 28)])
 
 
 def response_figure(points: int = 28) -> Figure:

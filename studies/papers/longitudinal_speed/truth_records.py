@@ -64,7 +64,7 @@ def truth_part(scope: Scope, tire: str = LUGRE) -> PartResult:
     starting = [begun(wheel_record(truth, row)) for row in FIGS_2_3]
     ranks = [gramian_rank(record) for record in turning]
     figures = [rank_figure(turning, ranks), start_figure(starting)]
-    return PartResult(tables=[rank_table(turning, ranks), start_table(starting)], drawings=figures)
+    return PartResult(tables=[rank_table(turning, ranks), start_table(starting)], figures=figures)
 
 
 def rank_table(records: Sequence[WheelRecord], ranks: Sequence[Ranks]) -> Table:

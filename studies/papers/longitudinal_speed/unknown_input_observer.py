@@ -65,7 +65,7 @@ def theorem_1(claimed_gain: float = 1.0) -> Finding:
 @TOPIC.part("unknown-input", "Error bound of the unknown-input observer")
 def unknown_input(scope: Scope) -> PartResult:
     """Theorem 1."""
-    return PartResult(TOPIC.found(), drawings=[theorem_figure()])
+    return PartResult(TOPIC.found(), figures=[theorem_figure()])
 
 
 def theorem_figure() -> Figure:

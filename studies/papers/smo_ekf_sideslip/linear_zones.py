@@ -102,7 +102,7 @@ def sampling(scope: Scope) -> PartResult:
 @TOPIC.part("moving-forces", "The lag of the front-rear split", 0.2)
 def moving_forces(_: Scope) -> PartResult:
     """The lag of the split while the true forces move."""
-    return PartResult(drawings=[tracking()])
+    return PartResult(figures=[tracking()])
 
 
 def zone_table() -> Table:

@@ -134,7 +134,7 @@ def axle_part(name: str, title: str, test: str, scope: Scope, tire: str = LUGRE)
         drawings.append(mass_history(f"{name}-mass", title, run))
     about = _about(run)
     tables = [replace(t, name=f"{name}-{t.name}", caption=f"{title}: {t.caption} {about}") for t in found]
-    return PartResult(tables=tables, drawings=drawings, measures=measures)
+    return PartResult(tables=tables, figures=drawings, measures=measures)
 
 
 def force_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:

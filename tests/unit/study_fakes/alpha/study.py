@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from studies.claim import Claim, ClaimVerdict, Finding
 from studies.papers.published import published_claims
-from studies.study import Drawing, Part, PartResult, Scope, Study, Table
+from studies.plots import Figure, Line, Panel, dots
+from studies.study import Part, PartResult, Scope, Study, Table
 from tests.unit.study_fakes.trace import computed
 
 VALUES = {
@@ -39,19 +39,13 @@ def numbers(scope: Scope) -> PartResult:
 
 def curve(_scope: Scope) -> PartResult:
     computed("alpha-curve")
-    figure = Figure(figsize=(7.2, 3.6), layout="constrained")
-    axis = figure.subplots()
     time = np.linspace(0.0, 10.0, 200)
-    axis.plot(time, np.sin(time), label="sine")
-    axis.set_xlabel("time [s]")
-    axis.set_ylabel("velocity [m/s]")
-    axis.legend()
-    dense = Figure(figsize=(4.0, 3.0), layout="constrained")
-    dense.subplots().plot(*np.random.default_rng(1).standard_normal((2, 6_000)), ".", ms=1)
+    sine = Panel([Line(time, np.sin(time), "sine")], "time [s]", "velocity [m/s]", legend="upper right")
+    cloud = Panel([dots(*np.random.default_rng(1).standard_normal((2, 6_000)), marker=".", size=1.0)])
     return PartResult(
-        drawings=(
-            Drawing("sine", "A sine over time.", "A line that swings between -1 and 1 m/s.", figure),
-            Drawing("cloud", "Many points.", "A round cloud of points.", dense),
+        figures=(
+            Figure("sine", "A sine over time.", "A line that swings between -1 and 1 m/s.", sine, (7.2, 3.6)),
+            Figure("cloud", "Many points.", "A round cloud of points.", cloud, (4.0, 3.0)),
         )
     )
 

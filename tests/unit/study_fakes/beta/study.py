@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from studies.claim import Finding, judged
-from studies.papers.published import computed_claims
+from studies.claim import Claim, Finding, judged
+from studies.papers.published import published_claims
 from studies.study import Part, PartResult, Scope, Study
 from tests.unit.study_fakes.trace import computed, present
 
@@ -15,7 +15,7 @@ def _claim(name: str, value: int) -> Callable[[Scope], PartResult]:
         computed(f"beta-{name}")
         if name == "P2-lost" and not present("mended"):
             raise ZeroDivisionError("no number\nto divide by")
-        return PartResult(computed_claims(__package__ or "", {name: lambda: Finding(value, judged(True), "")}))
+        return PartResult([Claim(published_claims(__package__ or "")[name], Finding(value, judged(True), ""))])
 
     return run
 
