@@ -11,8 +11,8 @@ import sympy as sp
 from numpy.typing import ArrayLike
 
 from analysis.checks import as_stack
-from analysis.error_norms import checked_gain
 from analysis.errors import AnalysisError
+from analysis.norms.observer_error import checked_gain
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from synthesis.models.extract import MATRICES

@@ -1,16 +1,9 @@
-"""What runs on the target: gain schedules, estimators and their fault handling; numpy is all it needs."""
+"""What runs on the target: gain schedules, estimators and their fault handling; numpy is all it needs.
 
-from estimators.errors import EstimatorError, RangeError, ScheduleError
-from estimators.faults import Flag
-from estimators.schedule import GainSchedule
-from estimators.velocity.lpv import LpvStep, LpvVelocityObserver
+Everything that users call can be imported from here: `from estimators import GainSchedule, EstimationPipeline`.
+The stub beside this file lists the names; each is imported when it is used.
+"""
 
-__all__ = [
-    "EstimatorError",
-    "Flag",
-    "GainSchedule",
-    "LpvStep",
-    "LpvVelocityObserver",
-    "RangeError",
-    "ScheduleError",
-]
+from estimators.lazy import door
+
+__getattr__, __dir__, __all__ = door(__name__, __file__)

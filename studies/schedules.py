@@ -20,11 +20,11 @@ from estimators.errors import GainsmithError
 from estimators.schedule import read_content
 from studies.execution.processes import available_cores, in_order
 from studies.spec import load_spec
-from synthesis.certificate.export import export, schedule_content
 from synthesis.certificate.frozen import frozen_gain
 from synthesis.certificate.proof import Proof, prove
-from synthesis.deploy import deploy
-from synthesis.hinf_observer import channel_matrices
+from synthesis.design.deploy import deploy
+from synthesis.design.export import export, schedule_content
+from synthesis.design.hinf_observer import channel_matrices
 from synthesis.models.parameter_set import ParameterSet
 
 # A stored claim may be worse than a fresh one by this share: levels are searched in steps, and solvers differ.

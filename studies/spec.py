@@ -8,14 +8,14 @@ from typing import Any, Literal
 from pydantic import Field
 
 from estimators.errors import unknown
-from synthesis.deploy import DeploySettings
+from synthesis.design.deploy import DeploySettings
+from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
+from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.errors import SpecError
-from synthesis.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
 from synthesis.lmi.settings import LmiSettings
 from synthesis.models.catalogue import CATALOGUE
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
-from synthesis.sampled_observer import design_sampled_observer
 from synthesis.toml_file import StrictTable, find_toml, load_toml, shipped_files
 
 
@@ -38,7 +38,7 @@ class ChannelSpec(StrictTable):
 
 
 class DesignSpec(StrictTable):
-    """What is asked of the gains (synthesis.hinf_observer)."""
+    """What is asked of the gains (synthesis.design.hinf_observer)."""
 
     degree: int = 1
     decay_rate: float = 0.0
@@ -51,7 +51,7 @@ class DesignSpec(StrictTable):
 
 
 class DeploySpec(StrictTable):
-    """How the gains become a table (synthesis.deploy) and how they are run (synthesis.loop.observer)."""
+    """How the gains become a table (synthesis.design.deploy) and how they are run (synthesis.loop.observer)."""
 
     update: Literal["held", "sampled"] = "held"
     sample_time: float

@@ -10,6 +10,7 @@ from typing import Any, get_args
 from flint import fmpq, fmpq_poly
 
 from estimators.errors import unknown
+from synthesis.design.stability import Form
 from synthesis.errors import ProblemError
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.enclosure import PolynomialMatrix
@@ -24,7 +25,6 @@ from synthesis.polynomials.rational import (
     scale,
     transpose,
 )
-from synthesis.stability import Form
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from estimators.schedule.checker import printable
-from studies.certify import certify
+from studies.certification import certify
 from synthesis.certificate.claims import written
 
 

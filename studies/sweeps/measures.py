@@ -9,10 +9,10 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from analysis.dropout import critical_drop_probability, drop_radius
-from analysis.dropout_modes import DropModes, DropPolicy
-from analysis.norms import hinf_norm
-from analysis.planar import planar_hinf_norm
+from analysis.drops.frozen import critical_drop_probability, drop_radius
+from analysis.drops.modes import DropModes, DropPolicy
+from analysis.norms.hinf import hinf_norm
+from analysis.norms.planar import planar_hinf_norm
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from studies.sweeps.measure import Measure

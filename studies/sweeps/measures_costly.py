@@ -10,13 +10,13 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from analysis.joint_spectral_radius import joint_spectral_radius
-from analysis.rank_loss_speeds import RankLossSpeeds
+from analysis.observability.rank_loss_speeds import RankLossSpeeds
+from analysis.switching.joint_spectral_radius import joint_spectral_radius
 from estimators.arrays import FloatArray
 from studies.spec import ScheduleSpec
 from studies.sweeps.measures import MeasureSpec
 from studies.sweeps.observer import Batch, Observer
-from synthesis.deploy import claim_channel, deploy
+from synthesis.design.deploy import claim_channel, deploy
 from synthesis.errors import SpecError
 from synthesis.lmi.result import Verdict
 from synthesis.models.lpv import LpvModel

@@ -9,14 +9,14 @@ from itertools import product
 
 import numpy as np
 
-from analysis.dropout_modes import DropModes, DropPolicy, runtime_drop_modes
-from analysis.error_norms import checked_gain
+from analysis.drops.modes import DropModes, DropPolicy, runtime_drop_modes
 from analysis.errors import AnalysisError
-from analysis.norms import stability_margin
+from analysis.markov.second_moment import spectral_radius
+from analysis.norms.hinf import stability_margin
+from analysis.norms.observer_error import checked_gain
+from analysis.norms.planar import planar_margin
 from analysis.perturbed import Matrices
-from analysis.planar import planar_margin
 from analysis.planar_exponential import planar_exponential
-from analysis.second_moment import spectral_radius
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from estimators.interpolate import PiecewiseLinear

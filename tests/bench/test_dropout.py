@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.dropout import critical_drop_probability
-from analysis.dropout_modes import schedule_drop_modes
-from analysis.dropout_schedule import frozen_critical_probability
-from analysis.gilbert_elliott import critical_recovery_probability
-from analysis.mean_square_schedule import mean_square_schedule
+from analysis.drops.frozen import critical_drop_probability
+from analysis.drops.gilbert_elliott import critical_recovery_probability
+from analysis.drops.mean_square import mean_square_schedule
+from analysis.drops.modes import schedule_drop_modes
+from analysis.drops.schedule import frozen_critical_probability
 from estimators import GainSchedule
 from tests.unit.schedule_content import schedule_content
 

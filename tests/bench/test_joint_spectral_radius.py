@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.joint_spectral_radius import joint_spectral_radius
+from analysis.switching.joint_spectral_radius import joint_spectral_radius
 
 
 @pytest.mark.parametrize("case", ["golden", "no finite product", "random 0", "random 1", "random 2"])

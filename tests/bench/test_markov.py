@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.coupled_lyapunov import solve_coupled_lyapunov
-from analysis.markov import MarkovJumpSystem
+from analysis.markov.coupled_lyapunov import solve_coupled_lyapunov
+from analysis.markov.system import MarkovJumpSystem
 
 
 def random_systems(states: int, modes: int, count: int) -> tuple[np.ndarray, np.ndarray]:

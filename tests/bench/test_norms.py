@@ -12,8 +12,8 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from analysis.hamiltonian import crosses_level
-from analysis.norms import hinf_norm
+from analysis.norms.hamiltonian import crosses_level
+from analysis.norms.hinf import hinf_norm
 from analysis.perturbed import PerturbedModel
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.parameter_set import load_parameter_set

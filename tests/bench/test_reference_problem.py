@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 
-from synthesis.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
+from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.models.lpv import LpvModel
 from tests.unit.lmi_cases import corner

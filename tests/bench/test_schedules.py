@@ -6,11 +6,11 @@ from pathlib import Path
 
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from studies.certify import certify
+from studies.certification import certify
 from studies.spec import load_spec
-from synthesis.certificate.export import schedule_content
 from synthesis.certificate.proof import prove
-from synthesis.deploy import deploy
+from synthesis.design.deploy import deploy
+from synthesis.design.export import schedule_content
 
 FOLDER = Path(__file__).parents[2] / "estimators" / "schedules"
 

@@ -18,7 +18,7 @@ import pytest
 
 from estimators.errors import ScheduleError
 from estimators.schedule import read_content, sealed
-from studies.certify import UNTIED, Certification, certify
+from studies.certification import UNTIED, Certification, certify
 from tests.support.mutations_blind import Content
 from tests.support.schedule_judge import Judge, statement
 from tests.support.schedule_mutations import mutated

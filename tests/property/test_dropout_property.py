@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from analysis.dropout import critical_drop_probability, drop_radius
-from analysis.dropout_planar import largest_cubic_root
-from analysis.gilbert_elliott import critical_recovery_probability
+from analysis.drops.frozen import critical_drop_probability, drop_radius
+from analysis.drops.gilbert_elliott import critical_recovery_probability
+from analysis.drops.planar import largest_cubic_root
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -48,7 +48,7 @@ def test_recovery_boundary_is_a_boundary(seed: int, failure: float) -> None:
     A1 *= 0.7 / max(np.abs(np.linalg.eigvals(A1)).max(), 1e-3)
     r = float(critical_recovery_probability(A0, A1, failure))
     assume(np.isfinite(r))
-    from analysis.gilbert_elliott import gilbert_elliott
+    from analysis.drops.gilbert_elliott import gilbert_elliott
 
     above = gilbert_elliott(A0, A1, failure, r + (1.0 - r) * np.linspace(1e-4, 1.0, 40)).second_moment_radius()
     assert (above < 1.0).all()

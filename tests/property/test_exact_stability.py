@@ -18,13 +18,13 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from synthesis.certificate.claims import Claim
 from synthesis.certificate.verify import Names, Verifier
+from synthesis.design.stability import affine_quadratic_stability
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.enclosure import PolynomialMatrix
-from synthesis.stability import affine_quadratic_stability
 from tests.support import exact_stability as oracle
 from tests.support.stability_cases import FAMILIES, Case, asked, case_of, complaint, survey
 from tests.unit.lmi_cases import parameter, small_model

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.coupled_lyapunov import expected_cost, solve_coupled_lyapunov
-from analysis.markov import MarkovJumpSystem
+from analysis.markov.coupled_lyapunov import expected_cost, solve_coupled_lyapunov
+from analysis.markov.system import MarkovJumpSystem
 
 seeds = st.integers(0, 2**32 - 1)
 sizes = st.tuples(st.integers(1, 4), st.integers(1, 4))

@@ -14,13 +14,13 @@ import sympy as sp
 from scipy.linalg import expm, solve_sylvester
 
 from estimators import GainSchedule, LpvVelocityObserver
-from synthesis.certificate.export import schedule_content
 from synthesis.certificate.proof import prove
-from synthesis.deploy import Deployment, DeploySettings, deploy
-from synthesis.hinf_observer import Channel, ObserverDesign, design_observer
+from synthesis.design.deploy import Deployment, DeploySettings, deploy
+from synthesis.design.export import schedule_content
+from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
+from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Constant, SchedulingParameter, Signal
-from synthesis.sampled_observer import design_sampled_observer
 from tests.support.random_plant import RandomPlant
 from tests.support.update_campaign import Case, searched
 from tests.support.update_judge import Judge, Tally

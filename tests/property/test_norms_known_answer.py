@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.hamiltonian import crosses_level
-from analysis.norms import hinf_norm
+from analysis.norms.hamiltonian import crosses_level
+from analysis.norms.hinf import hinf_norm
 
 
 def build(seed: int, modes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.coupled_lmi import mean_square_lmi
-from analysis.coupled_riccati import jump_regulator
-from analysis.intermittent import kalman_critical_arrival, static_critical_arrival
-from analysis.markov import MarkovJumpSystem
+from analysis.drops.intermittent import kalman_critical_arrival, static_critical_arrival
+from analysis.markov.coupled_lmi import mean_square_lmi
+from analysis.markov.coupled_riccati import jump_regulator
+from analysis.markov.system import MarkovJumpSystem
 from synthesis.lmi.result import Verdict
 
 # Blair and Sworder 1975, as given by Costa and Aya (Automatica, 2002): Samuelson's multiplier-accelerator model, three modes.

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.bounds import (
+from analysis.bounds.forces import (
     force_observer_bound,
     sharp_unknown_input_bound,
     unknown_input_bound,
     wheel_error_is_hurwitz,
     wheel_error_matrix,
 )
-from analysis.bounds_sliding_mode import (
+from analysis.bounds.sliding_mode import (
     OUTPUTS,
     PUBLISHED,
     Vehicle,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.norms import hinf_norm
+from analysis.norms.hinf import hinf_norm
 from studies.claim import ClaimVerdict
 from studies.papers.corner_estimation.hinf_design import OMEGA, fitted, optima, schedule, signed_model, velocity_floor
 from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, Corner

@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from analysis.gramians import observability_gramian
+from analysis.observability.gramians import observability_gramian
 from studies.papers.longitudinal_speed.inputs import (
     TYPICAL,
     accelerating,

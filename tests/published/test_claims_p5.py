@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from analysis.bounds_sliding_mode import PUBLISHED, SlidingModeGains
+from analysis.bounds.sliding_mode import PUBLISHED, SlidingModeGains
 from estimators.sideslip import CorneringModel, SlidingModeObserver
 from studies.claim import ClaimVerdict, Finding
 from studies.papers.published import published_claims

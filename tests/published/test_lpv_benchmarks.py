@@ -14,7 +14,7 @@ import pytest
 import sympy as sp
 
 from estimators.arrays import FloatArray
-from synthesis.hinf_observer import Channel, ObserverDesign, design_observer
+from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from synthesis.design.stability import Form, affine_quadratic_stability
 from synthesis.lmi.result import Verdict
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Signal
-from synthesis.stability import Form, affine_quadratic_stability
 
 CASES = [
     pytest.param([["-1", "2"], ["-3", "-4"]], 2.5, 1e-9, id="YALMIP"),

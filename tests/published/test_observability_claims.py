@@ -10,11 +10,11 @@ import pytest
 import sympy as sp
 
 from analysis.errors import AnalysisError
-from analysis.lie_rank import LieRankTest
-from analysis.lie_structure import generic_rank
-from analysis.observability import observability_matrix, observability_of, rate_symbol
-from analysis.observability_modes import frozen_modes, hautus_test
-from analysis.rank_loss import rank_loss
+from analysis.observability.lie_rank import LieRankTest
+from analysis.observability.lie_structure import generic_rank
+from analysis.observability.matrix import observability_matrix, observability_of, rate_symbol
+from analysis.observability.modes import frozen_modes, hautus_test
+from analysis.observability.rank_loss import rank_loss
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.catalogue.four_wheel import four_wheel_model
 from synthesis.models.catalogue.longitudinal_speed import WHEEL_MOTION, longitudinal_speed_model

@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from estimators.arrays import FloatArray
 from studies.papers.corner_estimation.inputs import CORNERS
 from studies.papers.corner_estimation.printed_lyapunov import Certificate, Reading, certificate, convexity
+from synthesis.design.stability import Form, GainBox, affine_quadratic_stability
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.models.catalogue.corner import Direction
 from synthesis.models.lpv import LpvModel
 from synthesis.published_certificate import check_certificate
-from synthesis.stability import Form, GainBox, affine_quadratic_stability
 from tests.unit.lmi_cases import corner
 
 DIRECTIONS: tuple[Direction, ...] = ("longitudinal", "lateral")

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from analysis.gramians import growing_observability, sampled_sequence, sliding_observability
-from analysis.observability_windows import uniform_detectability, uniform_stabilisability
-from analysis.stochastic_observability import stochastic_observability_along, wheel_speed_tests
+from analysis.observability.gramians import growing_observability, sampled_sequence, sliding_observability
+from analysis.observability.stochastic import stochastic_observability_along, wheel_speed_tests
+from analysis.observability.windows import uniform_detectability, uniform_stabilisability
 from studies.papers.longitudinal_speed.inputs import launch
 from synthesis.lmi.result import Verdict
 from synthesis.models.catalogue.corner import corner_velocity_model

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from analysis.dropout import critical_drop_probability, drop_radius
-from analysis.markov import MarkovJumpSystem, independent
+from analysis.drops.frozen import critical_drop_probability, drop_radius
+from analysis.markov.system import MarkovJumpSystem, independent
 from synthesis.models.catalogue.corner import Direction, corner_velocity_model
 from synthesis.models.parameter_set import load_parameter_set
 

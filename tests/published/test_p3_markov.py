@@ -11,8 +11,8 @@ import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from analysis.markov import MarkovJumpSystem
-from analysis.second_moment import lifted, spectral_radius
+from analysis.markov.second_moment import lifted, spectral_radius
+from analysis.markov.system import MarkovJumpSystem
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.parameter_set import load_parameter_set
 

@@ -7,11 +7,11 @@ import pytest
 import sympy as sp
 from scipy.optimize import brentq
 
-from analysis.dc_floor import static_gain
-from analysis.error_norms import error_hinf_norm
 from analysis.errors import AnalysisError
-from analysis.hamiltonian import crosses_level
-from analysis.norms import hinf_norm, stability_margin
+from analysis.norms.hamiltonian import crosses_level
+from analysis.norms.hinf import hinf_norm, stability_margin
+from analysis.norms.observer_error import error_hinf_norm
+from analysis.norms.static_gain import static_gain
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.labelled import Axis
-from analysis.norms import hinf_norm, stability_margin
+from analysis.norms.hinf import hinf_norm, stability_margin
 from analysis.perturbed import PerturbedModel, error_measure
 from analysis.sensitivity import around, one_at_a_time, worst_case
 from synthesis.models.catalogue.corner import corner_velocity_model

@@ -7,10 +7,10 @@ import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from analysis.joint_spectral_radius import joint_spectral_radius
-from analysis.switching_lyapunov import common_quadratic_lyapunov
-from analysis.switching_pair import exact_pair_test, pair_margin
-from analysis.switching_similarity import (
+from analysis.switching.common_lyapunov import common_quadratic_lyapunov
+from analysis.switching.joint_spectral_radius import joint_spectral_radius
+from analysis.switching.pair import exact_pair_test, pair_margin
+from analysis.switching.similarity import (
     best_diagonal_transform,
     common_growth,
     diagonal_window,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.parts.run import run_studies
+from studies.run import run_studies
 from studies.study import QUICK
 from tests.report.browser import Page, find_chromium
 from tests.unit.study_fakes.registry import REGISTRY

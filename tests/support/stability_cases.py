@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from synthesis.design.stability import GainBox, StabilityResult, _scale, affine_quadratic_stability
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
-from synthesis.stability import GainBox, StabilityResult, _scale, affine_quadratic_stability
 from tests.support import exact_stability as oracle
 
 NONE = Fraction(0)

@@ -18,19 +18,19 @@ from scipy.linalg import solve_discrete_are
 
 from estimators import GainSchedule
 from synthesis.certificate.claims import Claim, ClaimChannel
-from synthesis.certificate.export import schedule_content
 from synthesis.certificate.frozen import critical_probability, slowest_decay
 from synthesis.certificate.levels import best_gain, largest
 from synthesis.certificate.proof import prove
 from synthesis.certificate.search import Search, Wish
-from synthesis.deploy import Deployment, DeploySettings, names_of
+from synthesis.design.deploy import Deployment, DeploySettings, names_of
+from synthesis.design.export import schedule_content
+from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
+from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.errors import ProblemError
-from synthesis.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.lmi.settings import LmiSettings
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.observer import ObserverLoop
 from synthesis.polynomials.rational import decimal
-from synthesis.sampled_observer import design_sampled_observer
 from tests.support.random_plant import RandomPlant, few_digits, places, random_plant
 from tests.support.update_judge import Judge, Tally, still_motion
 from tests.support.update_run import Paths, Run, simulate, walks

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.bounds import (
+from analysis.bounds.forces import (
     best_split,
     force_observer_bound,
     sharp_unknown_input_bound,
@@ -17,7 +17,7 @@ from analysis.bounds import (
     wheel_error_is_hurwitz,
     wheel_error_matrix,
 )
-from analysis.bounds_sliding_mode import (
+from analysis.bounds.sliding_mode import (
     OUTPUTS,
     PUBLISHED,
     SlidingModeGains,

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from estimators.schedule import read_content, sealed, write_content
-from studies.certify import Certification, certify
+from studies.certification import Certification, certify
 from studies.spec import shipped_specs
 from tests.support.stored_loop import closed_loop, picked, polynomial, update, values
 

@@ -10,19 +10,26 @@ from scipy.linalg import expm
 
 from estimators.schedule import read_content
 from synthesis.certificate.claims import Claim
-from synthesis.certificate.export import export, schedule_content
 from synthesis.certificate.frozen import critical_probability, frozen_gain, slowest_decay
 from synthesis.certificate.proof import prove
 from synthesis.certificate.search import Search, Wish
-from synthesis.deploy import Deployment, DeploySettings, claim_channel, deploy, deployed_loop, names_of, tabulate
+from synthesis.design.deploy import Deployment, DeploySettings, claim_channel, deploy, deployed_loop, names_of, tabulate
+from synthesis.design.export import export, schedule_content
+from synthesis.design.hinf_observer import (
+    Channel,
+    ObserverDesign,
+    ObserverGains,
+    channel_matrices,
+    design_observer,
+    to_gamma,
+)
+from synthesis.design.sampled_observer import design_sampled_observer
+from synthesis.design.well_posedness import well_posedness
 from synthesis.errors import ProblemError
-from synthesis.hinf_observer import Channel, ObserverDesign, ObserverGains, channel_matrices, design_observer, to_gamma
 from synthesis.lmi.result import Verdict
 from synthesis.models.catalogue import corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import load_parameter_set
-from synthesis.sampled_observer import design_sampled_observer
-from synthesis.well_posedness import well_posedness
 
 FRICTION = Channel(("friction",), ("relative_velocity",), 1.05)
 NOISE = Channel(("force_noise",), ("relative_velocity",))
@@ -259,6 +266,6 @@ def test_table_that_only_interpolation_spoils_is_refused(monkeypatch: pytest.Mon
     coarse = search_of(dipped, 7)
     assert all(np.isinf(coarse.least_gain(Wish("gain", None, claim_channel(c)))) for c in WELL_POSED.channels)
     assert coarse.prove(Wish("decay rate", 0.1))[0] is None
-    monkeypatch.setattr("synthesis.deploy.SEGMENTS", (7,))
+    monkeypatch.setattr("synthesis.design.deploy.SEGMENTS", (7,))
     with pytest.raises(ProblemError, match="no table with up to 7 segments"):
         deploy(dipped)

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synthesis import hinf_observer
+from synthesis.design import hinf_observer
+from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
+from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.errors import ProblemError
-from synthesis.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.solve import solve
 from synthesis.models.lpv import LpvModel
-from synthesis.sampled_observer import design_sampled_observer
 from tests.unit.lmi_cases import parameter, small_model
 
 p = sp.Symbol("p")

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from analysis.dropout import critical_drop_probability, drop_radius, mean_square_stable_intervals
-from analysis.dropout_modes import runtime_drop_modes, schedule_drop_modes
-from analysis.errors import AnalysisError
-from analysis.gilbert_elliott import (
+from analysis.drops.frozen import critical_drop_probability, drop_radius, mean_square_stable_intervals
+from analysis.drops.gilbert_elliott import (
     critical_recovery_probability,
     gilbert_elliott,
     stability_region,
     stable_recovery_intervals,
 )
+from analysis.drops.modes import runtime_drop_modes, schedule_drop_modes
+from analysis.errors import AnalysisError
 from estimators import GainSchedule, LpvVelocityObserver
 from estimators.errors import RangeError
 from tests.unit.schedule_content import schedule_content

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from analysis.dropout import critical_drop_probability
-from analysis.dropout_cells import Cells, cell_updates, curvature
-from analysis.dropout_modes import schedule_drop_modes
-from analysis.dropout_schedule import frozen_critical_probability
+from analysis.drops.cells import Cells, cell_updates, curvature
+from analysis.drops.frozen import critical_drop_probability
+from analysis.drops.mean_square import certified_drop_probability, check_mean_square, design, mean_square_schedule
+from analysis.drops.modes import schedule_drop_modes
+from analysis.drops.schedule import frozen_critical_probability
 from analysis.errors import AnalysisError
-from analysis.mean_square_schedule import certified_drop_probability, check_mean_square, design, mean_square_schedule
 from estimators import GainSchedule
 from synthesis.lmi.result import Verdict
 from tests.unit.schedule_content import schedule_content, with_matrix

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analysis.errors import AnalysisError
-from analysis.gramians import (
+from analysis.observability.gramians import (
     controllability_gramian,
     growing_observability,
     observability_gramian,
@@ -18,7 +18,7 @@ from analysis.gramians import (
     sliding_controllability,
     sliding_observability,
 )
-from analysis.observability_windows import uniform_detectability, uniform_stabilisability
+from analysis.observability.windows import uniform_detectability, uniform_stabilisability
 from synthesis.lmi.result import Verdict
 from synthesis.models.catalogue.longitudinal_speed import longitudinal_speed_model
 from synthesis.models.discretise import zero_order_hold

@@ -21,8 +21,8 @@ from studies.identify.parameters import tire_parameters
 from studies.identify.prefilter import Prefilter, first_order_lag, pitched
 from studies.identify.settings import IdentifySettings
 from studies.spec import load_spec
-from synthesis.deploy import deploy
-from synthesis.hinf_observer import design_observer
+from synthesis.design.deploy import deploy
+from synthesis.design.hinf_observer import design_observer
 from synthesis.models.parameter_set import load_parameter_set
 from tests.drives.synthetic_drive import DRIVE, KAPPA, SIGMA0, SLIP, TORQUES, columns, write_drive, write_log
 

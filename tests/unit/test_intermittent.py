@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from analysis.errors import AnalysisError
-from analysis.intermittent import (
+from analysis.drops.intermittent import (
     certify_static_gain,
     kalman_critical_arrival,
     lmi_gain,
     static_critical_arrival,
     static_gain_radius,
 )
+from analysis.errors import AnalysisError
 from synthesis.lmi.result import Verdict
 
 TWO = (np.diag([1.3, 1.2]), np.array([[1.0, 1.0]]))

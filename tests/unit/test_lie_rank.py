@@ -10,9 +10,9 @@ import sympy as sp
 from flint import ctx
 
 from analysis.errors import AnalysisError
-from analysis.lie_rank import LieRankTest
-from analysis.lie_series import Evaluator, series_arithmetic
-from analysis.lie_structure import generic_rank
+from analysis.observability.lie_rank import LieRankTest
+from analysis.observability.lie_series import Evaluator, series_arithmetic
+from analysis.observability.lie_structure import generic_rank
 from synthesis.errors import ModelError
 from synthesis.models.catalogue.four_wheel import SUBSTITUTES, four_wheel_model
 from synthesis.models.catalogue.longitudinal_speed import longitudinal_speed_model

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from analysis.errors import AnalysisError
-from analysis.markov import MarkovJumpSystem, independent
-from analysis.markov_chain import recurrent, stationary_distribution
-from analysis.markov_montecarlo import check_second_moment
-from analysis.second_moment import smat, svec, symmetric_square
+from analysis.markov.chain import recurrent, stationary_distribution
+from analysis.markov.montecarlo import check_second_moment
+from analysis.markov.second_moment import smat, svec, symmetric_square
+from analysis.markov.system import MarkovJumpSystem, independent
 
 DRAW = np.random.default_rng(7)
 THREE = DRAW.normal(0, 0.45, (3, 3, 3))

@@ -7,13 +7,13 @@ import pytest
 from scipy.linalg import expm, solve_discrete_are, solve_discrete_lyapunov
 
 from analysis.constant_lmi import constant_problem, matrix_of
-from analysis.coupled_lmi import mean_square_lmi, weighted_sum
-from analysis.coupled_lyapunov import expected_cost, solve_coupled_lyapunov, stationary_second_moment
-from analysis.coupled_riccati import jump_regulator
 from analysis.errors import AnalysisError
-from analysis.markov import MarkovJumpSystem
-from analysis.markov_continuous import MarkovJumpProcess
-from analysis.second_moment import svec
+from analysis.markov.continuous import MarkovJumpProcess
+from analysis.markov.coupled_lmi import mean_square_lmi, weighted_sum
+from analysis.markov.coupled_lyapunov import expected_cost, solve_coupled_lyapunov, stationary_second_moment
+from analysis.markov.coupled_riccati import jump_regulator
+from analysis.markov.second_moment import svec
+from analysis.markov.system import MarkovJumpSystem
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.solve import solve

@@ -9,10 +9,15 @@ import pytest
 import sympy as sp
 
 from analysis.errors import AnalysisError
-from analysis.observability import exact_number, frozen_observability_matrix, observability_matrix, observability_of
-from analysis.observability_continuous import continuous_gramian
-from analysis.observability_modes import frozen_modes, hautus_test
-from analysis.rank_loss import rank_loss
+from analysis.observability.continuous import continuous_gramian
+from analysis.observability.matrix import (
+    exact_number,
+    frozen_observability_matrix,
+    observability_matrix,
+    observability_of,
+)
+from analysis.observability.modes import frozen_modes, hautus_test
+from analysis.observability.rank_loss import rank_loss
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.catalogue.longitudinal_speed import WHEEL_MOTION, longitudinal_speed_model
 from synthesis.models.lpv import LpvModel

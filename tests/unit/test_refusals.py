@@ -7,12 +7,12 @@ import pytest
 import sympy as sp
 
 from estimators.errors import GainsmithError
-from synthesis.hinf_observer import Channel, ObserverDesign, design_observer
+from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
+from synthesis.design.stability import affine_quadratic_stability
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.solve import solve
 from synthesis.models.param import Constant, SchedulingParameter, Signal
 from synthesis.published_certificate import check_certificate
-from synthesis.stability import affine_quadratic_stability
 from tests.unit.lmi_cases import parameter, small_model
 
 p = sp.Symbol("p")

@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 from flint import fmpq, fmpq_poly
 
+from synthesis.design.stability import affine_quadratic_stability
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import Verdict
@@ -17,7 +18,6 @@ from synthesis.polynomials.matrix import MatrixPolynomial
 from synthesis.polynomials.positivity import prove_positive
 from synthesis.polynomials.rational import is_positive_definite
 from synthesis.published_certificate import check_certificate
-from synthesis.stability import affine_quadratic_stability
 from tests.published.test_lpv_benchmarks import DIGITS, PARAMETERS, REFERENCE, rolmip
 from tests.unit.lmi_cases import corner, gain_problem, parameter, reference_problem, small_model, within
 from tests.unit.test_solve import closed_loop, condition_problem

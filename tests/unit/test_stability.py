@@ -7,12 +7,12 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
+from synthesis.design.stability import GainBox, StabilityResult, affine_quadratic_stability
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.polynomials.rational import polynomial_matrix
 from synthesis.published_certificate import check_certificate, leading_minors
-from synthesis.stability import GainBox, StabilityResult, affine_quadratic_stability
 from tests.unit.lmi_cases import parameter, small_model
 
 p, q = sp.symbols("p q")

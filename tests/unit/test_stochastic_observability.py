@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_are
 
 from analysis.errors import AnalysisError
-from analysis.stochastic_observability import stochastic_observability, wheel_speed_tests
+from analysis.observability.stochastic import stochastic_observability, wheel_speed_tests
 from synthesis.models.catalogue.longitudinal_speed import longitudinal_speed_model
 from synthesis.models.parameter_set import load_parameter_set
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from analysis.dropout_schedule import frozen_critical_probability
+from analysis.drops.schedule import frozen_critical_probability
 from estimators.velocity import with_constant_gain
 from studies.beyond.drop_tolerance.comparison import Interval, crossing, interval, questions, run_trial
 from studies.beyond.drop_tolerance.limits import any_gain, runs_above

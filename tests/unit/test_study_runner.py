@@ -17,7 +17,7 @@ import pytest
 
 from studies.execution.fingerprint import Sources
 from studies.parts.record import check_parts
-from studies.parts.run import RunSummary, run_studies
+from studies.run import RunSummary, run_studies
 from studies.registry import Registry
 from studies.study import QUICK, Part, PartResult, Preparation, Scope, Study
 from synthesis.errors import SpecError
@@ -209,7 +209,7 @@ SCRIPT = """
 import sys
 from pathlib import Path
 from studies.execution.fingerprint import Sources
-from studies.parts.run import run_studies
+from studies.run import run_studies
 from studies.study import QUICK
 from tests.unit.study_fakes.registry import REGISTRY
 out, sources, study, limit = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3], int(sys.argv[4])

@@ -11,11 +11,11 @@ import pytest
 import sympy as sp
 from scipy.linalg import expm
 
-from analysis.dropout import critical_drop_probability
-from analysis.dropout_schedule import frozen_critical_probability
-from analysis.error_norms import error_hinf_norm
-from analysis.mean_square_schedule import drop_radius
-from analysis.rank_loss_speeds import RankLossSpeeds
+from analysis.drops.frozen import critical_drop_probability
+from analysis.drops.mean_square import drop_radius
+from analysis.drops.schedule import frozen_critical_probability
+from analysis.norms.observer_error import error_hinf_norm
+from analysis.observability.rank_loss_speeds import RankLossSpeeds
 from analysis.sensitivity.designs import Sobol
 from estimators import GainSchedule, LpvVelocityObserver
 from estimators.schedule import SHIPPED, read_content, write_content

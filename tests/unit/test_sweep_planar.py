@@ -7,12 +7,12 @@ import pytest
 from scipy.linalg import expm
 
 from analysis.errors import AnalysisError
-from analysis.norms import hinf_norm, stability_margin
-from analysis.observability import observability_matrix
-from analysis.planar import planar_hinf_norm, planar_margin
+from analysis.norms.hinf import hinf_norm, stability_margin
+from analysis.norms.planar import planar_hinf_norm, planar_margin
+from analysis.observability.matrix import observability_matrix
+from analysis.observability.rank_loss import rank_loss
+from analysis.observability.rank_loss_speeds import RankLossSpeeds, real_roots
 from analysis.planar_exponential import planar_exponential, planar_phi
-from analysis.rank_loss import rank_loss
-from analysis.rank_loss_speeds import RankLossSpeeds, real_roots
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.parameter_set import load_parameter_set
 

@@ -11,14 +11,14 @@ from scipy.linalg import expm
 from scipy.optimize import brentq, minimize_scalar
 
 from analysis.errors import AnalysisError
-from analysis.joint_spectral_radius import joint_spectral_radius
-from analysis.jsr_ellipsoid import proved_bound
-from analysis.jsr_polytope import proved_polytope_bound
-from analysis.jsr_products import multiply_out
-from analysis.norms import stability_margin
-from analysis.switching_lyapunov import common_quadratic_lyapunov
-from analysis.switching_pair import exact_pair_test, pair_margin
-from analysis.switching_similarity import (
+from analysis.norms.hinf import stability_margin
+from analysis.switching.common_lyapunov import common_quadratic_lyapunov
+from analysis.switching.joint_spectral_radius import joint_spectral_radius
+from analysis.switching.jsr_ellipsoid import proved_bound
+from analysis.switching.jsr_polytope import proved_polytope_bound
+from analysis.switching.jsr_products import multiply_out
+from analysis.switching.pair import exact_pair_test, pair_margin
+from analysis.switching.similarity import (
     best_diagonal_transform,
     common_growth,
     diagonal_window,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from analysis.dropout import drop_radius
-from analysis.markov import independent
+from analysis.drops.frozen import drop_radius
+from analysis.markov.system import independent
 from estimators import GainSchedule, LpvVelocityObserver
 from estimators.velocity import SwitchedVelocityObserver
 from tests.unit.schedule_content import schedule_content

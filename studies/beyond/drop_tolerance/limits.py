@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 from scipy.linalg import expm
 
-from analysis.intermittent import certify_static_gain, kalman_critical_arrival
+from analysis.drops.intermittent import certify_static_gain, kalman_critical_arrival
 from estimators import GainSchedule, LpvVelocityObserver
 from estimators.arrays import FloatArray
 from studies.beyond.drop_tolerance.observers import PACKAGE, observer

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from analysis.dropout_modes import schedule_drop_modes
-from analysis.dropout_schedule import FrozenDropProbability, frozen_critical_probability
-from analysis.mean_square_schedule import MeanSquareSchedule, mean_square_schedule
+from analysis.drops.mean_square import MeanSquareSchedule, mean_square_schedule
+from analysis.drops.modes import schedule_drop_modes
+from analysis.drops.schedule import FrozenDropProbability, frozen_critical_probability
 from estimators import GainSchedule
 from estimators.arrays import FloatArray
 from studies.beyond.drop_tolerance.comparison import MISS

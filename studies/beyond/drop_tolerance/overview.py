@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.dropout_schedule import frozen_critical_probability
+from analysis.drops.schedule import frozen_critical_probability
 from studies.beyond.drop_tolerance.observers import NAMES, PACKAGE, SPEED_LABEL, observer
 from studies.beyond.drop_tolerance.prediction import boundary, critical, critical_bursts, harmless_from
 from studies.papers.topic import Topic

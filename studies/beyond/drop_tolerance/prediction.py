@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from analysis.dropout import critical_drop_probability
-from analysis.dropout_modes import schedule_drop_modes
-from analysis.gilbert_elliott import critical_recovery_probability, gilbert_elliott
-from analysis.markov import MarkovJumpSystem
-from analysis.second_moment import unpack
+from analysis.drops.frozen import critical_drop_probability
+from analysis.drops.gilbert_elliott import critical_recovery_probability, gilbert_elliott
+from analysis.drops.modes import schedule_drop_modes
+from analysis.markov.second_moment import unpack
+from analysis.markov.system import MarkovJumpSystem
 from estimators import GainSchedule
 from estimators.arrays import FloatArray
 

@@ -5,7 +5,7 @@ At rest of the bristle P1 (18) gives, with a = kappa R_e |w| and theta the frict
     z = v_r/(a + sigma0 |v_r|/theta),   Omega_z = -sigma0 |v_r| z/theta = -v_r s/(1 + s),   s = sigma0 |v_r|/(theta a).
 
 The static gain from Omega_z to the velocity error is -sigma0/(sigma0 + sigma2 a) for every gain with L_2 != 0
-(:func:`analysis.dc_floor.static_gain`), so the share of the slip velocity that is missed,
+(:func:`analysis.norms.static_gain.static_gain`), so the share of the slip velocity that is missed,
 
     (v_r - v_r_hat)/v_r = s/(1 + s) sigma0/(sigma0 + sigma2 a),   s = (sigma0/kappa) |lambda|/theta,   lambda = v_r/(R_e w),
 
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from analysis.dc_floor import static_gain
+from analysis.norms.static_gain import static_gain
 from estimators.schedule import GainSchedule
 from estimators.velocity import LpvVelocityObserver
 from studies.beyond.observers import SHIPPED

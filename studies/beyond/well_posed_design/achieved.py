@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.error_norms import error_hinf_norm, selection
-from analysis.norms_h2 import h2_norm
+from analysis.norms.h2 import h2_norm
+from analysis.norms.observer_error import error_hinf_norm, selection
 from estimators.arrays import FloatArray
 from studies.beyond.well_posed_design.cases import VELOCITY, Case
 from studies.study import Cell

@@ -10,8 +10,8 @@ import numpy as np
 from estimators.arrays import FloatArray
 from studies.beyond.observers import PAPERS, printed
 from studies.spec import load_spec
+from synthesis.design.hinf_observer import ObserverDesign
 from synthesis.errors import SpecError
-from synthesis.hinf_observer import ObserverDesign
 from synthesis.models.lpv import LpvModel
 
 PACKAGE = "studies.beyond.well_posed_design"

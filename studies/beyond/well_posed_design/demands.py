@@ -14,8 +14,8 @@ from studies.papers.topic import Topic
 from studies.plots import Axis, Band, Figure, Level, Line, Mark, Panel, Shade
 from studies.plots.colours import BLUE, GREEN, PURPLE, RED
 from studies.study import Cell, PartResult, Scope, Table
+from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.errors import ProblemError
-from synthesis.hinf_observer import Channel, ObserverDesign, design_observer
 
 TOPIC = Topic(PACKAGE)
 MOST_TICKS = 7

@@ -13,19 +13,19 @@ from dataclasses import dataclass
 import numpy as np
 import sympy as sp
 
-from analysis.dc_floor import static_gain
-from analysis.error_norms import error_hinf_norm
+from analysis.norms.observer_error import error_hinf_norm
+from analysis.norms.static_gain import static_gain
 from estimators.arrays import FloatArray
 from studies.beyond.well_posed_design.cases import PACKAGE, Case, p1_cases
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel, Words
 from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE, RED
 from studies.study import Cell, PartResult, Scope, Table
+from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains, observer_problem, to_gamma
+from synthesis.design.well_posedness import energy_problem
 from synthesis.errors import ProblemError
-from synthesis.hinf_observer import Channel, ObserverDesign, ObserverGains, observer_problem, to_gamma
 from synthesis.lmi.scaling import observer_scale
 from synthesis.lmi.solve import solve
-from synthesis.well_posedness import energy_problem
 
 TOPIC = Topic(PACKAGE)
 DEGREES = (0, 1, 2, 3)

@@ -15,11 +15,11 @@ from studies.papers.verdicts import derived
 from studies.plots import ZERO, Axis, Dash, Figure, Line, Mark, Panel
 from studies.plots.colours import CURVES, GREY
 from studies.study import PartResult, Scope, Table
+from synthesis.design.stability import physical
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
-from synthesis.stability import physical
 
 TOPIC = Topic(PACKAGE)
 CAPS = (1e3, 1e4)  # condition numbers that a general-purpose scaling might allow

@@ -40,14 +40,14 @@ from studies.papers.verdicts import derived, erratum, under_specified
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel, Shade, dots
 from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, PRINTED_BAND, RED
 from studies.study import PartResult, Scope, Table
+from synthesis.design.hinf_observer import ObserverGains, observer_problem, to_gamma
+from synthesis.design.well_posedness import well_posedness
 from synthesis.errors import ProblemError
-from synthesis.hinf_observer import ObserverGains, observer_problem, to_gamma
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.scaling import observer_scale
 from synthesis.lmi.solve import solve
 from synthesis.models.catalogue.corner import Direction
 from synthesis.models.lpv import LpvModel
-from synthesis.well_posedness import well_posedness
 
 TOPIC = Topic(PACKAGE)
 Sign = Literal["printed", "corrected"]

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from estimators.arrays import FloatArray
 from studies.plots import Axis
+from synthesis.design.hinf_observer import Channel, ObserverDesign
 from synthesis.errors import SpecError
-from synthesis.hinf_observer import Channel, ObserverDesign
 from synthesis.lmi.settings import LmiSettings
 from synthesis.models.catalogue.corner import Direction, corner_velocity_model
 from synthesis.models.lpv import LpvModel

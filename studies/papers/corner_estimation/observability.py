@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 import sympy as sp
 
-from analysis.observability import ObservabilityMatrix, observability_matrix, observability_of, rate_symbol
-from analysis.rank_loss import rank_loss
+from analysis.observability.matrix import ObservabilityMatrix, observability_matrix, observability_of, rate_symbol
+from analysis.observability.rank_loss import rank_loss
 from estimators.arrays import FloatArray
 from studies.claim import Finding, judged
 from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner, parameters

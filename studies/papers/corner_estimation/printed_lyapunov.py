@@ -18,10 +18,10 @@ from studies.papers.verdicts import partly
 from studies.plots import ZERO, Axis, Dash, Figure, Level, Line, Mark, Panel, Words, dots
 from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, RED
 from studies.study import Cell, PartResult, Scope, Table
+from synthesis.design.stability import Form
 from synthesis.models.catalogue.corner import Direction
 from synthesis.models.lpv import LpvModel
 from synthesis.published_certificate import CertifiedRange, check_certificate
-from synthesis.stability import Form
 
 TOPIC = Topic(PACKAGE)
 Reading = Literal["primal", "swapped", "dual", "adjugate"]

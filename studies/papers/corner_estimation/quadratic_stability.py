@@ -22,10 +22,10 @@ from studies.plots import Box as Outline
 from studies.plots import Contours, Figure, Mark, Panel, dots
 from studies.plots.colours import BLUE, FORBIDDEN, RED
 from studies.study import PartResult, Scope, Table
+from synthesis.design.stability import affine_quadratic_stability
 from synthesis.lmi.result import Verdict as Proof
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.models.catalogue.corner import Direction
-from synthesis.stability import affine_quadratic_stability
 
 TOPIC = Topic(PACKAGE)
 # Affine P with multi-convexity at the vertices, affine P on the continuum, constant P: (name, relaxation, degree).

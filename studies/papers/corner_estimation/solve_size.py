@@ -18,7 +18,7 @@ from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, POINTS, li
 from studies.papers.topic import Topic
 from studies.papers.verdicts import derived
 from studies.study import Cell, PartResult, Scope, Table
-from synthesis.hinf_observer import observer_problem
+from synthesis.design.hinf_observer import observer_problem
 from synthesis.lmi.conic import ConicData, assemble
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.relaxation import RelaxedProblem, relax

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.bounds import force_observer_bound, wheel_error_is_hurwitz, wheel_error_matrix
+from analysis.bounds.forces import force_observer_bound, wheel_error_is_hurwitz, wheel_error_matrix
 from estimators.arrays import FloatArray
 from studies.claim import Finding, agrees, judged
 from studies.papers.corner_estimation.inputs import PACKAGE, parameters

@@ -8,8 +8,8 @@ import numpy as np
 import sympy as sp
 
 from analysis.errors import AnalysisError
-from analysis.lie_rank import LieRankTest
-from analysis.lie_structure import GenericRank, generic_rank
+from analysis.observability.lie_rank import LieRankTest
+from analysis.observability.lie_structure import GenericRank, generic_rank
 from estimators.arrays import FloatArray
 from estimators.sideslip import FourWheelModel
 from studies.claim import Finding, judged

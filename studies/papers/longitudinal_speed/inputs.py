@@ -7,7 +7,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from analysis.gramians import SampledSequence, sampled_sequence
+from analysis.observability.gramians import SampledSequence, sampled_sequence
 from estimators.arrays import FloatArray
 from studies.papers.published import printed_numbers
 from synthesis.models.catalogue.longitudinal_speed import longitudinal_speed_model

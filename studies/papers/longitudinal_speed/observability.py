@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import sympy as sp
 
-from analysis.gramians import growing_observability
-from analysis.observability import ObservabilityMatrix, observability_matrix
-from analysis.rank_loss import rank_loss
+from analysis.observability.gramians import growing_observability
+from analysis.observability.matrix import ObservabilityMatrix, observability_matrix
+from analysis.observability.rank_loss import rank_loss
 from studies.claim import Finding, judged
 from studies.papers.longitudinal_speed.inputs import (
     PACKAGE,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from analysis.stochastic_observability import (
+from analysis.observability.stochastic import (
     RANK_TOLERANCE,
     StochasticObservability,
     stochastic_observability,

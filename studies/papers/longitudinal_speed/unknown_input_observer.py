@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.bounds import sharp_unknown_input_bound, unknown_input_bound
+from analysis.bounds.forces import sharp_unknown_input_bound, unknown_input_bound
 from estimators.arrays import FloatArray
 from studies.claim import Finding, judged
 from studies.papers.longitudinal_speed.inputs import PACKAGE

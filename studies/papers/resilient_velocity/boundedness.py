@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
-from analysis.norms import stability_margin
-from analysis.switching import best_diagonal_transform, similarity_bound, symmetric_growth
+from analysis.norms.hinf import stability_margin
+from analysis.switching.similarity import best_diagonal_transform, similarity_bound, symmetric_growth
 from studies.claim import Finding, agrees, judged
 from studies.papers.resilient_velocity.inputs import PACKAGE, PRINTED, SPEEDS, Setting, crossing
 from studies.papers.topic import Topic

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.second_moment import spectral_radius
+from analysis.markov.second_moment import spectral_radius
 from estimators.arrays import FloatArray
 from studies.claim import ClaimVerdict, Finding, JsonValue, judged
 from studies.papers.plain import by_speed

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from analysis.dropout import critical_drop_probability, drop_radius, mean_square_stable_intervals
-from analysis.markov import MarkovJumpSystem
+from analysis.drops.frozen import critical_drop_probability, drop_radius, mean_square_stable_intervals
+from analysis.markov.system import MarkovJumpSystem
 from estimators.arrays import FloatArray
 from studies.claim import Finding, JsonValue, agrees, judged
 from studies.papers.plain import by_speed

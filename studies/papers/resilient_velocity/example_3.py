@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.dropout import drop_radius
-from analysis.joint_spectral_radius import joint_spectral_radius
-from analysis.second_moment import spectral_radius
+from analysis.drops.frozen import drop_radius
+from analysis.markov.second_moment import spectral_radius
+from analysis.switching.joint_spectral_radius import joint_spectral_radius
 from estimators.arrays import FloatArray
 from studies.claim import ClaimVerdict, Finding, judged
 from studies.papers.plain import by_speed, floats

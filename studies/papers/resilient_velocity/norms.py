@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
-from analysis.dc_floor import static_gain
-from analysis.error_norms import error_hinf_norm
+from analysis.norms.observer_error import error_hinf_norm
+from analysis.norms.static_gain import static_gain
 from estimators.arrays import FloatArray
 from studies.claim import Finding, JsonValue, judged
 from studies.papers.plain import by_speed

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.labelled import Axis as LabelledAxis
-from analysis.norms import hinf_norm, stability_margin
-from analysis.observability import observability_matrix
-from analysis.observability_modes import frozen_modes, hautus_test
+from analysis.norms.hinf import hinf_norm, stability_margin
+from analysis.observability.matrix import observability_matrix
+from analysis.observability.modes import frozen_modes, hautus_test
+from analysis.observability.rank_loss import rank_loss
 from analysis.perturbed import PerturbedModel, error_measure
-from analysis.rank_loss import rank_loss
 from analysis.sensitivity import OneAtATime, one_at_a_time
 from estimators.arrays import FloatArray
 from studies.claim import ClaimVerdict, Finding, JsonValue, judged

@@ -9,9 +9,11 @@ from flint import fmpq, fmpq_mat
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.exact import Rational, rationals
-from analysis.markov import MarkovJumpSystem, second_moment_operator
-from analysis.second_moment import lifted, spectral_radius
-from analysis.switching import common_growth, diagonal_window, exact_pair_test, joint_spectral_radius, pair_margin
+from analysis.markov.second_moment import lifted, spectral_radius
+from analysis.markov.system import MarkovJumpSystem, second_moment_operator
+from analysis.switching.joint_spectral_radius import joint_spectral_radius
+from analysis.switching.pair import exact_pair_test, pair_margin
+from analysis.switching.similarity import common_growth, diagonal_window
 from estimators.arrays import FloatArray
 from studies.claim import Finding, judged
 from studies.papers.plain import by_speed, floats

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.bounds_sliding_mode import PUBLISHED, SlidingModeGains, reaching_time, sliding_mode_convergence
+from analysis.bounds.sliding_mode import PUBLISHED, SlidingModeGains, reaching_time, sliding_mode_convergence
 from estimators.arrays import FloatArray
 from studies.claim import Finding, agrees, judged
 from studies.papers.smo_ekf_sideslip.inputs import CAR, LARGEST, PACKAGE, SAMPLE_TIME

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.bounds_sliding_mode import Vehicle
+from analysis.bounds.sliding_mode import Vehicle
 from estimators.sideslip import SingleTrack
 from studies.papers.published import printed_numbers
 from synthesis.models.catalogue.single_track import PEUGEOT_307

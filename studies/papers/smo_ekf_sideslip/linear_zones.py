@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.bounds_sliding_mode import (
+from analysis.bounds.sliding_mode import (
     OUTPUTS,
     PUBLISHED,
     SlidingModeGains,

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
-from analysis.lie_rank import LieRankTest
-from analysis.lie_structure import generic_rank
+from analysis.observability.lie_rank import LieRankTest
+from analysis.observability.lie_structure import generic_rank
 from estimators.arrays import FloatArray
 from studies.claim import Finding, judged
 from studies.papers.smo_ekf_sideslip.inputs import PACKAGE, SAMPLE_TIME

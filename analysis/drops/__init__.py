@@ -1,0 +1,1 @@
+"""Lost measurements: critical drop probabilities of frozen loops, of schedules, and with bursts."""

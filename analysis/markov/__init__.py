@@ -1,0 +1,1 @@
+"""Markov jump linear systems: mean-square stability, stationary moments, optimal gains."""

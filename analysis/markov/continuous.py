@@ -1,0 +1,116 @@
+r"""Markov jump linear systems in continuous time: x' = A_i x, i jumping with a generator (Costa, Fragoso and Todorov 2013).
+
+    X_j' = A_j X_j + X_j A_j' + sum_i q_ij X_i,    q_ij >= 0 the rate of jumps from i to j, q_ii = -sum of the others.
+
+Mean-square stable if and only if the spectral abscissa of this operator is negative.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import expm
+
+from analysis.checks import as_stack, leading, positive, square
+from analysis.errors import AnalysisError
+from analysis.markov.chain import ROW_SUM_TOLERANCE, stationary_distribution
+from analysis.markov.second_moment import triangle
+from analysis.markov.system import MarkovJumpSystem
+from estimators.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+class MarkovJumpProcess:
+    """x' = A_i x with mode i following a Markov process.
+
+    Args:
+        modes: A_1..A_m in 1/s, shape (..., m, n, n).
+        generator: rates in 1/s, shape (..., m, m); generator[i, j] is the rate of jumps from i to j, rows sum to 0.
+
+    Raises:
+        AnalysisError: matrices that do not fit, negative rates, or rows that do not sum to 0.
+    """
+
+    def __init__(self, modes: ArrayLike, generator: ArrayLike) -> None:
+        self.modes = square("modes", modes, ndim=3)
+        self.generator = _checked(generator)
+        if self.generator.shape[-1] != self.modes.shape[-3]:
+            raise AnalysisError(
+                f"generator has the shape {self.generator.shape} for {self.modes.shape[-3]} modes; it must be (..., m, m)"
+            )
+        leading({"modes": self.modes.reshape(*self.modes.shape[:-2], -1), "generator": self.generator})
+
+    @cached_property
+    def second_moment_operator(self) -> FloatArray:
+        """Matrix (..., m d, m d), d = n(n+1)/2, with d/dt (svec X_1, ..., svec X_m) = operator (svec X_1, ...)."""
+        L = derivative_operator(self.modes)
+        m, d = L.shape[-3], L.shape[-1]
+        jumps = np.swapaxes(self.generator, -1, -2)[..., :, None, :, None] * np.eye(d)[:, None, :]
+        blocks = np.eye(m)[:, None, :, None] * np.moveaxis(L, -3, -2)[..., None, :, :, :] + jumps
+        return np.asarray(blocks.reshape(*blocks.shape[:-4], m * d, m * d))
+
+    def second_moment_abscissa(self) -> FloatArray:
+        """Largest real part of the eigenvalues in 1/s, shape of the batch: the rate at which E|x|^2 grows."""
+        return np.asarray(np.linalg.eigvals(self.second_moment_operator).real.max(axis=-1))
+
+    def is_mean_square_stable(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+        """Whether E|x|^2 tends to 0 from every start."""
+        return np.asarray(self.second_moment_abscissa() < 0.0)
+
+    @property
+    def margin(self) -> FloatArray:
+        """Minus the abscissa, in 1/s."""
+        return -self.second_moment_abscissa()
+
+    def stationary_distribution(self) -> FloatArray:
+        """pi Q = 0, shape (..., m). Raises AnalysisError if it is not unique."""
+        scale = np.maximum(-np.diagonal(self.generator, axis1=-2, axis2=-1).min(axis=-1), np.finfo(float).tiny)
+        return stationary_distribution(np.eye(self.generator.shape[-1]) + self.generator / scale[..., None, None])
+
+    def propagate_second_moment(self, moments: ArrayLike, times: ArrayLike) -> FloatArray:
+        """svec coordinates (t, ..., m d) of X_1..X_m at `times` (t,) in s, from those at time 0 (..., m d)."""
+        start, instants = as_stack("moments", moments, ndim=1), as_stack("times", times, ndim=1)
+        operator = self.second_moment_operator
+        if start.shape[-1] != operator.shape[-1]:
+            raise AnalysisError(f"moments has {start.shape[-1]} entries; m n(n+1)/2 = {operator.shape[-1]} are needed")
+        steps = instants.reshape(-1, *(1,) * operator.ndim) * operator
+        return np.asarray((expm(steps) @ start[..., None])[..., 0])
+
+    def small_step(self, step: float) -> MarkovJumpSystem:
+        """The jump system of one short step in s: modes e^{A_i h}, transition e^{Q h}; jumps only at its ends.
+
+        Its radius r obeys log(r) / h -> abscissa as h -> 0: the independent check for tests and Monte Carlo.
+        """
+        h = positive("step", step)
+        return MarkovJumpSystem(expm(self.modes * h), expm(self.generator * h))
+
+
+def derivative_operator(A: FloatArray) -> FloatArray:
+    """Matrix (..., d, d) of X -> A X + X A' on half-vectorised matrices."""
+    rows, columns, weights = triangle(A.shape[-1])
+    same = np.eye(A.shape[-1])
+    out = sum(
+        A[..., p, :][..., :, q] * same[r][:, s]
+        for p, r in ((rows, columns), (columns, rows))
+        for q, s in ((rows, columns), (columns, rows))
+    )
+    return np.asarray(out * (weights[:, None] / (weights * np.where(rows == columns, 2.0, 1.0))))
+
+
+def _checked(generator: ArrayLike) -> FloatArray:
+    Q = square("generator", generator)
+    off = Q - np.eye(Q.shape[-1]) * Q
+    if (off < 0.0).any():
+        place = tuple(int(i) for i in np.argwhere(off < 0.0)[0])
+        raise AnalysisError(f"generator{list(place)} = {Q[place]:g} is negative; rates of jumps are not")
+    error = np.abs(Q.sum(axis=-1)) - ROW_SUM_TOLERANCE * np.maximum(1.0, np.abs(Q).max(axis=(-2, -1)))[..., None]
+    if (error > 0.0).any():
+        place = tuple(int(i) for i in np.argwhere(error > 0.0)[0])
+        raise AnalysisError(
+            f"row {list(place)} of generator sums to {Q[place].sum():.6g}, not 0; the diagonal is minus the sum of the others"
+        )
+    return np.asarray(off - np.eye(Q.shape[-1]) * off.sum(axis=-1, keepdims=True))

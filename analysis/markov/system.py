@@ -1,0 +1,165 @@
+r"""Markov jump linear systems x+ = A_i x, i a Markov chain (P3 (21)-(25), Theorem 1; Costa, Fragoso and Marques 2005).
+
+With X_j = E[x x' 1{mode = j}] the second moment moves by
+
+    X_j+ = sum_i p_ij A_i X_i A_i',    p_ij = Pr(next = j | now = i),
+
+whose block (j, i) on half-vectorised matrices is p_ij S(A_i). The system is mean-square stable if and only if the spectral
+radius is below one: P3 (22) in a form half the size, with the same eigenvalue of largest modulus. Note the orientation: block
+(j, i) carries p_ij. With two modes a transposed matrix gives the same radius, with three it does not.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analysis.checks import as_stack, leading, positive_semidefinite, square
+from analysis.errors import AnalysisError
+from analysis.markov.chain import distribution, stationary_distribution, stochastic
+from analysis.markov.planar import planar_radius
+from analysis.markov.second_moment import lifted, pack, spectral_radius, unpack
+from estimators.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+MANY = 256  # two-state systems from which repeated squaring beats eigenvalue problems
+
+
+class MarkovJumpSystem:
+    """x+ = A_i x with mode i following a Markov chain.
+
+    Args:
+        modes: A_1..A_m, shape (..., m, n, n), any leading batch axes.
+        transition: (..., m, m), transition[i, j] = Pr(next = j | now = i); leading axes broadcast with those of `modes`.
+
+    Raises:
+        AnalysisError: matrices that are not square, finite or stochastic, or that do not fit.
+    """
+
+    def __init__(self, modes: ArrayLike, transition: ArrayLike) -> None:
+        self.modes = _frozen(square("modes", modes, ndim=3))
+        self.transition = _frozen(stochastic("transition", transition))
+        count = self.modes.shape[-3]
+        if self.transition.shape[-1] != count:
+            raise AnalysisError(
+                f"transition has the shape {self.transition.shape} for {count} modes of shape {self.modes.shape}; "
+                f"it must be (..., {count}, {count})"
+            )
+        flat = self.modes.reshape(*self.modes.shape[:-2], -1)
+        self.batch_shape = leading({"modes": flat, "transition": self.transition})
+
+    @property
+    def mode_count(self) -> int:
+        """Number of modes m."""
+        return int(self.modes.shape[-3])
+
+    @property
+    def size(self) -> int:
+        """Number of states n."""
+        return int(self.modes.shape[-1])
+
+    @cached_property
+    def second_moment_operator(self) -> FloatArray:
+        """Matrix (..., m d, m d), d = n(n+1)/2, that moves (svec X_1, ..., svec X_m) by one step."""
+        return _frozen(second_moment_operator(self.modes, self.transition))
+
+    def second_moment_radius(self) -> FloatArray:
+        """Spectral radius of the second-moment operator, shape of the batch (a 0-d array without one)."""
+        return self._radius
+
+    @cached_property
+    def _radius(self) -> FloatArray:
+        operator = self.second_moment_operator
+        if self.size != 2 or self.mode_count < 2 or math.prod(self.batch_shape) < MANY:
+            return _frozen(spectral_radius(operator))
+        flat = operator.reshape(-1, *operator.shape[-2:])
+        radius = planar_radius(flat)
+        unmet = np.isnan(radius)
+        if unmet.any():
+            radius[unmet] = spectral_radius(flat[unmet])
+        return _frozen(radius.reshape(self.batch_shape))
+
+    def is_mean_square_stable(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+        """Whether E|x|^2 tends to 0 from every start and every initial mode (P3 Definition 1): radius < 1."""
+        return np.asarray(self._radius < 1.0)
+
+    @property
+    def margin(self) -> FloatArray:
+        """1 - radius, the margin of P3 Fig. 6; negative where the second moment grows."""
+        return np.asarray(1.0 - self._radius)
+
+    def stationary_distribution(self) -> FloatArray:
+        """pi = pi P, shape (..., m). Raises AnalysisError if the chain has several closed classes."""
+        return stationary_distribution(self.transition)
+
+    def propagate_mean(self, state: ArrayLike, mode_distribution: ArrayLike, steps: int) -> FloatArray:
+        """E[x 1{mode = j}] for k = 0..steps, shape (steps+1, ..., m, n); sum over m for E[x].
+
+        `state` (..., n) is the initial state, independent of the initial mode with probabilities (..., m).
+        """
+        x = as_stack("state", state, ndim=1)
+        pi = distribution("mode_distribution", mode_distribution, self.mode_count)
+        if x.shape[-1] != self.size:
+            raise AnalysisError(f"state has {x.shape[-1]} entries for {self.size} states")
+        mean = pi[..., :, None] * x[..., None, :]
+        mean = np.broadcast_to(mean, np.broadcast_shapes(mean.shape, (*self.batch_shape, self.mode_count, self.size)))
+        out = np.empty((_steps(steps) + 1, *mean.shape))
+        out[0] = mean
+        for k in range(steps):
+            moved = (self.modes @ out[k][..., None])[..., 0]
+            out[k + 1] = np.swapaxes(self.transition, -1, -2) @ moved
+        return out
+
+    def propagate_second_moment(self, second_moment: ArrayLike, mode_distribution: ArrayLike, steps: int) -> FloatArray:
+        """E[x x' 1{mode = j}] for k = 0..steps, shape (steps+1, ..., m, n, n); its trace summed over m is E|x|^2.
+
+        `second_moment` (..., n, n) is E[x x'] at the start, independent of the initial mode.
+        """
+        X = self.initial_second_moment(second_moment, mode_distribution)
+        vector = pack(X).reshape(*X.shape[:-3], -1)
+        vector = np.broadcast_to(vector, np.broadcast_shapes(vector.shape, (*self.batch_shape, vector.shape[-1])))
+        out = np.empty((_steps(steps) + 1, *vector.shape))
+        out[0] = vector
+        for k in range(steps):
+            out[k + 1] = (self.second_moment_operator @ out[k][..., None])[..., 0]
+        return unpack(out.reshape(*out.shape[:-1], self.mode_count, -1), self.size)
+
+    def initial_second_moment(self, second_moment: ArrayLike, mode_distribution: ArrayLike) -> FloatArray:
+        """X_j(0) = pi_j E[x x'], shape (..., m, n, n)."""
+        X = positive_semidefinite("second_moment", second_moment)
+        pi = distribution("mode_distribution", mode_distribution, self.mode_count)
+        if X.shape[-1] != self.size:
+            raise AnalysisError(f"second_moment has the shape {X.shape} for {self.size} states")
+        return np.asarray(pi[..., :, None, None] * X[..., None, :, :])
+
+
+def second_moment_operator(modes: FloatArray, weights: FloatArray) -> FloatArray:
+    """Matrix with block (j, i) = weights[i, j] S(A_i) for modes (..., m, n, n) and weights (..., m, m)."""
+    S = lifted(modes)
+    m, d = S.shape[-3], S.shape[-1]
+    blocks = np.swapaxes(weights, -1, -2)[..., :, None, :, None] * np.moveaxis(S, -3, -2)[..., None, :, :, :]
+    return np.asarray(blocks.reshape(*blocks.shape[:-4], m * d, m * d))
+
+
+def independent(modes: ArrayLike, probabilities: ArrayLike) -> MarkovJumpSystem:
+    """Modes drawn independently at every step: every row of the transition matrix is the distribution (P3 (25))."""
+    stack = square("modes", modes, ndim=3)
+    pi = distribution("probabilities", probabilities, stack.shape[-3])
+    return MarkovJumpSystem(stack, np.repeat(pi[..., None, :], stack.shape[-3], axis=-2))
+
+
+def _frozen(array: FloatArray) -> FloatArray:
+    out = np.array(array, dtype=float)
+    out.setflags(write=False)
+    return out
+
+
+def _steps(steps: int) -> int:
+    if steps < 0:
+        raise AnalysisError(f"steps = {steps} must not be negative")
+    return int(steps)

@@ -1,0 +1,1 @@
+"""Observability and detectability: symbolic ranks, frozen modes, gramians, nonlinear and stochastic tests."""

@@ -1,0 +1,126 @@
+"""Where an observability matrix loses rank: the set solved for, in exact numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import sympy as sp
+
+from analysis.errors import AnalysisError
+from analysis.observability.matrix import ObservabilityMatrix, exact_number
+from estimators.errors import unknown
+
+Interval = tuple[sp.Expr, sp.Expr]
+
+
+@dataclass(frozen=True, eq=False)
+class RankLoss:
+    r"""The set {condition = 0} in the space of parameters and their time derivatives.
+
+    `condition` is the determinant, or for more rows than states the greatest common divisor of the maximal minors;
+    `leftover` are the minors divided by it: where all of them vanish together rank is lost as well (fewer dimensions).
+    `always`: every minor is identically zero. `frozen`: the parameters were held, so the set is no set of lost
+    observability.
+    """
+
+    condition: sp.Expr
+    leftover: tuple[sp.Expr, ...]
+    always: bool
+    frozen: bool
+    matrix: ObservabilityMatrix
+
+    @property
+    def factors(self) -> tuple[sp.Expr, ...]:
+        """The irreducible factors of the condition that are not constant, each a piece of the set."""
+        return tuple(sorted((f for f, _ in sp.factor_list(self.condition)[1]), key=sp.count_ops))
+
+    def curve(self, solved_for: str) -> tuple[sp.Expr, ...]:
+        """The set as a graph: every solution of the condition for one parameter or rate."""
+        symbol = self._symbol(solved_for)
+        return tuple(sp.factor(s) for s in sp.solve(self.condition, symbol))
+
+    def roots(self, parameter: str, values: Mapping[str, object] | None = None) -> tuple[sp.Expr, ...]:
+        """Exact real roots in one parameter, everything else fixed by `values`; a symbol not named there is held at 0."""
+        symbol = self._symbol(parameter)
+        given = {sp.Symbol(name): exact_number(name, v) for name, v in (values or {}).items()}
+        rest = {s: sp.Integer(0) for s in self.condition.free_symbols - {symbol} - set(given)}
+        return _real_roots(self.condition.subs({**rest, **given}), symbol)
+
+    def roots_inside(self, parameter: str, values: Mapping[str, object] | None = None) -> tuple[sp.Expr, ...]:
+        """The roots within the range of the model's parameter."""
+        low, high = self._range(parameter)
+        return tuple(r for r in self.roots(parameter, values) if low <= r <= high)
+
+    def interval_over_rates(
+        self, parameter: str, rates: tuple[object, object] | None = None, search: tuple[object, object] | None = None
+    ) -> tuple[Interval, ...]:
+        """All values of the parameter at which some rate within its bounds loses rank, as closed exact intervals.
+
+        `rates` and `search` default to the model's rate bounds and range. Raises AnalysisError if the condition is not
+        linear in the rate or contains other symbols.
+        """
+        symbol = self._symbol(parameter)
+        others = self.condition.free_symbols - {symbol}
+        if len(others) != 1 or sp.degree(self.condition, next(iter(others))) != 1:
+            raise AnalysisError(
+                f"{self.matrix.name}: the condition in {', '.join(sorted(map(str, others))) or 'no rate'} is not linear in one "
+                "rate; fix the other symbols or use curve()"
+            )
+        (rate,) = others
+        found = next((p for p in self.matrix.parameters if p.name == parameter), None)
+        low, high = (exact_number(parameter, v) for v in search or self._range(parameter))
+        if rates is None:
+            if found is None:
+                raise AnalysisError(f"{self.matrix.name}: '{parameter}' has no rate bounds; give rates=(low, high)")
+            rates = (found.rate_minimum, found.rate_maximum)
+        slow, fast = (exact_number("rate", v) for v in rates)
+        slope = sp.Poly(self.condition, rate).coeff_monomial(rate)
+        cuts = {low, high}
+        for expression in (self.condition.subs(rate, slow), self.condition.subs(rate, fast), slope):
+            cuts |= {root for root in _real_roots(expression, symbol) if low < root < high}
+        edges = sorted(cuts)
+        graph = sp.solve(self.condition, rate)[0]
+        pieces: list[Interval] = []
+        for left, right in pairwise(edges):
+            value = graph.subs(symbol, sp.nsimplify(sp.N((left + right) / 2, 30), rational=True))
+            if slow <= value <= fast:
+                joined = pieces and pieces[-1][1] == left
+                pieces = [*pieces[:-1], (pieces[-1][0], right)] if joined else [*pieces, (left, right)]
+        return tuple(pieces)
+
+    def _symbol(self, name: str) -> sp.Symbol:
+        if sp.Symbol(name) not in self.condition.free_symbols:
+            known = sorted(map(str, self.condition.free_symbols))
+            raise AnalysisError(
+                f"{self.matrix.name}: rank loss does not depend on '{name}'; {unknown('symbol', name, known)}"
+            )
+        return sp.Symbol(name)
+
+    def _range(self, parameter: str) -> tuple[object, object]:
+        for p in self.matrix.parameters:
+            if p.name == parameter:
+                return p.minimum, p.maximum
+        raise AnalysisError(f"{self.matrix.name}: '{parameter}' has no range; give search=(low, high)")
+
+
+def rank_loss(matrix: ObservabilityMatrix, values: Mapping[str, object] | None = None) -> RankLoss:
+    """Solve for the set where the matrix has less than full column rank; `values` fixes parameters or rates first."""
+    minors = matrix.minors(values)
+    if not minors:
+        return RankLoss(sp.Integer(0), (), True, matrix.frozen, matrix)
+    common = minors[0]
+    for minor in minors[1:]:
+        common = sp.gcd(common, minor)
+    condition = sp.factor(common)
+    leftover = tuple(q for q in (sp.cancel(m / condition) for m in minors) if q.free_symbols)
+    complete = len(leftover) < len(minors)  # a constant among them cannot vanish
+    return RankLoss(condition, () if complete else leftover, False, matrix.frozen, matrix)
+
+
+def _real_roots(expression: sp.Expr, symbol: sp.Symbol) -> tuple[sp.Expr, ...]:
+    if symbol not in expression.free_symbols:
+        return ()
+    polynomial = sp.Poly(sp.numer(sp.together(expression)), symbol)
+    return tuple(dict.fromkeys(sp.real_roots(polynomial)))

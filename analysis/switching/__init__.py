@@ -1,0 +1,1 @@
+"""Switched gains: what is guaranteed however the modes follow each other (P3 Example 1)."""

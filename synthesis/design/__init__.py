@@ -1,0 +1,1 @@
+"""Gains for a model: H-infinity and sampled observer design, deployment as a table, stability of given gains."""

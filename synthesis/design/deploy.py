@@ -1,0 +1,165 @@
+"""From gains to the table that is deployed: breakpoints, rounding, and P solved for again with that table fixed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from flint import fmpq_mat
+
+from estimators.arrays import FloatArray
+from synthesis.certificate.claims import Claim, ClaimChannel
+from synthesis.certificate.levels import held_claims, sampled_claims
+from synthesis.certificate.rounding import significant
+from synthesis.certificate.search import Search, Wish
+from synthesis.certificate.verify import Names
+from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains
+from synthesis.design.well_posedness import well_posedness
+from synthesis.errors import ProblemError
+from synthesis.lmi.result import Verdict
+from synthesis.loop.from_model import plant_of
+from synthesis.loop.observer import ObserverLoop
+from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.rational import decimal
+
+SEGMENTS = (7, 14, 28, 56, 112)
+REFINEMENT = 4  # a table is compared with one of so many times its segments
+TABLE_DIGITS = 4  # of the largest gain of each entry; more would be digits of the solver and not of the guarantee
+
+
+@dataclass(frozen=True)
+class DeploySettings:
+    """How gains become a table."""
+
+    sample_time: float = 0.005  # s
+    dtype: Literal["float32", "float64"] = "float64"
+    interpolation_cost: float = 0.01  # largest loss of any gain against a table four times as fine
+    settle: float = 0.005  # certified bounds are this much above their infimum, which buys margin for the proof
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.sample_time < 1.0:
+            raise ProblemError(f"sample time {self.sample_time} s must lie between 0 and 1 s")
+        if self.dtype not in ("float32", "float64"):
+            raise ProblemError(f"dtype '{self.dtype}' of the table must be float32 or float64")
+        if not 0.0 < self.interpolation_cost < 1.0:
+            raise ProblemError(f"interpolation cost {self.interpolation_cost} must lie between 0 and 1")
+
+
+@dataclass(frozen=True)
+class Deployment:
+    """A table with the claims that are proved for it: `table` (b_1, .., b_p, nx, ny) as stored, `breakpoints` (b_i,) each."""
+
+    gains: ObserverGains
+    settings: DeploySettings
+    breakpoints: tuple[FloatArray, ...]
+    table: FloatArray
+    claims: tuple[Claim, ...]
+    cost: float  # relative loss of the worst gain through tabulation and rounding
+
+    @property
+    def loop(self) -> ObserverLoop:
+        """The closed loop that was proved."""
+        return deployed_loop(self.gains, self.breakpoints, self.table, self.settings.sample_time)
+
+
+def deploy(
+    gains: ObserverGains, settings: DeploySettings | None = None, progress: Callable[[str], None] = lambda _: None
+) -> Deployment:
+    """Tabulate on the coarsest breakpoints that cost less than the allowed share of every gain, and prove claims.
+
+    Raises ProblemError if the gains are not certified, if the design is ill-posed, or if no table is fine enough.
+    """
+    settings = settings or DeploySettings()
+    model, design = gains.model, gains.design
+    if gains.verdict is not Verdict.CERTIFIED:
+        raise ProblemError(f"gains are not certified and are not deployed: {gains.result.message}")
+    if len(model.parameters) != 1:
+        raise ProblemError(
+            f"model '{model.name}' has {len(model.parameters)} scheduling parameters; a deployed table has one"
+        )
+    if not model.polynomial.is_polynomial:
+        raise ProblemError(f"model '{model.name}' is rational; schedule files store polynomial plants")
+    if gains.update == "sampled" and gains.sample_time != settings.sample_time:
+        raise ProblemError(
+            f"gains designed for a sample time of {gains.sample_time} s are not run at {settings.sample_time} s"
+        )
+    if gains.update == "held" and design.fastest_pole is None:  # nothing bounds the gains but the channels themselves
+        posed = well_posedness(model, design)
+        if posed.ill_posed:
+            raise ProblemError(f"model '{model.name}' is not deployed: {posed.message}")
+    kind = "gain" if gains.update == "held" else "sampled gain"
+    channels = [claim_channel(channel) for channel in design.channels]
+    for segments in SEGMENTS:
+        progress(f"{segments} segments")
+        search, points, table = _tabulated(gains, segments, settings, settings.dtype)
+        finer, _, _ = _tabulated(gains, REFINEMENT * segments, settings, "float64")
+        cost = max(table_cost(search, finer, Wish(kind, None, channel)) for channel in channels)
+        if not cost < settings.interpolation_cost:
+            continue
+        if gains.update == "held":
+            claims = held_claims(search, channels, design.decay_rate, design.fastest_pole, settings.settle)
+        else:
+            claims = sampled_claims(search, channels, settings.settle)
+        if claims is not None:
+            return Deployment(gains, settings, points, table, claims, cost)
+    raise ProblemError(
+        f"model '{model.name}': no table with up to {SEGMENTS[-1]} segments keeps the guarantee within "
+        f"{100 * settings.interpolation_cost:g} %; give the design more back-off or a lower degree"
+    )
+
+
+def table_cost(coarse: Search, fine: Search, wish: Wish) -> float:
+    """Relative loss of one gain by the coarser table; infinite if it has none."""
+    least, best = coarse.least_gain(wish), fine.least_gain(wish)
+    return least / best - 1.0 if np.isfinite(least) and np.isfinite(best) else np.inf
+
+
+def claim_channel(channel: Channel) -> ClaimChannel:
+    """A channel of the design as claims name it."""
+    sizes = channel.weights or (1.0,) * len(channel.disturbances)
+    return ClaimChannel(dict(zip(channel.disturbances, sizes, strict=True)), channel.errors)
+
+
+def deployed_loop(
+    gains: ObserverGains, breakpoints: tuple[FloatArray, ...], table: FloatArray, sample_time: float
+) -> ObserverLoop:
+    """A table in closed loop with its model, run with the update of its design."""
+    entries: dict[tuple[int, ...], fmpq_mat] = {
+        index: fmpq_mat([[decimal(float(x)) for x in row] for row in table[index]])
+        for index in np.ndindex(table.shape[:-2])
+    }
+    points = tuple(tuple(decimal(float(value)) for value in line) for line in breakpoints)
+    return ObserverLoop(plant_of(gains.model), points, entries, gains.update, decimal(sample_time))
+
+
+def tabulate(gains: ObserverGains, segments: int, dtype: str) -> tuple[tuple[FloatArray, ...], FloatArray]:
+    """Equidistant breakpoints of every parameter and gains there, rounded to a few digits and to the type that stores them."""
+    lines = tuple(np.linspace(p.minimum, p.maximum, segments + 1) for p in gains.model.parameters)
+    points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(lines))
+    table = gains.gain(points)
+    largest = np.abs(table).max(axis=0)
+    rounded = np.empty_like(table)
+    for place, value in np.ndenumerate(table):
+        rounded[place] = significant(float(value), float(largest[place[1:]]), TABLE_DIGITS)
+    return lines, rounded.reshape(*map(len, lines), *table.shape[1:]).astype(dtype).astype(np.float64)
+
+
+def names_of(model: LpvModel) -> Names:
+    """States and disturbances in order."""
+    return Names(tuple(s.name for s in model.states), tuple(d.name for d in model.disturbances))
+
+
+def _tabulated(
+    gains: ObserverGains, segments: int, settings: DeploySettings, dtype: str
+) -> tuple[Search, tuple[FloatArray, ...], FloatArray]:
+    model, design = gains.model, gains.design
+    points, table = tabulate(gains, segments, dtype)
+    loop = deployed_loop(gains, points, table, settings.sample_time)
+    return Search(loop, names_of(model), model.parameters, lyapunov_degree(design), design.settings), points, table
+
+
+def lyapunov_degree(design: ObserverDesign) -> int:
+    """Degree of P in the claims: that of the gains, at least one."""
+    return max(design.degree, 1)

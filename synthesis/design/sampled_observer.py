@@ -1,0 +1,148 @@
+r"""H-infinity gain synthesis for an observer that corrects once a sample, in discrete time.
+
+    xhat+ = e^(TA) xhat + T phi(TA) B u + K(p) (y - C xhat - D u),    e+ = (Phi - K C) e + (Gamma - K F) d
+
+with Phi = e^(TA), Gamma = T phi(TA) E, d held over a sample. V = e'P(p)e, P+ = P one sample later. With a slack matrix G(p) and
+X = G K (de Oliveira, Bernussou, Geromel 1999) K needs no P+, which is not known when it is used, and
+
+    decay a    [exp(-2 a T) P, *; G Phi - X C, G + G' - P+] > 0          |e|_P falls by exp(-a T) in every sample
+    channel    [P, *, *, *; 0, g I, *, *; G Phi - X C, (G Gamma - X F) W, G + G' - P+, *; Z, 0, 0, g I] > 0
+
+prove an l2 gain below g (with inputs and errors both weighted by sqrt(T) it is that of continuous signals). One P and one G serve
+all channels, so channel i is weighed by 1/g_i. Phi and Gamma are fitted by Chebyshev polynomials in the parameters to 1e-10; what
+comes out is proved for the exact ones (`synthesis.certificate`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from estimators.arrays import FloatArray
+from synthesis.design.hinf_observer import (
+    ObserverDesign,
+    ObserverGains,
+    channel_matrices,
+    design_scale,
+    error_unit,
+    minimised,
+    objective_name,
+)
+from synthesis.errors import ProblemError
+from synthesis.lmi.problem import LmiProblem
+from synthesis.loop.from_model import plant_of
+from synthesis.loop.motion import one_sample_later, rates
+from synthesis.models.discretise import zero_order_hold
+from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.matrix import MatrixPolynomial, symmetric_block, variable
+
+FIT = 1e-10  # relative
+DEGREES = (4, 8, 12, 16, 24)
+POINTS = 40  # for each parameter; what holds between them is proved for the table that is deployed
+
+
+def design_sampled_observer(model: LpvModel, design: ObserverDesign, sample_time: float) -> ObserverGains:
+    """K(p) for the given sample time; `gain` of the result gives K in the units state/output.
+
+    Raises ProblemError for a rational model, a bound on the fastest pole (an update has none), and as `design_observer`.
+    """
+    if not sample_time > 0.0:
+        raise ProblemError(f"sample time {sample_time} s must be positive")
+    if design.fastest_pole is not None:
+        raise ProblemError("a sampled design has no fastest pole: leave it out; noise channels bound its gains")
+    settings = replace(design.settings, points=min(design.settings.points, POINTS))
+    design = replace(design, settings=settings)
+    scale = design_scale(model, design) / np.sqrt(sample_time)  # errors in their size if time is counted in samples
+    fitted = _fitted(model, scale, sample_time)
+
+    def problem(gamma: float | None, maximise_margin: bool = True, floor: float = 0.0) -> LmiProblem:
+        return _problem(model, design, scale, sample_time, fitted, gamma, maximise_margin, floor)
+
+    return minimised(model, design, scale, problem, "sampled", sample_time)
+
+
+def _problem(
+    model: LpvModel,
+    design: ObserverDesign,
+    scale: FloatArray,
+    period: float,
+    fitted: dict[str, FloatArray],
+    gamma: float | None,
+    maximise_margin: bool,
+    floor: float,
+) -> LmiProblem:
+    problem = LmiProblem(model.parameters, maximise_margin and gamma is not None, least_norm=floor > 0.0, floor=floor)
+    known = {key: problem.scaled(array) for key, array in fitted.items()}
+    nx, ny, count = len(model.states), len(model.outputs), len(model.parameters)
+    degree = tuple(0 if p.may_jump else design.degree for p in model.parameters)
+    P = problem.symmetric("P", nx, degree or 0)
+    G = problem.matrix("G", nx, nx, design.degree)
+    X = problem.matrix("X", nx, ny, design.degree)
+    one = problem.constant(np.ones((1, 1)))
+    speeds = rates(
+        plant_of(model).axes, P, one, lambda i: variable(count + i, 2 * count), lambda x: int(x.p) / int(x.q)
+    )
+    later = one_sample_later(P, speeds, period)
+    closed, slack = G @ known["Phi"] - X @ known["C"], G + G.T - later
+    problem.require("P > 0", P)
+    if design.decay_rate > 0.0 or not design.channels:
+        kept = float(np.exp(-2.0 * design.decay_rate * (1.0 + design.reserve) * period))
+        problem.require("decay over a sample", symmetric_block([[P * kept, closed.T], [None, slack]]))
+    unit, compact = error_unit(model, design, scale), len(design.channels) == 1
+    for channel in design.channels:
+        d, z = channel_matrices(model, channel)
+        z = z / unit / scale
+        forced = (G @ known["Gamma"] - X @ known["F"]) @ problem.constant(d)
+        level = channel.bound or gamma
+        if level is None:
+            size: MatrixPolynomial = problem.scalar(objective_name(design))
+            problem.minimise(objective_name(design))
+        else:
+            size = problem.constant(np.array([[(level / unit) ** 2 if compact else level / unit]]))
+        inputs = problem.constant(np.eye(d.shape[1])).scaled_by(size)
+        if compact:
+            top = P - problem.constant(z.T @ z)
+            rows = [[top, None, closed.T], [None, inputs, forced.T], [None, None, slack]]
+        else:
+            output, errors = problem.constant(z.T), problem.constant(np.eye(len(z))).scaled_by(size)
+            rows = [
+                [P, None, closed.T, output], [None, inputs, forced.T, None], [None, None, slack, None],
+                [None, None, None, errors],
+            ]  # fmt: skip
+        problem.require(f"gain {channel.name}", symmetric_block(rows))
+    return problem
+
+
+def _fitted(model: LpvModel, scale: FloatArray, period: float) -> dict[str, FloatArray]:
+    """Phi, Gamma, C and F in the scaled states as polynomials in u, coefficients (d_1+1, ..., d_p+1, rows, columns)."""
+    if not model.polynomial.is_polynomial:
+        raise ProblemError(f"model '{model.name}' is rational; a sampled design takes polynomial models")
+    scaled = model.polynomial.with_states_scaled(scale)
+    found: dict[str, FloatArray] = {}
+    for degree in DEGREES:
+        nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
+        count = len(model.parameters)
+        points = np.array(list(product(nodes, repeat=count))).reshape(len(nodes) ** count, count)
+        middle, half = (np.array([getattr(p, key) for p in model.parameters]) for key in ("middle", "half_width"))
+        numeric = model.on(middle + half * points)
+        A, E = numeric.A * scale[:, None] / scale, numeric.E * scale[:, None]
+        values = np.concatenate(zero_order_hold(A, E, period), axis=-1)
+        series = values.reshape(*(len(nodes),) * count, *values.shape[1:])
+        inverse = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, degree))
+        for axis in range(count):
+            series = np.moveaxis(np.tensordot(inverse, series, axes=(1, axis)), 0, axis)
+        size = np.abs(series).max()
+        tail = max((np.abs(np.take(series, -1, axis=axis)).max() for axis in range(count)), default=0.0)
+        if tail <= FIT * size or degree == DEGREES[-1]:
+            powers = np.zeros((degree + 1, degree + 1))
+            for k in range(degree + 1):
+                column = np.polynomial.chebyshev.cheb2poly(np.eye(degree + 1)[k])
+                powers[: len(column), k] = column
+            for axis in range(count):
+                series = np.moveaxis(np.tensordot(powers, series, axes=(1, axis)), 0, axis)
+            n = len(model.states)
+            found = {"Phi": series[..., :n], "Gamma": series[..., n:], "C": scaled.C, "F": scaled.F}
+            break
+    return found
