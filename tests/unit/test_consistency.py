@@ -131,7 +131,7 @@ def test_stiffness_observers(kind: Any, monkeypatch: pytest.MonkeyPatch) -> None
         n = observer._states
         observer.step(*given, np.full((RUNS, 3), np.nan))  # takes the inputs up
         mean, spread = np.array([-0.01, 0.0, 0.0])[:n], np.diag(observer.covariance[0])
-        observer._filter.reset(state=mean, covariance=np.diag(spread))
+        observer.filter.reset(state=mean, covariance=np.diag(spread))
         truth = mean + normal(draw, spread)
         model = observer._model([np.asarray(value) for value in given])
         noise = np.array([1e-13, 0.24, 0.24])[:n]
