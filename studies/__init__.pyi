@@ -12,8 +12,8 @@ from .errors import LogError as LogError
 from .errors import SimulationError as SimulationError
 from .identify.identify import Identification as Identification
 from .identify.identify import identify_drive as identify_drive
-from .parts.run import RunSummary as RunSummary
-from .parts.run import run_studies as run_studies
+from .run import RunSummary as RunSummary
+from .run import run_studies as run_studies
 from .plots.figure import Figure as Figure
 from .plots.figure import Panel as Panel
 from .registry import Registry as Registry

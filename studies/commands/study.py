@@ -11,9 +11,9 @@ from typing import Any
 from studies.claim import ClaimVerdict
 from studies.commands.terminal import print_table, progress_bar
 from studies.execution.processes import available_cores
-from studies.run import RunSummary, run_studies
 from studies.registry import SHIPPED, Registry
 from studies.report.scoreboard import MARKS
+from studies.run import RunSummary, run_studies
 from studies.study import QUICK, Scope
 from synthesis.errors import SpecError
 

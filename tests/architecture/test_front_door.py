@@ -35,7 +35,7 @@ def test_every_name_of_a_door_is_there_and_described(package: str) -> None:
 
 @pytest.mark.parametrize("package", DOORS)
 def test_no_name_of_a_door_is_that_of_a_submodule(package: str) -> None:
-    """`import analysis.norms` would put the module in the place of a function `norms`."""
+    """`import analysis.norms.hinf` would put the module in the place of a function `norms`."""
     folder = Path(import_module(package).__file__ or "").parent
     modules = {path.stem for path in folder.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
     assert not modules & set(import_module(package).__all__)

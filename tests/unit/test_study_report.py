@@ -14,11 +14,11 @@ from xml.etree import ElementTree
 import pytest
 
 from studies.claim import ClaimVerdict
-from studies.run import run_studies
 from studies.report.html.pictures import LARGEST_SVG, picture
 from studies.report.html.text import alignments, brief, cell, label, number, prose
 from studies.report.scoreboard import MARKS, MEANINGS, scoreboard
 from studies.report.scoreboard_picture import scoreboard_svg
+from studies.run import run_studies
 from studies.study import QUICK
 from tests.unit.study_fakes.registry import REGISTRY
 

@@ -17,8 +17,8 @@ import pytest
 
 from studies.execution.fingerprint import Sources
 from studies.parts.record import check_parts
-from studies.run import RunSummary, run_studies
 from studies.registry import Registry
+from studies.run import RunSummary, run_studies
 from studies.study import QUICK, Part, PartResult, Preparation, Scope, Study
 from synthesis.errors import SpecError
 from tests.unit.study_fakes.registry import REGISTRY
