@@ -12,12 +12,12 @@ from .errors import LogError as LogError
 from .errors import SimulationError as SimulationError
 from .identify.identify import Identification as Identification
 from .identify.identify import identify_drive as identify_drive
-from .run import RunSummary as RunSummary
-from .run import run_studies as run_studies
 from .plots.figure import Figure as Figure
 from .plots.figure import Panel as Panel
 from .registry import Registry as Registry
 from .registry import load_study as load_study
+from .run import RunSummary as RunSummary
+from .run import run_studies as run_studies
 from .schedules import ScheduleRun as ScheduleRun
 from .schedules import regenerate as regenerate
 from .spec import ScheduleSpec as ScheduleSpec

@@ -46,7 +46,7 @@ class SlidingModeGains:
         return float(self.matrix.ravel()[number - 1])
 
 
-# P5 section 2.1; Omega_5 is rounded from 52142.857.
+# P5 notes 1; Omega_5 is rounded from 52142.857.
 PUBLISHED = SlidingModeGains.of(omega1=10, omega4=40000, omega5=52000, omega7=-40000, omega8=40000, omega12=50000)
 
 
@@ -176,7 +176,7 @@ def reaching_time(gains: SlidingModeGains, vehicle: Vehicle, yaw_error: float, y
 
 
 def linear_zone_matrix(gains: SlidingModeGains, vehicle: Vehicle, widths: Mapping[Output, float]) -> FloatArray:
-    r"""A (4, 4) of x~' = A x~ inside the linear zones, sign(y_i) replaced by y_i / width_i (P5 section 2.1).
+    r"""A (4, 4) of x~' = A x~ inside the linear zones, sign(y_i) replaced by y_i / width_i (P5 notes 4).
 
     Widths in rad/s, m/s^2, m/s^2; P5 does not print them.
     """

@@ -6,7 +6,7 @@ With Phi and Gamma of the update that the runtime performs (`estimators.velocity
     dropped, coast     e+ = e^{A T} e                                       (no gain: kinematics alone, P3 (24))
     dropped, hold      e+ = Phi e + Gamma s,   s+ = s + C (x+ - x)          (the last measurement is used again)
 
-    update "held"      Phi = e^{(A - L C) T},   Gamma = int_0^T e^{(A - L C) t} dt L   (P1 section 9)
+    update "held"      Phi = e^{(A - L C) T},   Gamma = int_0^T e^{(A - L C) t} dt L   (P1 notes 9)
     update "sampled"   Phi = e^{A T} - K C,     Gamma = K
 
 and s = C x - (measurement used), the staleness, which a received sample resets to zero. Where a measurement is held, the loop

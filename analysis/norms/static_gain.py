@@ -25,7 +25,7 @@ class StaticGain:
 
 
 def static_gain(model: LpvModel, disturbance: str, error: str) -> StaticGain:
-    r"""-z (A - L C)^-1 (E - L F) d with every entry of L a symbol L_i_j (P3 section IV; DESIGN, what must be coped with, 1).
+    r"""-z (A - L C)^-1 (E - L F) d with every entry of L a symbol L_i_j (P3 section IV).
 
     For the corner models friction -> relative velocity is -sigma0/(sigma0 + sigma2 a), a = kappa R_e |omega|, for every L:
     at standstill of the error friction cannot be told from slip velocity. Raises AnalysisError for unknown names and for

@@ -13,7 +13,7 @@ MOST = 0.99  # share of the rest of a covariance that a negative centre weight m
 class SigmaWeights(NamedTuple):
     """X_0 = x, X_i = x + tau S_i, X_(n+i) = x - tau S_i; tau^2 = N + eta = epsilon^2 N.
 
-    W0m = eta / (N + eta), W0c = W0m + 1 - epsilon^2 + beta, W_i = 1 / (2 (N + eta)): P1 section 3, corrected.
+    W0m = eta / (N + eta), W0c = W0m + 1 - epsilon^2 + beta, W_i = 1 / (2 (N + eta)): P1 notes 3, corrected.
     """
 
     tau: float

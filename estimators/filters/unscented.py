@@ -44,7 +44,7 @@ class UnscentedKalmanFilter(GaussianFilter):
     affine everywhere, many entries at once take P+ = P- - K Pyy K', whose factor is as good as the orthogonal one while
     none of its pivots is small, which is checked; the form above otherwise (`predicted.Predicted`).
 
-    Source: weights of the corner estimation paper (P1 section 3, with W_i = 1/(2 (N + eta))); Van der Merwe, Wan (2001)
+    Source: weights of the corner estimation paper (P1 notes 3, with W_i = 1/(2 (N + eta))); Van der Merwe, Wan (2001)
     for the square-root form; Kaminski, Bryson, Schmidt (1971) for square-root measurement updates.
 
     Args:

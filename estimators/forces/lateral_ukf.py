@@ -22,9 +22,9 @@ from estimators.signals.held import Held
 from estimators.vehicle import VehicleParameters
 
 PUBLISHED_PROCESS = 0.13
-"""kN a sample of 5 ms: Q = 0.13^2 I of P1 section 1, read in kN (in N the filter would lag by a second, P1 section 11)."""
+"""kN a sample of 5 ms: Q = 0.13^2 I of P1 notes 1, read in kN (in N the filter would lag by a second, P1 notes 11)."""
 PUBLISHED_MEASUREMENT = (0.012, 0.012, 0.012)
-"""m/s^2, m/s^2, rad/s^2: R = 0.012^2 I of P1 section 1. Real sensors need more, see the class."""
+"""m/s^2, m/s^2, rad/s^2: R = 0.012^2 I of P1 notes 1. Real sensors need more, see the class."""
 _LARGEST = np.array([limits.ACCELERATION, limits.ACCELERATION, limits.YAW_ACCELERATION])
 _EYE = np.eye(3)
 _DIAGONAL = np.arange(3)

@@ -16,7 +16,7 @@ from estimators.signals.held import Held
 from estimators.vehicle import VehicleParameters
 
 PUBLISHED_GAINS = (1.8, 11.4, 50.6)
-"""eta_1 N s, eta_2 N m, eta_3 1/s of P1 section 1."""
+"""eta_1 N s, eta_2 N m, eta_3 1/s of P1 notes 1."""
 
 
 class PidForceObserver(Memory):

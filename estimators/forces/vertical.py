@@ -2,7 +2,7 @@
 
 IMU convention (ISO, x forward, y left, z up): the accelerometers read specific force, a_z = +g at rest. Pitch is positive
 nose up, roll positive left side up (leaning right), so a body tilted at rest reads a_x = g sin(pitch), a_y = g sin(roll)
-as in P1 (11). Levelling must take that off, P1 section 11: the signs of (14) and (16) are turned here.
+as in P1 (11). Levelling must take that off, P1 notes 11: the signs of (14) and (16) are turned here.
 
 Angles are those of the body against the road; on a slope the road frame keeps its share of gravity, and that loads the
 lower wheels, as it should. Left out: unsprung masses, aerodynamic lift, the stiffness of springs and bars (each axle
@@ -69,8 +69,8 @@ def vertical_loads(
         F_z,iL = F_zi (1/2 - h_rc sin(roll)/T_i) - (F_zi/a_z) a_y h/T_i,  F_z,iR with the other signs.
 
     The axle's mass is m_i = F_zi/a_z, where the papers write F_zi/g: on a bump a_z would enter squared. Then the loads
-    sum to m a_z whatever the rest. h_rc as lever is the papers'; physically it is the roll arm h_CG - h_rc (P1 section
-    11): give that as `roll_center_height` if you prefer it. Nothing is limited here: loads may come out negative.
+    sum to m a_z whatever the rest. h_rc as lever is the papers'; physically it is the roll arm h_CG - h_rc (P1 notes 11):
+    give that as `roll_center_height` if you prefer it. Nothing is limited here: loads may come out negative.
     """
     given = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (ax, ay, az, pitch, roll)))
     a_x, a_y, a_z = levelled(*given)

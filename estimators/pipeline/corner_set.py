@@ -1,4 +1,4 @@
-"""The papers' observers at every corner, and the velocity of the car that they agree on: P1 sections 5 to 7."""
+"""The papers' observers at every corner, and the velocity of the car that they agree on: P1 notes 5 to 7."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class CornerSetStep(NamedTuple):
 class CornerObservers(Memory):
     """A longitudinal observer at every corner, a lateral one where one is given, and their mapping to the car.
 
-    u_x = R_e w' - v_xt', u_y = -v_yt' with the velocities of the last step in the accelerations, P1 section 6. Without a
+    u_x = R_e w' - v_xt', u_y = -v_yt' with the velocities of the last step in the accelerations, P1 notes 6. Without a
     lateral observer V_y is what `step` is given. Axles are weighed by slip (`SlipWeights`), or equally. One car runs on
     plain numbers, several on arrays, by the same formulas (`arithmetic`). What no car measures (`signals.limits`) is missing;
     a missing steering angle or yaw rate is held and flagged MISSING_INPUT at the corners concerned, a missing

@@ -43,7 +43,7 @@ class CornerVelocityStep(NamedTuple):
 
 
 class CornerVelocity(Memory):
-    """Slips, slip angles, V_x and V_y from `CornerObservers` alone: P1 sections 5 to 7, P3 section 3.
+    """Slips, slip angles, V_x and V_y from `CornerObservers` alone: P1 notes 5 to 7, P3 notes 3.
 
     With saturated friction, observers of this structure hardly see how fast a wheel slips; the fusion does. This part is
     for what a paper says, beside it. It runs at the sample time of its observers, whatever time has passed.

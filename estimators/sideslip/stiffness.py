@@ -18,7 +18,7 @@ from estimators.signals import limits
 from estimators.signals.held import Clipped
 from estimators.vehicle import SingleTrack
 
-GOOD_NOISE = (0.1, 0.1, 0.1)  # zones 5, 6: N^2, N^2, (m/s^2)^2, per sample; P5 section 4
+GOOD_NOISE = (0.1, 0.1, 0.1)  # zones 5, 6: N^2, N^2, (m/s^2)^2, per sample; P5 notes 5
 POOR_NOISE = (1e6, 1e6, 1e6)  # zones 1 to 4
 SIDESLIP_NOISE = 1e-13  # rad^2 per sample
 STIFFNESS_NOISE = 0.24  # (N/rad)^2 per sample, zones 5, 6 alone

@@ -1,6 +1,6 @@
 """Rigid-body kinematics of the four wheel centres: velocities and accelerations in the vehicle and tire frames.
 
-P1 section 6 with the steering-rate terms that the paper leaves out: 0.3 rad/s of steering at 12 m/s is 3.6 m/s^2.
+P1 notes 6 with the steering-rate terms that the paper leaves out: 0.3 rad/s of steering at 12 m/s is 3.6 m/s^2.
 Corners in the order fl, fr, rl, rr on the last axis; frame x forward, y left, yaw rate and steering to the left.
 Accelerations at the centre of gravity without gravity, (11). SI units; leading axes broadcast.
 """
@@ -57,7 +57,7 @@ def tire_frame(vector: CornerVectors, steer: npt.ArrayLike) -> CornerVectors:
 
 
 def vehicle_frame(vector: CornerVectors, steer: npt.ArrayLike) -> CornerVectors:
-    """The inverse of `tire_frame`: P1 (33), (42), P2 (28), P3 section 3."""
+    """The inverse of `tire_frame`: P1 (33), (42), P2 (28), P3 notes 3."""
     return tire_frame(vector, -np.asarray(steer, dtype=np.float64))
 
 

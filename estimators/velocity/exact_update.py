@@ -5,7 +5,7 @@
     sampled  xhat+ = xhat + T phi(M) (A xhat + B u) + K innovation,                    M = T A
 
 with phi(M) = int_0^1 e^(M s) ds and innovation = y - C xhat - D u at the start of the sample. `held` is the update for which
-P1 section 9 gives the poles: forward Euler and "predict, then correct with T L" are unstable with the published gains at 200 Hz.
+P1 notes 9 gives the poles: forward Euler and "predict, then correct with T L" are unstable with the published gains at 200 Hz.
 Its error follows the plant's own motion within a sample; that of `sampled` does not (synthesis.loop.observer).
 """
 

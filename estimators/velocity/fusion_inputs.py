@@ -117,7 +117,7 @@ class FusionInputs(CarsMemory):
     def slipping(self, acceleration: Signals, fresh: Signals, elapsed: Number, doubt: Number) -> Signals:
         """Fresh wheels whose surface leaves the car, |R w' - a| too large, now or within the hold time.
 
-        The wheel-acceleration criterion of P2 section 7, relative to the acceleration of the car, which may be off by
+        The wheel-acceleration criterion of P2 notes 7, relative to the acceleration of the car, which may be off by
         twice its `doubt`, m/s^2.
         """
         s, choose, largest = self.settings, self.kit.where, self.kit.maximum

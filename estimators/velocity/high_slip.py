@@ -1,10 +1,10 @@
-"""High-slip detection: an adaptive limit on the slip ratio, and a limit on the wheel acceleration, P2 section 7.
+"""High-slip detection: an adaptive limit on the slip ratio, and a limit on the wheel acceleration, P2 notes 7.
 
     lambda_th = lambda_u - (lambda_u - lambda_l) exp(-pi beta_e sigma_e (lambda_u - lambda_l)^2)          (29), corrected
 
 sigma_e variance of |a| = sqrt(a_x^2 + a_y^2) over the last N_a + 1 samples, beta_e transition rate in (m/s^2)^-2. Low
 excitation gives lambda_l, high excitation lambda_u. As printed, phi_e is the reciprocal of what it must be: the limit
-would start far below zero (P2 sheet, section 10 item 2).
+would start far below zero (P2 notes 7).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Lateral half of the fusion: V_y from the kinematics, held in place by what the two axles must slip to carry the car.
 
-    dV_y/dt = a (1 - s) - b - g - V_x (r_m (1 - s_t) - b_r)                          P1 section 5, with sensor errors
+    dV_y/dt = a (1 - s) - b - g - V_x (r_m (1 - s_t) - b_r)                          P1 notes 5, with sensor errors
     0 = V_y + L_f r - V_x tan(delta) + |V_x| alpha_f(mu_f),   0 = V_y - L_r r + |V_x| alpha_r(mu_r)
     alpha(mu) = c_1 mu + c_3 mu^3,   mu_f = (m a L_r + I_z r')/(L F_zf),   mu_r = (m a L_f - I_z r')/(L F_zr)
 

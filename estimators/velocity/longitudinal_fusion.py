@@ -6,7 +6,7 @@
 s scale error, b bias, g gravity along the road, c slip compliance, mu_i = F_x/F_z, rho_i relative radius error, v_xt,i
 speed of the wheel centre along the tire. The slip error grows with the friction used; a wheel whose surface leaves the
 car, or whose innovation is larger than its own model can explain, is left out while that lasts (the high-slip
-detection of P2 section 7 asks the same two questions). The force tells the side to which a wheel slips: towards the
+detection of P2 notes 7 asks the same two questions). The force tells the side to which a wheel slips: towards the
 other side a wheel is believed twice as far. Radii are learned from wheels that roll freely, where no slip hides them:
 neither one along the tire nor, through the load that a turn moves from side to side, one across it.
 """

@@ -156,7 +156,7 @@ class TwoStateObserver(Renewable):
 class LpvVelocityObserver(TwoStateObserver):
     """xhat' = A(p) xhat + B u + L(p) (y - C(p) xhat - D u), P1 (24), (38) and P3 (7), (12), updated exactly.
 
-    Over one sample u, y and p are held and the closed loop is integrated exactly (P1 section 9); a schedule whose update is
+    Over one sample u, y and p are held and the closed loop is integrated exactly (P1 notes 9); a schedule whose update is
     "sampled" instead predicts exactly with u and p held and adds K(p) (y - C(p) xhat - D u) once a sample. For the corner models
     the states are bristle deflection in m and relative velocity in m/s, u is the relative acceleration in m/s^2, y the
     normalised force and p the wheel speed in rad/s.

@@ -2,7 +2,7 @@
 
 Predictor form: correct with mu_k, then predict with u_k, which is (21)-(22) term by term. Q is one number in the paper;
 here it drives the model through its input, Q = q B B': errors of the acceleration move V_r (and with it z'), nothing
-else. q I_3 would let z absorb the correction and leave V_r to open-loop integration (P2 sheet, section 10 item 10).
+else. q I_3 would let z absorb the correction and leave V_r to open-loop integration (P2 notes 10).
 In high slip friction hides the slip velocity: there q and r change to values that follow the kinematics.
 """
 

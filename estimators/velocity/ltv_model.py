@@ -4,7 +4,7 @@
     A(t) = [-a 1; 0 0],                B = [0 1]',    C = [s0 - s1 a, s1 + s2]                              x = [z V_r]
 
 The third state of P2 is z' = V_r - a z written once more; at constant w it makes the pair unobservable, for both modes
-decay at a (P2 sheet, section 10 item 11), where the two-state form is observable unless a = s0/s1.
+decay at a (P2 notes 6), where the two-state form is observable unless a = s0/s1.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 An axle value is the mean of its wheels that are known, referred to the centre of gravity by the lever arm; the vehicle's
 value is W_f v_f + W_r v_r, W_f + W_r = 1. Fixed weights: P2 (eta_1 = eta_2 = 0.5); P3 takes one axle. By slip: P1 (34),
 (44), in the consistent reading: the printed lambda_am is the same for both axles and does not say which of them loses,
-so the argument is the difference of their slips (P1 sheet, section 11 item 13).
+so the argument is the difference of their slips (P1 notes 11 item 13).
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def to_centre(
     front_weight_x: npt.ArrayLike = 0.5,
     front_weight_y: npt.ArrayLike = 0.5,
 ) -> CentreVelocity:
-    """V_x, V_y from corner velocities in the vehicle frame: P1 (33), (42)-(43), P2 (28), P3 section 3.
+    """V_x, V_y from corner velocities in the vehicle frame: P1 (33), (42)-(43), P2 (28), P3 notes 3.
 
         v_xf = mean over the wheels of V_xc + r y_c        (with both wheels, r y_c cancels: the papers' mean)
         v_yf = -r L_f + mean of V_yc,    v_yr = r L_r + mean of V_yc

@@ -17,7 +17,7 @@ LEAST_SPEED = 0.5
 
 
 def slip_ratio(surface_speed: npt.ArrayLike, wheel_velocity: npt.ArrayLike, least: float = LEAST_SPEED) -> FloatArray:
-    """lambda = (R_e w - v_xt)/max(|R_e w|, |v_xt|, least), P1 section 1; arrays that broadcast, m/s.
+    """lambda = (R_e w - v_xt)/max(|R_e w|, |v_xt|, least), P1 notes 1; arrays that broadcast, m/s.
 
     With |.|, it holds backwards too: the sign is that of the slip velocity, which is that of the force. It is in
     [-1, 1] unless wheel and car move in opposite directions, then in [-2, 2]. NaN where an input is.
@@ -29,7 +29,7 @@ def slip_ratio(surface_speed: npt.ArrayLike, wheel_velocity: npt.ArrayLike, leas
 
 
 def side_slip_angle(along: npt.ArrayLike, across: npt.ArrayLike, least: float = LEAST_SPEED) -> FloatArray:
-    """alpha = atan(v_yt/max(|v_xt|, least)), rad, P1 section 1; `along` v_xt and `across` v_yt broadcast, m/s.
+    """alpha = atan(v_yt/max(|v_xt|, least)), rad, P1 notes 1; `along` v_xt and `across` v_yt broadcast, m/s.
 
     |v_xt|, so that it is opposed to F_y backwards too. NaN where an input is.
     """

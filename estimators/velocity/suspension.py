@@ -4,7 +4,7 @@
 
 With F_q the tire force on the unsprung mass, in the body frame, psi is the displacement of the wheel against the body:
 adding psi' to the velocity of the body at the corner gives that of the wheel centre, which belongs into slips. For the
-centre of gravity psi' must not be added (P3 sheet, section 9 item 11).
+centre of gravity psi' must not be added (P3 notes 9 item 11).
 """
 
 from __future__ import annotations

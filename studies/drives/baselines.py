@@ -19,7 +19,7 @@ def mean_over(values: FloatArray) -> FloatArray:
 def integrated_acceleration(
     ax: FloatArray, yaw_rate: FloatArray, vy: FloatArray, sample_time: float, start: float
 ) -> FloatArray:
-    """V_x(t) = V_x(0) + integral of (a_x + r V_y) dt, m/s, P1 section 5, by the trapezoidal rule.
+    """V_x(t) = V_x(0) + integral of (a_x + r V_y) dt, m/s, P1 notes 5, by the trapezoidal rule.
 
     Drifts with sensor bias and road grade; a missing sample keeps the last known acceleration.
     """

@@ -36,7 +36,7 @@ class Replay:
 
 
 def replay(inputs: CornerInputs, observer: CornerKind, progress: Callable[[float], None] | None = None) -> Replay:
-    """Run the four observers; V_x of the last step enters the corner accelerations of the next, P1 section 6.
+    """Run the four observers; V_x of the last step enters the corner accelerations of the next, P1 notes 6.
 
     They start at rest relative to the road (z = v_r = 0) with the first sample. Wheel accelerations are backward
     differences, so step k moves the estimate from sample k - 1 to k with what is known at k: nothing looks ahead.

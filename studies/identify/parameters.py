@@ -31,7 +31,7 @@ def tire_parameters(found: Identification, direction: str) -> dict[str, Identifi
 
     Not excited: the value of the base set, with two dependent ones that follow the identified ones: sigma0 = C*kappa keeps an
     identified ratio, and sigma1 = T1*sigma0 keeps the damping time of the bristles (a sigma1 made for another sigma0 is
-    another tire: at sigma0/sigma1 = kappa R|w| bristles leave the output, P1 section 11 item 18).
+    another tire: at sigma0/sigma1 = kappa R|w| bristles leave the output, P1 notes 11 item 18).
     """
     tire = found.base.tire[direction]
     base = found.base.id

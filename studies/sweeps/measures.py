@@ -122,7 +122,7 @@ class HinfNorm(MeasureSpec):
 
 
 class SampledRadius(MeasureSpec):
-    """Spectral radius of the runtime's update with a received sample: e^{A_e T} (P1 section 9), or e^{A T} - K C."""
+    """Spectral radius of the runtime's update with a received sample: e^{A_e T} (P1 notes 9), or e^{A T} - K C."""
 
     id: Literal["sampled_radius"]
     limit: ClassVar[float] = 1.0

@@ -19,7 +19,7 @@ PRINTED_TEST = "Printed values are those of the paper's road test with another d
 
 
 def rear_speed(drawn: Measured) -> Array:
-    """V_g (S, B, n), m/s: mean of the rear wheel speeds times the radius, P4 section 4."""
+    """V_g (S, B, n), m/s: mean of the rear wheel speeds times the radius, P4 notes 4."""
     out: Array = (believed(drawn).radius * drawn.signals["wheel_speed"])[..., 2:].mean(axis=-1)
     return out
 

@@ -67,7 +67,7 @@ class Plant:
         self._roll_arm: FloatArray = fleet.height - fleet.roll_center
 
     def slide(self, state: FloatArray, steered: SteerAngles) -> Slide:
-        """Velocities of the wheel centres, P1 section 6, with roll, pitch and the compliance of the suspension."""
+        """Velocities of the wheel centres, P1 notes 6, with roll, pitch and the compliance of the suspension."""
         car, spin = self.fleet, state[B["yaw_rate"]]
         x = state[B["vx"]] - spin * car.y + self._drop * state[B["pitch_speed"]] + state[W["compliance_x_rate"]]
         y = state[B["vy"]] + self._roll_arm * state[B["roll_speed"]] + spin * car.x + state[W["compliance_y_rate"]]

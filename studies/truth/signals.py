@@ -35,7 +35,7 @@ WHEEL_UNITS: Final = {
     "compliance_x_rate": "m/s", "compliance_y_rate": "m/s",
 }  # fmt: skip
 """(B, n, 4) signals, fl fr rl rr. Forces, slips, wheel_vx and wheel_vy (of the wheel centre) in the tire frame. torque:
-drive minus brake as it acted, I_w w' = torque - rolling_torque - R_e force_x. slip, slip_angle as in P1 section 1."""
+drive minus brake as it acted, I_w w' = torque - rolling_torque - R_e force_x. slip, slip_angle as in P1 notes 1."""
 UNITS: Final = {**CAR_UNITS, **WHEEL_UNITS}
 """Unit of every signal."""
 

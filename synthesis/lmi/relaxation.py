@@ -29,7 +29,7 @@ class SosInequality:
     """M(u, x) - margin * I = sum_t w_t(u) (b_t(u) (x) I)' X_t (b_t(u) (x) I) with X_t >= 0, matched at d+1 nodes.
 
     `values` (d+1, k, k, 1+N) holds M at the Chebyshev nodes, `weights` w_t and `bases` b_t at the same nodes.
-    For one variable on [-1, 1] this is exact: w = (1, 1-u^2) for even degree, (1+u, 1-u) for odd (Hol, Scherer; DESIGN).
+    For one variable on [-1, 1] this is exact: w = (1, 1-u^2) for even degree, (1+u, 1-u) for odd (Hol, Scherer).
     """
 
     name: str

@@ -38,7 +38,7 @@ def observer_scale(model: PolynomialModel, parameters: tuple[SchedulingParameter
 def error_scale(A: FloatArray) -> FloatArray:
     """Diagonal balancing of one matrix: rows and columns of the mid-range error matrix get equal norms.
 
-    For the corner models this is sqrt(|c/b|) on the bristle deflection, 150 to 6000 (DESIGN, conditioning).
+    For the corner models this is sqrt(|c/b|) on the bristle deflection, 150 to 6000.
     """
     _, (scaling, _) = matrix_balance(A, permute=False, separate=True)
     return np.asarray(1.0 / scaling)

@@ -26,7 +26,7 @@ def zero_order_hold(A: FloatArray, B: FloatArray, sample_time: float) -> tuple[F
 def closed_loop_update(
     A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, gain: FloatArray, sample_time: float
 ) -> tuple[FloatArray, FloatArray]:
-    r"""x^+ = Phi x^ + Gamma [u; y] of the observer x^' = A x^ + B u + L (y - C x^ - D u) with u, y held (P1 section 9).
+    r"""x^+ = Phi x^ + Gamma [u; y] of the observer x^' = A x^ + B u + L (y - C x^ - D u) with u, y held (P1 notes 9).
 
     The observer runs inside the sample, so the update contracts at any sample time at which A - L C is stable, which
     neither forward Euler nor a sampled innovation does.

@@ -42,7 +42,7 @@ def test_transfer_per_unit_of_acceleration() -> None:
 
 
 def test_sums_hold_for_any_motion() -> None:
-    """Axles add to m a_tz; the two corners of an axle to m_i a_fz (sheet section 11, item 12)."""
+    """Axles add to m a_tz; the two corners of an axle to m_i a_fz (P1 notes 11 item 12)."""
     random = np.random.default_rng(0)
     ax, ay, az, pitch, roll = random.normal([0, 0, 9.81, 0, 0], [3, 4, 0.5, 0.05, 0.08], (200, 5)).T
     for vehicle in (P1, P2, P3):

@@ -1,4 +1,4 @@
-"""What the papers claim on observability: P1 (10)-(12), P2 (24), P3 (9), P4 section IV-A, P5 sections 2 and 3.
+"""What the papers claim on observability: P1 (10)-(12), P2 (24), P3 (9), P4 section IV-A, P5 notes 6.
 
 `reference` names an entry of the shared claims, an independent recomputation.
 """
@@ -242,7 +242,7 @@ def test_p5_force_model_is_observable_only_because_the_rear_longitudinal_force_i
 
 
 def test_p5_stiffness_model_has_generic_rank_three_and_one_when_driving_straight() -> None:
-    """P5 section 3: rank 3 along the recorded drives (reference: P5-ekf-obs)."""
+    """P5 notes 6: rank 3 along the recorded drives (reference: P5-ekf-obs)."""
     model = adaptive_stiffness_model()
     ranges = {"sideslip": (-0.1, 0.1), "front_stiffness_change": (-2e4, 2e4), "rear_stiffness_change": (-2e4, 2e4),
               "steering_angle": (-0.1, 0.1), "yaw_rate": (-0.5, 0.5), "speed": (5.0, 30.0),

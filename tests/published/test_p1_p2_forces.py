@@ -1,4 +1,4 @@
-"""Force estimation: every checkable number of P1 sections 2 to 4 and P2 sections 2 to 4, and the drives beside the checkout.
+"""Force estimation: every checkable number of P1 notes 2 to 4 and P2 notes 2 to 4, and the drives beside the checkout.
 
 Sources: P1 = Hashemi et al., Corner-Based Estimation of Tire Forces and Vehicle Velocities Robust to Road Conditions;
 P2 = Hashemi et al., Longitudinal Speed Estimation Robust to Road Conditions for Ground Vehicles.
@@ -41,7 +41,7 @@ def test_pid_error_matrix_is_hurwitz_with_the_poles_of_the_printed_gains() -> No
 
 
 def test_pid_amplifies_the_fastest_noise_as_derived() -> None:
-    """(2 + a)/(2 - a) = 1.29 at the Nyquist frequency, 1 at rest (P1 section 2)."""
+    """(2 + a)/(2 - a) = 1.29 at the Nyquist frequency, 1 at rest (P1 notes 2)."""
     runner = PidForceObserver(CAR, TIME, stopped_below=1e-9)
     for k in range(400):
         m = 100.0 * (-1) ** k
@@ -100,7 +100,7 @@ def test_sigma_weights_of_both_papers() -> None:
 
 @pytest.mark.parametrize(("kilo", "lag"), [(1.0, 1.0), (1000.0, 0.0015)])
 def test_only_the_reading_in_kilonewtons_can_track_a_lane_change(kilo: float, lag: float) -> None:
-    """P1 section 11: Q = 0.13^2, R = 0.012^2 lag by about 1 s with forces in N, by 1.5 ms in kN."""
+    """P1 notes 11: Q = 0.13^2, R = 0.012^2 lag by about 1 s with forces in N, by 1.5 ms in kN."""
     runner = LateralForceEstimator(CAR, TIME, method="linear", process_deviation=0.13 * kilo)
     runner.filter.reset(covariance=np.eye(3) * (0.13e-3 * kilo) ** 2)
     for _ in range(4000):
@@ -114,7 +114,7 @@ def test_only_the_reading_in_kilonewtons_can_track_a_lane_change(kilo: float, la
 
 @pytest.mark.parametrize(("steer", "time_constant"), [(0.02, 9.0), (0.08, 0.6)])
 def test_front_difference_is_barely_seen_at_small_angles(steer: float, time_constant: float) -> None:
-    """P1 section 11: time constants of 9 s at 0.02 rad and 0.6 s at 0.08 rad, from the decay of an error of dF_yf."""
+    """P1 notes 11: time constants of 9 s at 0.02 rad and 0.6 s at 0.08 rad, from the decay of an error of dF_yf."""
     runner = LateralForceEstimator(CAR, TIME, method="linear", split_deviation=1e7)
     for _ in range(int(3 * time_constant / TIME)):
         found = runner.step(0.0, 0.0, 0.0, steer, np.zeros(4))

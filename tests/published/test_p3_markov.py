@@ -18,7 +18,7 @@ from synthesis.models.parameter_set import load_parameter_set
 
 SET = load_parameter_set("resilient-velocity")
 MODEL = corner_velocity_model(SET, "longitudinal")
-SAMPLE_TIME = 0.005  # s, 200 Hz (P3 section 1)
+SAMPLE_TIME = 0.005  # s, 200 Hz (P3 notes 1)
 PRINTED = SET.tire["longitudinal"].published
 assert PRINTED is not None
 NORMAL, HIGH_SLIP = np.array([PRINTED.gains]), np.array([PRINTED.gains_high_slip])

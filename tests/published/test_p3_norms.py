@@ -46,7 +46,7 @@ def test_fig_2_longitudinal() -> None:
 
 
 def test_fig_2_lateral() -> None:
-    """Published axis 0.995..1.005; values of the recomputation printed to four digits (P3 sheet, section 4)."""
+    """Published axis 0.995..1.005; values of the recomputation printed to four digits (P3 notes 4)."""
     model, gain = observer("lateral")
     both = error_hinf_norm(model, gain, SPEEDS, BOTH).norm
     printed = [1.0026, 1.0019, 1.0013, 1.0006, 1.0000, 0.9993, 0.9987, 0.9981]

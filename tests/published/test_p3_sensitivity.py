@@ -1,4 +1,4 @@
-"""Figs 3-5 of P3: each tire parameter scaled by 0.8 and 1.2. References: P3 sheet section 4, recomputed deviations."""
+"""Figs 3-5 of P3: each tire parameter scaled by 0.8 and 1.2. References: P3 notes 4, recomputed deviations."""
 
 from __future__ import annotations
 

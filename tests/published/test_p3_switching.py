@@ -84,7 +84,7 @@ def test_proposition_1_over_the_range() -> None:
 def test_arbitrary_switching_is_not_proved_by_the_transform_of_proposition_1() -> None:
     """(20) needs lambda_bar < 0: with T = diag(9000, 1) it is +7089 at 40 rad/s and +7174 over the range (claim P3-20)."""
     both = np.stack([modes(SPEEDS, 1)[0], modes(SPEEDS, 2)[0]])
-    assert symmetric_growth(both[1, 40], T) == pytest.approx(3545.0, abs=0.5)  # P3 sheet section 9, item 6
+    assert symmetric_growth(both[1, 40], T) == pytest.approx(3545.0, abs=0.5)  # P3 notes 9 item 6
     assert common_growth(both[:, 40], T) == pytest.approx(2 * 3544.67169, abs=1e-2)
     assert common_growth(both, T) == pytest.approx(7174.077, abs=1e-2)
 
@@ -100,7 +100,7 @@ def test_no_diagonal_transform_serves_both_modes() -> None:
 
 
 def test_no_common_quadratic_function_below_37_rad_s_in_continuous_time() -> None:
-    """The exact 2 x 2 test and the LMI with its refutation agree at every tested speed (P3 sheet section 9, item 6)."""
+    """The exact 2 x 2 test and the LMI with its refutation agree at every tested speed (P3 notes 9 item 6)."""
     first, second = modes(SPEEDS, 1)[0], modes(SPEEDS, 2)[0]
     np.testing.assert_array_equal(pair_margin(first, second) <= 0.0, SPEEDS <= 36.0)
     for speed in (0, 20, 36, 37, 78, 140):
@@ -158,7 +158,7 @@ def test_example_3_arbitrary_loss_is_marginal_at_high_speed(speed) -> None:
 
 @pytest.mark.parametrize(("speed", "rate"), [(1.0, 1.15), (10.0, 1.085), (20.0, 1.03)])
 def test_example_3_arbitrary_loss_grows_at_low_speed(speed, rate) -> None:
-    """One update after several drops expands: `marginally stable` fails (rates of the sheet, section 9, item 9)."""
+    """One update after several drops expands: `marginally stable` fails (P3 notes 9 item 9)."""
     found = joint_spectral_radius(sampled(speed, 1, 0), tolerance=1e-5)
     assert found.closed
     assert found.lower >= rate

@@ -84,7 +84,7 @@ def test_well_posed_design_lies_in_the_published_ranges(model: LpvModel, gains: 
 
 
 def test_friction_gain_has_the_floor_one_for_every_gain(model: LpvModel) -> None:
-    """Static gain of friction to velocity error: -sigma0/(sigma0 + sigma2 a), whatever L (P1 section 6)."""
+    """Static gain of friction to velocity error: -sigma0/(sigma0 + sigma2 a), whatever L (P1 notes 6)."""
     rng = np.random.default_rng(3)
     grid = np.linspace(0.0, 140.0, 15)
     a = 8.32 * 0.33 * grid

@@ -71,7 +71,7 @@ def test_closed_loop_update_is_the_observer_integrated_over_one_sample() -> None
 
 @pytest.mark.parametrize("direction", ["longitudinal", "lateral"])
 def test_the_exact_update_contracts_where_the_obvious_ones_do_not(direction: str) -> None:
-    """P1 section 9: with printed gains at 200 Hz, forward Euler is unstable at low speed longitudinally, and a sampled
+    """P1 notes 9: with printed gains at 200 Hz, forward Euler is unstable at low speed longitudinally, and a sampled
     innovation is unstable; the exact closed-loop update has the spectral radius exp(T max Re(pole)) < 1 everywhere."""
     model, published = corner("corner-estimation", direction)  # type: ignore[arg-type]
     assert published.gains is not None

@@ -74,7 +74,7 @@ def test_steps_are_the_published_recursion() -> None:
 
 
 def test_structured_noise_gives_the_gains_of_the_sheet() -> None:
-    """P2 sheet, section 10 item 10, at 40 rad/s: K_V 0.47, poles 0.23; high slip 0.036 and 0.59, 0.63, 0.77.
+    """P2 notes 10, at 40 rad/s: K_V 0.47, poles 0.23; high slip 0.036 and 0.59, 0.63, 0.77.
 
     The poles of the observable part are recomputed here; the hidden one is e^(-kappa R w T) = 0.59.
     """

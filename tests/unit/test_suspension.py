@@ -15,7 +15,7 @@ PARAMETERS = SuspensionParameters()
 
 
 def test_published_frequencies() -> None:
-    """P3 sheet, section 3: 80.8 rad/s and damping ratio 0.50 along, 123.4 rad/s and 0.33 across."""
+    """P3 notes 3: 80.8 rad/s and damping ratio 0.50 along, 123.4 rad/s and 0.33 across."""
     p = PARAMETERS
     for stiffness, damping, frequency, ratio in (
         (p.stiffness_x, p.damping_x, 80.8, 0.50),

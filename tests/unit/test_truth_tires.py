@@ -54,7 +54,7 @@ def test_lugre_steady_slip(slip: float) -> None:
 
 
 def test_lugre_small_slip_slopes() -> None:
-    """sigma_0/kappa + sigma_2 V: 76 along and 14.1 across for the tire of P1 (its sheet, section 5), at 1 m/s."""
+    """sigma_0/kappa + sigma_2 V: 76 along and 14.1 across for the tire of P1 (P1 notes 5), at 1 m/s."""
     slope = lugre(corners(1e-7, 1e-7), 1.0, 1.0) / 1e-7
     assert slope == pytest.approx([632.1 / 8.32, 181.5 / 12.84], abs=0.01)
 

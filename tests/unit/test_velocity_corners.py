@@ -43,7 +43,7 @@ def test_corner_acceleration_is_the_derivative_of_the_corner_velocity() -> None:
 
 
 def test_the_steering_rate_that_the_paper_leaves_out_is_not_small() -> None:
-    """0.3 rad/s at 12 m/s are 3.6 m/s^2 (P1 sheet, section 6)."""
+    """0.3 rad/s at 12 m/s are 3.6 m/s^2 (P1 notes 6)."""
     m = {key: np.array(0.0) for key in ("vy", "r", "dr", "ax", "ay")} | {"vx": np.array(12.0)}
     m["steer"], rate = np.zeros(4), np.array([0.3, 0.3, 0.0, 0.0])
     np.testing.assert_allclose((accelerated(m, rate) - accelerated(m, 0 * rate))[:, 1], [-3.6, -3.6, 0, 0], atol=1e-12)

@@ -56,7 +56,7 @@ def test_second_moment_of_the_error(name: str, speed: float, probability: float,
 
 
 def test_beyond_the_critical_probability_the_error_grows() -> None:
-    """P3 sheet, section 6: p_cr = 0.64 at 5 rad/s; below it the mean square falls, above it grows."""
+    """P3 notes 6: p_cr = 0.64 at 5 rad/s; below it the mean square falls, above it grows."""
     modes = sampled_modes(SCHEDULES["resilient-longitudinal"], 5.0)
     below, above = drop_radius(*modes, [0.55, 0.75])
     assert below < 1.0 < above

@@ -24,7 +24,7 @@ def _update(formula: Callable[[FloatArray, FloatArray, FloatArray], ArrayLike]) 
 
 
 exact_closed_loop = _update(lambda A, LC, T: EYE + (T * (A - LC)) @ phi_of(T * (A - LC)))
-"""e^{(A - L C) T}: the observer integrated inside the sample, as the runtime does (P1 section 9)."""
+"""e^{(A - L C) T}: the observer integrated inside the sample, as the runtime does (P1 notes 9)."""
 BREAKABLE: dict[str, Update] = {
     "forward Euler": _update(lambda A, LC, T: EYE + T * (A - LC)),
     # e^{A T} - int_0^T e^{A s} ds L C: the open loop exactly, the innovation computed once and held (P3 (10), literally)

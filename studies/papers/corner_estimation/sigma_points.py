@@ -144,7 +144,7 @@ def weight_figure() -> Figure:
     return Figure(
         "sigma-weights",
         "What the sigma point weights of the mean add up to, as printed and corrected, in both papers; the line "
-        "marks one, without which every predicted mean is off by that factor. P1 section 3, P2 section 3.",
+        "marks one, without which every predicted mean is off by that factor. P1 notes 3, P2 notes 3.",
         "Bars: the printed weights add up to 9 for three states and 11/3 for one, the corrected ones to 1.",
         Panel(marks, x, "sum of the mean weights [1]", legend="upper right"),
         size=(4.8, 3.0),

@@ -27,8 +27,8 @@ def corner_velocity_model(
     mu = (sigma0 - sigma1 a) z + (sigma1 + sigma2) v_r + sigma1 d_friction + n  (P1 (23); P3 (6))
 
     u is R_e omega' - v_xt' (longitudinal) or -v_yt' (lateral); v_r is R_e omega - v_xt or -v_yt. The disturbance
-    `friction` stands for -sigma0 |v_r| z / (theta g) (bounded, P1 section 11 item 6); `force_noise` n is the error of the
-    normalised force. The absolute value of P1 (18), (20) is kept throughout (P1 section 11 item 5).
+    `friction` stands for -sigma0 |v_r| z / (theta g) (bounded, P1 notes 11 item 6); `force_noise` n is the error of the
+    normalised force. The absolute value of P1 (18), (20) is kept throughout (P1 notes 11 item 5).
     """
     if direction not in parameters.tire:
         raise ModelError(f"parameter set '{parameters.id}': {unknown('tire direction', direction, parameters.tire)}")
