@@ -72,7 +72,7 @@ ClaimFunction = Callable[[], Finding]
 """Computes one claim from the models and analyses; takes nothing and reads no stored result."""
 
 
-def judged(holds: bool, otherwise: ClaimVerdict = ClaimVerdict.NOT_REPRODUCED) -> ClaimVerdict:
+def reproduced(holds: bool, otherwise: ClaimVerdict = ClaimVerdict.NOT_REPRODUCED) -> ClaimVerdict:
     """REPRODUCED when the computed value ``holds``, else ``otherwise``: a verdict follows from a comparison."""
     return ClaimVerdict.REPRODUCED if holds else otherwise
 

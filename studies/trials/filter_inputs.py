@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from studies.trials.play import believed
+from studies.trials.estimation import assumed_car
 from studies.truth import Measured
 
 Array = npt.NDArray[np.float64]
@@ -20,7 +20,7 @@ PRINTED_TEST = "Printed values are those of the paper's road test with another d
 
 def rear_speed(drawn: Measured) -> Array:
     """V_g (S, B, n), m/s: mean of the rear wheel speeds times the radius, P4 notes 4."""
-    out: Array = (believed(drawn).radius * drawn.signals["wheel_speed"])[..., 2:].mean(axis=-1)
+    out: Array = (assumed_car(drawn).radius * drawn.signals["wheel_speed"])[..., 2:].mean(axis=-1)
     return out
 
 

@@ -14,9 +14,9 @@ from estimators.vehicle import CORNERS, VehicleParameters
 from studies.plots import Figure, Line, Panel, colours
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import nrms, spread
-from studies.trials.driven import LUGRE
+from studies.trials.estimation import Parts, Reading, measured_runs, run_of, run_pipeline
 from studies.trials.histories import history
-from studies.trials.play import Parts, Reading, measured_runs, play, run_of
+from studies.trials.simulations import LUGRE
 from studies.truth import Truth
 
 Array = npt.NDArray[np.float64]
@@ -33,7 +33,7 @@ READINGS: dict[str, Reading] = {
 
 
 @dataclass(frozen=True)
-class Driven:
+class ForceTest:
     """A manoeuvre, its name in the paper, and the printed NRMS in % by (signal, place, method)."""
 
     manoeuvre: str
@@ -47,12 +47,12 @@ def differentiated_pid(car: VehicleParameters, sample_time: float, shape: tuple[
 
 
 def force_part(
-    name: str, rows: Sequence[Driven], methods: Mapping[str, Parts], scope: Scope, tire: str = LUGRE
+    name: str, rows: Sequence[ForceTest], methods: Mapping[str, Parts], scope: Scope, tire: str = LUGRE
 ) -> PartResult:
     """Every manoeuvre with each of the paper's wheel force observers in the pipeline; F_y and F_z from the first one."""
     drawn = measured_runs([row.manoeuvre for row in rows], tire, scope)
     truth = drawn.truth
-    estimates = {method: play(drawn, READINGS, parts) for method, parts in methods.items()}
+    estimates = {method: run_pipeline(drawn, READINGS, parts) for method, parts in methods.items()}
     first = next(iter(estimates.values()))
     table: list[list[Cell]] = []
     measures: dict[str, float] = {}
@@ -94,7 +94,7 @@ def _true(truth: Truth, key: str, run: int) -> Array:
     return np.asarray(truth[key][run])
 
 
-def _history(name: str, truth: Truth, row: Driven, estimates: Mapping[str, Array]) -> Figure:
+def _history(name: str, truth: Truth, row: ForceTest, estimates: Mapping[str, Array]) -> Figure:
     run, samples = run_of(truth, row.manoeuvre)
     time = truth.time[samples]
     panels = []

@@ -12,9 +12,9 @@ from estimators.vehicle import CORNERS, GRAVITY
 from studies.plots import Axis, Figure, Line, Panel, dots
 from studies.plots.colours import BLUE, ORANGE, RED
 from studies.study import Cell, PartResult, Scope, Table
-from studies.trials.driven import LUGRE, driven
+from studies.trials.estimation import run_of
 from studies.trials.histories import history
-from studies.trials.play import run_of
+from studies.trials.simulations import LUGRE, simulated_truth
 from studies.truth import Truth, load_manoeuvre
 
 Array = npt.NDArray[np.float64]
@@ -25,7 +25,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class Moved:
+class MotionTest:
     """A manoeuvre, its name in the paper, and whether the paper draws path and g-g diagram, or the rear wheels, of it."""
 
     manoeuvre: str
@@ -34,21 +34,21 @@ class Moved:
     rear: bool = False
 
 
-def motion_part(name: str, rows: Sequence[Moved], scope: Scope, tire: str = LUGRE) -> PartResult:
+def motion_part(name: str, rows: Sequence[MotionTest], scope: Scope, tire: str = LUGRE) -> PartResult:
     """Histories, diagrams and extremes of every manoeuvre; nothing is estimated."""
-    truth = driven(tuple(row.manoeuvre for row in rows), tire, scope)
+    truth = simulated_truth(tuple(row.manoeuvre for row in rows), tire, scope)
     drawings = [drawing for row in rows for drawing in motion_drawings(name, truth, row)]
     return PartResult(tables=[extremes(f"{name}-extremes", truth, rows)], figures=drawings)
 
 
-def motion_drawings(name: str, truth: Truth, row: Moved) -> list[Figure]:
+def motion_drawings(name: str, truth: Truth, row: MotionTest) -> list[Figure]:
     """The history of one manoeuvre, and what else the paper draws of it."""
     extra = [(_course, "course")] * row.course + [(_rear_wheels, "rear")] * row.rear
     found = [_history(f"{name}-{row.manoeuvre}", truth, row)]
     return found + [draw(f"{name}-{what}-{row.manoeuvre}", truth, row) for draw, what in extra]
 
 
-def extremes(name: str, truth: Truth, rows: Sequence[Moved]) -> Table:
+def extremes(name: str, truth: Truth, rows: Sequence[MotionTest]) -> Table:
     """How hard each manoeuvre is, beside what the paper says of it."""
     table: list[list[Cell]] = []
     for row in rows:
@@ -73,7 +73,7 @@ def _signals(truth: Truth, manoeuvre: str) -> tuple[Array, ...]:
     return vx, ax, ay, np.degrees(turn), np.degrees(truth["steer"][k, samples, 0])
 
 
-def _history(name: str, truth: Truth, row: Moved) -> Figure:
+def _history(name: str, truth: Truth, row: MotionTest) -> Figure:
     vx, ax, ay, turn, steer = _signals(truth, row.manoeuvre)
     time = truth.time[: vx.size]
     pull = [Line(time, ax, "$a_x$", BLUE, width=1.2), Line(time, ay, "$a_y$", RED, "dashed", 1.2)]
@@ -92,7 +92,7 @@ def _history(name: str, truth: Truth, row: Moved) -> Figure:
     )
 
 
-def _course(name: str, truth: Truth, row: Moved) -> Figure:
+def _course(name: str, truth: Truth, row: MotionTest) -> Figure:
     k, samples = run_of(truth, row.manoeuvre)
     _, ax, ay, _, _ = _signals(truth, row.manoeuvre)
     path = [Line(truth["x"][k, samples], truth["y"][k, samples], color=BLUE, width=1.3), dots(0.0, 0.0, color=BLUE)]
@@ -110,7 +110,7 @@ def _course(name: str, truth: Truth, row: Moved) -> Figure:
     )
 
 
-def _rear_wheels(name: str, truth: Truth, row: Moved) -> Figure:
+def _rear_wheels(name: str, truth: Truth, row: MotionTest) -> Figure:
     k, samples = run_of(truth, row.manoeuvre)
     time = truth.time[samples]
     panels: list[Panel] = []

@@ -16,9 +16,9 @@ from estimators.velocity import FusionSettings, SlipWeights, VelocityFusion
 from studies.plots import Axis, Figure, Line, Mark, Panel, colours, dots
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import Spread, nrms, spread
-from studies.trials.driven import LUGRE
+from studies.trials.estimation import INTEGRATED, WHEELS, Parts, Reading, baselines, measured_runs, run_of, run_pipeline
 from studies.trials.histories import error_dots, history, row_axis, truth_line
-from studies.trials.play import INTEGRATED, WHEELS, Parts, Reading, baselines, measured_runs, play, run_of
+from studies.trials.simulations import LUGRE
 from studies.truth import Measured
 from synthesis.models.parameter_set import load_parameter_set
 
@@ -37,7 +37,7 @@ USED = 0.6
 
 
 @dataclass(frozen=True)
-class Printed:
+class VelocityTest:
     """A row of a paper's table of velocity errors: the manoeuvre here, its name there, NRMS in % and peaks in m/s."""
 
     manoeuvre: str
@@ -94,11 +94,11 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def velocity_part(name: str, rows: Sequence[Printed], parts: Parts, scope: Scope, tire: str = LUGRE) -> PartResult:
+def velocity_part(name: str, rows: Sequence[VelocityTest], parts: Parts, scope: Scope, tire: str = LUGRE) -> PartResult:
     """Errors of every manoeuvre of ``rows`` over the seeds of ``scope``, beside the printed ones."""
     drawn = measured_runs([row.manoeuvre for row in rows], tire, scope)
     truth = drawn.truth
-    estimates = play(drawn, READINGS, parts) | baselines(drawn)
+    estimates = run_pipeline(drawn, READINGS, parts) | baselines(drawn)
     sources = {"vx": {FUSION: "vx", OWN: "own_vx", WHEELS: WHEELS, INTEGRATED: INTEGRATED},
                "vy": {FUSION: "vy", OWN: "own_vy"}}  # fmt: skip
     table: list[list[Cell]] = []
@@ -129,7 +129,7 @@ def velocity_part(name: str, rows: Sequence[Printed], parts: Parts, scope: Scope
     return PartResult(tables=[Table(f"{name}-errors", caption, COLUMNS, table)], figures=drawings, measures=measures)
 
 
-def _dots(name: str, rows: Sequence[Printed], found: Mapping[str, Sequence[Mapping[str, Spread]]]) -> Figure:
+def _dots(name: str, rows: Sequence[VelocityTest], found: Mapping[str, Sequence[Mapping[str, Spread]]]) -> Figure:
     panels = []
     for signal, errors in found.items():
         marks = error_dots(errors, LOOKS)
@@ -150,7 +150,7 @@ def _dots(name: str, rows: Sequence[Printed], found: Mapping[str, Sequence[Mappi
     )  # fmt: skip
 
 
-def _history(name: str, drawn: Measured, row: Printed, estimates: Mapping[str, Array]) -> Figure:
+def _history(name: str, drawn: Measured, row: VelocityTest, estimates: Mapping[str, Array]) -> Figure:
     truth = drawn.truth
     run, samples = run_of(truth, row.manoeuvre)
     time = truth.time[samples]

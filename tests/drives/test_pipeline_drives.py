@@ -64,7 +64,7 @@ def piped(runs: Runs) -> tuple[dict[str, FloatArray], FlagArray]:
     return {name: np.stack(row, axis=2) for name, row in rows.items()}, np.stack(failed, axis=2)
 
 
-def judged(value: FloatArray, reference: FloatArray) -> FloatArray:
+def reproduced(value: FloatArray, reference: FloatArray) -> FloatArray:
     """NRMS % (seeds, columns) from (seeds, n, columns) and (n, columns)."""
     n = reference.shape[0]
     large = np.abs(reference) > LEAST_FORCE
@@ -96,9 +96,9 @@ def all_found() -> Found:
         log.signals.update(log.reference)
         across = four(log, "force_y")
         axles = across.reshape(-1, 2, 2).sum(axis=-1)
-        force["force_x"].append(judged(estimates["force_x"][row], four(log, "force_x")))
-        force["force_z"].append(judged(estimates["force_z"][row], four(log, "force_z")))
-        force["force_y"].append(judged(estimates["axle_force_y"][row], axles))
+        force["force_x"].append(reproduced(estimates["force_x"][row], four(log, "force_x")))
+        force["force_z"].append(reproduced(estimates["force_z"][row], four(log, "force_z")))
+        force["force_y"].append(reproduced(estimates["axle_force_y"][row], axles))
     return Found(found, {name: np.stack(rows) for name, rows in force.items()}, failed)
 
 

@@ -7,10 +7,10 @@ import pytest
 
 from studies.papers.longitudinal_speed.observability import gramian_rank
 from studies.papers.longitudinal_speed.truth_records import begun, rank_table, start_table, wheel_record
-from studies.trials.motion import Moved
+from studies.trials.motion import MotionTest
 from studies.truth import Truth, load_manoeuvre
 
-ROW = Moved("p2-launch-dry", "launch")
+ROW = MotionTest("p2-launch-dry", "launch")
 STANDING, RAMP, STEP = 0.2, 150.0, 0.005  # s, rad/s^2, s
 
 

@@ -7,13 +7,13 @@ import pytest
 
 from studies.plots import Line
 from studies.study import PartResult
-from studies.trials.motion import COLUMNS, Moved, extremes, motion_drawings
+from studies.trials.motion import COLUMNS, MotionTest, extremes, motion_drawings
 from studies.truth import Truth, load_manoeuvre
 from synthesis.errors import SpecError
 from tests.unit.study_checks import check_result
 
 SPEED, TURN, STEER = 12.0, 0.25, 0.05  # m/s, rad/s, rad
-ROW = Moved("p4-bends-dry", "Bends", course=True, rear=True)
+ROW = MotionTest("p4-bends-dry", "Bends", course=True, rear=True)
 
 
 @pytest.fixture
@@ -60,4 +60,4 @@ def test_figures_stand_on_their_own_and_show_the_path(circle: Truth) -> None:
 
 def test_a_manoeuvre_that_was_not_driven_is_refused(circle: Truth) -> None:
     with pytest.raises(SpecError, match="was not driven"):
-        extremes("extremes", circle, (Moved("p5-slalom", "Slalom"),))
+        extremes("extremes", circle, (MotionTest("p5-slalom", "Slalom"),))

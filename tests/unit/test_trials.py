@@ -12,9 +12,9 @@ from studies.plots import ErrorBars, Panel, Shade
 from studies.registry import MODULES, load_study
 from studies.study import PartResult, Scope
 from studies.trials.accuracy import Spread, known_spread, nrms, sample_spreads, spread
-from studies.trials.driven import DRIVEN, LUGRE, MAGIC_FORMULA, driven, driven_part
+from studies.trials.estimation import assumed_car, baselines, measured, run_of, run_pipeline
 from studies.trials.histories import backgrounds, dot_heights, error_dots, history
-from studies.trials.play import baselines, believed, measured, play, run_of
+from studies.trials.simulations import LUGRE, MAGIC_FORMULA, SIMULATIONS, simulated_truth, trial_part
 from studies.trials.velocities import USED, side_slip_curve
 from studies.truth import PERFECT, Truth, load_manoeuvre, simulate_manoeuvres
 from studies.truth.record import read_truth, write_truth
@@ -27,7 +27,7 @@ SECONDS = 1.5
 
 @pytest.fixture(scope="module")
 def truth() -> Truth:
-    return driven(NAMES, LUGRE, SHORT, SECONDS)
+    return simulated_truth(NAMES, LUGRE, SHORT, SECONDS)
 
 
 def same(one: Truth, other: Truth) -> bool:
@@ -56,28 +56,28 @@ def test_a_truth_of_other_cars_or_of_no_folder_is_refused(truth: Truth, tmp_path
 def test_prepared_drives_are_those_that_are_driven_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Other runs in the batch change nothing but round-off, which saturated tires amplify."""
     shipped = {name: Path(f"{name}.toml") for name in (*NAMES, "p3-launch-split")}
-    monkeypatch.setattr("studies.trials.driven.shipped_manoeuvres", lambda: shipped)
-    monkeypatch.setattr("studies.trials.driven.QUICK_SECONDS", SECONDS)
-    folder = tmp_path / DRIVEN[LUGRE].name
+    monkeypatch.setattr("studies.trials.simulations.shipped_manoeuvres", lambda: shipped)
+    monkeypatch.setattr("studies.trials.simulations.QUICK_SECONDS", SECONDS)
+    folder = tmp_path / SIMULATIONS[LUGRE].name
     folder.mkdir()
-    DRIVEN[LUGRE].run(SHORT, folder)
+    SIMULATIONS[LUGRE].run(SHORT, folder)
     scope = replace(SHORT, prepared=tmp_path)
-    chosen = driven(NAMES[::-1], LUGRE, scope, 0.5)
+    chosen = simulated_truth(NAMES[::-1], LUGRE, scope, 0.5)
     assert chosen.names == NAMES[::-1] and chosen.time[-1] == pytest.approx(0.5) and set(chosen.tires) == {LUGRE}
-    alone = driven(NAMES[::-1], LUGRE, SHORT, 0.5)
+    alone = simulated_truth(NAMES[::-1], LUGRE, SHORT, 0.5)
     for name, value in alone.signals.items():
         np.testing.assert_allclose(chosen[name], value, rtol=1e-6, atol=1e-6, err_msg=name)
-    with pytest.raises(SpecError, match=r"magic-formula-tires.*driven_part"):
-        driven(NAMES, MAGIC_FORMULA, scope)
+    with pytest.raises(SpecError, match=r"magic-formula-tires.*trial_part"):
+        simulated_truth(NAMES, MAGIC_FORMULA, scope)
 
 
 def test_a_full_drive_is_not_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[float] = []
     monkeypatch.setattr(
-        "studies.trials.driven.simulate_manoeuvres", lambda runs: asked.extend(m.duration for m in runs)
+        "studies.trials.simulations.simulate_manoeuvres", lambda runs: asked.extend(m.duration for m in runs)
     )
-    driven(NAMES, LUGRE, Scope(), 0.5)
-    driven(NAMES, LUGRE, SHORT, 0.5)
+    simulated_truth(NAMES, LUGRE, Scope(), 0.5)
+    simulated_truth(NAMES, LUGRE, SHORT, 0.5)
     assert asked == [load_manoeuvre(name).duration for name in NAMES] + [0.5, 0.5]
 
 
@@ -85,7 +85,7 @@ def test_a_full_drive_is_not_cut(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_parts_on_drives_name_their_need_and_run_on_it(study: str) -> None:
     for part in load_study(study).parts:
         for need in part.needs:
-            assert DRIVEN[part.run.keywords["tire"]] is need  # type: ignore[attr-defined]
+            assert SIMULATIONS[part.run.keywords["tire"]] is need  # type: ignore[attr-defined]
 
 
 def test_a_part_gets_the_tire_that_it_needs() -> None:
@@ -95,26 +95,26 @@ def test_a_part_gets_the_tire_that_it_needs() -> None:
         seen.append((scope, tire))
         return PartResult()
 
-    part = driven_part("p", "P", run, 1.0, MAGIC_FORMULA)
+    part = trial_part("p", "P", run, 1.0, MAGIC_FORMULA)
     part.run(SHORT)
-    assert seen == [(SHORT, MAGIC_FORMULA)] and part.needs == (DRIVEN[MAGIC_FORMULA],) and not part.quick
+    assert seen == [(SHORT, MAGIC_FORMULA)] and part.needs == (SIMULATIONS[MAGIC_FORMULA],) and not part.quick
 
 
 def test_perfect_sensors_leave_small_errors_and_biased_ones_do_not(truth: Truth) -> None:
     row, samples = run_of(truth, "p1-lane-change-dry")
     true = truth["vx"][row, samples]
     drawn = measured(truth, range(2), PERFECT)
-    exact = play(drawn, {"vx": lambda step: step.vx})["vx"][:, row, samples]
+    exact = run_pipeline(drawn, {"vx": lambda step: step.vx})["vx"][:, row, samples]
     assert nrms(exact, true).max() < 0.5
     halved = replace(drawn, signals=drawn.signals | {"wheel_speed": 0.5 * drawn.signals["wheel_speed"]})
-    wrong = play(halved, {"vx": lambda step: step.vx})["vx"][:, row, samples]
+    wrong = run_pipeline(halved, {"vx": lambda step: step.vx})["vx"][:, row, samples]
     assert nrms(wrong, true).min() > 20.0
 
 
 def test_baselines_follow_their_formulas(truth: Truth) -> None:
     drawn = measured(truth, range(1), PERFECT)
     found = baselines(drawn)
-    radius, ax, time = believed(drawn).radius, drawn.signals["ax"], drawn.sample_time
+    radius, ax, time = assumed_car(drawn).radius, drawn.signals["ax"], drawn.sample_time
     k = 100
     assert found["mean wheel speed"][0, 0, k] == pytest.approx(np.mean(radius * drawn.signals["wheel_speed"][0, 0, k]))
     start = np.mean(radius * drawn.signals["wheel_speed"][0, 0, 0])
@@ -126,7 +126,7 @@ def test_runs_of_different_cars_are_not_played_together() -> None:
         [load_manoeuvre(n).model_copy(update={"duration": 0.05}) for n in ("p1-launch-split", "p4-bends-dry")]
     )
     with pytest.raises(SpecError, match="p1-launch-split, p4-bends-dry drive different cars"):
-        believed(measured(both, range(1), PERFECT))
+        assumed_car(measured(both, range(1), PERFECT))
     with pytest.raises(SpecError, match="manoeuvre 'p9' was not driven"):
         run_of(both, "p9")
 

@@ -16,7 +16,7 @@ from studies.plots import Axis, ErrorBars, Figure, Line, Mark, Panel
 from studies.plots.colours import FUSION, INTEGRATED_ACCELERATION, MEAN_WHEEL_SPEED, OWN_OBSERVERS, ROADS
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import Spread, nrms, spread
-from studies.trials.play import Reading, baselines, measured, play, run_of
+from studies.trials.estimation import Reading, baselines, measured, run_of, run_pipeline
 from studies.trials.sensors import TEST_CAR
 from studies.trials.velocities import corner_observers
 from studies.truth import Truth, load_manoeuvre, simulate_manoeuvres
@@ -82,7 +82,7 @@ def launches(scope: Scope) -> list[Launch]:
     """The estimates on all roads, computed in one batch."""
     truth = launched(scope.quick)
     drawn = measured(truth, range(scope.seeds), TEST_CAR)
-    estimates = play(drawn, READINGS, corner_observers("corner-estimation"))
+    estimates = run_pipeline(drawn, READINGS, corner_observers("corner-estimation"))
     velocities = {name: estimates[name] for name in ("fusion", "corner observers")} | baselines(drawn)
     values = load_parameter_set("corner-estimation")
     tire, car = values.tire["longitudinal"], truth.vehicles[0]

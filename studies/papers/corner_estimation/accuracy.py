@@ -9,7 +9,7 @@ import numpy as np
 import sympy as sp
 
 from estimators.velocity.mapping import SlipWeights
-from studies.claim import Finding, judged
+from studies.claim import Finding, reproduced
 from studies.papers.corner_estimation.inputs import PACKAGE
 from studies.papers.published import printed_numbers
 from studies.papers.topic import Topic
@@ -38,7 +38,7 @@ def velocity_table(rows: Sequence[Sequence[Any]] | None = None) -> Finding:
         f"Of {2 * len(table)} printed velocity errors {len(above)} exceed {limit:g} %: {shown}. Largest by drive: "
         f"{', '.join(f'{drive} {value:g} %' for drive, value in largest.items())}."
     )
-    return Finding(computed, judged(not above), reading)
+    return Finding(computed, reproduced(not above), reading)
 
 
 @TOPIC.claim("P1-34")

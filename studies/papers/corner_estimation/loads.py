@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from analysis.loads import Loads, vertical_loads
-from studies.claim import Finding, judged
+from studies.claim import Finding, reproduced
 from studies.papers.corner_estimation.inputs import PACKAGE, PRINTED_GRAVITY, parameters
 from studies.papers.topic import Topic
 from studies.plots import DASHES, ZERO, Figure, Line, Panel
@@ -75,7 +75,7 @@ def load_formulas(assumed: ParameterSet | None = None) -> Finding:
         f"{abs(conflict['angles_reversed']):.0f} m/s^2 across. (17) takes h_rc as lever of the lateral shift, where "
         f"the roll arm is {conflict['lever_of_the_lateral_shift_m']:.2f} m."
     )
-    return Finding(computed, judged(worst <= TOLERANCE), reading)
+    return Finding(computed, reproduced(worst <= TOLERANCE), reading)
 
 
 def _corners(loads: Loads) -> dict[str, float]:

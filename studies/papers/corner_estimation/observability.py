@@ -10,7 +10,7 @@ import sympy as sp
 from analysis.observability.matrix import ObservabilityMatrix, observability_matrix, observability_of, rate_symbol
 from analysis.observability.rank_loss import rank_loss
 from estimators.arrays import FloatArray
-from studies.claim import Finding, judged
+from studies.claim import Finding, reproduced
 from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner, parameters
 from studies.papers.topic import Topic
 from studies.plots import ZERO, Axis, Band, Figure, Line, Mark, Panel, Words, dots
@@ -62,7 +62,7 @@ def lateral_force_rank(third_output: str = "yaw_acceleration") -> Finding:
         f"of the front forces is hidden. Steering through straight ahead shows it (rank {found['through_straight']}). "
         f"With r itself as third output, as printed, the yaw row is missing and the rank is {without['steering']}."
     )
-    return Finding(computed, judged(only_sine and found["steering"] == 3 and found["straight"] == 2), reading)
+    return Finding(computed, reproduced(only_sine and found["steering"] == 3 and found["straight"] == 2), reading)
 
 
 @TOPIC.part("observability", "Observability of forces and velocities", 3.0)

@@ -11,7 +11,7 @@ import sympy as sp
 from numpy.typing import ArrayLike
 
 from estimators.arrays import FloatArray
-from studies.claim import Finding, JsonValue, judged
+from studies.claim import Finding, JsonValue, reproduced
 from studies.papers.corner_estimation.inputs import CORNERS, DESIGN_SPEED, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner
 from studies.papers.topic import Topic
 from studies.papers.verdicts import partly
@@ -122,7 +122,7 @@ def primal(direction: Direction, matrix: Coefficients | None = None) -> Finding:
         reading += (
             " The large entry weighs the velocity, where a P of these dynamics must weigh the bristle deflection."
         )
-    return Finding(computed, judged(inside.everywhere), reading)
+    return Finding(computed, reproduced(inside.everywhere), reading)
 
 
 def dual(direction: Direction, matrix: Coefficients | None = None) -> Finding:
@@ -186,7 +186,7 @@ def printed_slopes_are_multi_convex(slopes: dict[Direction, list[list[str]]] | N
         f"{shown}. Of {len(lowest)} readings (two matrices, as printed, exchanged, dual, adjugate) "
         f"{sum(low >= 0.0 for low in lowest)} meet it."
     )
-    return Finding(computed, judged(all(holds)), reading)
+    return Finding(computed, reproduced(all(holds)), reading)
 
 
 @TOPIC.part("printed-lyapunov", "What the printed Lyapunov matrices prove", 2.0)

@@ -15,7 +15,7 @@ import numpy as np
 import sympy as sp
 
 from estimators.arrays import FloatArray
-from studies.claim import Finding, JsonValue, judged
+from studies.claim import Finding, JsonValue, reproduced
 from studies.papers.corner_estimation.inputs import CORNERS, DESIGNS, PACKAGE, STATED_SPEED, Corner
 from studies.papers.topic import Topic
 from studies.plots import Box as Outline
@@ -124,7 +124,7 @@ def printed_gains_are_stable(gains: dict[Corner, tuple[float, ...]] | None = Non
         f"{STATED_SPEED:g} rad/s for any rate: plain quadratic stability holds already, the affine form and "
         "multi-convexity are not needed."
     )
-    return Finding(computed, judged(all(holds)), reading)
+    return Finding(computed, reproduced(all(holds)), reading)
 
 
 @TOPIC.claim("P1-aqs-box")
@@ -152,7 +152,7 @@ def printed_boxes_are_stable(boxes: dict[Direction, Box] | None = None) -> Findi
         )
         + f"The slowest pole on a grid is {x['slowest_pole_1_s']:.3g} and {y['slowest_pole_1_s']:.3g} 1/s."
     )
-    return Finding(computed, judged(proved), reading)
+    return Finding(computed, reproduced(proved), reading)
 
 
 def gain_grid(box: Box, points: int) -> tuple[FloatArray, FloatArray]:

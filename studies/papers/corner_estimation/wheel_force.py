@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.bounds.forces import force_observer_bound, wheel_error_is_hurwitz, wheel_error_matrix
 from estimators.arrays import FloatArray
-from studies.claim import Finding, agrees, judged
+from studies.claim import Finding, agrees, reproduced
 from studies.papers.corner_estimation.inputs import PACKAGE, parameters
 from studies.papers.topic import Topic
 from studies.plots import DASHES, Axis, Figure, Level, Line, Mark, Panel, Shade
@@ -44,7 +44,7 @@ def wheel_error(gains: tuple[float, float] = (ETA1, ETA2)) -> Finding:
         f"K is {'' if stable else 'not '}Hurwitz with poles {real:.8f} +- {imaginary:.8f}j 1/s: slow and hardly damped "
         f"({size:.3g} rad/s, damping ratio {-real / size:.3f}), so a wrong initial wheel speed rings for half a minute."
     )
-    return Finding(computed, judged(stable and real < 0.0), reading)
+    return Finding(computed, reproduced(stable and real < 0.0), reading)
 
 
 def force_errors(eta3: float = ETA3, rate: float = DISTURBANCE_RATE) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -84,7 +84,7 @@ def force_bound(eta3: float = ETA3, rate: float = DISTURBANCE_RATE) -> Finding:
         f"has died out, the full error equation leaves {ramp:.5f} N under a ramp, which attains it, and at most "
         f"{max(late.values()):.5f} N otherwise. The bound is asymptotic: before that e_omega drives the force error."
     )
-    return Finding(computed, judged(agrees(bound, printed, 0.5) and respected and attained), reading)
+    return Finding(computed, reproduced(agrees(bound, printed, 0.5) and respected and attained), reading)
 
 
 @TOPIC.part("wheel-force", "Longitudinal force observer", 2.0)

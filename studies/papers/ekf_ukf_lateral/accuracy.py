@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.claim import Finding, judged
+from studies.claim import Finding, reproduced
 from studies.papers.ekf_ukf_lateral.inputs import PACKAGE
 from studies.papers.published import printed_numbers
 from studies.papers.topic import Topic
@@ -54,7 +54,7 @@ def below_eight_percent(table: Sequence[Row] = TABLE_1) -> Finding:
         f"statement could hold. The unscented filter is better in {computed['ukf_better_means']} means and "
         f"{computed['ukf_better_deviations']} standard deviations of {len(table)}."
     )
-    return Finding(computed, judged(not above), reading)
+    return Finding(computed, reproduced(not above), reading)
 
 
 @TOPIC.part("table-1", "Table I against the text", 0.2)

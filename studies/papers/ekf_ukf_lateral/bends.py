@@ -17,10 +17,10 @@ from studies.papers.ekf_ukf_lateral.accuracy import Row
 from studies.plots import Axis, Dash, Figure, Level, Mark, Panel, colours, dots
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import ERROR_COLUMNS, SampleSpreads, known_spread, sample_errors, sample_spreads
-from studies.trials.driven import LUGRE
+from studies.trials.estimation import Reading, assumed_car, measured_runs, run_pipeline
 from studies.trials.filter_inputs import PRINTED_TEST, SAMPLE_TIME, conditions, counted, front_steer, rear_speed
 from studies.trials.histories import BANDS, dot_heights, error_dots, estimate_lines, history, row_axis, truth_line
-from studies.trials.play import Reading, believed, measured_runs, play
+from studies.trials.simulations import LUGRE
 from studies.trials.tire_curve import USE, TireFacts, tire_facts
 from studies.truth import Measured
 
@@ -65,7 +65,7 @@ class FourWheelRun:
         return {who: sample_spreads(*self.pair(k, who)) for who in (self.forces if k < 4 else self.sideslip)}
 
 
-def assumed_car(car: VehicleParameters, tire: TireFacts, at_rest: bool = False) -> FourWheel:
+def four_wheel_car(car: VehicleParameters, tire: TireFacts, at_rest: bool = False) -> FourWheel:
     """The truth's masses and lengths; of its tires the secant (or slope at rest), relaxation length and greatest friction."""
     front, rear = tire.slope if at_rest else tire.secant
     return FourWheel(
@@ -81,7 +81,7 @@ def level(drawn: Measured) -> tuple[Array, Array, Array]:
     accelerometers, with the motion of the car from `rear_speed` and the yaw rate.
     """
     time, shape = drawn.sample_time, drawn.batch_shape
-    car, speed = believed(drawn), rear_speed(drawn)
+    car, speed = assumed_car(drawn), rear_speed(drawn)
     attitude, vertical = AttitudeObserver(time, shape), VerticalLoads(car, time, shape)
     slope = FilteredDerivative(time, _LAG, shape)
     loads, along, across = np.empty((*speed.shape, 4)), np.empty_like(speed), np.empty_like(speed)
@@ -102,7 +102,7 @@ def run_four_wheel(drawn: Measured) -> FourWheelRun:
     Without a filter: m a_y shared by load; sideslip L_r r/V if the rear axle did not slip, and less m L_f a_y/(L C_r) if it did
     as a linear one does.
     """
-    car, truth = believed(drawn), drawn.truth
+    car, truth = assumed_car(drawn), drawn.truth
     speed, steer, (loads, ax, ay) = rear_speed(drawn), front_steer(drawn), level(drawn)
     friction = float(truth["friction"][0].mean())
     tire = tire_facts(truth.vehicles[0], truth.tires[0], float(truth["vx"][0].mean()), friction)
@@ -112,7 +112,7 @@ def run_four_wheel(drawn: Measured) -> FourWheelRun:
     sideslip: dict[str, Array] = {}
     kinds: tuple[tuple[str, _Kind], ...] = ((EKF, "extended"), (UKF, "unscented"))
     for at_rest in (False, True):
-        vehicle = assumed_car(car, tire, at_rest)
+        vehicle = four_wheel_car(car, tire, at_rest)
         for name, kind in kinds:
             label = name + AT_REST * at_rest
             forces[label], sideslip[label] = _observed(drawn, vehicle, kind, steer, loads, measurement)
@@ -120,7 +120,7 @@ def run_four_wheel(drawn: Measured) -> FourWheelRun:
     free = car.rear_axle_distance * yaw_rate / np.maximum(speed, 1.0)
     slip = car.mass * car.front_axle_distance / (car.wheelbase * (2.0 * tire.secant[1])) * ay
     sideslip |= {NO_SLIP: free[:, 0], STEADY: (free - slip)[:, 0]}
-    ours = play(drawn, READINGS)
+    ours = run_pipeline(drawn, READINGS)
     forces[PIPELINE], sideslip[PIPELINE] = ours["force_y"][:, 0], ours["sideslip"][:, 0]
     return FourWheelRun(drawn, forces, sideslip, loads[:, 0], counted(drawn, 0), tire)
 

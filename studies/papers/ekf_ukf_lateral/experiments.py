@@ -7,11 +7,11 @@ from functools import partial
 from studies.papers.ekf_ukf_lateral.accuracy import TABLE_1
 from studies.papers.ekf_ukf_lateral.bends import four_wheel_part
 from studies.study import PartResult, Scope
-from studies.trials.driven import MAGIC_FORMULA, driven_part
-from studies.trials.motion import Moved, motion_part
+from studies.trials.motion import MotionTest, motion_part
+from studies.trials.simulations import MAGIC_FORMULA, trial_part
 
 MANOEUVRE = "p4-bends-dry"
-MOTION = (Moved(MANOEUVRE, "Right, left and right bend, dry (Fig. 5)", course=True),)
+MOTION = (MotionTest(MANOEUVRE, "Right, left and right bend, dry (Fig. 5)", course=True),)
 
 
 def _table_1(name: str, scope: Scope, tire: str) -> PartResult:
@@ -19,9 +19,9 @@ def _table_1(name: str, scope: Scope, tire: str) -> PartResult:
 
 
 PARTS = (
-    driven_part("table-1-driven", "Table I on the truth vehicle", partial(_table_1, "bends"), 53.0, quick=True),
-    driven_part("table-1-other-tire", "Table I on a tire with another shape: Magic Formula with slip lag",
+    trial_part("table-1-driven", "Table I on the truth vehicle", partial(_table_1, "bends"), 53.0, quick=True),
+    trial_part("table-1-other-tire", "Table I on a tire with another shape: Magic Formula with slip lag",
                 partial(_table_1, "bends-other-tire"), 53.0, MAGIC_FORMULA),
-    driven_part("motion", "Fig. 5 on the truth vehicle: path, speed, steering, g-g diagram",
+    trial_part("motion", "Fig. 5 on the truth vehicle: path, speed, steering, g-g diagram",
                 partial(motion_part, "motion", MOTION), 5.0),
 )  # fmt: skip

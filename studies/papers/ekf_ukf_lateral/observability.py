@@ -12,7 +12,7 @@ from analysis.observability.lie_rank import LieRankTest
 from analysis.observability.lie_structure import GenericRank, generic_rank
 from estimators.arrays import FloatArray
 from estimators.sideslip import FourWheelModel
-from studies.claim import Finding, judged
+from studies.claim import Finding, reproduced
 from studies.papers.ekf_ukf_lateral.inputs import (
     CAR,
     LOADS,
@@ -107,7 +107,7 @@ def rank_of_the_model(model: NonlinearModel | None = None) -> Finding:
             "Rank 8 with the exception at zero steering holds for the printed y_4, whose x_6 sin(u_1) is a misprint (rank "
             f"{printed[0]} and {printed[1]})."
         )
-    return Finding(computed, judged(min(steering.rank, upper) == 8 and straight.rank < 8), reading)
+    return Finding(computed, reproduced(min(steering.rank, upper) == 8 and straight.rank < 8), reading)
 
 
 def singular_values(steering: FloatArray, speed: FloatArray, printed: bool = False) -> FloatArray:

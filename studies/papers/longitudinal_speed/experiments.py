@@ -10,9 +10,9 @@ from estimators.vehicle import CORNERS, VehicleParameters
 from studies.papers.longitudinal_speed.accuracy import FORCES, LOADS
 from studies.papers.longitudinal_speed.speed_trial import Drive, speed_part
 from studies.papers.longitudinal_speed.truth_records import truth_part
-from studies.trials.driven import driven_part
-from studies.trials.forces import Driven, force_part
-from studies.trials.motion import Moved, motion_part
+from studies.trials.forces import ForceTest, force_part
+from studies.trials.motion import MotionTest, motion_part
+from studies.trials.simulations import trial_part
 
 
 def _printed(k: int) -> dict[tuple[str, str, str], float]:
@@ -26,14 +26,14 @@ def _printed(k: int) -> dict[tuple[str, str, str], float]:
 
 
 TABLE_2 = (
-    Driven("p2-steer-wet-dry", "steering, wet and dry", _printed(0)),
-    Driven("p2-double-lane-change-snow", "double lane change, snow", _printed(1)),
-    Driven("p2-brake-in-turn-snow", "braking in a turn and accelerating, snow", _printed(2)),
+    ForceTest("p2-steer-wet-dry", "steering, wet and dry", _printed(0)),
+    ForceTest("p2-double-lane-change-snow", "double lane change, snow", _printed(1)),
+    ForceTest("p2-brake-in-turn-snow", "braking in a turn and accelerating, snow", _printed(2)),
 )
 FIG_6 = (
-    Driven("p2-throttle-brake-low", "alternating throttle and brake, friction 0.3 (Fig. 6a)"),
-    Driven("p2-acceleration-in-turn-dry", "acceleration in a turn, dry (Fig. 6b)"),
-    Driven("p2-acceleration-in-turn-low", "acceleration in a turn, friction 0.25 (Fig. 6c)"),
+    ForceTest("p2-throttle-brake-low", "alternating throttle and brake, friction 0.3 (Fig. 6a)"),
+    ForceTest("p2-acceleration-in-turn-dry", "acceleration in a turn, dry (Fig. 6b)"),
+    ForceTest("p2-acceleration-in-turn-low", "acceleration in a turn, friction 0.25 (Fig. 6c)"),
 )
 FIG_9 = (
     Drive("p2-step-steer-dry", "step steer, dry"),
@@ -49,12 +49,12 @@ FIG_12 = (
     Drive("p2-harsh-steering-ice", "harsh steering, snow and ice"),
 )
 MOTION = (
-    Moved("p2-steer-wet-dry", "Harsh steering, wet and dry (Fig. 7)", rear=True),
-    Moved("p2-double-lane-change-snow", "Double lane change, snow (Fig. 8)", rear=True),
-    Moved("p2-launch-wet-dry", "Launch, wet to dry, braking (Fig. 10)"),
-    Moved("p2-acceleration-in-turn-wet-dry", "Acceleration in a turn, wet to dry, braking (Fig. 10)"),
-    Moved("p2-brake-in-turn-snow", "Braking in a turn and accelerating, snow (Fig. 12)"),
-    Moved("p2-harsh-steering-ice", "Harsh steering, snow and ice (Fig. 12)"),
+    MotionTest("p2-steer-wet-dry", "Harsh steering, wet and dry (Fig. 7)", rear=True),
+    MotionTest("p2-double-lane-change-snow", "Double lane change, snow (Fig. 8)", rear=True),
+    MotionTest("p2-launch-wet-dry", "Launch, wet to dry, braking (Fig. 10)"),
+    MotionTest("p2-acceleration-in-turn-wet-dry", "Acceleration in a turn, wet to dry, braking (Fig. 10)"),
+    MotionTest("p2-brake-in-turn-snow", "Braking in a turn and accelerating, snow (Fig. 12)"),
+    MotionTest("p2-harsh-steering-ice", "Harsh steering, snow and ice (Fig. 12)"),
 )
 
 
@@ -71,16 +71,16 @@ def _unknown_input(
 
 OBSERVERS = {"UKF": _unscented, "UIO": _unknown_input}
 PARTS = (
-    driven_part("table-2-driven", "Table II on the truth vehicle", partial(force_part, "table-2", TABLE_2, OBSERVERS), 67.0),
-    driven_part("forces-fig-6", "Fig. 6 on the truth vehicle: forces under throttle and brake, and accelerating in a turn",
+    trial_part("table-2-driven", "Table II on the truth vehicle", partial(force_part, "table-2", TABLE_2, OBSERVERS), 67.0),
+    trial_part("forces-fig-6", "Fig. 6 on the truth vehicle: forces under throttle and brake, and accelerating in a turn",
                 partial(force_part, "fig-6", FIG_6, OBSERVERS), 79.0),
-    driven_part("speed-fig-9", "Fig. 9 on the truth vehicle: step steer, throttle in a turn",
+    trial_part("speed-fig-9", "Fig. 9 on the truth vehicle: step steer, throttle in a turn",
                 partial(speed_part, "fig-9", FIG_9), 79.0),
-    driven_part("speed-fig-10", "Figs. 10 and 11 on the truth vehicle: wet, then dry",
+    trial_part("speed-fig-10", "Figs. 10 and 11 on the truth vehicle: wet, then dry",
                 partial(speed_part, "fig-10", FIG_10), 54.0, quick=True),
-    driven_part("speed-fig-12", "Figs. 12 and 13 on the truth vehicle: snow and ice",
+    trial_part("speed-fig-12", "Figs. 12 and 13 on the truth vehicle: snow and ice",
                 partial(speed_part, "fig-12", FIG_12), 69.0),
-    driven_part("tests-driven", "Figs. 1 to 3 on the truth vehicle: gramian and unknown start", truth_part, 8.0),
-    driven_part("motion", "Figs. 7, 8, 10 and 12 on the truth vehicle: accelerations, yaw rate, rear wheels",
+    trial_part("tests-driven", "Figs. 1 to 3 on the truth vehicle: gramian and unknown start", truth_part, 8.0),
+    trial_part("motion", "Figs. 7, 8, 10 and 12 on the truth vehicle: accelerations, yaw rate, rear wheels",
                 partial(motion_part, "motion", MOTION), 5.0),
 )  # fmt: skip

@@ -8,7 +8,7 @@ from typing import Any
 import sympy as sp
 from pint import UnitRegistry
 
-from studies.claim import Finding, judged
+from studies.claim import Finding, reproduced
 from studies.papers.longitudinal_speed.inputs import PACKAGE, parameters, speed_model
 from studies.papers.topic import Topic
 from studies.papers.verdicts import erratum
@@ -40,7 +40,7 @@ def descriptor_form(M: tuple[tuple[int, ...], ...] = PRINTED_M) -> Finding:
         f"V_r' - kappa R_e w' z - kappa R_e w z', which differs from d/dt of the bristle equation by {mismatch} (friction "
         "left out)."
     )
-    return Finding(computed, judged(mismatch == 0 and same), reading)
+    return Finding(computed, reproduced(mismatch == 0 and same), reading)
 
 
 @TOPIC.claim("P2-kappa")

@@ -12,7 +12,7 @@ import sympy as sp
 from analysis.observability.gramians import growing_observability
 from analysis.observability.matrix import ObservabilityMatrix, observability_matrix
 from analysis.observability.rank_loss import rank_loss
-from studies.claim import Finding, judged
+from studies.claim import Finding, reproduced
 from studies.papers.longitudinal_speed.inputs import (
     PACKAGE,
     TYPICAL,
@@ -74,7 +74,7 @@ def rank_over_the_region(accelerations: tuple[object, ...] = (0, 1, "-5")) -> Fi
         f"{max(changing)} while the wheel accelerates (apart from speeds below {lowest_speed:.3g} rad/s). What is hidden "
         "decays while the wheel turns, so the model is detectable, except at standstill."
     )
-    return Finding(computed, judged(min(min(row) for row in ranks.values()) == 3), reading)
+    return Finding(computed, reproduced(min(min(row) for row in ranks.values()) == 3), reading)
 
 
 @cache

@@ -16,9 +16,18 @@ from estimators.velocity import BristleTire, FusionSettings, VelocityFusion
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel, colours
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import Spread, known_spread, nrms
-from studies.trials.driven import LUGRE
+from studies.trials.estimation import (
+    INTEGRATED,
+    WHEELS,
+    Reading,
+    assumed_car,
+    baselines,
+    measured_runs,
+    run_of,
+    run_pipeline,
+)
 from studies.trials.histories import BANDS, backgrounds, error_dots, estimate_lines, history, row_axis, truth_line
-from studies.trials.play import INTEGRATED, WHEELS, Reading, baselines, believed, measured_runs, play, run_of
+from studies.trials.simulations import LUGRE
 from studies.trials.velocities import COMPLIANCE_SPREAD, FUSION
 from studies.truth import Measured
 from synthesis.models.parameter_set import load_parameter_set
@@ -100,7 +109,7 @@ def speed_part(name: str, rows: Sequence[Drive], scope: Scope, tire: str = LUGRE
     """Errors of V_x of all of them in every manoeuvre."""
     drawn = measured_runs([row.manoeuvre for row in rows], tire, scope)
     truth = drawn.truth
-    estimates = play(drawn, READINGS, parts) | baselines(drawn)
+    estimates = run_pipeline(drawn, READINGS, parts) | baselines(drawn)
     table: list[list[Cell]] = []
     measures: dict[str, float] = {}
     found: list[dict[str, Spread]] = []
@@ -164,7 +173,7 @@ def speed_history(name: str, drawn: Measured, row: Drive, estimates: Mapping[str
         value = estimates[who][:, run, samples]
         speeds += estimate_lines(time, value, who, LOOKS[who][1])
         errors += estimate_lines(time, value - true, who, LOOKS[who][1])
-    surface = believed(drawn).radius[CORNER] * drawn.signals["wheel_speed"][0, run, samples, CORNER]
+    surface = assumed_car(drawn).radius[CORNER] * drawn.signals["wheel_speed"][0, run, samples, CORNER]
     high = (estimates["high"][0, run, samples] > 0.5).astype(int)
     wheel = [
         *backgrounds(time, high, [None, ("high slip detected", colours.HIGH_SLIP)]),

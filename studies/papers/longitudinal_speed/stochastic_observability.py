@@ -17,7 +17,7 @@ from analysis.observability.stochastic import (
     stochastic_observability,
     stochastic_observability_along,
 )
-from studies.claim import Finding, judged
+from studies.claim import Finding, reproduced
 from studies.papers.longitudinal_speed.inputs import (
     PACKAGE,
     SAMPLE_TIME,
@@ -138,7 +138,7 @@ def bound_of_test_2(records: Mapping[str, WheelRecord] | None = None) -> Finding
         f"'{first_record}' and Q = q I. What is bounded can be useless: the peak reaches {largest:.3g} where nearly silent "
         "data is taken as seen, so the rank tolerance decides the look of Fig. 3."
     )
-    return Finding(computed, judged(bounded == len(cases)), reading)
+    return Finding(computed, reproduced(bounded == len(cases)), reading)
 
 
 def standard_records(samples: int) -> dict[str, WheelRecord]:

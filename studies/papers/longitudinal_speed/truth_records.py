@@ -13,9 +13,9 @@ from studies.papers.longitudinal_speed.stochastic_observability import TOPIC, bo
 from studies.plots import DASHES, Axis, Figure
 from studies.plots.colours import CURVES
 from studies.study import Cell, PartResult, Scope, Table
-from studies.trials.driven import LUGRE, driven
-from studies.trials.motion import Moved
-from studies.trials.play import run_of
+from studies.trials.estimation import run_of
+from studies.trials.motion import MotionTest
+from studies.trials.simulations import LUGRE, simulated_truth
 from studies.truth import Truth
 
 SECONDS = 6.0
@@ -23,22 +23,22 @@ STARTS = 40  # samples of Figs. 2 and 3: 0.2 s
 TOLERANCES = (1e-9, 1e-2)
 CHANGES = 1.0  # rad/s^2, of the wheel's acceleration, from which on the manoeuvre has begun
 FIG_1 = (
-    Moved("p2-double-lane-change-dry", "double lane change, dry"),
-    Moved("p2-double-lane-change-snow", "double lane change, snow"),
-    Moved("p2-acceleration-in-turn-dry", "acceleration in a turn, dry"),
-    Moved("p2-brake-in-turn-snow", "braking in a turn, snow"),
-    Moved("p2-launch-dry", "launch, dry"),
-    Moved("p2-launch-ice", "launch, ice"),
+    MotionTest("p2-double-lane-change-dry", "double lane change, dry"),
+    MotionTest("p2-double-lane-change-snow", "double lane change, snow"),
+    MotionTest("p2-acceleration-in-turn-dry", "acceleration in a turn, dry"),
+    MotionTest("p2-brake-in-turn-snow", "braking in a turn, snow"),
+    MotionTest("p2-launch-dry", "launch, dry"),
+    MotionTest("p2-launch-ice", "launch, ice"),
 )
 FIGS_2_3 = (
-    Moved("p2-double-lane-change-dry", "double lane change, dry"),
-    Moved("p2-brake-in-turn-snow", "braking in a turn, snow"),
-    Moved("p2-sharp-turn", "sharp turn, dry and slippery"),
-    Moved("p2-steer-wet-dry", "steering, wet and dry"),
+    MotionTest("p2-double-lane-change-dry", "double lane change, dry"),
+    MotionTest("p2-brake-in-turn-snow", "braking in a turn, snow"),
+    MotionTest("p2-sharp-turn", "sharp turn, dry and slippery"),
+    MotionTest("p2-steer-wet-dry", "steering, wet and dry"),
 )
 
 
-def wheel_record(truth: Truth, row: Moved, wheel: int = 0) -> WheelRecord:
+def wheel_record(truth: Truth, row: MotionTest, wheel: int = 0) -> WheelRecord:
     """Speed of one wheel (front left) as the truth has it, and its difference quotient, at the filter's sample time.
 
     It ends where the wheel leaves the range of the model: on ice it spins faster.
@@ -59,7 +59,7 @@ def begun(record: WheelRecord) -> WheelRecord:
 def truth_part(scope: Scope, tire: str = LUGRE) -> PartResult:
     """Both figures and their tables."""
     names = tuple(dict.fromkeys(row.manoeuvre for row in (*FIG_1, *FIGS_2_3)))
-    truth = driven(names, tire, scope, SECONDS).until(SECONDS)
+    truth = simulated_truth(names, tire, scope, SECONDS).until(SECONDS)
     turning = [wheel_record(truth, row) for row in FIG_1]
     starting = [begun(wheel_record(truth, row)) for row in FIGS_2_3]
     ranks = [gramian_rank(record) for record in turning]

@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.bounds.forces import sharp_unknown_input_bound, unknown_input_bound
 from estimators.arrays import FloatArray
-from studies.claim import Finding, judged
+from studies.claim import Finding, reproduced
 from studies.papers.longitudinal_speed.inputs import PACKAGE
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel, dots
@@ -59,7 +59,7 @@ def theorem_1(claimed_gain: float = 1.0) -> Finding:
         f"excess {excess:.1e} rad/s). xi = 1/2 gives the smallest ultimate value b/K, which a constant force attains; the "
         f"exact worst case is exp(-K t)|e(0)| + (b/K)(1 - exp(-K t)), met to {attained:.0e}."
     )
-    return Finding(computed, judged(excess <= TOLERANCE and attained <= 1e-10 and best <= 1e-12), reading)
+    return Finding(computed, reproduced(excess <= TOLERANCE and attained <= 1e-10 and best <= 1e-12), reading)
 
 
 @TOPIC.part("unknown-input", "Error bound of the unknown-input observer")

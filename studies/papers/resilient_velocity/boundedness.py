@@ -7,7 +7,7 @@ import sympy as sp
 
 from analysis.norms.hinf import stability_margin
 from analysis.switching.similarity import best_diagonal_transform, similarity_bound, symmetric_growth
-from studies.claim import Finding, agrees, judged
+from studies.claim import Finding, agrees, reproduced
 from studies.papers.resilient_velocity.inputs import PACKAGE, PRINTED, SPEEDS, Setting, crossing
 from studies.papers.topic import Topic
 from studies.papers.verdicts import derived, erratum
@@ -42,7 +42,7 @@ def eigenvalue(setting: Setting = PRINTED) -> Finding:
     found = float(stability_margin(setting.error("longitudinal", setting.example_speed)[0])[0])
     return Finding(
         found,
-        judged(agrees(found, TOPIC.printed("P3-ex1-eig"), HALF_DIGIT)),
+        reproduced(agrees(found, TOPIC.printed("P3-ex1-eig"), HALF_DIGIT)),
         f"Largest eigenvalue of the continuous error matrix A - L C of (8) with Table I at {setting.example_speed:g} rad/s.",
     )
 
@@ -65,7 +65,7 @@ def symmetric(setting: Setting = PRINTED) -> Finding:
            f"The print belongs to {where:.2f} rad/s (kappa R_e omega = {rate:.1f} 1/s). ")
         + "That the symmetric part is far above zero, so that it proves nothing without a transformation, holds all the same."
     )  # fmt: skip
-    return Finding(computed, judged(agrees(found, published, 0.5)), reading)
+    return Finding(computed, reproduced(agrees(found, published, 0.5)), reading)
 
 
 @TOPIC.claim("P3-ex1-T")
@@ -87,7 +87,7 @@ def transformed(setting: Setting = PRINTED) -> Finding:
            f", and the speed that fits 108750 gives {at_other:.3f}, which meets it by truncation only.")
         + " The point of the example, that T turns a useless bound into a sharp one, holds."
     )  # fmt: skip
-    return Finding(computed, judged(agrees(found, TOPIC.printed("P3-ex1-T"), HALF_DIGIT)), reading)
+    return Finding(computed, reproduced(agrees(found, TOPIC.printed("P3-ex1-T"), HALF_DIGIT)), reading)
 
 
 @TOPIC.claim("P3-ex1-Topt")

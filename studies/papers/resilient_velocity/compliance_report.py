@@ -24,10 +24,10 @@ from studies.plots import ZERO, Axis, Band, Dash, Figure, Line, Mark, Panel
 from studies.plots.colours import BLUE, GREY, ORANGE, RED, TRUTH
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import known_spread, nrms
-from studies.trials.driven import LUGRE, driven
+from studies.trials.estimation import assumed_car, measured, run_of
 from studies.trials.histories import BAND
-from studies.trials.play import believed, measured, run_of
 from studies.trials.sensors import TEST_CAR
+from studies.trials.simulations import LUGRE, simulated_truth
 
 Array = npt.NDArray[np.float64]
 QUICK_SECONDS = 4.0
@@ -59,7 +59,7 @@ STYLE: dict[str, tuple[str, Dash, float]] = {
 
 def compliance_part(name: str, tests: Sequence[Shown], scope: Scope, tire: str = LUGRE) -> PartResult:
     """Every test with the three ways: forces and velocities."""
-    truth = driven(tuple(test.manoeuvre for test in tests), tire, scope, QUICK_SECONDS)
+    truth = simulated_truth(tuple(test.manoeuvre for test in tests), tire, scope, QUICK_SECONDS)
     trial = run_trial(measured(truth, range(scope.seeds), TEST_CAR))
     forces, measures = residual_table(f"{name}-forces", trial, tests)
     figures = [residual_history(f"{name}-{test.manoeuvre}", trial, test) for test in tests]
@@ -200,7 +200,7 @@ def wheel_history(name: str, trial: ComplianceTrial, test: Shown) -> Figure:
     """Fig. 9: surface speed of each wheel, velocity of its centre, and what the observers without compliance make of it."""
     truth = trial.drawn.truth
     row, samples = run_of(truth, test.manoeuvre)
-    time, radius = truth.time[samples], believed(trial.drawn).radius
+    time, radius = truth.time[samples], assumed_car(trial.drawn).radius
     panels = []
     for corner in range(4):
         surface = radius[corner] * trial.drawn.signals["wheel_speed"][:, row, samples, corner]

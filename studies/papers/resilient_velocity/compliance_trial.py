@@ -22,7 +22,7 @@ from estimators.velocity.corners import CornerVectors, tire_frame, vehicle_frame
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, PRINTED
 from studies.papers.resilient_velocity.tire import stribeck
 from studies.papers.resilient_velocity.vehicle import table_of_estimator
-from studies.trials.play import Reading, believed, play
+from studies.trials.estimation import Reading, assumed_car, run_pipeline
 from studies.truth import Measured
 from studies.truth.stepper import stepped_deflection
 
@@ -138,7 +138,7 @@ def run_trial(drawn: Measured) -> ComplianceTrial:
     """Estimate all runs of ``drawn`` and calculate the forces of every way: V_r = R_e w - V_xt - psi' with compliance."""
     forces = ("force_x", "force_y", "force_z")
     readings: dict[str, Reading] = {name: attrgetter(f"corners.{name}") for name in CompliantStep._fields[1:]}
-    found = play(drawn, readings | {name: attrgetter(name) for name in forces}, compliant_parts)
+    found = run_pipeline(drawn, readings | {name: attrgetter(name) for name in forces}, compliant_parts)
     relative, rate, truth = found["relative"], found["compliance"], drawn.truth
     rate_tire, true_rate = (
         np.stack(tire_frame(CornerVectors(x, y), steer), axis=-1)
@@ -151,7 +151,7 @@ def run_trial(drawn: Measured) -> ComplianceTrial:
     centre = {WITHOUT: found["centre"], PRINTED_WAY: found["centre"] + rate, INSIDE: found["centre_inside"] - rate}
     measured = np.stack([found["force_x"], found["force_y"]], axis=-1) / np.maximum(found["force_z"], 1.0)[..., None]
     calculated = model_force(drawn, np.stack([slip[way] for way in WAYS]))
-    shares = _shares(believed(drawn).radius * drawn.signals["wheel_speed"], relative)
+    shares = _shares(assumed_car(drawn).radius * drawn.signals["wheel_speed"], relative)
     return ComplianceTrial(
         drawn,
         relative,

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from analysis.markov.second_moment import spectral_radius
 from estimators.arrays import FloatArray
-from studies.claim import ClaimVerdict, Finding, JsonValue, judged
+from studies.claim import ClaimVerdict, Finding, JsonValue, reproduced
 from studies.papers.plain import by_speed
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, PACKAGE, PRINTED, SPEEDS, Setting, printed_gain
 from studies.papers.topic import Topic
@@ -68,7 +68,7 @@ def zero_order_hold_reading(setting: Setting = PRINTED) -> Finding:
     good, bad = (", ".join(name for name, ok in stable.items() if ok is wanted) for wanted in (True, False))
     return Finding(
         computed,
-        judged(
+        reproduced(
             all(stable.values()), ClaimVerdict.UNDER_SPECIFIED if any(stable.values()) else ClaimVerdict.NOT_REPRODUCED
         ),
         f"At {1.0 / T:g} Hz the printed longitudinal gain is stable as: {good or 'nothing'}; unstable as: {bad or 'nothing'}. "

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from analysis.drops.frozen import critical_drop_probability, drop_radius, mean_square_stable_intervals
 from analysis.markov.system import MarkovJumpSystem
 from estimators.arrays import FloatArray
-from studies.claim import Finding, JsonValue, agrees, judged
+from studies.claim import Finding, JsonValue, agrees, reproduced
 from studies.papers.plain import by_speed
 from studies.papers.published import printed
 from studies.papers.resilient_velocity.inputs import (
@@ -120,7 +120,7 @@ def critical_probability(setting: Setting = PRINTED) -> Finding:
         + f" ({'; '.join(words)}), and p = {setting.example_drop:g} of Example 3 lies "
         + ("below it everywhere." if below else "above it somewhere.")
     )  # fmt: skip
-    return Finding({**computed, "smallest": lowest}, judged(holds and below), reading)
+    return Finding({**computed, "smallest": lowest}, reproduced(holds and below), reading)
 
 
 @TOPIC.claim("P3-pcr-exact")

@@ -8,7 +8,7 @@ from analysis.drops.frozen import drop_radius
 from analysis.markov.second_moment import spectral_radius
 from analysis.switching.joint_spectral_radius import joint_spectral_radius
 from estimators.arrays import FloatArray
-from studies.claim import ClaimVerdict, Finding, judged
+from studies.claim import ClaimVerdict, Finding, reproduced
 from studies.papers.plain import by_speed, floats
 from studies.papers.resilient_velocity.drops import harmless_from, met_at, radius, updates
 from studies.papers.resilient_velocity.inputs import COLOUR, FINE, PACKAGE, PRINTED, SPEED_AXIS, Setting
@@ -77,7 +77,7 @@ def any_pattern(setting: Setting = PRINTED) -> Finding:
     )  # fmt: skip
     return Finding(
         computed,
-        judged(all(marginal), ClaimVerdict.PARTLY if any(marginal) else ClaimVerdict.NOT_REPRODUCED),
+        reproduced(all(marginal), ClaimVerdict.PARTLY if any(marginal) else ClaimVerdict.NOT_REPRODUCED),
         "With every sample lost the radius is 1 exactly, the integrator. Under any pattern of losses that is the worst only "
         + ("at no wheel speed" if start is None else f"from {start:.2f} rad/s on")
         + ("" if all(marginal) else below)

@@ -14,10 +14,10 @@ from studies.papers.resilient_velocity.inputs import DIRECTIONS, PACKAGE
 from studies.papers.topic import Topic
 from studies.papers.verdicts import open_choice
 from studies.study import PartResult, Scope
-from studies.trials.driven import LUGRE, MAGIC_FORMULA, driven_part
-from studies.trials.forces import Driven, differentiated_pid, force_part
-from studies.trials.motion import Moved, motion_part
-from studies.trials.velocities import Printed, corner_observers, velocity_part
+from studies.trials.forces import ForceTest, differentiated_pid, force_part
+from studies.trials.motion import MotionTest, motion_part
+from studies.trials.simulations import LUGRE, MAGIC_FORMULA, trial_part
+from studies.trials.velocities import VelocityTest, corner_observers, velocity_part
 
 TOPIC = Topic(PACKAGE)
 HALF_DIGIT = 0.05  # %
@@ -34,15 +34,15 @@ MOTIONS: Mapping[str, FloatArray] = {
 """Speed over its end value in a launch at constant acceleration; lateral velocity over its amplitude in one period of a sine."""
 OBSERVERS = corner_observers("resilient-velocity")
 ROWS = (
-    Printed("p3-launch-split", "harsh launch, ice and dry", BOUNDS[0]),
-    Printed("p3-acceleration-in-turn-dry", "acceleration in a turn, dry", BOUNDS[0], None, BOUNDS[1]),
-    Printed("p3-lane-change-snow", "lane change, accelerating and braking, snow", BOUNDS[0], None, BOUNDS[1]),
+    VelocityTest("p3-launch-split", "harsh launch, ice and dry", BOUNDS[0]),
+    VelocityTest("p3-acceleration-in-turn-dry", "acceleration in a turn, dry", BOUNDS[0], None, BOUNDS[1]),
+    VelocityTest("p3-lane-change-snow", "lane change, accelerating and braking, snow", BOUNDS[0], None, BOUNDS[1]),
 )
 """P3 prints no table: its text bounds the RMS error by 5.8 % (longitudinal) and 7.5 % (lateral)."""
-FORCES = (Driven("p3-lane-change-snow", "lane change on snow (Fig. 14)"),)
+FORCES = (ForceTest("p3-lane-change-snow", "lane change on snow (Fig. 14)"),)
 MOTION = (
-    Moved("p3-acceleration-in-turn-dry", "Acceleration in a turn, dry (Fig. 11)"),
-    Moved("p3-lane-change-snow", "Lane change, accelerating and braking, snow (Fig. 13)"),
+    MotionTest("p3-acceleration-in-turn-dry", "Acceleration in a turn, dry (Fig. 11)"),
+    MotionTest("p3-lane-change-snow", "Lane change, accelerating and braking, snow (Fig. 13)"),
 )
 
 
@@ -83,4 +83,4 @@ for name, title, run, cost, tire in (
     ("motion", "Figs. 11 and 13 on the truth vehicle: accelerations and yaw rate",
      partial(motion_part, "motion", MOTION), 5.0, LUGRE),
 ):  # fmt: skip
-    TOPIC.parts.append(driven_part(name, title, run, cost, tire))
+    TOPIC.parts.append(trial_part(name, title, run, cost, tire))

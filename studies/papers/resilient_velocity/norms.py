@@ -8,7 +8,7 @@ import sympy as sp
 from analysis.norms.observer_error import error_hinf_norm
 from analysis.norms.static_gain import static_gain
 from estimators.arrays import FloatArray
-from studies.claim import Finding, JsonValue, judged
+from studies.claim import Finding, JsonValue, reproduced
 from studies.papers.plain import by_speed
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, PACKAGE, PRINTED, SPEED_AXIS, SPEEDS, Setting
 from studies.papers.topic import Topic
@@ -71,7 +71,7 @@ def longitudinal(setting: Setting = PRINTED) -> Finding:
     inside, found = within_axes(setting, "longitudinal")
     return Finding(
         by_speed(SHOWN, norms(setting, "longitudinal", SHOWN)),
-        judged(inside),
+        reproduced(inside),
         f"Continuous error dynamics (8), both disturbances to both errors, peak at zero frequency: {found.min():.5f} to "
         f"{found.max():.7f} over 0..140 rad/s, on the axis of the figure to the accuracy of its labels.",
     )
@@ -87,7 +87,7 @@ def lateral(setting: Setting = PRINTED) -> Finding:
             "both_disturbances": by_speed(SHOWN, norms(setting, "lateral", SHOWN)),
             "friction_only": by_speed(SHOWN, norms(setting, "lateral", SHOWN, "friction")),
         },
-        judged(inside),
+        reproduced(inside),
         f"Error dynamics (13), both disturbances to both errors: {found.max():.5f} at standstill down to "
         f"{found.min():.5f} at 140 rad/s, inside the axis of the figure; friction alone would give "
         f"{friction.min():.4f} to {friction.max():.4f}, which fits it too.",
@@ -114,7 +114,7 @@ def non_expansive(setting: Setting = PRINTED) -> Finding:
         (f"With both disturbances the norm exceeds 1 ({'; '.join(where)}). " if where else "The norm stays at 1 or below. ")
         + ("For the friction disturbance alone the statement holds." if friction else "It fails for friction alone as well.")
     )  # fmt: skip
-    return Finding(computed, judged(not where), reading)
+    return Finding(computed, reproduced(not where), reading)
 
 
 @TOPIC.claim("P3-hinf-floor")

@@ -15,7 +15,7 @@ from analysis.observability.rank_loss import rank_loss
 from analysis.perturbed import PerturbedModel, error_measure
 from analysis.sensitivity import OneAtATime, one_at_a_time
 from estimators.arrays import FloatArray
-from studies.claim import ClaimVerdict, Finding, JsonValue, judged
+from studies.claim import ClaimVerdict, Finding, JsonValue, reproduced
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, FINE, PACKAGE, PRINTED, SPEED_AXIS, SPEEDS, Setting
 from studies.papers.topic import Topic
 from studies.plots import DASHES, Figure, Level, Line, Mark, Panel
@@ -83,7 +83,7 @@ def small_deviations(setting: Setting = PRINTED) -> Finding:
             worst |= {f"{direction} {kind}, {constant}": size for constant, size in sizes.items()}
     large = {name: value for name, value in worst.items() if value > CHANGE}
     rest = max(value for name, value in worst.items() if not name.endswith("sigma1"))
-    verdict = judged(stable and not large, ClaimVerdict.PARTLY if stable else ClaimVerdict.NOT_REPRODUCED)
+    verdict = reproduced(stable and not large, ClaimVerdict.PARTLY if stable else ClaimVerdict.NOT_REPRODUCED)
     return Finding(
         computed,
         verdict,
@@ -180,7 +180,7 @@ def rank_of_observability(setting: Setting = PRINTED) -> Finding:
     where = ", ".join(lost_inside)
     return Finding(
         computed,
-        judged(not lost_inside),
+        reproduced(not lost_inside),
         (f"Rank 2 is lost inside 0..140 rad/s: {where} at constant speed. " if lost_inside else "Rank 2 everywhere. ")
         + "det O_2 = (sigma_0 - sigma_1 a)(sigma_0 + sigma_2 a) + sigma_1 (sigma_1 + sigma_2) da/dt with a = kappa "
         "R_e omega vanishes on a curve in wheel speed and acceleration. "

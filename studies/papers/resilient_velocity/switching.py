@@ -15,7 +15,7 @@ from analysis.switching.joint_spectral_radius import joint_spectral_radius
 from analysis.switching.pair import exact_pair_test, pair_margin
 from analysis.switching.similarity import common_growth, diagonal_window
 from estimators.arrays import FloatArray
-from studies.claim import Finding, judged
+from studies.claim import Finding, reproduced
 from studies.papers.plain import by_speed, floats
 from studies.papers.resilient_velocity.inputs import (
     FINE,
@@ -92,7 +92,7 @@ def common_decay(setting: Setting = PRINTED) -> Finding:
            "Lyapunov function at all (exact test).")
         + (" Sampled at 5 ms they do, at every wheel speed held." if discrete else "")
     )  # fmt: skip
-    return Finding(computed, judged(worst < 0.0), reading)
+    return Finding(computed, reproduced(worst < 0.0), reading)
 
 
 @TOPIC.claim("P3-ex2-arb")
@@ -180,7 +180,7 @@ def markov_margin(setting: Setting = PRINTED) -> Finding:
     }  # fmt: skip
     return Finding(
         computed,
-        judged(stable and falling),
+        reproduced(stable and falling),
         "Fig. 6 prints no numbers; what it shows is checked: with P_dry of (23) the switched observer is mean-square stable "
         + ("for every stay probability and wheel speed" if stable else "not everywhere")
         + f" (smallest margin {dense.min():.4f}, at 1), and the margin "

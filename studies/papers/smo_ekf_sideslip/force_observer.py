@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from analysis.bounds.sliding_mode import PUBLISHED, SlidingModeGains, reaching_time, sliding_mode_convergence
 from estimators.arrays import FloatArray
-from studies.claim import Finding, agrees, judged
+from studies.claim import Finding, agrees, reproduced
 from studies.papers.smo_ekf_sideslip.inputs import CAR, LARGEST, PACKAGE, SAMPLE_TIME
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel
@@ -66,7 +66,7 @@ def gain_condition(gains: SlidingModeGains = PUBLISHED) -> Finding:
         f"{float(residual):g} N m/s in (A.11). It is harmless: on the sliding surface the equivalent value of the lateral "
         "sign is zero, so the residual does not act there and the split decays at the same rate."
     )
-    return Finding(computed, judged(agrees(float(exact), gains[5], 0.5)), reading)
+    return Finding(computed, reproduced(agrees(float(exact), gains[5], 0.5)), reading)
 
 
 @TOPIC.claim("P5-A4")
@@ -90,7 +90,7 @@ def dominance(gains: SlidingModeGains = PUBLISHED) -> Finding:
         "(A.4) prints L_1 x_2 + L_2 x_3; with that sign it is no condition (an error with zero sum makes the yaw error "
         "grow), (A.5) has the minus."
     )
-    return Finding(computed, judged(found.holds and found.yaw_margin > 0.0 and growth > 0.0), reading)
+    return Finding(computed, reproduced(found.holds and found.yaw_margin > 0.0 and growth > 0.0), reading)
 
 
 @TOPIC.claim("P5-A12")
@@ -112,7 +112,7 @@ def split_decay(gains: SlidingModeGains = PUBLISHED, tolerance: float = 1e-3) ->
         "forces, which is reached in finite time. Proved for constant true forces only."
     )
     good = exact > 0 and lateral_margin > 0.0 and abs(-slope / float(exact) - 1.0) < tolerance
-    return Finding(computed, judged(good), reading)
+    return Finding(computed, reproduced(good), reading)
 
 
 @TOPIC.part("gains", "Gain conditions of Appendix A", 1.5)

@@ -13,7 +13,7 @@ import sympy as sp
 from analysis.observability.lie_rank import LieRankTest
 from analysis.observability.lie_structure import generic_rank
 from estimators.arrays import FloatArray
-from studies.claim import Finding, judged
+from studies.claim import Finding, reproduced
 from studies.papers.smo_ekf_sideslip.inputs import PACKAGE, SAMPLE_TIME
 from studies.papers.smo_ekf_sideslip.saturating_car import LINEAR, SimulatedRun, simulate, slalom, steady_turn
 from studies.papers.topic import Topic
@@ -51,7 +51,7 @@ def force_model(model: NonlinearModel | None = None) -> Finding:
         "(m^2 I_z) up to its sign, so the rank is 4 for every car, speed and steering angle. With the rear longitudinal "
         "force as a fifth state one direction is lost and does not decay, which is why the paper neglects it."
     )
-    return Finding(computed, judged(found.rank == len(chosen.states) and not steered), reading)
+    return Finding(computed, reproduced(found.rank == len(chosen.states) and not steered), reading)
 
 
 def force_determinant() -> sp.Expr:
@@ -83,7 +83,7 @@ def sideslip_model(model: NonlinearModel | None = None) -> Finding:
         "steady turn at constant speed, where sideslip cannot be told from the two stiffnesses, and 1 straight ahead. The "
         "slip angles must keep changing, as they do in a slalom."
     )
-    return Finding(computed, judged(generic.rank == 3), reading)
+    return Finding(computed, reproduced(generic.rank == 3), reading)
 
 
 def steady_turn_rank() -> int:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from estimators.arrays import FloatArray
-from studies.claim import Finding, judged
+from studies.claim import Finding, reproduced
 from studies.papers.smo_ekf_sideslip.inputs import (
     CAR,
     MASS_SETTINGS,
@@ -56,7 +56,7 @@ def force_tables(tables: Mapping[str, Any] = PRINTED) -> Finding:
         f"{mass['beta_2'][0]:g} to {mass['beta_2'][1]:g} %: sideslip suffers least. The nominal columns of Tables 1, 3 and 5 "
         "agree."
     )
-    return Finding(computed, judged(mean < LIMIT and deviation < LIMIT and least == "beta_2" and agrees), reading)
+    return Finding(computed, reproduced(mean < LIMIT and deviation < LIMIT and least == "beta_2" and agrees), reading)
 
 
 @TOPIC.part("tables", "Tables 1 to 5 against the text", 0.2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from estimators.arrays import FloatArray
-from studies.claim import ClaimVerdict, Finding, judged
+from studies.claim import ClaimVerdict, Finding, reproduced
 from studies.papers.smo_ekf_sideslip.inputs import MASS_SETTINGS, PACKAGE, STIFFNESS_SETTINGS, WHEELBASE, published_car
 from studies.papers.smo_ekf_sideslip.observers import Estimates, estimates
 from studies.papers.smo_ekf_sideslip.saturating_car import LINEAR, SimulatedRun, simulate, with_noise
@@ -38,7 +38,7 @@ def fixed_stiffness(settings: tuple[float, ...] = STIFFNESS_SETTINGS) -> Finding
         "steady_state_ratio": [1.0 / factor for factor in settings],
     }  # fmt: skip
     otherwise = ClaimVerdict.ERRATUM if low > 0 > high else ClaimVerdict.NOT_REPRODUCED
-    verdict = judged(low > 0 and high > 0, otherwise)
+    verdict = reproduced(low > 0 and high > 0, otherwise)
     reading = (
         "The measured force fixes C beta: sideslip comes out as 1/factor. Reduced stiffness overestimates it (factor "
         f"{settings[0]:g}: {ratio[0]:.2f} times the true rear sideslip in the simulated slalom), increased stiffness "

@@ -26,11 +26,11 @@ from studies.plots import Axis, Figure, Panel
 from studies.plots.colours import SETTINGS
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import ERROR_COLUMNS, SampleSpreads, sample_spreads
-from studies.trials.driven import LUGRE, MAGIC_FORMULA, QUICK_SECONDS, driven_part
+from studies.trials.estimation import assumed_car, measured_runs
 from studies.trials.filter_inputs import PRINTED_TEST, conditions, counted, front_steer, rear_speed
 from studies.trials.histories import BANDS, estimate_lines, history, setting_lines, truth_line
-from studies.trials.motion import Moved, motion_part
-from studies.trials.play import believed, measured_runs
+from studies.trials.motion import MotionTest, motion_part
+from studies.trials.simulations import LUGRE, MAGIC_FORMULA, QUICK_SECONDS, trial_part
 from studies.trials.tire_curve import USE, TireFacts, tire_facts
 from studies.truth import Measured, Truth
 
@@ -95,7 +95,7 @@ def run_axles(drawn: Measured, settings: Sequence[Setting]) -> AxleRun:
 
     Block 1 starts at the greatest true values as in the paper.
     """
-    car, truth, at = believed(drawn), drawn.truth, counted(drawn, 0)
+    car, truth, at = assumed_car(drawn), drawn.truth, counted(drawn, 0)
     speed, friction = float(truth["vx"][0][at].mean()), float(truth["friction"][0].mean())
     tire = tire_facts(truth.vehicles[0], truth.tires[0], speed, friction)
     yaw_rate, ay, ax = (drawn.signals[name] for name in ("yaw_rate", "ay", "ax"))
@@ -268,16 +268,17 @@ def mass_history(name: str, title: str, run: AxleRun) -> Figure:
 
 
 MOTION = (
-    Moved("p5-slalom", "Slalom, dry (Fig. 5)", course=True), Moved("p5-roundabout", "Roundabout, dry (Fig. 6)", course=True),
-)  # fmt: skip
+    MotionTest("p5-slalom", "Slalom, dry (Fig. 5)", course=True),
+    MotionTest("p5-roundabout", "Roundabout, dry (Fig. 6)", course=True),
+)
 _slalom = partial(axle_part, "slalom", "Slalom", "slalom")
 _other_tire = partial(axle_part, "slalom-other-tire", "Slalom, other tire", "slalom")
 _OTHER_TITLE = "Tables 1, 3 and 5 on a tire with another shape: Magic Formula with slip lag"
 _roundabout = partial(axle_part, "roundabout", "Roundabout", "roundabout")
 _motion = partial(motion_part, "motion", MOTION)
 TOPIC.parts.extend([
-    driven_part("slalom-driven", "Tables 1, 3 and 5 on the truth vehicle: slalom", _slalom, 43.0, quick=True),
-    driven_part("slalom-other-tire", _OTHER_TITLE, _other_tire, 45.0, MAGIC_FORMULA),
-    driven_part("roundabout-driven", "Tables 2 and 4 on the truth vehicle: roundabout", _roundabout, 43.0),
-    driven_part("motion", "Figs. 5 and 6 on the truth vehicle: path and accelerations", _motion, 5.0),
+    trial_part("slalom-driven", "Tables 1, 3 and 5 on the truth vehicle: slalom", _slalom, 43.0, quick=True),
+    trial_part("slalom-other-tire", _OTHER_TITLE, _other_tire, 45.0, MAGIC_FORMULA),
+    trial_part("roundabout-driven", "Tables 2 and 4 on the truth vehicle: roundabout", _roundabout, 43.0),
+    trial_part("motion", "Figs. 5 and 6 on the truth vehicle: path and accelerations", _motion, 5.0),
 ])  # fmt: skip

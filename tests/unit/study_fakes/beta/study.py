@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from studies.claim import Claim, Finding, judged
+from studies.claim import Claim, Finding, reproduced
 from studies.papers.published import published_claims
 from studies.study import Part, PartResult, Scope, Study
 from tests.unit.study_fakes.trace import computed, present
@@ -15,7 +15,7 @@ def _claim(name: str, value: int) -> Callable[[Scope], PartResult]:
         computed(f"beta-{name}")
         if name == "P2-lost" and not present("mended"):
             raise ZeroDivisionError("no number\nto divide by")
-        return PartResult([Claim(published_claims(__package__ or "")[name], Finding(value, judged(True), ""))])
+        return PartResult([Claim(published_claims(__package__ or "")[name], Finding(value, reproduced(True), ""))])
 
     return run
 

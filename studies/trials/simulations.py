@@ -30,27 +30,29 @@ def _drive_all(tire: str, scope: Scope, folder: Path) -> None:
     write_truth(simulate_manoeuvres(_manoeuvres(shipped_manoeuvres(), tire, scope)), folder)
 
 
-DRIVEN = {tire: Preparation(f"{tire}-tires", partial(_drive_all, tire), cost=40.0) for tire in (LUGRE, MAGIC_FORMULA)}
+SIMULATIONS = {
+    tire: Preparation(f"{tire}-tires", partial(_drive_all, tire), cost=40.0) for tire in (LUGRE, MAGIC_FORMULA)
+}
 """Every shipped manoeuvre on one kind of tire."""
 
 
-def driven_part(
+def trial_part(
     name: str, title: str, run: Callable[..., PartResult], cost: float, tire: str = LUGRE, quick: bool = False
 ) -> Part:
     """A part that runs estimators on shipped manoeuvres: ``run(scope, tire=tire)``; ``quick``: in quick runs, too."""
-    return Part(name, title, partial(run, tire=tire), cost, (DRIVEN[tire],), quick)
+    return Part(name, title, partial(run, tire=tire), cost, (SIMULATIONS[tire],), quick)
 
 
-def driven(names: tuple[str, ...], tire: str, scope: Scope, seconds: float = QUICK_SECONDS) -> Truth:
+def simulated_truth(names: tuple[str, ...], tire: str, scope: Scope, seconds: float = QUICK_SECONDS) -> Truth:
     """The truth of the named manoeuvres on ``tire``: read in a run of studies, integrated elsewhere.
 
     When quick, the first ``seconds`` of each. Raises SpecError for unknown names and where the run did not prepare it.
     """
     if scope.prepared is None:
         return simulate_manoeuvres(_manoeuvres(names, tire, scope, seconds))
-    folder = scope.prepared / DRIVEN[tire].name
+    folder = scope.prepared / SIMULATIONS[tire].name
     if not folder.is_dir():
-        raise SpecError(f"the part does not name its need '{DRIVEN[tire].name}': make it with `driven_part`")
+        raise SpecError(f"the part does not name its need '{SIMULATIONS[tire].name}': make it with `trial_part`")
     truth = read_truth(folder, [m.truth_vehicle() for m in _manoeuvres(shipped_manoeuvres(), tire, scope)])
     chosen = truth.only([truth.names.index(name) for name in names])
     return chosen.until(seconds) if scope.quick else chosen

@@ -13,8 +13,8 @@ from estimators.pipeline import EstimationPipeline
 from estimators.pipeline.result import PipelineStep
 from estimators.vehicle import VehicleParameters
 from studies.study import Scope
-from studies.trials.driven import driven
 from studies.trials.sensors import TEST_CAR
+from studies.trials.simulations import simulated_truth
 from studies.truth import Measured, Sensors, Truth, draw
 from synthesis.errors import SpecError
 
@@ -33,7 +33,7 @@ def measured_runs(
     names: Sequence[str], tire: str, scope: Scope, seconds: float = QUICK_SECONDS, sample_time: float = 0.005
 ) -> Measured:
     """Sensor draws (S, B) of the named manoeuvres on one kind of tire; when quick, of the first ``seconds`` of each."""
-    return draw(driven(tuple(names), tire, scope, seconds), TEST_CAR, range(scope.seeds), sample_time)
+    return draw(simulated_truth(tuple(names), tire, scope, seconds), TEST_CAR, range(scope.seeds), sample_time)
 
 
 def measured(truth: Truth, seeds: Sequence[int], sensors: Sensors) -> Measured:
@@ -41,7 +41,7 @@ def measured(truth: Truth, seeds: Sequence[int], sensors: Sensors) -> Measured:
     return draw(truth, sensors, seeds)
 
 
-def believed(drawn: Measured) -> VehicleParameters:
+def assumed_car(drawn: Measured) -> VehicleParameters:
     """The car of the truth. Raises SpecError when the runs have different ones: a pipeline assumes one car."""
     cars = [vehicle.parameters for vehicle in drawn.truth.vehicles]
     if any(car != cars[0] for car in cars[1:]):
@@ -49,13 +49,13 @@ def believed(drawn: Measured) -> VehicleParameters:
     return cars[0]
 
 
-def play(drawn: Measured, readings: Mapping[str, Reading], parts: Parts | None = None) -> dict[str, Array]:
+def run_pipeline(drawn: Measured, readings: Mapping[str, Reading], parts: Parts | None = None) -> dict[str, Array]:
     """Every reading at every sample: (S, B, n) or (S, B, n, k). The estimators know the truth's own parameters.
 
     The inertial sensors are fixed to a body that rolls and pitches: an `AttitudeObserver` levels them unless ``parts`` bring
     another attitude (None: without).
     """
-    car = believed(drawn)
+    car = assumed_car(drawn)
     time, shape = drawn.sample_time, drawn.batch_shape
     chosen = {"attitude": AttitudeObserver(time, shape), **(parts(car, time, shape) if parts else {})}
     pipeline = EstimationPipeline(car, time, shape, **chosen)
@@ -72,7 +72,7 @@ def play(drawn: Measured, readings: Mapping[str, Reading], parts: Parts | None =
 
 def baselines(drawn: Measured) -> dict[str, Array]:
     """V_x (S, B, n) without an observer, m/s: `WHEELS`, their mean speed, and `INTEGRATED`, a_x from it on."""
-    wheels = (believed(drawn).radius * drawn.signals["wheel_speed"]).mean(axis=-1)
+    wheels = (assumed_car(drawn).radius * drawn.signals["wheel_speed"]).mean(axis=-1)
     moved = np.cumsum(drawn.signals["ax"] * drawn.sample_time, axis=-1)
     return {WHEELS: wheels, INTEGRATED: wheels[..., :1] + moved - moved[..., :1]}
 
