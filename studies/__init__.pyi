@@ -10,6 +10,9 @@ from .drives.run import run_drive as run_drive
 from .errors import IdentifyError as IdentifyError
 from .errors import LogError as LogError
 from .errors import SimulationError as SimulationError
+from .execution.cluster import Cluster as Cluster
+from .execution.processes import Processes as Processes
+from .execution.processes import Serial as Serial
 from .identify.identify import Identification as Identification
 from .identify.identify import identify_drive as identify_drive
 from .plots.figure import Figure as Figure
@@ -30,8 +33,12 @@ from .study import Study as Study
 from .study import Table as Table
 from .sweeps.engine import SweepResult as SweepResult
 from .sweeps.engine import run_sweep as run_sweep
+from .sweeps.measure import Measure as Measure
+from .sweeps.observer import model_observer as model_observer
+from .sweeps.ranges import RangeSpec as RangeSpec
 from .sweeps.spec import load_sweep as load_sweep
 from .sweeps.spec import shipped_sweeps as shipped_sweeps
+from .sweeps.sweep import Sweep as Sweep
 from .truth.manoeuvre import Manoeuvre as Manoeuvre
 from .truth.manoeuvre import load_manoeuvre as load_manoeuvre
 from .truth.manoeuvre import shipped_manoeuvres as shipped_manoeuvres

@@ -13,7 +13,7 @@ from analysis.drops.mean_square import mean_square_schedule
 from analysis.drops.modes import schedule_drop_modes
 from analysis.drops.schedule import frozen_critical_probability
 from estimators import GainSchedule
-from tests.unit.schedule_content import schedule_content
+from tests.support.schedule_content import schedule_content
 
 MODES = schedule_drop_modes(
     GainSchedule.from_content(schedule_content("resilient-longitudinal")), np.linspace(0.0, 140.0, 141)

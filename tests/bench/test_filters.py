@@ -12,7 +12,7 @@ import pytest
 
 from estimators.filters import KalmanFilter, UnscentedKalmanFilter
 from estimators.sideslip import FourWheelModel, FourWheelObserver
-from tests.unit.sideslip_truth import CAR, PERIOD
+from tests.support.sideslip_truth import CAR, PERIOD
 
 RUNS = 1000
 START = np.array([0.05, 20.0, 0.0, 100.0, 100.0, 80.0, 80.0, 150.0])

@@ -20,7 +20,7 @@ from estimators.forces import (
 from estimators.pipeline import CornerObservers, DifferentiatedPid
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import BristleTire, LtvKalmanObserver, SlipWeights, SwitchedVelocityObserver
-from tests.unit.schedule_content import schedule_content
+from tests.support.schedule_content import schedule_content
 
 CAR, TIME, COUNT = VehicleParameters.published_suv(), 0.005, 64
 DRAW = np.random.default_rng(0)

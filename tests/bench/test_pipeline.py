@@ -19,7 +19,7 @@ from estimators.pipeline import (
 )
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import BristleTire, SlipWeights
-from tests.unit.schedule_content import schedule_content
+from tests.support.schedule_content import schedule_content
 
 CAR, TIME = VehicleParameters.published_suv(), 0.005
 

@@ -22,7 +22,7 @@ import pytest
 from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.models.lpv import LpvModel
-from tests.unit.lmi_cases import corner
+from tests.support.lmi_cases import corner
 
 REFERENCE = 1.0441868
 SCRIPT = Path(__file__).resolve().parents[3] / "shared" / "bench" / "cvxpy_script.py"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimators import GainSchedule, LpvVelocityObserver
-from tests.unit.schedule_content import schedule_content
+from tests.support.schedule_content import schedule_content
 
 SPEEDS = tuple(140.0 * k / 50 for k in range(51))
 SCHEDULE = GainSchedule.from_content(

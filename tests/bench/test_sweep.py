@@ -21,8 +21,8 @@ from studies.sweeps.spec import build_sweep
 from studies.sweeps.summary import summarise
 from studies.sweeps.sweep import Sweep
 from studies.sweeps.tables import compute
-from tests.drives.synthetic_drive import columns, write_drive, write_log
-from tests.unit.sweep_cases import NOISE, small, sweep
+from tests.support.sweep_cases import NOISE, small, sweep
+from tests.support.synthetic_drive import columns, write_drive, write_log
 
 MEASURES = [{"id": "stability_margin"}, NOISE, {"id": "sampled_radius"}, {"id": "critical_drop_probability"}]
 

@@ -13,7 +13,7 @@ import pytest
 
 from studies.truth import load_manoeuvre, varied
 from studies.truth.simulate import simulate_in_processes
-from tests.unit.truth_cases import TIRES, shortened
+from tests.support.truth_cases import TIRES, shortened
 
 RUNS = int(os.environ.get("GAINSMITH_TRUTH_RUNS", "200"))
 SECONDS = 10.0 if RUNS >= 1000 else 1.0

@@ -16,7 +16,8 @@ from studies.drives.evaluation import DriveData, evaluate
 from studies.drives.quantities import CORNERS
 from studies.drives.run import RunResult, replay_drive, run_drive
 from studies.errors import LogError
-from tests.drives.synthetic_drive import (
+from tests.support.schedule_content import schedule_content
+from tests.support.synthetic_drive import (
     DRIVE,
     MASS,
     SLIP,
@@ -27,7 +28,6 @@ from tests.drives.synthetic_drive import (
     write_drive,
     write_log,
 )
-from tests.unit.schedule_content import schedule_content
 
 WITH_TORQUE = DRIVE.replace("[reference]", TORQUES + "\n[reference]")
 BACKWARDS = WITH_TORQUE.replace('unit = "rad/s"', 'unit = "rad/s", sign = "negative"')

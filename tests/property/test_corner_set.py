@@ -15,7 +15,7 @@ from estimators.arrays import FloatArray
 from estimators.pipeline import CornerObservers, KalmanCorners, SwitchedCorners
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import BristleTire, SlipWeights
-from tests.unit.schedule_content import schedule_content
+from tests.support.schedule_content import schedule_content
 
 CAR = VehicleParameters.published_suv()
 SCHEDULES = [GainSchedule.from_content(schedule_content(n), n) for n in ("longitudinal", "lateral")]

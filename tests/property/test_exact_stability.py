@@ -26,8 +26,8 @@ from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.enclosure import PolynomialMatrix
 from tests.support import exact_stability as oracle
+from tests.support.lmi_cases import parameter, small_model
 from tests.support.stability_cases import FAMILIES, Case, asked, case_of, complaint, survey
-from tests.unit.lmi_cases import parameter, small_model
 
 CASES, PARTS = 300, 6
 p = sp.Symbol("p")

@@ -14,7 +14,7 @@ from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import solve
-from tests.unit.lmi_cases import SLACK, confirmed, gain_problem, held, lyapunov_problem, parameter, within
+from tests.support.lmi_cases import SLACK, confirmed, gain_problem, held, lyapunov_problem, parameter, within
 
 SMALL = settings(deadline=None, max_examples=12)
 SEEDS = st.integers(0, 2**32 - 1)

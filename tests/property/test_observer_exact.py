@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 from estimators import GainSchedule, LpvVelocityObserver
 from estimators.phi import phi
-from tests.unit.schedule_content import PUBLISHED, schedule_content, with_matrix
+from tests.support.schedule_content import PUBLISHED, schedule_content, with_matrix
 
 FEW, MANY = (4,), (7, 4)  # plain numbers, arrays
 

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from estimators import Flag, GainSchedule, LpvVelocityObserver
 from estimators.arrays import FloatArray
 from estimators.velocity import SwitchedVelocityObserver, with_constant_gain
-from tests.unit.schedule_content import PUBLISHED, schedule_content, with_matrix
+from tests.support.schedule_content import PUBLISHED, schedule_content, with_matrix
 
 FEW, MANY = (4,), (7, 4)  # plain numbers, arrays
 SIZES = pytest.mark.parametrize("shape", [FEW, MANY], ids=["few", "many"])

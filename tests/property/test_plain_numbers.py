@@ -21,7 +21,7 @@ from estimators.forces import AttitudeObserver, BodyResponse, LateralForceEstima
 from estimators.forces.lateral_few import FEW, LateralFew
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import BristleTire, LtvKalmanObserver, SwitchedVelocityObserver
-from tests.unit.schedule_content import schedule_content
+from tests.support.schedule_content import schedule_content
 
 TIME = 0.005
 CAR = VehicleParameters.published_suv()

@@ -16,7 +16,7 @@ from studies.truth import simulate, varied
 from studies.truth.layout import COMPLIANCE, COMPLIANCE_RATE, DEFLECTION, JACK, STATES, B, W
 from studies.truth.plant import Controls, Forces, Plant, SteerAngles
 from studies.truth.road import Zone
-from tests.unit.truth_cases import TIRES, course, plant_of, suv
+from tests.support.truth_cases import TIRES, course, plant_of, suv
 
 SCALES = {"vx": 12.0, "vy": 3.0, "heave": 0.02, "roll": 0.02, "pitch": 0.02}
 SCALES |= {"heave_rate": 0.1, "roll_speed": 0.1, "pitch_speed": 0.1}

@@ -11,9 +11,9 @@ from studies.papers.corner_estimation.inputs import PACKAGE
 from studies.papers.corner_estimation.study import CLAIMS, STUDY
 from studies.papers.published import published_claims
 from studies.study import QUICK, PartResult
-from tests.unit.p1_findings import PRINT, finding
-from tests.unit.study_checks import check_result, check_study, desk_parts
-from tests.unit.study_reference import numbers, reference_claims
+from tests.support.p1_findings import PRINT, finding
+from tests.support.study_checks import check_result, check_study, desk_parts
+from tests.support.study_reference import numbers, reference_claims
 
 
 @cache

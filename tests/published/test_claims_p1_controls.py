@@ -23,7 +23,7 @@ from studies.papers.corner_estimation import (
 from studies.papers.corner_estimation.inputs import DESIGNS, PACKAGE, parameters
 from studies.papers.corner_estimation.study import CLAIMS
 from studies.papers.published import printed_numbers
-from tests.unit.p1_findings import finding
+from tests.support.p1_findings import finding
 
 
 def heavier() -> Finding:

@@ -18,7 +18,7 @@ from studies.papers.corner_estimation.sigma_points import filter_lag
 from studies.papers.corner_estimation.solve_size import expressions, one_by_one, relaxed_problem, solve_size
 from studies.papers.published import printed_numbers
 from synthesis.lmi.relaxation import RelaxedProblem
-from tests.unit.p1_findings import PRINT, RADIUS, finding
+from tests.support.p1_findings import PRINT, RADIUS, finding
 
 # ---- (30): H-infinity -----------------------------------------------------------------------------------------------------
 

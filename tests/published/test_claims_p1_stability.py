@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 from studies.claim import ClaimVerdict
 from studies.papers.corner_estimation.inputs import CORNERS
 from studies.papers.corner_estimation.quadratic_stability import diagonal_proof
-from tests.unit.p1_findings import PRINT, RADIUS, finding
+from tests.support.p1_findings import PRINT, RADIUS, finding
 
 PRINTED_29 = (("1.2176", "115.35", "80379.0"), ("-0.0011", "-0.2227", "-67.969"))
 PRINTED_41 = (("4.7718", "154.87", "75627.0"), ("-0.0070", "0.0038", "-0.0013"))

@@ -13,9 +13,9 @@ from studies.papers.longitudinal_speed.study import CLAIMS, STUDY
 from studies.papers.published import published_claims
 from studies.plots.draw import look
 from studies.study import QUICK, PartResult
-from tests.unit.p2_findings import finding
-from tests.unit.study_checks import check_result, check_study, desk_parts
-from tests.unit.study_reference import numbers, reference_claims
+from tests.support.p2_findings import finding
+from tests.support.study_checks import check_result, check_study, desk_parts
+from tests.support.study_reference import numbers, reference_claims
 
 
 @cache

@@ -18,7 +18,7 @@ from studies.papers.longitudinal_speed import (
 )
 from studies.papers.longitudinal_speed.inputs import constant
 from studies.papers.longitudinal_speed.study import CLAIMS
-from tests.unit.p2_findings import finding
+from tests.support.p2_findings import finding
 
 
 def without_the_worse_cells() -> Finding:

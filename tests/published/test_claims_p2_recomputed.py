@@ -25,7 +25,7 @@ from studies.papers.longitudinal_speed.observability import gramian_rank, histor
 from studies.papers.longitudinal_speed.steady_filter import filter_response
 from studies.papers.longitudinal_speed.stochastic_observability import STRUCTURES, both_tests
 from studies.papers.longitudinal_speed.unknown_input_observer import bounds, worst_runs
-from tests.unit.p2_findings import finding
+from tests.support.p2_findings import finding
 
 
 def test_determinant_in_closed_form() -> None:

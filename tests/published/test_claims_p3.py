@@ -24,7 +24,7 @@ from studies.papers.resilient_velocity.study import STUDY
 from studies.plots import Figure
 from studies.plots.draw import draw
 from studies.study import QUICK
-from tests.unit.study_checks import desk_parts
+from tests.support.study_checks import desk_parts
 
 REFERENCE = Path(__file__).parents[3] / "shared" / "reference" / "claims.json"
 PRINT: dict[str, dict[str, str]] = {

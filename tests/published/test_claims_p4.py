@@ -37,8 +37,8 @@ from studies.papers.ekf_ukf_lateral.study import CLAIMS, STUDY
 from studies.papers.ekf_ukf_lateral.tire import SPEED, single_track, single_track_poles, straight_poles, tire_sign
 from studies.papers.published import published_claims
 from studies.study import QUICK, PartResult
-from tests.unit.study_checks import check_result, check_study, desk_parts
-from tests.unit.study_reference import numbers, reference_claims
+from tests.support.study_checks import check_result, check_study, desk_parts
+from tests.support.study_reference import numbers, reference_claims
 
 
 @cache

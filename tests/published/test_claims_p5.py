@@ -48,8 +48,8 @@ from studies.papers.smo_ekf_sideslip.sideslip_settings import (
 from studies.papers.smo_ekf_sideslip.study import STUDY
 from studies.study import QUICK, PartResult
 from synthesis.models.catalogue.single_track import axle_force_model
-from tests.unit.study_checks import check_result, check_study, desk_parts
-from tests.unit.study_reference import numbers, reference_claims
+from tests.support.study_checks import check_result, check_study, desk_parts
+from tests.support.study_reference import numbers, reference_claims
 
 TOPICS = (force_observer, linear_zones, observability, printed_tables, sideslip_settings, truth_tests)
 FUNCTIONS = {name: function for module in TOPICS for name, function in module.TOPIC.claims.items()}

@@ -20,7 +20,7 @@ from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import solve
 from synthesis.polynomials.matrix import MatrixPolynomial
-from tests.unit.lmi_cases import (
+from tests.support.lmi_cases import (
     SLACK,
     capped,
     corner,

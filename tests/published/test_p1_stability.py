@@ -19,7 +19,7 @@ from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.models.catalogue.corner import Direction
 from synthesis.models.lpv import LpvModel
 from synthesis.published_certificate import check_certificate
-from tests.unit.lmi_cases import corner
+from tests.support.lmi_cases import corner
 
 DIRECTIONS: tuple[Direction, ...] = ("longitudinal", "lateral")
 FORMS: tuple[Form, ...] = ("primal", "dual")

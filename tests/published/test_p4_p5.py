@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimators.sideslip import CorneringModel, FourWheelModel, SingleTrack, SlidingGains, SlidingModeObserver
-from tests.unit.sideslip_truth import CAR
+from tests.support.sideslip_truth import CAR
 
 CAR_5 = SingleTrack(1447.0, 3000.0, 1.12, 1.46, 65_000.0, 50_000.0)
 OBSERVER = SlidingModeObserver(CAR_5)

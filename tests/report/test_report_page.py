@@ -10,8 +10,8 @@ import pytest
 
 from studies.run import run_studies
 from studies.study import QUICK
-from tests.report.browser import Page, find_chromium
-from tests.unit.study_fakes.registry import REGISTRY
+from tests.support.browser import Page, find_chromium
+from tests.support.study_fakes.registry import REGISTRY
 
 HERE = Path(__file__).parent
 WIDTHS = (390, 1280)

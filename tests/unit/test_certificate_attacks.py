@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from estimators.schedule.upgrade import UNTIED
-from tests.support.told import LATERAL, SAMPLED, SPRING, Content, Told, claim, content, refused, true, write
+from tests.support.terminal_output import LATERAL, SAMPLED, SPRING, Content, Told, claim, content, refused, true, write
 
 
 @pytest.mark.parametrize("level", [1e6, 300.0])

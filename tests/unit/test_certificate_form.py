@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from studies.cli import main
-from tests.support.told import Content, Told, claim, content, refused, true, write
+from tests.support.terminal_output import Content, Told, claim, content, refused, true, write
 
 
 def test_unknown_keys_are_refused_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

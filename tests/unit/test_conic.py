@@ -12,7 +12,7 @@ from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.relaxation import relax
 from synthesis.lmi.settings import LmiSettings
 from synthesis.polynomials.matrix import symmetric_block, variable
-from tests.unit.lmi_cases import gain_problem, parameter
+from tests.support.lmi_cases import gain_problem, parameter
 
 A = np.array([[[-1.0, 2.0], [0.0, -3.0]], [[0.5, 0.0], [1.0, 0.25]]])
 B = np.array([[[1.0], [0.5]]])

@@ -21,8 +21,8 @@ from estimators.filters import (
     nis,
 )
 from estimators.sideslip import AdaptiveStiffnessObserver, FixedStiffnessObserver, FourWheelModel, FourWheelObserver
-from tests.unit.monte_carlo import RUNS, judged, normal
-from tests.unit.sideslip_truth import AXLES, CAR, PERIOD
+from tests.support.monte_carlo import RUNS, consistency_of, normal
+from tests.support.sideslip_truth import AXLES, CAR, PERIOD
 
 STEPS = 150
 
@@ -74,7 +74,7 @@ def general(kind: str, process: float, sensor: float) -> tuple[Consistency, Cons
             step = which.correct(y, h, r)
         errors.append(nees(step.state - truth, step.covariance))
         innovations.append(nis(step.innovation, step.innovation_covariance)[0])
-    return judged(errors, innovations, 2, 1)
+    return consistency_of(errors, innovations, 2, 1)
 
 
 @pytest.mark.parametrize("kind", ["kalman", "extended", "unscented"])
@@ -108,7 +108,7 @@ def four_wheel(kind: Any, process: float, sensor: float) -> tuple[Consistency, C
         step = observer.step(np.full(RUNS, before), load, now.measurement(truth) + normal(draw, SENSOR))
         errors.append(nees(step.state - truth, step.filter.covariance))
         innovations.append(nis(step.filter.innovation, step.filter.innovation_covariance)[0])
-    return judged(errors, innovations, 8, 4)
+    return consistency_of(errors, innovations, 8, 4)
 
 
 @pytest.mark.parametrize("kind", ["extended", "unscented"])
@@ -143,7 +143,7 @@ def test_stiffness_observers(kind: Any, monkeypatch: pytest.MonkeyPatch) -> None
             assert step.excited.all()
             errors.append(nees(step.filter.state - truth, step.filter.covariance))
             innovations.append(nis(step.filter.innovation, step.filter.innovation_covariance)[0])
-        return judged(errors, innovations, n, 3)
+        return consistency_of(errors, innovations, n, 3)
 
     for found in run(1.0):
         assert found.consistent, str(found)

@@ -19,7 +19,7 @@ from estimators.forces.planar import planar_model
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import BristleTire, KinematicKalman, LtvKalmanObserver
 from estimators.velocity.ltv_model import sampled
-from tests.unit.monte_carlo import RUNS, judged, normal
+from tests.support.monte_carlo import RUNS, consistency_of, normal
 
 TIME = 0.005
 CAR = VehicleParameters.published_suv()
@@ -53,7 +53,7 @@ def test_time_varying_kalman(states: Literal[2, 3]) -> None:
             innovations.append(step.innovation**2 / step.innovation_variance)
             x = (A @ x[..., None])[..., 0] + 2.0 * B + math.sqrt(q) * draw.normal(size=(RUNS, 1)) * drive
             errors.append(nees((x - step.estimate)[:, 1:2], observer.filter.covariance[:, 1:2, 1:2]))
-        return judged(errors, innovations, 1, 1)
+        return consistency_of(errors, innovations, 1, 1)
 
     refuses_wrong_noise(run)
 
@@ -78,7 +78,7 @@ def test_kinematic_kalman() -> None:
             step = kalman.step(1.0, 2.0, 0.3, measured, math.sqrt(R))
             errors.append(nees(x - np.concatenate([step.velocity, step.bias], axis=1), step.covariance))
             innovations.append(nis(step.innovation, ahead[:, :2, :2] + R * np.eye(2))[0])
-        return judged(errors, innovations, 4, 2)
+        return consistency_of(errors, innovations, 4, 2)
 
     refuses_wrong_noise(run)
 
@@ -117,7 +117,7 @@ def test_wheel_force_filter(method: Any) -> None:
             errors.append(error.reshape(-1))
             total = pull**2 * ahead + runner.measurement_variance
             innovations.append((found.innovation**2 / total).reshape(-1))
-        return judged(errors, innovations, 1, 1)
+        return consistency_of(errors, innovations, 1, 1)
 
     refuses_wrong_noise(run)
 
@@ -150,6 +150,6 @@ def test_lateral_force_estimator(method: Any) -> None:
             step = runner.step(y[:, 0], y[:, 1], y[:, 2], steer, np.zeros((RUNS, 4)))
             errors.append(nees(runner.filter.state - states / 1000.0, runner.filter.covariance))
             innovations.append(nis(step.innovation, C @ ahead @ C.swapaxes(1, 2) + np.diag(np.square(claimed)))[0])
-        return judged(errors, innovations, 3, 3)
+        return consistency_of(errors, innovations, 3, 3)
 
     refuses_wrong_noise(run)

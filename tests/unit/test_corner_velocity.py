@@ -17,8 +17,8 @@ from estimators.pipeline import (
     SwitchedCorners,
 )
 from estimators.velocity import BristleTire, KinematicKalman, SlipWeights
-from tests.unit.pipeline_truth import CAR, TIME, Truth, finite, noisy, run, sample, straight, turning
-from tests.unit.schedule_content import PUBLISHED, schedule_content
+from tests.support.pipeline_truth import CAR, TIME, Truth, finite, noisy, run, sample, straight, turning
+from tests.support.schedule_content import PUBLISHED, schedule_content
 
 ALONG, ACROSS = (GainSchedule.from_content(schedule_content(n), n) for n in ("longitudinal", "lateral"))
 SLIP, SIDE = (PUBLISHED[n]["constants"][3] / PUBLISHED[n]["constants"][0] for n in ("longitudinal", "lateral"))

@@ -16,7 +16,7 @@ from synthesis.errors import ProblemError
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.solve import solve
 from synthesis.models.lpv import LpvModel
-from tests.unit.lmi_cases import parameter, small_model
+from tests.support.lmi_cases import parameter, small_model
 
 p = sp.Symbol("p")
 BACKOFF = 0.01

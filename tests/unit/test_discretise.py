@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import cont2discrete
 
 from synthesis.models.discretise import closed_loop_update, zero_order_hold
-from tests.unit.lmi_cases import corner
+from tests.support.lmi_cases import corner
 
 T = 0.005
 

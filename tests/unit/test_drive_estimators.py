@@ -27,8 +27,8 @@ from studies.drives.evaluation import evaluate
 from studies.drives.run import replay_drive
 from studies.drives.schedules import corner_observer, load_schedule
 from synthesis.errors import SpecError
-from tests.drives.synthetic_drive import DRIVE, TORQUES, columns, write_drive, write_log
-from tests.unit.schedule_content import EFFECTIVE_RADIUS, PUBLISHED, schedule_content
+from tests.support.schedule_content import EFFECTIVE_RADIUS, PUBLISHED, schedule_content
+from tests.support.synthetic_drive import DRIVE, TORQUES, columns, write_drive, write_log
 
 TORQUE = DRIVE.replace("[reference]", TORQUES + "\n[reference]")
 TIRES = (

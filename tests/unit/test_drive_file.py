@@ -11,7 +11,7 @@ import pytest
 from studies.drives.drive_file import Vehicle, read_drive
 from studies.drives.quantities import factor_to, to_si
 from synthesis.errors import SpecError
-from tests.drives.synthetic_drive import DRIVE, TORQUES
+from tests.support.synthetic_drive import DRIVE, TORQUES
 
 REPOSITORY = Path(__file__).parents[2]
 TWO_LOGS = DRIVE.replace(

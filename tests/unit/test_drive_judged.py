@@ -16,8 +16,8 @@ from studies.drives.evaluation import DriveData, evaluate
 from studies.drives.quantities import CORNERS
 from studies.drives.run import RunResult, estimate_columns, replay_drive, run_drive
 from studies.plots import Figure, Line, colours
-from tests.drives.synthetic_drive import DRIVE, FRONT, MASS, REAR, TORQUES, TRACK, columns, write_drive, write_log
-from tests.unit.schedule_content import EFFECTIVE_RADIUS, schedule_content
+from tests.support.schedule_content import EFFECTIVE_RADIUS, schedule_content
+from tests.support.synthetic_drive import DRIVE, FRONT, MASS, REAR, TORQUES, TRACK, columns, write_drive, write_log
 
 STEER, TURN, VX, VY = 0.1, 0.4, 10.0, -1.2
 MEASURED = """steering = { column = "steer", unit = "rad" }

@@ -8,30 +8,11 @@ import numpy as np
 import pytest
 
 from studies.drives.csv_log import read_columns
-from studies.drives.drive_file import DriveFile, read_drive
-from studies.drives.log import DriveLog, read_log
+from studies.drives.log import read_log
 from studies.errors import LogError
-from tests.drives.synthetic_drive import DRIVE, columns, write_log
-from tests.unit.schedule_content import EFFECTIVE_RADIUS
-
-HEADER = "t,v,ax,w_fl,w_fr,w_rl,w_rr"
-
-
-def drive(folder: Path, text: str = DRIVE) -> DriveFile:
-    path = folder / "drive.toml"
-    path.write_text(text, encoding="utf-8")
-    return read_drive(path)
-
-
-def rows(times: list[str], width: int = 7) -> str:
-    return HEADER + "\n" + "".join(",".join([t, *["1.0"] * (width - 1)]) + "\n" for t in times)
-
-
-def read(folder: Path, content: str, extra: str = "") -> DriveLog:
-    path = folder / "log.csv"
-    path.write_text(content, encoding="utf-8")
-    return read_log([path], drive(folder, DRIVE.replace('time = "t"', f'time = "t"\n{extra}')))
-
+from tests.support.drive_logs import HEADER, drive, read, rows
+from tests.support.schedule_content import EFFECTIVE_RADIUS
+from tests.support.synthetic_drive import DRIVE, columns, write_log
 
 TIMES = ["0.000", "0.005", "0.010", "0.015", "0.020"]
 GOOD = rows(TIMES)

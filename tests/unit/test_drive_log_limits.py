@@ -9,8 +9,8 @@ import pytest
 
 from studies.drives.log import read_log
 from studies.errors import LogError
-from tests.drives.synthetic_drive import DRIVE, columns, write_log
-from tests.unit.test_drive_log import HEADER, drive, read, rows
+from tests.support.drive_logs import HEADER, drive, read, rows
+from tests.support.synthetic_drive import DRIVE, columns, write_log
 
 
 @pytest.mark.parametrize(("gap", "refused"), [(59.0, False), (61.0, True)])

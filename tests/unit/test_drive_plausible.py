@@ -15,7 +15,7 @@ from studies.drives.plausible import LIMITS
 from studies.drives.quantities import CORNERS, SIGNALS, factor_to
 from studies.drives.run import run_drive
 from studies.errors import LogError
-from tests.drives.synthetic_drive import DRIVE, TORQUES, columns, write_drive, write_log
+from tests.support.synthetic_drive import DRIVE, TORQUES, columns, write_drive, write_log
 
 EXTRA = {
     "ay": "m/s^2",

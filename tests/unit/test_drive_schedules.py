@@ -12,8 +12,8 @@ from studies.commands.run import remarks
 from studies.drives.evaluation import evaluate
 from studies.drives.run import replay_drive, run_drive
 from synthesis.errors import SpecError
-from tests.drives.synthetic_drive import DRIVE, columns, write_drive, write_log
-from tests.unit.schedule_content import EFFECTIVE_RADIUS, schedule_content
+from tests.support.schedule_content import EFFECTIVE_RADIUS, schedule_content
+from tests.support.synthetic_drive import DRIVE, columns, write_drive, write_log
 
 BOTH = DRIVE.replace('"schedule.json"', '"schedule.json"\nlateral = "side.json"')
 

@@ -17,7 +17,7 @@ from analysis.drops.modes import runtime_drop_modes, schedule_drop_modes
 from analysis.errors import AnalysisError
 from estimators import GainSchedule, LpvVelocityObserver
 from estimators.errors import RangeError
-from tests.unit.schedule_content import schedule_content
+from tests.support.schedule_content import schedule_content
 
 SCHEDULE = GainSchedule.from_content(schedule_content())
 SAMPLED = GainSchedule.from_content(

@@ -16,7 +16,7 @@ from analysis.drops.schedule import frozen_critical_probability
 from analysis.errors import AnalysisError
 from estimators import GainSchedule
 from synthesis.lmi.result import Verdict
-from tests.unit.schedule_content import schedule_content, with_matrix
+from tests.support.schedule_content import schedule_content, with_matrix
 
 SHIPPED = GainSchedule.shipped("corner-estimation-longitudinal")
 SAMPLED = GainSchedule.from_content(

@@ -7,7 +7,7 @@ import pytest
 
 from estimators.sideslip import dugoff_force, dugoff_slope, used_friction
 from estimators.sideslip.dugoff import LEAST_KNEE
-from tests.unit.sideslip_truth import dugoff
+from tests.support.sideslip_truth import dugoff
 
 C, LIMIT = 32_500.0, 4000.0
 KNEE = LIMIT / (2 * C)

@@ -11,7 +11,7 @@ from studies.execution.fingerprint import PACKAGES, SOURCE_ROOT, Sources, traits
 from studies.parts.marks import Marks
 from studies.registry import MODULES, Registry
 from studies.study import QUICK, Part, PartResult, Scope
-from tests.unit.study_fakes.registry import REGISTRY
+from tests.support.study_fakes.registry import REGISTRY
 
 TREE = {
     "own/__init__.py": "",

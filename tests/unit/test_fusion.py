@@ -10,7 +10,7 @@ import pytest
 from estimators.errors import EstimatorError
 from estimators.faults import DRIVING, Flag
 from estimators.velocity import VelocityFusion
-from tests.unit.fusion_course import CAR, STEP, Signals, course, driven, phases, sensed
+from tests.support.fusion_course import CAR, STEP, Signals, course, driven, phases, sensed
 
 LAUNCH = phases((1.0, 0.0), (4.0, 3.0), (3.0, 0.0))
 

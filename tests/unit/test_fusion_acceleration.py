@@ -13,7 +13,7 @@ from estimators.faults import Flag
 from estimators.forces import vertical_loads
 from estimators.vehicle import GRAVITY
 from estimators.velocity import FusionStep, VelocityFusion
-from tests.unit.fusion_course import CAR, COMPLIANCE, STEP, Course, Signals, course, driven, phases, sensed
+from tests.support.fusion_course import CAR, COMPLIANCE, STEP, Course, Signals, course, driven, phases, sensed
 
 FROM = 200  # sample at which the fault begins, 1 s
 SETTLED = 100  # samples behind the fault, 0.5 s

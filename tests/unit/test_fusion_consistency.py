@@ -8,7 +8,7 @@ import numpy as np
 
 from estimators.vehicle import GRAVITY
 from estimators.velocity import FusionSettings, VelocityFusion
-from tests.unit.fusion_course import CAR, STEP, phases
+from tests.support.fusion_course import CAR, STEP, phases
 
 CARS = 200
 OWN = FusionSettings()

@@ -7,7 +7,7 @@ import pytest
 
 from estimators.faults import DRIVING, Flag
 from estimators.velocity import VelocityFusion
-from tests.unit.fusion_course import CAR, STEP, Signals, course, driven, phases, sensed
+from tests.support.fusion_course import CAR, STEP, Signals, course, driven, phases, sensed
 
 LAUNCH = phases((1.0, 0.0), (4.0, 3.0), (3.0, 0.0))
 CORNERING = (np.full(4, 60.0), np.array([0.05, 0.05, 0, 0]))

@@ -8,8 +8,8 @@ import pytest
 from estimators.faults import DRIVING, Flag
 from estimators.pipeline import EstimationPipeline
 from estimators.velocity import FusionStep, VelocityFusion
-from tests.unit import pipeline_truth
-from tests.unit.fusion_course import CAR, STEP, course, driven, phases, sensed
+from tests.support import pipeline_truth
+from tests.support.fusion_course import CAR, STEP, course, driven, phases, sensed
 
 CRUISE = course(phases((3.0, 0.0)), start=20.0)
 

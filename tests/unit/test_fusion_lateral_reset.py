@@ -9,7 +9,7 @@ from estimators.faults import Flag
 from estimators.velocity import FusionSettings, VelocityFusion
 from estimators.velocity.consistency_reset import LateralReset
 from estimators.velocity.lateral_fusion import AxleUpdate
-from tests.unit.fusion_course import CAR, STEP, Signals, course, driven, phases, sensed
+from tests.support.fusion_course import CAR, STEP, Signals, course, driven, phases, sensed
 
 SETTINGS = FusionSettings()
 BEFORE, AFTER = 400, 600

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimators.velocity import VelocityFusion
-from tests.unit.fusion_course import CAR, STEP, Signals, course, phases, sensed
+from tests.support.fusion_course import CAR, STEP, Signals, course, phases, sensed
 
 DRIVE = course(phases((0.2, 0.0), (0.5, 3.0), (0.2, 0.0), (0.3, -5.0)))
 N = DRIVE.speed.size

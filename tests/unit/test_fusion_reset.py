@@ -9,8 +9,8 @@ from estimators.arrays import FloatArray
 from estimators.faults import Flag
 from estimators.pipeline import EstimationPipeline
 from estimators.velocity import FusionStep, VelocityFusion
-from tests.unit import pipeline_truth
-from tests.unit.fusion_course import CAR, STEP, Course, Signals, course, driven, phases, sensed
+from tests.support import pipeline_truth
+from tests.support.fusion_course import CAR, STEP, Course, Signals, course, driven, phases, sensed
 
 ROLLING = course(phases((1.0, 0.0), (2.0, 1.0), (1.0, -2.0)), start=20.0)
 LATEST = 1.4  # s: one of rolling wheels, and the filter that differentiates them

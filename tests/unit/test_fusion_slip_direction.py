@@ -8,7 +8,7 @@ import pytest
 from estimators.arrays import FloatArray
 from estimators.faults import Flag
 from estimators.velocity import VelocityFusion
-from tests.unit.fusion_course import CAR, STEP, Course, Signals, course, driven, phases, sensed
+from tests.support.fusion_course import CAR, STEP, Course, Signals, course, driven, phases, sensed
 
 FAULT = slice(200, 500)
 FORGOTTEN = FAULT.stop + 300  # 1.5 s behind the fault

@@ -24,7 +24,7 @@ from studies.spec import load_spec
 from synthesis.design.deploy import deploy
 from synthesis.design.hinf_observer import design_observer
 from synthesis.models.parameter_set import load_parameter_set
-from tests.drives.synthetic_drive import DRIVE, KAPPA, SIGMA0, SLIP, TORQUES, columns, write_drive, write_log
+from tests.support.synthetic_drive import DRIVE, KAPPA, SIGMA0, SLIP, TORQUES, columns, write_drive, write_log
 
 WITH_TORQUE = DRIVE.replace("[reference]", TORQUES + "\n[reference]")
 

@@ -20,8 +20,8 @@ from estimators.pipeline import (
 from estimators.sideslip import FourWheel, FourWheelObserver, SingleTrack
 from estimators.vehicle import GRAVITY
 from estimators.velocity import KinematicKalman, SwitchedVelocityObserver
-from tests.unit.pipeline_truth import CAR, TIME, finite, noisy, run, sample, straight
-from tests.unit.schedule_content import schedule_content
+from tests.support.pipeline_truth import CAR, TIME, finite, noisy, run, sample, straight
+from tests.support.schedule_content import schedule_content
 
 ALONG, ACROSS = (GainSchedule.from_content(schedule_content(n), n) for n in ("longitudinal", "lateral"))
 BODY = (2270.0, 4650.0, 1.42, 1.43)

@@ -9,7 +9,7 @@ from synthesis.errors import ProblemError
 from synthesis.lmi.problem import MARGIN, LmiProblem
 from synthesis.models.param import SchedulingParameter
 from synthesis.polynomials.matrix import variable
-from tests.unit.lmi_cases import parameter
+from tests.support.lmi_cases import parameter
 
 SPEED = SchedulingParameter("speed", "m/s", 10.0, 50.0, -2.0, 6.0)
 LOAD = SchedulingParameter("load", "kg", 1.0, 3.0, 0.0, 0.0)

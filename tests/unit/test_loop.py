@@ -25,7 +25,7 @@ from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
 from synthesis.polynomials.enclosure import PolynomialMatrix
 from synthesis.polynomials.rational import decimal, rational
-from tests.unit.lmi_cases import parameter, small_model
+from tests.support.lmi_cases import parameter, small_model
 
 p, q = sp.symbols("p q")
 PAIR = (SchedulingParameter("p", "1", -1.0, 3.0, -2.0, 2.0), SchedulingParameter("q", "1", 100.0, 101.0, -0.5, 0.5))

@@ -16,7 +16,7 @@ from estimators.errors import GainsmithError
 from synthesis.errors import ModelError
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Constant, SchedulingParameter, Signal
-from tests.unit.lmi_cases import corner, parameter, small_model
+from tests.support.lmi_cases import corner, parameter, small_model
 
 p, q, k, m = sp.symbols("p q k m")
 

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from estimators import EstimatorError, Flag, GainSchedule, LpvVelocityObserver, RangeError, ScheduleError
 from estimators.arrays import FloatArray
-from tests.unit.schedule_content import schedule_content, with_matrix
+from tests.support.schedule_content import schedule_content, with_matrix
 
 SCHEDULE = GainSchedule.from_content(schedule_content(gains=[(0.9, 210.0), (0.8, 183.1), (0.7, 100.0), (0.5, 60.0)]))
 SIZES = [(4,), (5, 4)]  # plain numbers, arrays

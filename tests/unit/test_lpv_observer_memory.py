@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimators import EstimatorError, Flag, GainSchedule, LpvStep, LpvVelocityObserver
-from tests.unit.schedule_content import schedule_content
+from tests.support.schedule_content import schedule_content
 
 SCHEDULE = GainSchedule.from_content(schedule_content())
 SAMPLED = GainSchedule.from_content(schedule_content(gains=(1e-3, 0.05), update="sampled"))

@@ -24,8 +24,8 @@ from estimators.pipeline import (
 from estimators.sideslip import FourWheel, SingleTrack
 from estimators.vehicle import GRAVITY
 from estimators.velocity import SlipWeights, VelocityFusion
-from tests.unit.pipeline_truth import CAR, TIME, Truth, finite, flat, noisy, run, sample, straight, turning
-from tests.unit.schedule_content import schedule_content
+from tests.support.pipeline_truth import CAR, TIME, Truth, finite, flat, noisy, run, sample, straight, turning
+from tests.support.schedule_content import schedule_content
 
 DRIVE = straight(np.repeat([2.0, -3.0], 400), 10.0)
 

@@ -17,7 +17,7 @@ from estimators.arrays import FloatArray
 from estimators.faults import DRIVING
 from estimators.pipeline import Check, EstimationPipeline, PipelineStep
 from estimators.signals import TickSpeed
-from tests.unit.pipeline_truth import BIAS, CAR, TIME, Truth, finite, noisy, run, sample, straight
+from tests.support.pipeline_truth import BIAS, CAR, TIME, Truth, finite, noisy, run, sample, straight
 
 DRIVE = straight(np.repeat([2.0, -3.0], 400), 10.0)
 N = DRIVE.ax.size

@@ -13,7 +13,7 @@ from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.solve import solve
 from synthesis.models.param import Constant, SchedulingParameter, Signal
 from synthesis.published_certificate import check_certificate
-from tests.unit.lmi_cases import parameter, small_model
+from tests.support.lmi_cases import parameter, small_model
 
 p = sp.Symbol("p")
 m = small_model([[0, 1], [-4 - p, -1]], [[1, 0]])

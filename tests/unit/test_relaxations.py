@@ -12,7 +12,7 @@ from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
 from synthesis.polynomials.matrix import MatrixPolynomial, variable
-from tests.unit.lmi_cases import lyapunov_problem, parameter, within
+from tests.support.lmi_cases import lyapunov_problem, parameter, within
 
 GRID, VERTEX, EXACT = (LmiSettings(relaxation=kind) for kind in ("grid", "vertex", "exact"))
 

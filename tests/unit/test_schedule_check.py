@@ -9,7 +9,7 @@ import pytest
 
 from estimators import GainSchedule, ScheduleError
 from estimators.schedule import check_content
-from tests.unit.schedule_content import schedule_content
+from tests.support.schedule_content import schedule_content
 
 # path to the value, new value, place and reason that the message must carry
 VIOLATIONS: list[tuple[tuple[Any, ...], Any, str]] = [

@@ -20,7 +20,7 @@ from estimators.schedule.check import (
     MOST_PARAMETERS,
     MOST_PROVENANCE,
 )
-from tests.unit.schedule_content import schedule_content
+from tests.support.schedule_content import schedule_content
 
 LONGEST_LINE = 300
 Path_ = tuple[Any, ...]

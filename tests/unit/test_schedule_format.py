@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from estimators import GainSchedule, ScheduleError
 from estimators.schedule import SECTIONS, canonical, read_content, sealed, write_content
-from tests.unit.schedule_content import schedule_content
+from tests.support.schedule_content import schedule_content
 
 NUMBERS = st.floats(min_value=-1e100, max_value=1e100)
 SINGLES = st.floats(width=32, min_value=-(2.0**99), max_value=2.0**99)

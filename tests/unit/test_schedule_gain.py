@@ -11,7 +11,7 @@ from estimators import EstimatorError, GainSchedule, RangeError, ScheduleError
 from estimators.interpolate import PiecewiseLinear
 from estimators.schedule import Signal, sealed
 from synthesis.certificate.content import subject_of
-from tests.unit.schedule_content import PUBLISHED, schedule_content, with_matrix
+from tests.support.schedule_content import PUBLISHED, schedule_content, with_matrix
 
 GAINS = [(0.9, 210.0), (0.8, 183.1), (0.7, 100.0), (0.5, 60.0)]
 SCHEDULE = GainSchedule.from_content(schedule_content(gains=GAINS))

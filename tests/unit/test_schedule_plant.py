@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimators import GainSchedule, LpvVelocityObserver
-from tests.unit.schedule_content import chebyshev, schedule_content
+from tests.support.schedule_content import chebyshev, schedule_content
 
 RANGES = {
     "far from zero": (634.65, 635.65),

@@ -14,7 +14,7 @@ from estimators.filters.affine import Affine
 from estimators.filters.triangular import FEW
 from estimators.sideslip import FourWheel, FourWheelModel, FourWheelObserver
 from estimators.sideslip.four_wheel_model import AFFINE_FROM
-from tests.unit.sideslip_truth import CAR, PERIOD, double_track
+from tests.support.sideslip_truth import CAR, PERIOD, double_track
 
 KINDS = ["extended", "unscented"]
 
@@ -99,7 +99,7 @@ def test_transition_is_the_printed_model() -> None:
     m, iz, l1, l2, e = CAR.mass, CAR.yaw_inertia, CAR.front_axle_distance, CAR.rear_axle_distance, CAR.track
     r, v, b, f11, f12, f21, f22, fx = x
     sd, cd = np.sin(delta), np.cos(delta)
-    from tests.unit.sideslip_truth import dugoff
+    from tests.support.sideslip_truth import dugoff
 
     slips = [
         delta - np.arctan((v * b + l1 * r) / (v - e * r / 2)),

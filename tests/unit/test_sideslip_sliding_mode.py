@@ -9,7 +9,7 @@ import pytest
 
 from estimators import EstimatorError, Flag
 from estimators.sideslip import SlidingGains, SlidingModeObserver, wheel_axes
-from tests.unit.sideslip_truth import AXLES, single_track
+from tests.support.sideslip_truth import AXLES, single_track
 
 
 def outputs(state: np.ndarray) -> np.ndarray:

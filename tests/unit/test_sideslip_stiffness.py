@@ -10,7 +10,7 @@ import pytest
 
 from estimators import EstimatorError, Flag
 from estimators.sideslip import AdaptiveStiffnessObserver, CorneringModel, FixedStiffnessObserver
-from tests.unit.sideslip_truth import AXLES, PERIOD, single_track
+from tests.support.sideslip_truth import AXLES, PERIOD, single_track
 
 
 def slalom(amplitude: float = 0.04) -> dict[str, np.ndarray]:

@@ -9,16 +9,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
 from synthesis.lmi import solve as solve_module
 from synthesis.lmi.clarabel_backend import RawAnswer
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
-from synthesis.lmi.scaling import error_scale
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import margins_of, solve
-from tests.unit.lmi_cases import confirmed, corner, gain_problem, lyapunov_problem, parameter, within
+from tests.support.lmi_cases import (
+    closed_loop,
+    condition_problem,
+    confirmed,
+    gain_problem,
+    lyapunov_problem,
+    parameter,
+    within,
+)
 
 STABLE = np.array([[[-1.0, 0.0], [0.0, -2.0]], [[0.0, 0.5], [-0.5, 0.0]]])
 ONE = np.ones((1, 1, 1))
@@ -144,29 +150,6 @@ def test_too_low_a_degree_is_inconclusive_and_the_next_one_certifies() -> None:
     assert Verdict.CERTIFIED in (affine.verdict, better.verdict)
     fast = (parameter(low=-1.2, high=1.2, rate=50.0),)
     assert solve(lyapunov_problem(fast, A, 2), LmiSettings(relaxation="exact")).verdict is Verdict.INCONCLUSIVE
-
-
-def condition_problem(A: FloatArray, scale: FloatArray, degree: int) -> LmiProblem:
-    """Least t with 1 < P < t and dV/dt < 0 in the states diag(scale) x."""
-    model, _ = corner("corner-estimation", "longitudinal")
-    problem = LmiProblem(model.parameters)
-    known = problem.scaled(A * scale[:, None] / scale)
-    P = problem.symmetric("P", 2, degree)
-    t = problem.scalar("t")
-    problem.minimise("t")
-    product = P @ known
-    problem.require("P > 1", P - problem.constant(np.eye(2)))
-    problem.require("P < t", problem.constant(np.eye(2)).scaled_by(t) - P)
-    problem.require("dV/dt < 0", -(product + product.T + problem.time_derivative(P)))
-    return problem
-
-
-def closed_loop(direction: str) -> tuple[FloatArray, FloatArray]:
-    """Coefficients of A_e with the printed gains, and its balancing."""
-    model, published = corner("corner-estimation", direction)  # type: ignore[arg-type]
-    gain = np.array(published.gains)[:, None]
-    A = model.polynomial.A - gain @ model.polynomial.C
-    return A, error_scale(model.on([90.0]).error_dynamics(gain)[0][0])
 
 
 def test_without_balanced_states_verification_decides_and_not_the_status() -> None:

@@ -19,8 +19,16 @@ from synthesis.polynomials.positivity import prove_positive
 from synthesis.polynomials.rational import is_positive_definite
 from synthesis.published_certificate import check_certificate
 from tests.published.test_lpv_benchmarks import DIGITS, PARAMETERS, REFERENCE, rolmip
-from tests.unit.lmi_cases import corner, gain_problem, parameter, reference_problem, small_model, within
-from tests.unit.test_solve import closed_loop, condition_problem
+from tests.support.lmi_cases import (
+    closed_loop,
+    condition_problem,
+    corner,
+    gain_problem,
+    parameter,
+    reference_problem,
+    small_model,
+    within,
+)
 
 p = sp.Symbol("p")
 

@@ -13,7 +13,7 @@ from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.polynomials.rational import polynomial_matrix
 from synthesis.published_certificate import check_certificate, leading_minors
-from tests.unit.lmi_cases import parameter, small_model
+from tests.support.lmi_cases import parameter, small_model
 
 p, q = sp.symbols("p q")
 EXACT = LmiSettings(relaxation="exact")

@@ -15,8 +15,8 @@ import pytest
 from estimators.errors import GainsmithError
 from studies.cli import main
 from studies.commands.study import run_study
-from tests.unit.study_fakes.registry import REGISTRY
-from tests.unit.study_fakes.trace import VARIABLE
+from tests.support.study_fakes.registry import REGISTRY
+from tests.support.study_fakes.trace import VARIABLE
 
 ROOT = Path(__file__).parents[2]
 
@@ -74,7 +74,7 @@ def test_an_interrupt_is_one_line_and_ends_the_workers(tmp_path: Path, monkeypat
     monkeypatch.setenv(VARIABLE, str(tmp_path))
     code = (
         "import sys; from pathlib import Path; from studies.commands.study import run_study;"
-        "from tests.unit.study_fakes.registry import REGISTRY;"
+        "from tests.support.study_fakes.registry import REGISTRY;"
         "sys.exit(run_study(['slow'], False, True, 1, None, Path(sys.argv[1]), False, REGISTRY))"
     )
     process = subprocess.Popen(

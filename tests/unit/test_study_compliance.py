@@ -20,7 +20,7 @@ from studies.papers.resilient_velocity.tire import steady
 from studies.study import PartResult
 from studies.truth import Measured, Truth, draw, load_manoeuvre, load_vehicle, simulate_manoeuvres
 from studies.truth.sensors import PERFECT
-from tests.unit.study_checks import check_result
+from tests.support.study_checks import check_result
 
 GRIPPING = [1, 3]  # the right wheels of the launch stand on dry road
 RIGID = SuspensionParameters(

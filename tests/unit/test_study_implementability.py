@@ -29,8 +29,8 @@ from studies.beyond.implementability.spectral_radius import (
 from studies.beyond.implementability.study import STUDY
 from studies.beyond.implementability.updates import BREAKABLE, LASTING, UPDATES, jury_margin, spectral_radius
 from studies.study import QUICK, PartResult
-from tests.unit.study_checks import check_result, check_study
-from tests.unit.study_reference import reference_claims
+from tests.support.study_checks import check_result, check_study
+from tests.support.study_reference import reference_claims
 
 P1X, P1Y, P3X, P3S, P3Y = printed_designs()
 POINTS = 29

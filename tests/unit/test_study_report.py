@@ -20,7 +20,7 @@ from studies.report.scoreboard import MARKS, MEANINGS, scoreboard
 from studies.report.scoreboard_picture import scoreboard_svg
 from studies.run import run_studies
 from studies.study import QUICK
-from tests.unit.study_fakes.registry import REGISTRY
+from tests.support.study_fakes.registry import REGISTRY
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -21,11 +21,11 @@ from studies.registry import Registry
 from studies.run import RunSummary, run_studies
 from studies.study import QUICK, Part, PartResult, Preparation, Scope, Study
 from synthesis.errors import SpecError
-from tests.unit.study_fakes.registry import REGISTRY
-from tests.unit.study_fakes.trace import VARIABLE
+from tests.support.study_fakes.registry import REGISTRY
+from tests.support.study_fakes.trace import VARIABLE
 
 ROOT = Path(__file__).parents[2]
-FAKES = Path(__file__).parent / "study_fakes"
+FAKES = Path(__file__).parents[1] / "support" / "study_fakes"
 Run = Callable[..., RunSummary]
 
 
@@ -145,7 +145,7 @@ def test_a_part_that_raises_is_named_and_the_others_go_on(run: Run, trace: Path,
     assert not summary.good and summary.missing_claims == ["P2-lost"]
     ((study, part, message),) = summary.failures
     assert (study, part) == ("beta", "lost")
-    assert message.startswith("ZeroDivisionError: no number to divide by (tests/unit/study_fakes/beta/study.py:")
+    assert message.startswith("ZeroDivisionError: no number to divide by (tests/support/study_fakes/beta/study.py:")
     assert [c["id"] for c in json.loads((tmp_path / "out" / "claims.json").read_text())] == ["P2-sum"]
     result = json.loads((tmp_path / "out" / "beta" / "result.json").read_text())
     assert result["missing_claims"] == ["P2-lost"] and result["failed"][0]["part"] == "lost"
@@ -158,7 +158,7 @@ def test_what_parts_share_is_computed_once_and_before_them(run: Run, trace: Path
     summary = run("sharing")
     assert counts(trace) == {"number": 1, "broken": 1, "read": 2, "alone": 1}
     assert summary.failures == [("sharing", "three", "broken: ZeroDivisionError: nothing to share "
-                                 "(tests/unit/study_fakes/sharing/study.py:20)")]  # fmt: skip
+                                 "(tests/support/study_fakes/sharing/study.py:20)")]  # fmt: skip
     shared = tmp_path / "out" / ".parts" / ".prepared"
     assert sorted(p.name for p in shared.iterdir()) == ["number"]  # kept for what is missing; nothing half-written
     (trace / "mended").touch()
@@ -211,7 +211,7 @@ from pathlib import Path
 from studies.execution.fingerprint import Sources
 from studies.run import run_studies
 from studies.study import QUICK
-from tests.unit.study_fakes.registry import REGISTRY
+from tests.support.study_fakes.registry import REGISTRY
 out, sources, study, limit = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3], int(sys.argv[4])
 if limit:
     import resource

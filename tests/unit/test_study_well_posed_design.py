@@ -30,7 +30,7 @@ from studies.beyond.well_posed_design.literal import (
 from studies.beyond.well_posed_design.study import STUDY
 from studies.study import PartResult
 from synthesis.errors import SpecError
-from tests.unit.study_checks import check_result, check_study
+from tests.support.study_checks import check_result, check_study
 
 LONG, LATERAL = p1_cases()
 

@@ -22,7 +22,7 @@ from studies.execution.processes import Serial
 from studies.sweeps.engine import run_sweep
 from studies.sweeps.sweep import Sweep
 from synthesis.errors import SpecError
-from tests.unit.sweep_cases import contents, many_chunks
+from tests.support.sweep_cases import contents, many_chunks
 
 pytest.importorskip("distributed", reason="Dask is not installed: pip install 'gainsmith[cluster]'")
 ROOT = Path(__file__).parents[2]

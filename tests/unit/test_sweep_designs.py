@@ -13,7 +13,7 @@ from analysis.sensitivity.designs import Nominal
 from analysis.sensitivity.points import latin_points, sobol_points
 from studies.sweeps.spec import DESIGNS
 from synthesis.errors import SpecError
-from tests.unit.sweep_cases import sweep
+from tests.support.sweep_cases import sweep
 
 LOW, HIGH = np.array([1.0, -3.0, 0.2]), np.array([2.0, 5.0, 0.6])
 BOX = Box(("a", "b", "c"), LOW, HIGH, np.array([1.5, 0.0, 0.4]))

@@ -31,11 +31,11 @@ from studies.trials.sensors import TEST_CAR
 from studies.truth import draw, load_manoeuvre, simulate_manoeuvres, write_drive
 from synthesis.errors import SpecError
 from synthesis.toml_file import read_table
-from tests.drives.synthetic_drive import DRIVE, TORQUES, columns, write_log
-from tests.drives.synthetic_drive import write_drive as write_drive_file
-from tests.unit.schedule_content import schedule_content
-from tests.unit.sweep_cases import contents, small
-from tests.unit.sweep_integrated import Integrated
+from tests.support.schedule_content import schedule_content
+from tests.support.sweep_cases import contents, small
+from tests.support.sweep_integrated import Integrated
+from tests.support.synthetic_drive import DRIVE, TORQUES, columns, write_log
+from tests.support.synthetic_drive import write_drive as write_drive_file
 
 NAME = "corner-estimation-longitudinal"
 SCHEDULE = GainSchedule.shipped(NAME)

@@ -23,7 +23,7 @@ from studies.sweeps.spec import build_sweep, shipped_sweeps
 from studies.sweeps.statistics import UNPROVED, Summary
 from studies.sweeps.sweep import Sweep
 from synthesis.errors import SpecError
-from tests.unit.sweep_cases import small, sweep
+from tests.support.sweep_cases import small, sweep
 
 NAME = "corner-estimation-longitudinal"
 PARAMETERS = Path(str(resources.files("synthesis.models") / "parameters"))

@@ -31,7 +31,7 @@ from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Constant, SchedulingParameter, Signal
 from synthesis.models.parameter_set import load_parameter_set
-from tests.unit.schedule_content import schedule_content
+from tests.support.schedule_content import schedule_content
 
 NAME = "corner-estimation-longitudinal"
 SCHEDULE = GainSchedule.shipped(NAME)

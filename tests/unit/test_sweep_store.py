@@ -17,7 +17,7 @@ from studies.sweeps.engine import run_sweep
 from studies.sweeps.store import locked_folder
 from studies.sweeps.sweep import Sweep
 from synthesis.errors import SpecError
-from tests.unit.sweep_cases import contents, sweep
+from tests.support.sweep_cases import contents, sweep
 
 FORKS = Path(__file__).with_name("sweep_forks.py")
 SMALL = """
@@ -33,7 +33,7 @@ measures = [
 designs = [{ kind = "one at a time", levels = 3 }, { kind = "saltelli", blocks = 16, seed = 1 }]
 vary.constants.relative = 0.2
 grid.points = 5
-"""  # tests.unit.sweep_cases.small as a file
+"""  # tests.support.sweep_cases.small as a file
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from studies.study import PartResult
 from studies.trials.motion import COLUMNS, MotionTest, extremes, motion_drawings
 from studies.truth import Truth, load_manoeuvre
 from synthesis.errors import SpecError
-from tests.unit.study_checks import check_result
+from tests.support.study_checks import check_result
 
 SPEED, TURN, STEER = 12.0, 0.25, 0.05  # m/s, rad/s, rad
 ROW = MotionTest("p4-bends-dry", "Bends", course=True, rear=True)

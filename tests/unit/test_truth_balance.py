@@ -9,7 +9,7 @@ from estimators.arrays import FloatArray
 from estimators.vehicle import GRAVITY
 from studies.truth import Truth
 from studies.truth.road import Zone
-from tests.unit.truth_cases import TIRES, course, ramp, run
+from tests.support.truth_cases import TIRES, course, ramp, run
 
 STEP = 0.001
 

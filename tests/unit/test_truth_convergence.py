@@ -14,7 +14,7 @@ from studies.truth.layout import B, W, rolling
 from studies.truth.profile import GRID
 from studies.truth.road import Zone
 from studies.truth.simulate import STEP
-from tests.unit.truth_cases import TIRES, course, plant_of, ramp, run, suv
+from tests.support.truth_cases import TIRES, course, plant_of, ramp, run, suv
 
 AT = 0.05 * np.arange(1, 10)
 PATCH = Zone(0.3, (True, False, True, False), from_place=3.0, to_place=7.0)

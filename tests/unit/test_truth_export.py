@@ -13,7 +13,7 @@ from studies.drives.log import read_log
 from studies.drives.run import replay_drive
 from studies.truth import PERFECT, Channel, Drops, Measured, Sensors, draw, simulate, write_drive
 from synthesis.errors import SpecError
-from tests.unit.truth_cases import course, ramp, suv
+from tests.support.truth_cases import course, ramp, suv
 
 
 @pytest.fixture(scope="module")

@@ -7,13 +7,13 @@ import pytest
 
 from estimators.pipeline import EstimationPipeline
 from studies.truth import Sensors, Truth, draw, simulate
-from tests.unit.truth_cases import course, ramp
+from tests.support.truth_cases import course, ramp
 
 pytest.importorskip(
     "vehiclemodels", reason="commonroad-vehicle-models is not installed: no foreign vehicle to compare with"
 )
 
-from tests.unit.truth_foreign import as_truth_vehicle, bmw_320i, drive_foreign
+from tests.support.truth_foreign import as_truth_vehicle, bmw_320i, drive_foreign
 
 CASES = {
     "turn": course("magic-formula", speed=15.0, duration=2.0, steer=ramp(0.1, 0.5, 0.02), name="turn"),

@@ -10,7 +10,7 @@ import pytest
 from studies.truth import Manoeuvre, load_manoeuvre, load_vehicle, shipped_manoeuvres, simulate
 from synthesis.errors import SpecError
 from synthesis.models.parameter_set import load_parameter_set
-from tests.unit.truth_cases import shortened
+from tests.support.truth_cases import shortened
 
 SHIPPED = shipped_manoeuvres()
 PLACES = {

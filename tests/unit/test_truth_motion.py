@@ -11,7 +11,7 @@ from studies.truth import Assist, Drivetrain, Truth, load_vehicle, simulate
 from studies.truth.course import Course
 from studies.truth.profile import GRID, PathPiece, curvature
 from synthesis.errors import SpecError
-from tests.unit.truth_cases import TIRES, course, ramp, run, suv
+from tests.support.truth_cases import TIRES, course, ramp, run, suv
 
 
 def fitted(**options: object) -> Drivetrain:

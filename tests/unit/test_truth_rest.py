@@ -7,7 +7,7 @@ import pytest
 
 from estimators.vehicle import GRAVITY
 from studies.truth import Truth, simulate
-from tests.unit.truth_cases import TIRES, course, ramp, suv
+from tests.support.truth_cases import TIRES, course, ramp, suv
 
 GRADE, BANK = float(np.arctan(0.15)), float(np.arctan(0.05))
 FREE = {"rolling_resistance": 0.0, "drag_area": 0.0}

@@ -12,7 +12,7 @@ from studies.truth.layout import B, rolling
 from studies.truth.plant import Plant, SteerAngles
 from studies.truth.profile import GRID, PATH_GRID, PathPiece, Piece, curvature, sampled, to_si
 from studies.truth.road import Roads, Zone
-from tests.unit.truth_cases import course, ramp, run, suv
+from tests.support.truth_cases import course, ramp, run, suv
 
 
 def piece(**keys: object) -> Piece:

@@ -9,7 +9,7 @@ from estimators.pipeline import EstimationPipeline
 from studies.truth import PERFECT, Channel, Drops, Sensors, Ticks, Truth, draw, simulate
 from studies.truth.sensors import SOURCES
 from synthesis.errors import SpecError
-from tests.unit.truth_cases import course, ramp, suv
+from tests.support.truth_cases import course, ramp, suv
 
 RNG = np.random.SeedSequence(7)
 

@@ -10,7 +10,7 @@ from analysis.drops.frozen import drop_radius
 from analysis.markov.system import independent
 from estimators import GainSchedule, LpvVelocityObserver
 from estimators.velocity import SwitchedVelocityObserver
-from tests.unit.schedule_content import schedule_content
+from tests.support.schedule_content import schedule_content
 
 STEP, RUNS = 0.005, 40000
 SCHEDULES = {

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 from estimators import EstimatorError, Flag, GainSchedule, LpvVelocityObserver
 from estimators.velocity import SlipSwitch, SwitchedVelocityObserver, with_constant_gain
 from estimators.velocity.switching import HIGH_SLIP_GAIN
-from tests.unit.schedule_content import schedule_content
+from tests.support.schedule_content import schedule_content
 
 SCHEDULE = GainSchedule.from_content(schedule_content("resilient-longitudinal"))
 SIZE = (20,)

@@ -19,7 +19,7 @@ from studies.truth import Chassis, Drivetrain, Truth, TruthVehicle
 from studies.truth.course import Course
 from studies.truth.magic_formula import MagicFormulaParameters
 from studies.truth.profile import GRID
-from tests.unit.truth_cases import published
+from tests.support.truth_cases import published
 
 RECORD = 0.01
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from studies.study import Part, PartResult, Preparation, Scope, Study
-from tests.unit.study_fakes.trace import computed, present
+from tests.support.study_fakes.trace import computed, present
 
 
 def _number(scope: Scope, folder: Path) -> None:

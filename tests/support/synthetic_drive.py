@@ -15,7 +15,7 @@ import numpy as np
 
 from estimators.schedule import write_content
 from studies.drives.quantities import CORNERS
-from tests.unit.schedule_content import EFFECTIVE_RADIUS, PUBLISHED, schedule_content
+from tests.support.schedule_content import EFFECTIVE_RADIUS, PUBLISHED, schedule_content
 
 SIGMA0, _, SIGMA2, KAPPA = PUBLISHED["longitudinal"]["constants"]
 MASS, GRAVITY = 1600.0, 9.80665

@@ -10,7 +10,7 @@ from studies.claim import Claim, ClaimVerdict, Finding
 from studies.papers.published import published_claims
 from studies.plots import Figure, Line, Panel, dots
 from studies.study import Part, PartResult, Scope, Study, Table
-from tests.unit.study_fakes.trace import computed
+from tests.support.study_fakes.trace import computed
 
 VALUES = {
     "P1-root": (math.sqrt(2.0), ClaimVerdict.REPRODUCED, "positive root"),

@@ -13,7 +13,7 @@ def normal(draw: np.random.Generator, variances: np.ndarray) -> np.ndarray:
     return draw.normal(size=(RUNS, len(variances))) * np.sqrt(variances)
 
 
-def reproduced(
+def consistency_of(
     errors: list[np.ndarray], innovations: list[np.ndarray], n: int, m: int
 ) -> tuple[Consistency, Consistency]:
     """NEES and NIS of all runs (steps of (RUNS,)) with n and m degrees of freedom, without the first quarter."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from studies.study import Part, PartResult, Scope, Study, Table
-from tests.unit.study_fakes.trace import computed, hold_until
+from tests.support.study_fakes.trace import computed, hold_until
 
 
 def first(_scope: Scope) -> PartResult:

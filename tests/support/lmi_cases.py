@@ -12,7 +12,7 @@ from flint import fmpq, fmpq_poly
 from estimators.arrays import FloatArray
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult
-from synthesis.lmi.scaling import observer_scale
+from synthesis.lmi.scaling import error_scale, observer_scale
 from synthesis.models.catalogue.corner import Direction, corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
@@ -181,3 +181,26 @@ def confirmed(problem: LmiProblem, result: LmiResult) -> bool:
     """Every strict inequality at the decisions of the result, with the common margin taken out, proved exactly."""
     decisions = problem.without_margin(result.decisions)
     return all(exactly_positive(entry.matrix.substitute(decisions)) for entry in problem.inequalities if entry.strict)
+
+
+def condition_problem(A: FloatArray, scale: FloatArray, degree: int) -> LmiProblem:
+    """Least t with 1 < P < t and dV/dt < 0 in the states diag(scale) x."""
+    model, _ = corner("corner-estimation", "longitudinal")
+    problem = LmiProblem(model.parameters)
+    known = problem.scaled(A * scale[:, None] / scale)
+    P = problem.symmetric("P", 2, degree)
+    t = problem.scalar("t")
+    problem.minimise("t")
+    product = P @ known
+    problem.require("P > 1", P - problem.constant(np.eye(2)))
+    problem.require("P < t", problem.constant(np.eye(2)).scaled_by(t) - P)
+    problem.require("dV/dt < 0", -(product + product.T + problem.time_derivative(P)))
+    return problem
+
+
+def closed_loop(direction: str) -> tuple[FloatArray, FloatArray]:
+    """Coefficients of A_e with the printed gains, and its balancing."""
+    model, published = corner("corner-estimation", direction)  # type: ignore[arg-type]
+    gain = np.array(published.gains)[:, None]
+    A = model.polynomial.A - gain @ model.polynomial.C
+    return A, error_scale(model.on([90.0]).error_dynamics(gain)[0][0])

@@ -4,5 +4,5 @@ from __future__ import annotations
 
 from studies.registry import Registry
 
-HOME = "tests.unit.study_fakes"
+HOME = "tests.support.study_fakes"
 REGISTRY = Registry({name: f"{HOME}.{name}.study" for name in ("alpha", "beta", "slow", "crash", "sharing")})

@@ -29,7 +29,7 @@ from studies.sweeps.spec import load_sweep
 from studies.sweeps.sweep import Sweep
 from studies.sweeps.tables import compute
 from synthesis.errors import SpecError
-from tests.unit.sweep_cases import many_chunks
+from tests.support.sweep_cases import many_chunks
 
 
 def in_child(work: Callable[[], Any]) -> Any:

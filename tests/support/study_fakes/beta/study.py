@@ -7,7 +7,7 @@ from collections.abc import Callable
 from studies.claim import Claim, Finding, reproduced
 from studies.papers.published import published_claims
 from studies.study import Part, PartResult, Scope, Study
-from tests.unit.study_fakes.trace import computed, present
+from tests.support.study_fakes.trace import computed, present
 
 
 def _claim(name: str, value: int) -> Callable[[Scope], PartResult]:
