@@ -7,6 +7,7 @@ import re
 from typing import Any
 
 from studies.claim import ClaimVerdict
+from studies.plots import Figure, colours
 from studies.plots.draw import draw
 from studies.study import Part, PartResult, Study
 
@@ -28,6 +29,7 @@ def check_result(result: PartResult) -> None:
     """Axes carry names and units, captions say something, rows fit their columns, claims are JSON."""
     for figure in result.figures:
         assert len(figure.caption) > 120 and len(figure.alternative) > 60, figure.name
+        assert not nameless(figure), figure.name
         sheet = draw(figure)
         sheet.draw_without_rendering()
         for axis in sheet.axes:
@@ -42,6 +44,15 @@ def check_result(result: PartResult) -> None:
     for claim in result.claims:
         row = json.loads(json.dumps(claim.row()))
         assert row["reading"] and row["computed"] and row["verdict"] in set(ClaimVerdict)
+
+
+def nameless(figure: Figure) -> set[str]:
+    """Colours of the marks of a figure that have no name in `studies.plots.colours`, greys and plain white and black apart."""
+    named = {value for value in vars(colours).values() if isinstance(value, str)} | {"white", "black"}
+    marks = [mark for row in figure.rows for panel in row if panel is not None for mark in panel.marks]
+    used = [getattr(mark, key, "") for mark in marks for key in ("color", "edge")]
+    flat = {c for entry in used for c in ([entry] if isinstance(entry, str) else entry)}
+    return {c for c in flat - named if c and not re.fullmatch(r"0?\.\d+", c)}
 
 
 def _bottom(axis: Any) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +16,3 @@ def reference_claims(paper: str) -> dict[str, dict[str, Any]]:
     if not REFERENCE.is_file():
         pytest.skip("the shared reference claims are not beside the checkout")
     return {entry["id"]: entry for entry in json.loads(REFERENCE.read_text()) if entry["paper"] == paper}
-
-
-def numbers(text: object) -> list[float]:
-    """All numbers of a text (or of the JSON text of a value), signs included."""
-    found = re.findall(
-        r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", text if isinstance(text, str) else json.dumps(text)
-    )
-    return [float(entry) for entry in found]

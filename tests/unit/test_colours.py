@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import re
 from itertools import combinations
-from pathlib import Path
 
 import pytest
 from matplotlib.colors import to_rgb
 
-import studies
-from studies.plots import colours
-
-ROOT = Path(studies.__file__).parent
-NAMELESS = re.compile(r"[\"'](#[0-9a-fA-F]{3,8}|tab:\w+)[\"']")
+from studies.plots import Figure, Line, Panel, colours
+from tests.support.study_checks import nameless
 
 
-@pytest.mark.parametrize("room", ["papers", "beyond", "trials", "drives", "identify", "sweeps", "commands"])
-def test_figures_of_the_studies_take_colours_by_name(room: str) -> None:
-    found = [path.name for path in (ROOT / room).rglob("*.py") if NAMELESS.search(path.read_text(encoding="utf-8"))]
-    assert not found
-    assert NAMELESS.search((ROOT / "plots" / "colours.py").read_text(encoding="utf-8"))  # the search does find some
+def test_a_colour_without_a_name_is_found() -> None:
+    """`check_result` asks it of every figure of every study."""
+
+    def figure(*marks: Line) -> Figure:
+        return Figure("name", "caption", "alternative", Panel(marks))
+
+    assert not nameless(figure(Line([0.0], [0.0], color=colours.RED), Line([0.0], [0.0], color="0.4", edge="white")))
+    assert nameless(figure(Line([0.0], [0.0], color="#123456"))) == {"#123456"}
+    assert nameless(figure(Line([0.0], [0.0], edge="tab:blue"))) == {"tab:blue"}
 
 
 @pytest.mark.parametrize("group", [colours.CURVES, colours.CORNERS, colours.SETTINGS, colours.ROADS, (
