@@ -5,7 +5,6 @@ from __future__ import annotations
 from enum import IntFlag
 
 from estimators.arrays import AnyArray, FlagArray
-from estimators.arrays import BoolArray as BoolArray  # noqa: PLC0414 - until the last importer from here has gone
 
 
 class Flag(IntFlag):

@@ -6,15 +6,14 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from estimators.arguments import LIMIT
 from estimators.arithmetic import Arithmetic, Number
-from estimators.arrays import BoolArray, FlagArray
+from estimators.arrays import AnyArray, BoolArray, FlagArray
 from estimators.errors import EstimatorError
 from estimators.faults import Flag, raise_flag
 
-Saved = dict[str, npt.NDArray[Any]]
+Saved = dict[str, AnyArray]
 
 
 class Memory:
@@ -35,7 +34,7 @@ class Memory:
             saved |= {lead + name: array for name, array in part.save().items()}
         return saved
 
-    def restore(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def restore(self, saved: Mapping[str, AnyArray]) -> None:
         """Continues from `save`, bit for bit.
 
         Raises:
@@ -49,7 +48,7 @@ class Memory:
             self._take(before)
             raise
 
-    def _check(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _check(self, saved: Mapping[str, AnyArray]) -> None:
         unknowns = self._all_unknowns()
         for key, own in self.save().items():
             if key not in saved:
@@ -66,7 +65,7 @@ class Memory:
         found = {name.lstrip("_") for name in self.unknowns}
         return found.union(*(part._all_unknowns() for _, part in self._members() if isinstance(part, Memory)))
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         for name in self.memory:
             setattr(self, name, _as(getattr(self, name), np.array(saved[name.lstrip("_")])))
         for lead, part in self._members():
@@ -85,7 +84,7 @@ class Memory:
                 yield f"{name.lstrip('_')}.", part
 
 
-def _as(own: Any, array: npt.NDArray[Any]) -> Any:
+def _as(own: Any, array: AnyArray) -> Any:
     """A saved array in the form of the value `own`."""
     if isinstance(own, np.ndarray):
         return array

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from estimators.arrays import FloatArray
+from estimators.arrays import FloatArray, IntArray
 
 Integers = NDArray[np.uint64]
 BITS = 30  # of a Sobol coordinate: what scipy's generator has, enough for 10^9 points
 ROUNDS = 4  # of the Feistel network
 
 
-def sobol_points(indices: NDArray[np.int64], dimensions: int, seed: int) -> FloatArray:
+def sobol_points(indices: IntArray, dimensions: int, seed: int) -> FloatArray:
     """Scrambled Sobol points (Owen 1998), the same as those of `scipy.stats.qmc.Sobol`.
 
     A scrambled Sobol sequence is affine over the two-element field in the bits of the index: x_n = x_0 XOR the sum over the
@@ -47,7 +47,7 @@ def _sobol_basis(dimensions: int, seed: int, bits: int) -> tuple[Integers, list[
     return start, steps
 
 
-def latin_points(indices: NDArray[np.int64], dimensions: int, samples: int, seed: int) -> FloatArray:
+def latin_points(indices: IntArray, dimensions: int, samples: int, seed: int) -> FloatArray:
     """A Latin hypercube of `samples` points: every coordinate has one point in each of as many equal slices.
 
     The slices are permuted by a keyed bijection of 0 .. samples-1, so no permutation is held in memory.

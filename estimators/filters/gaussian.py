@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from estimators.arguments import LIMIT, broadcast, mask, numbers
-from estimators.arrays import BoolArray, FloatArray
+from estimators.arrays import AnyArray, BoolArray, FloatArray
 from estimators.errors import EstimatorError
 from estimators.memory import Memory, Saved
 
@@ -70,7 +69,7 @@ class GaussianFilter(Memory):
         """Everything needed to continue later, as plain arrays."""
         return {key: array.copy() for key, array in self._memory().items()}
 
-    def _take(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _take(self, saved: Mapping[str, AnyArray]) -> None:
         for key, own in self._memory().items():
             own[...] = saved[key]
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from estimators.arguments import entries, mask, setting
-from estimators.arrays import FloatArray
+from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import EstimatorError
 from estimators.faults import Flag, raise_flag
 from estimators.forces.wheel import WheelForceStep, WheelInputs, WheelSignals
@@ -156,7 +156,7 @@ class PidForceObserver(Memory):
         self.starts = self.starts | chosen
         self.flowing = False
 
-    def _move_speed(self, speed: FloatArray, rate: FloatArray, error: FloatArray, again: npt.NDArray[np.bool_]) -> None:
+    def _move_speed(self, speed: FloatArray, rate: FloatArray, error: FloatArray, again: BoolArray) -> None:
         """what at the end of the sample: (5) over one sample, exactly."""
         both = np.stack((np.where(again, 0.0, self.speed_integral), error), axis=-1)
         moved = np.einsum("cij,...cj->...ci", self._move, both)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from estimators.arguments import LIMIT, batch, entries, finite, mask, quiet
-from estimators.arrays import BoolArray, FlagArray, FloatArray
+from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from estimators.errors import EstimatorError
 from estimators.memory import Renewable, Saved
 from estimators.schedule import GainSchedule
@@ -197,7 +197,7 @@ class LpvVelocityObserver(TwoStateObserver):
         """Everything needed to continue later, and the digest of the schedule, as plain arrays."""
         return super().save() | {"schedule_sha256": np.array(self.schedule.sha256)}
 
-    def _check(self, saved: Mapping[str, npt.NDArray[Any]]) -> None:
+    def _check(self, saved: Mapping[str, AnyArray]) -> None:
         if "schedule_sha256" in saved and str(saved["schedule_sha256"]) != self.schedule.sha256:
             raise EstimatorError(f"saved with another schedule than '{self.schedule.name}' {self.schedule.sha256[:12]}")
         super()._check(saved)

@@ -7,14 +7,14 @@ Vertical load and force before friction: no road parameter enters anywhere. Sour
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from estimators.arrays import BoolArray, FloatArray
+
 LEAST_LOAD = 0.05
 """Share of the static load below which a wheel counts as lifted and its normalised force as unknown."""
 
 
-def derivative(value: Array, sample_time: float, lag: float) -> Array:
+def derivative(value: FloatArray, sample_time: float, lag: float) -> FloatArray:
     """Causal first-order derivative of (n,) samples: y' = (x' - y)/lag, per second.
 
     Exact for piecewise linear x: y[k] = a y[k-1] + (1 - a) (x[k] - x[k-1])/Ts with a = exp(-Ts/lag); lag 0 is the
@@ -32,15 +32,15 @@ def derivative(value: Array, sample_time: float, lag: float) -> Array:
 
 
 def wheel_forces(
-    torque: Array,
-    wheel_speed: Array,
-    wheel_acceleration: Array,
-    vertical_load: Array,
+    torque: FloatArray,
+    wheel_speed: FloatArray,
+    wheel_acceleration: FloatArray,
+    vertical_load: FloatArray,
     inertia: float,
-    radius: Array,
+    radius: FloatArray,
     rolling_resistance: float,
     stopped_below: float,
-) -> Array:
+) -> FloatArray:
     """Longitudinal forces (n, 4), N, from wheel dynamics: F_x = (T - I_w dw/dt)/R_e - c_rr F_z sign(w), P1 (1).
 
     ``torque`` N m (drive minus brake), ``wheel_acceleration`` rad/s^2, ``radius`` (4,) m. P1 has no rolling
@@ -53,7 +53,9 @@ def wheel_forces(
     return np.where(stopped, np.nan, force)
 
 
-def shared_forces(ax: Array, vertical_load: Array, mass: float, dynamics: Array, known: npt.NDArray[np.bool_]) -> Array:
+def shared_forces(
+    ax: FloatArray, vertical_load: FloatArray, mass: float, dynamics: FloatArray, known: BoolArray
+) -> FloatArray:
     """Longitudinal forces (n, 4), N: what m a_x leaves, shared by load: F_i = (m a_x - sum of known) F_zi / sum F_z.
 
     ``dynamics`` (n, 4) counts at the corners marked in ``known`` (4,); the sum of loads runs over the others. With none
@@ -67,7 +69,7 @@ def shared_forces(ax: Array, vertical_load: Array, mass: float, dynamics: Array,
     return forces
 
 
-def normalised_forces(force: Array, vertical_load: Array, static_load: float) -> Array:
+def normalised_forces(force: FloatArray, vertical_load: FloatArray, static_load: float) -> FloatArray:
     """mu = F_x/F_z (n, 4), P1 (13); NaN where a wheel carries less than 5 % of ``static_load``, N."""
     lifted = vertical_load < LEAST_LOAD * static_load
     return np.where(lifted, np.nan, force / np.where(lifted, 1.0, vertical_load))

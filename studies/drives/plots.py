@@ -6,8 +6,8 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from studies.drives.chain import Chain
 from studies.drives.evaluation import (
     AXLES,
@@ -19,8 +19,6 @@ from studies.drives.evaluation import (
 )
 from studies.drives.quantities import CORNERS
 from studies.plots import ZERO, Figure, Line, Mark, Panel, colours
-
-Array = npt.NDArray[np.float64]
 
 REFERENCE = partial(Line, label="reference", color=colours.TRUTH, width=1.8)
 ESTIMATE = partial(Line, label="corner observers", color=colours.OWN_OBSERVERS, width=1.1)
@@ -140,12 +138,12 @@ def _measured(data: DriveData, name: str, scale: float) -> list[Mark]:
     return [] if value is None else [REFERENCE(data.log.time, value / scale)]
 
 
-def _while_driving(chain: Chain, value: Array) -> Array:
+def _while_driving(chain: Chain, value: FloatArray) -> FloatArray:
     """NaN at standstill, where slips and angles mean nothing."""
     return np.where(np.abs(chain.vx) >= LEAST_SPEED, value, np.nan)
 
 
-def _force_unit(force: Array) -> tuple[float, str]:
+def _force_unit(force: FloatArray) -> tuple[float, str]:
     return (1e3, "kN") if np.nanmax(np.abs(force), initial=0.0) > 1e3 else (1.0, "N")
 
 

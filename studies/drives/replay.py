@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from estimators.arithmetic import ManyCars, OneCar
+from estimators.arrays import FloatArray, IntArray
 from estimators.pipeline import CornerSample
 from estimators.pipeline.corner_kinds import CornerKind
 from estimators.velocity import slip_ratio
@@ -16,7 +16,6 @@ from estimators.velocity.mapping import weighed
 from studies.drives.baselines import held, mean_over
 from studies.drives.prepare import CornerInputs
 
-Array = npt.NDArray[np.float64]
 PROGRESS_STEPS = 50
 
 
@@ -28,11 +27,11 @@ class Replay:
     ``relative_velocity`` v_r and ``innovation`` (n, 4); ``flags`` (n, 4) are the observer's flags.
     """
 
-    velocity: Array
-    corner_velocity: Array
-    relative_velocity: Array
-    innovation: Array
-    flags: npt.NDArray[np.int64]
+    velocity: FloatArray
+    corner_velocity: FloatArray
+    relative_velocity: FloatArray
+    innovation: FloatArray
+    flags: IntArray
 
 
 def replay(inputs: CornerInputs, observer: CornerKind, progress: Callable[[float], None] | None = None) -> Replay:
@@ -62,7 +61,7 @@ def replay(inputs: CornerInputs, observer: CornerKind, progress: Callable[[float
     return Replay(cg_velocity(corner), corner, relative, innovation, flags)
 
 
-def centre_map(inputs: CornerInputs) -> tuple[Array, Array]:
+def centre_map(inputs: CornerInputs) -> tuple[FloatArray, FloatArray]:
     """V_x = gain * v_xt + shift (n, 4): from wheel-centre velocity along the tyre to the centre of gravity, P1 (33).
 
     v_xc = v_xt cos d - v_yt sin d with v_yt from the rigid body becomes v_xc = (v_xt - (V_y + r x_c) sin d)/cos d;
@@ -73,7 +72,7 @@ def centre_map(inputs: CornerInputs) -> tuple[Array, Array]:
     return 1.0 / np.cos(inputs.steer), r * inputs.y - across * np.tan(inputs.steer)
 
 
-def cg_velocity(corner: Array) -> Array:
+def cg_velocity(corner: FloatArray) -> FloatArray:
     """V_x (...,) from the corners (..., 4): axles weigh 0.5 each, wheels of an axle alike, missing ones left out."""
     if corner.ndim == 1:
         return np.asarray(weighed(OneCar(), corner.tolist(), 0.5)[0])

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import AnyArray
 from studies.claim import JsonValue
 from synthesis.errors import SpecError
 
@@ -127,7 +127,7 @@ def write_json(path: Path, content: Any) -> None:
     write_bytes(path, json_bytes(content, 2))
 
 
-def write_csv(path: Path, columns: Mapping[str, npt.NDArray[Any]]) -> None:
+def write_csv(path: Path, columns: Mapping[str, AnyArray]) -> None:
     """One column a name, six decimals; what is missing is an empty cell."""
     import polars as pl
 

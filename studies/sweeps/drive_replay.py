@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.planar_exponential import planar_phi
-from estimators.arrays import FloatArray
+from estimators.arrays import BoolArray, FloatArray
 from studies.drives.baselines import held, mean_over
 from studies.drives.drive_file import read_drive
 from studies.drives.log import read_log
@@ -33,7 +32,7 @@ class Recorded:
     sample_time: float
 
     @property
-    def known(self) -> NDArray[np.bool_]:
+    def known(self) -> BoolArray:
         """Samples (n,) that count: with a reference, and with a wheel that has a speed."""
         return np.isfinite(self.reference) & np.isfinite(_weights(self.inputs)).all(axis=1)
 

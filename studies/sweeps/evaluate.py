@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
 from analysis.sensitivity.worst import WorstCaseSearch, worst_case
-from estimators.arrays import FloatArray
+from estimators.arrays import FlagArray, FloatArray, IntArray
 from studies.sweeps.measure import Measure
 from studies.sweeps.observer import Batch, Observer
 from studies.sweeps.plant import Grid
@@ -24,7 +24,7 @@ TIE = 1e-9  # relative
 REFUSALS = (AnalysisError, ModelError, ProblemError, np.linalg.LinAlgError)
 
 Answer = TypeVar("Answer")
-Rows: TypeAlias = NDArray[np.int64]
+Rows: TypeAlias = IntArray
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Evaluated:
 
     columns: dict[str, FloatArray]
     worst: dict[str, FloatArray]
-    place: dict[str, NDArray[np.int32]]
+    place: dict[str, FlagArray]
     envelopes: dict[str, Envelope]
     outcome: NDArray[np.str_]
     reason: list[str]
@@ -45,7 +45,7 @@ class Envelope:
     """At every grid point (g,) the worst and the best value of some designs, and the row that has the worst."""
 
     worst: FloatArray
-    row: NDArray[np.int64]
+    row: IntArray
     best: FloatArray
 
 
@@ -118,7 +118,7 @@ def _separate(function: Callable[[Rows], Answer], rows: Rows) -> list[tuple[Rows
     return _separate(function, rows[:middle]) + _separate(function, rows[middle:])
 
 
-def _worst(measure: Measure, values: FloatArray) -> tuple[FloatArray, NDArray[np.int32]]:
+def _worst(measure: Measure, values: FloatArray) -> tuple[FloatArray, FlagArray]:
     """The worst over the grid and where; NaN wins, so that it is never hidden behind a number."""
     place = np.argmax(np.where(np.isnan(values), np.inf, measure.sign * values), axis=1)
     chosen = np.take_along_axis(values, place[:, None], axis=1)[:, 0]

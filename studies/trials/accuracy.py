@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import t as student
 
+from estimators.arrays import FloatArray
 from studies.study import Cell
 
-Array = npt.NDArray[np.float64]
 
-
-def nrms(estimate: Array, truth: Array, least: float = 0.0) -> Array:
+def nrms(estimate: FloatArray, truth: FloatArray, least: float = 0.0) -> FloatArray:
     """P1 (46) per run, %: RMS of ``estimate`` (S, n) minus ``truth`` (n,) over max |truth|, at samples with |truth| >= ``least``.
 
     NaN where the truth never reaches ``least`` or stays 0.
@@ -23,13 +21,13 @@ def nrms(estimate: Array, truth: Array, least: float = 0.0) -> Array:
     peak = float(np.max(np.abs(truth)))
     if peak == 0.0 or not counted.any():
         return np.full(estimate.shape[0], np.nan)
-    error: Array = np.sqrt(np.mean((estimate[:, counted] - truth[counted]) ** 2, axis=1))
+    error: FloatArray = np.sqrt(np.mean((estimate[:, counted] - truth[counted]) ** 2, axis=1))
     return 100.0 * error / peak
 
 
-def sample_errors(estimate: Array, truth: Array) -> Array:
+def sample_errors(estimate: FloatArray, truth: FloatArray) -> FloatArray:
     """P4 (13), P5 (8): 100 |estimate - truth|/max |truth| at every sample, %, shape of ``estimate`` (S, n)."""
-    out: Array = 100.0 * np.abs(estimate - truth) / float(np.max(np.abs(truth)))
+    out: FloatArray = 100.0 * np.abs(estimate - truth) / float(np.max(np.abs(truth)))
     return out
 
 
@@ -48,7 +46,7 @@ class Spread:
         return f"{self.mean:.{digits}f} [{self.low:.{digits}f}, {self.high:.{digits}f}]"
 
 
-def spread(values: Array) -> Spread | None:
+def spread(values: FloatArray) -> Spread | None:
     """Of one number a run (S,); None where it is not known in any run.
 
     Raises ValueError when it is known in some runs only: a mean over the others would flatter.
@@ -63,7 +61,7 @@ def spread(values: Array) -> Spread | None:
     return Spread(mean, mean - half, mean + half, float(values.max()), runs)
 
 
-def known_spread(values: Array) -> Spread:
+def known_spread(values: FloatArray) -> Spread:
     """`spread` of values that are known in every run. Raises ValueError otherwise."""
     found = spread(values)
     if found is None:
@@ -90,7 +88,7 @@ class SampleSpreads(NamedTuple):
         return {f"{name}, mean": self.mean.mean, f"{name}, deviation": self.deviation.mean}
 
 
-def sample_spreads(estimate: Array, truth: Array) -> SampleSpreads:
+def sample_spreads(estimate: FloatArray, truth: FloatArray) -> SampleSpreads:
     """Of the estimates (S, n) against the truth (n,)."""
     error = sample_errors(estimate, truth)
     return SampleSpreads(known_spread(error.mean(axis=1)), known_spread(error.std(axis=1)))

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from estimators.forces import AttitudeObserver
 from estimators.pipeline import EstimationPipeline
 from estimators.pipeline.result import PipelineStep
@@ -18,12 +18,11 @@ from studies.trials.simulations import simulated_truth
 from studies.truth import Measured, Sensors, Truth, draw
 from synthesis.errors import SpecError
 
-Array = npt.NDArray[np.float64]
 QUICK_SECONDS = 4.0
 """So much of each manoeuvre goes through the pipeline when quick."""
 Parts = Callable[[VehicleParameters, float, tuple[int, ...]], Mapping[str, Any]]
 """(vehicle, sample time, batch shape) -> parts that replace those of the pipeline, by its argument names."""
-Reading = Callable[[PipelineStep], Array]
+Reading = Callable[[PipelineStep], FloatArray]
 """Takes one signal out of a step."""
 
 WHEELS, INTEGRATED = "mean wheel speed", "integrated acceleration"
@@ -49,7 +48,7 @@ def assumed_car(drawn: Measured) -> VehicleParameters:
     return cars[0]
 
 
-def run_pipeline(drawn: Measured, readings: Mapping[str, Reading], parts: Parts | None = None) -> dict[str, Array]:
+def run_pipeline(drawn: Measured, readings: Mapping[str, Reading], parts: Parts | None = None) -> dict[str, FloatArray]:
     """Every reading at every sample: (S, B, n) or (S, B, n, k). The estimators know the truth's own parameters.
 
     The inertial sensors are fixed to a body that rolls and pitches: an `AttitudeObserver` levels them unless ``parts`` bring
@@ -59,7 +58,7 @@ def run_pipeline(drawn: Measured, readings: Mapping[str, Reading], parts: Parts 
     time, shape = drawn.sample_time, drawn.batch_shape
     chosen = {"attitude": AttitudeObserver(time, shape), **(parts(car, time, shape) if parts else {})}
     pipeline = EstimationPipeline(car, time, shape, **chosen)
-    found: dict[str, Array] = {}
+    found: dict[str, FloatArray] = {}
     for k, signals in enumerate(drawn):
         step = pipeline.step(signals)
         for name, reading in readings.items():
@@ -70,7 +69,7 @@ def run_pipeline(drawn: Measured, readings: Mapping[str, Reading], parts: Parts 
     return found
 
 
-def baselines(drawn: Measured) -> dict[str, Array]:
+def baselines(drawn: Measured) -> dict[str, FloatArray]:
     """V_x (S, B, n) without an observer, m/s: `WHEELS`, their mean speed, and `INTEGRATED`, a_x from it on."""
     wheels = (assumed_car(drawn).radius * drawn.signals["wheel_speed"]).mean(axis=-1)
     moved = np.cumsum(drawn.signals["ax"] * drawn.sample_time, axis=-1)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from studies.trials.estimation import assumed_car
 from studies.truth import Measured
 
-Array = npt.NDArray[np.float64]
 SAMPLE_TIME = 0.01
 """s, P4 and P5: 100 Hz."""
 START = 1.0
@@ -18,19 +17,19 @@ LEAST_SPEED = 3.0
 PRINTED_TEST = "Printed values are those of the paper's road test with another driver, road and car."
 
 
-def rear_speed(drawn: Measured) -> Array:
+def rear_speed(drawn: Measured) -> FloatArray:
     """V_g (S, B, n), m/s: mean of the rear wheel speeds times the radius, P4 notes 4."""
-    out: Array = (assumed_car(drawn).radius * drawn.signals["wheel_speed"])[..., 2:].mean(axis=-1)
+    out: FloatArray = (assumed_car(drawn).radius * drawn.signals["wheel_speed"])[..., 2:].mean(axis=-1)
     return out
 
 
-def front_steer(drawn: Measured) -> Array:
+def front_steer(drawn: Measured) -> FloatArray:
     """Steering angle of the front wheels (S, B, n), rad: mean of both."""
-    out: Array = drawn.signals["steer"][..., :2].mean(axis=-1)
+    out: FloatArray = drawn.signals["steer"][..., :2].mean(axis=-1)
     return out
 
 
-def counted(drawn: Measured, run: int) -> npt.NDArray[np.bool_]:
+def counted(drawn: Measured, run: int) -> BoolArray:
     """Samples (n,) of a run that count in errors: from `START` on, and not below `LEAST_SPEED`."""
     truth = drawn.truth
     fast = np.absolute(truth["vx"][run]) >= LEAST_SPEED

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from estimators.pipeline import DifferentiatedPid
 from estimators.vehicle import CORNERS, VehicleParameters
 from studies.plots import Figure, Line, Panel, colours
@@ -19,7 +19,6 @@ from studies.trials.histories import history
 from studies.trials.simulations import LUGRE
 from studies.truth import Truth
 
-Array = npt.NDArray[np.float64]
 LEAST = 1000.0
 """N: samples below it are left out, and a force that never reaches it has no row."""
 AXLES = ("front axle", "rear axle")
@@ -87,14 +86,14 @@ def force_part(
     return PartResult(tables=[Table(f"{name}-errors", caption, columns, table)], figures=drawings, measures=measures)
 
 
-def _true(truth: Truth, key: str, run: int) -> Array:
+def _true(truth: Truth, key: str, run: int) -> FloatArray:
     """(n, k) N: of the corners, or of the axles for F_y."""
     if key == "axle_force_y":
         return np.stack([truth["force_y"][run, :, :2].sum(axis=1), truth["force_y"][run, :, 2:].sum(axis=1)], axis=1)
     return np.asarray(truth[key][run])
 
 
-def _history(name: str, truth: Truth, row: ForceTest, estimates: Mapping[str, Array]) -> Figure:
+def _history(name: str, truth: Truth, row: ForceTest, estimates: Mapping[str, FloatArray]) -> Figure:
     run, samples = run_of(truth, row.manoeuvre)
     time = truth.time[samples]
     panels = []

@@ -8,25 +8,24 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from studies.plots import Axis, Band, Dash, ErrorBars, Figure, Line, Mark, Panel, Shade
 from studies.plots.colours import SETTINGS, TRUTH
 from studies.trials.accuracy import Spread
 
-Array = npt.NDArray[np.float64]
 BAND = (2.5, 97.5)
 """Percentiles over the sensor draws."""
 BANDS = "Lines: first sensor draw; bands: 95 % of all draws."
 
 
-def truth_line(time: Array, truth: Array) -> Line:
+def truth_line(time: FloatArray, truth: FloatArray) -> Line:
     """The truth (n,), wide: the first mark, so that estimates lie above it."""
     return Line(time, truth, "truth", TRUTH, width=2.0, alpha=0.8)
 
 
 def estimate_lines(
-    time: Array, estimate: Array, label: str, color: str, dash: Dash = "solid", width: float = 0.9
+    time: FloatArray, estimate: FloatArray, label: str, color: str, dash: Dash = "solid", width: float = 0.9
 ) -> list[Mark]:
     """First draw of (S, n) as a line, all draws as a band."""
     line = Line(time, estimate[0], label, color, dash, width)
@@ -36,7 +35,7 @@ def estimate_lines(
     return [line, Band(time, low, high, color=color, alpha=0.18)]
 
 
-def setting_lines(time: Array, estimates: Iterable[Array], labels: Sequence[str]) -> list[Mark]:
+def setting_lines(time: FloatArray, estimates: Iterable[FloatArray], labels: Sequence[str]) -> list[Mark]:
     """The estimates (S, n) of up to three settings of one estimator."""
     shown = zip(estimates, labels, SETTINGS, strict=False)
     return [mark for value, label, color in shown for mark in estimate_lines(time, value, label, color)]
@@ -53,7 +52,9 @@ def history(
     return Figure(name, caption, alternative, rows, size, legend, share_x="all", share_y=share_y)
 
 
-def backgrounds(time: Array, state: Array, looks: Sequence[tuple[str, str] | None], alpha: float = 1.0) -> list[Mark]:
+def backgrounds(
+    time: FloatArray, state: FloatArray, looks: Sequence[tuple[str, str] | None], alpha: float = 1.0
+) -> list[Mark]:
     """Stripes by the ``state`` (n,) of every sample, 0, 1, ...: label and colour of each state, None without one."""
     found: list[Mark] = []
     unnamed = set(looks)
@@ -79,7 +80,7 @@ def error_dots(rows: Sequence[Mapping[str, Spread]], looks: Mapping[str, tuple[s
     return found
 
 
-def dot_heights(rows: Sequence[int], who: str, looks: Mapping[str, tuple[str, str]]) -> Array:
+def dot_heights(rows: Sequence[int], who: str, looks: Mapping[str, tuple[str, str]]) -> FloatArray:
     """Where `error_dots` puts ``who`` in the ``rows``."""
     return np.array(rows) + 0.7 / len(looks) * (list(looks).index(who) - 0.5 * (len(looks) - 1))
 

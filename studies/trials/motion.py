@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from estimators.vehicle import CORNERS, GRAVITY
 from studies.plots import Axis, Figure, Line, Panel, dots
 from studies.plots.colours import BLUE, ORANGE, RED
@@ -17,7 +17,6 @@ from studies.trials.histories import history
 from studies.trials.simulations import LUGRE, simulated_truth
 from studies.truth import Truth, load_manoeuvre
 
-Array = npt.NDArray[np.float64]
 COLUMNS = (
     "manoeuvre", "shown in", "the paper gives", "V_x, least [m/s]", "V_x, greatest [m/s]", "|a_x|, greatest [m/s^2]",
     "|a_y|, greatest [m/s^2]", "|yaw rate|, greatest [deg/s]", "steering at the wheels, greatest [deg]",
@@ -66,7 +65,7 @@ def extremes(name: str, truth: Truth, rows: Sequence[MotionTest]) -> Table:
     )
 
 
-def _signals(truth: Truth, manoeuvre: str) -> tuple[Array, ...]:
+def _signals(truth: Truth, manoeuvre: str) -> tuple[FloatArray, ...]:
     """V_x m/s, a_x and a_y m/s^2, yaw rate deg/s, steering deg: (n,) each."""
     k, samples = run_of(truth, manoeuvre)
     vx, ax, ay, turn = (truth[signal][k, samples] for signal in ("vx", "road_ax", "road_ay", "yaw_rate"))

@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from studies.truth import TruthVehicle
 from studies.truth.fleet import tires_of
 from studies.truth.lugre import LuGreTire
 from synthesis.errors import SpecError
 
-Array = npt.NDArray[np.float64]
-ANGLES: Array = np.concatenate([[1e-4], np.linspace(2e-3, 0.4, 200)])
+ANGLES: FloatArray = np.concatenate([[1e-4], np.linspace(2e-3, 0.4, 200)])
 """rad: the first stands for the slope at rest."""
 USE = 0.4
 """Share of the load at which the secant is read: ordinary cornering."""
@@ -28,7 +27,7 @@ class TireFacts(NamedTuple):
     relaxation: tuple[float, float]  # m, at little slip
 
 
-def lateral_curve(vehicle: TruthVehicle, kind: str, speed: float, friction: float) -> Array:
+def lateral_curve(vehicle: TruthVehicle, kind: str, speed: float, friction: float) -> FloatArray:
     """F_y/F_z (2, n) of a front and a rear tire that rolls freely at `speed`, m/s, at the slip angles `ANGLES`.
 
     Positive for a positive angle, at static load: the deflection (or lagged slip) at rest is its source over its decay.
@@ -36,13 +35,13 @@ def lateral_curve(vehicle: TruthVehicle, kind: str, speed: float, friction: floa
     tire = tires_of(kind, [vehicle] * ANGLES.size)
     shape = (4, ANGLES.size)
     across = speed * np.tan(ANGLES)
-    slide: Array = np.stack([np.zeros(shape), np.broadcast_to(across, shape)])
+    slide: FloatArray = np.stack([np.zeros(shape), np.broadcast_to(across, shape)])
     surface, transport = np.full(shape, speed), np.broadcast_to(np.maximum(speed, across), shape)
     load = np.broadcast_to(vehicle.parameters.static_loads[:, None], shape)
     grip, nothing = np.full(shape, friction), np.zeros((2, *shape))
     decay, push = tire.rates(nothing, slide, surface, transport, grip)
     force = tire.forces(push / decay, nothing, slide, transport, load, grip)
-    out: Array = (force[1] / load)[0::2]
+    out: FloatArray = (force[1] / load)[0::2]
     return out
 
 

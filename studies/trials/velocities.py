@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from estimators.pipeline import CornerObservers
 from estimators.schedule import GainSchedule
 from estimators.vehicle import CORNERS, VehicleParameters
@@ -22,7 +22,6 @@ from studies.trials.simulations import LUGRE
 from studies.truth import Measured
 from synthesis.models.parameter_set import load_parameter_set
 
-Array = npt.NDArray[np.float64]
 OWN, FUSION = "paper's observers", "fusion"
 LOOKS = {
     OWN: ("s", colours.OWN_OBSERVERS),
@@ -150,7 +149,7 @@ def _dots(name: str, rows: Sequence[VelocityTest], found: Mapping[str, Sequence[
     )  # fmt: skip
 
 
-def _history(name: str, drawn: Measured, row: VelocityTest, estimates: Mapping[str, Array]) -> Figure:
+def _history(name: str, drawn: Measured, row: VelocityTest, estimates: Mapping[str, FloatArray]) -> Figure:
     truth = drawn.truth
     run, samples = run_of(truth, row.manoeuvre)
     time = truth.time[samples]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimators.arrays import FloatArray as FloatArray  # noqa: PLC0414 - until the last importer from here has gone
+from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
 
 

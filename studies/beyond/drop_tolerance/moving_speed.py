@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from analysis.drops.mean_square import MeanSquareSchedule, mean_square_schedule
 from analysis.drops.modes import schedule_drop_modes
 from analysis.drops.schedule import FrozenDropProbability, frozen_critical_probability
 from estimators import GainSchedule
-from estimators.arrays import FloatArray
+from estimators.arrays import BoolArray, FloatArray, IntArray
 from studies.beyond.drop_tolerance.comparison import MISS
 from studies.beyond.drop_tolerance.observers import NAMES, PACKAGE, QUICK, Observer, observer
 from studies.beyond.drop_tolerance.population import START, evolve
@@ -35,12 +34,12 @@ class Sweep:
 
     speed: FloatArray
     exact: FloatArray
-    at: NDArray[np.int64]
+    at: IntArray
     seen: FloatArray
     half: FloatArray  # half width of the interval
 
     @property
-    def holds(self) -> NDArray[np.bool_]:
+    def holds(self) -> BoolArray:
         """Which intervals hold the exact energy, (m,)."""
         return np.asarray(np.abs(self.seen - self.exact[self.at]) <= self.half)
 

@@ -14,15 +14,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimators import GainSchedule, LpvVelocityObserver
-from estimators.arrays import FloatArray
+from estimators.arrays import BoolArray, FloatArray, IntArray
 from studies.beyond.drop_tolerance.prediction import Channel, Norm
 
 EVERY = 4  # samples from one resampling to the next
 START = np.array([0.0, 1.0])  # m, m/s
-Lost = NDArray[np.bool_]
+Lost = BoolArray
 
 
 def simulate(
@@ -87,7 +86,7 @@ def evolve(
     return np.stack(logs)
 
 
-def resampled(weights: FloatArray, offset: FloatArray) -> NDArray[np.int64]:
+def resampled(weights: FloatArray, offset: FloatArray) -> IntArray:
     """Systematic resampling along the last axis: n indices, i about n w_i / sum(w) times, in expectation exactly so.
 
     weights (..., n) >= 0; offset in [0, 1), broadcasts to (..., 1).

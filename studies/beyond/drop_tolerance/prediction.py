@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from analysis.drops.frozen import critical_drop_probability
@@ -16,7 +16,7 @@ from analysis.drops.modes import schedule_drop_modes
 from analysis.markov.second_moment import unpack
 from analysis.markov.system import MarkovJumpSystem
 from estimators import GainSchedule
-from estimators.arrays import FloatArray
+from estimators.arrays import BoolArray, FloatArray
 
 LONGEST_BURST = 300.0  # samples; 1.5 s at 200 Hz
 FAILURES = (1e-4, 1.0)  # failure probabilities of the boundary
@@ -127,7 +127,7 @@ class Norm:
 
     P: FloatArray
 
-    def of(self, error: FloatArray, lost: NDArray[np.bool_]) -> FloatArray:
+    def of(self, error: FloatArray, lost: BoolArray) -> FloatArray:
         """h (c, ...) of errors (c, ..., n) whose next sample is lost or not (c, ...)."""
         good, bad = (np.einsum("c...i,cij,c...j->c...", error, self.P[:, mode], error) for mode in (0, 1))
         return np.asarray(np.where(lost, bad, good))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from estimators.vehicle import GRAVITY
 from studies.beyond.friction_floor.resting_tire import FRICTIONS, friction_curve, missed_share
 from studies.papers.topic import Topic
@@ -23,7 +23,6 @@ from studies.truth import Truth, load_manoeuvre, simulate_manoeuvres
 from studies.truth.road import Road
 from synthesis.models.parameter_set import load_parameter_set
 
-Array = npt.NDArray[np.float64]
 TOPIC = Topic("studies.beyond.friction_floor")
 BEYOND = 1.15
 """Peak torque over what the road holds of sliding wheels: enough to leave static friction, mu_s/mu_c = 1.3, at the front."""
@@ -71,10 +70,10 @@ class Launch:
     """One road: slips and shares over time of the first sensor draw, velocity errors over all draws."""
 
     friction: float
-    time: Array  # (n,)
-    slip: Array  # (n,) mean over the wheels, v_r/(R_e w)
-    predicted: Array  # (n,) share of the slip velocity missed, NaN at little slip
-    missed: Array  # (n,) mean over the draws
+    time: FloatArray  # (n,)
+    slip: FloatArray  # (n,) mean over the wheels, v_r/(R_e w)
+    predicted: FloatArray  # (n,) share of the slip velocity missed, NaN at little slip
+    missed: FloatArray  # (n,) mean over the draws
     errors: dict[str, Spread]
 
 

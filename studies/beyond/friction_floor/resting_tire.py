@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analysis.norms.static_gain import static_gain
+from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule
 from estimators.velocity import LpvVelocityObserver
 from studies.beyond.observers import SHIPPED
@@ -31,7 +32,6 @@ from studies.truth.lugre import LuGreParameters
 from synthesis.models.catalogue import corner_velocity_model
 from synthesis.models.parameter_set import Tire, load_parameter_set
 
-Array = npt.NDArray[np.float64]
 TOPIC = Topic("studies.beyond.friction_floor")
 FRICTIONS = (0.2, 0.35, 0.5, 0.8, 1.0)
 """Of the roads, 1."""
@@ -41,7 +41,7 @@ SETTLED = 6.0
 """s: sixty time constants of the slowest shipped observer."""
 
 
-def hidden_ratio(tire: Tire, slip: npt.ArrayLike, friction: npt.ArrayLike) -> Array:
+def hidden_ratio(tire: Tire, slip: npt.ArrayLike, friction: npt.ArrayLike) -> FloatArray:
     """s = (sigma0/kappa) |lambda|/theta [1]: the slip that friction hides over the slip that deflects the bristles."""
     stiffness = tire.sigma0.value / tire.kappa.value
     return np.asarray(stiffness * np.abs(slip) / np.asarray(friction))
@@ -49,7 +49,7 @@ def hidden_ratio(tire: Tire, slip: npt.ArrayLike, friction: npt.ArrayLike) -> Ar
 
 def missed_share(
     tire: Tire, radius: float, wheel_speed: npt.ArrayLike, slip: npt.ArrayLike, friction: npt.ArrayLike
-) -> Array:
+) -> FloatArray:
     """(v_r - v_r_hat)/v_r [1] at rest; ``wheel_speed`` rad/s, ``slip`` v_r/(R_e w), ``friction`` theta, broadcast."""
     s = hidden_ratio(tire, slip, friction)
     a = tire.kappa.value * radius * np.abs(np.asarray(wheel_speed))
@@ -58,7 +58,7 @@ def missed_share(
 
 def resting_force(
     tire: Tire, radius: float, wheel_speed: npt.ArrayLike, slip: npt.ArrayLike, friction: npt.ArrayLike
-) -> Array:
+) -> FloatArray:
     """mu = sigma0 z + sigma2 v_r of P1 (19) with the bristle at rest: what a force sensor would say."""
     speed = radius * np.asarray(wheel_speed)
     relative = np.asarray(slip) * speed
@@ -66,7 +66,7 @@ def resting_force(
     return np.asarray(tire.sigma0.value * relative / rate + tire.sigma2.value * relative)
 
 
-def friction_curve(tire: LuGreParameters, relative: npt.ArrayLike) -> Array:
+def friction_curve(tire: LuGreParameters, relative: npt.ArrayLike) -> FloatArray:
     """g(v_r) [1] of P1 below (19) with exponent 0.5: falls from mu_s to mu_c over the Stribeck velocity; v_r in m/s."""
     fall = np.exp(-np.sqrt(np.abs(relative) / tire.stribeck))
     return np.asarray(tire.sliding + (tire.static - tire.sliding) * fall)
@@ -77,8 +77,8 @@ class Missed:
     """Shares (wheel speeds, friction, slip), predicted and missed by the observer of one shipped schedule."""
 
     schedule: str
-    predicted: Array
-    simulated: Array
+    predicted: FloatArray
+    simulated: FloatArray
 
     @property
     def largest_gap(self) -> float:

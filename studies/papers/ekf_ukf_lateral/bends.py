@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from estimators.forces import AttitudeObserver, VerticalLoads, levelled
 from estimators.sideslip import FourWheel, FourWheelObserver, used_friction
 from estimators.signals import FilteredDerivative
@@ -24,7 +24,6 @@ from studies.trials.simulations import LUGRE
 from studies.trials.tire_curve import USE, TireFacts, tire_facts
 from studies.truth import Measured
 
-Array = npt.NDArray[np.float64]
 EKF, UKF, PIPELINE = "EKF", "UKF", "pipeline"
 AT_REST = ", stiffness at rest"
 SHARE, NO_SLIP, STEADY = "m a_y shared by load", "no slip at the rear", "steady linear car"
@@ -44,17 +43,17 @@ class FourWheelRun:
     """Estimates of S sensor draws of one run over n samples by who made them, beside the truth (n[, 4])."""
 
     drawn: Measured
-    forces: dict[str, Array]  # (S, n, 4) N, tire frame
-    sideslip: dict[str, Array]  # (S, n) rad
-    loads: Array  # (S, n, 4) N, of block 1
-    counted: npt.NDArray[np.bool_]  # (n,) samples that count in errors
+    forces: dict[str, FloatArray]  # (S, n, 4) N, tire frame
+    sideslip: dict[str, FloatArray]  # (S, n) rad
+    loads: FloatArray  # (S, n, 4) N, of block 1
+    counted: BoolArray  # (n,) samples that count in errors
     tire: TireFacts
 
-    def true(self, signal: str) -> Array:
+    def true(self, signal: str) -> FloatArray:
         """A signal of the truth, (n,) or (n, 4)."""
         return np.asarray(self.drawn.truth[signal][0])
 
-    def pair(self, k: int, who: str) -> tuple[Array, Array]:
+    def pair(self, k: int, who: str) -> tuple[FloatArray, FloatArray]:
         """Estimate (S, m) and truth (m,) of the force of corner k, of the sideslip for k = 4, at the samples that count."""
         if k < 4:
             return self.forces[who][:, self.counted, k], self.true("force_y")[self.counted, k]
@@ -74,7 +73,7 @@ def four_wheel_car(car: VehicleParameters, tire: TireFacts, at_rest: bool = Fals
     )  # fmt: skip
 
 
-def level(drawn: Measured) -> tuple[Array, Array, Array]:
+def level(drawn: Measured) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Block 1 of P4: wheel loads (S, B, n, 4) in N, and a_x, a_y (S, B, n) along the road without their share of gravity.
 
     The paper's own (earlier work) uses suspension deflections; here roll and pitch come from gyros led back by
@@ -108,8 +107,8 @@ def run_four_wheel(drawn: Measured) -> FourWheelRun:
     tire = tire_facts(truth.vehicles[0], truth.tires[0], float(truth["vx"][0].mean()), friction)
     yaw_rate = drawn.signals["yaw_rate"]
     measurement = np.stack([yaw_rate, speed, ax, ay], axis=-1)
-    forces: dict[str, Array] = {}
-    sideslip: dict[str, Array] = {}
+    forces: dict[str, FloatArray] = {}
+    sideslip: dict[str, FloatArray] = {}
     kinds: tuple[tuple[str, _Kind], ...] = ((EKF, "extended"), (UKF, "unscented"))
     for at_rest in (False, True):
         vehicle = four_wheel_car(car, tire, at_rest)
@@ -126,8 +125,8 @@ def run_four_wheel(drawn: Measured) -> FourWheelRun:
 
 
 def _observed(
-    drawn: Measured, vehicle: FourWheel, kind: _Kind, steer: Array, loads: Array, measurement: Array
-) -> tuple[Array, Array]:
+    drawn: Measured, vehicle: FourWheel, kind: _Kind, steer: FloatArray, loads: FloatArray, measurement: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Forces (S, n, 4) and sideslip (S, n); the filter starts straight ahead at the measured speed."""
     shape, samples = drawn.batch_shape, drawn.time.size
     observer = FourWheelObserver(vehicle, kind, shape, drawn.sample_time)
@@ -212,7 +211,7 @@ def dot_figure(name: str, printed: Sequence[Row], found: Sequence[Mapping[str, S
     )  # fmt: skip
 
 
-def _estimate(time: Array, value: Array, who: str) -> list[Mark]:
+def _estimate(time: FloatArray, value: FloatArray, who: str) -> list[Mark]:
     label = {SHARE: "m a_y by load"}.get(who, who)
     return estimate_lines(time, value, label, LOOKS[who][1], *LINES.get(who, ()))
 

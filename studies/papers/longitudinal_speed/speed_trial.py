@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from estimators.pipeline import CornerObservers, KalmanCorners
 from estimators.schedule import GainSchedule
 from estimators.vehicle import VehicleParameters
@@ -32,7 +32,6 @@ from studies.trials.velocities import COMPLIANCE_SPREAD, FUSION
 from studies.truth import Measured
 from synthesis.models.parameter_set import load_parameter_set
 
-Array = npt.NDArray[np.float64]
 PARAMETERS = "longitudinal-speed"
 THREE, TWO, LPV = "Kalman, 3 states", "Kalman, 2 states", "schedule"
 CLAIMED = 6.6
@@ -68,7 +67,7 @@ class Drive:
 class Compared(NamedTuple):
     """Steps by name; ``vx`` is that of the first."""
 
-    vx: Array
+    vx: FloatArray
     steps: Mapping[str, Any]
 
 
@@ -158,7 +157,7 @@ def dot_figure(name: str, rows: Sequence[Drive], found: Sequence[Mapping[str, Sp
     )  # fmt: skip
 
 
-def speed_history(name: str, drawn: Measured, row: Drive, estimates: Mapping[str, Array]) -> Figure:
+def speed_history(name: str, drawn: Measured, row: Drive, estimates: Mapping[str, FloatArray]) -> Figure:
     """Speed, its error, and the front left wheel: surface speed, velocity of its centre, and where the detector speaks."""
     truth = drawn.truth
     run, samples = run_of(truth, row.manoeuvre)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from estimators.vehicle import CORNERS
 from estimators.velocity.slip import LEAST_SPEED
 from studies.papers.published import printed
@@ -29,7 +29,6 @@ from studies.trials.histories import BAND
 from studies.trials.sensors import TEST_CAR
 from studies.trials.simulations import LUGRE, simulated_truth
 
-Array = npt.NDArray[np.float64]
 QUICK_SECONDS = 4.0
 HARD = 500.0
 """N m at all wheels together, from which on traction counts as hard: the paper's word for where compliance helps."""
@@ -68,7 +67,7 @@ def compliance_part(name: str, tests: Sequence[Shown], scope: Scope, tire: str =
     return PartResult((), [forces, velocities], figures, [_note(forces)], measures)
 
 
-def hard_traction(trial: ComplianceTrial, test: Shown) -> tuple[int, npt.NDArray[np.bool_]]:
+def hard_traction(trial: ComplianceTrial, test: Shown) -> tuple[int, BoolArray]:
     """Row of the test, and its samples (n,) under drive torque and above the speed from which on slips mean something."""
     truth = trial.drawn.truth
     row, _ = run_of(truth, test.manoeuvre)
@@ -114,7 +113,7 @@ def residual_table(name: str, trial: ComplianceTrial, tests: Sequence[Shown]) ->
     return Table(name, caption, columns, rows), measures
 
 
-def _rms(error: Array) -> Array:
+def _rms(error: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.mean(error**2, axis=-1)))
 
 

@@ -11,8 +11,8 @@ from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import FloatArray
 from estimators.forces import VerticalLoads
 from estimators.pipeline import CornerObservers, CornerSample, CornerStep, ScheduledCorners
 from estimators.schedule import GainSchedule
@@ -26,7 +26,6 @@ from studies.trials.estimation import Reading, assumed_car, run_pipeline
 from studies.truth import Measured
 from studies.truth.stepper import stepped_deflection
 
-Array = npt.NDArray[np.float64]
 WITHOUT, PRINTED_WAY, INSIDE = "without", "as (15) is printed", "in the observer's input"
 WAYS = (WITHOUT, PRINTED_WAY, INSIDE)
 
@@ -34,12 +33,14 @@ WAYS = (WITHOUT, PRINTED_WAY, INSIDE)
 class CompliantStep(NamedTuple):
     """Per corner (..., 4, 2), x and y on the last axis, m/s."""
 
-    vx: Array  # (...) of the observers without compliance; what the pipeline compares with its own
-    relative: Array  # V_r in the tire frame, without compliance
-    relative_inside: Array  # the same of the observers whose input knows how the wheel accelerates against the body
-    centre: Array  # velocity of the centre of gravity by each corner, without compliance
-    centre_inside: Array  # the same from `relative_inside`: psi' is still in it
-    compliance: Array  # psi' of (14), body frame
+    vx: FloatArray  # (...) of the observers without compliance; what the pipeline compares with its own
+    relative: FloatArray  # V_r in the tire frame, without compliance
+    relative_inside: (
+        FloatArray  # the same of the observers whose input knows how the wheel accelerates against the body
+    )
+    centre: FloatArray  # velocity of the centre of gravity by each corner, without compliance
+    centre_inside: FloatArray  # the same from `relative_inside`: psi' is still in it
+    compliance: FloatArray  # psi' of (14), body frame
 
 
 class RecordedLoads:
@@ -93,7 +94,15 @@ class CompliantCorners:
         self.compliance = SuspensionCompliance(table_of_estimator(PRINTED), sample_time, batch_shape)
 
     def step(
-        self, wheel_speed: Any, steer: Any, ax: Any, ay: Any, yaw_rate: Any, use_x: Array, use_y: Array, vy: Any
+        self,
+        wheel_speed: Any,
+        steer: Any,
+        ax: Any,
+        ay: Any,
+        yaw_rate: Any,
+        use_x: FloatArray,
+        use_y: FloatArray,
+        vy: Any,
     ) -> CompliantStep:
         """One sample, as `CornerObservers.step`."""
         load, total = self.loads.load, self.loads.load.sum(axis=-1, keepdims=True)
@@ -127,11 +136,11 @@ class ComplianceTrial:
     """S sensor draws x B runs over n samples; x and y of the tire frame on the last axis of what is per corner."""
 
     drawn: Measured
-    slip: Array  # V_r without compliance (S, B, n, 4, 2), m/s
-    residual: Mapping[str, Array]  # by way: measured minus calculated F/F_z (S, B, n, 4, 2)
-    centre: Mapping[str, Array]  # by way: V_x, V_y (S, B, n, 2), m/s
-    compliance: Array  # estimated psi' (S, B, n, 4, 2), m/s
-    true_compliance: Array  # (B, n, 4, 2) m/s
+    slip: FloatArray  # V_r without compliance (S, B, n, 4, 2), m/s
+    residual: Mapping[str, FloatArray]  # by way: measured minus calculated F/F_z (S, B, n, 4, 2)
+    centre: Mapping[str, FloatArray]  # by way: V_x, V_y (S, B, n, 2), m/s
+    compliance: FloatArray  # estimated psi' (S, B, n, 4, 2), m/s
+    true_compliance: FloatArray  # (B, n, 4, 2) m/s
 
 
 def run_trial(drawn: Measured) -> ComplianceTrial:
@@ -162,7 +171,7 @@ def run_trial(drawn: Measured) -> ComplianceTrial:
     )
 
 
-def _shares(surface: Array, relative: Array) -> Array:
+def _shares(surface: FloatArray, relative: FloatArray) -> FloatArray:
     """What each corner counts in V_x and V_y (..., 4, 2): the axle that slips less counts more, each wheel half of it."""
     along, across = surface - relative[..., 0], -relative[..., 1]
     slips = slip_ratio(surface, along), side_slip_angle(along, across)
@@ -170,7 +179,7 @@ def _shares(surface: Array, relative: Array) -> Array:
     return 0.5 * np.concatenate([front, front, 1.0 - front, 1.0 - front], axis=-2)
 
 
-def model_force(drawn: Measured, slip: Array) -> Array:
+def model_force(drawn: Measured, slip: FloatArray) -> FloatArray:
     """F/F_z of the LuGre tire (1), (2) with Table I at slip velocities (..., S, B, n, 4, 2), m/s, each direction by itself.
 
     The road parameter is that of the truth: the paper does not say which one its tire model gets on ice and on dry road.

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from flint import fmpq, fmpq_mat
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from analysis.exact import Rational, rationals
 from analysis.markov.second_moment import lifted, spectral_radius
@@ -14,7 +14,7 @@ from analysis.markov.system import MarkovJumpSystem, second_moment_operator
 from analysis.switching.joint_spectral_radius import joint_spectral_radius
 from analysis.switching.pair import exact_pair_test, pair_margin
 from analysis.switching.similarity import common_growth, diagonal_window
-from estimators.arrays import FloatArray
+from estimators.arrays import FloatArray, IntArray
 from studies.claim import Finding, reproduced
 from studies.papers.plain import by_speed, floats
 from studies.papers.resilient_velocity.inputs import (
@@ -36,7 +36,7 @@ from studies.study import PartResult, Scope, Table
 from synthesis.lmi.result import Verdict as Proof
 
 TOPIC = Topic(PACKAGE)
-Tenths = NDArray[np.int64]
+Tenths = IntArray
 PROVED = (0.0, 20.0, 36.0, 38.0, 80.0, 140.0)  # rad/s, where a common quadratic function is decided in exact arithmetic
 HALF_DIGIT = 5e-5
 SHOWN = (8.0, 9.0, 10.0, 40.0)

@@ -8,8 +8,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from estimators.arrays import BoolArray, FloatArray
 from estimators.sideslip import SingleTrack
 from estimators.vehicle import VehicleParameters
 from studies.papers.smo_ekf_sideslip.inputs import (
@@ -34,7 +34,6 @@ from studies.trials.simulations import LUGRE, MAGIC_FORMULA, QUICK_SECONDS, tria
 from studies.trials.tire_curve import USE, TireFacts, tire_facts
 from studies.truth import Measured, Truth
 
-Array = npt.NDArray[np.float64]
 TOPIC = Topic(PACKAGE)
 RIGHT = 0.0, 1.0
 """The setting without an error."""
@@ -51,26 +50,26 @@ class AxleRun:
 
     drawn: Measured
     tire: TireFacts
-    counted: npt.NDArray[np.bool_]  # (n,)
-    true_forces: Array  # (n, 4)
-    true_sideslip: Array  # (n,)
-    forces: dict[float, Array]
-    static: Array  # (S, n, 4), without an observer
-    adaptive: dict[Setting, Array]  # (S, n)
-    stiffness: dict[Setting, Array]  # (S, n, 2), adapted
-    fixed: dict[Setting, Array]  # (S, n)
+    counted: BoolArray  # (n,)
+    true_forces: FloatArray  # (n, 4)
+    true_sideslip: FloatArray  # (n,)
+    forces: dict[float, FloatArray]
+    static: FloatArray  # (S, n, 4), without an observer
+    adaptive: dict[Setting, FloatArray]  # (S, n)
+    stiffness: dict[Setting, FloatArray]  # (S, n, 2), adapted
+    fixed: dict[Setting, FloatArray]  # (S, n)
 
-    def force_errors(self, estimate: Array) -> dict[str, SampleSpreads]:
+    def force_errors(self, estimate: FloatArray) -> dict[str, SampleSpreads]:
         """Of (8), from (S, n, 4), by the names of `FORCES`."""
         at = self.counted
         return {name: sample_spreads(estimate[:, at, k], self.true_forces[at, k]) for k, name in enumerate(FORCES)}
 
-    def sideslip_errors(self, estimate: Array) -> SampleSpreads:
+    def sideslip_errors(self, estimate: FloatArray) -> SampleSpreads:
         """Of (8) of the rear sideslip, from (S, n)."""
         return sample_spreads(estimate[:, self.counted], self.true_sideslip[self.counted])
 
 
-def true_axles(truth: Truth) -> Array:
+def true_axles(truth: Truth) -> FloatArray:
     """F_y1, F_y2 and F_x1 of the axles in body axes, N, and the yaw rate, rad/s: (n, 4) of the first run."""
     steer, along, across = (truth[name][0] for name in ("steer", "force_x", "force_y"))
     forward, left = along * np.cos(steer) - across * np.sin(steer), along * np.sin(steer) + across * np.cos(steer)
@@ -78,7 +77,7 @@ def true_axles(truth: Truth) -> Array:
     return np.stack(columns, axis=1)
 
 
-def true_rear_sideslip(truth: Truth, rear: float) -> Array:
+def true_rear_sideslip(truth: Truth, rear: float) -> FloatArray:
     """beta_2 (n,), rad, as P5 (11) counts it: positive where the rear axle's force is."""
     side = truth["vy"][0] - rear * truth["yaw_rate"][0]
     return np.asarray(np.arctan2(-side, np.maximum(np.absolute(truth["vx"][0]), 0.1)))
@@ -104,7 +103,7 @@ def run_axles(drawn: Measured, settings: Sequence[Setting]) -> AxleRun:
     start = np.roll(true.max(axis=0), 1)  # the observer's state begins with the yaw rate
     states = {m: axle_forces(single_track(car, tire, m), signals, start) for m in dict.fromkeys(m for m, _ in settings)}
 
-    def sideslip(setting: Setting, adaptive: bool) -> tuple[Array, Array]:
+    def sideslip(setting: Setting, adaptive: bool) -> tuple[FloatArray, FloatArray]:
         rear, stiffness = rear_sideslip(single_track(car, tire, *setting), signals, states[setting[0]], adaptive)
         return rear[:, 0], stiffness[:, 0]
 
@@ -216,7 +215,9 @@ def force_history(name: str, title: str, run: AxleRun) -> Figure:
     )  # fmt: skip
 
 
-def _sideslip_panel(run: AxleRun, estimates: Sequence[Array], labels: Sequence[str], y: str, title: str = "") -> Panel:
+def _sideslip_panel(
+    run: AxleRun, estimates: Sequence[FloatArray], labels: Sequence[str], y: str, title: str = ""
+) -> Panel:
     """True rear sideslip where it counts, with the estimates (S, n)."""
     time, limit = run.drawn.truth.time, 1.9 * float(np.degrees(np.abs(run.true_sideslip[run.counted]).max()))
     true = truth_line(time, np.where(run.counted, np.degrees(run.true_sideslip), np.nan))
