@@ -32,7 +32,8 @@ _TAYLOR = [1.0 / math.factorial(k) for k in range(13, 0, -1)]
 
 def phi(mean: Number, delta: Number) -> tuple[Number, Number]:
     """alpha and beta of the matrices with m = `mean`: of one, in plain numbers, or of many, in arrays."""
-    if isinstance(mean, np.ndarray):
+    if isinstance(mean, np.ndarray) or isinstance(delta, np.ndarray):
+        mean, delta = np.broadcast_arrays(mean, delta)  # one of them may be the same for all
         alpha, beta = _arrays(mean.ravel(), delta.ravel())
         return alpha.reshape(mean.shape), beta.reshape(mean.shape)
     square = mean * mean

@@ -15,7 +15,7 @@ from studies.commands.run import HEADER, summary_rows
 from studies.drives.evaluation import DriveData, evaluate
 from studies.drives.quantities import CORNERS
 from studies.drives.run import RunResult, replay_drive, run_drive
-from studies.errors import LogError
+from synthesis.errors import SpecError
 from tests.support.schedule_content import schedule_content
 from tests.support.synthetic_drive import (
     DRIVE,
@@ -195,6 +195,6 @@ def test_unknown_shipped_schedule_lists_those_there_are(tmp_path: Path) -> None:
 def test_out_that_is_a_file_is_refused(tmp_path: Path) -> None:
     """At once: the log, which is not there either, is not even looked for."""
     (tmp_path / "out").write_text("mine")
-    with pytest.raises(LogError, match="give another --out"):
+    with pytest.raises(SpecError, match="give another --out"):
         run_drive([tmp_path / "no-such-log.csv"], write_drive(tmp_path), tmp_path / "out")
     assert (tmp_path / "out").read_text() == "mine"

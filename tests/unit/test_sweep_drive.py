@@ -153,7 +153,7 @@ def pull(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def simulated_truth(pull: Path) -> Measure:
+def driven(pull: Path) -> Measure:
     found = measure(pull, manoeuvre="pull.toml", seed=3)
     found.prepare()
     return found
@@ -164,13 +164,13 @@ def test_manoeuvre_is_the_drive_that_one_would_write_and_run(observer: Observer,
     log, description = write_drive(pull / "written", draw(truth, TEST_CAR, [3]), longitudinal=NAME)
     data = replay_drive([log], description)
     driven.check(observer)
-    (value,) = simulated_truth(observer.at({"kappa": np.array([8.32])}, observer.grid(2)))
+    (value,) = driven(observer.at({"kappa": np.array([8.32])}, observer.grid(2)))
     assert value == pytest.approx(nrms(data.replay.velocity, data.log.reference["vx"]), rel=1e-9)
 
 
 def test_a_worse_radius_is_worse(observer: Observer, driven: Measure) -> None:
     radius = 0.33 * np.array([1.0, 1.02, 1.05, 1.1])
-    values = simulated_truth(observer.at({"effective_radius": radius}, observer.grid(2)))
+    values = driven(observer.at({"effective_radius": radius}, observer.grid(2)))
     assert (np.diff(values) > 1.0).all() and values[0] < 2.0
 
 
@@ -261,4 +261,4 @@ def test_other_observers_are_refused(observer: Observer, pull: Path) -> None:
 def test_a_batch_is_needed_for_nothing_but_its_columns(observer: Observer, driven: Measure) -> None:
     """The grid of the sweep does not enter: the drive has its own wheel speeds."""
     batches: list[Batch] = [observer.at({"sigma0": np.array([600.0])}, observer.grid(n)) for n in (2, 9)]
-    assert simulated_truth(batches[0])[0] == simulated_truth(batches[1])[0]
+    assert driven(batches[0])[0] == driven(batches[1])[0]
