@@ -141,7 +141,7 @@ class EstimationPipeline(Memory):
         turned = _possible(kit, turn, limits.YAW_RATE)
         late = self._late(signals.elapsed)
         fresh = self.readings.step(w)
-        tilt, own_x, own_y, free_x, free_y = self._tilted(signals, read_x, read_y, turn)
+        tilt, own_x, own_y, free_x, free_y = self._tilted(signals, read_x, read_y, turned)
         own_x, own_y = own_x - self.bias[0], own_y - self.bias[1]
         lean, rise = (None, None) if tilt is None else (tilt.roll, tilt.pitch)
         loads = self.loads.step(read_x - self.bias[0], read_y - self.bias[1], signals.az, rise, lean)
@@ -149,7 +149,7 @@ class EstimationPipeline(Memory):
         delayed = kit.some(late)
         unknown = wheels.unknown | np.asarray(late)[..., None] if delayed else wheels.unknown
         front = kit.rows(steer, 4)
-        angle = 0.5 * (front[0] + front[1])
+        angle = _possible(kit, 0.5 * (front[0] + front[1]), limits.ANGLE)
         self.angle = choose(abs(angle) < math.inf, angle, self.angle)
         total = car.mass * own_x + self.front * kit.sin(self.angle)
         agreed = reconcile(wheels.force, wheels.deviation, total, self._total_deviation, loads.load, unknown)
@@ -261,19 +261,24 @@ class EstimationPipeline(Memory):
         """The attitude step, a_x and a_y level with the road (forces), and without gravity (velocities), m/s^2."""
         if self.attitude is None:
             return None, ax, ay, ax, ay
-        nothing, shape, kit = math.nan, self.batch_shape, self._kit
+        shape, kit = self.batch_shape, self._kit
+
+        def read(given: npt.ArrayLike | None, name: str, limit: float) -> Number:
+            """NaN for what is absent, and for what no sensor reads."""
+            return math.nan if given is None else _possible(kit, kit.own(entries(given, shape, name)), limit)
+
         tilt = self.attitude.step(
-            nothing if signals.roll_rate is None else signals.roll_rate,
-            nothing if signals.pitch_rate is None else signals.pitch_rate,
+            read(signals.roll_rate, "roll_rate", limits.YAW_RATE),
+            read(signals.pitch_rate, "pitch_rate", limits.YAW_RATE),
             ax - self.bias[0],
             ay - self.bias[1],
             motion_x=self.drive,
             motion_y=self.speed[2] * self.speed[0],
             yaw_rate=turn,
-            grade=signals.grade,
-            bank=signals.bank,
+            grade=read(signals.grade, "grade", limits.ANGLE),
+            bank=read(signals.bank, "bank", limits.ANGLE),
         )
-        up = GRAVITY if signals.az is None else kit.own(entries(signals.az, shape, "az"))
+        up = read(signals.az, "az", limits.ACCELERATION)
         up = kit.where(abs(up) < math.inf, up, GRAVITY)
         own_x, own_y, _ = levelled(ax, ay, up, tilt.pitch, tilt.roll)
         free = without_gravity(ax, ay, tilt.total_roll, tilt.total_pitch)

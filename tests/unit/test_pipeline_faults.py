@@ -12,11 +12,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from estimators import Flag
+from estimators import AttitudeObserver, Flag
 from estimators.arrays import FloatArray
 from estimators.faults import DRIVING
-from estimators.pipeline import Check, EstimationPipeline, PipelineStep
+from estimators.pipeline import Check, EstimationPipeline, PipelineStep, VehicleSignals
 from estimators.signals import TickSpeed
+from estimators.vehicle import VehicleParameters
 from tests.support.pipeline_truth import BIAS, CAR, TIME, Truth, finite, noisy, run, sample, straight
 
 DRIVE = straight(np.repeat([2.0, -3.0], 400), 10.0)
@@ -318,3 +319,40 @@ def test_bias_of_the_accelerometer_is_learned_while_rolling() -> None:
     last = run(EstimationPipeline(CAR, TIME), truth)[-1]
     assert last.velocity.sensor_bias[0] + last.velocity.gravity[0] == pytest.approx(0.3, abs=0.06)
     assert last.vx == pytest.approx(20.0, abs=0.15)
+
+
+READ = {
+    "wheel_speed": 1e4, "steer": 3.0, "torque": 1e6, "ax": 150.0, "ay": -150.0, "az": 150.0, "yaw_rate": 30.0,
+    "roll_rate": 30.0, "pitch_rate": -30.0, "grade": 2.0, "bank": -2.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("shape", [(), (3,)], ids=["one car", "three cars"])
+@pytest.mark.parametrize("factor", [1.0, 1e28])
+@pytest.mark.parametrize("name", READ)
+def test_what_no_sensor_reads_is_estimated_as_if_it_were_missing(
+    name: str, factor: float, shape: tuple[int, ...]
+) -> None:
+    """Whatever parts read a signal, an attitude among them: bit for bit the forces and velocities of a missing reading."""
+
+    def last(bad: float) -> PipelineStep:
+        pipeline = EstimationPipeline(
+            VehicleParameters.published_suv(), 0.005, shape, attitude=AttitudeObserver(0.005, shape)
+        )
+        for k in range(110):
+            given = {"wheel_speed": np.full((*shape, 4), 50.0), "steer": np.full((*shape, 4), 0.02)}
+            given["torque"] = np.full((*shape, 4), 50.0)
+            for key, value in (("ax", 0.5), ("ay", 1.0), ("yaw_rate", 0.06), ("az", 9.8), ("grade", 0.01)):
+                given[key] = np.full(shape, value)
+            given |= {key: np.zeros(shape) for key in ("roll_rate", "pitch_rate", "bank")}
+            if k >= 90 and given[name].ndim > len(shape):
+                given[name][..., 0] = bad
+            elif k >= 90:
+                given[name] = np.full(shape, bad)
+            step = pipeline.step(VehicleSignals(**given))
+        return step
+
+    found, missing = last(READ[name] * factor), last(np.nan)
+    for key in ("force_x", "force_z", "axle_force_y", "vx", "vy"):
+        np.testing.assert_array_equal(getattr(found, key), getattr(missing, key), key)
+    assert np.all(found.flags != 0)
