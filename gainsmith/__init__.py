@@ -33,13 +33,15 @@ if _hidden := hidden_by():
     )
 
 
+_HOMES = {name: package for package in PACKAGES for name in import_module(package).__all__}
+__all__: list[str] = sorted(_HOMES)  # noqa: PLE0605 - a list, made of the doors
+
+
 def __getattr__(name: str) -> object:
-    for package in PACKAGES:
-        door = import_module(package)
-        if name in door.__all__:
-            return getattr(door, name)
-    raise AttributeError(f"gainsmith has no '{name}'; there are: {', '.join(__dir__())}")
+    if name not in _HOMES:
+        raise AttributeError(f"gainsmith has no '{name}'; there are: {', '.join(__all__)}")
+    return getattr(import_module(_HOMES[name]), name)
 
 
 def __dir__() -> list[str]:
-    return sorted({name for package in PACKAGES for name in import_module(package).__all__})
+    return __all__

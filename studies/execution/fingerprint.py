@@ -7,7 +7,8 @@ import platform
 import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from functools import cache, partial
+from dataclasses import fields, is_dataclass
+from functools import cache, cached_property, partial
 from hashlib import sha256
 from importlib.metadata import requires, version
 from pathlib import Path
@@ -114,7 +115,8 @@ class Sources:
 
 def traits(function: Callable[..., Any]) -> tuple[set[str], str]:
     """The modules that define a function and what it is bound to (arguments, defaults, enclosing variables), and those values."""
-    modules, values, waiting, seen = set[str](), list[str](), list[Any]([function]), set[int]()
+    modules, values, waiting = set[str](), list[str](), list[Any]([function])
+    seen: dict[int, Any] = {}  # what was looked at is held: the address of a list that is gone would be another one's
     while waiting:
         one = waiting.pop()
         if id(one) in seen:
@@ -122,7 +124,7 @@ def traits(function: Callable[..., Any]) -> tuple[set[str], str]:
         if isinstance(one, str | int | float | None):
             values.append(repr(one))
             continue
-        seen.add(id(one))
+        seen[id(one)] = one
         modules.add(getattr(one, "__module__", None) or type(one).__module__)
         if isinstance(one, partial):
             waiting += [one.func, *one.args, one.keywords]
@@ -139,8 +141,18 @@ def traits(function: Callable[..., Any]) -> tuple[set[str], str]:
             waiting += [cell.cell_contents for cell in getattr(one, "__closure__", None) or ()]
             waiting += [*(getattr(one, "__defaults__", None) or ()), getattr(one, "__kwdefaults__", None) or {}]
         else:
-            waiting.append(getattr(one, "__dict__", None) or str(one))
+            waiting.append(_state(one) or re.sub(r" at 0x[0-9a-f]+", "", str(one)))
     return modules, " ".join(values)
+
+
+def _state(one: object) -> dict[str, Any]:
+    """What an object was made with: what it worked out later and remembers is no part of it."""
+    if is_dataclass(one):
+        return {field.name: getattr(one, field.name) for field in fields(one)}
+    kept = getattr(one, "__dict__", {})
+    return {
+        name: value for name, value in kept.items() if not isinstance(getattr(type(one), name, None), cached_property)
+    }
 
 
 def _imports_of(tree: ast.Module) -> Iterator[ast.Import | ast.ImportFrom]:

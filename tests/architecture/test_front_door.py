@@ -46,7 +46,10 @@ def test_gainsmith_is_the_same_door() -> None:
 
     assert gainsmith.__version__ == version("gainsmith")
     names = [name for package in DOORS for name in import_module(package).__all__]
-    assert sorted(set(names)) == dir(gainsmith)
+    assert sorted(set(names)) == dir(gainsmith) == gainsmith.__all__
+    everything: dict[str, object] = {}
+    exec("from gainsmith import *", everything)
+    assert everything["design_observer"] is gainsmith.design_observer
     for package in DOORS:
         for name in import_module(package).__all__:
             assert getattr(gainsmith, name) is getattr(import_module(package), name)

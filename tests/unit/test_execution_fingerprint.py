@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from studies.execution.fingerprint import PACKAGES, SOURCE_ROOT, Sources, traits
@@ -105,6 +109,39 @@ def test_what_a_part_is_bound_to_belongs_to_it() -> None:
 
     assert of(1.5) == of(1.5) != of(1.6)
     assert of([1, (2, bound)]) == of([1, (2, bound)]) != of([1, (2, mark)])
+
+
+def test_all_values_count_and_the_same_ones_every_time() -> None:
+    """Many lists that live for a moment: none may pass for another one that had its place in memory."""
+    arrays = [np.arange(3.0 * k, 3.0 * k + 3.0) for k in range(400)]
+    _, values = traits(partial(bound, {f"a{k}": array for k, array in enumerate(arrays)}))
+    assert sorted(float(v) for v in values.split() if v[0].isdigit()) == list(range(1200))
+
+
+@dataclass(frozen=True)
+class Remembering:
+    value: float
+
+    @cached_property
+    def square(self) -> float:
+        return self.value**2
+
+
+class Plain:
+    def __init__(self) -> None:
+        self.value, self.mark = 2.0, object()
+
+    @cached_property
+    def square(self) -> float:
+        return self.value**2
+
+
+@pytest.mark.parametrize("made", [lambda: Remembering(2.0), Plain])
+def test_what_an_object_remembers_later_is_no_part_of_it(made: Callable[[], Any]) -> None:
+    one = made()
+    before = traits(partial(bound, {"x": one}))
+    assert one.square == 4.0 and traits(partial(bound, {"x": one})) == before == traits(partial(bound, {"x": made()}))
+    assert "2.0" in before[1] and "0x" not in before[1]
 
 
 def test_the_shipped_studies_do_not_depend_on_how_they_are_shown() -> None:
