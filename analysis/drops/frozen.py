@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.checks import leading, probability, same_size, square
+from analysis.drops.balance import balanced
 from analysis.drops.planar import critical_planar
 from analysis.errors import AnalysisError
 from analysis.markov.second_moment import lifted, spectral_radius
@@ -60,7 +61,7 @@ def critical_drop_probability(open_loop: ArrayLike, closed_loop: ArrayLike) -> F
 
     Raises AnalysisError for matrices that are not square, not finite or do not fit, or if an answer fails its check.
     """
-    A0, A1 = pair(open_loop, closed_loop)
+    A0, A1 = balanced(*pair(open_loop, closed_loop))
     if A0.shape[-1] == 2:
         return critical_planar(A0, A1)
     A, B = lifted(A0), lifted(A1)
@@ -103,6 +104,7 @@ def mean_square_stable_intervals(open_loop: ArrayLike, closed_loop: ArrayLike) -
     A0, A1 = pair(open_loop, closed_loop)
     if A0.ndim != 2 or A1.ndim != 2:
         raise AnalysisError(f"intervals are for one pair of matrices, not stacks {A0.shape}, {A1.shape}")
+    A0, A1 = balanced(A0, A1)
     return stable_intervals(lifted(A1), lifted(A0))
 
 

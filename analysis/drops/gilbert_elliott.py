@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.checks import probability
+from analysis.drops.balance import balanced
 from analysis.drops.frozen import CHECK, REAL, pair, stable_intervals
 from analysis.errors import AnalysisError
 from analysis.markov.second_moment import lifted, spectral_radius
@@ -71,7 +72,7 @@ def critical_recovery_probability(open_loop: ArrayLike, closed_loop: ArrayLike, 
 
     Raises AnalysisError for arguments that do not fit, probabilities outside [0, 1], or an answer that fails its check.
     """
-    A0, A1 = pair(open_loop, closed_loop)
+    A0, A1 = balanced(*pair(open_loop, closed_loop))
     f = probability("failure", failure)
     try:
         shape = np.broadcast_shapes(A0.shape[:-2], A1.shape[:-2], f.shape)
@@ -110,7 +111,8 @@ def stable_recovery_intervals(
     The region need not reach r = 1: losing exactly one sample at a time can be worse than losing some in a row.
     Raises AnalysisError as `gilbert_elliott`.
     """
-    never, always = (gilbert_elliott(open_loop, closed_loop, failure, r) for r in (0.0, 1.0))
+    A0, A1 = balanced(*pair(open_loop, closed_loop))
+    never, always = (gilbert_elliott(A0, A1, failure, r) for r in (0.0, 1.0))
     if never.batch_shape:
         raise AnalysisError(f"intervals are for one pair and one failure probability, not a batch {never.batch_shape}")
     return stable_intervals(never.second_moment_operator, always.second_moment_operator)

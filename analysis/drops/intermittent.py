@@ -11,6 +11,10 @@ x+ = A x + w, y = C x + v, measurements arriving independently with probability 
   1 - 1/max|lambda|^2 and lambda-bar, and equals the lower bound where unstable eigenvalues of one modulus are told apart by one
   measurement (non-degenerate systems, Mo and Sinopoli 2012).
 
+With one output the answer is known: a static gain exists exactly for a > 1 - 1/prod |lambda_u|^2 over the eigenvalues outside
+the unit circle, because the least ||T||^2 of T = C (z I - A + K' C)^-1 K' is that product less one, and K = K'/a is mean-square
+stable where (1 - a) ||T||^2 < a [Elia2005]. K' is the limit of Kalman gains for vanishing process noise.
+
 Beside the LMI stands its nonlinear Perron problem, Phi_a(X) = min over K of (1-a) A X A' + a (A - K C) X (A - K C)'. A matrix
 X >= 0, X != 0 with Phi_a(X) >= X shows that no gain whatever is stable at a: a refutation without a solver.
 """
@@ -21,6 +25,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
+from scipy.linalg import solve_discrete_are
 
 from analysis.checks import as_stack, probability, square
 from analysis.constant_lmi import constant_problem, matrix_of
@@ -53,9 +58,10 @@ class StaticGain:
 
 @dataclass(frozen=True)
 class CriticalArrival:
-    """Bracket of the critical arrival rate: `lower` is refuted, `upper` is certified by the static `gain` K (n, k).
+    """Bracket of the critical arrival rate: `lower` is refuted, and the static `gain` K (n, k) has `radius` < 1 at `arrival`.
 
-    `verdict` is CERTIFIED if the bracket is as narrow as asked for.
+    `upper` is that rate, or with one output the same as `lower`: the answer is a theorem then. `verdict` is CERTIFIED if the
+    bracket is as narrow as asked for.
     """
 
     verdict: Verdict
@@ -63,6 +69,7 @@ class CriticalArrival:
     upper: float
     gain: FloatArray
     radius: float
+    arrival: float
 
 
 @dataclass(frozen=True)
@@ -100,6 +107,12 @@ def certify_static_gain(
     a = float(probability("arrival", arrival))
     if method not in get_args(Method):
         raise AnalysisError(unknown("method", str(method), get_args(Method)))
+    single = _single_output_rate(plant, output)
+    if single is not None and method == "riccati":
+        gain, radius = _limit_gain(plant, output, a)
+        if radius < 1.0:
+            return StaticGain(Verdict.CERTIFIED, a, gain, radius)
+        return StaticGain(Verdict.REFUTED if a <= single else Verdict.INCONCLUSIVE, a, gain, radius)
     X, gain = _perron(plant, output, a)
     candidate = gain if method == "riccati" else lmi_gain(plant, output, a, settings)
     if candidate is not None:
@@ -130,8 +143,18 @@ def static_critical_arrival(
     none = np.zeros((plant.shape[0], output.shape[0]))
     open_radius = float(spectral_radius(lifted(plant)))
     if open_radius < 1.0:
-        return CriticalArrival(Verdict.CERTIFIED, 0.0, 0.0, none, open_radius)
+        return CriticalArrival(Verdict.CERTIFIED, 0.0, 0.0, none, open_radius, 0.0)
     _require_detectable(plant, output)
+    single = _single_output_rate(plant, output)
+    if single is not None and method == "riccati":
+        for arrival in (
+            *(single + (1.0 - single) * tolerance * 10.0**k for k in range(12) if tolerance * 10.0**k < 1.0),
+            1.0,
+        ):
+            best = certify_static_gain(plant, output, arrival)
+            if best.verdict is Verdict.CERTIFIED:
+                return CriticalArrival(Verdict.CERTIFIED, single, single, best.gain, best.radius, arrival)
+        raise AnalysisError("no static gain was found that is stable with every measurement; scale the states")
     best = certify_static_gain(plant, output, 1.0, method, settings)
     if best.verdict is not Verdict.CERTIFIED:
         raise AnalysisError("no static gain was found that is stable with every measurement; scale the states")
@@ -145,7 +168,8 @@ def static_critical_arrival(
         else:
             narrow = False  # between the two proofs: report the bracket as it is
             break
-    return CriticalArrival(Verdict.CERTIFIED if narrow else Verdict.INCONCLUSIVE, low, high, best.gain, best.radius)
+    verdict = Verdict.CERTIFIED if narrow else Verdict.INCONCLUSIVE
+    return CriticalArrival(verdict, low, high, best.gain, best.radius, high)
 
 
 def kalman_critical_arrival(
@@ -220,6 +244,29 @@ def _require_detectable(A: FloatArray, C: FloatArray) -> None:
             raise AnalysisError(
                 f"(A, C) is not detectable: the mode at eigenvalue {value:.6g} cannot be seen, so no arrival rate suffices"
             )
+
+
+def _single_output_rate(A: FloatArray, C: FloatArray) -> float | None:
+    """1 - 1/prod |lambda_u|^2 for one output, None for several."""
+    size = np.abs(np.linalg.eigvals(A))
+    return 1.0 - 1.0 / float(np.prod(size[size > 1.0] ** 2)) if C.shape[0] == 1 else None
+
+
+def _limit_gain(A: FloatArray, C: FloatArray, arrival: float) -> tuple[FloatArray, float]:
+    """The K = K'/a of least radius among Kalman gains K' for process noise from large to next to none, in balanced states."""
+    scale = _output_scale(A, C)
+    F, G, n = A * (scale[:, None] / scale), C / scale, A.shape[0]
+    best, least = np.zeros((n, C.shape[0])), np.inf
+    for exponent in range(2, -25, -1) if arrival > 0.0 else ():
+        try:
+            X = solve_discrete_are(F.T, G.T, 10.0**exponent * np.eye(n), np.eye(C.shape[0]))
+        except (np.linalg.LinAlgError, ValueError):
+            continue  # noise too small for this precision: the larger ones stand
+        gain = F @ X @ G.T @ np.linalg.inv(G @ X @ G.T + np.eye(C.shape[0])) / scale[:, None] / arrival
+        radius = float(static_gain_radius(A, C, gain, arrival)) if np.isfinite(gain).all() else np.inf
+        if radius < least:
+            best, least = gain, radius
+    return best, least
 
 
 def _optimal_gain(A: FloatArray, C: FloatArray, X: FloatArray) -> FloatArray:

@@ -49,11 +49,15 @@ class LieRank:
 
 
 class LieRankTest:
-    """The symbolic work (Jacobians, shared subexpressions) done once for many points of one model."""
+    """The symbolic work (Jacobians, shared subexpressions) done once for many points of one model.
+
+    `order` Lie derivatives, 2 nx - 1 if None: nx - 1 reach the generic rank, but at a special point (a state at zero) more may
+    be needed, and no order is enough for every model.
+    """
 
     def __init__(self, model: NonlinearModel, order: int | None = None) -> None:
         self.model = model
-        self.order = len(model.states) - 1 if order is None else order
+        self.order = 2 * len(model.states) - 1 if order is None else order
         if self.order < 0:
             raise AnalysisError(f"order = {self.order} must be at least 0 (number of Lie derivatives)")
         self.names = tuple(s.name for s in model.states)

@@ -63,7 +63,7 @@ def generic_rank(
 ) -> GenericRank:
     """Lie rank at random rational points of a box over all states and inputs.
 
-    `moving_inputs` draws the first two derivatives of every input as well (per second, within its half-width);
+    `moving_inputs` draws the derivatives of every input up to the order of the test as well (per second, within its half-width);
     otherwise inputs are held. A range (v, v) fixes a value, and its derivatives at zero. Raises AnalysisError for
     missing or reversed ranges.
     """
@@ -88,7 +88,7 @@ def generic_rank(
         inputs = {}
         for name in test.input_names:
             half = 0.5 * (ranges[name][1] - ranges[name][0])
-            more = [draw(-half, half) for _ in range(2)] if moving_inputs and half > 0.0 else []
+            more = [draw(-half, half) for _ in range(test.order)] if moving_inputs and half > 0.0 else []
             inputs[name] = [draw(*ranges[name]), *more]
         found.append(test.at(state, inputs))
     fixed = {name: ranges[name][0] for name in test.input_names if ranges[name][0] == ranges[name][1]}
@@ -100,7 +100,8 @@ def _structure(model: NonlinearModel, found: list[LieRank], fixed: Mapping[str, 
     rows = [row for result in found for row in result.rows]
     names = found[0].state_names
     rank, _ = ball_rank(rows)
-    basis = _rational_null_space(rows, rank)
+    # Points that miss more than all of them together have directions of their own: no constant ones explain the rank.
+    basis = _rational_null_space(rows, rank) if rank == max(result.rank for result in found) else None
     if basis is None:  # directions that depend on the point, or no small rationals: nothing constant to prove
         basis = sp.zeros(len(names), 0)
         return StructuralDirections(sp.ImmutableMatrix(basis), sp.ImmutableMatrix(sp.zeros(0, 0)), names, False)

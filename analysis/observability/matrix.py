@@ -14,6 +14,7 @@ from analysis.errors import AnalysisError
 from estimators.errors import unknown
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter
+from synthesis.models.symbols import plain
 
 MOST_MINORS = 5000
 
@@ -159,7 +160,12 @@ def observability_of(
 
     With an empty `motion` the result is marked frozen. Raises AnalysisError for shapes that do not fit and blocks < 1.
     """
-    A, C = sp.Matrix(A), sp.Matrix(C)
+    A, C = plain(sp.Matrix(A)), plain(sp.Matrix(C))
+    motion = (
+        dict(zip(*(plain(sp.Matrix(list(side))) for side in (motion.keys(), motion.values())), strict=True))
+        if motion
+        else {}
+    )
     if A.rows != A.cols or C.cols != A.rows or not A.rows or not C.rows:
         raise AnalysisError(f"A has the shape {A.shape} and C {C.shape}; A must be (nx, nx) and C (ny, nx)")
     if blocks < 1:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 
 import sympy as sp
 
@@ -80,14 +79,23 @@ class RankLoss:
         cuts = {low, high}
         for expression in (self.condition.subs(rate, slow), self.condition.subs(rate, fast), slope):
             cuts |= {root for root in _real_roots(expression, symbol) if low < root < high}
-        edges = sorted(cuts)
-        graph = sp.solve(self.condition, rate)[0]
+        offset = self.condition.subs(rate, 0)
+
+        def lost(value: sp.Expr) -> bool:
+            """Whether slope rate + offset = 0 for some rate in its bounds."""
+            a, b = (sp.simplify(e.subs(symbol, value)) for e in (slope, offset))
+            return bool(b == 0 if a == 0 else slow <= -b / a <= fast)
+
         pieces: list[Interval] = []
-        for left, right in pairwise(edges):
-            value = graph.subs(symbol, sp.nsimplify(sp.N((left + right) / 2, 30), rational=True))
-            if slow <= value <= fast:
-                joined = pieces and pieces[-1][1] == left
-                pieces = [*pieces[:-1], (pieces[-1][0], right)] if joined else [*pieces, (left, right)]
+        edges = sorted(cuts)
+        for place, edge in enumerate(edges):
+            if lost(edge):
+                if not (pieces and pieces[-1][1] == edge):
+                    pieces.append((edge, edge))
+                after = edges[place + 1] if place + 1 < len(edges) else None
+                middle = None if after is None else sp.nsimplify(sp.N((edge + after) / 2, 30), rational=True)
+                if middle is not None and lost(middle):
+                    pieces[-1] = (pieces[-1][0], after)
         return tuple(pieces)
 
     def _symbol(self, name: str) -> sp.Symbol:

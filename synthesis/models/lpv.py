@@ -16,6 +16,7 @@ from synthesis.errors import ModelError
 from synthesis.models.extract import MATRICES, ExactModel, PolynomialModel, extract, in_floats
 from synthesis.models.numeric import NumericModel, evaluate
 from synthesis.models.param import Constant, SchedulingParameter, Signal
+from synthesis.models.symbols import plain
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -54,7 +55,7 @@ class LpvModel:
         for key, shape in shapes.items():
             given = getattr(self, key)
             try:
-                matrix = sp.zeros(*shape) if given is None else sp.Matrix(given)
+                matrix = plain(sp.zeros(*shape) if given is None else sp.Matrix(given))
             except (TypeError, ValueError) as error:
                 raise ModelError(f"model '{self.name}': {key} is not a matrix ({error})") from None
             if matrix.shape != shape:
@@ -62,7 +63,7 @@ class LpvModel:
                     f"model '{self.name}': {key} has the shape {matrix.shape}, but {nx} states, {nu} inputs, {ny} outputs and "
                     f"{nd} disturbances need {shape}"
                 )
-            object.__setattr__(self, key, sp.ImmutableMatrix(matrix))
+            object.__setattr__(self, key, matrix)
         self._check_symbols()
         self.polynomial  # noqa: B018  a model that is not rational, or divides by zero, must not exist
 

@@ -12,6 +12,7 @@ from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from synthesis.errors import ModelError
 from synthesis.models.param import Constant, Signal
+from synthesis.models.symbols import plain
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,13 +35,13 @@ class NonlinearModel:
         if not self.source.strip():
             raise ModelError(f"model '{self.name}' has no source; say where its equations come from")
         for key, signals in (("f", self.states), ("h", self.outputs)):
-            matrix = sp.Matrix(getattr(self, key))
+            matrix = plain(sp.Matrix(getattr(self, key)))
             if not signals or matrix.shape != (len(signals), 1):
                 raise ModelError(
                     f"model '{self.name}': {key} has the shape {matrix.shape}, but {len(signals)} signals need "
                     f"{(max(len(signals), 1), 1)}"
                 )
-            object.__setattr__(self, key, sp.ImmutableMatrix(matrix))
+            object.__setattr__(self, key, matrix)
         # An output may carry the name of the state it measures.
         names = [s.name for s in (*self.states, *self.inputs)] + list(self.constants)
         repeated = sorted({n for n in names if names.count(n) > 1})

@@ -250,7 +250,7 @@ def test_p5_stiffness_model_has_generic_rank_three_and_one_when_driving_straight
     moving = generic_rank(model, ranges)
     assert moving.rank == 3 and moving.structure.proved and moving.structure.basis.cols == 0
     assert generic_rank(model, ranges, moving_inputs=False).rank == 3
-    assert moving.samples[0].by_order == (2, 3, 3)
+    assert moving.samples[0].by_order[:3] == (2, 3, 3)
     test = LieRankTest(model)
     zero = {"sideslip": 0, "front_stiffness_change": 0, "rear_stiffness_change": 0}
     straight = {"steering_angle": 0, "yaw_rate": 0, "speed": 20, "front_force_x": 0}

@@ -36,7 +36,8 @@ def test_one_output_needs_the_product_of_unstable_eigenvalues(method: str) -> No
     found = static_critical_arrival(A, [[1.0, 0.4, 0.2]], tolerance=1e-5, method=method)  # type: ignore[arg-type]
     assert found.lower <= expected + 1e-8 and expected <= found.upper + 1e-8
     assert found.upper - found.lower < 1e-4
-    assert static_gain_radius(A, [[1.0, 0.4, 0.2]], found.gain, found.upper) < 1.0
+    assert static_gain_radius(A, [[1.0, 0.4, 0.2]], found.gain, found.arrival) < 1.0
+    assert found.arrival - found.upper < 1e-4
 
 
 def test_invertible_output_closes_the_gap() -> None:
