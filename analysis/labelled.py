@@ -59,7 +59,7 @@ class LabelledArray:
         raise AnalysisError(unknown("axis", name, (axis.name for axis in self.axes)))
 
     def at(self, **labels: str | float) -> LabelledArray:
-        """The array at one label of some axes: numbers must be met to 1e-12, words exactly."""
+        """The array at one label of some axes: words exactly, numbers to 1e-12 or a millionth of the gap between labels."""
         values, axes = self.values, list(self.axes)
         for name, label in labels.items():
             axis = self.axis(name)
@@ -85,8 +85,8 @@ class LabelledArray:
             "schema": SCHEMA,
             "name": self.name,
             "unit": self.unit,
-            "axes": [{"name": a.name, "unit": a.unit, "labels": np.asarray(a.labels).tolist()} for a in self.axes],
-            "notes": dict(self.notes),
+            "axes": [{"name": a.name, "unit": a.unit, "labels": _plain(np.asarray(a.labels))} for a in self.axes],
+            "notes": _plain(dict(self.notes)),
             "sha256": hashlib.sha256(data).hexdigest(),
         }
         text = json.dumps(head, indent=1, allow_nan=False) + "\n"  # before anything is written: notes may not be plain
@@ -123,10 +123,23 @@ def _find(axis: Axis, label: str | float) -> int:
     elif isinstance(label, str):
         hits = np.flatnonzero(labels == label)
     else:
-        hits = np.flatnonzero(np.isclose(labels.astype(float), label, rtol=1e-12, atol=1e-12))
+        numbers = labels.astype(float)
+        apart = np.diff(np.unique(numbers)).min(initial=np.inf)  # labels tell themselves apart, whatever their size
+        hits = np.flatnonzero(np.isclose(numbers, label, rtol=1e-12, atol=1e-6 * apart if np.isfinite(apart) else 0.0))
     if not len(hits):
         raise AnalysisError(f"axis '{axis.name}': {unknown('label', str(label), map(str, labels.tolist()))}")
     return int(hits[0])
+
+
+def _plain(value: Any) -> Any:
+    """Numbers of numpy as Python's, what is not finite as a word: JSON has neither."""
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    return str(value) if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def _pair(path: str | Path) -> tuple[Path, Path]:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from analysis.checks import as_stack, leading, square
 from analysis.errors import AnalysisError
+from analysis.state_space import given_system
 from estimators.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 
 
@@ -36,12 +37,18 @@ class Systems:
 
 
 def read_systems(
-    A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike | None, discrete: bool
+    A: Any, B: ArrayLike | None, C: ArrayLike | None, D: ArrayLike | None, discrete: bool | None
 ) -> tuple[tuple[int, ...], Systems]:
     """Check four stacks, broadcast their leading axes and flatten them; also returns the leading shape.
 
-    D = None means zero. Raises AnalysisError for matrices that are not finite, not square or do not fit.
+    D = None means zero; A may be a system object (`analysis.state_space`). Raises AnalysisError for matrices that are not finite,
+    not square or do not fit.
     """
+    A, B, C, D, discrete = given_system(A, B, C, D, discrete)
+    if B is None or C is None:
+        raise AnalysisError(
+            f"{'B' if B is None else 'C'} is missing; give A, B and C, or a system object with all of them"
+        )
     a, b, c = square("A", A), as_stack("B", B), as_stack("C", C)
     n, m, p = a.shape[-1], b.shape[-1], c.shape[-2]
     d = np.zeros((p, m)) if D is None else as_stack("D", D)

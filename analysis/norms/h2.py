@@ -2,6 +2,8 @@ r"""H2 norm of stacks of systems: trace(C X C')^(1/2) with the controllability g
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -12,14 +14,21 @@ from estimators.arrays import FloatArray
 DOUBLINGS = 64  # covers spectral radii up to 1 - 2^-60
 
 
-def h2_norm(A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike | None = None, discrete: bool = False) -> FloatArray:
+def h2_norm(
+    A: Any,
+    B: ArrayLike | None = None,
+    C: ArrayLike | None = None,
+    D: ArrayLike | None = None,
+    discrete: bool | None = None,
+) -> FloatArray:
     r"""||G||_2^2 = trace(C X C') with A X + X A' + B B' = 0, or trace(C X C' + D D') with X = A X A' + B B'.
 
-    Stacks as in `hinf_norm`; an array over the leading axes. Unstable systems give inf, and so does a continuous system
-    with D != 0 (white noise passes straight through). Raises AnalysisError for matrices that do not fit or are not finite.
+    Stacks or a system object as in `hinf_norm`; an array over the leading axes. Unstable systems give inf, and so does a
+    continuous system with D != 0 (white noise passes straight through). Raises AnalysisError for matrices that do not fit or are
+    not finite.
     """
     shape, systems = read_systems(A, B, C, D, discrete)
-    poles = systems.poles()
+    discrete, poles = systems.discrete, systems.poles()
     stable = (np.abs(poles) < 1.0 if discrete else poles.real < 0.0).all(axis=-1)
     feedthrough = systems.D.any(axis=(-2, -1))
     index = np.flatnonzero(stable if discrete else stable & ~feedthrough)

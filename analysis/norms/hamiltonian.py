@@ -114,7 +114,7 @@ def gain_at(systems: Systems, frequency: FloatArray) -> FloatArray:
 
 
 def crosses_level(
-    A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike | None, gamma: ArrayLike, discrete: bool = False
+    A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike | None, gamma: ArrayLike, discrete: bool | None = None
 ) -> BoolArray:
     r"""Whether sigma_max(G) reaches the level gamma > 0 at some frequency: boolean array over the leading axes.
 

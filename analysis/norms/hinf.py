@@ -9,6 +9,7 @@ Convergence is quadratic: three or four rounds, and only systems that are not fi
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +19,7 @@ from analysis.errors import AnalysisError
 from analysis.norms.frequency_response import Systems, read_systems
 from analysis.norms.hamiltonian import between, gain_at, near_axis, surely_clear, to_continuous
 from analysis.norms.lower_bound import starting_bound
+from analysis.state_space import given_system
 from estimators.arrays import FloatArray
 
 ROUNDS = 40
@@ -39,16 +41,17 @@ class HinfNorm:
 
 
 def hinf_norm(
-    A: ArrayLike,
-    B: ArrayLike,
-    C: ArrayLike,
+    A: Any,
+    B: ArrayLike | None = None,
+    C: ArrayLike | None = None,
     D: ArrayLike | None = None,
-    discrete: bool = False,
+    discrete: bool | None = None,
     tolerance: float = 1e-9,
 ) -> HinfNorm:
     r"""||G||_inf = sup_w sigma_max(C (s I - A)^-1 B + D), s = j w or z = e^{j w}, for stacks with any leading axes.
 
-    A (..., n, n), B (..., n, m), C (..., p, n), D (..., p, m) or None for zero; leading axes broadcast. A pole that is not
+    A (..., n, n), B (..., n, m), C (..., p, n), D (..., p, m) or None for zero; leading axes broadcast; or a
+    system object in the place of A (`analysis.state_space`). A pole that is not
     strictly stable gives inf, whether inputs and outputs see it or not (internal stability). `tolerance` is relative.
     Raises AnalysisError for matrices that are not finite, not square or do not fit, and if a search does not settle.
     """
@@ -63,11 +66,13 @@ def hinf_norm(
     return HinfNorm(norm.reshape(shape), frequency.reshape(shape), upper.reshape(shape))
 
 
-def stability_margin(A: ArrayLike, discrete: bool = False) -> FloatArray:
+def stability_margin(A: Any, discrete: bool | None = None) -> FloatArray:
     """max_i Re lambda_i(A) in 1/s, or max_i |lambda_i(A)| - 1 per sample: negative is stable (P3 section IV, SM).
 
-    A (..., n, n) gives an array over the leading axes. Raises AnalysisError for matrices that are not square or finite.
+    A (..., n, n) gives an array over the leading axes, a system object its margin. Raises AnalysisError for matrices that are not
+    square or finite.
     """
+    A, *_, discrete = given_system(A, discrete=discrete)
     eigenvalues = np.linalg.eigvals(square("A", A))
     return np.asarray(np.abs(eigenvalues).max(axis=-1) - 1.0 if discrete else eigenvalues.real.max(axis=-1))
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
 
 from analysis.checks import as_stack, leading, square
 from analysis.errors import AnalysisError
+from analysis.state_space import given_system
 from estimators.arrays import BoolArray, ComplexArray, FloatArray
 
 if TYPE_CHECKING:
@@ -63,13 +64,20 @@ class HautusTest:
             )
 
 
-def hautus_test(A: ArrayLike, C: ArrayLike, discrete: bool = False, tolerance: float = 1e-9) -> HautusTest:
-    r"""Test stacks A (..., n, n), C (..., m, n); raises AnalysisError for shapes that do not fit and values not finite.
+def hautus_test(
+    A: Any, C: ArrayLike | None = None, discrete: bool | None = None, tolerance: float = 1e-9
+) -> HautusTest:
+    r"""Test stacks A (..., n, n), C (..., m, n), or a system object in the place of A (`analysis.state_space`).
+
+    Raises AnalysisError for shapes that do not fit and values not finite.
 
     A k-fold defective eigenvalue comes out of any algorithm with errors of up to (rounding)^(1/k), while the mean of the k is
     accurate to rounding. So beside every eigenvalue the means of it with its nearest neighbours are looked at, as far as rounding
     explains their spread: a singular value at any point at all bounds the distance to a pair with a hidden mode.
     """
+    A, _, C, _, discrete = given_system(A, C=C, discrete=discrete)
+    if C is None:
+        raise AnalysisError("C is missing; give A and C, or a system object with both")
     A, C = square("A", A), as_stack("C", C)
     if C.shape[-1] != A.shape[-1]:
         raise AnalysisError(f"C has the shape {C.shape}; A {A.shape} needs {A.shape[-1]} columns")

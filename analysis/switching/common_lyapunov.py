@@ -20,6 +20,7 @@ from analysis.checks import square
 from analysis.constant_lmi import constant_problem, matrix_of
 from analysis.errors import AnalysisError
 from analysis.exact import Rational, congruence, is_positive, rationals, total
+from analysis.state_space import flag
 from estimators.arrays import FloatArray, IndexArray
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import Verdict
@@ -54,6 +55,7 @@ def common_quadratic_lyapunov(modes: ArrayLike, discrete: bool = False) -> Commo
     are not finite square matrices of one size. A common one proves stability under arbitrary switching; none proves
     nothing about it (see `joint_spectral_radius`).
     """
+    flag("discrete", discrete)
     A = square("modes", modes, ndim=3)
     if A.ndim != 3 or not len(A):
         raise AnalysisError(f"modes have the shape {A.shape}; give one stack (m, n, n) of at least one mode")

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from analysis.checks import leading, square
 from analysis.errors import AnalysisError
 from analysis.exact import Rational, rationals
+from analysis.state_space import flag
 from estimators.arrays import FloatArray
 from synthesis.lmi.result import Verdict
 
@@ -24,6 +25,7 @@ def pair_margin(first: ArrayLike, second: ArrayLike, discrete: bool = False) -> 
     Stacks (..., 2, 2) whose leading axes broadcast; an unstable mode gives -inf. In floating point:
     use `exact_pair_test` where the value is at rounding level. Raises AnalysisError for modes that are not 2 x 2.
     """
+    flag("discrete", discrete)
     A1, A2 = _two_by_two(first, second)
     shape = leading({"first": A1, "second": A2})
     A1, A2 = (np.broadcast_to(A, (*shape, 2, 2)) for A in (A1, A2))
@@ -49,6 +51,7 @@ def exact_pair_test(first: ArrayLike, second: ArrayLike, discrete: bool = False)
 
     One pair of 2 x 2 modes, read bit for bit; the boundary itself is REFUTED, as the inequalities are strict.
     """
+    flag("discrete", discrete)
     A1, A2 = _two_by_two(first, second)
     if A1.ndim != 2 or A2.ndim != 2:
         raise AnalysisError("the exact test takes one pair of 2 x 2 modes; use pair_margin for stacks")
