@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import TypeVar
 
 import numpy as np
@@ -11,6 +11,7 @@ import sympy as sp
 from numpy.typing import ArrayLike
 
 from estimators.arrays import FloatArray
+from studies.papers.topic import Topic
 from studies.plots import Axis
 from synthesis.design.hinf_observer import Channel, ObserverDesign
 from synthesis.errors import SpecError
@@ -21,6 +22,7 @@ from synthesis.models.parameter_set import ParameterSet, Published, load_paramet
 
 T = TypeVar("T")
 PACKAGE = "studies.papers.corner_estimation"
+topic = partial(Topic, PACKAGE)  # one for each file
 PARAMETERS = "corner-estimation"
 PAPER = {PARAMETERS: "P1", "resilient-velocity": "P3"}  # that prints a parameter set
 STATED_SPEED = 180.0  # rad/s: the range that the stability claims name, text before (29)

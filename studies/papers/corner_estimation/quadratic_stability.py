@@ -8,7 +8,6 @@ these three decide for the whole box.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -16,18 +15,16 @@ import sympy as sp
 
 from estimators.arrays import FloatArray
 from studies.claim import Finding, JsonValue, reproduced
-from studies.papers.corner_estimation.inputs import CORNERS, DESIGNS, PACKAGE, STATED_SPEED, Corner
-from studies.papers.topic import Topic
+from studies.papers.corner_estimation.inputs import CORNERS, DESIGNS, STATED_SPEED, Corner, topic
 from studies.plots import Box as Outline
-from studies.plots import Contours, Figure, Mark, Panel, dots
-from studies.plots.colours import BLUE, FORBIDDEN, RED
+from studies.plots import Contours, Figure, Mark, Panel, colours, dots
 from studies.study import PartResult, Scope, Table
 from synthesis.design.stability import affine_quadratic_stability
 from synthesis.lmi.result import Verdict as Proof
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.models.catalogue.corner import Direction
 
-TOPIC = Topic(PACKAGE)
+TOPIC = topic()
 # Affine P with multi-convexity at the vertices, affine P on the continuum, constant P: (name, relaxation, degree).
 LMI_FORMS: tuple[tuple[str, Relaxation, int], ...] = (
     ("with multi-convexity", "vertex", 1), ("without", "exact", 1), ("constant P", "exact", 0),
@@ -36,31 +33,19 @@ Span = tuple[float, float]
 Box = tuple[tuple[float, float], ...]
 
 
-@dataclass(frozen=True)
-class DiagonalProof:
-    """Weights w for which diag(w, 1) proves stability at every vertex; empty (low >= high) if there is none.
-
-    `chosen` is a round number from the middle of them, and `proved` what exact arithmetic says of it at all `vertices`.
-    """
-
-    low: float
-    high: float
-    chosen: int
-    proved: bool
-    vertices: int
-
-
-def diagonal_proof(corner: Corner, box: Box, weight: int | None = None) -> DiagonalProof:
+def diagonal_proof(corner: Corner, box: Box, weight: int | None = None) -> dict[str, JsonValue]:
     """Stability of all gains of `box` ((low, high) of L1 and of L2) at all wheel speeds that are stated and any rate.
 
-    `weight` tries a certain w instead of one from the middle.
+    The weights w for which diag(w, 1) proves it at every vertex, [low, high] (low >= high: none); a round one from the middle
+    of them, or `weight`; and what exact arithmetic says of that one.
     """
     matrices = exact_matrices(corner, box)
-    spans = [admissible(matrix) for matrix in matrices]
-    low, high = max(span[0] for span in spans), min(span[1] for span in spans)
+    lows, highs = zip(*map(admissible, matrices), strict=True)
+    low, high = max(lows), min(highs)
     if weight is None:
         weight = _round(float(np.sqrt(low * high))) if 0.0 < low < high else 1
-    return DiagonalProof(low, high, weight, all(decreases(matrix, weight) for matrix in matrices), len(matrices))
+    proved = all(decreases(matrix, weight) for matrix in matrices)
+    return {"weights_of_diag_w_1": [low, high], "weight": weight, "proved_exactly": proved}
 
 
 def exact_matrices(corner: Corner, box: Box) -> list[sp.Matrix]:
@@ -112,17 +97,14 @@ def printed_gains_are_stable(gains: dict[Corner, tuple[float, ...]] | None = Non
             for form, relaxation, degree in LMI_FORMS
         }
         proof = diagonal_proof(corner, tuple((gain, gain) for gain in given))
-        holds.append(proof.proved and all(verdict is Proof.CERTIFIED for verdict in verdicts.values()))
-        computed[str(corner)] = {
-            "gains": list(given), "lmi": {form: str(verdict) for form, verdict in verdicts.items()},
-            "weights_of_diag_w_1": [proof.low, proof.high], "weight": proof.chosen, "proved_exactly": proof.proved,
-        }  # fmt: skip
+        holds.append(proof["proved_exactly"] and all(verdict is Proof.CERTIFIED for verdict in verdicts.values()))
+        lmi = {form: str(verdict) for form, verdict in verdicts.items()}
+        computed[str(corner)] = {"gains": list(given), "lmi": lmi, **proof}
     weights = ", ".join(f"{entry['weight']:,}" for entry in computed.values())
     reading = (
-        f"{sum(holds)} of {len(holds)} sets of printed gains (P1 and P3, both directions) are stable with P = "
-        f"diag(w, 1) that does not depend on the wheel speed, w = {weights}, proved in rational numbers on 0 to "
-        f"{STATED_SPEED:g} rad/s for any rate: plain quadratic stability holds already, the affine form and "
-        "multi-convexity are not needed."
+        f"{sum(holds)} of {len(holds)} sets of printed gains (P1 and P3, both directions) are stable with P = diag(w, 1) "
+        f"that does not depend on the wheel speed, w = {weights}, proved in rational numbers on 0 to {STATED_SPEED:g} rad/s "
+        "for any rate: plain quadratic stability holds already, the affine form and multi-convexity are not needed."
     )
     return Finding(computed, reproduced(all(holds)), reading)
 
@@ -133,32 +115,28 @@ def printed_boxes_are_stable(boxes: dict[Direction, Box] | None = None) -> Findi
     computed: dict[str, JsonValue] = {}
     for direction, corner in CORNERS.items():
         box = corner.box if boxes is None else boxes[direction]
-        proof = diagonal_proof(corner, box)
-        slowest = slowest_poles(corner, *gain_grid(box, 21))
         computed[direction] = {
-            "L1": list(box[0]), "L2": list(box[1]), "vertices": proof.vertices,
-            "weights_of_diag_w_1": [proof.low, proof.high], "weight": proof.chosen, "proved_exactly": proof.proved,
-            "slowest_pole_1_s": float(slowest.max()),
+            "L1": list(box[0]), "L2": list(box[1]), "vertices": len(exact_matrices(corner, box)),
+            **diagonal_proof(corner, box),
+            "slowest_pole_1_s": float(slowest_poles(corner, *gain_grid(box, 21)).max()),
         }  # fmt: skip
     x, y = computed.values()
     proved = bool(x["proved_exactly"] and y["proved_exactly"])
+    found = (
+        f"P = diag({x['weight']:,}, 1) longitudinally and diag({y['weight']:,}, 1) laterally prove every gain of both "
+        f"boxes on 0 to {STATED_SPEED:g} rad/s, for any rate, in rational numbers."
+    )
     reading = (
         "A_e is affine in omega, L1 and L2 one at a time, so a constant P decides at the eight vertices. "
-        + (
-            f"P = diag({x['weight']:,}, 1) longitudinally and diag({y['weight']:,}, 1) laterally prove every gain "
-            f"of both boxes on 0 to {STATED_SPEED:g} rad/s, for any rate, in rational numbers. "
-            if proved
-            else "No constant diagonal P proves both boxes. "
-        )
-        + f"The slowest pole on a grid is {x['slowest_pole_1_s']:.3g} and {y['slowest_pole_1_s']:.3g} 1/s."
+        f"{found if proved else 'No constant diagonal P proves both boxes.'} "
+        f"The slowest pole on a grid is {x['slowest_pole_1_s']:.3g} and {y['slowest_pole_1_s']:.3g} 1/s."
     )
     return Finding(computed, reproduced(proved), reading)
 
 
 def gain_grid(box: Box, points: int) -> tuple[FloatArray, FloatArray]:
     """L1 and L2 over a box, each (points, points)."""
-    first, second = (np.linspace(low, high, points) for low, high in box)
-    L1, L2 = np.meshgrid(first, second)
+    L1, L2 = np.meshgrid(*(np.linspace(*span, points) for span in box))
     return L1, L2
 
 
@@ -179,30 +157,28 @@ def quadratic_stability(scope: Scope) -> PartResult:
         low, high = entry["weights_of_diag_w_1"]
         rows.append([name, float(low), float(high), entry["weight"], entry["proved_exactly"]])
     caption = (
-        "Constant Lyapunov matrices diag(w, 1) that prove stability for every wheel speed from 0 to 180 rad/s and "
-        "any rate: the interval of admissible weights w in closed form, and a round one that was checked in "
-        "rational numbers."
+        "Constant Lyapunov matrices diag(w, 1) that prove stability for every wheel speed from 0 to 180 rad/s and any rate: "
+        "the interval of admissible weights w in closed form, and a round one that was checked in rational numbers."
     )
     columns = ["gains", "least w [1/s^2]", "greatest w [1/s^2]", "w checked [1/s^2]", "proved exactly"]
     table = Table("diagonal-proofs", caption, columns, rows)
     return PartResult(claims, [table], [box_figure(41 if scope.quick else 81)])
 
 
-def box_figure(points: int = 81) -> Figure:
+def box_figure(points: int) -> Figure:
     """Slowest frozen pole over the plane of gains, with the printed boxes."""
     panels = []
-    for direction, corner in CORNERS.items():
+    steps = ([-200.0, -100.0, -50.0, -25.0, 0.0], [-10.0, -5.0, -2.5, -1.0, 0.0])
+    for (direction, corner), levels in zip(CORNERS.items(), steps, strict=True):
         box, (L1, L2) = corner.box, corner.gains
         wide = tuple((low - 0.6 * (high - low), high + 0.6 * (high - low)) for low, high in box)
-        first, second = gain_grid(wide, points)
-        slowest = slowest_poles(corner, first, second, speeds=46)
-        steps = [-200.0, -100.0, -50.0, -25.0, 0.0] if direction == "longitudinal" else [-10.0, -5.0, -2.5, -1.0, 0.0]
+        grid = gain_grid(wide, points)
+        slowest = slowest_poles(corner, *grid, speeds=46)
         marks: list[Mark] = [
-            Contours(first, second, slowest, [0.0, max(1.0, slowest.max())], FORBIDDEN, filled=True),
-            Contours(first, second, slowest, steps),
-            Outline(box[0], box[1], "printed box", BLUE, 1.8),
-            dots(L1, L2, "printed gains", RED),
-        ]
+            Contours(*grid, slowest, [0.0, max(1.0, slowest.max())], colours.FORBIDDEN, filled=True),
+            Contours(*grid, slowest, levels), Outline(box[0], box[1], "printed box", colours.BLUE, 1.8),
+            dots(L1, L2, "printed gains", colours.RED),
+        ]  # fmt: skip
         panels.append(Panel(marks, "L₁ [m/s]", "L₂ [m/s²]", direction, grid=False))
     return Figure(
         "gain-boxes",
@@ -210,6 +186,5 @@ def box_figure(points: int = 81) -> Figure:
         "of constant gains; shaded: unstable at some wheel speed. The printed boxes lie well inside the stable "
         "region; one constant Lyapunov matrix proves each of them, exactly. P1, text after (28) and (40).",
         "Contour maps of the slowest pole with the printed gain boxes inside the stable region.",
-        panels,
-        legend="below",
-    )
+        panels, legend="below",
+    )  # fmt: skip

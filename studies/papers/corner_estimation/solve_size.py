@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from studies.claim import Finding, JsonValue
-from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, POINTS, literal_design
-from studies.papers.topic import Topic
+from studies.papers.corner_estimation.inputs import CORNERS, POINTS, literal_design, topic
 from studies.papers.verdicts import derived
 from studies.study import Cell, PartResult, Scope, Table
 from synthesis.design.hinf_observer import observer_problem
@@ -26,7 +25,7 @@ from synthesis.lmi.scaling import observer_scale
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import solve
 
-TOPIC = Topic(PACKAGE)
+TOPIC = topic()
 ROUNDING = 1e-12  # relative: all that two assemblies of the same numbers may differ by
 
 
@@ -59,10 +58,11 @@ def one_by_one(relaxed: RelaxedProblem) -> Any:
 def expressions(problem: Any) -> int:
     """Nodes in the expression trees of all constraints: the layer visits each before the solver sees anything."""
 
-    def nodes(expression: Any) -> int:
-        return 1 + sum(nodes(part) for part in expression.args)
-
-    return sum(nodes(constraint) for constraint in problem.constraints)
+    stack, count = list(problem.constraints), 0
+    while stack:
+        stack += stack.pop().args
+        count += 1
+    return count
 
 
 @TOPIC.claim("P1-hinf-time")
@@ -80,9 +80,8 @@ def solve_size(
     arrays = {"points": len(grid.sampled), "twice_the_points": len(finer.sampled)}
     same = _hands_over(modelled, direct)
     computed: dict[str, JsonValue] = {
-        "points": points, "degree": degree, "conic_problem": _size(direct),
-        "layer_hands_over_the_same_problem": same, "expressions_walked_by_the_layer": work,
-        "arrays_stacked_by_direct_assembly": arrays,
+        "points": points, "degree": degree, "conic_problem": _size(direct), "layer_hands_over_the_same_problem": same,
+        "expressions_walked_by_the_layer": work, "arrays_stacked_by_direct_assembly": arrays,
         "exact_relaxation": _size(exact), "exact_relaxation_with_twice_the_points": _size(again),
     }  # fmt: skip
     grows = work["twice_the_points"] - work["points"] >= points and arrays["twice_the_points"] == arrays["points"]
@@ -123,10 +122,11 @@ def solve_time(scope: Scope) -> PartResult:
     claims = TOPIC.found()
     found = claims[0].finding.computed
     rows: list[list[Cell]] = []
-    sizes = {f"{found['points']} points, one by one": "conic_problem", "exact relaxation": "exact_relaxation"}
-    for name, size in ((name, found[key]) for name, key in sizes.items()):
-        cones = ", ".join(f"{number} of {shape}" for shape, number in size["cones"].items())
-        rows.append([name, size["unknowns"], size["rows"], sum(size["cones"].values()), cones])
+    forms = (f"{found['points']} points, one by one", "conic_problem"), ("exact relaxation", "exact_relaxation")
+    for name, key in forms:
+        unknowns, height, cones = found[key].values()
+        sizes = ", ".join(f"{number} of {shape}" for shape, number in cones.items())
+        rows.append([name, unknowns, height, sum(cones.values()), sizes])
     caption = (
         f"(30) as the solver sees it, degree {found['degree']}, longitudinal: unknowns, rows and positive semidefinite "
         "cones. The exact relaxation holds between the points, too, and does not grow with their number."
@@ -139,9 +139,8 @@ def time_table(points: int) -> Table:
     """Seconds of one solve of (30) by both assemblies, on this machine as busy as it is: no part of any verdict."""
     problem, settings = conic_problem(points, 1)
     rows: list[list[Cell]] = []
-    for name, solver in (
-        ("cvxpy, then Clarabel", "cvxpy:CLARABEL"), ("conic data assembled directly, Clarabel", "CLARABEL"),
-    ):  # fmt: skip
+    roads = {"cvxpy, then Clarabel": "cvxpy:CLARABEL", "conic data assembled directly, Clarabel": "CLARABEL"}
+    for name, solver in roads.items():
         solve(problem, replace(settings, solver=solver, points=2))  # imports and first calls are not counted
         start = perf_counter()
         report = solve(problem, replace(settings, solver=solver)).report

@@ -7,14 +7,12 @@ import numpy as np
 from analysis.bounds.forces import force_observer_bound, wheel_error_is_hurwitz, wheel_error_matrix
 from estimators.arrays import FloatArray
 from studies.claim import Finding, agrees, reproduced
-from studies.papers.corner_estimation.inputs import PACKAGE, parameters
-from studies.papers.topic import Topic
-from studies.plots import DASHES, Axis, Figure, Level, Line, Mark, Panel, Shade
-from studies.plots.colours import CURVES, GREY
+from studies.papers.corner_estimation.inputs import parameters, topic
+from studies.plots import DASHES, Axis, Figure, Level, Line, Mark, Panel, Shade, colours
 from studies.study import PartResult, Scope
 from synthesis.models.discretise import zero_order_hold
 
-TOPIC = Topic(PACKAGE)
+TOPIC = topic()
 ETA1, ETA2, ETA3 = 1.8, 11.4, 50.6  # N s, N m, 1/s: P1 notes 1
 DISTURBANCE_RATE = 100.0  # N/s, what the paper takes as the order of magnitude of dOmega_f/dt
 STEP = 0.005  # s
@@ -36,10 +34,8 @@ def wheel_error(gains: tuple[float, float] = (ETA1, ETA2)) -> Finding:
     stable = wheel_error_is_hurwitz(*gains, *wheel())
     size = float(np.abs(poles).max())
     real, imaginary = float(poles.real.max()), float(np.abs(poles.imag).max())
-    computed = {
-        "poles_1_s": [[real, imaginary], [float(poles.real.min()), -imaginary]],
-        "natural_frequency_rad_s": size, "damping_ratio": -real / size, "hurwitz": stable,
-    }  # fmt: skip
+    computed = {"poles_1_s": [[real, imaginary], [float(poles.real.min()), -imaginary]],
+                "natural_frequency_rad_s": size, "damping_ratio": -real / size, "hurwitz": stable}  # fmt: skip
     reading = (
         f"K is {'' if stable else 'not '}Hurwitz with poles {real:.8f} +- {imaginary:.8f}j 1/s: slow and hardly damped "
         f"({size:.3g} rad/s, damping ratio {-real / size:.3f}), so a wrong initial wheel speed rings for half a minute."
@@ -97,10 +93,13 @@ def error_figure() -> Figure:
     """Force error against the bound of Proposition 1, and the wheel speed error that delays it."""
     time, wheel_speed, force = force_errors()
     bound = force_observer_bound(ETA3, DISTURBANCE_RATE).ultimate
-    marks: list[Mark] = [Line(time, force[:, k], name, CURVES[k], DASHES[k], 1.4) for k, name in enumerate(RUNS)]
+    marks: list[Mark] = [
+        Line(time, force[:, k], name, colours.CURVES[k], DASHES[k], 1.4) for k, name in enumerate(RUNS)
+    ]
     marks.append(Shade(-bound, bound, label=f"±{bound:.3f} N, the bound", alpha=0.18))
-    right = Line(time, wheel_speed, width=1.0)
-    speed = Panel([right], Axis("time [s]", 0.0, 40.0), "virtual wheel speed error [rad/s]")
+    speed = Panel(
+        [Line(time, wheel_speed, width=1.0)], Axis("time [s]", 0.0, 40.0), "virtual wheel speed error [rad/s]"
+    )
     return Figure(
         "force-observer-error",
         "Left: first seconds of the error of the longitudinal force observer with the printed gains, started 1 "
@@ -109,9 +108,8 @@ def error_figure() -> Figure:
         "has died out. Behind that the bound holds, and the ramp attains it. P1 (3)-(8), Proposition 1.",
         "Left: force errors fall within 0.1 s to about two newtons and follow the disturbance. Right: an "
         "oscillation of 2.6 rad/s that takes 30 seconds to decay.",
-        [Panel(marks, Axis("time [s]", 0.0, 6.0), Axis("force error [N]", -4.0, 6.0)), speed],
-        legend="below",
-    )
+        [Panel(marks, Axis("time [s]", 0.0, 6.0), Axis("force error [N]", -4.0, 6.0)), speed], legend="below",
+    )  # fmt: skip
 
 
 def noise_figure() -> Figure:
@@ -121,7 +119,7 @@ def noise_figure() -> Figure:
     z = np.exp(2j * np.pi * frequency * STEP)
     gain = np.abs((1.0 + a - 1.0 / z) / (1.0 - (1.0 - a) / z))
     limit = (2 + a) / (2 - a)
-    level = Level(limit, label=f"(2 + a)/(2 − a) = {limit:.3f}", color=GREY, dash="dashed", width=1.5)
+    level = Level(limit, label=f"(2 + a)/(2 − a) = {limit:.3f}", color=colours.GREY, dash="dashed", width=1.5)
     y = Axis("gain from (T − I dω/dt)/R to the force [1]", 0.9, 1.4)
     panel = Panel([Line(frequency, gain), level], Axis("frequency [Hz]", scale="log"), y, legend="upper left")
     return Figure(
@@ -130,6 +128,5 @@ def noise_figure() -> Figure:
         f"last estimate, a = η₃ Ts = {a:.3f}), started at the measured wheel speed: it smooths nothing and amplifies "
         "the fastest noise, so the wheel acceleration must come filtered. P1 (2) and its implementation note.",
         "The gain is one at low frequency and rises to 1.29 at 100 hertz.",
-        panel,
-        size=(4.8, 3.2),
-    )
+        panel, size=(4.8, 3.2),
+    )  # fmt: skip

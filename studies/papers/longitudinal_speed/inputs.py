@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 
 import numpy as np
 
 from analysis.observability.gramians import SampledSequence, sampled_sequence
 from estimators.arrays import FloatArray
 from studies.papers.published import printed_numbers
+from studies.papers.topic import Topic
 from synthesis.models.catalogue.longitudinal_speed import longitudinal_speed_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
 
 PACKAGE = "studies.papers.longitudinal_speed"
+topic = partial(Topic, PACKAGE)  # one for each file
 PARAMETERS = "longitudinal-speed"
 TYPICAL = (1e-3, 1.0, 0.1)  # sizes of z [m], V_r [m/s], z' [m/s], to compare singular values
 SAMPLE_TIME = float(printed_numbers(PACKAGE)["filter"]["sample_time"])  # s, 200 Hz

@@ -9,12 +9,11 @@ import sympy as sp
 from pint import UnitRegistry
 
 from studies.claim import Finding, reproduced
-from studies.papers.longitudinal_speed.inputs import PACKAGE, parameters, speed_model
-from studies.papers.topic import Topic
+from studies.papers.longitudinal_speed.inputs import parameters, speed_model, topic
 from studies.papers.verdicts import erratum
 from studies.study import PartResult, Scope
 
-TOPIC = Topic(PACKAGE)
+TOPIC = topic()
 PRINTED_M = ((1, 0, 0), (0, 1, 0), (0, -1, 1))
 
 

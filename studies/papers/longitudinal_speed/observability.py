@@ -14,7 +14,6 @@ from analysis.observability.matrix import ObservabilityMatrix, observability_mat
 from analysis.observability.rank_loss import rank_loss
 from studies.claim import Finding, reproduced
 from studies.papers.longitudinal_speed.inputs import (
-    PACKAGE,
     TYPICAL,
     WheelRecord,
     braking,
@@ -22,14 +21,13 @@ from studies.papers.longitudinal_speed.inputs import (
     launch,
     slalom,
     speed_model,
+    topic,
 )
-from studies.papers.topic import Topic
-from studies.plots import DASHES, Axis, Figure, Level, Line, Map, Mark, Panel, Words
-from studies.plots.colours import CURVES, RED
+from studies.plots import DASHES, Axis, Figure, Level, Line, Map, Mark, Panel, Words, colours
 from studies.study import Cell, PartResult, Scope, Table
 from synthesis.models.catalogue.longitudinal_speed import WHEEL_MOTION
 
-TOPIC = Topic(PACKAGE)
+TOPIC = topic()
 SPEEDS = (1, 40, 140)  # rad/s
 ACCELERATION, JERK = "wheel_acceleration", "wheel_acceleration_rate"
 RANK_TOLERANCE = 1e-12  # singular values of the gramian's factor, over the largest, states in their typical sizes
@@ -120,7 +118,7 @@ def rank_panels(records: Sequence[WheelRecord], ranks: Sequence[Ranks], speed: A
     """Wheel speeds, and below them the ranks of the gramian, a little apart so that no line hides another."""
     upper, lower = [], []
     for k, (record, rank) in enumerate(zip(records, ranks, strict=True)):
-        color, dash = CURVES[k], DASHES[k % len(DASHES)]
+        color, dash = colours.CURVES[k], DASHES[k % len(DASHES)]
         apart = 0.05 * (k - (len(records) - 1) / 2)
         upper.append(Line(record.time, record.speed, record.name, color, dash))
         lower.append(Line(record.time, rank + apart, "", color, dash, steps=True))
@@ -150,8 +148,8 @@ def determinant_figure(points: int = 201) -> Figure:
     bar = "log₁₀ of the determinant over its value at the corner [1]"
     marks: list[Mark] = [
         Map(speed, acceleration, np.log10(size), bar, "Blues", -5.0, 0.0),
-        Level(y=0.0, color=RED, dash="dashed", width=1.4),
-        Words(70.0, 0.0, "rank 2", RED, offset=(0, 5), horizontal="center"),
+        Level(y=0.0, color=colours.RED, dash="dashed", width=1.4),
+        Words(70.0, 0.0, "rank 2", colours.RED, offset=(0, 5), horizontal="center"),
     ]
     return Figure(
         "observability-determinant",

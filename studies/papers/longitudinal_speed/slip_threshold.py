@@ -7,14 +7,12 @@ import sympy as sp
 
 from estimators.velocity.high_slip import adaptive_threshold
 from studies.claim import Finding
-from studies.papers.longitudinal_speed.inputs import PACKAGE
-from studies.papers.topic import Topic
+from studies.papers.longitudinal_speed.inputs import topic
 from studies.papers.verdicts import erratum
-from studies.plots import Axis, Figure, Level, Line, Mark, Panel, Words
-from studies.plots.colours import BLUE, GREY, RED
+from studies.plots import Axis, Figure, Level, Line, Mark, Panel, Words, colours
 from studies.study import PartResult, Scope
 
-TOPIC = Topic(PACKAGE)
+TOPIC = topic()
 LOWER, UPPER = sp.Rational(1, 20), sp.Rational(1, 5)  # lambda_l, lambda_u of the example; none are printed
 VARIANCE, RATE = sp.symbols("sigma_e beta_e", positive=True)
 ROOT = sp.sqrt(2 * sp.pi)
@@ -68,10 +66,15 @@ def threshold_figure() -> Figure:
     rate, low, high = 100.0, float(LOWER), float(UPPER)
     variance, fine = np.linspace(0.0, 1.5, 301), np.linspace(0.0, 5e-3, 301)
     function = sp.lambdify(VARIANCE, threshold(PRINTED_WIDTH).subs(RATE, rate), "numpy")
-    lower, upper = (Level(y=y, color=GREY, dash="dotted", width=1.0) for y in (low, high))
+    lower, upper = (Level(y=y, color=colours.GREY, dash="dotted", width=1.0) for y in (low, high))
     names = [Words(1.45, y, name, offset=(0, 3)) for y, name in ((low, "λl"), (high, "λu"))]
-    left: list[Mark] = [Line(variance, adaptive_threshold(variance, low, high, rate), color=BLUE), lower, upper, *names]
-    right: list[Mark] = [Line(fine, function(fine), color=RED, dash="dashed"), lower]
+    left: list[Mark] = [
+        Line(variance, adaptive_threshold(variance, low, high, rate), color=colours.BLUE),
+        lower,
+        upper,
+        *names,
+    ]
+    right: list[Mark] = [Line(fine, function(fine), color=colours.RED, dash="dashed"), lower]
     x, y = "variance of |a| [m²/s⁴]", "slip threshold [1]"
     panels = [
         Panel(left, x, Axis(y, 0.0, 0.25), "φe = 1/(√(2π) (λu − λl))"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -27,6 +26,7 @@ from studies.trials.estimation import (
     run_pipeline,
 )
 from studies.trials.histories import BANDS, backgrounds, error_dots, estimate_lines, history, row_axis, truth_line
+from studies.trials.motion import MotionTest
 from studies.trials.simulations import LUGRE
 from studies.trials.velocities import COMPLIANCE_SPREAD, FUSION
 from studies.truth import Measured
@@ -54,14 +54,6 @@ LOOKS = {
     WHEELS: ("^", colours.MEAN_WHEEL_SPEED),
     INTEGRATED: ("v", colours.INTEGRATED_ACCELERATION),
 }
-
-
-@dataclass(frozen=True)
-class Drive:
-    """A manoeuvre here and its name in the paper."""
-
-    manoeuvre: str
-    title: str
 
 
 class Compared(NamedTuple):
@@ -104,7 +96,7 @@ def parts(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) ->
     }
 
 
-def speed_part(name: str, rows: Sequence[Drive], scope: Scope, tire: str = LUGRE) -> PartResult:
+def speed_part(name: str, rows: Sequence[MotionTest], scope: Scope, tire: str = LUGRE) -> PartResult:
     """Errors of V_x of all of them in every manoeuvre."""
     drawn = measured_runs([row.manoeuvre for row in rows], tire, scope)
     truth = drawn.truth
@@ -142,7 +134,7 @@ def speed_part(name: str, rows: Sequence[Drive], scope: Scope, tire: str = LUGRE
     return PartResult(tables=[Table(f"{name}-errors", caption, columns, table)], figures=drawings, measures=measures)
 
 
-def dot_figure(name: str, rows: Sequence[Drive], found: Sequence[Mapping[str, Spread]]) -> Figure:
+def dot_figure(name: str, rows: Sequence[MotionTest], found: Sequence[Mapping[str, Spread]]) -> Figure:
     """Mean NRMS with its interval by manoeuvre and estimate, and the claim."""
     marks = [*error_dots(found, LOOKS), Level(x=CLAIMED, label="claimed", dash="dashed", width=1.0)]
     x = Axis("$V_x$ NRMS [% of the peak]", scale="log")
@@ -152,12 +144,11 @@ def dot_figure(name: str, rows: Sequence[Drive], found: Sequence[Mapping[str, Sp
         "of its own.",
         "Dot plot of the normalised speed error of two Kalman filters, a gain schedule, the fusion and two baselines by "
         "manoeuvre.",
-        Panel(marks, x, row_axis([row.title for row in rows])),
-        size=(8.0, 1.7 + 0.75 * len(rows)), legend="below",
+        Panel(marks, x, row_axis([row.title for row in rows])), size=(8.0, 1.7 + 0.75 * len(rows)), legend="below",
     )  # fmt: skip
 
 
-def speed_history(name: str, drawn: Measured, row: Drive, estimates: Mapping[str, FloatArray]) -> Figure:
+def speed_history(name: str, drawn: Measured, row: MotionTest, estimates: Mapping[str, FloatArray]) -> Figure:
     """Speed, its error, and the front left wheel: surface speed, velocity of its centre, and where the detector speaks."""
     truth = drawn.truth
     run, samples = run_of(truth, row.manoeuvre)

@@ -12,15 +12,13 @@ from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 
 from estimators.arrays import FloatArray
 from studies.claim import Finding
-from studies.papers.longitudinal_speed.inputs import PACKAGE, SAMPLE_TIME, constant, noise, structures
+from studies.papers.longitudinal_speed.inputs import SAMPLE_TIME, constant, noise, structures, topic
 from studies.papers.longitudinal_speed.stochastic_observability import STRUCTURES, both_tests
-from studies.papers.topic import Topic
 from studies.papers.verdicts import erratum
-from studies.plots import DASHES, Axis, Figure, Line, Panel
-from studies.plots.colours import BLUE, CURVES, ORANGE, RED
+from studies.plots import DASHES, Axis, Figure, Line, Panel, colours
 from studies.study import Cell, PartResult, Scope, Table
 
-TOPIC = Topic(PACKAGE)
+TOPIC = topic()
 SPEED = 40.0  # rad/s
 READINGS = [(structure, mode) for structure in STRUCTURES for mode in ("normal", "high_slip")]
 EXACT = 1e-9  # relative
@@ -145,13 +143,13 @@ def recursion_figure() -> Figure:
     printed, corrected, summed = fixed_gain(s)[0] / np.trace(s.P)
     time, (plus, minus) = SAMPLE_TIME * np.arange(1, len(printed) + 1), remainder_errors(s, sizes)
     traces = [
-        Line(time, corrected, "(A4) with + Q", BLUE),
-        Line(time, summed, "(A5)", ORANGE, "dotted", 2.2),
-        Line(time, printed, "(A4) as printed", RED, "dashed"),
+        Line(time, corrected, "(A4) with + Q", colours.BLUE),
+        Line(time, summed, "(A5)", colours.ORANGE, "dotted", 2.2),
+        Line(time, printed, "(A4) as printed", colours.RED, "dashed"),
     ]
     errors = [
-        Line(sizes, plus, "+ T/ψ, as printed", RED, "dashed", marker="s"),
-        Line(sizes, minus, "− T/ψ", BLUE, marker="o"),
+        Line(sizes, plus, "+ T/ψ, as printed", colours.RED, "dashed", marker="s"),
+        Line(sizes, minus, "− T/ψ", colours.BLUE, marker="o"),
     ]
     trace, error = (
         Axis(label, scale="log") for label in ("trace over that of the filter [1]", "relative error of (A8) [1]")
@@ -199,7 +197,7 @@ def response_figure(points: int = 28) -> Figure:
     gains, constants = [], []
     for k, (structure, mode) in enumerate(READINGS):
         found = np.array([filter_response(float(w), structure, mode) for w in speeds])
-        name, color, dash = f"S = {structure}, {mode.replace('_', ' ')}", CURVES[k // 2], DASHES[k % 2]
+        name, color, dash = f"S = {structure}, {mode.replace('_', ' ')}", colours.CURVES[k // 2], DASHES[k % 2]
         gains.append(Line(speeds, found[:, 0], name, color, dash))
         constants.append(Line(speeds, found[:, 1], name, color, dash))
     panels = [

@@ -19,7 +19,6 @@ from analysis.observability.stochastic import (
 )
 from studies.claim import Finding, reproduced
 from studies.papers.longitudinal_speed.inputs import (
-    PACKAGE,
     SAMPLE_TIME,
     WheelRecord,
     accelerating,
@@ -28,15 +27,14 @@ from studies.papers.longitudinal_speed.inputs import (
     parameters,
     slalom,
     structures,
+    topic,
 )
-from studies.papers.topic import Topic
 from studies.papers.verdicts import under_specified
-from studies.plots import Axis, Dash, Figure, Level, Line, Mark, Panel, dots
-from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, PURPLE, RED
+from studies.plots import Axis, Dash, Figure, Level, Line, Mark, Panel, colours, dots
 from studies.study import PartResult, Scope, Table
 from synthesis.models.catalogue.corner import corner_velocity_model
 
-TOPIC = Topic(PACKAGE)
+TOPIC = topic()
 SPEEDS = (40.0, 100.0)  # rad/s, 13 and 33 m/s
 STRUCTURES = {"I": 1600, "B B'": 600, "B_k B_k'": 600}  # samples until N has settled to 1e-3; the first is slow
 RAMP = 100.0  # rad/s^2, a wheel that spins up on slippery ground
@@ -199,12 +197,12 @@ def start_figure() -> Figure:
     """lambda_max(M) and lambda_max(N) over time in five readings."""
     moving, turning = accelerating(SPEEDS[0], RAMP, 40, 80), slalom(45.0, 4.0, 0.5, 0.4)
     curves: tuple[Curve, ...] = (
-        ("constant 40 rad/s", both_tests(constant(SPEEDS[0], 80)), BLUE, "solid"),
-        ("constant 100 rad/s", both_tests(constant(SPEEDS[1], 80)), GREEN, "dashed"),
-        (moving.name, both_tests(moving), RED, "dash-dot"),
-        ("slalom, rank tolerance 1e-9", both_tests(turning), ORANGE, "dotted"),
-        ("slalom, rank tolerance 1e-2", both_tests(turning, tolerance=1e-2), PURPLE, "dashed"),
-        ("two states, accelerating", two_states(80), GREY, "solid"),
+        ("constant 40 rad/s", both_tests(constant(SPEEDS[0], 80)), colours.BLUE, "solid"),
+        ("constant 100 rad/s", both_tests(constant(SPEEDS[1], 80)), colours.GREEN, "dashed"),
+        (moving.name, both_tests(moving), colours.RED, "dash-dot"),
+        ("slalom, rank tolerance 1e-9", both_tests(turning), colours.ORANGE, "dotted"),
+        ("slalom, rank tolerance 1e-2", both_tests(turning, tolerance=1e-2), colours.PURPLE, "dashed"),
+        ("two states, accelerating", two_states(80), colours.GREY, "solid"),
     )
     panels = covariance_panels(curves, Axis("time [s]", 0.0, 0.1), round(0.1 / SAMPLE_TIME) + 1, 1e-9)
     return Figure(

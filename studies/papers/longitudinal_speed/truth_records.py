@@ -10,8 +10,7 @@ from estimators.velocity.slip import LEAST_SPEED
 from studies.papers.longitudinal_speed.inputs import SAMPLE_TIME, WheelRecord, speed_model
 from studies.papers.longitudinal_speed.observability import Ranks, gramian_rank, rank_panels
 from studies.papers.longitudinal_speed.stochastic_observability import TOPIC, both_tests, covariance_panels
-from studies.plots import DASHES, Axis, Figure
-from studies.plots.colours import CURVES
+from studies.plots import DASHES, Axis, Figure, colours
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.estimation import run_of
 from studies.trials.motion import MotionTest
@@ -127,7 +126,7 @@ def start_figure(records: Sequence[WheelRecord]) -> Figure:
     """Figs. 2 and 3: both tests for two rank tolerances."""
     curves = [
         (f"{record.name}, {tolerance:g}", both_tests(record.cut(0, STARTS), tolerance=tolerance), color, dash)
-        for record, color in zip(records, CURVES, strict=False)
+        for record, color in zip(records, colours.CURVES, strict=False)
         for tolerance, dash in zip(TOLERANCES, DASHES, strict=False)
     ]
     return Figure(

@@ -7,13 +7,11 @@ import numpy as np
 from analysis.bounds.forces import sharp_unknown_input_bound, unknown_input_bound
 from estimators.arrays import FloatArray
 from studies.claim import Finding, reproduced
-from studies.papers.longitudinal_speed.inputs import PACKAGE
-from studies.papers.topic import Topic
-from studies.plots import Axis, Figure, Level, Line, Mark, Panel, dots
-from studies.plots.colours import GREY, RED
+from studies.papers.longitudinal_speed.inputs import topic
+from studies.plots import Axis, Figure, Level, Line, Mark, Panel, colours, dots
 from studies.study import PartResult, Scope
 
-TOPIC = Topic(PACKAGE)
+TOPIC = topic()
 RUNS, STEPS, STEP = 200, 400, 2e-3
 TOLERANCE = 1e-12  # rad/s, absolute and relative: the runs are of size 1 to 100
 
@@ -74,13 +72,13 @@ def theorem_figure() -> Figure:
     share = size / bounds(time, runs)
     left: list[Mark] = [
         Line(time, share[:, ::5], width=0.5, alpha=0.35),
-        Line(time, share.max(axis=1), "largest of 200 runs", RED),
+        Line(time, share.max(axis=1), "largest of 200 runs", colours.RED),
         Level(y=1.0, width=0.9),
     ]
     right: list[Mark] = [
         Line(xi, 0.5 / np.sqrt(xi * (1.0 - xi))),
-        Level(y=1.0, color=GREY, dash="dotted", width=1.5),
-        dots(0.5, 1.0, color=RED),
+        Level(y=1.0, color=colours.GREY, dash="dotted", width=1.5),
+        dots(0.5, 1.0, color=colours.RED),
     ]
     panels = [
         Panel(left, "time [s]", Axis("|e| over the bound of Theorem 1 [1]", 0.0, 1.08), legend="lower right"),
