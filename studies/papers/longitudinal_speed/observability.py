@@ -60,10 +60,10 @@ def rank_over_the_region(accelerations: tuple[object, ...] = (0, 1, "-5")) -> Fi
     ranks = {f"acceleration {a} rad/s^2": exact_ranks(a) for a in accelerations}
     changing, lowest_speed = exact_ranks(0, 1), second_piece()
     (determinant,) = speed_observability().minors(symbolic=True)
+    always = rank_loss(speed_observability(), {JERK: 0, ACCELERATION: 0}).always
     computed = {
         "determinant": str(determinant), "wheel_speeds_rad_s": list(SPEEDS), "ranks": ranks,
-        "ranks_with_changing_acceleration": changing,
-        "lost_at_every_constant_speed": rank_loss(speed_observability(), {JERK: 0, ACCELERATION: 0}).always,
+        "ranks_with_changing_acceleration": changing, "lost_at_every_constant_speed": always,
         "lost_while_accelerating_below_rad_s": lowest_speed,
     }  # fmt: skip
     reading = (
@@ -97,12 +97,9 @@ def observability(scope: Scope) -> PartResult:
 def rank_table(ranks: Sequence[Ranks]) -> Table:
     """Exact rank of (24) at points, and numerical rank of the gramian along the histories."""
     rows: list[list[Cell]] = []
-    for name, found in (
-        ("constant speed", exact_ranks()),
-        ("accelerating, 1 rad/s^2", exact_ranks(1)),
-        ("acceleration changing, 1 rad/s^3", exact_ranks(0, 1)),
-    ):
-        where = f"at {', '.join(map(str, SPEEDS))} rad/s"
+    motions = {"constant speed": (), "accelerating, 1 rad/s^2": (1,), "acceleration changing, 1 rad/s^3": (0, 1)}
+    for name, motion in motions.items():
+        found, where = exact_ranks(*motion), f"at {', '.join(map(str, SPEEDS))} rad/s"
         rows.append(["rank of O3, exact", name, where, min(found), max(found)])
     for record, rank in zip(histories(), ranks, strict=True):
         rows.append(["rank of V(0, N)", record.name, f"{len(rank)} samples", int(rank[len(rank) // 4]), int(rank[-1])])
@@ -142,7 +139,7 @@ def rank_figure(ranks: Sequence[Ranks]) -> Figure:
 def determinant_figure(points: int = 201) -> Figure:
     """Size of det O_3 over wheel speed and acceleration."""
     (determinant,) = speed_observability().minors({JERK: 0})
-    function = sp.lambdify([sp.Symbol("wheel_speed"), sp.Symbol(ACCELERATION)], determinant, "numpy")
+    function = sp.lambdify(["wheel_speed", ACCELERATION], determinant, "numpy")
     speed, acceleration = np.linspace(0.0, 140.0, points), np.linspace(-800.0, 800.0, points + 1)
     size = np.abs(function(speed, acceleration[:, None])) / abs(float(function(140.0, 800.0)))
     bar = "log₁₀ of the determinant over its value at the corner [1]"
