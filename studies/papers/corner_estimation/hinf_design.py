@@ -25,15 +25,7 @@ from scipy.linalg import solve_continuous_are
 from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule
 from studies.claim import Finding, JsonValue
-from studies.papers.corner_estimation.inputs import (
-    CORNERS,
-    DESIGN_SPEED,
-    POINTS,
-    STATES,
-    Corner,
-    literal_design,
-    topic,
-)
+from studies.papers.corner_estimation.inputs import CORNERS, DESIGN_SPEED, POINTS, STATES, Corner, literal_design, topic
 from studies.papers.verdicts import derived, erratum, under_specified
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel, Shade, colours, dots
 from studies.study import PartResult, Scope, Table
