@@ -22,6 +22,7 @@ from synthesis.lmi.solve import solve
 TOPIC = topic()
 CAPS = (1e3, 1e4)  # condition numbers that a general-purpose scaling might allow
 BALANCED = 2.0
+LOOSE = ("solver", "largest_growth_1_s", "at_rad_s")  # of the vertices alone, in the table
 
 
 def natural_scale(corner: Corner) -> float:
@@ -46,8 +47,7 @@ def best_margin(corner: Corner, scale: float, condition: float) -> float:
 def vertices_only(corner: Corner) -> tuple[LmiResult, FloatArray, FloatArray]:
     """An affine P, asked of a solver at the four vertices of (omega, rate) alone, without multi-convexity and scaling.
 
-    Returns its answer and, at wheel speeds (g,), the largest growth rate of V in 1/s (g,): above zero the certificate is
-    false, whatever the solver said.
+    Its answer; wheel speeds (g,) and the largest growth rate of V there, 1/s (g,): above zero the certificate is false.
     """
     problem = _problem(corner, np.ones(2), degree=1, margin=False)
     problem.require("P > 0", problem.unknowns["P"])
@@ -110,10 +110,8 @@ def conditioning(scope: Scope) -> PartResult:
     claims = TOPIC.found()
     rows = []
     for name, entry in claims[0].finding.computed.items():
-        loose = entry["vertices_only"]
-        rows.append([name, entry["scale_of_z"], entry["natural_condition_number"], *entry["margin_unscaled"].values(),
-                     entry[f"margin_scaled_condition_{BALANCED:g}"], loose["solver"], loose["largest_growth_1_s"],
-                     loose["at_rad_s"]])  # fmt: skip
+        scale, condition, unscaled, scaled, loose = entry.values()
+        rows.append([name, scale, condition, *unscaled.values(), scaled, *(loose[key] for key in LOOSE)])
     caption = (
         "Search for a constant P with I <= P <= kappa I (margin: largest t with A_e'P + P A_e < -t I), with z in "
         "metres and with z multiplied by g; and an affine P from the vertices alone: what the solver says, and how "
@@ -128,10 +126,8 @@ def conditioning(scope: Scope) -> PartResult:
 def conditioning_figure(conditions: FloatArray) -> Figure:
     """Best Lyapunov margin over the allowed condition number, and false certificates between the vertices."""
     growth: list[Mark] = [ZERO]
-    margins: list[Mark] = [ZERO]
-    margins += [
-        Line([], [], *look) for look in (("z scaled by g", colours.GREY), ("z in metres", colours.GREY, "dashed"))
-    ]
+    grey = colours.GREY
+    margins: list[Mark] = [ZERO, Line([], [], "z scaled by g", grey), Line([], [], "z in metres", grey, "dashed")]
     for corner, colour in zip(DESIGNS, colours.CURVES, strict=False):
         _, omega, rate = vertices_only(corner)
         growth.append(Line(omega, rate, str(corner), colour))

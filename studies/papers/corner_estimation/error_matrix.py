@@ -80,30 +80,23 @@ def absolute_value(signed: bool = True) -> Finding:
 @TOPIC.part("error-matrix", "Error dynamics of the velocity observer", 2.0)
 def error_matrix(scope: Scope) -> PartResult:
     """The misprints of (26) and (23), and both poles of the velocity observer at five wheel speeds."""
-    rows, columns = [[omega] for omega in SPEEDS], [SPEED_AXIS.label]
+    rows, columns, panels = [[speed] for speed in SPEEDS], [SPEED_AXIS.label], []
+    omega = np.linspace(0.0, STATED_SPEED, 361)
     for direction, corner in CORNERS.items():
         for row, poles in zip(rows, np.linalg.eigvals(corner.error_matrices(SPEEDS)), strict=True):
             first, second = sorted(poles, key=lambda pole: (pole.real, -pole.imag))
             row.extend([float(first.real), float(second.real), float(abs(first.imag))])
         columns += [f"{direction}, {p} [1/s]" for p in ("faster real part", "slower real part", "imaginary part +-")]
-    gains = " and ".join(str(list(corner.gains)) for corner in CORNERS.values())
-    caption = f"Poles of the velocity observer error A - L C with the printed gains {gains} at constant wheel speed."
-    return PartResult(TOPIC.found(), [Table("poles", caption, columns, rows)], [pole_figure()])
-
-
-def pole_figure() -> Figure:
-    """Real parts of the error poles over wheel speed, corrected and printed A0."""
-    omega = np.linspace(0.0, STATED_SPEED, 361)
-    panels = []
-    for direction, corner in CORNERS.items():
         right, wrong = (poles_with(entry, corner, omega) for entry in (derived_entry(), PRINTED_ENTRY))
         marks: list[Mark] = [
             Line(omega, right, "A − L C (corrected entry)"), Line(omega, wrong, "A₀ as printed in (26)", colours.RED, "dashed"),
             ZERO, dots([0.0], [wrong[0, 1]], color=colours.RED),
         ]  # fmt: skip
-        y, title = "real part of the poles [1/s]", "{}, L = [{:g}, {:g}]".format(direction, *corner.gains)
-        panels.append(Panel(marks, SPEED_AXIS, y, title))
-    return Figure(
+        title = "{}, L = [{:g}, {:g}]".format(direction, *corner.gains)
+        panels.append(Panel(marks, SPEED_AXIS, "real part of the poles [1/s]", title))
+    gains = " and ".join(str(list(corner.gains)) for corner in CORNERS.values())
+    caption = f"Poles of the velocity observer error A - L C with the printed gains {gains} at constant wheel speed."
+    figure = Figure(
         "poles",
         "Real parts of the two poles of the velocity observer error over wheel speed, with the printed gains. With "
         "entry (1,2) of A0 as printed, without its one, a pole lies at zero at standstill (dot): nothing could be "
@@ -111,3 +104,4 @@ def pole_figure() -> Figure:
         "Two panels, longitudinal and lateral. Corrected poles stay below zero; the printed ones reach zero at standstill.",
         panels, legend="below",
     )  # fmt: skip
+    return PartResult(TOPIC.found(), [Table("poles", caption, columns, rows)], [figure])

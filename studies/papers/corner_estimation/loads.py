@@ -84,20 +84,15 @@ def loads(scope: Scope) -> PartResult:
     rows = [[f"{axle} {side}", static[n], along[axle] / 2.0, across[n]] for n, (axle, _, side) in wheels.items()]
     columns = ["corner", "static load [N]", "per m/s^2 of a_x [N]", "per m/s^2 of a_y [N]"]
     caption = "Corner loads of the level car of Table I by (15), (17), g = 9.81 m/s^2."
-    return PartResult(claims, [Table("vertical-loads", caption, columns, rows)], [load_figure()])
-
-
-def load_figure() -> Figure:
-    """Corner loads over lateral and longitudinal acceleration."""
     acceleration, panels = np.linspace(-9.0, 9.0, 73), []
-    for (along, across), axis, title in zip(MOTIONS[1:], "ₓᵧ", ("longitudinal", "lateral"), strict=True):
-        found = vertical_loads(parameters(), along * acceleration, across * acceleration, gravity=PRINTED_GRAVITY)
+    for (ax, ay), axis, title in zip(MOTIONS[1:], "ₓᵧ", ("longitudinal", "lateral"), strict=True):
+        found = vertical_loads(parameters(), ax * acceleration, ay * acceleration, gravity=PRINTED_GRAVITY)
         lines = [
             Line(acceleration, getattr(found, name) / 1e3, name.replace("_", " "), colour, dash)
             for name, colour, dash in zip(WHEELS, colours.CURVES, DASHES, strict=False)
         ]
         panels.append(Panel([ZERO, *lines], f"a{axis} [m/s²]", "vertical load [kN]", f"{title} acceleration"))
-    return Figure(
+    figure = Figure(
         "vertical-loads",
         "Vertical load of each corner over one acceleration at a time, level car of Table I, no body angles. Left "
         "lines lie on right ones for longitudinal acceleration. Below zero the formulas no longer apply: the wheel "
@@ -106,3 +101,4 @@ def load_figure() -> Figure:
         "side laterally.",
         panels, legend="below", share_y="all",
     )  # fmt: skip
+    return PartResult(claims, [Table("vertical-loads", caption, columns, rows)], [figure])

@@ -25,11 +25,10 @@ from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.models.catalogue.corner import Direction
 
 TOPIC = topic()
-# Affine P with multi-convexity at the vertices, affine P on the continuum, constant P: (name, relaxation, degree).
-LMI_FORMS: tuple[tuple[str, Relaxation, int], ...] = (
-    ("with multi-convexity", "vertex", 1), ("without", "exact", 1), ("constant P", "exact", 0),
-)  # fmt: skip
-Span = tuple[float, float]
+# Affine P with multi-convexity at the vertices, affine P on the continuum, constant P: relaxation and degree.
+LMI_FORMS: dict[str, tuple[Relaxation, int]] = {
+    "with multi-convexity": ("vertex", 1), "without": ("exact", 1), "constant P": ("exact", 0),
+}  # fmt: skip
 Box = tuple[tuple[float, float], ...]
 
 
@@ -56,16 +55,14 @@ def exact_matrices(corner: Corner, box: Box) -> list[sp.Matrix]:
     return [(A - sp.Matrix([first, second]) * C).subs("wheel_speed", w) for w, first, second in product(*ends)]
 
 
-def admissible(A_e: sp.Matrix) -> Span:
+def admissible(A_e: sp.Matrix) -> tuple[float, float]:
     """All w with diag(w, 1) A_e + A_e' diag(w, 1) < 0: roots of b^2 w^2 + (2 b c - 4 a d) w + c^2; (inf, -inf) if none."""
     a, b, c, d = (float(x) for x in A_e)
-    if not (a < 0.0 and d < 0.0):
-        return np.inf, -np.inf
-    if b == 0.0:
+    if a < 0.0 and d < 0.0 and b == 0.0:
         return c * c / (4.0 * a * d), np.inf
     middle = 2.0 * a * d - b * c
     inside = middle * middle - (b * c) ** 2
-    if not (inside > 0.0 and middle > 0.0):
+    if not (a < 0.0 and d < 0.0 and inside > 0.0 and middle > 0.0):
         return np.inf, -np.inf
     larger = (middle + np.sqrt(inside)) / (b * b)
     return float(c * c / (b * b * larger)), float(larger)
@@ -87,14 +84,13 @@ def _round(value: float, digits: int = 2) -> int:
 @TOPIC.claim("P1-aqs-feas")
 def printed_gains_are_stable(gains: dict[Corner, tuple[float, ...]] | None = None) -> Finding:
     """(28), (40) by three LMIs, and a constant diagonal P in exact arithmetic, for the gains of P1 and of P3."""
-    computed: dict[str, JsonValue] = {}
-    holds = []
+    holds, computed = [], dict[str, JsonValue]()
     for corner in DESIGNS:
         given = corner.gains if gains is None else gains[corner]
         model, column = corner.model, np.array(given)[:, None]
         verdicts = {
             form: affine_quadratic_stability(model, column, degree, settings=LmiSettings(relaxation=relaxation)).verdict
-            for form, relaxation, degree in LMI_FORMS
+            for form, (relaxation, degree) in LMI_FORMS.items()
         }
         proof = diagonal_proof(corner, tuple((gain, gain) for gain in given))
         holds.append(proof["proved_exactly"] and all(verdict is Proof.CERTIFIED for verdict in verdicts.values()))
@@ -118,7 +114,7 @@ def printed_boxes_are_stable(boxes: dict[Direction, Box] | None = None) -> Findi
         computed[direction] = {
             "L1": list(box[0]), "L2": list(box[1]), "vertices": len(exact_matrices(corner, box)),
             **diagonal_proof(corner, box),
-            "slowest_pole_1_s": float(slowest_poles(corner, *gain_grid(box, 21)).max()),
+            "slowest_pole_1_s": float(slowest_poles(corner, box, 21, speeds=91)[-1].max()),
         }  # fmt: skip
     x, y = computed.values()
     proved = bool(x["proved_exactly"] and y["proved_exactly"])
@@ -134,17 +130,12 @@ def printed_boxes_are_stable(boxes: dict[Direction, Box] | None = None) -> Findi
     return Finding(computed, reproduced(proved), reading)
 
 
-def gain_grid(box: Box, points: int) -> tuple[FloatArray, FloatArray]:
-    """L1 and L2 over a box, each (points, points)."""
-    L1, L2 = np.meshgrid(*(np.linspace(*span, points) for span in box))
-    return L1, L2
-
-
-def slowest_poles(corner: Corner, L1: FloatArray, L2: FloatArray, speeds: int = 91) -> FloatArray:
-    """Largest real part of the frozen poles in 1/s over all wheel speeds, for each pair of gains."""
+def slowest_poles(corner: Corner, box: Box, points: int, speeds: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """L1 and L2 over a box, and the largest real part of the frozen poles in 1/s over all wheel speeds: (points, points) each."""
     numeric = corner.model.on(np.linspace(0.0, STATED_SPEED, speeds))
+    L1, L2 = np.meshgrid(*(np.linspace(*span, points) for span in box))
     gains = np.stack([L1, L2], axis=-1)[..., None, :, None]
-    return np.asarray(np.linalg.eigvals(numeric.A - gains @ numeric.C).real.max(axis=(-2, -1)))
+    return L1, L2, np.asarray(np.linalg.eigvals(numeric.A - gains @ numeric.C).real.max(axis=(-2, -1)))
 
 
 @TOPIC.part("quadratic-stability", "Stability of the printed gains and gain boxes", 3.0)
@@ -152,35 +143,28 @@ def quadratic_stability(scope: Scope) -> PartResult:
     """Both claims, every proof in a table, and the boxes over the plane of gains."""
     claims = TOPIC.found()
     gains, boxes = (claim.finding.computed for claim in claims)
-    rows = []
-    for name, entry in (*gains.items(), *((f"box of P1, {d}", e) for d, e in boxes.items())):
-        low, high = entry["weights_of_diag_w_1"]
-        rows.append([name, float(low), float(high), entry["weight"], entry["proved_exactly"]])
+    proofs = {**gains, **{f"box of P1, {direction}": entry for direction, entry in boxes.items()}}
+    rows = [
+        [name, *map(float, e["weights_of_diag_w_1"]), e["weight"], e["proved_exactly"]] for name, e in proofs.items()
+    ]
     caption = (
         "Constant Lyapunov matrices diag(w, 1) that prove stability for every wheel speed from 0 to 180 rad/s and any rate: "
         "the interval of admissible weights w in closed form, and a round one that was checked in rational numbers."
     )
     columns = ["gains", "least w [1/s^2]", "greatest w [1/s^2]", "w checked [1/s^2]", "proved exactly"]
-    table = Table("diagonal-proofs", caption, columns, rows)
-    return PartResult(claims, [table], [box_figure(41 if scope.quick else 81)])
-
-
-def box_figure(points: int) -> Figure:
-    """Slowest frozen pole over the plane of gains, with the printed boxes."""
     panels = []
     steps = ([-200.0, -100.0, -50.0, -25.0, 0.0], [-10.0, -5.0, -2.5, -1.0, 0.0])
     for (direction, corner), levels in zip(CORNERS.items(), steps, strict=True):
         box, (L1, L2) = corner.box, corner.gains
         wide = tuple((low - 0.6 * (high - low), high + 0.6 * (high - low)) for low, high in box)
-        grid = gain_grid(wide, points)
-        slowest = slowest_poles(corner, *grid, speeds=46)
+        poles = slowest_poles(corner, wide, 41 if scope.quick else 81, speeds=46)
         marks: list[Mark] = [
-            Contours(*grid, slowest, [0.0, max(1.0, slowest.max())], colours.FORBIDDEN, filled=True),
-            Contours(*grid, slowest, levels), Outline(box[0], box[1], "printed box", colours.BLUE, 1.8),
+            Contours(*poles, [0.0, max(1.0, poles[-1].max())], colours.FORBIDDEN, filled=True),
+            Contours(*poles, levels), Outline(box[0], box[1], "printed box", colours.BLUE, 1.8),
             dots(L1, L2, "printed gains", colours.RED),
         ]  # fmt: skip
         panels.append(Panel(marks, "L₁ [m/s]", "L₂ [m/s²]", direction, grid=False))
-    return Figure(
+    figure = Figure(
         "gain-boxes",
         f"Slowest pole in 1/s (largest real part over wheel speeds from 0 to {STATED_SPEED:g} rad/s) over the plane "
         "of constant gains; shaded: unstable at some wheel speed. The printed boxes lie well inside the stable "
@@ -188,3 +172,4 @@ def box_figure(points: int) -> Figure:
         "Contour maps of the slowest pole with the printed gain boxes inside the stable region.",
         panels, legend="below",
     )  # fmt: skip
+    return PartResult(claims, [Table("diagonal-proofs", caption, columns, rows)], [figure])

@@ -115,11 +115,6 @@ def sigma_weights(scope: Scope) -> PartResult:
         "it can. The unit is not printed."
     )
     columns = ["covariances", "unit of force", "Q", "R", "time constant [s]"]
-    return PartResult(TOPIC.found(), [weight_table, Table("filter-lag", caption, columns, rows)], [weight_figure()])
-
-
-def weight_figure() -> Figure:
-    """Sums of sigma point weights, printed against corrected."""
     marks: list[Mark] = [Level(1.0)]
     names = ("W = (N + η)/2, as printed", "W = 1/(2 (N + η))")
     for form, name, colour, shift in zip(FORMS, names, (colours.RED, colours.BLUE), (-0.19, 0.19), strict=True):
@@ -128,10 +123,11 @@ def weight_figure() -> Figure:
         for place, total in totals.items():
             marks.append(Words(place, float(total), str(total), offset=(0, 2), horizontal="center"))
     x = Axis(ticks={0: "N = 3, lateral forces (P1)", 1: "N = 1, wheel force (P2)"})
-    return Figure(
+    figure = Figure(
         "sigma-weights",
         "What the sigma point weights of the mean add up to, as printed and corrected, in both papers; the line "
         "marks one, without which every predicted mean is off by that factor. P1 notes 3, P2 notes 3.",
         "Bars: the printed weights add up to 9 for three states and 11/3 for one, the corrected ones to 1.",
         Panel(marks, x, "sum of the mean weights [1]", legend="upper right"), size=(4.8, 3.0),
     )  # fmt: skip
+    return PartResult(TOPIC.found(), [weight_table, Table("filter-lag", caption, columns, rows)], [figure])

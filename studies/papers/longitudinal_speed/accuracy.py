@@ -55,11 +55,6 @@ def accuracy(scope: Scope) -> PartResult:
             ("table-2-loads", "normalised error and largest value of the vertical loads", ("NRMS [%]", "largest [kN]"), LOADS),
         )
     ]  # fmt: skip
-    return PartResult(TOPIC.found(), tables, [table_figure()])
-
-
-def table_figure() -> Figure:
-    """Table II: force errors of both observers, beside the limit of the text."""
     limit = float(LIMIT["ukf"])
     places, corners = np.arange(len(FORCES)), {float(k): row[0] for k, row in enumerate(FORCES)}
     panels = []
@@ -74,10 +69,11 @@ def table_figure() -> Figure:
         ]
         x, y = Axis(ticks=corners, turned=30), "" if k else "normalised force error [%]"
         panels.append(Panel(marks, x, y, name.replace(", ", ",\n", 1)))
-    return Figure(
+    figure = Figure(
         "table-2",
         "Longitudinal force errors of Table II as the paper prints them (three drives on the road, four corners), with the "
         "limit that the text states for the UKF. In the three marked cells of twelve the simpler observer is better.",
         "Grouped bars per corner for three drives; three red marks over pairs whose second bar is lower.",
         panels, (7.2, 3.6), legend="below", share_y="all",
     )  # fmt: skip
+    return PartResult(TOPIC.found(), tables, [figure])

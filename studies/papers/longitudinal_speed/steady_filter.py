@@ -174,11 +174,7 @@ def covariances(scope: Scope) -> PartResult:
     caption = f"Steady Kalman filter at {SPEED:g} rad/s and 200 Hz for the readings of the printed scalar covariances, Q = q S."
     columns = ["S", "mode", "velocity gain [m/s]", "slowest time constant [s]"]
     table = Table("covariance-readings", caption, columns, rows)
-    return PartResult(tables=[table], figures=[response_figure(10 if scope.quick else 28)])
-
-
-def response_figure(points: int = 28) -> Figure:
-    """Velocity gain and slowest time constant over wheel speed for each reading of Q, both modes."""
+    points = 10 if scope.quick else 28
     speeds = np.linspace(5.0, 140.0, points)
     found = [np.array([filter_response(float(w), *reading) for w in speeds]) for reading in READINGS]
     names = [f"S = {structure}, {mode.replace('_', ' ')}" for structure, mode in READINGS]
@@ -189,7 +185,7 @@ def response_figure(points: int = 28) -> Figure:
               "wheel speed [rad/s]", Axis(label, scale="log"))
         for i, label in enumerate(labels)
     ]  # fmt: skip
-    return Figure(
+    figure = Figure(
         "covariance-readings",
         "Steady Kalman filter of the three-state model for three readings of the printed scalar Q = q S (normal: q = 2.5e-3, "
         "R = 1e-3; high slip: q = 3.3e-4, R = 0.21): gain from the innovation to the velocity, and slowest time constant "
@@ -198,3 +194,4 @@ def response_figure(points: int = 28) -> Figure:
         "Gains near 1e-3 for the unit matrix, about 0.5 for B B' in the normal mode.",
         panels, (7.2, 3.8), legend="below", columns=3,
     )  # fmt: skip
+    return PartResult(tables=[table], figures=[figure])

@@ -152,7 +152,27 @@ def first_test(scope: Scope) -> PartResult:
     caption = (
         f"Test 1 of P2: seconds until M is exactly zero at {1 / SAMPLE_TIME:g} Hz; Fig. 2 of the paper reads 0.03 s."
     )
-    return PartResult(claims, [Table("test-1", caption, ["reading", "seconds to zero [s]"], rows)], [start_figure()])
+    moving, turning = accelerating(SPEEDS[0], RAMP, 40, 80), slalom(45.0, 4.0, 0.5, 0.4)
+    curves: tuple[Curve, ...] = (
+        ("constant 40 rad/s", both_tests(constant(SPEEDS[0], 80)), colours.BLUE, "solid"),
+        ("constant 100 rad/s", both_tests(constant(SPEEDS[1], 80)), colours.GREEN, "dashed"),
+        (moving.name, both_tests(moving), colours.RED, "dash-dot"),
+        ("slalom, rank tolerance 1e-9", both_tests(turning), colours.ORANGE, "dotted"),
+        ("slalom, rank tolerance 1e-2", both_tests(turning, tolerance=1e-2), colours.PURPLE, "dashed"),
+        ("two states, accelerating", two_states(80), colours.GREY, "solid"),
+    )
+    panels = covariance_panels(curves, Axis("time [s]", 0.0, 0.1), round(0.1 / SAMPLE_TIME) + 1, 1e-9)
+    figure = Figure(
+        "unknown-start",
+        "Both tests for an initial covariance of which nothing is known (200 Hz, Q = 2.5e-3 I, R = 1e-3). Left: M ends at "
+        "exactly zero (the line stops at a cross) after as many samples as states while the wheel accelerates, and decays "
+        "for ever at constant speed. Right: N stays bounded, but peaks beyond all use where nearly silent data is taken as "
+        "seen; a coarser rank tolerance keeps it small. Figs 2 and 3 of P2, on wheel speeds of our own.",
+        "Left: lines that stop after two or three samples, and two straight decays. Right: peaks between 0.1 and 1e8 that "
+        "fall off.",
+        panels, legend="below", columns=3,
+    )  # fmt: skip
+    return PartResult(claims, [Table("test-1", caption, ["reading", "seconds to zero [s]"], rows)], [figure])
 
 
 @TOPIC.part("second-test", "Bounded covariance after an unknown start", 5.0)
@@ -191,27 +211,3 @@ def covariance_panels(
         Panel(left, time, unknown_axis, "test 1: what is still unknown"),
         Panel(right, time, known_axis, "test 2: covariance of what is known"),
     ]
-
-
-def start_figure() -> Figure:
-    """lambda_max(M) and lambda_max(N) over time in five readings."""
-    moving, turning = accelerating(SPEEDS[0], RAMP, 40, 80), slalom(45.0, 4.0, 0.5, 0.4)
-    curves: tuple[Curve, ...] = (
-        ("constant 40 rad/s", both_tests(constant(SPEEDS[0], 80)), colours.BLUE, "solid"),
-        ("constant 100 rad/s", both_tests(constant(SPEEDS[1], 80)), colours.GREEN, "dashed"),
-        (moving.name, both_tests(moving), colours.RED, "dash-dot"),
-        ("slalom, rank tolerance 1e-9", both_tests(turning), colours.ORANGE, "dotted"),
-        ("slalom, rank tolerance 1e-2", both_tests(turning, tolerance=1e-2), colours.PURPLE, "dashed"),
-        ("two states, accelerating", two_states(80), colours.GREY, "solid"),
-    )
-    panels = covariance_panels(curves, Axis("time [s]", 0.0, 0.1), round(0.1 / SAMPLE_TIME) + 1, 1e-9)
-    return Figure(
-        "unknown-start",
-        "Both tests for an initial covariance of which nothing is known (200 Hz, Q = 2.5e-3 I, R = 1e-3). Left: M ends at "
-        "exactly zero (the line stops at a cross) after as many samples as states while the wheel accelerates, and decays "
-        "for ever at constant speed. Right: N stays bounded, but peaks beyond all use where nearly silent data is taken as "
-        "seen; a coarser rank tolerance keeps it small. Figs 2 and 3 of P2, on wheel speeds of our own.",
-        "Left: lines that stop after two or three samples, and two straight decays. Right: peaks between 0.1 and 1e8 that "
-        "fall off.",
-        panels, legend="below", columns=3,
-    )  # fmt: skip
