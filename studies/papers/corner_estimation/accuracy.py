@@ -43,22 +43,20 @@ def weight_readings(names_axle: bool = False) -> Finding:
     mean, low, high = sp.symbols("W_s W_lb W_ub", real=True)
     x = sp.Symbol("x", real=True)
     weight = mean + (high - low) / sp.pi * sp.atan(x)
-    ends = [sp.simplify(sp.limit(weight, x, where)) for where in (-sp.oo, sp.oo)]
+    least, most = (sp.simplify(sp.limit(weight, x, where)) for where in (-sp.oo, sp.oo))
     # W_i and 1 - W_i must both run over [W_lb, W_ub]:
-    needed = sp.solve([ends[0] - low, ends[1] - high, (1 - ends[1]) - low], [mean, low], dict=True)[0]
-    at_threshold = weight.subs(x, 0)
-    shipped = SlipWeights()
+    needed = sp.solve([least - low, most - high, (1 - most) - low], [mean, low], dict=True)[0]
+    at_threshold, shipped = weight.subs(x, 0), SlipWeights()
     example = {mean: sp.Rational(1, 2), low: sp.Rational(str(shipped.lower)), high: sp.Rational(str(shipped.upper))}
     # lambda_am is the same for both axles, so i may be either: the front weight is then W or 1 - W.
     spread = 0.0 if names_axle else float(sp.limit(abs(2 * weight.subs(example) - 1), x, sp.oo))
     computed = {
-        "lowest": str(ends[0]), "highest": str(ends[1]),
+        "lowest": str(least), "highest": str(most), "weight_at_threshold": str(at_threshold), "spread_between_readings": spread,
         "needed_for_both_axles": {str(key): str(value) for key, value in needed.items()},
-        "weight_at_threshold": str(at_threshold), "spread_between_readings": spread,
         "example": {str(key): float(value) for key, value in example.items()},
     }  # fmt: skip
     reading = (
-        f"(34) runs from {ends[0]} to {ends[1]} and is {at_threshold} at the threshold: both axles stay within [W_lb, "
+        f"(34) runs from {least} to {most} and is {at_threshold} at the threshold: both axles stay within [W_lb, "
         f"W_ub] and are equal there only if W_s = {needed[mean]} and W_lb = {needed[low]}. lambda_am is the same for "
         f"both axles, so the formula does not say which of them gets W and which 1 - W: with W_lb = {shipped.lower:g}, "
         f"W_ub = {shipped.upper:g} the two readings differ by up to {spread:.2g}. No values are printed."
@@ -98,17 +96,14 @@ def table_figure() -> Figure:
 
 def axle_weight_figure() -> Figure:
     """The axle weight (34) in both readings, and with the difference of the slips as argument."""
-    shipped, threshold = SlipWeights(), 0.1
-    slip = np.linspace(0.0, 0.3, 301)
+    shipped, threshold, slip = SlipWeights(), 0.1, np.linspace(0.0, 0.3, 301)
     weight = 0.5 + (shipped.upper - shipped.lower) / np.pi * np.arctan(shipped.sharpness * (slip - threshold))
-    corners = np.zeros((len(slip), 4))
-    corners[:, 2] = slip  # all of it at the rear
+    ours = shipped.front(np.outer(slip, [0.0, 0.0, 1.0, 0.0]))  # all of it at the rear
     marks: list[Mark] = [
-        Line(slip, weight, "W, if i is the front axle"),
+        Line(slip, weight, "W, if i is the front axle"), Level(x=threshold, color=colours.GREY, dash="dotted"),
         Line(slip, 1.0 - weight, "1 − W, if i is the rear axle", colours.RED, "dashed"),
-        Line(slip, shipped.front(corners), "argument Σr − Σf instead (ours)", colours.ORANGE, "dash-dot"),
-        Level(x=threshold, color=colours.GREY, dash="dotted"),
-    ]
+        Line(slip, ours, "argument Σr − Σf instead (ours)", colours.ORANGE, "dash-dot"),
+    ]  # fmt: skip
     x = "slip of the rear axle Σr, front without slip [1]"
     return Figure(
         "axle-weights",

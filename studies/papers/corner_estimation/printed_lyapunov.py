@@ -59,15 +59,8 @@ class Certificate:
         total = half + np.swapaxes(half, 1, 2)
         return M, np.stack([total + sign * rate * slope for rate in RATES])
 
-    def eigenvalues(self, omega: FloatArray) -> FloatArray:
-        """Eigenvalues of the inequality at both rate bounds, (g, 4)."""
-        return np.concatenate(list(np.linalg.eigvalsh(self.at(omega)[1])), axis=1)
-
     def growth(self, omega: FloatArray) -> FloatArray:
-        """Largest growth rate of V in 1/s at each wheel speed, (g,): eigenvalue of the inequality relative to M.
-
-        NaN where M is not positive definite; then V measures nothing.
-        """
+        """Largest growth rate of V in 1/s, (g,): eigenvalue of the inequality relative to M; NaN where M is not > 0."""
         M, total = self.at(omega)
         definite = np.linalg.eigvalsh(M)[:, 0] > 0.0
         root = np.linalg.cholesky(np.where(definite[:, None, None], M, np.eye(2)))
@@ -101,16 +94,16 @@ def primal(direction: Direction, matrix: Coefficients | None = None) -> Finding:
     """The matrix as printed, P of V = e'Pe: does (28) or (40) hold on 0..180 rad/s?"""
     offered = certificate(CORNERS[direction], "primal", matrix)
     inside, wide = offered.validity(), offered.validity(BEYOND)
-    ends = offered.eigenvalues(np.array([0.0, STATED_SPEED])).max(axis=1)
+    first, last = np.linalg.eigvalsh(offered.at(np.array([0.0, STATED_SPEED]))[1]).max(axis=(0, 2)).tolist()
     computed = {
         "holds_everywhere": inside.everywhere, "holds_on_rad_s": _listed(inside),
         f"holds_on_up_to_{BEYOND:g}_rad_s": _listed(wide),
-        "largest_eigenvalue_at_0_rad_s": float(ends[0]), "largest_eigenvalue_at_180_rad_s": float(ends[1]),
+        "largest_eigenvalue_at_0_rad_s": first, "largest_eigenvalue_at_180_rad_s": last,
     }  # fmt: skip
     reading = (
         f"As P of V = e'Pe the printed {NUMBERS[direction]} satisfies its inequality on {_words(wide)} "
-        f"rad/s (searched up to {BEYOND:g} rad/s). The largest eigenvalue, to be negative, is {ends[0]:.4g} at "
-        f"standstill and {ends[1]:.4g} at {STATED_SPEED:g} rad/s."
+        f"rad/s (searched up to {BEYOND:g} rad/s). The largest eigenvalue, to be negative, is {first:.4g} at "
+        f"standstill and {last:.4g} at {STATED_SPEED:g} rad/s."
     )
     why = " The large entry weighs the velocity, where a P of these dynamics must weigh the bristle deflection."
     return Finding(computed, reproduced(inside.everywhere), reading + ("" if inside.everywhere else why))
@@ -198,8 +191,7 @@ def printed_lyapunov(scope: Scope) -> PartResult:
 def growth_figure() -> Figure:
     """Growth rate of V over wheel speed in four readings of (29), (41)."""
     omega = np.linspace(0.0, STATED_SPEED, 721)
-    ticks = {-1e3: "−10³", -1e2: "−10²", -10.0: "−10", 0.0: "0", 10.0: "10", 1e2: "10²", 1e3: "10³",
-             1e5: "10⁵", 1e7: "10⁷"}  # fmt: skip
+    ticks = {-1e3: "−10³", -1e2: "−10²", -10.0: "−10", 0.0: "0", 10.0: "10", 1e2: "10²", 1e3: "10³", 1e5: "10⁵", 1e7: "10⁷"}  # fmt: skip
     y = Axis("largest growth rate of V [1/s]", -2e3, 5e7, "symlog", ticks, linear=10.0)
     panels = []
     for direction, corner in CORNERS.items():

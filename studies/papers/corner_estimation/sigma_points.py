@@ -17,7 +17,7 @@ from studies.papers.corner_estimation.inputs import PACKAGE, topic
 from studies.papers.published import printed_numbers
 from studies.papers.verdicts import erratum
 from studies.plots import Axis, Bars, Figure, Level, Mark, Panel, Words, colours
-from studies.study import Cell, PartResult, Scope, Table
+from studies.study import PartResult, Scope, Table
 
 TOPIC = topic()
 BETA = 2  # of P1 and P2
@@ -50,11 +50,10 @@ class Weights:
 
 def weights(size: int, form: Form) -> Weights:
     """For N states with epsilon^2 = 3/N: W_i = (N + eta)/2 as printed, 1/(2 (N + eta)) corrected."""
-    epsilon_squared = Fraction(3, size)
-    spread = epsilon_squared * size
-    eta = spread - size
+    epsilon_squared, spread = Fraction(3, size), Fraction(3)  # N + eta = epsilon^2 N
+    centre = (spread - size) / spread
     outer = spread / 2 if form == "printed" else 1 / (2 * spread)
-    return Weights(size, eta / spread, eta / spread + 1 - epsilon_squared + BETA, outer, spread)
+    return Weights(size, centre, centre + 1 - epsilon_squared + BETA, outer, spread)
 
 
 @TOPIC.claim("P1-ukf")
@@ -95,26 +94,24 @@ def filter_lag(process: float, measurement: float, newtons: float) -> float:
 @TOPIC.part("sigma-weights", "Sigma points and covariances of the lateral force filter", 1.0)
 def sigma_weights(scope: Scope) -> PartResult:
     """Weights of both papers in both forms, and the lag of the filter in every reading of its covariances."""
-    rows: list[list[Cell]] = []
-    for n, form in product(SIZES, FORMS):
-        w = weights(n, form)
-        entries = w.centre_mean, w.centre_spread, w.outer, w.total, w.second_moment
-        rows.append([f"N = {n}", form, *map(str, entries)])
-    caption = (
-        "Sigma point weights with epsilon = sqrt(3/N), beta = 2 in rational numbers; sum and second moment must be one."
+    found = {(f"N = {n}", form): weights(n, form) for n, form in product(SIZES, FORMS)}
+    entries = ("centre_mean", "centre_spread", "outer", "total", "second_moment")
+    weight_table = Table(
+        "sigma-weights",
+        "Sigma point weights with epsilon = sqrt(3/N), beta = 2 in rational numbers; sum and second moment must be one.",
+        ["states", "form", "W0 of the mean", "W0 of the covariance", "W_i", "sum of the mean weights", "second moment"],
+        [[*names, *(str(getattr(w, entry)) for entry in entries)] for names, w in found.items()],
     )
-    columns = ["states", "form", "W0 of the mean", "W0 of the covariance", "W_i", "sum of the mean weights",
-               "second moment"]  # fmt: skip
-    weight_table = Table("sigma-weights", caption, columns, rows)
     units = (("N", 1.0), ("kN", 1e3))
     readings = (entry.values() for entry in printed_numbers(PACKAGE)["force_filter"]["readings"])
-    rows = [[name, unit, Q, R, filter_lag(Q, R, size)] for (name, Q, R), (unit, size) in product(readings, units)]
-    caption = (
-        "Slowest time constant of the lateral force filter straight ahead at 200 Hz, for every reading of the "
-        "printed covariances Q I and R I: with forces in newtons it cannot follow a lane change, with kilonewtons "
-        "it can. The unit is not printed."
+    lag_table = Table(
+        "filter-lag",
+        "Slowest time constant of the lateral force filter straight ahead at 200 Hz, for every reading of the printed "
+        "covariances Q I and R I: with forces in newtons it cannot follow a lane change, with kilonewtons it can. The unit "
+        "is not printed.",
+        ["covariances", "unit of force", "Q", "R", "time constant [s]"],
+        [[name, unit, Q, R, filter_lag(Q, R, size)] for (name, Q, R), (unit, size) in product(readings, units)],
     )
-    columns = ["covariances", "unit of force", "Q", "R", "time constant [s]"]
     marks: list[Mark] = [Level(1.0)]
     names = ("W = (N + η)/2, as printed", "W = 1/(2 (N + η))")
     for form, name, colour, shift in zip(FORMS, names, (colours.RED, colours.BLUE), (-0.19, 0.19), strict=True):
@@ -130,4 +127,4 @@ def sigma_weights(scope: Scope) -> PartResult:
         "Bars: the printed weights add up to 9 for three states and 11/3 for one, the corrected ones to 1.",
         Panel(marks, x, "sum of the mean weights [1]", legend="upper right"), size=(4.8, 3.0),
     )  # fmt: skip
-    return PartResult(TOPIC.found(), [weight_table, Table("filter-lag", caption, columns, rows)], [figure])
+    return PartResult(TOPIC.found(), [weight_table, lag_table], [figure])

@@ -26,7 +26,6 @@ from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import solve
 
 TOPIC = topic()
-ROUNDING = 1e-12  # relative: all that two assemblies of the same numbers may differ by
 
 
 def conic_problem(points: int, degree: int) -> tuple[LmiProblem, LmiSettings]:
@@ -65,14 +64,13 @@ def expressions(problem: Any) -> int:
     return count
 
 
+Layer = Callable[[RelaxedProblem], Any]
+
+
 @TOPIC.claim("P1-hinf-time")
-def solve_size(
-    points: int = POINTS,
-    degree: int = 1,
-    layer: Callable[[RelaxedProblem], Any] = one_by_one,
-    walked: Callable[[Any], int] = expressions,
-) -> Finding:
+def solve_size(points: int = POINTS, layer: Layer = one_by_one, walked: Callable[[Any], int] = expressions) -> Finding:
     """Count (30) in both assemblies and in its exact form, on `points` wheel speeds and on twice as many."""
+    degree = 1
     grid, finer = (relaxed_problem(number, degree, "grid") for number in (points, 2 * points))
     exact, again = (assemble(relaxed_problem(number, degree, "exact")) for number in (points, 2 * points))
     direct, modelled = assemble(grid), layer(grid)
@@ -107,13 +105,13 @@ def _size(data: ConicData) -> dict[str, JsonValue]:
 
 
 def _hands_over(problem: Any, direct: ConicData) -> bool:
-    """Whether the layer ends with the rows, cones and numbers of direct assembly."""
+    """Whether the layer ends with the rows, cones and numbers of direct assembly, these to 1e-12 relative (rounding)."""
     data = problem.get_problem_data("CLARABEL")[0]
     cones, A = data["dims"], data["A"]
     if (cones.zero, tuple(cones.psd), A.shape) != (direct.equalities, direct.semidefinite, direct.A.shape):
         return False
     pairs = ((A.toarray(), direct.A.toarray()), (data["b"], direct.b), (data["c"], direct.q))
-    return all(float(np.abs(a - b).max()) <= ROUNDING * float(np.abs(b).max()) for a, b in pairs)
+    return all(float(np.abs(a - b).max()) <= 1e-12 * float(np.abs(b).max()) for a, b in pairs)
 
 
 @TOPIC.part("solve-time", "Preparing and solving the H-infinity problem", 8.0)

@@ -16,8 +16,8 @@ TOPIC = topic()
 ETA1, ETA2, ETA3 = 1.8, 11.4, 50.6  # N s, N m, 1/s: P1 notes 1
 DISTURBANCE_RATE = 100.0  # N/s, what the paper takes as the order of magnitude of dOmega_f/dt
 STEP = 0.005  # s
-SECONDS = 60.0  # well beyond the transient of the wheel speed, which takes 1/0.177 s for a factor e
-LATE = 50.0  # s, from where on the asymptotic bound is looked at
+# s: well beyond the transient of the wheel speed (1/0.177 s for a factor e), and from where on the asymptotic bound is looked at
+SECONDS, LATE = 60.0, 50.0
 RUNS = ("ramp", "slope changing sign each second", "cosine, 2.8 rad/s")  # the disturbances
 
 
@@ -49,9 +49,7 @@ def force_errors(eta3: float = ETA3, rate: float = DISTURBANCE_RATE) -> tuple[Fl
     (3) with its e_omega term, started 1 rad/s and 30 N off; states e_omega, e_omega', e_F with
     e_F' = -eta3 e_F + eta1 e_omega' + Omega_f', |Omega_f'| at most `rate` in N/s; exact over each sample.
     """
-    A = np.zeros((3, 3))
-    A[:2, :2] = wheel_error_matrix(ETA1, ETA2, *wheel())
-    A[2] = [0.0, ETA1, -eta3]
+    A = np.vstack([np.hstack([wheel_error_matrix(ETA1, ETA2, *wheel()), np.zeros((2, 1))]), [0.0, ETA1, -eta3]])
     move, push = zero_order_hold(A, np.array([[0.0], [0.0], [1.0]]), STEP)
     time = np.asarray(STEP * np.arange(round(SECONDS / STEP) + 1), float)
     slopes = rate * np.stack([np.ones_like(time), np.sign(np.sin(np.pi * time + 1e-9)), np.cos(2.8 * time)], axis=1)
@@ -70,17 +68,15 @@ def force_bound(eta3: float = ETA3, rate: float = DISTURBANCE_RATE) -> Finding:
     time, _, force = force_errors(eta3, rate)
     late = dict(zip(RUNS, np.abs(force[time >= LATE]).max(axis=0).tolist(), strict=True))
     computed = {"bound_N": bound, "largest_late_error_N": late, "seen_from_s": LATE}
-    ramp = late[RUNS[0]]
+    ramp, largest, printed = late[RUNS[0]], max(late.values()), float(TOPIC.printed("P1-prop1"))
     # What is left of the wheel speed's transient at LATE adds a share below 1e-3.
-    respected = max(late.values()) <= bound * (1.0 + 1e-3)
-    attained = abs(ramp / bound - 1.0) <= 1e-3
-    printed = float(TOPIC.printed("P1-prop1"))
+    met = agrees(bound, printed, 0.5) and largest <= bound * (1.0 + 1e-3) and abs(ramp / bound - 1.0) <= 1e-3
     reading = (
         f"The bound is {bound:.8f} N, printed as about {printed:g} N. From {LATE:g} s on, when the wheel speed error "
         f"has died out, the full error equation leaves {ramp:.5f} N under a ramp, which attains it, and at most "
-        f"{max(late.values()):.5f} N otherwise. The bound is asymptotic: before that e_omega drives the force error."
+        f"{largest:.5f} N otherwise. The bound is asymptotic: before that e_omega drives the force error."
     )
-    return Finding(computed, reproduced(agrees(bound, printed, 0.5) and respected and attained), reading)
+    return Finding(computed, reproduced(met), reading)
 
 
 @TOPIC.part("wheel-force", "Longitudinal force observer", 2.0)
