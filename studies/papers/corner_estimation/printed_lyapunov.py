@@ -191,7 +191,8 @@ def printed_lyapunov(scope: Scope) -> PartResult:
 def growth_figure() -> Figure:
     """Growth rate of V over wheel speed in four readings of (29), (41)."""
     omega = np.linspace(0.0, STATED_SPEED, 721)
-    ticks = {-1e3: "−10³", -1e2: "−10²", -10.0: "−10", 0.0: "0", 10.0: "10", 1e2: "10²", 1e3: "10³", 1e5: "10⁵", 1e7: "10⁷"}  # fmt: skip
+    ticks = {-1e3: "−10³", -1e2: "−10²", -10.0: "−10", 0.0: "0", 10.0: "10", 1e2: "10²", 1e3: "10³",
+             1e5: "10⁵", 1e7: "10⁷"}  # fmt: skip
     y = Axis("largest growth rate of V [1/s]", -2e3, 5e7, "symlog", ticks, linear=10.0)
     panels = []
     for direction, corner in CORNERS.items():

@@ -13,21 +13,12 @@ from analysis.observability.gramians import growing_observability
 from analysis.observability.matrix import ObservabilityMatrix, observability_matrix
 from analysis.observability.rank_loss import rank_loss
 from studies.claim import Finding, reproduced
-from studies.papers.longitudinal_speed.inputs import (
-    TYPICAL,
-    WheelRecord,
-    braking,
-    constant,
-    launch,
-    slalom,
-    speed_model,
-    topic,
-)
+from studies.papers.longitudinal_speed import inputs
 from studies.plots import DASHES, Axis, Figure, Level, Line, Map, Mark, Panel, Words, colours
 from studies.study import Cell, PartResult, Scope, Table
 from synthesis.models.catalogue.longitudinal_speed import WHEEL_MOTION
 
-TOPIC = topic()
+TOPIC = inputs.topic()
 SPEEDS = (1, 40, 140)  # rad/s
 ACCELERATION, JERK = "wheel_acceleration", "wheel_acceleration_rate"
 RANK_TOLERANCE = 1e-12  # singular values of the gramian's factor, over the largest, states in their typical sizes
@@ -37,7 +28,7 @@ Ranks = npt.NDArray[np.int_]
 @cache
 def speed_observability() -> ObservabilityMatrix:
     """O_3 of (24) with omega' as the parameter of the model and omega'' as its rate."""
-    return observability_matrix(speed_model(), motion=WHEEL_MOTION)
+    return observability_matrix(inputs.speed_model(), motion=WHEEL_MOTION)
 
 
 def exact_ranks(acceleration: object = 0, jerk: object = 0) -> list[int]:
@@ -76,14 +67,19 @@ def rank_over_the_region(accelerations: tuple[object, ...] = (0, 1, "-5")) -> Fi
 
 
 @cache
-def histories() -> tuple[WheelRecord, ...]:
+def histories() -> tuple[inputs.WheelRecord, ...]:
     """Wheel speed histories of the kinds that Fig. 1 covers, 6 s each; constant speed is ours."""
-    return launch(2.0, 6.0), slalom(45.0, 4.0, 0.5, 6.0), braking(80.0, 25.0, 6.0), constant(40.0, 1200)
+    return (
+        inputs.launch(2.0, 6.0),
+        inputs.slalom(45.0, 4.0, 0.5, 6.0),
+        inputs.braking(80.0, 25.0, 6.0),
+        inputs.constant(40.0, 1200),
+    )
 
 
-def gramian_rank(record: WheelRecord) -> Ranks:
+def gramian_rank(record: inputs.WheelRecord) -> Ranks:
     """rank V(0, N) of (A1) for every N, (K,)."""
-    return growing_observability(record.sequence.A, record.sequence.C, TYPICAL).rank(RANK_TOLERANCE)
+    return growing_observability(record.sequence.A, record.sequence.C, inputs.TYPICAL).rank(RANK_TOLERANCE)
 
 
 @TOPIC.part("observability", "Observability of the three-state model (Fig. 1)", 4.0)
@@ -111,7 +107,7 @@ def rank_table(ranks: Sequence[Ranks]) -> Table:
     return Table("ranks", caption, ["what", "motion", "where", "rank, first", "rank, last"], rows)
 
 
-def rank_panels(records: Sequence[WheelRecord], ranks: Sequence[Ranks], speed: Axis) -> list[list[Panel]]:
+def rank_panels(records: Sequence[inputs.WheelRecord], ranks: Sequence[Ranks], speed: Axis) -> list[list[Panel]]:
     """Wheel speeds, and below them the ranks of the gramian, a little apart so that no line hides another."""
     upper, lower = [], []
     for k, (record, rank) in enumerate(zip(records, ranks, strict=True)):

@@ -14,17 +14,8 @@ from estimators.vehicle import VehicleParameters
 from estimators.velocity import BristleTire, FusionSettings, VelocityFusion
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel, colours
 from studies.study import Cell, PartResult, Scope, Table
+from studies.trials import estimation
 from studies.trials.accuracy import Spread, known_spread, nrms
-from studies.trials.estimation import (
-    INTEGRATED,
-    WHEELS,
-    Reading,
-    assumed_car,
-    baselines,
-    measured_runs,
-    run_of,
-    run_pipeline,
-)
 from studies.trials.histories import BANDS, backgrounds, error_dots, estimate_lines, history, row_axis, truth_line
 from studies.trials.motion import MotionTest
 from studies.trials.simulations import LUGRE
@@ -38,7 +29,7 @@ CLAIMED = 6.6
 """%, what the paper claims of the longitudinal speed (section VI, no table)."""
 CORNER = 0
 """The wheel whose own velocity is drawn: front left."""
-READINGS: dict[str, Reading] = {
+READINGS: dict[str, estimation.Reading] = {
     FUSION: lambda step: step.vx,
     THREE: lambda step: step.corners.steps[THREE].vx,
     TWO: lambda step: step.corners.steps[TWO].vx,
@@ -51,8 +42,8 @@ LOOKS = {
     TWO: ("D", colours.SECOND_FILTER),
     LPV: ("P", colours.SCHEDULE),
     FUSION: ("o", colours.FUSION),
-    WHEELS: ("^", colours.MEAN_WHEEL_SPEED),
-    INTEGRATED: ("v", colours.INTEGRATED_ACCELERATION),
+    estimation.WHEELS: ("^", colours.MEAN_WHEEL_SPEED),
+    estimation.INTEGRATED: ("v", colours.INTEGRATED_ACCELERATION),
 }
 
 
@@ -98,14 +89,14 @@ def parts(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) ->
 
 def speed_part(name: str, rows: Sequence[MotionTest], scope: Scope, tire: str = LUGRE) -> PartResult:
     """Errors of V_x of all of them in every manoeuvre."""
-    drawn = measured_runs([row.manoeuvre for row in rows], tire, scope)
+    drawn = estimation.measured_runs([row.manoeuvre for row in rows], tire, scope)
     truth = drawn.truth
-    estimates = run_pipeline(drawn, READINGS, parts) | baselines(drawn)
+    estimates = estimation.run_pipeline(drawn, READINGS, parts) | estimation.baselines(drawn)
     table: list[list[Cell]] = []
     measures: dict[str, float] = {}
     found: list[dict[str, Spread]] = []
     for row in rows:
-        run, samples = run_of(truth, row.manoeuvre)
+        run, samples = estimation.run_of(truth, row.manoeuvre)
         true = truth["vx"][run, samples]
         errors = {who: known_spread(nrms(estimates[who][:, run, samples], true)) for who in LOOKS}
         found.append(errors)
@@ -151,11 +142,11 @@ def dot_figure(name: str, rows: Sequence[MotionTest], found: Sequence[Mapping[st
 def speed_history(name: str, drawn: Measured, row: MotionTest, estimates: Mapping[str, FloatArray]) -> Figure:
     """Speed, its error, and the front left wheel: surface speed, velocity of its centre, and where the detector speaks."""
     truth = drawn.truth
-    run, samples = run_of(truth, row.manoeuvre)
+    run, samples = estimation.run_of(truth, row.manoeuvre)
     time, true = truth.time[samples], truth["vx"][run, samples]
-    grey = LOOKS[WHEELS][1]
+    grey = LOOKS[estimation.WHEELS][1]
     speeds: list[Mark] = [
-        Line(time, estimates[WHEELS][0, run, samples], WHEELS, grey, width=0.7),
+        Line(time, estimates[estimation.WHEELS][0, run, samples], estimation.WHEELS, grey, width=0.7),
         truth_line(time, true),
     ]
     errors: list[Mark] = []
@@ -163,7 +154,7 @@ def speed_history(name: str, drawn: Measured, row: MotionTest, estimates: Mappin
         value = estimates[who][:, run, samples]
         speeds += estimate_lines(time, value, who, LOOKS[who][1])
         errors += estimate_lines(time, value - true, who, LOOKS[who][1])
-    surface = assumed_car(drawn).radius[CORNER] * drawn.signals["wheel_speed"][0, run, samples, CORNER]
+    surface = estimation.assumed_car(drawn).radius[CORNER] * drawn.signals["wheel_speed"][0, run, samples, CORNER]
     high = (estimates["high"][0, run, samples] > 0.5).astype(int)
     wheel = [
         *backgrounds(time, high, [None, ("high slip detected", colours.HIGH_SLIP)]),

@@ -11,68 +11,57 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from analysis.observability.stochastic import (
-    RANK_TOLERANCE,
-    StochasticObservability,
-    stochastic_observability,
-    stochastic_observability_along,
-)
+from analysis.observability import stochastic
 from studies.claim import Finding, reproduced
-from studies.papers.longitudinal_speed.inputs import (
-    SAMPLE_TIME,
-    WheelRecord,
-    accelerating,
-    constant,
-    noise,
-    parameters,
-    slalom,
-    structures,
-    topic,
-)
+from studies.papers.longitudinal_speed import inputs
 from studies.papers.verdicts import under_specified
 from studies.plots import Axis, Dash, Figure, Level, Line, Mark, Panel, colours, dots
 from studies.study import PartResult, Scope, Table
 from synthesis.models.catalogue.corner import corner_velocity_model
 
-TOPIC = topic()
+TOPIC = inputs.topic()
 SPEEDS = (40.0, 100.0)  # rad/s, 13 and 33 m/s
 STRUCTURES = {"I": 1600, "B B'": 600, "B_k B_k'": 600}  # samples until N has settled to 1e-3; the first is slow
 RAMP = 100.0  # rad/s^2, a wheel that spins up on slippery ground
-Curve = tuple[str, StochasticObservability, str, Dash]  # label, tests, colour, dash
+Curve = tuple[str, stochastic.StochasticObservability, str, Dash]  # label, tests, colour, dash
 
 
-def both_tests(record: WheelRecord, structure: str = "I", tolerance: float = RANK_TOLERANCE) -> StochasticObservability:
+def both_tests(
+    record: inputs.WheelRecord, structure: str = "I", tolerance: float = stochastic.RANK_TOLERANCE
+) -> stochastic.StochasticObservability:
     """M and N of (26) along a record with Q = 2.5e-3 S and R = 1e-3."""
     sequence = record.sequence
-    q, R = noise()
-    return stochastic_observability(sequence.A, sequence.C, q * structures(sequence)[structure], R, tolerance)
+    q, R = inputs.noise()
+    return stochastic.stochastic_observability(
+        sequence.A, sequence.C, q * inputs.structures(sequence)[structure], R, tolerance
+    )
 
 
-def two_states(samples: int = 13) -> StochasticObservability:
+def two_states(samples: int = 13) -> stochastic.StochasticObservability:
     """The same without the redundant third state: z and V_r alone, accelerating."""
-    q, R = noise()
-    record = accelerating(SPEEDS[0], RAMP, samples, samples)
-    model = corner_velocity_model(parameters(), "longitudinal")
-    return stochastic_observability_along(model, record.speed, SAMPLE_TIME, q * np.eye(2), R)
+    q, R = inputs.noise()
+    record = inputs.accelerating(SPEEDS[0], RAMP, samples, samples)
+    model = corner_velocity_model(inputs.parameters(), "longitudinal")
+    return stochastic.stochastic_observability_along(model, record.speed, inputs.SAMPLE_TIME, q * np.eye(2), R)
 
 
-def time_to_zero(found: StochasticObservability) -> float:
+def time_to_zero(found: stochastic.StochasticObservability) -> float:
     """Seconds after which M is exactly zero; inf if not on this record."""
-    return np.inf if found.samples_needed is None else found.samples_needed * SAMPLE_TIME
+    return np.inf if found.samples_needed is None else found.samples_needed * inputs.SAMPLE_TIME
 
 
 @TOPIC.claim("P2-test1")
 def time_of_test_1(readings: Mapping[str, float] | None = None) -> Finding:
     """When M is zero: while accelerating, at constant speed, without the third state; and how far it has decayed at 0.03 s."""
     printed = float(TOPIC.printed("P2-test1"))
-    samples = round(printed / SAMPLE_TIME)
-    steady = {speed: both_tests(constant(speed, 40)).largest_unknown for speed in SPEEDS}
+    samples = round(printed / inputs.SAMPLE_TIME)
+    steady = {speed: both_tests(inputs.constant(speed, 40)).largest_unknown for speed in SPEEDS}
     found = readings or {
-        "three states, accelerating": time_to_zero(both_tests(accelerating(SPEEDS[0], RAMP, 13, 13))),
-        "three states, constant speed": time_to_zero(both_tests(constant(SPEEDS[0], 400))),
+        "three states, accelerating": time_to_zero(both_tests(inputs.accelerating(SPEEDS[0], RAMP, 13, 13))),
+        "three states, constant speed": time_to_zero(both_tests(inputs.constant(SPEEDS[0], 400))),
         "two states": time_to_zero(two_states()),
     }
-    a = parameters().tire["longitudinal"].kappa.value * parameters().vehicle["effective_radius"].value
+    a = inputs.parameters().tire["longitudinal"].kappa.value * inputs.parameters().vehicle["effective_radius"].value
 
     def by_speed(values: Mapping[float, float]) -> dict[str, float]:
         return {f"{speed:g} rad/s": float(value) for speed, value in values.items()}
@@ -80,7 +69,7 @@ def time_of_test_1(readings: Mapping[str, float] | None = None) -> Finding:
     computed = {
         "seconds_to_zero": {name: value if np.isfinite(value) else "never" for name, value in found.items()},
         f"left_after_{samples}_samples": by_speed({w: M[samples] for w, M in steady.items()}),
-        "decay_rate_1_s": by_speed({w: np.log(M[5] / M[6]) / SAMPLE_TIME for w, M in steady.items()}),
+        "decay_rate_1_s": by_speed({w: np.log(M[5] / M[6]) / inputs.SAMPLE_TIME for w, M in steady.items()}),
         "twice_kappa_R_omega_1_s": by_speed({w: 2.0 * a * w for w in SPEEDS}),
     }
     shown = ", ".join(
@@ -94,20 +83,22 @@ def time_of_test_1(readings: Mapping[str, float] | None = None) -> Finding:
     )
     values = list(found.values())
     spread = max(values) - min(values) if np.isfinite(values).all() else np.inf
-    agree = all(abs(value - printed) <= SAMPLE_TIME for value in values)
-    return Finding(computed, under_specified(spread, SAMPLE_TIME / 2, agree), reading)
+    agree = all(abs(value - printed) <= inputs.SAMPLE_TIME for value in values)
+    return Finding(computed, under_specified(spread, inputs.SAMPLE_TIME / 2, agree), reading)
 
 
-def settling(record: WheelRecord, structure: str = "I") -> dict[str, Any]:
+def settling(record: inputs.WheelRecord, structure: str = "I") -> dict[str, Any]:
     """Test 2 on a record that ends at a constant speed: the peak of lambda_max(N), when, and where it ends.
 
     `riccati` is where it must end, the stabilising Riccati solution of the last speed, inf where there is none; `bounded`:
     it ended there, to 1e-3.
     """
     known, sequence = both_tests(record, structure).largest_known, record.sequence
-    q, R = noise()
+    q, R = inputs.noise()
     try:
-        steady = solve_discrete_are(sequence.A[-1].T, sequence.C[-1].T, q * structures(sequence)[structure][-1], R)
+        steady = solve_discrete_are(
+            sequence.A[-1].T, sequence.C[-1].T, q * inputs.structures(sequence)[structure][-1], R
+        )
         limit = float(np.linalg.eigvalsh(steady)[-1])
     except np.linalg.LinAlgError:  # an undetectable mode on the unit circle: no stabilising solution exists
         limit = np.inf
@@ -119,9 +110,9 @@ def settling(record: WheelRecord, structure: str = "I") -> dict[str, Any]:
 
 
 @TOPIC.claim("P2-test2")
-def bound_of_test_2(records: Mapping[str, WheelRecord] | None = None) -> Finding:
+def bound_of_test_2(records: Mapping[str, inputs.WheelRecord] | None = None) -> Finding:
     """Peak and end of lambda_max(N), for each reading of Q and each record, against the Riccati solution."""
-    q, _ = noise()
+    q, _ = inputs.noise()
     computed = {
         f"{name}, Q = {q:g} {structure}": settling(record, structure)
         for structure, samples in STRUCTURES.items()
@@ -139,9 +130,12 @@ def bound_of_test_2(records: Mapping[str, WheelRecord] | None = None) -> Finding
     return Finding(computed, reproduced(bounded == len(cases)), reading)
 
 
-def standard_records(samples: int) -> dict[str, WheelRecord]:
+def standard_records(samples: int) -> dict[str, inputs.WheelRecord]:
     """Constant speed, and spinning up before it."""
-    return {"constant": constant(SPEEDS[0], samples), "accelerating": accelerating(SPEEDS[0], RAMP, 60, samples)}
+    return {
+        "constant": inputs.constant(SPEEDS[0], samples),
+        "accelerating": inputs.accelerating(SPEEDS[0], RAMP, 60, samples),
+    }
 
 
 @TOPIC.part("first-test", "Forgetting an unknown start (Figs 2 and 3)", 2.0)
@@ -149,19 +143,17 @@ def first_test(scope: Scope) -> PartResult:
     """Figs 2 and 3, and when M is zero."""
     claims = TOPIC.found("P2-test1")
     rows = list(claims[0].finding.computed["seconds_to_zero"].items())
-    caption = (
-        f"Test 1 of P2: seconds until M is exactly zero at {1 / SAMPLE_TIME:g} Hz; Fig. 2 of the paper reads 0.03 s."
-    )
-    moving, turning = accelerating(SPEEDS[0], RAMP, 40, 80), slalom(45.0, 4.0, 0.5, 0.4)
+    caption = f"Test 1 of P2: seconds until M is exactly zero at {1 / inputs.SAMPLE_TIME:g} Hz; Fig. 2 of the paper reads 0.03 s."
+    moving, turning = inputs.accelerating(SPEEDS[0], RAMP, 40, 80), inputs.slalom(45.0, 4.0, 0.5, 0.4)
     curves: tuple[Curve, ...] = (
-        ("constant 40 rad/s", both_tests(constant(SPEEDS[0], 80)), colours.BLUE, "solid"),
-        ("constant 100 rad/s", both_tests(constant(SPEEDS[1], 80)), colours.GREEN, "dashed"),
+        ("constant 40 rad/s", both_tests(inputs.constant(SPEEDS[0], 80)), colours.BLUE, "solid"),
+        ("constant 100 rad/s", both_tests(inputs.constant(SPEEDS[1], 80)), colours.GREEN, "dashed"),
         (moving.name, both_tests(moving), colours.RED, "dash-dot"),
         ("slalom, rank tolerance 1e-9", both_tests(turning), colours.ORANGE, "dotted"),
         ("slalom, rank tolerance 1e-2", both_tests(turning, tolerance=1e-2), colours.PURPLE, "dashed"),
         ("two states, accelerating", two_states(80), colours.GREY, "solid"),
     )
-    panels = covariance_panels(curves, Axis("time [s]", 0.0, 0.1), round(0.1 / SAMPLE_TIME) + 1, 1e-9)
+    panels = covariance_panels(curves, Axis("time [s]", 0.0, 0.1), round(0.1 / inputs.SAMPLE_TIME) + 1, 1e-9)
     figure = Figure(
         "unknown-start",
         "Both tests for an initial covariance of which nothing is known (200 Hz, Q = 2.5e-3 I, R = 1e-3). Left: M ends at "
@@ -197,7 +189,7 @@ def covariance_panels(
     left: list[Mark] = []
     right: list[Mark] = []
     for name, found, color, dash in curves:
-        seconds = SAMPLE_TIME * np.arange(len(found.M))[:end]
+        seconds = inputs.SAMPLE_TIME * np.arange(len(found.M))[:end]
         unknown, known, zero = found.largest_unknown[:end], found.largest_known[:end], found.samples_needed
         left.append(Line(seconds[:zero], unknown[:zero], name, color, dash, marker="."))
         right.append(Line(seconds[1:], known[1:], "", color, dash, marker="."))
