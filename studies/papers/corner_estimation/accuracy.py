@@ -100,10 +100,11 @@ def axle_weight_figure() -> Figure:
     weight = 0.5 + (shipped.upper - shipped.lower) / np.pi * np.arctan(shipped.sharpness * (slip - threshold))
     ours = shipped.front(np.outer(slip, [0.0, 0.0, 1.0, 0.0]))  # all of it at the rear
     marks: list[Mark] = [
-        Line(slip, weight, "W, if i is the front axle"), Level(x=threshold, color=colours.GREY, dash="dotted"),
+        Line(slip, weight, "W, if i is the front axle"),
         Line(slip, 1.0 - weight, "1 − W, if i is the rear axle", colours.RED, "dashed"),
         Line(slip, ours, "argument Σr − Σf instead (ours)", colours.ORANGE, "dash-dot"),
-    ]  # fmt: skip
+        Level(x=threshold, color=colours.GREY, dash="dotted"),
+    ]
     x = "slip of the rear axle Σr, front without slip [1]"
     return Figure(
         "axle-weights",

@@ -63,8 +63,8 @@ def unknown_input(scope: Scope) -> PartResult:
     (time, size, runs), xi = worst_runs(), np.linspace(0.02, 0.98, 193)
     share = size / bounds(time, runs)
     left: list[Mark] = [
-        Line(time, share[:, ::5], width=0.5, alpha=0.35), Level(y=1.0, width=0.9),
-        Line(time, share.max(axis=1), "largest of 200 runs", colours.RED),
+        Line(time, share[:, ::5], width=0.5, alpha=0.35),
+        Line(time, share.max(axis=1), "largest of 200 runs", colours.RED), Level(y=1.0, width=0.9),
     ]  # fmt: skip
     level = Level(y=1.0, color=colours.GREY, dash="dotted", width=1.5)
     right: list[Mark] = [Line(xi, 0.5 / np.sqrt(xi * (1.0 - xi))), level, dots(0.5, 1.0, color=colours.RED)]
