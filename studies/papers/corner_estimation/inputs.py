@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
-from typing import TypeVar
+from typing import TypeVar, get_args
 
 import numpy as np
 import sympy as sp
@@ -104,10 +104,7 @@ def _given(value: T | None, what: str) -> T:
 
 
 # The printed gains that the stability claims are about: of P1 and of P3.
-DESIGNS = (
-    Corner("longitudinal"), Corner("lateral"),
-    Corner("longitudinal", "resilient-velocity"), Corner("lateral", "resilient-velocity"),
-)  # fmt: skip
+DESIGNS = tuple(Corner(direction, name) for name in PAPER for direction in get_args(Direction))
 CORNERS: dict[Direction, Corner] = {corner.direction: corner for corner in DESIGNS[:2]}
 
 

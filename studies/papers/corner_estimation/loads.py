@@ -36,11 +36,8 @@ def residuals(assumed: ParameterSet, true: ParameterSet) -> dict[str, float]:
         left, right = (getattr(found, f"{axle}_{side}") for side in ("left", "right"))
         moment = getattr(found, axle) / PRINTED_GRAVITY * height * ay
         roll.append(np.abs((right - left) * size[f"{axle}_track"] / 2.0 - moment).max())
-    return {
-        "vertical_N": float(np.abs(vertical).max()),
-        "pitch_Nm": float(np.abs(pitch).max()),
-        "roll_Nm": float(max(roll)),
-    }
+    largest = {"vertical_N": np.abs(vertical).max(), "pitch_Nm": np.abs(pitch).max(), "roll_Nm": max(roll)}
+    return {name: float(value) for name, value in largest.items()}
 
 
 def sign_conflict(vehicle: ParameterSet) -> dict[str, float]:

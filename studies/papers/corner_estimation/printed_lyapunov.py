@@ -96,8 +96,8 @@ def primal(direction: Direction, matrix: Coefficients | None = None) -> Finding:
     inside, wide = offered.validity(), offered.validity(BEYOND)
     first, last = np.linalg.eigvalsh(offered.at(np.array([0.0, STATED_SPEED]))[1]).max(axis=(0, 2)).tolist()
     computed = {
-        "holds_everywhere": inside.everywhere, "holds_on_rad_s": _listed(inside),
-        f"holds_on_up_to_{BEYOND:g}_rad_s": _listed(wide),
+        "holds_everywhere": inside.everywhere, "holds_on_rad_s": inside.intervals,
+        f"holds_on_up_to_{BEYOND:g}_rad_s": wide.intervals,
         "largest_eigenvalue_at_0_rad_s": first, "largest_eigenvalue_at_180_rad_s": last,
     }  # fmt: skip
     reading = (
@@ -116,7 +116,7 @@ def dual(direction: Direction, matrix: Coefficients | None = None) -> Finding:
     omega = np.linspace(0.0, STATED_SPEED, 1801)
     growth = offered.growth(omega)
     computed = {
-        "holds_everywhere": found.everywhere, "holds_on_design_range": designed, "holds_on_rad_s": _listed(found),
+        "holds_everywhere": found.everywhere, "holds_on_design_range": designed, "holds_on_rad_s": found.intervals,
         "largest_relative_eigenvalue_1_s": float(growth.max()), "at_wheel_speed_rad_s": float(omega[growth.argmax()]),
     }  # fmt: skip
     reading = (
@@ -135,10 +135,6 @@ TOPIC.claim("P1-41-dual")(partial(dual, "lateral"))
 
 def _words(found: CertifiedRange) -> str:
     return " and ".join(f"({low:.7g}, {high:.7g})" for low, high in found.intervals) or "no part"
-
-
-def _listed(found: CertifiedRange) -> list[list[float]]:
-    return [list(interval) for interval in found.intervals]
 
 
 @TOPIC.claim("P1-mc")

@@ -13,6 +13,7 @@ from studies.study import PartResult, Scope
 from synthesis.models.discretise import zero_order_hold
 
 TOPIC = topic()
+INERTIA, RADIUS = (parameters().vehicle[name].value for name in ("wheel_inertia", "effective_radius"))  # kg*m^2 and m
 ETA1, ETA2, ETA3 = 1.8, 11.4, 50.6  # N s, N m, 1/s: P1 notes 1
 DISTURBANCE_RATE = 100.0  # N/s, what the paper takes as the order of magnitude of dOmega_f/dt
 STEP = 0.005  # s
@@ -21,17 +22,11 @@ SECONDS, LATE = 60.0, 50.0
 RUNS = ("ramp", "slope changing sign each second", "cosine, 2.8 rad/s")  # the disturbances
 
 
-def wheel() -> tuple[float, float]:
-    """I_w in kg*m^2 and R_e in m of P1 Table I."""
-    values = parameters().vehicle
-    return values["wheel_inertia"].value, values["effective_radius"].value
-
-
 @TOPIC.claim("P1-pid-K")
 def wheel_error(gains: tuple[float, float] = (ETA1, ETA2)) -> Finding:
     """Poles of K of (7) by its characteristic polynomial, and Routh-Hurwitz without tolerance."""
-    poles = np.linalg.eigvals(wheel_error_matrix(*gains, *wheel()))
-    stable = wheel_error_is_hurwitz(*gains, *wheel())
+    poles = np.linalg.eigvals(wheel_error_matrix(*gains, INERTIA, RADIUS))
+    stable = wheel_error_is_hurwitz(*gains, INERTIA, RADIUS)
     size = float(np.abs(poles).max())
     real, imaginary = float(poles.real.max()), float(np.abs(poles.imag).max())
     computed = {"poles_1_s": [[real, imaginary], [float(poles.real.min()), -imaginary]],
@@ -49,7 +44,7 @@ def force_errors(eta3: float = ETA3, rate: float = DISTURBANCE_RATE) -> tuple[Fl
     (3) with its e_omega term, started 1 rad/s and 30 N off; states e_omega, e_omega', e_F with
     e_F' = -eta3 e_F + eta1 e_omega' + Omega_f', |Omega_f'| at most `rate` in N/s; exact over each sample.
     """
-    A = np.vstack([np.hstack([wheel_error_matrix(ETA1, ETA2, *wheel()), np.zeros((2, 1))]), [0.0, ETA1, -eta3]])
+    A = np.vstack([np.hstack([wheel_error_matrix(ETA1, ETA2, INERTIA, RADIUS), np.zeros((2, 1))]), [0.0, ETA1, -eta3]])
     move, push = zero_order_hold(A, np.array([[0.0], [0.0], [1.0]]), STEP)
     time = np.asarray(STEP * np.arange(round(SECONDS / STEP) + 1), float)
     slopes = rate * np.stack([np.ones_like(time), np.sign(np.sin(np.pi * time + 1e-9)), np.cos(2.8 * time)], axis=1)

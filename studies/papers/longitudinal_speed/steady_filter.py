@@ -21,8 +21,7 @@ from studies.study import PartResult, Scope, Table
 TOPIC = topic()
 SPEED = 40.0  # rad/s
 READINGS = [(structure, mode) for structure in STRUCTURES for mode in ("normal", "high_slip")]
-EXACT = 1e-9  # relative
-CLOSE = 1e-4  # relative, for a first-order formula at a remainder of 1e-6
+EXACT, CLOSE = 1e-9, 1e-4  # relative; the latter for a first-order formula at a remainder of 1e-6
 
 
 class SteadyFilter(NamedTuple):
@@ -87,9 +86,8 @@ def remainder_errors(s: SteadyFilter, sizes: tuple[float, ...] = (1e-6,)) -> lis
     """Relative error of (A8) with the printed and with the corrected sign, for remainders of these sizes."""
     N = both_tests(constant(SPEED, 12)).N[-1]
     exact = {size: _riccati(s, N + size * s.P) - _riccati(s, N) for size in sizes}
-    return [
-        [_distance(remainder(s, N, size * s.P, sign), step) for size, step in exact.items()] for sign in (1.0, -1.0)
-    ]
+    signs = (1.0, -1.0)
+    return [[_distance(remainder(s, N, size * s.P, sign), step) for size, step in exact.items()] for sign in signs]
 
 
 def _riccati(s: SteadyFilter, P: FloatArray) -> FloatArray:
@@ -130,14 +128,11 @@ def recursions(scope: Scope) -> PartResult:
     printed, corrected, summed = fixed_gain(s)[0] / np.trace(s.P)
     time, (plus, minus) = SAMPLE_TIME * np.arange(1, len(printed) + 1), remainder_errors(s, sizes)
     traces = [
-        Line(time, corrected, "(A4) with + Q", colours.BLUE),
-        Line(time, summed, "(A5)", colours.ORANGE, "dotted", 2.2),
+        Line(time, corrected, "(A4) with + Q", colours.BLUE), Line(time, summed, "(A5)", colours.ORANGE, "dotted", 2.2),
         Line(time, printed, "(A4) as printed", colours.RED, "dashed"),
-    ]
-    errors = [
-        Line(sizes, plus, "+ T/ψ, as printed", colours.RED, "dashed", marker="s"),
-        Line(sizes, minus, "− T/ψ", colours.BLUE, marker="o"),
-    ]
+    ]  # fmt: skip
+    wrong = Line(sizes, plus, "+ T/ψ, as printed", colours.RED, "dashed", marker="s")
+    errors = [wrong, Line(sizes, minus, "− T/ψ", colours.BLUE, marker="o")]
     labels = "trace over that of the filter [1]", "size of the remainder S over N [1]", "relative error of (A8) [1]"
     trace, size, error = (Axis(label, scale="log") for label in labels)
     figure = Figure(

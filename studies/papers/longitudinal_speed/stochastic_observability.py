@@ -82,8 +82,7 @@ def time_of_test_1(readings: Mapping[str, float] | None = None) -> Finding:
 def settling(record: inputs.WheelRecord, structure: str = "I") -> dict[str, Any]:
     """Test 2 on a record that ends at a constant speed: the peak of lambda_max(N), when, and where it ends.
 
-    `riccati` is where it must end, the stabilising Riccati solution of the last speed, inf where there is none; `bounded`:
-    it ended there, to 1e-3.
+    It must end at `riccati`, the stabilising solution at the last speed (inf: there is none); `bounded`: it did, to 1e-3.
     """
     known, s, (q, R) = both_tests(record, structure).largest_known, record.sequence, inputs.noise()
     try:
