@@ -67,10 +67,8 @@ def weight_readings(names_axle: bool = False) -> Finding:
 @TOPIC.part("accuracy", "Accuracy claims and axle weights", 2.0)
 def accuracy(scope: Scope) -> PartResult:
     """Table III against the text, and the axle weights."""
-    caption = (
-        "Table III of P1 as printed: velocity errors at the centre of gravity, measured on the road by its authors."
-    )
-    table = Table("table-3", caption, TABLE_3["columns"], TABLE_3["rows"])
+    what = "velocity errors at the centre of gravity, measured on the road by its authors"
+    table = Table("table-3", f"Table III of P1 as printed: {what}.", TABLE_3["columns"], TABLE_3["rows"])
     return PartResult(TOPIC.found(), [table], [table_figure(), axle_weight_figure()])
 
 

@@ -39,10 +39,9 @@ def poles_with(entry: sp.Expr, corner: Corner, omega: ArrayLike) -> FloatArray:
 def entry_of_the_error_matrix(printed: sp.Expr = PRINTED_ENTRY) -> Finding:
     """The printed entry of (26) against A - L C, and what each makes of the poles at standstill."""
     derived = derived_entry()
-    slowest = {
-        form: {direction: float(poles_with(entry, corner, [0.0]).max()) for direction, corner in CORNERS.items()}
-        for form, entry in (("printed", printed), ("corrected", derived))
-    }
+    forms = {"printed": printed, "corrected": derived}
+    slowest = {form: {d: float(poles_with(entry, corner, [0.0]).max()) for d, corner in CORNERS.items()}
+               for form, entry in forms.items()}  # fmt: skip
     determinant = sp.expand(sp.Symbol("sigma0") * (L1 * L2 * P1 + printed * L2))
     wrong = sp.expand(printed - derived)
     computed = {"entry": str(derived), "printed_minus_entry": str(wrong), "determinant_of_printed_A0": str(determinant),

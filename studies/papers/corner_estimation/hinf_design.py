@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -187,9 +188,8 @@ def fitted(corner: Corner, gains: tuple[float, ...], omega: float) -> Intensitie
     rest = p1 * p1 - 2.0 * p0 - (L2 * (s1 + s2)) ** 2
     friction = (rest - a * a) / (s0 * s0 - s1 * s1 * rest)
     if not friction > 0.0:
-        raise ProblemError(
-            f"no steady filter of the {corner.direction} model has the gains {list(gains)} at {omega:g} rad/s"
-        )
+        where = f"{list(gains)} at {omega:g} rad/s"
+        raise ProblemError(f"no steady filter of the {corner.direction} model has the gains {where}")
     return Intensities(friction, L2 * L2 * (1.0 + s1 * s1 * friction))
 
 
@@ -256,12 +256,10 @@ def plotted_gains(degree: int = 1, outputs: Mapping[str, tuple[str, ...]] = OUTP
 def gain_curves(scope: Scope) -> PartResult:
     """Figs 3 and 4."""
     claims = TOPIC.found("P1-hinf-figs")
-    rows = [
-        [direction, name, *entry["L1"], *entry["L2"], all(entry["on_the_axes"])]
-        for direction in CORNERS
-        for name, entry in claims[0].finding.computed[direction].items()
-        if name in (*OUTPUTS, "Kalman filter")
-    ]
+    rows = []
+    for direction, name in product(CORNERS, (*OUTPUTS, "Kalman filter")):
+        entry = claims[0].finding.computed[direction][name]
+        rows.append([direction, name, *entry["L1"], *entry["L2"], all(entry["on_the_axes"])])
     caption = (
         "Gains at 0 and 140 rad/s that minimising gamma returns for three readings of the unprinted performance "
         "output C_e, and those of the steady Kalman filter that passes through the printed gains at 70 rad/s; "
@@ -275,12 +273,11 @@ def gain_curves(scope: Scope) -> PartResult:
 def gain_figure() -> Figure:
     """Figs 3 and 4: gains over wheel speed against the printed axes."""
     omega = np.linspace(0.0, DESIGN_SPEED, 141)
-    rows: list[list[Panel]] = []
+    rows = []
     for direction, corner in CORNERS.items():
-        gains = corner.gains
+        gains, row = corner.gains, []
         filtered = schedule(corner, fitted(corner, gains, FIT_SPEED), omega)
         shipped = GainSchedule.shipped(f"corner-estimation-{direction}").gain(omega)[..., 0]
-        rows.append([])
         for i, (low, high) in enumerate(printed_axes(direction)):
             marks: list[Mark] = [
                 Shade(low, high, label="axis of the printed figure", color=colours.PRINTED_BAND, alpha=0.13),
@@ -291,7 +288,8 @@ def gain_figure() -> Figure:
             ]
             x = Axis("wheel speed [rad/s]" if direction == "lateral" else "", 0.0, DESIGN_SPEED)
             y = Axis(f"L{'₁₂'[i]}{LETTER[direction]} [{('m/s', 'm/s²')[i]}]", 0.0)
-            rows[-1].append(Panel(marks, x, y))
+            row.append(Panel(marks, x, y))
+        rows.append(row)
     return Figure(
         "gain-curves",
         "Observer gains over wheel speed, longitudinal above and lateral below (Figs 3 and 4 of P1, whose curves "

@@ -85,14 +85,16 @@ def force_figure() -> Figure:
     for angle in (0.02, 0.08):
         at = np.rad2deg(angle), abs(float(function(angle))) / full
         marks += [dots(*at, color=colours.RED), Words(*at, f"{angle:g} rad: {at[1]:.1e}", offset=(8, -10))]
-    y = Axis("determinant, share of its value at 90° [1]", scale="log")
+    x, y = (
+        Axis(label, scale="log") for label in ("steering angle [deg]", "determinant, share of its value at 90° [1]")
+    )
     return Figure(
         "force-observability",
         "Determinant of the output matrix of the lateral force model (outputs a_x, a_y and yaw acceleration) over "
         "the steering angle: it falls with the square of the sine and is zero straight ahead, where the right-left "
         "difference of the front forces cannot be seen. P1 (10), (12).",
         "A straight line of slope two on logarithmic axes: four ten-thousandths of its largest value at 0.02 radians.",
-        Panel(marks, Axis("steering angle [deg]", scale="log"), y), size=(4.8, 3.2),
+        Panel(marks, x, y), size=(4.8, 3.2),
     )  # fmt: skip
 
 

@@ -194,11 +194,12 @@ def growth_figure() -> Figure:
     for direction, corner in CORNERS.items():
         marks: list[Mark] = [ZERO, Level(x=DESIGN_SPEED, color=colours.GREY, dash="dotted")]
         for reading, (_, name, colour, dash, width) in READINGS.items():
-            marks.append(Line(omega, certificate(corner, reading).growth(omega), name, colour, dash, width))
-        ends = (w for span in certificate(corner, "dual").validity().intervals for w in span if 0.0 < w < STATED_SPEED)
-        for end in ends:
-            text = Words(end, 0.0, f"{end:.1f}", offset=(-6, 6), horizontal="right")
-            marks += [dots([end], [0.0], color=READINGS["dual"][2]), text]
+            offered = certificate(corner, reading)
+            marks.append(Line(omega, offered.growth(omega), name, colour, dash, width))
+            spans = offered.validity().intervals if reading == "dual" else ()
+            for end in (w for span in spans for w in span if 0.0 < w < STATED_SPEED):
+                text = Words(end, 0.0, f"{end:.1f}", offset=(-6, 6), horizontal="right")
+                marks += [dots([end], [0.0], color=colour), text]
         panels.append(Panel(marks, SPEED_AXIS, y, f"{direction}, {NUMBERS[direction]}"))
     return Figure(
         "printed-lyapunov",
