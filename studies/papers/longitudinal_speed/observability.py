@@ -84,14 +84,8 @@ def gramian_rank(record: inputs.WheelRecord) -> Ranks:
 
 @TOPIC.part("observability", "Observability of the three-state model (Fig. 1)", 4.0)
 def observability(scope: Scope) -> PartResult:
-    """Rank of (24), and Fig. 1."""
+    """Exact rank of (24) at points, numerical rank of the gramian along the histories, and Fig. 1."""
     ranks = [gramian_rank(record) for record in histories()]
-    figures = [rank_figure(ranks), determinant_figure(81 if scope.quick else 201)]
-    return PartResult(TOPIC.found(), [rank_table(ranks)], figures)
-
-
-def rank_table(ranks: Sequence[Ranks]) -> Table:
-    """Exact rank of (24) at points, and numerical rank of the gramian along the histories."""
     rows: list[list[Cell]] = []
     motions = {"constant speed": (), "accelerating, 1 rad/s^2": (1,), "acceleration changing, 1 rad/s^3": (0, 1)}
     for name, motion in motions.items():
@@ -104,7 +98,17 @@ def rank_table(ranks: Sequence[Ranks]) -> Table:
         "speeds), and numerical rank of the gramian (A1) along wheel speed histories (after a quarter of the record and at "
         f"its end, tolerance {RANK_TOLERANCE:g})."
     )
-    return Table("ranks", caption, ["what", "motion", "where", "rank, first", "rank, last"], rows)
+    table = Table("ranks", caption, ["what", "motion", "where", "rank, first", "rank, last"], rows)
+    figure = Figure(
+        "gramian-rank",
+        "Wheel speed histories (above) and numerical rank of the observability gramian over all samples so far (below, lines "
+        f"a little apart; tolerance {RANK_TOLERANCE:g} of the largest singular value of its factor, states in typical sizes). "
+        "Full rank comes once the wheel changes its speed: not while it stands, and not at constant speed. Fig. 1 and (A1) "
+        "of P2, on histories of our own.",
+        "The rank is two during the two seconds of standstill and for constant speed, three otherwise.",
+        rank_panels(histories(), ranks, Axis("wheel speed [rad/s]")), (7.2, 4.4), legend="below", share_x="col",
+    )  # fmt: skip
+    return PartResult(TOPIC.found(), [table], [figure, determinant_figure(81 if scope.quick else 201)])
 
 
 def rank_panels(records: Sequence[inputs.WheelRecord], ranks: Sequence[Ranks], speed: Axis) -> list[list[Panel]]:
@@ -119,20 +123,7 @@ def rank_panels(records: Sequence[inputs.WheelRecord], ranks: Sequence[Ranks], s
     return [[Panel(upper, "", speed)], [Panel(lower, Axis("time [s]", 0.0, 6.0), below)]]
 
 
-def rank_figure(ranks: Sequence[Ranks]) -> Figure:
-    """Wheel speed and rank of V(0, N) over time."""
-    return Figure(
-        "gramian-rank",
-        "Wheel speed histories (above) and numerical rank of the observability gramian over all samples so far (below, lines "
-        f"a little apart; tolerance {RANK_TOLERANCE:g} of the largest singular value of its factor, states in typical sizes). "
-        "Full rank comes once the wheel changes its speed: not while it stands, and not at constant speed. Fig. 1 and (A1) "
-        "of P2, on histories of our own.",
-        "The rank is two during the two seconds of standstill and for constant speed, three otherwise.",
-        rank_panels(histories(), ranks, Axis("wheel speed [rad/s]")), (7.2, 4.4), legend="below", share_x="col",
-    )  # fmt: skip
-
-
-def determinant_figure(points: int = 201) -> Figure:
+def determinant_figure(points: int) -> Figure:
     """Size of det O_3 over wheel speed and acceleration."""
     (determinant,) = speed_observability().minors({JERK: 0})
     function = sp.lambdify(["wheel_speed", ACCELERATION], determinant, "numpy")

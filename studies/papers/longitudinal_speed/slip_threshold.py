@@ -67,16 +67,13 @@ def high_slip(scope: Scope) -> PartResult:
     curve = Line(variance, adaptive_threshold(variance, LOWER, UPPER, STEEPNESS), color=colours.BLUE)
     wrong = Line(fine, function(fine), color=colours.RED, dash="dashed")
     x, y = "variance of |a| [m²/s⁴]", "slip threshold [1]"
-    panels = [
-        Panel([curve, lower, upper, *names], x, Axis(y, 0.0, 0.25), "φe = 1/(√(2π) (λu − λl))"),
-        Panel([wrong, lower], x, y, "φe as printed (finer axis)"),
-    ]
+    corrected = Panel([curve, lower, upper, *names], x, Axis(y, 0.0, 0.25), "φe = 1/(√(2π) (λu − λl))")
     figure = Figure(
         "slip-threshold",
         f"Threshold (29) of the high-slip detector over the variance of the measured acceleration, λl = {LOWER:g}, λu = "
         f"{UPPER:g}, βe = {STEEPNESS:g} s⁴/m² (the paper prints no values). Corrected it rises from λl to λu; as printed it "
         "starts at −6.47, so that any slip counts as high.",
         "Left: a curve from 0.05 to 0.2. Right: a curve that starts at minus 6.5.",
-        panels, (7.2, 3.2),
+        [corrected, Panel([wrong, lower], x, y, "φe as printed (finer axis)")], (7.2, 3.2),
     )  # fmt: skip
     return PartResult(TOPIC.found(), figures=[figure])

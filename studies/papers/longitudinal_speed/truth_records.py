@@ -19,8 +19,7 @@ from studies.trials.simulations import LUGRE, simulated_truth
 from studies.truth import Truth
 
 SECONDS = 6.0
-STARTS = 40  # samples of Figs. 2 and 3: 0.2 s
-TOLERANCES = (1e-9, 1e-2)
+STARTS, TOLERANCES = 40, (1e-9, 1e-2)  # samples of Figs. 2 and 3 (0.2 s), and rank tolerances
 CHANGES = 1.0  # rad/s^2, of the wheel's acceleration, from which on the manoeuvre has begun
 FIG_1 = (
     MotionTest("p2-double-lane-change-dry", "double lane change, dry"),
@@ -31,11 +30,10 @@ FIG_1 = (
     MotionTest("p2-launch-ice", "launch, ice"),
 )
 FIGS_2_3 = (
-    MotionTest("p2-double-lane-change-dry", "double lane change, dry"),
-    MotionTest("p2-brake-in-turn-snow", "braking in a turn, snow"),
+    FIG_1[0], FIG_1[3],
     MotionTest("p2-sharp-turn", "sharp turn, dry and slippery"),
     MotionTest("p2-steer-wet-dry", "steering, wet and dry"),
-)
+)  # fmt: skip
 
 
 def wheel_record(truth: Truth, row: MotionTest) -> WheelRecord:

@@ -68,16 +68,14 @@ def unknown_input(scope: Scope) -> PartResult:
     ]  # fmt: skip
     level = Level(y=1.0, color=colours.GREY, dash="dotted", width=1.5)
     right: list[Mark] = [Line(xi, 0.5 / np.sqrt(xi * (1.0 - xi))), level, dots(0.5, 1.0, color=colours.RED)]
-    panels = [
-        Panel(left, "time [s]", Axis("|e| over the bound of Theorem 1 [1]", 0.0, 1.08), legend="lower right"),
-        Panel(right, "ξ [1]", Axis("ultimate bound over the attained b/K [1]", 0.0, 4.0)),
-    ]
+    runs_panel = Panel(left, "time [s]", Axis("|e| over the bound of Theorem 1 [1]", 0.0, 1.08), legend="lower right")
+    best_xi = Panel(right, "ξ [1]", Axis("ultimate bound over the attained b/K [1]", 0.0, 4.0))
     figure = Figure(
         "theorem-1",
         "Left: wheel speed error of the unknown-input observer in 200 random runs (K, b, start, ξ) with the disturbance "
         "always pushing outward, as a share of Theorem 1's bound (every fifth run thin); none reaches one. Right: the "
         "ultimate bound over the error b/K that a constant force leaves: ξ = 1/2 is sharp. P2 (9).",
         "Left: thin lines below one. Right: a curve with its minimum one at one half.",
-        panels, (7.2, 3.4),
+        [runs_panel, best_xi], (7.2, 3.4),
     )  # fmt: skip
     return PartResult(TOPIC.found(), figures=[figure])
