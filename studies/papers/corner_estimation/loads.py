@@ -33,8 +33,8 @@ def residuals(assumed: ParameterSet, true: ParameterSet) -> dict[str, float]:
     pitch = size["front_axle_distance"] * found.front - size["rear_axle_distance"] * found.rear + mass * height * ax
     roll = []
     for axle in ("front", "rear"):
-        left, right = (getattr(found, f"{axle}_{side}") for side in ("left", "right"))
-        moment = getattr(found, axle) / PRINTED_GRAVITY * height * ay
+        whole, left, right = (getattr(found, axle + side) for side in ("", "_left", "_right"))
+        moment = whole / PRINTED_GRAVITY * height * ay
         roll.append(np.abs((right - left) * size[f"{axle}_track"] / 2.0 - moment).max())
     largest = {"vertical_N": np.abs(vertical).max(), "pitch_Nm": np.abs(pitch).max(), "roll_Nm": max(roll)}
     return {name: float(value) for name, value in largest.items()}

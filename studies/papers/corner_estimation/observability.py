@@ -101,7 +101,7 @@ def force_figure() -> Figure:
 def velocity_determinant(corner: Corner, omega: FloatArray, rate: float) -> FloatArray:
     """det O_2 of the time-varying observability matrix over its value at rest, (g,)."""
     (determinant,) = observability_matrix(corner.model).minors()
-    function = sp.lambdify(sp.symbols("wheel_speed wheel_speed_rate"), determinant, "numpy")
+    function = sp.lambdify(["wheel_speed", "wheel_speed_rate"], determinant, "numpy")
     return np.asarray(function(omega, rate) / function(0.0, 0.0) * np.ones_like(omega))
 
 

@@ -8,7 +8,7 @@ from analysis.bounds.forces import force_observer_bound, wheel_error_is_hurwitz,
 from estimators.arrays import FloatArray
 from studies.claim import Finding, agrees, reproduced
 from studies.papers.corner_estimation.inputs import parameters, topic
-from studies.plots import DASHES, Axis, Figure, Level, Line, Mark, Panel, Shade, colours
+from studies.plots import DASHES, Axis, Figure, Level, Line, Panel, Shade, colours
 from studies.study import PartResult, Scope
 from synthesis.models.discretise import zero_order_hold
 
@@ -76,22 +76,15 @@ def force_bound(eta3: float = ETA3, rate: float = DISTURBANCE_RATE) -> Finding:
 
 @TOPIC.part("wheel-force", "Longitudinal force observer", 2.0)
 def wheel_force(scope: Scope) -> PartResult:
-    """The longitudinal force observer."""
-    return PartResult(TOPIC.found(), figures=[error_figure(), noise_figure()])
-
-
-def error_figure() -> Figure:
-    """Force error against the bound of Proposition 1, and the wheel speed error that delays it."""
+    """Force error against the bound of Proposition 1 with the wheel speed error that delays it; and what noise becomes."""
     time, wheel_speed, force = force_errors()
     bound = force_observer_bound(ETA3, DISTURBANCE_RATE).ultimate
-    marks: list[Mark] = [
-        Line(time, force[:, k], name, colours.CURVES[k], DASHES[k], 1.4) for k, name in enumerate(RUNS)
-    ]
-    marks.append(Shade(-bound, bound, label=f"±{bound:.3f} N, the bound", alpha=0.18))
-    speed = Panel(
-        [Line(time, wheel_speed, width=1.0)], Axis("time [s]", 0.0, 40.0), "virtual wheel speed error [rad/s]"
-    )
-    return Figure(
+    lines = [Line(time, force[:, k], name, colours.CURVES[k], DASHES[k], 1.4) for k, name in enumerate(RUNS)]
+    inside = Shade(-bound, bound, label=f"±{bound:.3f} N, the bound", alpha=0.18)
+    left = Panel([*lines, inside], Axis("time [s]", 0.0, 6.0), Axis("force error [N]", -4.0, 6.0))
+    spin = Line(time, wheel_speed, width=1.0)
+    right = Panel([spin], Axis("time [s]", 0.0, 40.0), "virtual wheel speed error [rad/s]")
+    errors = Figure(
         "force-observer-error",
         "Left: first seconds of the error of the longitudinal force observer with the printed gains, started 1 "
         f"rad/s and 30 N off (cut off), under three disturbances whose slope stays within {DISTURBANCE_RATE:g} N/s. "
@@ -99,25 +92,22 @@ def error_figure() -> Figure:
         "has died out. Behind that the bound holds, and the ramp attains it. P1 (3)-(8), Proposition 1.",
         "Left: force errors fall within 0.1 s to about two newtons and follow the disturbance. Right: an "
         "oscillation of 2.6 rad/s that takes 30 seconds to decay.",
-        [Panel(marks, Axis("time [s]", 0.0, 6.0), Axis("force error [N]", -4.0, 6.0)), speed], legend="below",
+        [left, right], legend="below",
     )  # fmt: skip
-
-
-def noise_figure() -> Figure:
-    """Frequency response of the force estimate to the wheel equation as implemented, (1 + a - 1/z)/(1 - (1 - a)/z)."""
+    # The force estimate to the wheel equation as implemented, (1 + a - 1/z)/(1 - (1 - a)/z).
     a = ETA3 * STEP
     frequency = np.geomspace(0.1, 0.5 / STEP, 400)
     z = np.exp(2j * np.pi * frequency * STEP)
     gain = np.abs((1.0 + a - 1.0 / z) / (1.0 - (1.0 - a) / z))
     limit = (2 + a) / (2 - a)
     level = Level(limit, label=f"(2 + a)/(2 − a) = {limit:.3f}", color=colours.GREY, dash="dashed", width=1.5)
-    y = Axis("gain from (T − I dω/dt)/R to the force [1]", 0.9, 1.4)
-    panel = Panel([Line(frequency, gain), level], Axis("frequency [Hz]", scale="log"), y, legend="upper left")
-    return Figure(
+    x, y = Axis("frequency [Hz]", scale="log"), Axis("gain from (T − I dω/dt)/R to the force [1]", 0.9, 1.4)
+    noise = Figure(
         "force-observer-noise",
         "Gain of the force observer as the paper implements it (200 Hz, integral of the equation's force minus the "
         f"last estimate, a = η₃ Ts = {a:.3f}), started at the measured wheel speed: it smooths nothing and amplifies "
         "the fastest noise, so the wheel acceleration must come filtered. P1 (2) and its implementation note.",
         "The gain is one at low frequency and rises to 1.29 at 100 hertz.",
-        panel, size=(4.8, 3.2),
+        Panel([Line(frequency, gain), level], x, y, legend="upper left"), size=(4.8, 3.2),
     )  # fmt: skip
+    return PartResult(TOPIC.found(), figures=[errors, noise])
