@@ -9,11 +9,9 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from studies.claim import Finding, JsonValue
-from studies.papers.corner_estimation.inputs import DESIGNS, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner
-from studies.papers.topic import Topic
+from studies.papers.corner_estimation.inputs import DESIGNS, SPEED_AXIS, STATED_SPEED, Corner, topic
 from studies.papers.verdicts import derived
-from studies.plots import ZERO, Axis, Dash, Figure, Line, Mark, Panel
-from studies.plots.colours import CURVES, GREY
+from studies.plots import ZERO, Axis, Dash, Figure, Line, Mark, Panel, colours
 from studies.study import PartResult, Scope, Table
 from synthesis.design.stability import physical
 from synthesis.lmi.problem import LmiProblem
@@ -21,9 +19,10 @@ from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
 
-TOPIC = Topic(PACKAGE)
+TOPIC = topic()
 CAPS = (1e3, 1e4)  # condition numbers that a general-purpose scaling might allow
 BALANCED = 2.0
+LOOSE = ("solver", "largest_growth_1_s", "at_rad_s")  # of the vertices alone, in the table
 
 
 def natural_scale(corner: Corner) -> float:
@@ -48,8 +47,7 @@ def best_margin(corner: Corner, scale: float, condition: float) -> float:
 def vertices_only(corner: Corner) -> tuple[LmiResult, FloatArray, FloatArray]:
     """An affine P, asked of a solver at the four vertices of (omega, rate) alone, without multi-convexity and scaling.
 
-    Returns its answer and, at wheel speeds (g,), the largest growth rate of V in 1/s (g,): above zero the certificate is
-    false, whatever the solver said.
+    Its answer; wheel speeds (g,) and the largest growth rate of V there, 1/s (g,): above zero the certificate is false.
     """
     problem = _problem(corner, np.ones(2), degree=1, margin=False)
     problem.require("P > 0", problem.unknowns["P"])
@@ -59,10 +57,8 @@ def vertices_only(corner: Corner) -> tuple[LmiResult, FloatArray, FloatArray]:
     P = constant + omega[:, None, None] * slope
     product = P @ corner.error_matrices(omega)
     total = product + np.swapaxes(product, 1, 2)
-    relative = [
-        np.linalg.eigvals(np.linalg.solve(P, total + rate * slope)).real.max(axis=1) for rate in (-800.0, 800.0)
-    ]
-    return found, omega, np.maximum(*relative)
+    growth = (np.linalg.eigvals(np.linalg.solve(P, total + rate * slope)).real.max(axis=1) for rate in (-800.0, 800.0))
+    return found, omega, np.maximum(*growth)
 
 
 def _problem(corner: Corner, scale: FloatArray, degree: int, margin: bool) -> LmiProblem:
@@ -85,8 +81,7 @@ def scaling(scaled: bool = True) -> Finding:
         g = natural_scale(corner)
         loose, omega, growth = vertices_only(corner)
         computed[str(corner)] = {
-            "scale_of_z": g,
-            "natural_condition_number": g * g,
+            "scale_of_z": g, "natural_condition_number": g * g,
             "margin_unscaled": {f"{cap:g}": best_margin(corner, 1.0, cap) for cap in CAPS},
             f"margin_scaled_condition_{BALANCED:g}": best_margin(corner, g if scaled else 1.0, BALANCED),
             "vertices_only": {
@@ -115,10 +110,8 @@ def conditioning(scope: Scope) -> PartResult:
     claims = TOPIC.found()
     rows = []
     for name, entry in claims[0].finding.computed.items():
-        loose = entry["vertices_only"]
-        rows.append([name, entry["scale_of_z"], entry["natural_condition_number"], *entry["margin_unscaled"].values(),
-                     entry[f"margin_scaled_condition_{BALANCED:g}"], loose["solver"], loose["largest_growth_1_s"],
-                     loose["at_rad_s"]])  # fmt: skip
+        scale, condition, unscaled, scaled, loose = entry.values()
+        rows.append([name, scale, condition, *unscaled.values(), scaled, *(loose[key] for key in LOOSE)])
     caption = (
         "Search for a constant P with I <= P <= kappa I (margin: largest t with A_e'P + P A_e < -t I), with z in "
         "metres and with z multiplied by g; and an affine P from the vertices alone: what the solver says, and how "
@@ -126,16 +119,16 @@ def conditioning(scope: Scope) -> PartResult:
     )
     columns = ["design", "g [1/s]", "g^2 [1/s^2]", "margin, kappa 1e3", "margin, kappa 1e4", "margin with g, kappa 2",
                "solver at the vertices", "largest growth rate [1/s]", "at [rad/s]"]  # fmt: skip
-    figure = conditioning_figure(7 if scope.quick else 13)
-    return PartResult(claims, [Table("conditioning", caption, columns, rows)], [figure])
+    table = Table("conditioning", caption, columns, rows)
+    return PartResult(claims, [table], [conditioning_figure(np.geomspace(1.0, 1e6, 7 if scope.quick else 13))])
 
 
-def conditioning_figure(caps: int = 13) -> Figure:
+def conditioning_figure(conditions: FloatArray) -> Figure:
     """Best Lyapunov margin over the allowed condition number, and false certificates between the vertices."""
-    conditions = np.geomspace(1.0, 1e6, caps)
-    margins: list[Mark] = [ZERO, Line([], [], "z scaled by g", GREY), Line([], [], "z in metres", GREY, "dashed")]
     growth: list[Mark] = [ZERO]
-    for corner, colour in zip(DESIGNS, CURVES, strict=False):
+    grey = colours.GREY
+    margins: list[Mark] = [ZERO, Line([], [], "z scaled by g", grey), Line([], [], "z in metres", grey, "dashed")]
+    for corner, colour in zip(DESIGNS, colours.CURVES, strict=False):
         _, omega, rate = vertices_only(corner)
         growth.append(Line(omega, rate, str(corner), colour))
         dashes: dict[Dash, float] = {"dashed": 1.0, "solid": natural_scale(corner)}
@@ -146,18 +139,14 @@ def conditioning_figure(caps: int = 13) -> Figure:
     ticks = {-1e4: "−10⁴", -1e2: "−10²", -1.0: "−1", 0.0: "0", 1.0: "1", 1e2: "10²"}
     x = Axis("allowed condition number κ of P [1]", scale="log")
     y = Axis("best margin / κ [1/s]", scale="symlog", ticks=ticks, linear=1e-3)
-    left = Panel(margins, x, y, "constant P")
-    title = "affine P, vertices only, z in metres"
-    right = Panel(growth, SPEED_AXIS, "growth rate of V [1/s]", title)
+    right = Panel(growth, SPEED_AXIS, "growth rate of V [1/s]", "affine P, vertices only, z in metres")
     return Figure(
         "conditioning",
-        "Left: the largest margin of the Lyapunov inequality that a constant P with I ≤ P ≤ κ I reaches, over the "
-        "allowed condition number κ, with the bristle deflection in metres (dashed) and multiplied by its natural "
-        "scale g (solid); below zero there is no certificate (logarithmic beyond ±0.001). Right: an affine P(ω) "
-        "that a solver accepts at the four vertices of wheel speed and acceleration lets V grow between them. "
-        "Printed gains of P1 and P3.",
+        "Left: the largest margin of the Lyapunov inequality that a constant P with I ≤ P ≤ κ I reaches, over the allowed "
+        "condition number κ, with the bristle deflection in metres (dashed) and multiplied by its natural scale g (solid); "
+        "below zero there is no certificate (logarithmic beyond ±0.001). Right: an affine P(ω) that a solver accepts at the "
+        "four vertices of wheel speed and acceleration lets V grow between them. Printed gains of P1 and P3.",
         "Left: unscaled margins become positive only at condition numbers of 1e4 to 1e5, scaled ones at once. "
         "Right: growth rates below zero at both ends and up to 280 per second in between.",
-        [left, right],
-        legend="below",
-    )
+        [Panel(margins, x, y, "constant P"), right], legend="below",
+    )  # fmt: skip

@@ -14,9 +14,10 @@ therefore determine both intensities.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
-from typing import Literal
+from itertools import product
+from typing import Literal, NamedTuple
 
 import numpy as np
 import sympy as sp
@@ -25,20 +26,9 @@ from scipy.linalg import solve_continuous_are
 from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule
 from studies.claim import Finding, JsonValue
-from studies.papers.corner_estimation.inputs import (
-    CORNERS,
-    DESIGN_SPEED,
-    PACKAGE,
-    POINTS,
-    SPEED_AXIS,
-    STATES,
-    Corner,
-    literal_design,
-)
-from studies.papers.topic import Topic
+from studies.papers.corner_estimation.inputs import CORNERS, DESIGN_SPEED, POINTS, STATES, Corner, literal_design, topic
 from studies.papers.verdicts import derived, erratum, under_specified
-from studies.plots import Axis, Figure, Level, Line, Mark, Panel, Shade, dots
-from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, PRINTED_BAND, RED
+from studies.plots import Axis, Figure, Level, Line, Mark, Panel, Shade, colours, dots
 from studies.study import PartResult, Scope, Table
 from synthesis.design.hinf_observer import ObserverGains, observer_problem, to_gamma
 from synthesis.design.well_posedness import well_posedness
@@ -49,13 +39,11 @@ from synthesis.lmi.solve import solve
 from synthesis.models.catalogue.corner import Direction
 from synthesis.models.lpv import LpvModel
 
-TOPIC = Topic(PACKAGE)
+TOPIC = topic()
 Sign = Literal["printed", "corrected"]
 SIGNS: tuple[Sign, ...] = ("printed", "corrected")
 DEGREES = (0, 1, 2, 3)  # of P and chi; the paper's f is not printed
 OUTPUTS = {"C_e = I": STATES, "C_e = [0 1]": STATES[1:], "C_e = [1 0]": STATES[:1]}
-SIGN_TOLERANCE = 1e-3  # of gamma
-GAMMA_TOLERANCE = 2e-5  # from the infimum
 TREND_POINTS = 40  # grid of the energy trend: it asks how fast, not how much
 FIT_SPEED = DESIGN_SPEED / 2  # rad/s: where the Kalman gains are made to equal the printed ones
 OMEGA = np.linspace(0.0, DESIGN_SPEED, 71)  # rad/s, where the gains are looked at
@@ -64,20 +52,14 @@ LETTER = {"longitudinal": "x", "lateral": "y"}
 
 def signed_model(corner: Corner, sign: Sign) -> LpvModel:
     """The corner model; `printed` reverses sigma1 of the friction column, so that the error sees I + L [sigma1 0]."""
-    model = corner.design_model
-    if sign == "corrected":
-        return model
-    F = sp.Matrix(model.F)
+    F = sp.Matrix(corner.design_model.F)
     F[0, 0] = -F[0, 0]
-    return replace(model, F=F)
+    return replace(corner.design_model, F=F) if sign == "printed" else corner.design_model
 
 
 @cache
 def least_gamma(corner: Corner, degree: int, sign: Sign, errors: tuple[str, ...], points: int) -> ObserverGains:
-    """Minimise gamma over P and chi of this degree, with the gains that the solver happens to return.
-
-    Raises ProblemError if it finds nothing.
-    """
+    """Minimise gamma over P and chi of this degree, with the gains that the solver returns. Raises ProblemError if none."""
     model, design = signed_model(corner, sign), literal_design(degree, errors, points)
     scale = observer_scale(model.polynomial, model.parameters)
     found = solve(observer_problem(model, design, scale), design.settings)
@@ -98,12 +80,10 @@ def velocity_floor(corner: Corner, sign: Sign, omega: FloatArray) -> FloatArray:
     The second row of the error at rest says C e = -sigma1 d (correct sign) or + sigma1 d (printed one), the first
     e_v = a e_z - d. Hence sigma0/(sigma0 + sigma2 a), and |(2 sigma1 + sigma2) a/(sigma0 + sigma2 a) - 1| as printed.
     """
-    values = corner.constants
-    a = values["kappa"] * values["effective_radius"] * np.abs(omega)
-    below = values["sigma0"] + values["sigma2"] * a
-    if sign == "corrected":
-        return np.asarray(values["sigma0"] / below)
-    return np.asarray(np.abs((2.0 * values["sigma1"] + values["sigma2"]) * a / below - 1.0))
+    s0, s1, s2, kappa, radius = corner.constants.values()
+    a = kappa * radius * np.abs(omega)
+    below = s0 + s2 * a
+    return np.asarray(s0 / below if sign == "corrected" else np.abs((2.0 * s1 + s2) * a / below - 1.0))
 
 
 def disturbance_matrix_error(sign: int) -> sp.Matrix:
@@ -121,12 +101,9 @@ def sign_of_the_disturbance(printed_sign: int = 1) -> Finding:
     omega = np.linspace(0.0, DESIGN_SPEED, POINTS)
     gamma = {s: {d: least_gamma(c, 1, s, STATES, POINTS).gamma for d, c in CORNERS.items()} for s in SIGNS}
     floor = {s: {d: float(velocity_floor(c, s, omega).max()) for d, c in CORNERS.items()} for s in SIGNS}
-    attained = all(abs(gamma[s][d] - floor[s][d]) <= SIGN_TOLERANCE for s in SIGNS for d in CORNERS)
-    computed = {
-        "printed_minus_derived": [str(entry) for entry in wrong],
-        "corrected_minus_derived": [str(entry) for entry in right],
-        "gamma": gamma, "static_floor": floor,
-    }  # fmt: skip
+    attained = all(abs(gamma[s][d] - floor[s][d]) <= 1e-3 for s in SIGNS for d in CORNERS)
+    computed = {"printed_minus_derived": [*map(str, wrong)], "corrected_minus_derived": [*map(str, right)],
+                "gamma": gamma, "static_floor": floor}  # fmt: skip
     shown = ", ".join(f"{d} {gamma['printed'][d]:.4f} against {gamma['corrected'][d]:.4f}" for d in CORNERS)
     reading = (
         "By (25) the disturbance enters the error through I - L [sigma1 0], so block (1,2) of (30) is P - chi [sigma1 "
@@ -137,7 +114,7 @@ def sign_of_the_disturbance(printed_sign: int = 1) -> Finding:
 
 
 @TOPIC.claim("P1-hinf-gamma")
-def least_gamma_by_degree(points: int = POINTS, tolerance: float = GAMMA_TOLERANCE) -> Finding:
+def least_gamma_by_degree(points: int = POINTS, tolerance: float = 2e-5) -> Finding:
     """gamma for f = 0..3 and both directions, against the static gain that no observer can lower."""
     found = {d: optima(c, points) for d, c in CORNERS.items()}
     floor = {d: float(velocity_floor(c, "corrected", np.array([0.0]))[0]) for d, c in CORNERS.items()}
@@ -145,16 +122,14 @@ def least_gamma_by_degree(points: int = POINTS, tolerance: float = GAMMA_TOLERAN
     largest = {d: [float(np.abs(o.gain(OMEGA)[:, 1]).max()) for o in found[d]] for d in CORNERS}
     distance = max(abs(g - floor[d]) for d in CORNERS for g in gamma[d])
     proved = all(o.verdict is Verdict.CERTIFIED for d in CORNERS for o in found[d])
-    computed = {
-        "degrees": list(DEGREES), "gamma": gamma, "exact_infimum": floor, "largest_distance": distance,
-        "proved_on_the_whole_range": proved, "largest_L2_returned": largest,
-    }  # fmt: skip
-    low, high = (pick(value for row in largest.values() for value in row) for pick in (min, max))
+    computed = {"degrees": list(DEGREES), "gamma": gamma, "exact_infimum": floor, "largest_distance": distance,
+                "proved_on_the_whole_range": proved, "largest_L2_returned": largest}  # fmt: skip
+    returned = [value for row in largest.values() for value in row]
     reading = (
         "At standstill of the error friction cannot be told from slip velocity: their static gain is "
         "sigma0/(sigma0 + sigma2 a) for every L, 1 at rest, so gamma has the infimum 1. All degrees come within "
         f"{distance:.1e} of it; the degree buys nothing, and the gains returned on the way there are as large as "
-        f"the solver's tolerance lets them be (L2 up to {low:.2g} to {high:.2g} m/s^2)."
+        f"the solver's tolerance lets them be (L2 up to {min(returned):.2g} to {max(returned):.2g} m/s^2)."
     )
     return Finding(computed, derived(distance <= tolerance and proved), reading)
 
@@ -170,43 +145,34 @@ def hinf_optimum(scope: Scope) -> PartResult:
     """The optimum of (30) by degree, and how its gains run away."""
     claims = TOPIC.found("P1-hinf-gamma")
     found = claims[0].finding.computed
-    rows = [
-        [degree, *(found[key][d][k] for d in CORNERS for key in ("gamma", "largest_L2_returned"))]
-        for k, degree in enumerate(found["degrees"])
-    ]
-    columns = [f"{d} {what}" for d in CORNERS for what in ("gamma [1]", "largest L2 returned [m/s^2]")]
+    columns, rows = ["degree f"], [[degree] for degree in DEGREES]
+    for d in CORNERS:
+        columns += [f"{d} gamma [1]", f"{d} largest L2 returned [m/s^2]"]
+        for k, row in enumerate(rows):
+            row += [found["gamma"][d][k], found["largest_L2_returned"][d][k]]
     caption = (
-        "Least gamma of (30) (sign corrected, C_e = I, both disturbances) on 140 wheel speeds in [0, 140] rad/s at "
-        "wheel accelerations of +-800 rad/s^2. The exact infimum is 1; the returned gains are the solver's, not "
-        "the problem's."
+        "Least gamma of (30) (sign corrected, C_e = I, both disturbances) on 140 wheel speeds in [0, 140] rad/s at wheel "
+        "accelerations of +-800 rad/s^2. The exact infimum is 1; the returned gains are the solver's, not the problem's."
     )
-    table = Table("least-gamma", caption, ["degree f", *columns], rows)
-    return PartResult(claims, [table], [optimum_figure(scope.quick)])
-
-
-def optimum_figure(quick: bool = False) -> Figure:
-    """Least gain energy over the distance from the optimum of (30)."""
-    design = literal_design(1, points=TREND_POINTS)
-    backoffs = (1.0, 1e-1, 1e-2, 1e-3) if quick else (1.0, 3e-1, 1e-1, 3e-2, 1e-2, 3e-3, 1e-3)
-    lines = []
-    for corner, colour, marker in zip(CORNERS.values(), (BLUE, RED), "os", strict=True):
+    backoffs = (1.0, 1e-1, 1e-2, 1e-3) if scope.quick else (1.0, 3e-1, 1e-1, 3e-2, 1e-2, 3e-3, 1e-3)
+    design, lines = literal_design(1, points=TREND_POINTS), []
+    for corner, colour, marker in zip(CORNERS.values(), (colours.BLUE, colours.RED), "os", strict=True):
         energy = well_posedness(corner.design_model, design, backoffs).energy
         lines.append(Line(backoffs, energy, corner.direction, colour, marker=marker))
     x = Axis("γ above its infimum, relative [1]", 1.4, 7e-4, "log")  # towards the optimum
     panel = Panel(lines, x, Axis("least gain energy, max over ω of LᵀPL [1]", scale="log"), legend="upper left")
-    return Figure(
+    figure = Figure(
         "hinf-ill-posed",
         "The least energy LᵀPL that gains of degree 1 need, over the distance that gamma keeps from its infimum (1 "
         "in both directions). It grows without bound as the optimum is approached: minimising gamma alone "
         "determines no gains. P1 (30)-(32).",
         "Gain energy rises with every decade towards the optimum, for both directions.",
-        panel,
-        size=(4.8, 3.4),
-    )
+        panel, size=(4.8, 3.4),
+    )  # fmt: skip
+    return PartResult(claims, [Table("least-gamma", caption, columns, rows)], [figure])
 
 
-@dataclass(frozen=True)
-class Intensities:
+class Intensities(NamedTuple):
     """Of friction and of the acceleration error, relative to that of the force noise (white, two-sided)."""
 
     friction: float
@@ -215,25 +181,22 @@ class Intensities:
 
 def fitted(corner: Corner, gains: tuple[float, ...], omega: float) -> Intensities:
     """The intensities whose steady filter has these gains at this wheel speed. Raises ProblemError if none does."""
-    values = corner.constants
-    s0, s1, s2 = (values[f"sigma{i}"] for i in range(3))
-    a = values["kappa"] * values["effective_radius"] * omega
-    L1, L2 = gains
+    (s0, s1, s2, kappa, radius), (L1, L2) = corner.constants.values(), gains
+    a = kappa * radius * omega
     p1 = a + L1 * (s0 - s1 * a) + L2 * (s1 + s2)
     p0 = L2 * (s0 + s2 * a)
     rest = p1 * p1 - 2.0 * p0 - (L2 * (s1 + s2)) ** 2
     friction = (rest - a * a) / (s0 * s0 - s1 * s1 * rest)
     if not friction > 0.0:
-        raise ProblemError(
-            f"no steady filter of the {corner.direction} model has the gains {list(gains)} at {omega:g} rad/s"
-        )
+        where = f"{list(gains)} at {omega:g} rad/s"
+        raise ProblemError(f"no steady filter of the {corner.direction} model has the gains {where}")
     return Intensities(friction, L2 * L2 * (1.0 + s1 * s1 * friction))
 
 
 def schedule(corner: Corner, noise: Intensities, omega: FloatArray) -> FloatArray:
     """Steady gains (g, 2) of the frozen filters at wheel speeds (g,), by the algebraic Riccati equation."""
     model = corner.design_model.on(omega)
-    weights = np.diag([noise.friction, noise.acceleration, 1.0])
+    weights = np.diag([*noise, 1.0])
     out = np.empty((len(omega), 2))
     for k, (A, C, E, F) in enumerate(zip(model.A, model.C, model.E, model.F, strict=True)):
         sensor, cross = F @ weights @ F.T, E @ weights @ F.T
@@ -250,10 +213,8 @@ def printed_axes(direction: Direction) -> list[tuple[float, float]]:
 
 def _summary(gains: FloatArray, direction: Direction) -> dict[str, JsonValue]:
     """L1 and L2 of (g, 2) at both ends of the range, and whether they stay on the axes of the figure."""
-    inside = [
-        bool(low <= column.min() and column.max() <= high)
-        for (low, high), column in zip(printed_axes(direction), gains.T, strict=True)
-    ]
+    axes = zip(printed_axes(direction), gains.T, strict=True)
+    inside = [bool(low <= column.min() and column.max() <= high) for (low, high), column in axes]
     return {"L1": gains[[0, -1], 0].tolist(), "L2": gains[[0, -1], 1].tolist(), "on_the_axes": inside}
 
 
@@ -263,10 +224,8 @@ def plotted_gains(degree: int = 1, outputs: Mapping[str, tuple[str, ...]] = OUTP
     computed: dict[str, JsonValue] = {}
     spread, open_gains = 0.0, []
     for direction, corner in CORNERS.items():
-        readings = {
-            name: least_gamma(corner, degree, "corrected", errors, POINTS).gain(OMEGA)[..., 0]
-            for name, errors in outputs.items()
-        }
+        found = {name: least_gamma(corner, degree, "corrected", errors, POINTS) for name, errors in outputs.items()}
+        readings = {name: design.gain(OMEGA)[..., 0] for name, design in found.items()}
         largest = [float(np.abs(gains[:, 1]).max()) for gains in readings.values()]
         spread = max(spread, max(largest) / min(largest) - 1.0)
         noise = fitted(corner, corner.gains, FIT_SPEED)
@@ -274,7 +233,7 @@ def plotted_gains(degree: int = 1, outputs: Mapping[str, tuple[str, ...]] = OUTP
         posed = well_posedness(corner.design_model, literal_design(degree, points=TREND_POINTS))
         open_gains.append(posed.ill_posed)
         computed[direction] = {
-            "intensities_of_friction_and_acceleration": [noise.friction, noise.acceleration],
+            "intensities_of_friction_and_acceleration": list(noise),
             "least_gain_energy_by_backoff": dict(zip(map(str, posed.backoffs), posed.energy, strict=True)),
             "gains_unbounded_towards_optimum": posed.ill_posed,
             **{name: _summary(gains, direction) for name, gains in readings.items()},
@@ -297,12 +256,10 @@ def plotted_gains(degree: int = 1, outputs: Mapping[str, tuple[str, ...]] = OUTP
 def gain_curves(scope: Scope) -> PartResult:
     """Figs 3 and 4."""
     claims = TOPIC.found("P1-hinf-figs")
-    rows = [
-        [direction, name, *entry["L1"], *entry["L2"], all(entry["on_the_axes"])]
-        for direction in CORNERS
-        for name, entry in claims[0].finding.computed[direction].items()
-        if name in (*OUTPUTS, "Kalman filter")
-    ]
+    rows = []
+    for direction, name in product(CORNERS, (*OUTPUTS, "Kalman filter")):
+        entry = claims[0].finding.computed[direction][name]
+        rows.append([direction, name, *entry["L1"], *entry["L2"], all(entry["on_the_axes"])])
     caption = (
         "Gains at 0 and 140 rad/s that minimising gamma returns for three readings of the unprinted performance "
         "output C_e, and those of the steady Kalman filter that passes through the printed gains at 70 rad/s; "
@@ -316,23 +273,23 @@ def gain_curves(scope: Scope) -> PartResult:
 def gain_figure() -> Figure:
     """Figs 3 and 4: gains over wheel speed against the printed axes."""
     omega = np.linspace(0.0, DESIGN_SPEED, 141)
-    rows: list[list[Panel]] = []
+    rows = []
     for direction, corner in CORNERS.items():
-        gains = corner.gains
+        gains, row = corner.gains, []
         filtered = schedule(corner, fitted(corner, gains, FIT_SPEED), omega)
         shipped = GainSchedule.shipped(f"corner-estimation-{direction}").gain(omega)[..., 0]
-        rows.append([])
         for i, (low, high) in enumerate(printed_axes(direction)):
             marks: list[Mark] = [
-                Shade(low, high, label="axis of the printed figure", color=PRINTED_BAND, alpha=0.13),
-                Level(gains[i], label="printed constant gain", color=GREY, width=1.2, dash="dotted"),
-                Line(omega, filtered[:, i], "Kalman filter through the printed gain", ORANGE, "dashed"),
-                Line(omega, shipped[:, i], "our proved schedule", GREEN),
-                dots([FIT_SPEED], [gains[i]], color=RED, size=4.0),
+                Shade(low, high, label="axis of the printed figure", color=colours.PRINTED_BAND, alpha=0.13),
+                Level(gains[i], label="printed constant gain", color=colours.GREY, width=1.2, dash="dotted"),
+                Line(omega, filtered[:, i], "Kalman filter through the printed gain", colours.ORANGE, "dashed"),
+                Line(omega, shipped[:, i], "our proved schedule", colours.GREEN),
+                dots([FIT_SPEED], [gains[i]], color=colours.RED, size=4.0),
             ]
-            x = Axis(SPEED_AXIS.label if direction == "lateral" else "", 0.0, DESIGN_SPEED)
+            x = Axis("wheel speed [rad/s]" if direction == "lateral" else "", 0.0, DESIGN_SPEED)
             y = Axis(f"L{'₁₂'[i]}{LETTER[direction]} [{('m/s', 'm/s²')[i]}]", 0.0)
-            rows[-1].append(Panel(marks, x, y))
+            row.append(Panel(marks, x, y))
+        rows.append(row)
     return Figure(
         "gain-curves",
         "Observer gains over wheel speed, longitudinal above and lateral below (Figs 3 and 4 of P1, whose curves "
@@ -340,9 +297,5 @@ def gain_figure() -> Figure:
         f"whose noise intensities make it pass through the printed gains at {FIT_SPEED:g} rad/s (dot), and our "
         "schedule with bounded friction gain, a pole band and least force noise.",
         "Four panels of gains over wheel speed; both designs run inside the ranges of the printed axes.",
-        rows,
-        size=(7.2, 5.2),
-        legend="below",
-        columns=2,
-        share_x="all",
-    )
+        rows, size=(7.2, 5.2), legend="below", columns=2, share_x="all",
+    )  # fmt: skip

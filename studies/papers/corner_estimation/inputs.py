@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
-from typing import TypeVar
+from functools import cache, cached_property, partial
+from typing import TypeVar, get_args
 
 import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
 
 from estimators.arrays import FloatArray
+from studies.papers.topic import Topic
 from studies.plots import Axis
 from synthesis.design.hinf_observer import Channel, ObserverDesign
 from synthesis.errors import SpecError
@@ -21,6 +22,7 @@ from synthesis.models.parameter_set import ParameterSet, Published, load_paramet
 
 T = TypeVar("T")
 PACKAGE = "studies.papers.corner_estimation"
+topic = partial(Topic, PACKAGE)  # one for each file
 PARAMETERS = "corner-estimation"
 PAPER = {PARAMETERS: "P1", "resilient-velocity": "P3"}  # that prints a parameter set
 STATED_SPEED = 180.0  # rad/s: the range that the stability claims name, text before (29)
@@ -102,10 +104,7 @@ def _given(value: T | None, what: str) -> T:
 
 
 # The printed gains that the stability claims are about: of P1 and of P3.
-DESIGNS = (
-    Corner("longitudinal"), Corner("lateral"),
-    Corner("longitudinal", "resilient-velocity"), Corner("lateral", "resilient-velocity"),
-)  # fmt: skip
+DESIGNS = tuple(Corner(direction, name) for name in PAPER for direction in get_args(Direction))
 CORNERS: dict[Direction, Corner] = {corner.direction: corner for corner in DESIGNS[:2]}
 
 

@@ -11,14 +11,12 @@ from analysis.observability.matrix import ObservabilityMatrix, observability_mat
 from analysis.observability.rank_loss import rank_loss
 from estimators.arrays import FloatArray
 from studies.claim import Finding, reproduced
-from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner, parameters
-from studies.papers.topic import Topic
-from studies.plots import ZERO, Axis, Band, Figure, Line, Mark, Panel, Words, dots
-from studies.plots.colours import RED
+from studies.papers.corner_estimation.inputs import CORNERS, SPEED_AXIS, STATED_SPEED, Corner, parameters, topic
+from studies.plots import ZERO, Axis, Band, Figure, Line, Mark, Panel, Words, colours, dots
 from studies.study import PartResult, Scope
 from synthesis.models.catalogue.planar_force import planar_force_model
 
-TOPIC = Topic(PACKAGE)
+TOPIC = topic()
 STEER = sp.Symbol("steering_angle")
 RATE, RATE2 = rate_symbol("steering_angle"), rate_symbol("steering_angle", 2)
 WHEEL_RATE = 800.0  # rad/s^2
@@ -37,10 +35,10 @@ def ranks(third_output: str = "yaw_acceleration") -> dict[str, int]:
     matrix = force_observability(third_output)
     names = {str(s) for s in matrix.matrix.free_symbols}
     car = {key: str(q.value) for key, q in parameters().vehicle.items() if key in names}
-    cases = {"steering": ("0.1", 0, 0), "straight": (0, 0, 0), "through_straight": (0, "0.01", 0),
-             "starting_to_steer": (0, 0, "0.01")}  # fmt: skip
-    keys = [str(s) for s in (STEER, RATE, RATE2)]
-    return {name: matrix.rank_at({**car, **dict(zip(keys, case, strict=True))}) for name, case in cases.items()}
+    still = {**car, **{str(s): 0 for s in (STEER, RATE, RATE2)}}
+    cases = {"steering": {str(STEER): "0.1"}, "straight": {}, "through_straight": {str(RATE): "0.01"},
+             "starting_to_steer": {str(RATE2): "0.01"}}  # fmt: skip
+    return {name: matrix.rank_at(still | case) for name, case in cases.items()}
 
 
 def determinants(third_output: str = "yaw_acceleration") -> tuple[sp.Expr, ...]:
@@ -85,32 +83,31 @@ def force_figure() -> Figure:
     degrees = np.geomspace(0.05, 35.0, 200)
     marks: list[Mark] = [Line(degrees, np.abs(function(np.deg2rad(degrees))) / full)]
     for angle in (0.02, 0.08):
-        share, place = abs(float(function(angle))) / full, np.rad2deg(angle)
-        text = Words(place, share, f"{angle:g} rad: {share:.1e}", offset=(8, -10))
-        marks += [dots([place], [share], color=RED), text]
-    y = Axis("determinant, share of its value at 90° [1]", scale="log")
+        at = np.rad2deg(angle), abs(float(function(angle))) / full
+        marks += [dots(*at, color=colours.RED), Words(*at, f"{angle:g} rad: {at[1]:.1e}", offset=(8, -10))]
+    x, y = (
+        Axis(label, scale="log") for label in ("steering angle [deg]", "determinant, share of its value at 90° [1]")
+    )
     return Figure(
         "force-observability",
         "Determinant of the output matrix of the lateral force model (outputs a_x, a_y and yaw acceleration) over "
         "the steering angle: it falls with the square of the sine and is zero straight ahead, where the right-left "
         "difference of the front forces cannot be seen. P1 (10), (12).",
         "A straight line of slope two on logarithmic axes: four ten-thousandths of its largest value at 0.02 radians.",
-        Panel(marks, Axis("steering angle [deg]", scale="log"), y),
-        size=(4.8, 3.2),
-    )
+        Panel(marks, x, y), size=(4.8, 3.2),
+    )  # fmt: skip
 
 
 def velocity_determinant(corner: Corner, omega: FloatArray, rate: float) -> FloatArray:
     """det O_2 of the time-varying observability matrix over its value at rest, (g,)."""
     (determinant,) = observability_matrix(corner.model).minors()
-    function = sp.lambdify(sp.symbols("wheel_speed wheel_speed_rate"), determinant, "numpy")
+    function = sp.lambdify(["wheel_speed", "wheel_speed_rate"], determinant, "numpy")
     return np.asarray(function(omega, rate) / function(0.0, 0.0) * np.ones_like(omega))
 
 
 def lost_speeds(corner: Corner) -> list[float]:
     """Constant wheel speeds in the stated range at which rank is lost, rad/s; exact roots, rounded to floats."""
-    roots = rank_loss(observability_matrix(corner.model)).roots_inside("wheel_speed")
-    return [float(root) for root in roots]
+    return [float(root) for root in rank_loss(observability_matrix(corner.model)).roots_inside("wheel_speed")]
 
 
 def velocity_figure() -> Figure:
@@ -119,13 +116,10 @@ def velocity_figure() -> Figure:
     panels = []
     for direction, corner in CORNERS.items():
         slow, still, fast = (velocity_determinant(corner, omega, rate) for rate in (-WHEEL_RATE, 0.0, WHEEL_RATE))
-        marks: list[Mark] = [
-            Band(omega, slow, fast, f"wheel acceleration within ±{WHEEL_RATE:g} rad/s²"),
-            Line(omega, still, "constant wheel speed"),
-            ZERO,
-        ]
+        around = Band(omega, slow, fast, f"wheel acceleration within ±{WHEEL_RATE:g} rad/s²")
+        marks: list[Mark] = [around, Line(omega, still, "constant wheel speed"), ZERO]
         for root in lost_speeds(corner):
-            marks += [dots([root], [0.0], color=RED), Words(root, 0.0, f"{root:.1f} rad/s", offset=(6, 8))]
+            marks += [dots([root], [0.0], color=colours.RED), Words(root, 0.0, f"{root:.1f} rad/s", offset=(6, 8))]
         panels.append(Panel(marks, SPEED_AXIS, "determinant over its value at rest [1]", direction))
     return Figure(
         "velocity-observability",
@@ -133,7 +127,5 @@ def velocity_figure() -> Figure:
         "Laterally it vanishes inside the operating range (dot: constant wheel speed); the bristle deflection is "
         "hidden there, and decays by itself. Derived from P1 (22), (23), (36), (37).",
         "Longitudinally the determinant stays positive; laterally it crosses zero near 53 radians per second.",
-        panels,
-        legend="below",
-        share_y="all",
-    )
+        panels, legend="below", share_y="all",
+    )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -12,25 +13,23 @@ from numpy.typing import ArrayLike
 
 from estimators.arrays import FloatArray
 from studies.claim import Finding, JsonValue, reproduced
-from studies.papers.corner_estimation.inputs import CORNERS, DESIGN_SPEED, PACKAGE, SPEED_AXIS, STATED_SPEED, Corner
-from studies.papers.topic import Topic
+from studies.papers.corner_estimation.inputs import CORNERS, DESIGN_SPEED, SPEED_AXIS, STATED_SPEED, Corner, topic
 from studies.papers.verdicts import partly
-from studies.plots import ZERO, Axis, Dash, Figure, Level, Line, Mark, Panel, Words, dots
-from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, RED
+from studies.plots import ZERO, Axis, Dash, Figure, Level, Line, Mark, Panel, Words, colours, dots
 from studies.study import Cell, PartResult, Scope, Table
 from synthesis.design.stability import Form
 from synthesis.models.catalogue.corner import Direction
 from synthesis.models.lpv import LpvModel
 from synthesis.published_certificate import CertifiedRange, check_certificate
 
-TOPIC = Topic(PACKAGE)
+TOPIC = topic()
 Reading = Literal["primal", "swapped", "dual", "adjugate"]
 # Each reading: its name in tables and in figures; colour, dash and width of its line.
 READINGS: dict[Reading, tuple[str, str, str, Dash, float]] = {
-    "primal": ("as printed, V = e'P e", "as printed, V = e'Pe", RED, "dotted", 1.5),
-    "swapped": ("states exchanged", "states exchanged", ORANGE, "dash-dot", 1.5),
-    "dual": ("V = e'Q^-1 e", "dual, V = e'Q⁻¹e", BLUE, "solid", 2.6),
-    "adjugate": ("adjugate", "adjugate", GREEN, "dashed", 1.5),
+    "primal": ("as printed, V = e'P e", "as printed, V = e'Pe", colours.RED, "dotted", 1.5),
+    "swapped": ("states exchanged", "states exchanged", colours.ORANGE, "dash-dot", 1.5),
+    "dual": ("V = e'Q^-1 e", "dual, V = e'Q⁻¹e", colours.BLUE, "solid", 2.6),
+    "adjugate": ("adjugate", "adjugate", colours.GREEN, "dashed", 1.5),
 }
 NUMBERS = {"longitudinal": "(29)", "lateral": "(41)"}
 RATES = (-800.0, 800.0)  # rad/s^2
@@ -56,20 +55,12 @@ class Certificate:
         constant, slope = (np.array(part, float) for part in self.matrix)
         M = constant + omega[:, None, None] * slope
         A_e = self.model.on(omega).error_dynamics(np.array(self.gains, float))[0]
-        product = M @ A_e if self.form == "primal" else A_e @ M
-        total = product + np.swapaxes(product, 1, 2)
-        sign = 1.0 if self.form == "primal" else -1.0
+        half, sign = (M @ A_e, 1.0) if self.form == "primal" else (A_e @ M, -1.0)
+        total = half + np.swapaxes(half, 1, 2)
         return M, np.stack([total + sign * rate * slope for rate in RATES])
 
-    def eigenvalues(self, omega: FloatArray) -> FloatArray:
-        """Eigenvalues of the inequality at both rate bounds, (g, 4)."""
-        return np.concatenate(list(np.linalg.eigvalsh(self.at(omega)[1])), axis=1)
-
     def growth(self, omega: FloatArray) -> FloatArray:
-        """Largest growth rate of V in 1/s at each wheel speed, (g,): eigenvalue of the inequality relative to M.
-
-        NaN where M is not positive definite; then V measures nothing.
-        """
+        """Largest growth rate of V in 1/s, (g,): eigenvalue of the inequality relative to M; NaN where M is not > 0."""
         M, total = self.at(omega)
         definite = np.linalg.eigvalsh(M)[:, 0] > 0.0
         root = np.linalg.cholesky(np.where(definite[:, None, None], M, np.eye(2)))
@@ -85,13 +76,9 @@ def certificate(corner: Corner, reading: Reading, matrix: Coefficients | None = 
     if reading in ("swapped", "adjugate"):
         found = [[row[::-1] for row in coefficient[::-1]] for coefficient in found]
     if reading == "adjugate":
-        found = [[[a, _negated(b)], [_negated(c), d]] for ((a, b), (c, d)) in found]
+        found = [[[a, f"-{b}".removeprefix("--")], [f"-{c}".removeprefix("--"), d]] for ((a, b), (c, d)) in found]
     gains = [[str(gain)] for gain in corner.gains]
     return Certificate(corner.model, gains, found, "dual" if reading == "dual" else "primal")
-
-
-def _negated(decimal: str) -> str:
-    return decimal[1:] if decimal.startswith("-") else f"-{decimal}"
 
 
 def convexity(model: LpvModel, gain: ArrayLike, slope: ArrayLike, form: Form = "primal") -> FloatArray:
@@ -99,30 +86,27 @@ def convexity(model: LpvModel, gain: ArrayLike, slope: ArrayLike, form: Form = "
     A_e = model.on([0.0, 1.0]).error_dynamics(np.asarray(gain, float))[0]
     A1 = A_e[1] - A_e[0]
     A1[:, 1] = 0.0  # exactly, as (26) has it; the difference above leaves rounding
-    product = (A1.T if form == "primal" else A1) @ np.asarray(slope, float)
-    return np.asarray(product + product.T)
+    half = (A1.T if form == "primal" else A1) @ np.asarray(slope, float)
+    return np.asarray(half + half.T)
 
 
 def primal(direction: Direction, matrix: Coefficients | None = None) -> Finding:
     """The matrix as printed, P of V = e'Pe: does (28) or (40) hold on 0..180 rad/s?"""
     offered = certificate(CORNERS[direction], "primal", matrix)
     inside, wide = offered.validity(), offered.validity(BEYOND)
-    ends = offered.eigenvalues(np.array([0.0, STATED_SPEED])).max(axis=1)
+    first, last = np.linalg.eigvalsh(offered.at(np.array([0.0, STATED_SPEED]))[1]).max(axis=(0, 2)).tolist()
     computed = {
-        "holds_everywhere": inside.everywhere, "holds_on_rad_s": _listed(inside),
-        f"holds_on_up_to_{BEYOND:g}_rad_s": _listed(wide),
-        "largest_eigenvalue_at_0_rad_s": float(ends[0]), "largest_eigenvalue_at_180_rad_s": float(ends[1]),
+        "holds_everywhere": inside.everywhere, "holds_on_rad_s": inside.intervals,
+        f"holds_on_up_to_{BEYOND:g}_rad_s": wide.intervals,
+        "largest_eigenvalue_at_0_rad_s": first, "largest_eigenvalue_at_180_rad_s": last,
     }  # fmt: skip
     reading = (
         f"As P of V = e'Pe the printed {NUMBERS[direction]} satisfies its inequality on {_words(wide)} "
-        f"rad/s (searched up to {BEYOND:g} rad/s). The largest eigenvalue, to be negative, is {ends[0]:.4g} at "
-        f"standstill and {ends[1]:.4g} at {STATED_SPEED:g} rad/s."
+        f"rad/s (searched up to {BEYOND:g} rad/s). The largest eigenvalue, to be negative, is {first:.4g} at "
+        f"standstill and {last:.4g} at {STATED_SPEED:g} rad/s."
     )
-    if not inside.everywhere:
-        reading += (
-            " The large entry weighs the velocity, where a P of these dynamics must weigh the bristle deflection."
-        )
-    return Finding(computed, reproduced(inside.everywhere), reading)
+    why = " The large entry weighs the velocity, where a P of these dynamics must weigh the bristle deflection."
+    return Finding(computed, reproduced(inside.everywhere), reading + ("" if inside.everywhere else why))
 
 
 def dual(direction: Direction, matrix: Coefficients | None = None) -> Finding:
@@ -132,15 +116,13 @@ def dual(direction: Direction, matrix: Coefficients | None = None) -> Finding:
     omega = np.linspace(0.0, STATED_SPEED, 1801)
     growth = offered.growth(omega)
     computed = {
-        "holds_everywhere": found.everywhere, "holds_on_design_range": designed, "holds_on_rad_s": _listed(found),
-        "largest_relative_eigenvalue_1_s": float(growth.max()),
-        "at_wheel_speed_rad_s": float(omega[growth.argmax()]),
+        "holds_everywhere": found.everywhere, "holds_on_design_range": designed, "holds_on_rad_s": found.intervals,
+        "largest_relative_eigenvalue_1_s": float(growth.max()), "at_wheel_speed_rad_s": float(omega[growth.argmax()]),
     }  # fmt: skip
     reading = (
-        f"Read as Q of V = e'Q^-1 e, {NUMBERS[direction]} proves stability on {_words(found)} of the "
-        f"stated 0 to {STATED_SPEED:g} rad/s, at both bounds of the rate; relative to Q the largest eigenvalue is "
-        f"{growth.max():.4g} 1/s. The design range of the gains, 0 to {DESIGN_SPEED:g} rad/s, is "
-        f"{'covered' if designed else 'not covered'}."
+        f"Read as Q of V = e'Q^-1 e, {NUMBERS[direction]} proves stability on {_words(found)} of the stated 0 to "
+        f"{STATED_SPEED:g} rad/s, at both bounds of the rate; relative to Q the largest eigenvalue is {growth.max():.4g} "
+        f"1/s. The design range of the gains, 0 to {DESIGN_SPEED:g} rad/s, is {'covered' if designed else 'not covered'}."
     )
     return Finding(computed, partly(found.everywhere, designed), reading)
 
@@ -155,28 +137,21 @@ def _words(found: CertifiedRange) -> str:
     return " and ".join(f"({low:.7g}, {high:.7g})" for low, high in found.intervals) or "no part"
 
 
-def _listed(found: CertifiedRange) -> list[list[float]]:
-    return [list(interval) for interval in found.intervals]
-
-
 @TOPIC.claim("P1-mc")
 def printed_slopes_are_multi_convex(slopes: dict[Direction, list[list[str]]] | None = None) -> Finding:
     """Sign of A1'P1 + P1 A1 in exact arithmetic, and its eigenvalues in every reading of the matrices."""
-    holds = []
-    computed: dict[str, JsonValue] = {}
+    holds, computed = [], dict[str, JsonValue]()
     for direction, corner in CORNERS.items():
         constant, slope = corner.lyapunov
         matrix = [constant, slopes[direction] if slopes else slope]
-        gain = sp.Matrix([sp.Rational(str(g)) for g in corner.gains])
-        model, P1 = corner.model, sp.Matrix([[sp.Rational(entry) for entry in row] for row in matrix[1]])
-        A1 = (model.A - gain * model.C).diff("wheel_speed").subs(corner.exact_constants)
+        offered = {reading: certificate(corner, reading, matrix) for reading in READINGS}
+        printed = (offered["primal"].gains, matrix[1])
+        gain, P1 = (sp.Matrix([[sp.Rational(entry) for entry in row] for row in rows]) for rows in printed)
+        A1 = (corner.model.A - gain * corner.model.C).diff("wheel_speed").subs(corner.exact_constants)
         exact = A1.T * P1 + P1 * A1
         holds.append(bool(exact[0, 0] >= 0 and exact[1, 1] >= 0 and exact.det() >= 0))
-        offered = {reading: certificate(corner, reading, matrix) for reading in READINGS}
-        spread = {
-            reading: np.linalg.eigvalsh(convexity(o.model, o.gains, o.matrix[1], o.form)).tolist()
-            for reading, o in offered.items()
-        }
+        condition = {reading: convexity(o.model, o.gains, o.matrix[1], o.form) for reading, o in offered.items()}
+        spread = {reading: np.linalg.eigvalsh(found).tolist() for reading, found in condition.items()}
         computed[direction] = {"eigenvalues": spread, "determinant_as_printed": float(exact.det())}
     lowest = [low for d in CORNERS for low, _ in computed[d]["eigenvalues"].values()]
     shown = "; ".join("{} {:.3g}, {:.3g}".format(d, *computed[d]["eigenvalues"]["primal"]) for d in CORNERS)
@@ -193,13 +168,12 @@ def printed_slopes_are_multi_convex(slopes: dict[Direction, list[list[str]]] | N
 def printed_lyapunov(scope: Scope) -> PartResult:
     """All claims about (29) and (41), and where each reading holds and how fast V grows at most."""
     rows: list[list[Cell]] = []
-    for direction, corner in CORNERS.items():
-        for reading, (name, *_) in READINGS.items():
-            offered = certificate(corner, reading)
-            found = offered.validity()
-            where = "; ".join(f"{low:.2f} to {high:.2f}" for low, high in found.intervals) or "nowhere"
-            worst = float(np.nanmax(offered.growth(np.linspace(0.0, STATED_SPEED, 361))))
-            rows.append([NUMBERS[direction], direction, name, found.everywhere, where, worst])
+    for (direction, corner), (reading, (name, *_)) in product(CORNERS.items(), READINGS.items()):
+        offered = certificate(corner, reading)
+        found = offered.validity()
+        where = "; ".join(f"{low:.2f} to {high:.2f}" for low, high in found.intervals) or "nowhere"
+        worst = float(np.nanmax(offered.growth(np.linspace(0.0, STATED_SPEED, 361))))
+        rows.append([NUMBERS[direction], direction, name, found.everywhere, where, worst])
     caption = (
         f"The printed Lyapunov matrices in four readings, judged exactly on 0 to {STATED_SPEED:g} rad/s at wheel "
         "accelerations of +-800 rad/s^2: where all inequalities hold, and the largest growth rate of V on a grid "
@@ -218,24 +192,22 @@ def growth_figure() -> Figure:
     y = Axis("largest growth rate of V [1/s]", -2e3, 5e7, "symlog", ticks, linear=10.0)
     panels = []
     for direction, corner in CORNERS.items():
-        marks: list[Mark] = [ZERO, Level(x=DESIGN_SPEED, color=GREY, dash="dotted")]
+        marks: list[Mark] = [ZERO, Level(x=DESIGN_SPEED, color=colours.GREY, dash="dotted")]
         for reading, (_, name, colour, dash, width) in READINGS.items():
             offered = certificate(corner, reading)
             marks.append(Line(omega, offered.growth(omega), name, colour, dash, width))
-            if reading == "dual":
-                for end in (w for span in offered.validity().intervals for w in span if 0.0 < w < STATED_SPEED):
-                    text = Words(end, 0.0, f"{end:.1f}", offset=(-6, 6), horizontal="right")
-                    marks += [dots([end], [0.0], color=colour), text]
+            spans = offered.validity().intervals if reading == "dual" else ()
+            for end in (w for span in spans for w in span if 0.0 < w < STATED_SPEED):
+                text = Words(end, 0.0, f"{end:.1f}", offset=(-6, 6), horizontal="right")
+                marks += [dots([end], [0.0], color=colour), text]
         panels.append(Panel(marks, SPEED_AXIS, y, f"{direction}, {NUMBERS[direction]}"))
     return Figure(
         "printed-lyapunov",
-        "Largest growth rate of V along the error dynamics, over both bounds of the wheel acceleration (±800 "
-        "rad/s²), for the printed Lyapunov matrices in four readings; below zero the matrix proves stability at "
-        "that wheel speed. Logarithmic beyond ±10 1/s. Dots: exact ends of the dual reading. Dotted line: "
-        f"{DESIGN_SPEED:g} rad/s, the end of the design range. As printed (41) holds on 0.03 rad/s, too little to "
-        "see. P1 (28), (29), (40), (41).",
+        "Largest growth rate of V along the error dynamics, over both bounds of the wheel acceleration (±800 rad/s²), for "
+        "the printed Lyapunov matrices in four readings; below zero the matrix proves stability at that wheel speed. "
+        f"Logarithmic beyond ±10 1/s. Dots: exact ends of the dual reading. Dotted line: {DESIGN_SPEED:g} rad/s, the end of "
+        "the design range. As printed (41) holds on 0.03 rad/s, too little to see. P1 (28), (29), (40), (41).",
         "As printed both matrices give growth rates of 1e5 to 1e7 per second; the dual reading is negative over "
         "the whole range longitudinally, and up to 162 rad/s laterally.",
-        panels,
-        legend="below",
-    )
+        panels, legend="below",
+    )  # fmt: skip

@@ -8,7 +8,6 @@ these three decide for the whole box.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -16,51 +15,36 @@ import sympy as sp
 
 from estimators.arrays import FloatArray
 from studies.claim import Finding, JsonValue, reproduced
-from studies.papers.corner_estimation.inputs import CORNERS, DESIGNS, PACKAGE, STATED_SPEED, Corner
-from studies.papers.topic import Topic
+from studies.papers.corner_estimation.inputs import CORNERS, DESIGNS, STATED_SPEED, Corner, topic
 from studies.plots import Box as Outline
-from studies.plots import Contours, Figure, Mark, Panel, dots
-from studies.plots.colours import BLUE, FORBIDDEN, RED
+from studies.plots import Contours, Figure, Mark, Panel, colours, dots
 from studies.study import PartResult, Scope, Table
 from synthesis.design.stability import affine_quadratic_stability
 from synthesis.lmi.result import Verdict as Proof
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.models.catalogue.corner import Direction
 
-TOPIC = Topic(PACKAGE)
-# Affine P with multi-convexity at the vertices, affine P on the continuum, constant P: (name, relaxation, degree).
-LMI_FORMS: tuple[tuple[str, Relaxation, int], ...] = (
-    ("with multi-convexity", "vertex", 1), ("without", "exact", 1), ("constant P", "exact", 0),
-)  # fmt: skip
-Span = tuple[float, float]
+TOPIC = topic()
+# Affine P with multi-convexity at the vertices, affine P on the continuum, constant P: relaxation and degree.
+LMI_FORMS: dict[str, tuple[Relaxation, int]] = {
+    "with multi-convexity": ("vertex", 1), "without": ("exact", 1), "constant P": ("exact", 0),
+}  # fmt: skip
 Box = tuple[tuple[float, float], ...]
 
 
-@dataclass(frozen=True)
-class DiagonalProof:
-    """Weights w for which diag(w, 1) proves stability at every vertex; empty (low >= high) if there is none.
-
-    `chosen` is a round number from the middle of them, and `proved` what exact arithmetic says of it at all `vertices`.
-    """
-
-    low: float
-    high: float
-    chosen: int
-    proved: bool
-    vertices: int
-
-
-def diagonal_proof(corner: Corner, box: Box, weight: int | None = None) -> DiagonalProof:
+def diagonal_proof(corner: Corner, box: Box, weight: int | None = None) -> dict[str, JsonValue]:
     """Stability of all gains of `box` ((low, high) of L1 and of L2) at all wheel speeds that are stated and any rate.
 
-    `weight` tries a certain w instead of one from the middle.
+    The weights w for which diag(w, 1) proves it at every vertex, [low, high] (low >= high: none); a round one from the middle
+    of them, or `weight`; and what exact arithmetic says of that one.
     """
     matrices = exact_matrices(corner, box)
-    spans = [admissible(matrix) for matrix in matrices]
-    low, high = max(span[0] for span in spans), min(span[1] for span in spans)
+    lows, highs = zip(*map(admissible, matrices), strict=True)
+    low, high = max(lows), min(highs)
     if weight is None:
         weight = _round(float(np.sqrt(low * high))) if 0.0 < low < high else 1
-    return DiagonalProof(low, high, weight, all(decreases(matrix, weight) for matrix in matrices), len(matrices))
+    proved = all(decreases(matrix, weight) for matrix in matrices)
+    return {"weights_of_diag_w_1": [low, high], "weight": weight, "proved_exactly": proved}
 
 
 def exact_matrices(corner: Corner, box: Box) -> list[sp.Matrix]:
@@ -71,16 +55,14 @@ def exact_matrices(corner: Corner, box: Box) -> list[sp.Matrix]:
     return [(A - sp.Matrix([first, second]) * C).subs("wheel_speed", w) for w, first, second in product(*ends)]
 
 
-def admissible(A_e: sp.Matrix) -> Span:
+def admissible(A_e: sp.Matrix) -> tuple[float, float]:
     """All w with diag(w, 1) A_e + A_e' diag(w, 1) < 0: roots of b^2 w^2 + (2 b c - 4 a d) w + c^2; (inf, -inf) if none."""
     a, b, c, d = (float(x) for x in A_e)
-    if not (a < 0.0 and d < 0.0):
-        return np.inf, -np.inf
-    if b == 0.0:
+    if a < 0.0 and d < 0.0 and b == 0.0:
         return c * c / (4.0 * a * d), np.inf
     middle = 2.0 * a * d - b * c
     inside = middle * middle - (b * c) ** 2
-    if not (inside > 0.0 and middle > 0.0):
+    if not (a < 0.0 and d < 0.0 and inside > 0.0 and middle > 0.0):
         return np.inf, -np.inf
     larger = (middle + np.sqrt(inside)) / (b * b)
     return float(c * c / (b * b * larger)), float(larger)
@@ -102,27 +84,23 @@ def _round(value: float, digits: int = 2) -> int:
 @TOPIC.claim("P1-aqs-feas")
 def printed_gains_are_stable(gains: dict[Corner, tuple[float, ...]] | None = None) -> Finding:
     """(28), (40) by three LMIs, and a constant diagonal P in exact arithmetic, for the gains of P1 and of P3."""
-    computed: dict[str, JsonValue] = {}
-    holds = []
+    holds, computed = [], dict[str, JsonValue]()
     for corner in DESIGNS:
         given = corner.gains if gains is None else gains[corner]
         model, column = corner.model, np.array(given)[:, None]
         verdicts = {
             form: affine_quadratic_stability(model, column, degree, settings=LmiSettings(relaxation=relaxation)).verdict
-            for form, relaxation, degree in LMI_FORMS
+            for form, (relaxation, degree) in LMI_FORMS.items()
         }
         proof = diagonal_proof(corner, tuple((gain, gain) for gain in given))
-        holds.append(proof.proved and all(verdict is Proof.CERTIFIED for verdict in verdicts.values()))
-        computed[str(corner)] = {
-            "gains": list(given), "lmi": {form: str(verdict) for form, verdict in verdicts.items()},
-            "weights_of_diag_w_1": [proof.low, proof.high], "weight": proof.chosen, "proved_exactly": proof.proved,
-        }  # fmt: skip
+        holds.append(proof["proved_exactly"] and all(verdict is Proof.CERTIFIED for verdict in verdicts.values()))
+        lmi = {form: str(verdict) for form, verdict in verdicts.items()}
+        computed[str(corner)] = {"gains": list(given), "lmi": lmi, **proof}
     weights = ", ".join(f"{entry['weight']:,}" for entry in computed.values())
     reading = (
-        f"{sum(holds)} of {len(holds)} sets of printed gains (P1 and P3, both directions) are stable with P = "
-        f"diag(w, 1) that does not depend on the wheel speed, w = {weights}, proved in rational numbers on 0 to "
-        f"{STATED_SPEED:g} rad/s for any rate: plain quadratic stability holds already, the affine form and "
-        "multi-convexity are not needed."
+        f"{sum(holds)} of {len(holds)} sets of printed gains (P1 and P3, both directions) are stable with P = diag(w, 1) "
+        f"that does not depend on the wheel speed, w = {weights}, proved in rational numbers on 0 to {STATED_SPEED:g} rad/s "
+        "for any rate: plain quadratic stability holds already, the affine form and multi-convexity are not needed."
     )
     return Finding(computed, reproduced(all(holds)), reading)
 
@@ -133,40 +111,31 @@ def printed_boxes_are_stable(boxes: dict[Direction, Box] | None = None) -> Findi
     computed: dict[str, JsonValue] = {}
     for direction, corner in CORNERS.items():
         box = corner.box if boxes is None else boxes[direction]
-        proof = diagonal_proof(corner, box)
-        slowest = slowest_poles(corner, *gain_grid(box, 21))
         computed[direction] = {
-            "L1": list(box[0]), "L2": list(box[1]), "vertices": proof.vertices,
-            "weights_of_diag_w_1": [proof.low, proof.high], "weight": proof.chosen, "proved_exactly": proof.proved,
-            "slowest_pole_1_s": float(slowest.max()),
+            "L1": list(box[0]), "L2": list(box[1]), "vertices": len(exact_matrices(corner, box)),
+            **diagonal_proof(corner, box),
+            "slowest_pole_1_s": float(slowest_poles(corner, box, 21, speeds=91)[-1].max()),
         }  # fmt: skip
     x, y = computed.values()
     proved = bool(x["proved_exactly"] and y["proved_exactly"])
+    found = (
+        f"P = diag({x['weight']:,}, 1) longitudinally and diag({y['weight']:,}, 1) laterally prove every gain of both "
+        f"boxes on 0 to {STATED_SPEED:g} rad/s, for any rate, in rational numbers."
+    )
     reading = (
         "A_e is affine in omega, L1 and L2 one at a time, so a constant P decides at the eight vertices. "
-        + (
-            f"P = diag({x['weight']:,}, 1) longitudinally and diag({y['weight']:,}, 1) laterally prove every gain "
-            f"of both boxes on 0 to {STATED_SPEED:g} rad/s, for any rate, in rational numbers. "
-            if proved
-            else "No constant diagonal P proves both boxes. "
-        )
-        + f"The slowest pole on a grid is {x['slowest_pole_1_s']:.3g} and {y['slowest_pole_1_s']:.3g} 1/s."
+        f"{found if proved else 'No constant diagonal P proves both boxes.'} "
+        f"The slowest pole on a grid is {x['slowest_pole_1_s']:.3g} and {y['slowest_pole_1_s']:.3g} 1/s."
     )
     return Finding(computed, reproduced(proved), reading)
 
 
-def gain_grid(box: Box, points: int) -> tuple[FloatArray, FloatArray]:
-    """L1 and L2 over a box, each (points, points)."""
-    first, second = (np.linspace(low, high, points) for low, high in box)
-    L1, L2 = np.meshgrid(first, second)
-    return L1, L2
-
-
-def slowest_poles(corner: Corner, L1: FloatArray, L2: FloatArray, speeds: int = 91) -> FloatArray:
-    """Largest real part of the frozen poles in 1/s over all wheel speeds, for each pair of gains."""
+def slowest_poles(corner: Corner, box: Box, points: int, speeds: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """L1 and L2 over a box, and the largest real part of the frozen poles in 1/s over all wheel speeds: (points, points) each."""
     numeric = corner.model.on(np.linspace(0.0, STATED_SPEED, speeds))
+    L1, L2 = np.meshgrid(*(np.linspace(*span, points) for span in box))
     gains = np.stack([L1, L2], axis=-1)[..., None, :, None]
-    return np.asarray(np.linalg.eigvals(numeric.A - gains @ numeric.C).real.max(axis=(-2, -1)))
+    return L1, L2, np.asarray(np.linalg.eigvals(numeric.A - gains @ numeric.C).real.max(axis=(-2, -1)))
 
 
 @TOPIC.part("quadratic-stability", "Stability of the printed gains and gain boxes", 3.0)
@@ -174,42 +143,33 @@ def quadratic_stability(scope: Scope) -> PartResult:
     """Both claims, every proof in a table, and the boxes over the plane of gains."""
     claims = TOPIC.found()
     gains, boxes = (claim.finding.computed for claim in claims)
-    rows = []
-    for name, entry in (*gains.items(), *((f"box of P1, {d}", e) for d, e in boxes.items())):
-        low, high = entry["weights_of_diag_w_1"]
-        rows.append([name, float(low), float(high), entry["weight"], entry["proved_exactly"]])
+    proofs = {**gains, **{f"box of P1, {direction}": entry for direction, entry in boxes.items()}}
+    rows = [
+        [name, *map(float, e["weights_of_diag_w_1"]), e["weight"], e["proved_exactly"]] for name, e in proofs.items()
+    ]
     caption = (
-        "Constant Lyapunov matrices diag(w, 1) that prove stability for every wheel speed from 0 to 180 rad/s and "
-        "any rate: the interval of admissible weights w in closed form, and a round one that was checked in "
-        "rational numbers."
+        "Constant Lyapunov matrices diag(w, 1) that prove stability for every wheel speed from 0 to 180 rad/s and any rate: "
+        "the interval of admissible weights w in closed form, and a round one that was checked in rational numbers."
     )
     columns = ["gains", "least w [1/s^2]", "greatest w [1/s^2]", "w checked [1/s^2]", "proved exactly"]
-    table = Table("diagonal-proofs", caption, columns, rows)
-    return PartResult(claims, [table], [box_figure(41 if scope.quick else 81)])
-
-
-def box_figure(points: int = 81) -> Figure:
-    """Slowest frozen pole over the plane of gains, with the printed boxes."""
     panels = []
-    for direction, corner in CORNERS.items():
+    steps = ([-200.0, -100.0, -50.0, -25.0, 0.0], [-10.0, -5.0, -2.5, -1.0, 0.0])
+    for (direction, corner), levels in zip(CORNERS.items(), steps, strict=True):
         box, (L1, L2) = corner.box, corner.gains
         wide = tuple((low - 0.6 * (high - low), high + 0.6 * (high - low)) for low, high in box)
-        first, second = gain_grid(wide, points)
-        slowest = slowest_poles(corner, first, second, speeds=46)
-        steps = [-200.0, -100.0, -50.0, -25.0, 0.0] if direction == "longitudinal" else [-10.0, -5.0, -2.5, -1.0, 0.0]
+        poles = slowest_poles(corner, wide, 41 if scope.quick else 81, speeds=46)
         marks: list[Mark] = [
-            Contours(first, second, slowest, [0.0, max(1.0, slowest.max())], FORBIDDEN, filled=True),
-            Contours(first, second, slowest, steps),
-            Outline(box[0], box[1], "printed box", BLUE, 1.8),
-            dots(L1, L2, "printed gains", RED),
-        ]
+            Contours(*poles, [0.0, max(1.0, poles[-1].max())], colours.FORBIDDEN, filled=True),
+            Contours(*poles, levels), Outline(box[0], box[1], "printed box", colours.BLUE, 1.8),
+            dots(L1, L2, "printed gains", colours.RED),
+        ]  # fmt: skip
         panels.append(Panel(marks, "L₁ [m/s]", "L₂ [m/s²]", direction, grid=False))
-    return Figure(
+    figure = Figure(
         "gain-boxes",
         f"Slowest pole in 1/s (largest real part over wheel speeds from 0 to {STATED_SPEED:g} rad/s) over the plane "
         "of constant gains; shaded: unstable at some wheel speed. The printed boxes lie well inside the stable "
         "region; one constant Lyapunov matrix proves each of them, exactly. P1, text after (28) and (40).",
         "Contour maps of the slowest pole with the printed gain boxes inside the stable region.",
-        panels,
-        legend="below",
-    )
+        panels, legend="below",
+    )  # fmt: skip
+    return PartResult(claims, [Table("diagonal-proofs", caption, columns, rows)], [figure])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -12,15 +13,13 @@ from scipy.linalg import solve_discrete_are
 from estimators.forces.planar import planar_model
 from estimators.vehicle import VehicleParameters
 from studies.claim import Finding
-from studies.papers.corner_estimation.inputs import PACKAGE
+from studies.papers.corner_estimation.inputs import PACKAGE, topic
 from studies.papers.published import printed_numbers
-from studies.papers.topic import Topic
 from studies.papers.verdicts import erratum
-from studies.plots import Axis, Bars, Figure, Level, Mark, Panel, Words
-from studies.plots.colours import BLUE, RED
-from studies.study import Cell, PartResult, Scope, Table
+from studies.plots import Axis, Bars, Figure, Level, Mark, Panel, Words, colours
+from studies.study import PartResult, Scope, Table
 
-TOPIC = Topic(PACKAGE)
+TOPIC = topic()
 BETA = 2  # of P1 and P2
 SIZES = (3, 1)  # states of the lateral filter of P1, and of the force filter of P2
 STEP = 0.005  # s
@@ -51,37 +50,31 @@ class Weights:
 
 def weights(size: int, form: Form) -> Weights:
     """For N states with epsilon^2 = 3/N: W_i = (N + eta)/2 as printed, 1/(2 (N + eta)) corrected."""
-    epsilon_squared = Fraction(3, size)
-    eta = epsilon_squared * size - size
-    spread = size + eta
+    epsilon_squared, spread = Fraction(3, size), Fraction(3)  # N + eta = epsilon^2 N
+    centre = (spread - size) / spread
     outer = spread / 2 if form == "printed" else 1 / (2 * spread)
-    return Weights(size, eta / spread, eta / spread + 1 - epsilon_squared + BETA, outer, spread)
+    return Weights(size, centre, centre + 1 - epsilon_squared + BETA, outer, spread)
 
 
 @TOPIC.claim("P1-ukf")
 def sums_of_the_weights(printed_form: Form = "printed", sizes: tuple[int, ...] = SIZES) -> Finding:
     """Sums of the weights and second moments in rational numbers, both forms."""
-    forms = {
-        name: [weights(n, form) for n in sizes]
-        for name, form in (("printed", printed_form), ("corrected", "corrected"))
-    }
+    wrong, right = ([weights(n, form) for n in sizes] for form in (printed_form, FORMS[1]))
+    entries = {"outer_weight": "outer", "sum_of_mean_weights": "total", "second_moment": "second_moment"}
     computed = {
-        f"N={right.size}": {
-            "N_plus_eta": float(right.tau_squared),
-            "outer_weight": {"printed": float(wrong.outer), "corrected": float(right.outer)},
-            "sum_of_mean_weights": {"printed": float(wrong.total), "corrected": float(right.total)},
-            "second_moment": {"printed": float(wrong.second_moment), "corrected": float(right.second_moment)},
-            "centre_weights": [float(right.centre_mean), float(right.centre_spread)],
+        f"N={w.size}": {
+            "N_plus_eta": float(w.tau_squared), "centre_weights": [float(w.centre_mean), float(w.centre_spread)],
+            **{name: {"printed": float(getattr(printed, of)), "corrected": float(getattr(w, of))}
+               for name, of in entries.items()},
         }
-        for wrong, right in zip(forms["printed"], forms["corrected"], strict=True)
-    }
-    sums = ", ".join(f"{w.total} for N = {w.size}" for w in forms["printed"])
-    first = forms["corrected"][0]
+        for printed, w in zip(wrong, right, strict=True)
+    }  # fmt: skip
+    sums = ", ".join(f"{w.total} for N = {w.size}" for w in wrong)
     reading = (
-        f"(N + eta)/2 gives mean weights that add up to {sums}. 1/(2 (N + eta)) gives {first.outer}, "
-        f"a sum of {first.total} and the right second moment, with tau = sqrt({first.tau_squared})."
+        f"(N + eta)/2 gives mean weights that add up to {sums}. 1/(2 (N + eta)) gives {right[0].outer}, "
+        f"a sum of {right[0].total} and the right second moment, with tau = sqrt({right[0].tau_squared})."
     )
-    good = [all(w.total == 1 and w.second_moment == 1 for w in form) for form in forms.values()]
+    good = [all(w.total == 1 and w.second_moment == 1 for w in form) for form in (wrong, right)]
     return Finding(computed, erratum(*good), reading)
 
 
@@ -101,51 +94,37 @@ def filter_lag(process: float, measurement: float, newtons: float) -> float:
 @TOPIC.part("sigma-weights", "Sigma points and covariances of the lateral force filter", 1.0)
 def sigma_weights(scope: Scope) -> PartResult:
     """Weights of both papers in both forms, and the lag of the filter in every reading of its covariances."""
-    rows: list[list[Cell]] = [
-        [f"N = {n}", form, *map(str, (w.centre_mean, w.centre_spread, w.outer, w.total, w.second_moment))]
-        for n in SIZES
-        for form in FORMS
-        for w in [weights(n, form)]
-    ]
-    caption = (
-        "Sigma point weights with epsilon = sqrt(3/N), beta = 2 in rational numbers; sum and second moment must be one."
+    found = {(f"N = {n}", form): weights(n, form) for n, form in product(SIZES, FORMS)}
+    entries = ("centre_mean", "centre_spread", "outer", "total", "second_moment")
+    weight_table = Table(
+        "sigma-weights",
+        "Sigma point weights with epsilon = sqrt(3/N), beta = 2 in rational numbers; sum and second moment must be one.",
+        ["states", "form", "W0 of the mean", "W0 of the covariance", "W_i", "sum of the mean weights", "second moment"],
+        [[*names, *(str(getattr(w, entry)) for entry in entries)] for names, w in found.items()],
     )
-    columns = ["states", "form", "W0 of the mean", "W0 of the covariance", "W_i", "sum of the mean weights",
-               "second moment"]  # fmt: skip
-    weight_table = Table("sigma-weights", caption, columns, rows)
-    rows = [
-        [entry["name"], unit, Q, R, filter_lag(Q, R, newtons)]
-        for entry in printed_numbers(PACKAGE)["force_filter"]["readings"]
-        for Q, R in [(entry["process"], entry["measurement"])]
-        for unit, newtons in (("N", 1.0), ("kN", 1e3))
-    ]
-    caption = (
-        "Slowest time constant of the lateral force filter straight ahead at 200 Hz, for every reading of the "
-        "printed covariances Q I and R I: with forces in newtons it cannot follow a lane change, with kilonewtons "
-        "it can. The unit is not printed."
+    units = (("N", 1.0), ("kN", 1e3))
+    readings = (entry.values() for entry in printed_numbers(PACKAGE)["force_filter"]["readings"])
+    lag_table = Table(
+        "filter-lag",
+        "Slowest time constant of the lateral force filter straight ahead at 200 Hz, for every reading of the printed "
+        "covariances Q I and R I: with forces in newtons it cannot follow a lane change, with kilonewtons it can. The unit "
+        "is not printed.",
+        ["covariances", "unit of force", "Q", "R", "time constant [s]"],
+        [[name, unit, Q, R, filter_lag(Q, R, size)] for (name, Q, R), (unit, size) in product(readings, units)],
     )
-    columns = ["covariances", "unit of force", "Q", "R", "time constant [s]"]
-    return PartResult(TOPIC.found(), [weight_table, Table("filter-lag", caption, columns, rows)], [weight_figure()])
-
-
-def weight_figure() -> Figure:
-    """Sums of sigma point weights, printed against corrected."""
     marks: list[Mark] = [Level(1.0)]
     names = ("W = (N + η)/2, as printed", "W = 1/(2 (N + η))")
-    for form, name, colour, shift in zip(FORMS, names, (RED, BLUE), (-0.19, 0.19), strict=True):
-        totals = [weights(n, form).total for n in SIZES]
-        places = [k + shift for k in range(len(SIZES))]
-        marks.append(Bars(places, [float(total) for total in totals], name, colour, 0.36, alpha=0.85))
-        marks += [
-            Words(place, float(total), str(total), offset=(0, 2), horizontal="center")
-            for place, total in zip(places, totals, strict=True)
-        ]
+    for form, name, colour, shift in zip(FORMS, names, (colours.RED, colours.BLUE), (-0.19, 0.19), strict=True):
+        totals = {k + shift: weights(n, form).total for k, n in enumerate(SIZES)}
+        marks.append(Bars([*totals], [*map(float, totals.values())], name, colour, 0.36, alpha=0.85))
+        for place, total in totals.items():
+            marks.append(Words(place, float(total), str(total), offset=(0, 2), horizontal="center"))
     x = Axis(ticks={0: "N = 3, lateral forces (P1)", 1: "N = 1, wheel force (P2)"})
-    return Figure(
+    figure = Figure(
         "sigma-weights",
         "What the sigma point weights of the mean add up to, as printed and corrected, in both papers; the line "
         "marks one, without which every predicted mean is off by that factor. P1 notes 3, P2 notes 3.",
         "Bars: the printed weights add up to 9 for three states and 11/3 for one, the corrected ones to 1.",
-        Panel(marks, x, "sum of the mean weights [1]", legend="upper right"),
-        size=(4.8, 3.0),
-    )
+        Panel(marks, x, "sum of the mean weights [1]", legend="upper right"), size=(4.8, 3.0),
+    )  # fmt: skip
+    return PartResult(TOPIC.found(), [weight_table, lag_table], [figure])

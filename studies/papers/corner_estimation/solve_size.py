@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from studies.claim import Finding, JsonValue
-from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, POINTS, literal_design
-from studies.papers.topic import Topic
+from studies.papers.corner_estimation.inputs import CORNERS, POINTS, literal_design, topic
 from studies.papers.verdicts import derived
 from studies.study import Cell, PartResult, Scope, Table
 from synthesis.design.hinf_observer import observer_problem
@@ -26,8 +25,7 @@ from synthesis.lmi.scaling import observer_scale
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import solve
 
-TOPIC = Topic(PACKAGE)
-ROUNDING = 1e-12  # relative: all that two assemblies of the same numbers may differ by
+TOPIC = topic()
 
 
 def conic_problem(points: int, degree: int) -> tuple[LmiProblem, LmiSettings]:
@@ -59,20 +57,20 @@ def one_by_one(relaxed: RelaxedProblem) -> Any:
 def expressions(problem: Any) -> int:
     """Nodes in the expression trees of all constraints: the layer visits each before the solver sees anything."""
 
-    def nodes(expression: Any) -> int:
-        return 1 + sum(nodes(part) for part in expression.args)
+    stack, count = list(problem.constraints), 0
+    while stack:
+        stack += stack.pop().args
+        count += 1
+    return count
 
-    return sum(nodes(constraint) for constraint in problem.constraints)
+
+Layer = Callable[[RelaxedProblem], Any]
 
 
 @TOPIC.claim("P1-hinf-time")
-def solve_size(
-    points: int = POINTS,
-    degree: int = 1,
-    layer: Callable[[RelaxedProblem], Any] = one_by_one,
-    walked: Callable[[Any], int] = expressions,
-) -> Finding:
+def solve_size(points: int = POINTS, layer: Layer = one_by_one, walked: Callable[[Any], int] = expressions) -> Finding:
     """Count (30) in both assemblies and in its exact form, on `points` wheel speeds and on twice as many."""
+    degree = 1
     grid, finer = (relaxed_problem(number, degree, "grid") for number in (points, 2 * points))
     exact, again = (assemble(relaxed_problem(number, degree, "exact")) for number in (points, 2 * points))
     direct, modelled = assemble(grid), layer(grid)
@@ -80,9 +78,8 @@ def solve_size(
     arrays = {"points": len(grid.sampled), "twice_the_points": len(finer.sampled)}
     same = _hands_over(modelled, direct)
     computed: dict[str, JsonValue] = {
-        "points": points, "degree": degree, "conic_problem": _size(direct),
-        "layer_hands_over_the_same_problem": same, "expressions_walked_by_the_layer": work,
-        "arrays_stacked_by_direct_assembly": arrays,
+        "points": points, "degree": degree, "conic_problem": _size(direct), "layer_hands_over_the_same_problem": same,
+        "expressions_walked_by_the_layer": work, "arrays_stacked_by_direct_assembly": arrays,
         "exact_relaxation": _size(exact), "exact_relaxation_with_twice_the_points": _size(again),
     }  # fmt: skip
     grows = work["twice_the_points"] - work["points"] >= points and arrays["twice_the_points"] == arrays["points"]
@@ -108,13 +105,13 @@ def _size(data: ConicData) -> dict[str, JsonValue]:
 
 
 def _hands_over(problem: Any, direct: ConicData) -> bool:
-    """Whether the layer ends with the rows, cones and numbers of direct assembly."""
+    """Whether the layer ends with the rows, cones and numbers of direct assembly, these to 1e-12 relative (rounding)."""
     data = problem.get_problem_data("CLARABEL")[0]
     cones, A = data["dims"], data["A"]
     if (cones.zero, tuple(cones.psd), A.shape) != (direct.equalities, direct.semidefinite, direct.A.shape):
         return False
     pairs = ((A.toarray(), direct.A.toarray()), (data["b"], direct.b), (data["c"], direct.q))
-    return all(float(np.abs(a - b).max()) <= ROUNDING * float(np.abs(b).max()) for a, b in pairs)
+    return all(float(np.abs(a - b).max()) <= 1e-12 * float(np.abs(b).max()) for a, b in pairs)
 
 
 @TOPIC.part("solve-time", "Preparing and solving the H-infinity problem", 8.0)
@@ -123,10 +120,11 @@ def solve_time(scope: Scope) -> PartResult:
     claims = TOPIC.found()
     found = claims[0].finding.computed
     rows: list[list[Cell]] = []
-    sizes = {f"{found['points']} points, one by one": "conic_problem", "exact relaxation": "exact_relaxation"}
-    for name, size in ((name, found[key]) for name, key in sizes.items()):
-        cones = ", ".join(f"{number} of {shape}" for shape, number in size["cones"].items())
-        rows.append([name, size["unknowns"], size["rows"], sum(size["cones"].values()), cones])
+    forms = (f"{found['points']} points, one by one", "conic_problem"), ("exact relaxation", "exact_relaxation")
+    for name, key in forms:
+        unknowns, height, cones = found[key].values()
+        sizes = ", ".join(f"{number} of {shape}" for shape, number in cones.items())
+        rows.append([name, unknowns, height, sum(cones.values()), sizes])
     caption = (
         f"(30) as the solver sees it, degree {found['degree']}, longitudinal: unknowns, rows and positive semidefinite "
         "cones. The exact relaxation holds between the points, too, and does not grow with their number."
@@ -139,9 +137,8 @@ def time_table(points: int) -> Table:
     """Seconds of one solve of (30) by both assemblies, on this machine as busy as it is: no part of any verdict."""
     problem, settings = conic_problem(points, 1)
     rows: list[list[Cell]] = []
-    for name, solver in (
-        ("cvxpy, then Clarabel", "cvxpy:CLARABEL"), ("conic data assembled directly, Clarabel", "CLARABEL"),
-    ):  # fmt: skip
+    roads = {"cvxpy, then Clarabel": "cvxpy:CLARABEL", "conic data assembled directly, Clarabel": "CLARABEL"}
+    for name, solver in roads.items():
         solve(problem, replace(settings, solver=solver, points=2))  # imports and first calls are not counted
         start = perf_counter()
         report = solve(problem, replace(settings, solver=solver)).report

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 
 import numpy as np
 
 from analysis.observability.gramians import SampledSequence, sampled_sequence
 from estimators.arrays import FloatArray
 from studies.papers.published import printed_numbers
+from studies.papers.topic import Topic
 from synthesis.models.catalogue.longitudinal_speed import longitudinal_speed_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
 
 PACKAGE = "studies.papers.longitudinal_speed"
+topic = partial(Topic, PACKAGE)  # one for each file
 PARAMETERS = "longitudinal-speed"
 TYPICAL = (1e-3, 1.0, 0.1)  # sizes of z [m], V_r [m/s], z' [m/s], to compare singular values
 SAMPLE_TIME = float(printed_numbers(PACKAGE)["filter"]["sample_time"])  # s, 200 Hz
@@ -40,10 +42,8 @@ def noise(mode: str = "normal") -> tuple[float, FloatArray]:
 
 def structures(sequence: SampledSequence) -> dict[str, FloatArray]:
     """What may stand for the unprinted 3 x 3 structure S of Q = q S (P2 notes 10): each (K, 3, 3)."""
-    shape = (len(sequence.A), 3, 3)
-    B = np.array(speed_model().B, float)
-    held = sequence.B @ np.swapaxes(sequence.B, 1, 2)
-    return {"I": np.broadcast_to(np.eye(3), shape), "B B'": np.broadcast_to(B @ B.T, shape), "B_k B_k'": held}
+    B, held = np.array(speed_model().B, float), sequence.B @ np.swapaxes(sequence.B, 1, 2)
+    return {"I": np.broadcast_to(np.eye(3), held.shape), "B B'": np.broadcast_to(B @ B.T, held.shape), "B_k B_k'": held}
 
 
 @dataclass(frozen=True)
@@ -80,11 +80,9 @@ def constant(speed: float, samples: int) -> WheelRecord:
 
 def accelerating(speed: float, acceleration: float, ramp: int, samples: int) -> WheelRecord:
     """From `speed` at a constant acceleration for `ramp` samples, then constant."""
-    k = np.arange(samples)
-    return WheelRecord(
-        f"{acceleration:g} rad/s² from {speed:g} rad/s", times(samples),
-        speed + acceleration * SAMPLE_TIME * np.minimum(k, ramp), np.where(k < ramp, acceleration, 0.0),
-    )  # fmt: skip
+    k, name = np.arange(samples), f"{acceleration:g} rad/s² from {speed:g} rad/s"
+    speeds = speed + acceleration * SAMPLE_TIME * np.minimum(k, ramp)
+    return WheelRecord(name, times(samples), speeds, np.where(k < ramp, acceleration, 0.0))
 
 
 def launch(standing: float, duration: float) -> WheelRecord:
@@ -110,6 +108,5 @@ def braking(start: float, end: float, duration: float) -> WheelRecord:
     t = times(round(duration / SAMPLE_TIME))
     share = np.clip(t / (0.7 * duration), 0.0, 1.0)
     slope = np.where(share < 1.0, np.pi / (0.7 * duration) * np.sin(np.pi * share), 0.0)
-    fall = 0.5 * (start - end)
-    speed = start - fall * (1.0 - np.cos(np.pi * share))
-    return WheelRecord(f"braking from {start:g} to {end:g} rad/s", t, speed, -fall * slope)
+    fall, name = 0.5 * (start - end), f"braking from {start:g} to {end:g} rad/s"
+    return WheelRecord(name, t, start - fall * (1.0 - np.cos(np.pi * share)), -fall * slope)

@@ -9,17 +9,15 @@ import sympy as sp
 from pint import UnitRegistry
 
 from studies.claim import Finding, reproduced
-from studies.papers.longitudinal_speed.inputs import PACKAGE, parameters, speed_model
-from studies.papers.topic import Topic
+from studies.papers.longitudinal_speed.inputs import parameters, speed_model, topic
 from studies.papers.verdicts import erratum
 from studies.study import PartResult, Scope
 
-TOPIC = Topic(PACKAGE)
-PRINTED_M = ((1, 0, 0), (0, 1, 0), (0, -1, 1))
+TOPIC = topic()
 
 
 @TOPIC.claim("P2-19M")
-def descriptor_form(M: tuple[tuple[int, ...], ...] = PRINTED_M) -> Finding:
+def descriptor_form(M: tuple[tuple[int, ...], ...] = ((1, 0, 0), (0, 1, 0), (0, -1, 1))) -> Finding:
     """M^-1 times (19) against the model, and its third row against d/dt of the first."""
     model = speed_model()
     inverse = sp.Matrix(M).inv()
@@ -27,13 +25,11 @@ def descriptor_form(M: tuple[tuple[int, ...], ...] = PRINTED_M) -> Finding:
     t = sp.Symbol("t")
     z, v, speed = (sp.Function(name)(t) for name in ("z", "v", "w"))
     rate = sp.Symbol("kappa") * sp.Symbol("effective_radius")
-    moving = {sp.Symbol("wheel_speed"): speed, sp.Symbol("wheel_acceleration"): speed.diff(t)}
-    third = (A * sp.Matrix([z, v, z.diff(t)]) + B * v.diff(t))[2].subs(moving)
+    third = (A * sp.Matrix([z, v, z.diff(t)]) + B * v.diff(t))[2]
+    third = third.subs({"wheel_speed": speed, "wheel_acceleration": speed.diff(t)})
     mismatch = sp.simplify((v - rate * speed * z).diff(t) - third)
-    computed = {
-        "B": [int(entry) for entry in B], "third_row_of_A": [str(entry) for entry in A.row(2)],
-        "third_row_minus_derivative_of_the_first": str(mismatch),
-    }  # fmt: skip
+    computed = {"B": [*map(int, B)], "third_row_of_A": [*map(str, A.row(2))],
+                "third_row_minus_derivative_of_the_first": str(mismatch)}  # fmt: skip
     same = sp.Matrix(model.A) == A and sp.Matrix(model.B) == B
     reading = (
         f"M^-1 gives B = {computed['B']}' and {'leaves' if same else 'does not leave'} A as it is; the third row is z'' = "
@@ -54,13 +50,12 @@ def patch_constant(printed: str = "7/6 L") -> Finding:
     kappa = Fraction(str(parameters().tire["longitudinal"].kappa.value))
     lengths = {"7/6 L": kappa * Fraction(6, 7), "7/(6 L)": Fraction(7, 6) / kappa}
     right = lengths["7/(6 L)"]
-    computed = {
-        "kappa_1_m": float(kappa), "unit_fits": fits, "patch_length_m": {k: float(v) for k, v in lengths.items()},
-    }  # fmt: skip
+    metres = {name: float(length) for name, length in lengths.items()}
+    computed = {"kappa_1_m": float(kappa), "unit_fits": fits, "patch_length_m": metres}
     reading = (
         f"kappa R_e |omega| z must be a velocity, so kappa is in 1/m: 7/(6 L) fits and gives a patch of L = {right} m = "
         f"{float(right):.4f} m for kappa = {float(kappa):g} 1/m; 7/6 L has the unit of a length and would mean "
-        f"{float(lengths['7/6 L']):.2f} m."
+        f"{metres['7/6 L']:.2f} m."
     )
     plausible = 0.05 < right < 0.3  # m, contact patches of car tires
     return Finding(computed, erratum(fits[printed], fits["7/(6 L)"] and plausible), reading)

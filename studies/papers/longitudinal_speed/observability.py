@@ -13,23 +13,12 @@ from analysis.observability.gramians import growing_observability
 from analysis.observability.matrix import ObservabilityMatrix, observability_matrix
 from analysis.observability.rank_loss import rank_loss
 from studies.claim import Finding, reproduced
-from studies.papers.longitudinal_speed.inputs import (
-    PACKAGE,
-    TYPICAL,
-    WheelRecord,
-    braking,
-    constant,
-    launch,
-    slalom,
-    speed_model,
-)
-from studies.papers.topic import Topic
-from studies.plots import DASHES, Axis, Figure, Level, Line, Map, Mark, Panel, Words
-from studies.plots.colours import CURVES, RED
+from studies.papers.longitudinal_speed import inputs
+from studies.plots import DASHES, Axis, Figure, Level, Line, Map, Mark, Panel, Words, colours
 from studies.study import Cell, PartResult, Scope, Table
 from synthesis.models.catalogue.longitudinal_speed import WHEEL_MOTION
 
-TOPIC = Topic(PACKAGE)
+TOPIC = inputs.topic()
 SPEEDS = (1, 40, 140)  # rad/s
 ACCELERATION, JERK = "wheel_acceleration", "wheel_acceleration_rate"
 RANK_TOLERANCE = 1e-12  # singular values of the gramian's factor, over the largest, states in their typical sizes
@@ -39,7 +28,7 @@ Ranks = npt.NDArray[np.int_]
 @cache
 def speed_observability() -> ObservabilityMatrix:
     """O_3 of (24) with omega' as the parameter of the model and omega'' as its rate."""
-    return observability_matrix(speed_model(), motion=WHEEL_MOTION)
+    return observability_matrix(inputs.speed_model(), motion=WHEEL_MOTION)
 
 
 def exact_ranks(acceleration: object = 0, jerk: object = 0) -> list[int]:
@@ -62,10 +51,10 @@ def rank_over_the_region(accelerations: tuple[object, ...] = (0, 1, "-5")) -> Fi
     ranks = {f"acceleration {a} rad/s^2": exact_ranks(a) for a in accelerations}
     changing, lowest_speed = exact_ranks(0, 1), second_piece()
     (determinant,) = speed_observability().minors(symbolic=True)
+    always = rank_loss(speed_observability(), {JERK: 0, ACCELERATION: 0}).always
     computed = {
         "determinant": str(determinant), "wheel_speeds_rad_s": list(SPEEDS), "ranks": ranks,
-        "ranks_with_changing_acceleration": changing,
-        "lost_at_every_constant_speed": rank_loss(speed_observability(), {JERK: 0, ACCELERATION: 0}).always,
+        "ranks_with_changing_acceleration": changing, "lost_at_every_constant_speed": always,
         "lost_while_accelerating_below_rad_s": lowest_speed,
     }  # fmt: skip
     reading = (
@@ -78,33 +67,29 @@ def rank_over_the_region(accelerations: tuple[object, ...] = (0, 1, "-5")) -> Fi
 
 
 @cache
-def histories() -> tuple[WheelRecord, ...]:
+def histories() -> tuple[inputs.WheelRecord, ...]:
     """Wheel speed histories of the kinds that Fig. 1 covers, 6 s each; constant speed is ours."""
-    return launch(2.0, 6.0), slalom(45.0, 4.0, 0.5, 6.0), braking(80.0, 25.0, 6.0), constant(40.0, 1200)
+    return (
+        inputs.launch(2.0, 6.0),
+        inputs.slalom(45.0, 4.0, 0.5, 6.0),
+        inputs.braking(80.0, 25.0, 6.0),
+        inputs.constant(40.0, 1200),
+    )
 
 
-def gramian_rank(record: WheelRecord) -> Ranks:
+def gramian_rank(record: inputs.WheelRecord) -> Ranks:
     """rank V(0, N) of (A1) for every N, (K,)."""
-    return growing_observability(record.sequence.A, record.sequence.C, TYPICAL).rank(RANK_TOLERANCE)
+    return growing_observability(record.sequence.A, record.sequence.C, inputs.TYPICAL).rank(RANK_TOLERANCE)
 
 
 @TOPIC.part("observability", "Observability of the three-state model (Fig. 1)", 4.0)
 def observability(scope: Scope) -> PartResult:
-    """Rank of (24), and Fig. 1."""
+    """Exact rank of (24) at points, numerical rank of the gramian along the histories, and Fig. 1."""
     ranks = [gramian_rank(record) for record in histories()]
-    figures = [rank_figure(ranks), determinant_figure(81 if scope.quick else 201)]
-    return PartResult(TOPIC.found(), [rank_table(ranks)], figures)
-
-
-def rank_table(ranks: Sequence[Ranks]) -> Table:
-    """Exact rank of (24) at points, and numerical rank of the gramian along the histories."""
     rows: list[list[Cell]] = []
-    for name, found in (
-        ("constant speed", exact_ranks()),
-        ("accelerating, 1 rad/s^2", exact_ranks(1)),
-        ("acceleration changing, 1 rad/s^3", exact_ranks(0, 1)),
-    ):
-        where = f"at {', '.join(map(str, SPEEDS))} rad/s"
+    motions = {"constant speed": (), "accelerating, 1 rad/s^2": (1,), "acceleration changing, 1 rad/s^3": (0, 1)}
+    for name, motion in motions.items():
+        found, where = exact_ranks(*motion), f"at {', '.join(map(str, SPEEDS))} rad/s"
         rows.append(["rank of O3, exact", name, where, min(found), max(found)])
     for record, rank in zip(histories(), ranks, strict=True):
         rows.append(["rank of V(0, N)", record.name, f"{len(rank)} samples", int(rank[len(rank) // 4]), int(rank[-1])])
@@ -113,24 +98,8 @@ def rank_table(ranks: Sequence[Ranks]) -> Table:
         "speeds), and numerical rank of the gramian (A1) along wheel speed histories (after a quarter of the record and at "
         f"its end, tolerance {RANK_TOLERANCE:g})."
     )
-    return Table("ranks", caption, ["what", "motion", "where", "rank, first", "rank, last"], rows)
-
-
-def rank_panels(records: Sequence[WheelRecord], ranks: Sequence[Ranks], speed: Axis) -> list[list[Panel]]:
-    """Wheel speeds, and below them the ranks of the gramian, a little apart so that no line hides another."""
-    upper, lower = [], []
-    for k, (record, rank) in enumerate(zip(records, ranks, strict=True)):
-        color, dash = CURVES[k], DASHES[k % len(DASHES)]
-        apart = 0.05 * (k - (len(records) - 1) / 2)
-        upper.append(Line(record.time, record.speed, record.name, color, dash))
-        lower.append(Line(record.time, rank + apart, "", color, dash, steps=True))
-    below = Axis("rank of V(0, N) [1]", 0.7, 3.4, ticks=[1, 2, 3])
-    return [[Panel(upper, "", speed)], [Panel(lower, Axis("time [s]", 0.0, 6.0), below)]]
-
-
-def rank_figure(ranks: Sequence[Ranks]) -> Figure:
-    """Wheel speed and rank of V(0, N) over time."""
-    return Figure(
+    table = Table("ranks", caption, ["what", "motion", "where", "rank, first", "rank, last"], rows)
+    figure = Figure(
         "gramian-rank",
         "Wheel speed histories (above) and numerical rank of the observability gramian over all samples so far (below, lines "
         f"a little apart; tolerance {RANK_TOLERANCE:g} of the largest singular value of its factor, states in typical sizes). "
@@ -139,19 +108,32 @@ def rank_figure(ranks: Sequence[Ranks]) -> Figure:
         "The rank is two during the two seconds of standstill and for constant speed, three otherwise.",
         rank_panels(histories(), ranks, Axis("wheel speed [rad/s]")), (7.2, 4.4), legend="below", share_x="col",
     )  # fmt: skip
+    return PartResult(TOPIC.found(), [table], [figure, determinant_figure(81 if scope.quick else 201)])
 
 
-def determinant_figure(points: int = 201) -> Figure:
+def rank_panels(records: Sequence[inputs.WheelRecord], ranks: Sequence[Ranks], speed: Axis) -> list[list[Panel]]:
+    """Wheel speeds, and below them the ranks of the gramian, a little apart so that no line hides another."""
+    upper, lower = [], []
+    for k, (record, rank) in enumerate(zip(records, ranks, strict=True)):
+        color, dash = colours.CURVES[k], DASHES[k % len(DASHES)]
+        apart = 0.05 * (k - (len(records) - 1) / 2)
+        upper.append(Line(record.time, record.speed, record.name, color, dash))
+        lower.append(Line(record.time, rank + apart, "", color, dash, steps=True))
+    below = Axis("rank of V(0, N) [1]", 0.7, 3.4, ticks=[1, 2, 3])
+    return [[Panel(upper, "", speed)], [Panel(lower, Axis("time [s]", 0.0, 6.0), below)]]
+
+
+def determinant_figure(points: int) -> Figure:
     """Size of det O_3 over wheel speed and acceleration."""
     (determinant,) = speed_observability().minors({JERK: 0})
-    function = sp.lambdify([sp.Symbol("wheel_speed"), sp.Symbol(ACCELERATION)], determinant, "numpy")
+    function = sp.lambdify(["wheel_speed", ACCELERATION], determinant, "numpy")
     speed, acceleration = np.linspace(0.0, 140.0, points), np.linspace(-800.0, 800.0, points + 1)
     size = np.abs(function(speed, acceleration[:, None])) / abs(float(function(140.0, 800.0)))
     bar = "log₁₀ of the determinant over its value at the corner [1]"
     marks: list[Mark] = [
         Map(speed, acceleration, np.log10(size), bar, "Blues", -5.0, 0.0),
-        Level(y=0.0, color=RED, dash="dashed", width=1.4),
-        Words(70.0, 0.0, "rank 2", RED, offset=(0, 5), horizontal="center"),
+        Level(y=0.0, color=colours.RED, dash="dashed", width=1.4),
+        Words(70.0, 0.0, "rank 2", colours.RED, offset=(0, 5), horizontal="center"),
     ]
     return Figure(
         "observability-determinant",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -15,18 +14,10 @@ from estimators.vehicle import VehicleParameters
 from estimators.velocity import BristleTire, FusionSettings, VelocityFusion
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel, colours
 from studies.study import Cell, PartResult, Scope, Table
+from studies.trials import estimation
 from studies.trials.accuracy import Spread, known_spread, nrms
-from studies.trials.estimation import (
-    INTEGRATED,
-    WHEELS,
-    Reading,
-    assumed_car,
-    baselines,
-    measured_runs,
-    run_of,
-    run_pipeline,
-)
 from studies.trials.histories import BANDS, backgrounds, error_dots, estimate_lines, history, row_axis, truth_line
+from studies.trials.motion import MotionTest
 from studies.trials.simulations import LUGRE
 from studies.trials.velocities import COMPLIANCE_SPREAD, FUSION
 from studies.truth import Measured
@@ -34,11 +25,10 @@ from synthesis.models.parameter_set import load_parameter_set
 
 PARAMETERS = "longitudinal-speed"
 THREE, TWO, LPV = "Kalman, 3 states", "Kalman, 2 states", "schedule"
-CLAIMED = 6.6
-"""%, what the paper claims of the longitudinal speed (section VI, no table)."""
-CORNER = 0
-"""The wheel whose own velocity is drawn: front left."""
-READINGS: dict[str, Reading] = {
+CLAIMED = 6.6  # %, what the paper claims of the longitudinal speed (section VI, no table)
+STATES: tuple[Literal[3], Literal[2]] = (3, 2)
+CORNER = 0  # the wheel whose own velocity is drawn: front left
+READINGS: dict[str, estimation.Reading] = {
     FUSION: lambda step: step.vx,
     THREE: lambda step: step.corners.steps[THREE].vx,
     TWO: lambda step: step.corners.steps[TWO].vx,
@@ -47,21 +37,10 @@ READINGS: dict[str, Reading] = {
     "high": lambda step: step.corners.steps[THREE].high_slip[..., CORNER],
 }
 LOOKS = {
-    THREE: ("s", colours.KALMAN),
-    TWO: ("D", colours.SECOND_FILTER),
-    LPV: ("P", colours.SCHEDULE),
-    FUSION: ("o", colours.FUSION),
-    WHEELS: ("^", colours.MEAN_WHEEL_SPEED),
-    INTEGRATED: ("v", colours.INTEGRATED_ACCELERATION),
-}
-
-
-@dataclass(frozen=True)
-class Drive:
-    """A manoeuvre here and its name in the paper."""
-
-    manoeuvre: str
-    title: str
+    THREE: ("s", colours.KALMAN), TWO: ("D", colours.SECOND_FILTER), LPV: ("P", colours.SCHEDULE),
+    FUSION: ("o", colours.FUSION), estimation.WHEELS: ("^", colours.MEAN_WHEEL_SPEED),
+    estimation.INTEGRATED: ("v", colours.INTEGRATED_ACCELERATION),
+}  # fmt: skip
 
 
 class Compared(NamedTuple):
@@ -71,11 +50,10 @@ class Compared(NamedTuple):
     steps: Mapping[str, Any]
 
 
-class SideBySide:
+class SideBySide(NamedTuple):
     """Several corner observers on the same signals, one after the other."""
 
-    def __init__(self, observers: Mapping[str, Any]) -> None:
-        self.observers = observers
+    observers: Mapping[str, Any]
 
     def step(self, *signals: Any) -> Compared:
         """What each of them says of one sample."""
@@ -93,38 +71,29 @@ def parts(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) ->
     tire = BristleTire(*constants, float(np.mean(car.radius)))
     compliance = tire.kappa / tire.sigma0
     settings = FusionSettings(slip_compliance=compliance, slip_compliance_spread=COMPLIANCE_SPREAD * compliance)
-
-    def kalman(states: Literal[2, 3]) -> CornerObservers:
-        return CornerObservers(car, KalmanCorners(tire, sample_time, (*shape, 4), states), None, shape)
-
-    schedule = CornerObservers(car, GainSchedule.shipped(PARAMETERS), None, shape)
+    three, two = (KalmanCorners(tire, sample_time, (*shape, 4), states) for states in STATES)
+    laws: dict[str, GainSchedule | KalmanCorners] = {THREE: three, TWO: two, LPV: GainSchedule.shipped(PARAMETERS)}
+    observers = {name: CornerObservers(car, law, None, shape) for name, law in laws.items()}
     return {
-        "velocity": VelocityFusion(car, sample_time, shape, settings),
-        "corner_observers": SideBySide({THREE: kalman(3), TWO: kalman(2), LPV: schedule}),
-    }
+        "velocity": VelocityFusion(car, sample_time, shape, settings), "corner_observers": SideBySide(observers),
+    }  # fmt: skip
 
 
-def speed_part(name: str, rows: Sequence[Drive], scope: Scope, tire: str = LUGRE) -> PartResult:
+def speed_part(name: str, rows: Sequence[MotionTest], scope: Scope, tire: str = LUGRE) -> PartResult:
     """Errors of V_x of all of them in every manoeuvre."""
-    drawn = measured_runs([row.manoeuvre for row in rows], tire, scope)
+    drawn = estimation.measured_runs([row.manoeuvre for row in rows], tire, scope)
     truth = drawn.truth
-    estimates = run_pipeline(drawn, READINGS, parts) | baselines(drawn)
-    table: list[list[Cell]] = []
-    measures: dict[str, float] = {}
-    found: list[dict[str, Spread]] = []
+    estimates = estimation.run_pipeline(drawn, READINGS, parts) | estimation.baselines(drawn)
+    table, measures, found = list[list[Cell]](), dict[str, float](), list[dict[str, Spread]]()
     for row in rows:
-        run, samples = run_of(truth, row.manoeuvre)
+        run, samples = estimation.run_of(truth, row.manoeuvre)
         true = truth["vx"][run, samples]
-        errors = {who: known_spread(nrms(estimates[who][:, run, samples], true)) for who in LOOKS}
-        found.append(errors)
-        for who, error in errors.items():
+        peak = round(float(np.abs(true).max()), 2)
+        found.append({who: known_spread(nrms(estimates[who][:, run, samples], true)) for who in LOOKS})
+        for who, error in found[-1].items():
             largest = known_spread(np.abs(estimates[who][:, run, samples] - true).max(axis=1))
-            table.append(
-                [
-                    row.title, round(float(np.abs(true).max()), 2), who, CLAIMED if who == THREE else None, error.text(),
-                    round(error.worst, 2), error.worst < CLAIMED, largest.text(),
-                ]
-            )  # fmt: skip
+            claimed, worst = CLAIMED if who == THREE else None, round(error.worst, 2)
+            table.append([row.title, peak, who, claimed, error.text(), worst, error.worst < CLAIMED, largest.text()])
             measures[f"{row.manoeuvre}, {who}"] = error.mean
     caption = (
         f"Longitudinal speed at the centre of gravity on the truth vehicle ({tire} tires), NRMS in % of the peak as P1 (46): "
@@ -137,42 +106,33 @@ def speed_part(name: str, rows: Sequence[Drive], scope: Scope, tire: str = LUGRE
         "manoeuvre", "peak [m/s]", "estimate", "claimed NRMS [%]", "NRMS [%]", "worst draw [%]", "every draw below the claim",
         "greatest error [m/s]",
     )  # fmt: skip
-    histories = [speed_history(f"{name}-{row.manoeuvre}", drawn, row, estimates) for row in rows]
-    drawings = [dot_figure(f"{name}-errors", rows, found), *histories]
-    return PartResult(tables=[Table(f"{name}-errors", caption, columns, table)], figures=drawings, measures=measures)
-
-
-def dot_figure(name: str, rows: Sequence[Drive], found: Sequence[Mapping[str, Spread]]) -> Figure:
-    """Mean NRMS with its interval by manoeuvre and estimate, and the claim."""
     marks = [*error_dots(found, LOOKS), Level(x=CLAIMED, label="claimed", dash="dashed", width=1.0)]
     x = Axis("$V_x$ NRMS [% of the peak]", scale="log")
-    return Figure(
-        name,
+    dots = Figure(
+        f"{name}-errors",
         "Error of the longitudinal speed by manoeuvre, mean over the sensor draws with 95 % interval; dashed: what P2 claims "
         "of its own.",
         "Dot plot of the normalised speed error of two Kalman filters, a gain schedule, the fusion and two baselines by "
         "manoeuvre.",
-        Panel(marks, x, row_axis([row.title for row in rows])),
-        size=(8.0, 1.7 + 0.75 * len(rows)), legend="below",
+        Panel(marks, x, row_axis([row.title for row in rows])), size=(8.0, 1.7 + 0.75 * len(rows)), legend="below",
     )  # fmt: skip
+    drawings = [dots, *(speed_history(f"{name}-{row.manoeuvre}", drawn, row, estimates) for row in rows)]
+    return PartResult(tables=[Table(f"{name}-errors", caption, columns, table)], figures=drawings, measures=measures)
 
 
-def speed_history(name: str, drawn: Measured, row: Drive, estimates: Mapping[str, FloatArray]) -> Figure:
+def speed_history(name: str, drawn: Measured, row: MotionTest, estimates: Mapping[str, FloatArray]) -> Figure:
     """Speed, its error, and the front left wheel: surface speed, velocity of its centre, and where the detector speaks."""
     truth = drawn.truth
-    run, samples = run_of(truth, row.manoeuvre)
+    run, samples = estimation.run_of(truth, row.manoeuvre)
     time, true = truth.time[samples], truth["vx"][run, samples]
-    grey = LOOKS[WHEELS][1]
-    speeds: list[Mark] = [
-        Line(time, estimates[WHEELS][0, run, samples], WHEELS, grey, width=0.7),
-        truth_line(time, true),
-    ]
-    errors: list[Mark] = []
+    wheels, grey = estimation.WHEELS, LOOKS[estimation.WHEELS][1]
+    mean_speed = Line(time, estimates[wheels][0, run, samples], wheels, grey, width=0.7)
+    speeds, errors = list[Mark]([mean_speed, truth_line(time, true)]), list[Mark]()
     for who in (THREE, LPV, FUSION):
         value = estimates[who][:, run, samples]
         speeds += estimate_lines(time, value, who, LOOKS[who][1])
         errors += estimate_lines(time, value - true, who, LOOKS[who][1])
-    surface = assumed_car(drawn).radius[CORNER] * drawn.signals["wheel_speed"][0, run, samples, CORNER]
+    surface = estimation.assumed_car(drawn).radius[CORNER] * drawn.signals["wheel_speed"][0, run, samples, CORNER]
     high = (estimates["high"][0, run, samples] > 0.5).astype(int)
     wheel = [
         *backgrounds(time, high, [None, ("high slip detected", colours.HIGH_SLIP)]),
@@ -185,10 +145,6 @@ def speed_history(name: str, drawn: Measured, row: Drive, estimates: Mapping[str
         f"{row.title}: speed of the car, its error, and the velocity of the front left wheel's centre. {BANDS}",
         "Three panels over time: speed with estimates, errors of the estimates, and the front left wheel with detected high "
         "slip shaded.",
-        [
-            Panel(speeds, y="$V_x$ [m/s]", legend="best", columns=3),
-            Panel(errors, y="error of $V_x$ [m/s]"),
-            Panel(wheel, y="front left wheel [m/s]", legend="best", columns=4),
-        ],
-        (8.6, 6.4),
+        [Panel(speeds, y="$V_x$ [m/s]", legend="best", columns=3), Panel(errors, y="error of $V_x$ [m/s]"),
+         Panel(wheel, y="front left wheel [m/s]", legend="best", columns=4)], (8.6, 6.4),
     )  # fmt: skip

@@ -12,19 +12,16 @@ from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 
 from estimators.arrays import FloatArray
 from studies.claim import Finding
-from studies.papers.longitudinal_speed.inputs import PACKAGE, SAMPLE_TIME, constant, noise, structures
+from studies.papers.longitudinal_speed.inputs import SAMPLE_TIME, constant, noise, structures, topic
 from studies.papers.longitudinal_speed.stochastic_observability import STRUCTURES, both_tests
-from studies.papers.topic import Topic
 from studies.papers.verdicts import erratum
-from studies.plots import DASHES, Axis, Figure, Line, Panel
-from studies.plots.colours import BLUE, CURVES, ORANGE, RED
-from studies.study import Cell, PartResult, Scope, Table
+from studies.plots import DASHES, Axis, Figure, Line, Panel, colours
+from studies.study import PartResult, Scope, Table
 
-TOPIC = Topic(PACKAGE)
+TOPIC = topic()
 SPEED = 40.0  # rad/s
 READINGS = [(structure, mode) for structure in STRUCTURES for mode in ("normal", "high_slip")]
-EXACT = 1e-9  # relative
-CLOSE = 1e-4  # relative, for a first-order formula at a remainder of 1e-6
+EXACT, CLOSE = 1e-9, 1e-4  # relative; the latter for a first-order formula at a remainder of 1e-6
 
 
 class SteadyFilter(NamedTuple):
@@ -71,11 +68,9 @@ def first_split(s: SteadyFilter) -> dict[str, float]:
     W = 1.0 / (Sigma.T @ Sigma)
     unseen = np.eye(3) - Sigma @ W @ Sigma.T
     M1, N1 = s.A @ unseen @ s.A.T, s.Q + s.A @ Sigma @ W @ W @ Sigma.T @ s.A.T
-    return {
-        "M1_of_A6": _distance(M1, found.M[1]), "N1_of_A6": _distance(N1, found.N[1]),
-        "M1_of_A7_as_printed": _distance(unseen, found.M[1]),
-        "M1_of_A7_with_later_transition": _distance(M1, found.M[1]),
-    }  # fmt: skip
+    M1_error = _distance(M1, found.M[1])
+    return {"M1_of_A6": M1_error, "N1_of_A6": _distance(N1, found.N[1]), "M1_of_A7_as_printed": _distance(unseen, found.M[1]),
+            "M1_of_A7_with_later_transition": M1_error}  # fmt: skip
 
 
 def remainder(s: SteadyFilter, N: FloatArray, S: FloatArray, sign: float) -> FloatArray:
@@ -83,21 +78,16 @@ def remainder(s: SteadyFilter, N: FloatArray, S: FloatArray, sign: float) -> Flo
     Xi = np.sqrt(s.R + s.C @ N @ s.C.T)  # one output
     known, unknown = s.A @ N @ s.C.T / Xi, s.A @ S @ s.C.T / Xi
     T = s.C @ S @ s.C.T / (Xi @ Xi)
-    inner = np.eye(1) - T
-    crossed = known @ inner @ unknown.T
-    return np.asarray(
-        s.A @ S @ s.A.T - known @ (sign * T) @ known.T - crossed - crossed.T - unknown @ inner @ unknown.T
-    )
+    crossed, small = known @ (1.0 - T) @ unknown.T, unknown @ (1.0 - T) @ unknown.T
+    return np.asarray(s.A @ S @ s.A.T - known @ (sign * T) @ known.T - crossed - crossed.T - small)
 
 
 def remainder_errors(s: SteadyFilter, sizes: tuple[float, ...] = (1e-6,)) -> list[list[float]]:
     """Relative error of (A8) with the printed and with the corrected sign, for remainders of these sizes."""
     N = both_tests(constant(SPEED, 12)).N[-1]
-    exact = [_riccati(s, N + size * s.P) - _riccati(s, N) for size in sizes]
-    return [
-        [_distance(remainder(s, N, size * s.P, sign), step) for size, step in zip(sizes, exact, strict=True)]
-        for sign in (1.0, -1.0)
-    ]
+    exact = {size: _riccati(s, N + size * s.P) - _riccati(s, N) for size in sizes}
+    signs = (1.0, -1.0)
+    return [[_distance(remainder(s, N, size * s.P, sign), step) for size, step in exact.items()] for sign in signs]
 
 
 def _riccati(s: SteadyFilter, P: FloatArray) -> FloatArray:
@@ -117,11 +107,9 @@ def appendix(noise_share: float = 1.0) -> Finding:
     missing, complete = (end / float(np.trace(s.P)) for end in ends)
     sums_agree = float(np.abs(corrected / summed - 1.0).max())
     split, ((plus,), (minus,)) = first_split(s), remainder_errors(s)
-    computed = {
-        "A4_printed_over_filter_covariance": missing, "A4_with_Q_over_filter_covariance": complete,
-        "A4_with_Q_against_A5": sums_agree, **split, "A8_error_with_printed_sign": plus,
-        "A8_error_with_corrected_sign": minus,
-    }  # fmt: skip
+    computed = {"A4_printed_over_filter_covariance": missing, "A4_with_Q_over_filter_covariance": complete,
+                "A4_with_Q_against_A5": sums_agree, **split, "A8_error_with_printed_sign": plus,
+                "A8_error_with_corrected_sign": minus}  # fmt: skip
     reading = (
         f"(A4) lacks + Q: as printed it ends at {missing:.3g} of the covariance of the very filter that it bounds, with Q at "
         f"{complete:.6f}, and it then equals (A5). (A6) holds. (A7) needs phi_(k+1,0) in M_(k+1): with phi_(k,0) M_1 is off "
@@ -135,29 +123,19 @@ def appendix(noise_share: float = 1.0) -> Finding:
 
 @TOPIC.part("appendix", "Recursions of the appendix")
 def recursions(scope: Scope) -> PartResult:
-    """The recursions of the appendix."""
-    return PartResult(TOPIC.found(), figures=[recursion_figure()])
-
-
-def recursion_figure() -> Figure:
     """(A4) with and without Q, and the error of (A8) with both signs."""
     s, sizes = steady_filter(), (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
     printed, corrected, summed = fixed_gain(s)[0] / np.trace(s.P)
     time, (plus, minus) = SAMPLE_TIME * np.arange(1, len(printed) + 1), remainder_errors(s, sizes)
     traces = [
-        Line(time, corrected, "(A4) with + Q", BLUE),
-        Line(time, summed, "(A5)", ORANGE, "dotted", 2.2),
-        Line(time, printed, "(A4) as printed", RED, "dashed"),
-    ]
-    errors = [
-        Line(sizes, plus, "+ T/ψ, as printed", RED, "dashed", marker="s"),
-        Line(sizes, minus, "− T/ψ", BLUE, marker="o"),
-    ]
-    trace, error = (
-        Axis(label, scale="log") for label in ("trace over that of the filter [1]", "relative error of (A8) [1]")
-    )
-    size = Axis("size of the remainder S over N [1]", scale="log")
-    return Figure(
+        Line(time, corrected, "(A4) with + Q", colours.BLUE), Line(time, summed, "(A5)", colours.ORANGE, "dotted", 2.2),
+        Line(time, printed, "(A4) as printed", colours.RED, "dashed"),
+    ]  # fmt: skip
+    wrong = Line(sizes, plus, "+ T/ψ, as printed", colours.RED, "dashed", marker="s")
+    errors = [wrong, Line(sizes, minus, "− T/ψ", colours.BLUE, marker="o")]
+    labels = "trace over that of the filter [1]", "size of the remainder S over N [1]", "relative error of (A8) [1]"
+    trace, size, error = (Axis(label, scale="log") for label in labels)
+    figure = Figure(
         "appendix",
         "Left: trace of the fixed-gain covariance at 40 rad/s, started at four times that of the filter. Without + Q, (A4) "
         "falls below the covariance that it is meant to bound; with it, it is (A5). Right: first-order remainder (A8) "
@@ -166,6 +144,7 @@ def recursion_figure() -> Figure:
         "near one.",
         [Panel(traces, "time [s]", trace, legend="best"), Panel(errors, size, error, legend="best")], (7.2, 3.4),
     )  # fmt: skip
+    return PartResult(TOPIC.found(), figures=[figure])
 
 
 def filter_response(speed: float, structure: str, mode: str) -> tuple[float, float]:
@@ -184,29 +163,24 @@ def filter_response(speed: float, structure: str, mode: str) -> tuple[float, flo
 @TOPIC.part("covariances", "What the printed covariances can mean", 2.0)
 def covariances(scope: Scope) -> PartResult:
     """Velocity gain and time constant at 40 rad/s as a table, over the wheel speed as a figure."""
-    rows: list[list[Cell]] = []
-    for structure, mode in READINGS:
-        rows.append([structure, mode.replace("_", " "), *filter_response(SPEED, structure, mode)])
+    rows = [
+        (structure, mode.replace("_", " "), *filter_response(SPEED, structure, mode)) for structure, mode in READINGS
+    ]
     caption = f"Steady Kalman filter at {SPEED:g} rad/s and 200 Hz for the readings of the printed scalar covariances, Q = q S."
     columns = ["S", "mode", "velocity gain [m/s]", "slowest time constant [s]"]
     table = Table("covariance-readings", caption, columns, rows)
-    return PartResult(tables=[table], figures=[response_figure(10 if scope.quick else 28)])
-
-
-def response_figure(points: int = 28) -> Figure:
-    """Velocity gain and slowest time constant over wheel speed for each reading of Q, both modes."""
+    points = 10 if scope.quick else 28
     speeds = np.linspace(5.0, 140.0, points)
-    gains, constants = [], []
-    for k, (structure, mode) in enumerate(READINGS):
-        found = np.array([filter_response(float(w), structure, mode) for w in speeds])
-        name, color, dash = f"S = {structure}, {mode.replace('_', ' ')}", CURVES[k // 2], DASHES[k % 2]
-        gains.append(Line(speeds, found[:, 0], name, color, dash))
-        constants.append(Line(speeds, found[:, 1], name, color, dash))
+    found = [np.array([filter_response(float(w), *reading) for w in speeds]) for reading in READINGS]
+    names = [f"S = {structure}, {mode.replace('_', ' ')}" for structure, mode in READINGS]
+    looks = [(name, colours.CURVES[k // 2], DASHES[k % 2]) for k, name in enumerate(names)]
+    labels = "velocity gain [m/s per unit of μ]", "slowest time constant [s]"
     panels = [
-        Panel(lines, "wheel speed [rad/s]", Axis(what, scale="log"))
-        for lines, what in ((gains, "velocity gain [m/s per unit of μ]"), (constants, "slowest time constant [s]"))
-    ]
-    return Figure(
+        Panel([Line(speeds, values[:, i], *look) for values, look in zip(found, looks, strict=True)],
+              "wheel speed [rad/s]", Axis(label, scale="log"))
+        for i, label in enumerate(labels)
+    ]  # fmt: skip
+    figure = Figure(
         "covariance-readings",
         "Steady Kalman filter of the three-state model for three readings of the printed scalar Q = q S (normal: q = 2.5e-3, "
         "R = 1e-3; high slip: q = 3.3e-4, R = 0.21): gain from the innovation to the velocity, and slowest time constant "
@@ -215,3 +189,4 @@ def response_figure(points: int = 28) -> Figure:
         "Gains near 1e-3 for the unit matrix, about 0.5 for B B' in the normal mode.",
         panels, (7.2, 3.8), legend="below", columns=3,
     )  # fmt: skip
+    return PartResult(tables=[table], figures=[figure])
