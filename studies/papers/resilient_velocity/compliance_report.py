@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,31 +11,22 @@ from estimators.arrays import BoolArray, FloatArray
 from estimators.vehicle import CORNERS
 from estimators.velocity.slip import LEAST_SPEED
 from studies.papers.published import printed
-from studies.papers.resilient_velocity.compliance_trial import (
-    INSIDE,
-    PRINTED_WAY,
-    WAYS,
-    WITHOUT,
-    ComplianceTrial,
-    run_trial,
-)
+from studies.papers.resilient_velocity.compliance_trial import WAYS, WITHOUT, ComplianceTrial, run_trial
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, PACKAGE
-from studies.plots import ZERO, Axis, Band, Dash, Figure, Line, Mark, Panel
-from studies.plots.colours import BLUE, GREY, ORANGE, RED, TRUTH
+from studies.plots import ZERO, Axis, Dash, Figure, Line, Mark, Panel
+from studies.plots.colours import BLUE, GREY, ORANGE, RED
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import known_spread, nrms
 from studies.trials.estimation import assumed_car, measured, run_of
-from studies.trials.histories import BAND
+from studies.trials.histories import estimate_lines, history, truth_line
 from studies.trials.sensors import TEST_CAR
 from studies.trials.simulations import LUGRE, simulated_truth
 
-QUICK_SECONDS = 4.0
 HARD = 500.0
 """N m at all wheels together, from which on traction counts as hard: the paper's word for where compliance helps."""
 
 
-@dataclass(frozen=True)
-class Shown:
+class Shown(NamedTuple):
     """A test of the paper, what it says of it, and the corners and the direction (0: along, 1: across) of its figure."""
 
     manoeuvre: str
@@ -51,20 +42,26 @@ TESTS = (
 )
 BOUNDS: tuple[float, float] = tuple(printed(PACKAGE, "P3-nrms"))
 """%, of V_x and V_y: the text of the paper."""
-STYLE: dict[str, tuple[str, Dash, float]] = {
-    WITHOUT: (GREY, "solid", 1.8), PRINTED_WAY: (RED, "dashed", 1.0), INSIDE: (BLUE, "solid", 0.9),
-}  # fmt: skip
+STYLES: tuple[tuple[str, Dash, float], ...] = ((GREY, "solid", 1.8), (RED, "dashed", 1.0), (BLUE, "solid", 0.9))
+WAY_COLUMNS = ("without [%]", "as (15) is printed [%]", "in the input [%]")
 
 
 def compliance_part(name: str, tests: Sequence[Shown], scope: Scope, tire: str = LUGRE) -> PartResult:
     """Every test with the three ways: forces and velocities."""
-    truth = simulated_truth(tuple(test.manoeuvre for test in tests), tire, scope, QUICK_SECONDS)
+    truth = simulated_truth(tuple(test.manoeuvre for test in tests), tire, scope, seconds=4.0)
     trial = run_trial(measured(truth, range(scope.seeds), TEST_CAR))
     forces, measures = residual_table(f"{name}-forces", trial, tests)
     figures = [residual_history(f"{name}-{test.manoeuvre}", trial, test) for test in tests]
     figures += [wheel_history(f"wheels-{test.manoeuvre}", trial, test) for test in tests if test.direction == 0]
-    velocities = _velocity_table(f"{name}-velocities", trial, tests)
-    return PartResult((), [forces, velocities], figures, [_note(forces)], measures)
+    printed_way, inside = (sum(bool(row[forces.columns.index(f"smaller by {way}")]) for row in forces.rows)
+                           for way in ("(15)", "the input"))  # fmt: skip
+    note = (
+        f"Of {len(forces.rows)} forces, (15) as it is printed makes {printed_way} agree better with the tire model, and psi'' in "
+        f"the observers' input {inside}. (15) adds psi' to a velocity that it takes to be that of the body; but "
+        "observers that are corrected by the force of the tire follow the slip of the wheel itself, so that psi' would count "
+        "twice. In the input it is right for any gain."
+    )
+    return PartResult((), [forces, velocity_table(f"{name}-velocities", trial, tests)], figures, [note], measures)
 
 
 def hard_traction(trial: ComplianceTrial, test: Shown) -> tuple[int, BoolArray]:
@@ -77,18 +74,17 @@ def hard_traction(trial: ComplianceTrial, test: Shown) -> tuple[int, BoolArray]:
 
 def residual_table(name: str, trial: ComplianceTrial, tests: Sequence[Shown]) -> tuple[Table, dict[str, float]]:
     """Measured minus calculated F/F_z by corner and way, and how the two ways with compliance compare draw by draw."""
-    rows: list[list[Cell]] = []
-    measures, truth = dict[str, float](), trial.drawn.truth
+    rows, measures, truth = list[list[Cell]](), dict[str, float](), trial.drawn.truth
     for test in tests:
         row, hard = hard_traction(trial, test)
         for corner in test.corners:
-            at = (row, hard, corner)
-            each = (slice(None), *at, test.direction)
+            at = row, hard, corner
+            each = slice(None), *at, test.direction
             force, load = (truth[key][at] for key in (("force_x", "force_y")[test.direction], "force_z"))
             peak = float(np.abs(force / np.maximum(load, 1.0)).max())
             error = {way: 100.0 * _rms(trial.residual[way][each]) / peak for way in WAYS}
             compliance = trial.true_compliance[each[1:]]
-            changes = [known_spread(error[way] - error[WITHOUT]) for way in (PRINTED_WAY, INSIDE)]
+            changes = [known_spread(error[way] - error[WITHOUT]) for way in WAYS[1:]]
             missed = _rms(trial.compliance[each] - compliance).mean()
             rows.append([
                 test.title, f"{DIRECTIONS[test.direction]}, {CORNERS[corner]}", round(peak, 3), test.statement,
@@ -106,7 +102,7 @@ def residual_table(name: str, trial: ComplianceTrial, tests: Sequence[Shown]) ->
         "below zero. The paper prints curves without numbers."
     )
     columns = (
-        "test", "force", "peak of F/F_z [1]", "the paper says", "without [%]", "as (15) is printed [%]", "in the input [%]",
+        "test", "force", "peak of F/F_z [1]", "the paper says", *WAY_COLUMNS,
         "change by (15) [points]", "smaller by (15)", "change by the input [points]", "smaller by the input",
         "RMS of psi' [m/s]", "RMS error of psi' [m/s]",
     )  # fmt: skip
@@ -117,46 +113,25 @@ def _rms(error: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.mean(error**2, axis=-1)))
 
 
-def _velocity_table(name: str, trial: ComplianceTrial, tests: Sequence[Shown]) -> Table:
-    rows: list[list[Cell]] = []
-    truth = trial.drawn.truth
+def velocity_table(name: str, trial: ComplianceTrial, tests: Sequence[Shown]) -> Table:
+    """V_x and V_y of the centre of gravity by way, and how the two ways with compliance change them draw by draw."""
+    rows, truth = list[list[Cell]](), trial.drawn.truth
     for test in tests:
         row, samples = run_of(truth, test.manoeuvre)
-        for k, signal in enumerate(("vx", "vy")):
-            if k == 1 and test.direction == 0:
-                continue  # straight ahead there is no V_y to relate an error to
+        for k, signal in enumerate(("vx", "vy")[: test.direction + 1]):  # straight ahead no V_y to relate an error to
             true = truth[signal][row, samples]
             found = {way: nrms(trial.centre[way][:, row, samples, k], true) for way in WAYS}
-            changes = [known_spread(found[way] - found[WITHOUT]).text(3) for way in (PRINTED_WAY, INSIDE)]
-            peak = round(float(np.abs(true).max()), 3)
-            spreads = [known_spread(found[way]).text() for way in WAYS]
-            rows.append([test.title, f"V_{signal[1]}", peak, BOUNDS[k], *spreads, *changes])
+            changes = [known_spread(found[way] - found[WITHOUT]).text(3) for way in WAYS[1:]]
+            known: list[Cell] = [test.title, f"V_{signal[1]}", round(float(np.abs(true).max()), 3), BOUNDS[k]]
+            rows.append([*known, *(known_spread(found[way]).text() for way in WAYS), *changes])
     return Table(
         name,
         "Velocity of the centre of gravity from the corner observers, NRMS in % of the peak as P1 (46): mean over "
         f"{len(trial.drawn.seeds)} sensor draws with its 95 % confidence interval. As (15) is printed, psi' is added on the way "
         "to the centre of gravity; with psi'' in the observers' input it is taken from the wheel centre's velocity. Changes "
         "against the observers without compliance, draw by draw. The paper's bounds are those of its text.",
-        (
-            "test", "signal", "peak [m/s]", "printed bound [%]", "without [%]", "as (15) is printed [%]", "in the input [%]",
-            "change by (15) [points]", "change by the input [points]",
-        ),
-        rows,
-    )  # fmt: skip
-
-
-def _note(forces: Table) -> str:
-    """What the ways do, from the numbers of this run."""
-    printed_way, inside = (
-        sum(bool(row[forces.columns.index(f"smaller by {way}")]) for row in forces.rows)
-        for way in ("(15)", "the input")
-    )
-    return (
-        f"Of {len(forces.rows)} forces, (15) as it is printed makes {printed_way} agree better with the tire model, and psi'' in "
-        f"the observers' input {inside}. (15) adds psi' to a velocity that it takes to be that of the body; but "
-        "observers that are corrected by the force of the tire follow the slip of the wheel itself, so that psi' would count "
-        "twice. In the input it is right for any gain."
-    )
+        ("test", "signal", "peak [m/s]", "printed bound [%]", *WAY_COLUMNS, "change by (15) [points]",
+         "change by the input [points]"), rows)  # fmt: skip
 
 
 def residual_history(name: str, trial: ComplianceTrial, test: Shown) -> Figure:
@@ -170,29 +145,24 @@ def residual_history(name: str, trial: ComplianceTrial, test: Shown) -> Figure:
     rows = []
     for corner in test.corners:
         left: list[Mark] = [
-            Line(time, np.where(moving, trial.residual[way][0, row, samples, corner, k], np.nan), way, *STYLE[way])
-            for way in WAYS
+            Line(time, np.where(moving, trial.residual[way][0, row, samples, corner, k], np.nan), way, *style)
+            for way, style in zip(WAYS, STYLES, strict=True)
         ]
         right: list[Mark] = [
-            Line(time, trial.true_compliance[row, samples, corner, k], "truth", TRUTH, width=2.0, alpha=0.8),
+            truth_line(time, trial.true_compliance[row, samples, corner, k]),
             Line(time, trial.compliance[0, row, samples, corner, k], "(14) on estimated forces", ORANGE, width=0.9),
         ]
-        x = _time_axis(corner == test.corners[-1])
+        x = Axis("time [s]" if corner == test.corners[-1] else "", margin=0.01)
         residual = Axis(f"$\\Delta f_{{n{axis}}}$ [1]", -limit, limit)
         rows.append([Panel([*left, ZERO], x, residual, CORNERS[corner]), Panel(right, x, f"$\\dot\\psi_{axis}$ [m/s]")])
-    direction = DIRECTIONS[k]
+    direction, size = DIRECTIONS[k], (9.4, 1.2 + 1.55 * len(test.corners))
     return Figure(
         name,
         f"{test.title}: {direction} force of the wheels, measured minus calculated, over the vertical load (left), "
         "with and without the suspension compliance, and the velocity of the wheel against the body (right). First sensor draw.",
         f"Rows of two panels over time, one for each corner: the difference of the {direction} forces for three ways of "
         "treating the compliance, and the wheel's velocity against the body with its estimate.",
-        rows,
-        size=(9.4, 1.2 + 1.55 * len(test.corners)),
-        legend="below",
-        columns=5,
-        share_x="all",
-    )
+        rows, size, "below", 5, "all")  # fmt: skip
 
 
 def wheel_history(name: str, trial: ComplianceTrial, test: Shown) -> Figure:
@@ -204,27 +174,15 @@ def wheel_history(name: str, trial: ComplianceTrial, test: Shown) -> Figure:
     for corner in range(4):
         surface = radius[corner] * trial.drawn.signals["wheel_speed"][:, row, samples, corner]
         centre = surface - trial.slip[:, row, samples, corner, 0]
-        low, high = np.percentile(centre, BAND, axis=0)
-        marks: list[Mark] = [
-            Line(time, truth["wheel_vx"][row, samples, corner], "truth", TRUTH, width=2.0, alpha=0.8),
-            Line(time, surface[0], "$R_e\\omega$", GREY, width=0.8),
-            Band(time, low, high, color=RED, alpha=0.18),
-            Line(time, centre[0], "$R_e\\omega-\\hat V_{rx}$", RED, width=0.9),
-        ]
-        panels.append(Panel(marks, _time_axis(corner > 1), "speed [m/s]" if corner % 2 == 0 else "", CORNERS[corner]))
-    return Figure(
+        true = truth_line(time, truth["wheel_vx"][row, samples, corner])
+        wheel = Line(time, surface[0], "$R_e\\omega$", GREY, width=0.8)
+        marks = [true, wheel, *estimate_lines(time, centre, "$R_e\\omega-\\hat V_{rx}$", RED)]
+        panels.append(Panel(marks, y="speed [m/s]" if corner % 2 == 0 else "", title=CORNERS[corner]))
+    return history(
         name,
         f"{test.title.replace('10', '9')}: surface speed of the wheels, velocity of their centres along the car, and the corner "
         "observers' estimate of it, as Fig. 9 of P3. Lines: first sensor draw; band: 95 % of all draws. On ice the wheels spin "
         "and their observers follow them: what friction hides of the slip, no gain brings back.",
         "Four panels of speed over time: on the right side all lines agree, on the left the wheel's surface and its estimate "
         "run away from the car.",
-        [panels[:2], panels[2:]],
-        size=(9.4, 5.4),
-        legend="below",
-        share_x="all",
-    )
-
-
-def _time_axis(last: bool) -> Axis:
-    return Axis("time [s]" if last else "", margin=0.01)
+        panels, (9.4, 5.4), columns=2, legend="below")  # fmt: skip

@@ -10,17 +10,15 @@ import numpy as np
 from estimators.arrays import FloatArray
 from studies.claim import Finding
 from studies.papers.resilient_velocity.compliance_report import BOUNDS, TESTS, compliance_part
-from studies.papers.resilient_velocity.inputs import DIRECTIONS, PACKAGE
+from studies.papers.resilient_velocity.inputs import PACKAGE
 from studies.papers.topic import Topic
 from studies.papers.verdicts import open_choice
-from studies.study import PartResult, Scope
 from studies.trials.forces import ForceTest, differentiated_pid, force_part
 from studies.trials.motion import MotionTest, motion_part
 from studies.trials.simulations import LUGRE, MAGIC_FORMULA, trial_part
 from studies.trials.velocities import VelocityTest, corner_observers, velocity_part
 
 TOPIC = Topic(PACKAGE)
-HALF_DIGIT = 0.05  # %
 NORMALISERS: Mapping[str, Callable[[FloatArray], float]] = {
     "largest value": lambda v: float(np.abs(v).max()),
     "range": lambda v: float(np.ptp(v)),
@@ -50,27 +48,20 @@ MOTION = (
 def normalised_errors(motions: Mapping[str, FloatArray] = MOTIONS) -> Finding:
     """One error in m/s, chosen to be the print of its largest value, under each way of normalising it."""
     computed: dict[str, dict[str, float]] = {}
-    for direction, bound in zip(DIRECTIONS, BOUNDS, strict=True):
-        signal = motions[direction]
+    for (direction, signal), bound in zip(motions.items(), BOUNDS, strict=True):
         error = bound * NORMALISERS["largest value"](signal)
         computed[direction] = {name: error / normaliser(signal) for name, normaliser in NORMALISERS.items()}
     readings = [[entry[name] for entry in computed.values()] for name in NORMALISERS]
-    return Finding(
-        computed,
-        open_choice(readings, HALF_DIGIT),
+    reading = (
         "Neither a table nor the normaliser of the percentages is given. One and the same error that is 5.8 % of the largest "
         f"speed of a launch at constant acceleration is {computed['longitudinal']['mean size']:.1f} % of its mean; 7.5 % of "
         f"the amplitude of a sinusoidal lane change is {computed['lateral']['range']:.2f} % of the range and "
-        f"{computed['lateral']['mean size']:.1f} % of the mean size. What our observers reach is measured on simulated drives.",
+        f"{computed['lateral']['mean size']:.1f} % of the mean size. What our observers reach is measured on simulated drives."
     )
+    return Finding(computed, open_choice(readings, 0.05), reading)
 
 
-@TOPIC.part("accuracy", "The percentages of the conclusion", 0.1)
-def accuracy(_: Scope) -> PartResult:
-    """What a percentage without a normaliser can mean."""
-    return PartResult(TOPIC.found())
-
-
+TOPIC.show("accuracy", "The percentages of the conclusion", 0.1)
 for name, title, run, cost, tire in (
     ("velocities", "Figs. 9, 11, 13 on the truth vehicle",
      partial(velocity_part, "velocities", ROWS, OBSERVERS), 40.0, LUGRE),

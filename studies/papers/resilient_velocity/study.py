@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from studies.papers.resilient_velocity import (
-    boundedness,
     discretisation,
     drops,
-    example_3,
+    error_dynamics,
     experiments,
-    norms,
     sensitivity,
     switching,
-    tire,
+    vehicle,
 )
 from studies.study import Study
 
-TOPICS = (
-    boundedness, norms, sensitivity, switching, drops, example_3, discretisation, tire, experiments,
-)  # fmt: skip
+TOPICS = error_dynamics, sensitivity, switching, drops, discretisation, vehicle, experiments
 STUDY = Study(
     "resilient-velocity",
     "Resilient corner-based velocity estimation",

@@ -136,8 +136,7 @@ def gain_conditions() -> Table:
         "gain-conditions",
         "Conditions of Appendix A with the printed gains, at the worst start that the printed maxima of Table 1 allow (|L1 "
         f"x2 - L2 x3| = {WORST_MOMENT / 1e3:.2f} kN m); (A.4) with the minus sign of (A.5). Margins in the unit given.",
-        ("condition", "unit", "margin or value", "holds"), rows,
-    )  # fmt: skip
+        ("condition", "unit", "margin or value", "holds"), rows)  # fmt: skip
 
 
 def convergence() -> Figure:
@@ -165,9 +164,6 @@ def convergence() -> Figure:
         "decays at 3.44 1/s, as (A.12) says, and stays below the limit up to which Omega_1 dominates.",
         "Left: force errors over time; the sum drops to zero at once, front and rear errors decay slowly towards zero from "
         "opposite sides. Right: the split on a logarithmic scale, parallel to a dashed exponential.",
-        [
-            Panel(forces, "time [s]", "force error [kN]", legend="best"),
-            Panel(marks, "time [s]", Axis("yaw moment error of the split [kN m]", 0.1, 60.0, "log"), legend="best"),
-        ],
-        size=(9.2, 3.7),
-    )
+        [Panel(forces, "time [s]", "force error [kN]", legend="best"),
+         Panel(marks, "time [s]", Axis("yaw moment error of the split [kN m]", 0.1, 60.0, "log"), legend="best")],
+        size=(9.2, 3.7))  # fmt: skip

@@ -121,8 +121,7 @@ def zone_table() -> Table:
         "zones, and largest errors after 3 s over 60 starts within the printed maxima, true forces constant.",
         ("reading", "yaw width [rad/s]", "lateral width [m/s^2]", "longitudinal width [m/s^2]", "spectral radius [1]",
          "yaw rate error [rad/s]", "front force error [N]", "rear force error [N]", "longitudinal force error [N]"),
-        rows,
-    )  # fmt: skip
+        rows)  # fmt: skip
 
 
 def chatter() -> Figure:
@@ -146,8 +145,7 @@ def chatter() -> Figure:
         "linear zones of two widths (rad/s, m/s², m/s²; P5 prints none). The sign chatters by 0.1 rad/s and several hundred "
         "newtons; zones wide enough converge smoothly, zones narrower than gain times half a sample keep chattering.",
         "Six panels over two seconds: ragged bands for the bare sign and the narrow zone, smooth decay for the wide zone.",
-        [upper, lower], size=(9.2, 4.6), share_x="all", share_y="row",
-    )  # fmt: skip
+        [upper, lower], size=(9.2, 4.6), share_x="all", share_y="row")  # fmt: skip
 
 
 def zone_widths(points: int = 121) -> Figure:
@@ -185,13 +183,10 @@ def zone_widths(points: int = 121) -> Figure:
         "(4 Omega_4 (L_1 + L_2)); wider zones are sluggish.",
         "Left: map with a rectangular unstable region at small widths. Right: curve of the spectral radius that dips below "
         "one above 0.05 rad/s.",
-        [
-            Panel(plane, Axis(name, scale="log"),
-                  Axis("width of the lateral acceleration zone [m/s²]", scale="log"), grid=False),
-            Panel(cut, Axis(name, 0.01, 2.0, "log"), Axis("spectral radius [1]", 0.9, 1.1), legend="upper right"),
-        ],
-        size=(9.2, 3.9),
-    )  # fmt: skip
+        [Panel(plane, Axis(name, scale="log"),
+               Axis("width of the lateral acceleration zone [m/s²]", scale="log"), grid=False),
+         Panel(cut, Axis(name, 0.01, 2.0, "log"), Axis("spectral radius [1]", 0.9, 1.1), legend="upper right")],
+        size=(9.2, 3.9))  # fmt: skip
 
 
 def tracking() -> Figure:
@@ -223,9 +218,5 @@ def tracking() -> Figure:
         "slower than about 0.25 Hz by this bound; the paper prints neither speed nor period.",
         "Left: three curves of the relative error rising with frequency to about one. Right: force error rising with the "
         "square of the frequency, crossed by two red lines.",
-        [
-            Panel([*shares, slow], x, Axis("split error / true split [1]", 0.02, 3.0, "log"), legend="lower right"),
-            Panel(forces, x, Axis("amplitude of the error of each axle force [N]", 5.0, 2e4, "log")),
-        ],
-        size=(9.2, 3.6),
-    )
+        [Panel([*shares, slow], x, Axis("split error / true split [1]", 0.02, 3.0, "log"), legend="lower right"),
+         Panel(forces, x, Axis("amplitude of the error of each axle force [N]", 5.0, 2e4, "log"))], size=(9.2, 3.6))  # fmt: skip

@@ -185,9 +185,5 @@ def stiffness_observability() -> Figure:
         "softer tires. In the slalom it stays large.",
         "Left: slip angles over time, oscillating in the slalom and constant in the turn. Right: the singular value on a "
         "logarithmic scale, large throughout the slalom, falling steadily in the steady turn.",
-        [
-            Panel(slips, "time [s]", Axis("slip angle [deg]", high=9.0), legend="upper left", columns=2),
-            Panel(values, "time [s]", value, legend="upper left"),
-        ],
-        size=(9.2, 3.7), share_x="all",
-    )  # fmt: skip
+        [Panel(slips, "time [s]", Axis("slip angle [deg]", high=9.0), legend="upper left", columns=2),
+         Panel(values, "time [s]", value, legend="upper left")], size=(9.2, 3.7), share_x="all")  # fmt: skip

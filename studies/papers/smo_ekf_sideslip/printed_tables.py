@@ -75,8 +75,7 @@ def printed_forces() -> Table:
     return Table(
         "tables-1-2",
         "Tables 1 and 2 of P5 as printed: errors (8) of the force observer in the two road tests, in percent of the maximum.",
-        ("test", "quantity", "max", "unit", "mean [%]", "std [%]", "below 6 %"), rows,
-    )  # fmt: skip
+        ("test", "quantity", "max", "unit", "mean [%]", "std [%]", "below 6 %"), rows)  # fmt: skip
 
 
 def printed_settings() -> Table:
@@ -92,8 +91,7 @@ def printed_settings() -> Table:
     return Table(
         "tables-3-5",
         "Tables 3, 4 and 5 of P5 as printed: errors (8) with other settings of the stiffness and of the mass, in percent.",
-        ("table", "test", "quantity", "setting", "mean [%]", "std [%]"), rows,
-    )  # fmt: skip
+        ("table", "test", "quantity", "setting", "mean [%]", "std [%]"), rows)  # fmt: skip
 
 
 def burckhardt_force(slip: FloatArray, road: str, load: float) -> FloatArray:
@@ -133,5 +131,4 @@ def lateral_models() -> Figure:
         Panel(
             marks, Axis("front slip angle β₁ [deg]", 0, 12), Axis("front axle lateral force [kN]", 0, 13),
             legend="upper left", columns=2,
-        ),
-    )  # fmt: skip
+        ))  # fmt: skip

@@ -106,8 +106,7 @@ def stiffness_table(run: SimulatedRun, fixed: Estimates, adaptive: Estimates) ->
         "stiffness-settings",
         "Error (8) of the rear sideslip in the simulated slalom (saturating axles, no noise, from 5 s on), and the size of "
         "the estimate against the true one. A model, not the road test of Tables 3 and 4.",
-        ("observer", "stiffness setting [1]", "mean error [%]", "std of the error [%]", "estimate / true [1]"), rows,
-    )  # fmt: skip
+        ("observer", "stiffness setting [1]", "mean error [%]", "std of the error [%]", "estimate / true [1]"), rows)  # fmt: skip
 
 
 def mass_table(run: SimulatedRun, found: Estimates) -> Table:
@@ -121,8 +120,7 @@ def mass_table(run: SimulatedRun, found: Estimates) -> Table:
         "mass-settings",
         "Error (8) in the simulated slalom by assumed mass, and the size of the estimate against the true one: forces scale "
         "with the mass (300 kg are 20.7 %), sideslip does not. A model, not the road test of Table 5.",
-        ("mass change [kg]", "quantity", "mean error [%]", "std of the error [%]", "estimate / true [1]"), rows,
-    )  # fmt: skip
+        ("mass change [kg]", "quantity", "mean error [%]", "std of the error [%]", "estimate / true [1]"), rows)  # fmt: skip
 
 
 def _curves(run: SimulatedRun, true: FloatArray, found: FloatArray, labels: list[str]) -> list[Mark]:
@@ -155,8 +153,7 @@ def stiffness_figure(run: SimulatedRun, fixed: Estimates, adaptive: Estimates) -
         "stays low because the force observer follows the split late.",
         "Upper panels: rear sideslip over time, three spread curves at the left, three nearly equal ones at the right. Lower "
         "panels: front and rear stiffness, constant until 5 s, then converging.",
-        [upper, lower], size=(9.4, 5.6), share_x="all",
-    )  # fmt: skip
+        [upper, lower], size=(9.4, 5.6), share_x="all")  # fmt: skip
 
 
 def mass_figure(run: SimulatedRun, found: Estimates) -> Figure:
@@ -181,8 +178,7 @@ def mass_figure(run: SimulatedRun, found: Estimates) -> Figure:
         "because mass and force cancel in (10) and the adapted stiffness takes the rest.",
         "Three panels over time: front force, rear force and rear sideslip; force curves differ in size by a fifth, sideslip "
         "curves nearly coincide.",
-        panels, size=(9.4, 3.8),
-    )  # fmt: skip
+        panels, size=(9.4, 3.8))  # fmt: skip
 
 
 def zone_of(slip: FloatArray, force: FloatArray, threshold: float = THRESHOLD) -> FloatArray:
@@ -219,11 +215,8 @@ def zones(run: SimulatedRun, found: Estimates) -> Figure:
         "front stiffness moves in zones 5 and 6 and is frozen elsewhere.",
         "Left: a band of points through the origin, red and orange near the axes, blue outside, with two straight lines. "
         "Right: stiffness over time that moves where the background is blue.",
-        [
-            Panel(plane, Axis("estimated front slip angle β₁ [deg]", -5.5, 5.5),
-                  Axis("estimated front lateral force [kN]", -8, 8), legend="upper left"),
-            Panel([*background, Line(run.time, stiffness, color=TRUTH)], Axis("time [s]", run.time[0], run.time[-1]),
-                  "C₁ + ΔC₁ [kN/rad]", "stiffness over time; background: zone", grid=False),
-        ],
-        size=(9.2, 4.0), widths=(1.1, 1.0),
-    )  # fmt: skip
+        [Panel(plane, Axis("estimated front slip angle β₁ [deg]", -5.5, 5.5),
+               Axis("estimated front lateral force [kN]", -8, 8), legend="upper left"),
+         Panel([*background, Line(run.time, stiffness, color=TRUTH)], Axis("time [s]", run.time[0], run.time[-1]),
+               "C₁ + ΔC₁ [kN/rad]", "stiffness over time; background: zone", grid=False)],
+        size=(9.2, 4.0), widths=(1.1, 1.0))  # fmt: skip

@@ -211,8 +211,7 @@ def force_history(name: str, title: str, run: AxleRun) -> Figure:
         f"{title}: axle forces and yaw rate of the sliding-mode observer, as Figs. 7 and 8 of P5. It starts from the greatest "
         f"values of the drive. {BANDS}",
         "Four panels over time: front and rear lateral force, front longitudinal force, yaw rate, each with its estimate.",
-        panels, (9.0, 7.0),
-    )  # fmt: skip
+        panels, (9.0, 7.0))  # fmt: skip
 
 
 def _sideslip_panel(
@@ -242,13 +241,9 @@ def stiffness_history(name: str, title: str, run: AxleRun) -> Figure:
         f"stiffness of both axles, as Figs. 12 to 17 of P5. {BANDS}",
         "Upper panels: rear sideslip over time for three settings, fixed left, adapted right. Lower panels: adapted "
         "stiffness of the axles.",
-        [
-            _sideslip_panel(run, fixed, labels, "sideslip [deg]", "rear sideslip, stiffness fixed (ORL)"),
-            _sideslip_panel(run, adapted, labels, "", "rear sideslip, stiffness adapted (EKF)"),
-            *axles,
-        ],
-        (9.4, 6.2), columns=2, legend="below",
-    )  # fmt: skip
+        [_sideslip_panel(run, fixed, labels, "sideslip [deg]", "rear sideslip, stiffness fixed (ORL)"),
+         _sideslip_panel(run, adapted, labels, "", "rear sideslip, stiffness adapted (EKF)"),
+         *axles], (9.4, 6.2), columns=2, legend="below")  # fmt: skip
 
 
 def mass_history(name: str, title: str, run: AxleRun) -> Figure:
@@ -264,8 +259,7 @@ def mass_history(name: str, title: str, run: AxleRun) -> Figure:
         name,
         f"{title}: front axle force and rear sideslip by believed mass, as Fig. 18 of P5. {BANDS}",
         "Front lateral force and rear sideslip over time for three believed masses.",
-        [force, slip], (9.0, 5.0),
-    )  # fmt: skip
+        [force, slip], (9.0, 5.0))  # fmt: skip
 
 
 MOTION = (
