@@ -55,10 +55,15 @@ class Topic:
         tables: Sequence[Callable[[], Table]] = (), figures: Sequence[Callable[[], Figure]] = (), notes: Sequence[str] = (),
     ) -> None:  # fmt: skip
         """Register a part that is its claims (see `found`) and what makes its tables and figures, whatever the scope."""
+        found = self.found
 
         def run(_: Scope) -> PartResult:
-            return PartResult(self.found(*claims), [make() for make in tables], [make() for make in figures], notes)
+            return PartResult(found(*claims), [make() for make in tables], [make() for make in figures], notes)
 
+        first = next(iter(self.claims.values()))
+        run.__module__ = getattr(
+            first, "func", first
+        ).__module__  # whose code decides whether a stored result is still good
         self.parts.append(Part(name, title, run, cost))
 
     def found(self, *names: str) -> list[Claim]:

@@ -265,18 +265,18 @@ def table() -> Table:
     return column_table("drops", caption, columns)
 
 
-def critical_figure(setting: Setting = PRINTED) -> Figure:
+def critical_figure() -> Figure:
     """Fig. 7, whole range and near standstill."""
     near = np.linspace(0.0, 2.0, 201)
     panels: list[list[Mark]] = [[], []]
     for direction, dash in zip(DIRECTIONS, DASHES, strict=False):
-        colour, start = COLOUR[direction], harmless_from(setting, direction)
+        colour, start = COLOUR[direction], harmless_from(PRINTED, direction)
         for marks, speeds in zip(panels, (FINE, near), strict=True):
-            marks.append(Line(speeds, critical(setting, direction, speeds), direction, colour, dash, 1.9))
+            marks.append(Line(speeds, critical(PRINTED, direction, speeds), direction, colour, dash, 1.9))
         if start is not None:
             words = Words(start, 1.0, f"1 from {start:.2f} rad/s", colour, offset=(5, -13))
             panels[int(start <= near[-1])] += [dots(start, 1.0, color=colour, size=6, hollow=True), words]
-    p = setting.example_drop
+    p = PRINTED.example_drop
     panels[0].append(Level(y=p, label=f"p = {p:g} of Example 3", color=GREY, dash="dotted", width=1.0))
     y = Axis("critical drop probability [1]", 0.0, 1.05)
     return Figure(
@@ -290,16 +290,16 @@ def critical_figure(setting: Setting = PRINTED) -> Figure:
          Panel(panels[1], Axis(SPEED_AXIS.label, 0.0, near[-1]), y, "near standstill")], (9.2, 3.7))  # fmt: skip
 
 
-def radius_figure(setting: Setting = PRINTED) -> Figure:
+def radius_figure() -> Figure:
     """Fig. 8 for several drop probabilities, with the printed number of Example 3."""
-    panels, label, p = [], f"{PRINTED_RADIUS} of Example 3", setting.example_drop
+    panels, label, p = [], f"{PRINTED_RADIUS} of Example 3", PRINTED.example_drop
     for d, low, high, other in zip(DIRECTIONS, (0.0, 0.82), (1.25, 1.01), (1.0 - p, p), strict=True):
         marks: list[Mark] = [
-            Line(FINE, radius(setting, d, FINE, q), f"p = {q:g}", colour, dash)
+            Line(FINE, radius(PRINTED, d, FINE, q), f"p = {q:g}", colour, dash)
             for q, colour, dash in zip((0.2, 0.4, 0.5, 0.6, 0.8), CURVES, DASHES, strict=False)
         ]
         marks += [Level(y=1.0), Level(y=PRINTED_RADIUS, label=label, color=GREY, dash="dotted", width=1.0)]
-        met = met_at(setting, d, other)
+        met = met_at(PRINTED, d, other)
         if met is not None:
             marks.append(dots(met, PRINTED_RADIUS, color="0.1", size=6, hollow=True))
         panels.append(Panel(marks, SPEED_AXIS, Axis("second-moment radius ρ [1]", low, high), d))
@@ -314,12 +314,12 @@ def radius_figure(setting: Setting = PRINTED) -> Figure:
         panels, (9.2, 3.9), "below", 6)  # fmt: skip
 
 
-def map_figure(setting: Setting = PRINTED) -> Figure:
+def map_figure() -> Figure:
     """Radius over wheel speed and drop probability."""
     probabilities = np.linspace(0.0, 1.0, 101)
     panels = []
     for d, label in zip(DIRECTIONS, ("", "second-moment radius ρ [1]"), strict=True):
-        found, border = radius(setting, d, SPEEDS, probabilities[:, None]), critical(setting, d, FINE)
+        found, border = radius(PRINTED, d, SPEEDS, probabilities[:, None]), critical(PRINTED, d, FINE)
         marks: list[Mark] = [
             Map(SPEEDS, probabilities, found, label, low=0.2, high=1.2),
             Contours(SPEEDS, probabilities, found, LEVELS[d], "white", width=0.7),
@@ -336,13 +336,13 @@ def map_figure(setting: Setting = PRINTED) -> Figure:
         panels, (9.2, 4.0), share_y="all")  # fmt: skip
 
 
-def readings_figure(setting: Setting = PRINTED) -> Figure:
+def readings_figure() -> Figure:
     """Example 3 under two discretisations that keep stability."""
-    p, (x, y) = setting.example_drop, COLOUR.values()
+    p, (x, y) = PRINTED.example_drop, COLOUR.values()
     marks: list[Mark] = [
-        Line(FINE, radius(setting, "longitudinal", FINE, p), "longitudinal, exact update", x, width=1.9),
-        Line(FINE, tustin_radius(setting), "longitudinal, Tustin's update", x, "dashed"),
-        Line(FINE, radius(setting, "lateral", FINE, p), "lateral, exact update", y, "dash-dot"),
+        Line(FINE, radius(PRINTED, "longitudinal", FINE, p), "longitudinal, exact update", x, width=1.9),
+        Line(FINE, tustin_radius(PRINTED), "longitudinal, Tustin's update", x, "dashed"),
+        Line(FINE, radius(PRINTED, "lateral", FINE, p), "lateral, exact update", y, "dash-dot"),
         Level(y=PRINTED_RADIUS, label=f"printed, {PRINTED_RADIUS}", color=GREY, dash="dotted", width=1.0),
     ]
     return Figure(

@@ -273,20 +273,20 @@ def table() -> Table:
     return column_table("norms", caption, columns)
 
 
-def norm_figure(setting: Setting = PRINTED) -> Figure:
+def norm_figure() -> Figure:
     """One panel for each direction, on the axis range of the paper."""
     panels, top, sparse = [], dict[str, float](), SPEEDS[::20]
     for d, (low, high) in AXES.items():
-        both, room = norms(setting, d, SPEEDS), 0.1 * (high - low)
+        both, room = norms(PRINTED, d, SPEEDS), 0.1 * (high - low)
         top[d] = float(both.max())
         marks: list[Mark] = [
             Shade(low, high, "y", "axis of the paper", "0.9", 1.0),
             Level(y=1.0, color=GREY),
             Line(SPEEDS, both, "friction and acceleration error", BLUE, width=1.9),
-            Line(SPEEDS, norms(setting, d, SPEEDS, "friction"), "friction alone", RED, "dashed"),
-            dots(sparse, floor(setting, d, sparse), "floor of any gain", "0.1", "x"),
+            Line(SPEEDS, norms(PRINTED, d, SPEEDS, "friction"), "friction alone", RED, "dashed"),
+            dots(sparse, floor(PRINTED, d, sparse), "floor of any gain", "0.1", "x"),
         ]
-        for speed in norm_crosses_one(setting, d):
+        for speed in norm_crosses_one(PRINTED, d):
             words = Words(speed, 1.0, f"1 at {speed:.1f} rad/s", BLUE, offset=(12.0 if speed < 70 else -4.0, 11.0))
             marks += [dots(speed, 1.0, color=BLUE, size=6, hollow=True), words]
         y = Axis("H∞ norm to both errors [1]", low - room, high + room, ticks=np.linspace(low, high, 6).tolist())

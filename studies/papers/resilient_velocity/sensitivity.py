@@ -124,11 +124,11 @@ WORDS = {
 """Of the figures: name, caption, alternative."""
 
 
-def deviation_figure(measure: str, setting: Setting = PRINTED) -> Figure:
+def deviation_figure(measure: str) -> Figure:
     """Rows: direction; columns: sigma_1, which outweighs the rest, and the other constants on a scale of their own."""
     rows = []
     for direction in DIRECTIONS:
-        found = deviations(setting, direction, FINE, measure)
+        found = deviations(PRINTED, direction, FINE, measure)
         row, x = [], Axis(SPEED_AXIS.label if direction == DIRECTIONS[-1] else "", SPEED_AXIS.low, SPEED_AXIS.high)
         for title, constants in (("σ₁", ("sigma1",)), ("the other constants", ("sigma0", "sigma2", "kappa"))):
             marks: list[Mark] = [Level(y=0.0, color=GREY)]

@@ -121,15 +121,15 @@ def arbitrary_switching(setting: Setting = PRINTED) -> Finding:
     return Finding(computed, among_readings(np.concatenate([radius, square]), published, HALF_DIGIT), reading)
 
 
-def window_figure(setting: Setting = PRINTED) -> Figure:
+def window_figure() -> Figure:
     """Which gamma of T = diag(gamma, 1) proves which gain, over the wheel speed."""
-    normal, high_slip = windows(setting, FINE)
+    normal, high_slip = windows(PRINTED, FINE)
     marks: list[Mark] = [
         Band(FINE, normal[0], normal[1], "normal gain [1.18, 387] proved", BLUE, 0.25),
         Band(FINE, high_slip[0], high_slip[1], "high-slip gain [0.22, 0.1] proved", RED, 0.5),
-        Level(y=setting.similarity, label=f"γ = {setting.similarity:g} of Proposition 1", width=1.2),
+        Level(y=PRINTED.similarity, label=f"γ = {PRINTED.similarity:g} of Proposition 1", width=1.2),
     ]
-    threshold = common_function_from(setting)
+    threshold = common_function_from(PRINTED)
     if threshold is not None:
         words = f"no common quadratic\nfunction of any kind\nbelow {threshold:.1f} rad/s"
         marks.append(Level(x=threshold, color=GREY, dash="dotted", width=1.0))
@@ -225,10 +225,10 @@ def table() -> Table:
     return column_table("markov-margins", caption, {"probability of staying [1]": STAYS} | speeds)
 
 
-def markov_figure(setting: Setting = PRINTED) -> Figure:
+def markov_figure() -> Figure:
     """Margin over the stay probability, and what is left of it beside 1 minus that probability."""
     stays = np.linspace(0.0, 1.0, 101)
-    found, rest = margins(setting, stays, CHAIN_SPEEDS), 1.0 - stays
+    found, rest = margins(PRINTED, stays, CHAIN_SPEEDS), 1.0 - stays
     left, right = list[Mark](), list[Mark]([ZERO])
     for column, speed, colour, dash in zip(found.T, CHAIN_SPEEDS, CURVES, DASHES, strict=False):
         left.append(Line(stays, column, f"{speed:g} rad/s", colour, dash))

@@ -165,15 +165,15 @@ def modes(setting: Setting = PRINTED) -> Finding:
     return Finding(computed, derived(holds), reading)
 
 
-def compliance_figure(setting: Setting = PRINTED) -> Figure:
+def compliance_figure() -> Figure:
     """Response of the wheel velocity to a force step, with the runtime at 200 Hz on it, and over frequency."""
     time, hertz = np.linspace(0.0, 0.2, 801), np.geomspace(0.5, 100.0, 400)
-    samples = np.arange(1, round(0.2 / setting.sample_time) + 1) * setting.sample_time
-    runtime, force = SuspensionCompliance(table_of_estimator(setting), setting.sample_time), np.full(4, FORCE)
+    samples = np.arange(1, round(0.2 / PRINTED.sample_time) + 1) * PRINTED.sample_time
+    runtime, force = SuspensionCompliance(table_of_estimator(PRINTED), PRINTED.sample_time), np.full(4, FORCE)
     steps = np.stack([runtime.step(force, force).velocity[0] for _ in samples])
     left, right, fastest = list[Mark]([ZERO]), list[Mark](), 0.0
     for k, (direction, dash) in enumerate(zip(DIRECTIONS, DASHES, strict=False)):
-        M, C, K = compliance(setting, direction)
+        M, C, K = compliance(PRINTED, direction)
         colour, decay, natural = COLOUR[direction], 0.5 * C / M, math.sqrt(K / M) / (2.0 * math.pi)
         damped, s = math.sqrt(K / M - decay**2), 2j * np.pi * hertz
         response = FORCE / M / damped * np.exp(-decay * time) * np.sin(damped * time)
@@ -294,17 +294,17 @@ def table() -> Table:
         ("quantity", "value", "unit used", "unit printed"), rows)  # fmt: skip
 
 
-def friction_figure(setting: Setting = PRINTED) -> Figure:
+def friction_figure() -> Figure:
     """Steady force over slip velocity, and the friction disturbance that the observers do not know."""
     v = np.linspace(0.0, 13.0, 1301)
     left, right = list[Mark](), list[Mark]()
     pairs = [(d, road) for d in DIRECTIONS for road in ROADS]
     for (direction, road), colour, dash in zip(pairs, CURVES, DASHES, strict=False):
-        force, disturbance = steady(setting, direction, v, road)
+        force, disturbance = steady(PRINTED, direction, v, road)
         left.append(Line(v, force, f"{direction}, θ = {road:g}", colour, dash, 1.7))
         right.append(Line(v[1:], np.abs(disturbance[1:]) / v[1:], color=colour, dash=dash, width=1.7))
         if direction == "longitudinal":  # the softer lateral tire rises all the way
-            left.append(dots(*peak(setting, direction, road), color=colour, hollow=True))
+            left.append(dots(*peak(PRINTED, direction, road), color=colour, hollow=True))
     slip, share = "slip velocity v [m/s]", Axis("share |ϱ| / |v| [1]", 0.0, 1.0)
     return Figure(
         "lugre-curves",
