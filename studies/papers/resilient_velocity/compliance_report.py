@@ -90,8 +90,7 @@ def residual_table(name: str, trial: ComplianceTrial, tests: Sequence[Shown]) ->
                 test.title, f"{DIRECTIONS[test.direction]}, {CORNERS[corner]}", round(peak, 3), test.statement,
                 *(known_spread(error[way]).text() for way in WAYS),
                 *(cell for change in changes for cell in (change.text(), change.high < 0.0)),
-                round(float(_rms(compliance)), 4), round(float(missed), 4),
-            ])  # fmt: skip
+                round(float(_rms(compliance)), 4), round(float(missed), 4)])  # fmt: skip
             measures |= {f"{test.manoeuvre} {CORNERS[corner]} {way}": float(error[way].mean()) for way in WAYS}
     caption = (
         "Measured minus calculated normalised force, RMS in % of the peak of F/F_z under hard traction (drive torque above "
@@ -104,8 +103,7 @@ def residual_table(name: str, trial: ComplianceTrial, tests: Sequence[Shown]) ->
     columns = (
         "test", "force", "peak of F/F_z [1]", "the paper says", *WAY_COLUMNS,
         "change by (15) [points]", "smaller by (15)", "change by the input [points]", "smaller by the input",
-        "RMS of psi' [m/s]", "RMS error of psi' [m/s]",
-    )  # fmt: skip
+        "RMS of psi' [m/s]", "RMS error of psi' [m/s]")  # fmt: skip
     return Table(name, caption, columns, rows), measures
 
 

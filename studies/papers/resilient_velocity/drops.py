@@ -115,8 +115,7 @@ def critical_probability(setting: Setting = PRINTED) -> Finding:
         + ("one critical probability separates stable from unstable at every wheel speed" if holds else
            "no single probability separates")
         + f" ({'; '.join(words)}), and p = {setting.example_drop:g} of Example 3 lies "
-        + ("below it everywhere." if below else "above it somewhere.")
-    )  # fmt: skip
+        + ("below it everywhere." if below else "above it somewhere."))  # fmt: skip
     return Finding({**computed, "smallest": lowest}, reproduced(holds and below), reading)
 
 
@@ -182,8 +181,7 @@ def detectable_mixture(setting: Setting = PRINTED) -> Finding:
     holds &= all(bool((critical(setting, d, SPEEDS) <= 1.0).all()) for d in DIRECTIONS)
     computed = {
         "radius_without_force": alone, "growth_of_second_moment_at_p_0.6_and_10_rad_per_s": growth,
-        "second_moment_radius": mixed, "p_cr_at_10_rad_per_s": p_cr,
-    }  # fmt: skip
+        "second_moment_radius": mixed, "p_cr_at_10_rad_per_s": p_cr}  # fmt: skip
     reading = (
         "Without the force the velocity error is an exact integrator, eigenvalue 1, and does not decay by itself; "
         f"the mixture does: at {REMARK_SPEED:g} rad/s and p = {REMARK_DROP:g} the second moment falls by the factor "
@@ -209,14 +207,12 @@ def twenty_percent(setting: Setting = PRINTED) -> Finding:
         "longitudinal": by_speed(EXAMPLE_SPEEDS, radius(setting, "longitudinal", EXAMPLE_SPEEDS, p)),
         "range_over_0_to_140": [float(found.min()), float(found.max())],
         "tustin_range_over_0_to_140": [float(other.min()), float(other.max())],
-        "with_p_0.8_met_at_rad_per_s": swapped, "lateral_met_at_rad_per_s": lateral,
-    }  # fmt: skip
+        "with_p_0.8_met_at_rad_per_s": swapped, "lateral_met_at_rad_per_s": lateral}  # fmt: skip
     reading = (
         f"The wheel speed is not stated, but no wheel speed in 0..140 rad/s gives the print: {found.min():.4f} to "
         f"{found.max():.4f} with the exact update, up to {other.max():.4f} with Tustin's. "
         + ("" if swapped is None else f"It is met with the probabilities swapped (p = {1.0 - p:g}) at {swapped:.2f} rad/s")
-        + ("." if lateral is None else f", or by the lateral observer with p = {p:g} at {lateral:.2f} rad/s.")
-    )  # fmt: skip
+        + ("." if lateral is None else f", or by the lateral observer with p = {p:g} at {lateral:.2f} rad/s."))  # fmt: skip
     verdict = among_readings(np.concatenate([found, other]), PRINTED_RADIUS, 5e-5)
     return Finding(computed, verdict, reading)
 
@@ -234,14 +230,12 @@ def any_pattern(setting: Setting = PRINTED) -> Finding:
     computed = {
         "joint_spectral_radius": {w: [j.lower, j.upper] for w, j in named.items()},
         "worst_pattern_drops_to_one_update": {w: len(j.product) - 1 for w, j in grows.items()},
-        "marginal_from_rad_per_s": start, "radius_with_every_sample_lost": floats([always.min(), always.max()]),
-    }  # fmt: skip
+        "marginal_from_rad_per_s": start, "radius_with_every_sample_lost": floats([always.min(), always.max()])}  # fmt: skip
     worst = max(named, key=lambda w: named[w].lower)
     below = (
         f"; below, one update after several lost samples overshoots and a pattern grows, by {named[worst].lower:.3f} a "
         f"sample at {worst} rad/s (proved from below and above)" if grows else
-        f"; no growing pattern was found elsewhere, and {len(found) - sum(marginal)} brackets stay open"
-    )  # fmt: skip
+        f"; no growing pattern was found elsewhere, and {len(found) - sum(marginal)} brackets stay open")  # fmt: skip
     reading = (
         "With every sample lost the radius is 1 exactly, the integrator. Under any pattern of losses that is the worst only "
         + ("at no wheel speed" if start is None else f"from {start:.2f} rad/s on")
@@ -357,6 +351,5 @@ def readings_figure() -> Figure:
 
 TOPIC.show(
     "drops", "Lost force measurements (Figs 7 and 8)", 1.4, ("P3-pcr", "P3-pcr-exact", "P3-fig8", "P3-rem4"),
-    [table], [critical_figure, radius_figure, map_figure], [UPDATE_NOTE],
-)  # fmt: skip
+    [table], [critical_figure, radius_figure, map_figure], [UPDATE_NOTE])  # fmt: skip
 TOPIC.show("example-3", "Example 3", 1.2, ("P3-ex3", "P3-ex3-arb"), figures=[readings_figure])

@@ -76,8 +76,7 @@ def symmetric(setting: Setting = PRINTED) -> Finding:
     rate = None if where is None else float(setting.rolling_rate("longitudinal", where))
     computed = {
         "at_40_rad_per_s": found, "relative_difference": found / published - 1.0,
-        "speeds_that_round_to_print_rad_per_s": match, "kappa_Re_omega_there_per_s": rate,
-    }  # fmt: skip
+        "speeds_that_round_to_print_rad_per_s": match, "kappa_Re_omega_there_per_s": rate}  # fmt: skip
     reading = (
         f"Table I gives {found:.0f} 1/s at the stated {setting.example_speed:g} rad/s, {found / published - 1:+.1%} from the "
         "print. "
@@ -97,16 +96,14 @@ def transformed(setting: Setting = PRINTED) -> Finding:
     at_other = None if other is None else symmetric_part(setting, 0.5 * sum(other), transformed=True)
     computed = {
         "at_40_rad_per_s": found, "at_the_speed_that_gives_108750": at_other,
-        "speeds_that_round_to_print_rad_per_s": match,
-    }  # fmt: skip
+        "speeds_that_round_to_print_rad_per_s": match}  # fmt: skip
     reading = (
         f"T A_e T^-1 with T = diag({setting.similarity:g}, 1) gives {found:.2f} 1/s at {setting.example_speed:g} rad/s; "
         + ("no wheel speed rounds to the print" if match is None else
            f"{match[0]:.2f} to {match[1]:.2f} rad/s round to it")
         + ("." if at_other is None else
            f", and the speed that fits 108750 gives {at_other:.3f}, which meets it by truncation only.")
-        + " The point of the example, that T turns a useless bound into a sharp one, holds."
-    )  # fmt: skip
+        + " The point of the example, that T turns a useless bound into a sharp one, holds.")  # fmt: skip
     return Finding(computed, reproduced(agrees(found, TOPIC.printed("P3-ex1-T"), HALF_DIGIT)), reading)
 
 
@@ -140,8 +137,7 @@ def young(setting: Setting = PRINTED) -> Finding:
     corrected_holds = corrected == 0 and sp.simplify(forms[1].trace()).is_positive and bound.bounded
     computed = {
         "left_over_epsilon": 1.0, "printed_right_over_epsilon": sides[0], "corrected_right_over_epsilon": sides[1],
-        "determinant_printed": float(printed), "determinant_corrected": float(corrected), "eta1_per_s": bound.eta1,
-    }  # fmt: skip
+        "determinant_printed": float(printed), "determinant_corrected": float(corrected), "eta1_per_s": bound.eta1}  # fmt: skip
     reading = (
         "With B rho = epsilon e the left side of the printed step is epsilon |e|^2 and the right side half of it. "
         "Young's inequality needs |B rho|^2/(2 epsilon) + epsilon |e|^2/2; then eta_1 = 2 lambda_max + epsilon "
@@ -223,8 +219,7 @@ def non_expansive(setting: Setting = PRINTED) -> Finding:
         crossings, largest = norm_crosses_one(setting, d), float(both.max())
         computed[d] = {
             "at_0_rad_per_s": float(both[0]), "largest": largest, "crosses_1_at_rad_per_s": crossings,
-            "largest_friction_only": alone,
-        }  # fmt: skip
+            "largest_friction_only": alone}  # fmt: skip
         if largest > 1.0 + NON_EXPANSIVE:
             where.append(f"{d} by {largest - 1.0:.2g} at most, below {', '.join(f'{r:.4g}' for r in crossings)} rad/s")
     friction = all(entry["largest_friction_only"] <= 1.0 + NON_EXPANSIVE for entry in computed.values())
@@ -304,9 +299,7 @@ def norm_figure() -> Figure:
 
 TOPIC.show(
     "example-1", "Example 1 and the boundedness proof", 0.6,
-    ("P3-ex1-eig", "P3-ex1-sym", "P3-ex1-T", "P3-ex1-Topt", "P3-prop1-young"),
-)  # fmt: skip
+    ("P3-ex1-eig", "P3-ex1-sym", "P3-ex1-T", "P3-ex1-Topt", "P3-prop1-young"))  # fmt: skip
 TOPIC.show(
     "norms", "H∞ norms over the wheel speed (Fig. 2)", 1.2,
-    ("P3-fig2-x", "P3-fig2-y", "P3-fig2-nonexp", "P3-hinf-floor"), [table], [norm_figure],
-)  # fmt: skip
+    ("P3-fig2-x", "P3-fig2-y", "P3-fig2-nonexp", "P3-hinf-floor"), [table], [norm_figure])  # fmt: skip

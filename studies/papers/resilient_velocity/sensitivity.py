@@ -167,13 +167,11 @@ def rank_of_observability(setting: Setting = PRINTED) -> Finding:
         + "det O_2 = (sigma_0 - sigma_1 a)(sigma_0 + sigma_2 a) + sigma_1 (sigma_1 + sigma_2) da/dt with a = kappa "
         "R_e omega vanishes on a curve in wheel speed and acceleration. "
         + ("What is lost is the bristle deflection, which decays, so the pair stays detectable." if detectable else
-           "The pair is not detectable.")
-    )  # fmt: skip
+           "The pair is not detectable."))  # fmt: skip
     return Finding(computed, reproduced(not lost_inside), reading)
 
 
 TOPIC.show(
     "sensitivity", "Tire constants off by 20 % (Figs 3 to 5)", 0.5, ("P3-fig345",),
-    [table], [partial(deviation_figure, measure) for measure in MEASURES],
-)  # fmt: skip
+    [table], [partial(deviation_figure, measure) for measure in MEASURES])  # fmt: skip
 TOPIC.show("observability", "The observability rank", 1.1, ("P3-obs",))

@@ -78,8 +78,7 @@ def common_decay(setting: Setting = PRINTED) -> Finding:
         "gamma_that_proves_high_slip_gain_below": [float(high[1].min()), float(high[1].max())],
         "speeds_where_one_diagonal_T_serves_both": floats(SPEEDS[shared]),
         "common_quadratic_function_exists": proofs, "common_quadratic_function_from_rad_per_s": threshold,
-        "sampled_modes_share_one_at_every_speed": discrete,
-    }  # fmt: skip
+        "sampled_modes_share_one_at_every_speed": discrete}  # fmt: skip
     reading = (
         f"With T = diag({setting.similarity:g}, 1) lambda_bar is {worst:+.0f} 1/s, from the high-slip gain "
         f"({high_slip:+.0f}; the normal gain alone gives {normal:+.0f}). "
@@ -87,8 +86,7 @@ def common_decay(setting: Setting = PRINTED) -> Finding:
            f"A diagonal T serves both gains at {int(shared.sum())} of {len(SPEEDS)} wheel speeds")
         + ("." if threshold is None else f", and below {threshold:.2f} rad/s the two continuous modes share no quadratic "
            "Lyapunov function at all (exact test).")
-        + (" Sampled at 5 ms they do, at every wheel speed held." if discrete else "")
-    )  # fmt: skip
+        + (" Sampled at 5 ms they do, at every wheel speed held." if discrete else ""))  # fmt: skip
     return Finding(computed, reproduced(worst < 0.0), reading)
 
 
@@ -107,8 +105,7 @@ def arbitrary_switching(setting: Setting = PRINTED) -> Finding:
         "second_moment_radius": by_speed(SHOWN, shown**2), "radius": by_speed(SHOWN, shown),
         "radius_over_0_to_140": [float(radius.min()), float(radius.max())],
         "square_over_0_to_140": [float(square.min()), float(square.max())],
-        "speeds_where_square_rounds_to_print": matches, "joint_spectral_radius_at_40": [proved.lower, proved.upper],
-    }  # fmt: skip
+        "speeds_where_square_rounds_to_print": matches, "joint_spectral_radius_at_40": [proved.lower, proved.upper]}  # fmt: skip
     never = among_readings(radius, published, HALF_DIGIT) == "not reproduced"
     reading = (
         f"The fastest growth is that of the high-slip gain alone. Its spectral radius, {radius.min():.5f} to "
@@ -162,8 +159,7 @@ def markov_margin(setting: Setting = PRINTED) -> Finding:
     computed = {
         "stay_probability": floats(STAYS), "wheel_speed_rad_per_s": floats(CHAIN_SPEEDS),
         "margin": [floats(row) for row in shown], "smallest_over_0_to_1_and_0_to_140": float(dense.min()),
-        "largest_distance_from_1_minus_stay": float(np.abs(shown - (1.0 - STAYS[:, None])).max()),
-    }  # fmt: skip
+        "largest_distance_from_1_minus_stay": float(np.abs(shown - (1.0 - STAYS[:, None])).max())}  # fmt: skip
     reading = (
         "Fig. 6 prints no numbers; what it shows is checked: with P_dry of (23) the switched observer is mean-square stable "
         + ("for every stay probability and wheel speed" if stable else "not everywhere")
@@ -188,8 +184,7 @@ def orientation(setting: Setting = PRINTED) -> Finding:
         "left_and_right_identical": same_side, "two_modes_P_and_transpose_identical": same_transposed,
         "three_modes_P_and_transpose_differ": three_differ,
         "two_modes": _radius(pair, TWO), "two_modes_transposed": _radius(pair, TWO.T),
-        "three_modes": _radius(modes, CYCLIC), "three_modes_transposed": _radius(modes, CYCLIC.T),
-    }  # fmt: skip
+        "three_modes": _radius(modes, CYCLIC), "three_modes_transposed": _radius(modes, CYCLIC.T)}  # fmt: skip
     reading = (
         "The factor P' x I may stand left or right of the block matrix, and with two modes P may be transposed: "
         "the characteristic polynomials are equal in exact arithmetic, because every chain of two modes is "
@@ -257,5 +252,4 @@ TOPIC.show(
     [UPDATE_NOTE],
 )
 TOPIC.show(
-    "markov", "Switching by a Markov chain (Fig. 6)", 0.2, ("P3-fig6", "P3-kron"), [table], [markov_figure]
-)  # fmt: skip
+    "markov", "Switching by a Markov chain (Fig. 6)", 0.2, ("P3-fig6", "P3-kron"), [table], [markov_figure])  # fmt: skip

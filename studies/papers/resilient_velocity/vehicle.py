@@ -121,8 +121,7 @@ def loads(setting: Setting = PRINTED) -> Finding:
         "pitch_reading_at_rest_nose_down": float(pitched),
         "lateral_reading_at_rest_leaning_3_deg_m_per_s2": off[0],
         "front_left_load_error_at_rest_leaning_3_deg_N": off[1],
-        "corrected_errors": [float(e) for e in corrected] if corrected_holds else [str(e) for e in corrected],
-    }  # fmt: skip
+        "corrected_errors": [float(e) for e in corrected] if corrected_holds else [str(e) for e in corrected]}  # fmt: skip
     reading = (
         f"Static loads {front:.1f} and {rear:.1f} N by the lever rule, transfer {longitudinal:.1f} N per m/s^2, "
         "sums conserved exactly. But (27) takes roll as left side up while a_phi_y levels with the opposite sign: "
@@ -266,8 +265,7 @@ def steady_curve(setting: Setting = PRINTED) -> Finding:
         "slip_stiffness": stiffness, "slope_at_origin": slope, "peak_velocity_and_force_by_road": peaks,
         "disturbance_at_most_slip_velocity": bounded,
         "contact_patch_m": {d: PATCH / tire[d].kappa.value for d in DIRECTIONS},
-        "printed_units_consistent": printed, "corrected_units_consistent": corrected,
-    }  # fmt: skip
+        "printed_units_consistent": printed, "corrected_units_consistent": corrected}  # fmt: skip
     reading = (
         f"At {SPEED:g} rad/s the steady longitudinal force rises with sigma0/kappa = {stiffness['longitudinal']:.2f} "
         "per unit of slip and peaks at "
@@ -282,8 +280,7 @@ def table() -> Table:
     """Tire constants, vehicle and gains, with the units that the equations need."""
     rows: list[list[Cell]] = [
         [f"{name}, {d}", q.value, q.unit, PRINTED_UNITS.get(name, q.unit)]
-        for d in DIRECTIONS for name, q in quantities(PRINTED.parameters.tire[d]).items()
-    ]  # fmt: skip
+        for d in DIRECTIONS for name, q in quantities(PRINTED.parameters.tire[d]).items()]  # fmt: skip
     rows += [[name.replace("_", " "), q.value, q.unit, q.unit] for name, q in PRINTED.parameters.vehicle.items()]
     for name, gain in (*PRINTED.gains.items(), ("longitudinal, high slip", PRINTED.high_slip)):
         rows += [[f"gain L{k + 1}, {name}", gain[k], unit, "not printed"] for k, unit in enumerate(("m/s", "m/s^2"))]
@@ -321,5 +318,4 @@ def friction_figure() -> Figure:
 
 TOPIC.show(
     "vehicle", "Table I, loads, suspension and tire", 0.7, ("P3-26", "P3-susp", "P3-lugre"),
-    [table], [compliance_figure, friction_figure],
-)  # fmt: skip
+    [table], [compliance_figure, friction_figure])  # fmt: skip

@@ -11,18 +11,18 @@ from estimators.arrays import FloatArray
 from studies.claim import Finding, reproduced
 from studies.papers.smo_ekf_sideslip.inputs import (
     CAR,
-    MASS_SETTINGS,
+    FACTORS,
+    GRAVITY,
+    MASSES,
     PACKAGE,
     PRINTED,
-    PRINTED_GRAVITY,
-    STIFFNESS_SETTINGS,
     WHEELBASE,
     published_car,
 )
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Line, Mark, Panel, dots
 from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE, RED, TRUTH
-from studies.study import Cell, PartResult, Scope, Table
+from studies.study import Cell, Table
 
 TOPIC = Topic(PACKAGE)
 LIMIT = 6.0  # %
@@ -48,8 +48,7 @@ def force_tables(tables: Mapping[str, Any] = PRINTED) -> Finding:
     computed = {
         "largest_mean_percent": mean, "largest_deviation_percent": deviation,
         "mean_by_mass_percent": {name: list(pair) for name, pair in mass.items()}, "least_sensitive_to_mass": least,
-        "nominal_columns_agree_between_tables": agrees,
-    }  # fmt: skip
+        "nominal_columns_agree_between_tables": agrees}  # fmt: skip
     reading = (
         f"Largest mean {mean:g} % and largest standard deviation {deviation:g} % of Tables 1 and 2, both below {LIMIT:g} %. "
         f"With 300 kg more or less F_y2 runs from {mass['F_y2'][0]:g} to {mass['F_y2'][1]:g} %, the rear sideslip from "
@@ -59,19 +58,12 @@ def force_tables(tables: Mapping[str, Any] = PRINTED) -> Finding:
     return Finding(computed, reproduced(mean < LIMIT and deviation < LIMIT and least == "beta_2" and agrees), reading)
 
 
-@TOPIC.part("tables", "Tables 1 to 5 against the text", 0.2)
-def tables(_: Scope) -> PartResult:
-    """The printed tables against the text."""
-    return PartResult(TOPIC.found(), [printed_forces(), printed_settings()], [lateral_models()])
-
-
 def printed_forces() -> Table:
     """Tables 1 and 2."""
     rows: list[list[Cell]] = [
         [test, name, *(row[key] for key in ("largest", "unit", "mean", "deviation")), max(row["mean"], row["deviation"]) < 6]
         for test, found in PRINTED.items()
-        for name, row in found["forces"].items()
-    ]  # fmt: skip
+        for name, row in found["forces"].items()]  # fmt: skip
     return Table(
         "tables-1-2",
         "Tables 1 and 2 of P5 as printed: errors (8) of the force observer in the two road tests, in percent of the maximum.",
@@ -80,7 +72,7 @@ def printed_forces() -> Table:
 
 def printed_settings() -> Table:
     """Tables 3 to 5."""
-    factors, changes = [f"stiffness x {k:g}" for k in STIFFNESS_SETTINGS], [f"mass {k:+g} kg" for k in MASS_SETTINGS]
+    factors, changes = [f"stiffness x {k:g}" for k in FACTORS], [f"mass {k:+g} kg" for k in MASSES]
     found = [(n, test, "beta_2", PRINTED[test]["stiffness"], factors) for n, test in ((3, "slalom"), (4, "roundabout"))]
     found += [(5, "slalom", name, row, changes) for name, row in PRINTED["slalom"]["mass"].items()]
     rows: list[list[Cell]] = [
@@ -103,24 +95,21 @@ def burckhardt_force(slip: FloatArray, road: str, load: float) -> FloatArray:
 
 def lateral_models() -> Figure:
     """Fig. 9: linear, linear adaptive and Burckhardt."""
-    load = CAR.mass * PRINTED_GRAVITY * CAR.rear_axle_distance / WHEELBASE
+    load = CAR.mass * GRAVITY * CAR.rear_axle_distance / WHEELBASE
     slip, point = np.radians(np.linspace(0.0, 12.0, 241)), np.radians(6.0)
     secant = float(burckhardt_force(np.array(point), "dry asphalt", load)) / point
     marks: list[Mark] = [
         Line(np.degrees(slip), burckhardt_force(slip, road, load) / 1e3, f"Burckhardt, {road}", color)
         for road, color in zip(BURCKHARDT, (BLUE, ORANGE, GREEN, PURPLE), strict=True)
     ]
-
-    def straight(stiffness: float) -> FloatArray:
-        """Up to 10.4 kN, so that it ends below the legend."""
-        return np.where(stiffness * slip < 10.4e3, stiffness * slip / 1e3, np.nan)
-
-    linear = straight(published_car().front_stiffness)
-    marks += [
-        Line(np.degrees(slip), linear, "linear, C₁ = 65 kN/rad", TRUTH, "dashed", 1.2),
-        Line(np.degrees(slip), straight(secant), "linear adaptive, through dry asphalt at 6°", RED, width=1.2),
-        dots(6.0, secant * point / 1e3, color=RED),
-    ]
+    # Straight lines up to 10.4 kN, so that they end below the legend.
+    linear, adaptive = (
+        np.where(k * slip < 10.4e3, k * slip / 1e3, np.nan) for k in (published_car().front_stiffness, secant)
+    )
+    marks.append(Line(np.degrees(slip), linear, "linear, C₁ = 65 kN/rad", TRUTH, "dashed", 1.2))
+    marks.append(Line(np.degrees(slip), adaptive, "linear adaptive, through dry asphalt at 6°", RED, width=1.2))
+    marks.append(dots(6.0, secant * point / 1e3, color=RED))
+    x, y = Axis("front slip angle β₁ [deg]", 0, 12), Axis("front axle lateral force [kN]", 0, 13)
     return Figure(
         "lateral-models",
         "Fig. 9 of P5: lateral force of the front axle over its slip angle by the linear model with the printed stiffness, "
@@ -128,7 +117,8 @@ def lateral_models() -> Figure:
         f"static axle load of {load / 1e3:.1f} kN. P5 prints no Burckhardt values; the common ones are used. The adaptive "
         "model needs no road: its slope follows.",
         "Rising curves of force over slip angle: two straight lines and four saturating curves, snow far below asphalt.",
-        Panel(
-            marks, Axis("front slip angle β₁ [deg]", 0, 12), Axis("front axle lateral force [kN]", 0, 13),
-            legend="upper left", columns=2,
-        ))  # fmt: skip
+        Panel(marks, x, y, legend="upper left", columns=2),
+    )
+
+
+TOPIC.show("tables", "Tables 1 to 5 against the text", 0.2, (), [printed_forces, printed_settings], [lateral_models])

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from estimators.arrays import FloatArray
-from studies.papers.smo_ekf_sideslip.inputs import CAR, PRINTED_GRAVITY, SAMPLE_TIME, WHEELBASE, published_car
+from studies.papers.smo_ekf_sideslip.inputs import CAR, GRAVITY, SAMPLE_TIME, WHEELBASE, published_car
 from studies.papers.smo_ekf_sideslip.observers import Signals
 
 LINEAR = 1e9  # friction so large that the axles are linear: an observer with the right stiffness has no model error
@@ -69,7 +69,7 @@ def simulate(
     P5 (10), (11) and (1) with the front forces turned into body axes. A large `friction` makes the axles linear.
     """
     car, front, rear = published_car(), CAR.front_axle_distance, CAR.rear_axle_distance
-    limit = friction * (car.mass * PRINTED_GRAVITY / WHEELBASE) * np.array([rear, front])
+    limit = friction * (car.mass * GRAVITY / WHEELBASE) * np.array([rear, front])
     stiffness = np.array([car.front_stiffness, car.rear_stiffness])
 
     def forces(angle: Any, beta: Any, yaw: Any) -> tuple[FloatArray, FloatArray, Any]:
