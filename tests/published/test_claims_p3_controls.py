@@ -14,8 +14,8 @@ from studies.papers.resilient_velocity import (
     discretisation,
     drops,
     error_dynamics,
-    experiments,
     sensitivity,
+    study,
     switching,
     vehicle,
 )
@@ -83,7 +83,7 @@ def test_a_changed_formula_changes_the_verdict(monkeypatch: pytest.MonkeyPatch) 
     assert error_dynamics.any_gain(other).verdict is ClaimVerdict.NOT_REPRODUCED
     flat = np.ones(10**6)
     flat[0] = 0.0
-    assert experiments.normalised_errors({"longitudinal": flat, "lateral": flat}).verdict is ClaimVerdict.REPRODUCED
+    assert study.normalised_errors({"longitudinal": flat, "lateral": flat}).verdict is ClaimVerdict.REPRODUCED
     with monkeypatch.context() as patch:
         patch.setattr(drops, "FIG8_DROPS", (0.2, 0.2))
         assert drops.radius_under_drops().verdict is ClaimVerdict.REPRODUCED

@@ -14,19 +14,12 @@ from analysis.bounds.sliding_mode import PUBLISHED, SlidingModeGains
 from estimators.sideslip import CorneringModel, SlidingModeObserver
 from studies.claim import ClaimVerdict, Finding
 from studies.papers.published import published_claims
-from studies.papers.smo_ekf_sideslip import (
-    force_observer,
-    observability,
-    printed_tables,
-    sideslip_settings,
-    truth_tests,
-)
+from studies.papers.smo_ekf_sideslip import force_observer, observability, printed_tables, road_tests, sideslip_settings
 from studies.papers.smo_ekf_sideslip.force_observer import NARROW, WIDE, error_motion, split, split_tracking
 from studies.papers.smo_ekf_sideslip.inputs import CAR, LARGEST, MASSES, PACKAGE, PRINTED, WHEELBASE, published_car
 from studies.papers.smo_ekf_sideslip.observability import third_singular_value
-from studies.papers.smo_ekf_sideslip.observers import estimates
+from studies.papers.smo_ekf_sideslip.observers import estimates, simulate, steady_turn
 from studies.papers.smo_ekf_sideslip.printed_tables import BURCKHARDT, burckhardt_force
-from studies.papers.smo_ekf_sideslip.saturating_car import simulate, steady_turn
 from studies.papers.smo_ekf_sideslip.sideslip_settings import (
     mass_figure,
     mass_table,
@@ -41,7 +34,7 @@ from synthesis.models.catalogue.single_track import axle_force_model
 from tests.support.study_checks import check_result, check_study, desk_parts
 from tests.support.study_reference import reference_claims
 
-TOPICS = (force_observer, observability, printed_tables, sideslip_settings, truth_tests)
+TOPICS = (force_observer, observability, printed_tables, sideslip_settings, road_tests)
 FUNCTIONS = {name: function for module in TOPICS for name, function in module.TOPIC.claims.items()}
 
 

@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 
 from estimators.velocity import SuspensionParameters
-from studies.papers.resilient_velocity.compliance_report import TESTS, hard_traction, residual_history, residual_table
-from studies.papers.resilient_velocity.compliance_trial import (
+from studies.papers.resilient_velocity.compliance import (
     INSIDE,
     PRINTED_WAY,
+    TESTS,
     WITHOUT,
     ComplianceTrial,
+    hard_traction,
     model_force,
+    residual_history,
+    residual_table,
     run_trial,
 )
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, PRINTED

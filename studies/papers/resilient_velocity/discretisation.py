@@ -74,8 +74,7 @@ def zero_order_hold_reading(setting: Setting = PRINTED) -> Finding:
     return Finding(computed, reproduced(all(stable.values()), otherwise), reading)
 
 
-def table() -> Table:
-    """The readings of (10) over the sample rate."""
+def _table() -> Table:
     columns: dict[str, ArrayLike] = {"sample rate [Hz]": SAMPLE_RATES}
     for d, model in PRINTED.models.items():
         for name, update in READINGS.items():
@@ -88,4 +87,4 @@ def table() -> Table:
     return column_table("sampling", caption, columns)
 
 
-TOPIC.show("sampling", "What the printed gains need from the discretisation", 0.3, tables=[table])
+TOPIC.show("sampling", "What the printed gains need from the discretisation", 0.3, tables=[_table])

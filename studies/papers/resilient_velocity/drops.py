@@ -17,11 +17,11 @@ from studies.papers.resilient_velocity.inputs import (
     COLOUR,
     DIRECTIONS,
     FINE,
+    NOTE,
     PACKAGE,
     PRINTED,
     SPEED_AXIS,
     SPEEDS,
-    UPDATE_NOTE,
     Setting,
     crossing,
 )
@@ -110,13 +110,12 @@ def critical_probability(setting: Setting = PRINTED) -> Finding:
         words.append(f"{direction} {found[0]:.3f} at standstill")
         words[-1] += "" if start is None else f", 1 from {start:.2f} rad/s on"
     below = all(value > setting.example_drop for value in lowest.values())
-    reading = (
+    return Finding({**computed, "smallest": lowest}, reproduced(holds and below), (
         "Fig. 7 prints no numbers; what it says is checked, for exp(A T) while dropped and exp(A_e T) otherwise, T = 5 ms: "
         + ("one critical probability separates stable from unstable at every wheel speed" if holds else
            "no single probability separates")
         + f" ({'; '.join(words)}), and p = {setting.example_drop:g} of Example 3 lies "
-        + ("below it everywhere." if below else "above it somewhere."))  # fmt: skip
-    return Finding({**computed, "smallest": lowest}, reproduced(holds and below), reading)
+        + ("below it everywhere." if below else "above it somewhere.")))  # fmt: skip
 
 
 @TOPIC.claim("P3-pcr-exact")
@@ -132,12 +131,10 @@ def exact_critical_probability(setting: Setting = PRINTED) -> Finding:
         computed[f"{direction}_largest_difference_from_bisection"] = apart
         computed[f"{direction}_speeds_with_p_cr_1"] = int(one.sum())
         holds &= apart <= 1e-10 and bool(np.array_equal(found[1:] == 1.0, one))
-    reading = (
+    return Finding(computed, derived(holds), (
         "p_cr = 1/mu with mu the largest real eigenvalue of (I - S(A1))^-1 (S(A0) - S(A1)) on the 3 x 3 symmetric "
         "square; the integrator of A0 puts an exact root at p = 1, which is divided out, so a quadratic remains. "
-        "p_cr = 1 if and only if |e2' A1 [1/a, 1]'| <= 1, a = kappa R_e |omega|."
-    )
-    return Finding(computed, derived(holds), reading)
+        "p_cr = 1 if and only if |e2' A1 [1/a, 1]'| <= 1, a = kappa R_e |omega|."))  # fmt: skip
 
 
 def bisected(A0: FloatArray, A1: FloatArray, steps: int = 50) -> FloatArray:
@@ -182,12 +179,10 @@ def detectable_mixture(setting: Setting = PRINTED) -> Finding:
     computed = {
         "radius_without_force": alone, "growth_of_second_moment_at_p_0.6_and_10_rad_per_s": growth,
         "second_moment_radius": mixed, "p_cr_at_10_rad_per_s": p_cr}  # fmt: skip
-    reading = (
+    return Finding(computed, derived(holds), (
         "Without the force the velocity error is an exact integrator, eigenvalue 1, and does not decay by itself; "
         f"the mixture does: at {REMARK_SPEED:g} rad/s and p = {REMARK_DROP:g} the second moment falls by the factor "
-        f"{growth:.6f} a sample, which is the radius of (22)."
-    )
-    return Finding(computed, derived(holds), reading)
+        f"{growth:.6f} a sample, which is the radius of (22)."))  # fmt: skip
 
 
 def tustin_radius(setting: Setting) -> FloatArray:
@@ -236,17 +231,14 @@ def any_pattern(setting: Setting = PRINTED) -> Finding:
         f"; below, one update after several lost samples overshoots and a pattern grows, by {named[worst].lower:.3f} a "
         f"sample at {worst} rad/s (proved from below and above)" if grows else
         f"; no growing pattern was found elsewhere, and {len(found) - sum(marginal)} brackets stay open")  # fmt: skip
-    reading = (
+    return Finding(computed, partly(all(marginal), any(marginal)), (
         "With every sample lost the radius is 1 exactly, the integrator. Under any pattern of losses that is the worst only "
         + ("at no wheel speed" if start is None else f"from {start:.2f} rad/s on")
         + ("" if all(marginal) else below)
-        + ". The wheel speed of the example is not stated."
-    )
-    return Finding(computed, partly(all(marginal), any(marginal)), reading)
+        + ". The wheel speed of the example is not stated."))  # fmt: skip
 
 
-def table() -> Table:
-    """Figs 7 and 8 in numbers."""
+def _table() -> Table:
     columns: dict[str, ArrayLike] = {"wheel speed [rad/s]": TABLE_SPEEDS}
     p = PRINTED.example_drop
     for d in DIRECTIONS:
@@ -259,8 +251,7 @@ def table() -> Table:
     return column_table("drops", caption, columns)
 
 
-def critical_figure() -> Figure:
-    """Fig. 7, whole range and near standstill."""
+def _critical_figure() -> Figure:
     near = np.linspace(0.0, 2.0, 201)
     panels: list[list[Mark]] = [[], []]
     for direction, dash in zip(DIRECTIONS, DASHES, strict=False):
@@ -273,8 +264,7 @@ def critical_figure() -> Figure:
     p = PRINTED.example_drop
     panels[0].append(Level(y=p, label=f"p = {p:g} of Example 3", color=GREY, dash="dotted", width=1.0))
     y = Axis("critical drop probability [1]", 0.0, 1.05)
-    return Figure(
-        "fig-7-critical-drop-probability",
+    return Figure("fig-7-critical-drop-probability",
         "Fig. 7 regenerated: critical drop probability of the force measurement over the wheel speed, printed "
         "gains, exact update at 200 Hz. Below a curve the error is mean-square stable. It is 1, every loss below "
         "100 % is survived, from the circles on. Right: near standstill the lateral value is below 1 as well.",
@@ -284,8 +274,7 @@ def critical_figure() -> Figure:
          Panel(panels[1], Axis(SPEED_AXIS.label, 0.0, near[-1]), y, "near standstill")], (9.2, 3.7))  # fmt: skip
 
 
-def radius_figure() -> Figure:
-    """Fig. 8 for several drop probabilities, with the printed number of Example 3."""
+def _radius_figure() -> Figure:
     panels, label, p = [], f"{PRINTED_RADIUS} of Example 3", PRINTED.example_drop
     for d, low, high, other in zip(DIRECTIONS, (0.0, 0.82), (1.25, 1.01), (1.0 - p, p), strict=True):
         marks: list[Mark] = [
@@ -297,8 +286,7 @@ def radius_figure() -> Figure:
         if met is not None:
             marks.append(dots(met, PRINTED_RADIUS, color="0.1", size=6, hollow=True))
         panels.append(Panel(marks, SPEED_AXIS, Axis("second-moment radius ρ [1]", low, high), d))
-    return Figure(
-        "fig-8-radius-under-drops",
+    return Figure("fig-8-radius-under-drops",
         "Fig. 8 regenerated for five drop probabilities, as the paper does not state its own: spectral radius of the second "
         "moment of the error over the wheel speed, printed gains, exact update at 200 Hz. Above 1 the mean square grows. "
         "Dotted: the 0.9026 that Example 3 prints for the longitudinal observer at p = 0.2; the blue curve of the left panel "
@@ -308,8 +296,7 @@ def radius_figure() -> Figure:
         panels, (9.2, 3.9), "below", 6)  # fmt: skip
 
 
-def map_figure() -> Figure:
-    """Radius over wheel speed and drop probability."""
+def _map_figure() -> Figure:
     probabilities = np.linspace(0.0, 1.0, 101)
     panels = []
     for d, label in zip(DIRECTIONS, ("", "second-moment radius ρ [1]"), strict=True):
@@ -320,8 +307,7 @@ def map_figure() -> Figure:
             Line(FINE, np.where(border < 1.0, border, np.nan), color=ORANGE, width=2.0),
         ]
         panels.append(Panel(marks, SPEED_AXIS, "drop probability p [1]", d, grid=False))
-    return Figure(
-        "radius-map",
+    return Figure("radius-map",
         "Second-moment radius of the error over wheel speed and drop probability, printed gains, exact update at "
         "200 Hz. Orange: the critical drop probability, radius 1; unstable above it. At p = 1 the radius is 1 "
         "everywhere, the integrator of the velocity error.",
@@ -330,8 +316,7 @@ def map_figure() -> Figure:
         panels, (9.2, 4.0), share_y="all")  # fmt: skip
 
 
-def readings_figure() -> Figure:
-    """Example 3 under two discretisations that keep stability."""
+def _readings_figure() -> Figure:
     p, (x, y) = PRINTED.example_drop, COLOUR.values()
     marks: list[Mark] = [
         Line(FINE, radius(PRINTED, "longitudinal", FINE, p), "longitudinal, exact update", x, width=1.9),
@@ -339,8 +324,7 @@ def readings_figure() -> Figure:
         Line(FINE, radius(PRINTED, "lateral", FINE, p), "lateral, exact update", y, "dash-dot"),
         Level(y=PRINTED_RADIUS, label=f"printed, {PRINTED_RADIUS}", color=GREY, dash="dotted", width=1.0),
     ]
-    return Figure(
-        "example-3-readings",
+    return Figure("example-3-readings",
         f"Example 3 under the readings that its text allows: spectral radius of the second moment with {p:.0%} of "
         "the force measurements lost, over the wheel speed, which is not stated. The printed 0.9026 belongs to the "
         "lateral observer near 51 rad/s, not to the longitudinal gain that the example names.",
@@ -351,5 +335,5 @@ def readings_figure() -> Figure:
 
 TOPIC.show(
     "drops", "Lost force measurements (Figs 7 and 8)", 1.4, ("P3-pcr", "P3-pcr-exact", "P3-fig8", "P3-rem4"),
-    [table], [critical_figure, radius_figure, map_figure], [UPDATE_NOTE])  # fmt: skip
-TOPIC.show("example-3", "Example 3", 1.2, ("P3-ex3", "P3-ex3-arb"), figures=[readings_figure])
+    [_table], [_critical_figure, _radius_figure, _map_figure], [NOTE])  # fmt: skip
+TOPIC.show("example-3", "Example 3", 1.2, ("P3-ex3", "P3-ex3-arb"), figures=[_readings_figure])

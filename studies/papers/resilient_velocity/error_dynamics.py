@@ -15,15 +15,7 @@ from analysis.switching.similarity import best_diagonal_transform, similarity_bo
 from estimators.arrays import FloatArray
 from studies.claim import ClaimVerdict, Finding, JsonValue, agrees, reproduced
 from studies.papers.plain import by_speed, column_table
-from studies.papers.resilient_velocity.inputs import (
-    DIRECTIONS,
-    PACKAGE,
-    PRINTED,
-    SPEED_AXIS,
-    SPEEDS,
-    Setting,
-    crossing,
-)
+from studies.papers.resilient_velocity.inputs import DIRECTIONS, PACKAGE, PRINTED, SPEED_AXIS, SPEEDS, Setting, crossing
 from studies.papers.topic import Topic
 from studies.papers.verdicts import derived, erratum
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel, Shade, Words, dots
@@ -97,14 +89,13 @@ def transformed(setting: Setting = PRINTED) -> Finding:
     computed = {
         "at_40_rad_per_s": found, "at_the_speed_that_gives_108750": at_other,
         "speeds_that_round_to_print_rad_per_s": match}  # fmt: skip
-    reading = (
+    return Finding(computed, reproduced(agrees(found, TOPIC.printed("P3-ex1-T"), HALF_DIGIT)), (
         f"T A_e T^-1 with T = diag({setting.similarity:g}, 1) gives {found:.2f} 1/s at {setting.example_speed:g} rad/s; "
         + ("no wheel speed rounds to the print" if match is None else
            f"{match[0]:.2f} to {match[1]:.2f} rad/s round to it")
         + ("." if at_other is None else
            f", and the speed that fits 108750 gives {at_other:.3f}, which meets it by truncation only.")
-        + " The point of the example, that T turns a useless bound into a sharp one, holds.")  # fmt: skip
-    return Finding(computed, reproduced(agrees(found, TOPIC.printed("P3-ex1-T"), HALF_DIGIT)), reading)
+        + " The point of the example, that T turns a useless bound into a sharp one, holds."))  # fmt: skip
 
 
 @TOPIC.claim("P3-ex1-Topt")
@@ -115,11 +106,9 @@ def best_transform(setting: Setting = PRINTED) -> Finding:
     b, c = float(A_e[0, 0, 1]), float(A_e[0, 1, 0])
     gamma, growth = float(found.gamma[0]), float(found.growth[0])
     holds = b * c > 0.0 and agrees(gamma, float(np.sqrt(c / b)), 1e-9 * gamma) and agrees(growth, exact, 1e-6)
-    reading = (
+    return Finding({"gamma_star": gamma, "lmax_sym": growth}, derived(holds), (
         "The off-diagonal entries b, c of A_e have one sign, so gamma = sqrt(c/b) makes T A_e T^-1 symmetric and "
-        "its largest eigenvalue that of A_e itself: no diagonal T can do better, and none is needed beyond it."
-    )
-    return Finding({"gamma_star": gamma, "lmax_sym": growth}, derived(holds), reading)
+        "its largest eigenvalue that of A_e itself: no diagonal T can do better, and none is needed beyond it."))  # fmt: skip
 
 
 @TOPIC.claim("P3-prop1-young")
@@ -138,12 +127,10 @@ def young(setting: Setting = PRINTED) -> Finding:
     computed = {
         "left_over_epsilon": 1.0, "printed_right_over_epsilon": sides[0], "corrected_right_over_epsilon": sides[1],
         "determinant_printed": float(printed), "determinant_corrected": float(corrected), "eta1_per_s": bound.eta1}  # fmt: skip
-    reading = (
+    return Finding(computed, erratum(bool(printed >= 0), bool(corrected_holds)), (
         "With B rho = epsilon e the left side of the printed step is epsilon |e|^2 and the right side half of it. "
         "Young's inequality needs |B rho|^2/(2 epsilon) + epsilon |e|^2/2; then eta_1 = 2 lambda_max + epsilon "
-        "stays negative over 0..140 rad/s, and boundedness survives."
-    )
-    return Finding(computed, erratum(bool(printed >= 0), bool(corrected_holds)), reading)
+        "stays negative over 0..140 rad/s, and boundedness survives."))  # fmt: skip
 
 
 def norms(setting: Setting, direction: Direction, speeds: FloatArray, *disturbances: str) -> FloatArray:
@@ -186,12 +173,10 @@ def within_axes(direction: Direction, found: FloatArray) -> ClaimVerdict:
 def longitudinal(setting: Setting = PRINTED) -> Finding:
     """On the axis of the figure."""
     found = norms(setting, "longitudinal", SPEEDS)
-    reading = (
-        f"Continuous error dynamics (8), both disturbances to both errors, peak at zero frequency: {found.min():.5f} to "
-        f"{found.max():.7f} over 0..140 rad/s, on the axis of the figure to the accuracy of its labels."
-    )
     computed = by_speed(SHOWN, norms(setting, "longitudinal", SHOWN))
-    return Finding(computed, within_axes("longitudinal", found), reading)
+    return Finding(computed, within_axes("longitudinal", found), (
+        f"Continuous error dynamics (8), both disturbances to both errors, peak at zero frequency: {found.min():.5f} to "
+        f"{found.max():.7f} over 0..140 rad/s, on the axis of the figure to the accuracy of its labels."))  # fmt: skip
 
 
 @TOPIC.claim("P3-fig2-y")
@@ -202,12 +187,10 @@ def lateral(setting: Setting = PRINTED) -> Finding:
         "both_disturbances": by_speed(SHOWN, norms(setting, "lateral", SHOWN)),
         "friction_only": by_speed(SHOWN, norms(setting, "lateral", SHOWN, "friction")),
     }
-    reading = (
+    return Finding(computed, within_axes("lateral", found), (
         f"Error dynamics (13), both disturbances to both errors: {found.max():.5f} at standstill down to "
         f"{found.min():.5f} at 140 rad/s, inside the axis of the figure; friction alone would give "
-        f"{friction.min():.4f} to {friction.max():.4f}, which fits it too."
-    )
-    return Finding(computed, within_axes("lateral", found), reading)
+        f"{friction.min():.4f} to {friction.max():.4f}, which fits it too."))  # fmt: skip
 
 
 @TOPIC.claim("P3-fig2-nonexp")
@@ -246,16 +229,13 @@ def any_gain(setting: Setting = PRINTED) -> Finding:
         holds &= bool(np.abs(np.abs(evaluated) - shown).max() <= 1e-12) and bool((excess >= -1e-12).all())
         computed[direction] = by_speed(SHOWN, shown)
         computed[f"{direction}_printed_gain_excess"] = float(excess.max())
-    reading = (
+    return Finding(computed, derived(holds), (
         "At zero frequency friction and slip velocity look alike to the force: the gain from one to the other is "
         "-sigma0/(sigma0 + sigma2 kappa R_e |omega|) for every L with L_2 != 0. No tuning lowers the norm below "
-        "it, it is 1 at standstill, and the printed gains sit on it."
-    )
-    return Finding(computed, derived(holds), reading)
+        "it, it is 1 at standstill, and the printed gains sit on it."))  # fmt: skip
 
 
-def table() -> Table:
-    """Fig. 2 and its floor in numbers."""
+def _table() -> Table:
     columns, speeds = dict[str, ArrayLike]({"wheel speed [rad/s]": SPEEDS[::20]}), SPEEDS[::20]
     for d in DIRECTIONS:
         columns[f"{d}, both disturbances [1]"] = norms(PRINTED, d, speeds)
@@ -268,8 +248,7 @@ def table() -> Table:
     return column_table("norms", caption, columns)
 
 
-def norm_figure() -> Figure:
-    """One panel for each direction, on the axis range of the paper."""
+def _norm_figure() -> Figure:
     panels, top, sparse = [], dict[str, float](), SPEEDS[::20]
     for d, (low, high) in AXES.items():
         both, room = norms(PRINTED, d, SPEEDS), 0.1 * (high - low)
@@ -286,8 +265,7 @@ def norm_figure() -> Figure:
             marks += [dots(speed, 1.0, color=BLUE, size=6, hollow=True), words]
         y = Axis("H∞ norm to both errors [1]", low - room, high + room, ticks=np.linspace(low, high, 6).tolist())
         panels.append(Panel(marks, SPEED_AXIS, y, d))
-    return Figure(
-        "fig-2-norms",
+    return Figure("fig-2-norms",
         "Fig. 2 regenerated: H∞ norm of the error dynamics with the printed gains over the wheel speed. Both curves lie on "
         "the axis of the paper. Crosses: the static gain σ₀/(σ₀ + σ₂κRₑ|ω|) that no observer gain can lower. With both "
         f"disturbances the norm starts above 1 ({top['longitudinal']:.6f} and {top['lateral']:.4f} at standstill) and falls "
@@ -302,4 +280,4 @@ TOPIC.show(
     ("P3-ex1-eig", "P3-ex1-sym", "P3-ex1-T", "P3-ex1-Topt", "P3-prop1-young"))  # fmt: skip
 TOPIC.show(
     "norms", "H∞ norms over the wheel speed (Fig. 2)", 1.2,
-    ("P3-fig2-x", "P3-fig2-y", "P3-fig2-nonexp", "P3-hinf-floor"), [table], [norm_figure])  # fmt: skip
+    ("P3-fig2-x", "P3-fig2-y", "P3-fig2-nonexp", "P3-hinf-floor"), [_table], [_norm_figure])  # fmt: skip

@@ -50,12 +50,6 @@ def at_40(found: OneAtATime, constant: str) -> list[float]:
     return [found.deviations.at(parameter=constant, factor=f, wheel_speed=SPEED).item() for f in FACTORS]
 
 
-def largest_relative(found: OneAtATime) -> dict[str, float]:
-    """By constant: the largest |deviation| / |nominal value|."""
-    relative = np.abs(found.deviations.values) / np.abs(found.nominal.values)
-    return dict(zip(CONSTANTS, relative.max(axis=(1, 2)).tolist(), strict=True))
-
-
 @TOPIC.claim("P3-fig345")
 def small_deviations(setting: Setting = PRINTED) -> Finding:
     """`small` is read as: no larger in proportion than the 20 % that caused it, and stable throughout."""
@@ -64,37 +58,34 @@ def small_deviations(setting: Setting = PRINTED) -> Finding:
         margin, norm = (deviations(setting, direction, SPEEDS, name) for name in MEASURES)
         stable &= bool((margin.values.values < 0.0).all())
         lost = float((margin.deviations.values / np.abs(margin.nominal.values)).max())  # of the last, the lateral one
-        largest = {"margin": largest_relative(margin), "norm": largest_relative(norm)}
         computed[direction] = {
             "margin_per_s": margin.nominal.at(wheel_speed=SPEED).item(),
             "margin_deviation_at_40_per_s": {name: at_40(margin, name) for name in CONSTANTS},
             "least_stable_margin_per_s": float(margin.values.values.max()),
             "largest_relative_margin_loss": lost,
         }
-        for kind, sizes in largest.items():
+        for kind, found in (("margin", margin), ("norm", norm)):
+            relative = (np.abs(found.deviations.values) / np.abs(found.nominal.values)).max(axis=(1, 2))
+            sizes = dict(zip(CONSTANTS, relative.tolist(), strict=True))
             computed[direction][f"largest_relative_{kind}_deviation"] = sizes
             worst |= {f"{direction} {kind}, {constant}": size for constant, size in sizes.items()}
     large = {name: value for name, value in worst.items() if value > CHANGE}
     rest = max(value for name, value in worst.items() if not name.endswith("sigma1"))
-    reading = (
+    return Finding(computed, partly(stable and not large, stable), (
         f"No number is printed; small is read as at most the {CHANGE:.0%} that caused it. "
         + ("Every perturbed observer stays stable" if stable else "A perturbed observer is unstable")
         + f", and sigma_0, sigma_2 and kappa move margin and norm by {rest:.1%} at most; but "
         + (", ".join(f"{name}: {value:.0%}" for name, value in large.items()) or "nothing moves by more")
         + f" of the nominal value. Most of it is gained; the most that is lost is {lost:.0%} of the lateral margin. "
-        "Only sigma_1 matters."
-    )
-    return Finding(computed, partly(stable and not large, stable), reading)
+        "Only sigma_1 matters."))  # fmt: skip
 
 
-def table() -> Table:
-    """The deviations at one wheel speed."""
+def _table() -> Table:
     rows: list[list[Cell]] = []
     for d in DIRECTIONS:
         found = [deviations(PRINTED, d, np.array([SPEED]), name) for name in MEASURES]
         rows += [[f"{d}, {constant}", *(v for one in found for v in at_40(one, constant))] for constant in CONSTANTS]
-    return Table(
-        "deviations",
+    return Table("deviations",
         "What a tire constant that is 20 % too low or too high does to the stability margin (largest real part of the "
         "eigenvalues; positive deviations are towards instability) and to the H-infinity norm, at "
         f"{SPEED:g} rad/s with the printed gains.",
@@ -162,16 +153,15 @@ def rank_of_observability(setting: Setting = PRINTED) -> Finding:
             "hidden_mode": [str(m.eigenvalue) for m in frozen_modes(model.A, model.C) if m.eigenvalue != 0],
         }
     where = ", ".join(lost_inside)
-    reading = (
+    return Finding(computed, reproduced(not lost_inside), (
         (f"Rank 2 is lost inside 0..140 rad/s: {where} at constant speed. " if where else "Rank 2 everywhere. ")
         + "det O_2 = (sigma_0 - sigma_1 a)(sigma_0 + sigma_2 a) + sigma_1 (sigma_1 + sigma_2) da/dt with a = kappa "
         "R_e omega vanishes on a curve in wheel speed and acceleration. "
         + ("What is lost is the bristle deflection, which decays, so the pair stays detectable." if detectable else
-           "The pair is not detectable."))  # fmt: skip
-    return Finding(computed, reproduced(not lost_inside), reading)
+           "The pair is not detectable.")))  # fmt: skip
 
 
 TOPIC.show(
     "sensitivity", "Tire constants off by 20 % (Figs 3 to 5)", 0.5, ("P3-fig345",),
-    [table], [partial(deviation_figure, measure) for measure in MEASURES])  # fmt: skip
+    [_table], [partial(deviation_figure, measure) for measure in MEASURES])  # fmt: skip
 TOPIC.show("observability", "The observability rank", 1.1, ("P3-obs",))

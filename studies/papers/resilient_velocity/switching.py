@@ -17,17 +17,7 @@ from analysis.switching.similarity import common_growth, diagonal_window
 from estimators.arrays import FloatArray, IntArray
 from studies.claim import Finding, reproduced
 from studies.papers.plain import by_speed, column_table, floats
-from studies.papers.resilient_velocity.inputs import (
-    FINE,
-    PACKAGE,
-    PRINTED,
-    SPEED_AXIS,
-    SPEEDS,
-    UPDATE_NOTE,
-    Gain,
-    Setting,
-    crossing,
-)
+from studies.papers.resilient_velocity.inputs import FINE, NOTE, PACKAGE, PRINTED, SPEED_AXIS, SPEEDS, Setting, crossing
 from studies.papers.topic import Topic
 from studies.papers.verdicts import among_readings, derived
 from studies.plots import DASHES, ZERO, Axis, Band, Figure, Level, Line, Mark, Panel, Words
@@ -42,7 +32,7 @@ SHOWN = (8.0, 9.0, 10.0, 40.0)
 STAY_NORMAL = 0.9  # p_11 of P_dry (23)
 STAYS = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 CHAIN_SPEEDS = np.array([1.0, 20.0, 40.0, 80.0, 140.0])
-OTHER_GAINS: tuple[Gain, Gain] = ((0.68, 183.1), (0.0, 0.0))  # as further modes: that of P1, longitudinal, and none
+OTHER_GAINS = (0.68, 183.1), (0.0, 0.0)  # as further modes: that of P1, longitudinal, and none
 TWO, CYCLIC = np.array([[9, 1], [5, 5]]), np.array([[1, 8, 1], [1, 1, 8], [8, 1, 1]])  # P in tenths
 
 
@@ -79,15 +69,14 @@ def common_decay(setting: Setting = PRINTED) -> Finding:
         "speeds_where_one_diagonal_T_serves_both": floats(SPEEDS[shared]),
         "common_quadratic_function_exists": proofs, "common_quadratic_function_from_rad_per_s": threshold,
         "sampled_modes_share_one_at_every_speed": discrete}  # fmt: skip
-    reading = (
+    return Finding(computed, reproduced(worst < 0.0), (
         f"With T = diag({setting.similarity:g}, 1) lambda_bar is {worst:+.0f} 1/s, from the high-slip gain "
         f"({high_slip:+.0f}; the normal gain alone gives {normal:+.0f}). "
         + ("No diagonal T serves both gains at any wheel speed" if not shared.any() else
            f"A diagonal T serves both gains at {int(shared.sum())} of {len(SPEEDS)} wheel speeds")
         + ("." if threshold is None else f", and below {threshold:.2f} rad/s the two continuous modes share no quadratic "
            "Lyapunov function at all (exact test).")
-        + (" Sampled at 5 ms they do, at every wheel speed held." if discrete else ""))  # fmt: skip
-    return Finding(computed, reproduced(worst < 0.0), reading)
+        + (" Sampled at 5 ms they do, at every wheel speed held." if discrete else "")))  # fmt: skip
 
 
 @TOPIC.claim("P3-ex2-arb")
@@ -107,19 +96,16 @@ def arbitrary_switching(setting: Setting = PRINTED) -> Finding:
         "square_over_0_to_140": [float(square.min()), float(square.max())],
         "speeds_where_square_rounds_to_print": matches, "joint_spectral_radius_at_40": [proved.lower, proved.upper]}  # fmt: skip
     never = among_readings(radius, published, HALF_DIGIT) == "not reproduced"
-    reading = (
+    return Finding(computed, among_readings(np.concatenate([radius, square]), published, HALF_DIGIT), (
         f"The fastest growth is that of the high-slip gain alone. Its spectral radius, {radius.min():.5f} to "
         f"{radius.max():.5f} over 0..140 rad/s, "
         + ("never rounds to the print" if never else "rounds to the print in places")
         + "; its square, the second-moment radius rho(A2 x A2), does "
         + (f"from {matches[0]:.2f} to {matches[1]:.2f} rad/s" if None not in matches else "nowhere")
-        + f". The wheel speed is not stated; at 40 rad/s the square is {shown[-1] ** 2:.7f}."
-    )
-    return Finding(computed, among_readings(np.concatenate([radius, square]), published, HALF_DIGIT), reading)
+        + f". The wheel speed is not stated; at 40 rad/s the square is {shown[-1] ** 2:.7f}."))  # fmt: skip
 
 
-def window_figure() -> Figure:
-    """Which gamma of T = diag(gamma, 1) proves which gain, over the wheel speed."""
+def _window_figure() -> Figure:
     normal, high_slip = windows(PRINTED, FINE)
     marks: list[Mark] = [
         Band(FINE, normal[0], normal[1], "normal gain [1.18, 387] proved", BLUE, 0.25),
@@ -131,8 +117,7 @@ def window_figure() -> Figure:
         words = f"no common quadratic\nfunction of any kind\nbelow {threshold:.1f} rad/s"
         marks.append(Level(x=threshold, color=GREY, dash="dotted", width=1.0))
         marks.append(Words(threshold, 1.4e5, words, offset=(6, -8), vertical="top"))
-    return Figure(
-        "eq-20-windows",
+    return Figure("eq-20-windows",
         "Why (20) fails: values of γ for which T = diag(γ, 1) makes the symmetric part of the transformed error "
         "matrix negative definite, over the wheel speed, for either gain. The two bands never meet, so no diagonal "
         "T proves both gains, and the printed γ = 9000 proves the normal one only. Left of the dotted line the "
@@ -160,15 +145,13 @@ def markov_margin(setting: Setting = PRINTED) -> Finding:
         "stay_probability": floats(STAYS), "wheel_speed_rad_per_s": floats(CHAIN_SPEEDS),
         "margin": [floats(row) for row in shown], "smallest_over_0_to_1_and_0_to_140": float(dense.min()),
         "largest_distance_from_1_minus_stay": float(np.abs(shown - (1.0 - STAYS[:, None])).max())}  # fmt: skip
-    reading = (
+    return Finding(computed, reproduced(stable and falling), (
         "Fig. 6 prints no numbers; what it shows is checked: with P_dry of (23) the switched observer is mean-square stable "
         + ("for every stay probability and wheel speed" if stable else "not everywhere")
         + f" (smallest margin {dense.min():.4f}, at 1), and the margin "
         + ("falls as high slip lasts longer" if falling else "does not fall monotonically")
         + ", close to 1 minus the probability of staying in high slip, because the normal gain takes most of "
-        "the error away in one sample."
-    )
-    return Finding(computed, reproduced(stable and falling), reading)
+        "the error away in one sample."))  # fmt: skip
 
 
 @TOPIC.claim("P3-kron")
@@ -185,13 +168,11 @@ def orientation(setting: Setting = PRINTED) -> Finding:
         "three_modes_P_and_transpose_differ": three_differ,
         "two_modes": _radius(pair, TWO), "two_modes_transposed": _radius(pair, TWO.T),
         "three_modes": _radius(modes, CYCLIC), "three_modes_transposed": _radius(modes, CYCLIC.T)}  # fmt: skip
-    reading = (
+    return Finding(computed, derived(same_side and same_transposed and three_differ), (
         "The factor P' x I may stand left or right of the block matrix, and with two modes P may be transposed: "
         "the characteristic polynomials are equal in exact arithmetic, because every chain of two modes is "
         "reversible. With three modes in a cycle the transposed matrix gives another radius, so only a test with "
-        "three modes can find a wrong orientation."
-    )
-    return Finding(computed, derived(same_side and same_transposed and three_differ), reading)
+        "three modes can find a wrong orientation."))  # fmt: skip
 
 
 def _radius(modes: FloatArray, tenths: IntArray) -> float:
@@ -209,8 +190,7 @@ def _polynomial(modes: FloatArray, tenths: IntArray, left: bool = True) -> Any:
     return matrix.charpoly()
 
 
-def table() -> Table:
-    """Fig. 6 in numbers."""
+def _table() -> Table:
     found = margins(PRINTED, STAYS, CHAIN_SPEEDS)
     caption = (
         "Margin 1 - rho of mean-square stability with the transition matrix (23): rows by the probability of staying in high "
@@ -220,8 +200,7 @@ def table() -> Table:
     return column_table("markov-margins", caption, {"probability of staying [1]": STAYS} | speeds)
 
 
-def markov_figure() -> Figure:
-    """Margin over the stay probability, and what is left of it beside 1 minus that probability."""
+def _markov_figure() -> Figure:
     stays = np.linspace(0.0, 1.0, 101)
     found, rest = margins(PRINTED, stays, CHAIN_SPEEDS), 1.0 - stays
     left, right = list[Mark](), list[Mark]([ZERO])
@@ -230,8 +209,7 @@ def markov_figure() -> Figure:
         right.append(Line(stays, column - rest, "", colour, dash))
     left.append(Line(stays, rest, "1 − γ̄", GREY, width=0.8))
     x, y = Axis("probability γ̄ of staying in high slip [1]", 0.0, 1.0), Axis("margin 1 − ρ [1]", 0.0, 1.0)
-    return Figure(
-        "fig-6-markov-margin",
+    return Figure("fig-6-markov-margin",
         "Fig. 6 regenerated: margin 1 − ρ of mean-square stability when the gain switches between [1.18, 387] "
         f"(stays with probability {STAY_NORMAL:g}) and the high-slip gain [0.22, 0.1] (stays with probability γ̄), "
         "longitudinal observer at 200 Hz, five wheel speeds. Left: the margin is positive everywhere and close to "
@@ -248,8 +226,8 @@ TOPIC.show(
     0.2,
     ("P3-20", "P3-ex2-arb"),
     (),
-    [window_figure],
-    [UPDATE_NOTE],
+    [_window_figure],
+    [NOTE],
 )
 TOPIC.show(
-    "markov", "Switching by a Markov chain (Fig. 6)", 0.2, ("P3-fig6", "P3-kron"), [table], [markov_figure])  # fmt: skip
+    "markov", "Switching by a Markov chain (Fig. 6)", 0.2, ("P3-fig6", "P3-kron"), [_table], [_markov_figure])  # fmt: skip

@@ -63,14 +63,6 @@ CORRECTED = LoadFormula(-1, HEIGHT - ROLL_HEIGHT)
 AT_REST = (GRAVITY * sp.sin(ROLL), GRAVITY * sp.cos(ROLL))
 
 
-def true_wheels() -> list[sp.Expr]:
-    """Loads from the balance of forces and of moments about the middle of the track."""
-    left, right = wheels = sp.symbols("F_L F_R")
-    weight, offset = AXLE_MASS * GRAVITY, (HEIGHT - ROLL_HEIGHT) * sp.sin(ROLL)  # the offset to the right
-    solved = sp.solve([left + right - weight, (right - left) * TRACK / 2 - weight * offset], wheels)
-    return [solved[wheel] for wheel in wheels]
-
-
 def reduced(expression: sp.Expr, angle: sp.Symbol = ROLL) -> sp.Expr:
     """A polynomial in sine and cosine with every square of the cosine replaced: zero if and only if it vanishes identically."""
     sine, cosine = sp.symbols("s c")
@@ -80,15 +72,15 @@ def reduced(expression: sp.Expr, angle: sp.Symbol = ROLL) -> sp.Expr:
 
 
 def residual(formula: LoadFormula) -> tuple[sp.Expr, ...]:
-    """What the formula is off by at rest: (lateral acceleration, left load, right load); zeros if it is right."""
-    wheels = zip(formula.wheels(*AT_REST), true_wheels(), strict=True)
-    return tuple(reduced(e) for e in (formula.level(*AT_REST)[0], *(found - true for found, true in wheels)))
+    """What the formula is off by at rest: (lateral acceleration, left load, right load); zeros if it is right.
 
-
-def axle_sum(formula: LoadFormula) -> sp.Expr:
-    """F_L + F_R - m_i a_phi_n for any readings: zero if the axle load is conserved."""
-    readings = sp.symbols("a_y a_n")
-    return reduced(sum(formula.wheels(*readings)) - AXLE_MASS * formula.level(*readings)[1])
+    The true loads follow from the balance of forces and of moments about the middle of the track.
+    """
+    left, right = wheels = sp.symbols("F_L F_R")
+    weight, offset = AXLE_MASS * GRAVITY, (HEIGHT - ROLL_HEIGHT) * sp.sin(ROLL)  # the offset to the right
+    true = sp.solve([left + right - weight, (right - left) * TRACK / 2 - weight * offset], wheels)
+    off = [found - true[wheel] for found, wheel in zip(formula.wheels(*AT_REST), wheels, strict=True)]
+    return tuple(reduced(e) for e in (formula.level(*AT_REST)[0], *off))
 
 
 @TOPIC.claim("P3-26")
@@ -109,7 +101,8 @@ def loads(setting: Setting = PRINTED) -> Finding:
     # a_theta_x of (26) at rest on a level road, nose down by p: zero if (26) levels the body.
     along, normal = -GRAVITY * sp.sin(PITCH), GRAVITY * sp.cos(PITCH)
     pitched = reduced(along * sp.cos(PITCH) + normal * sp.sin(PITCH), PITCH)
-    sums = axle_sum(AS_PRINTED) == 0 and axle_sum(CORRECTED) == 0
+    readings, formulas = sp.symbols("a_y a_n"), (AS_PRINTED, CORRECTED)
+    sums = all(reduced(sum(f.wheels(*readings)) - AXLE_MASS * f.level(*readings)[1]) == 0 for f in formulas)
     printed, corrected = residual(AS_PRINTED), residual(CORRECTED)
     leaning = {ROLL: math.radians(3.0), GRAVITY: g, AXLE_MASS: front / g}
     car = {HEIGHT: height, TRACK: track, ROLL_HEIGHT: v["roll_center_height"]}
@@ -156,16 +149,13 @@ def modes(setting: Setting = PRINTED) -> Finding:
         computed[direction] = {"natural_frequency_rad_per_s": frequency, "damping_ratio": ratio}
         computed[direction]["natural_frequency_Hz"] = frequency / (2.0 * math.pi)
     x, y = (computed[d] for d in DIRECTIONS)
-    reading = (
+    return Finding(computed, derived(holds), (
         f"A wheel against the body swings at {x['natural_frequency_Hz']:.1f} Hz along (damping ratio "
         f"{x['damping_ratio']:.2f}) and {y['natural_frequency_Hz']:.1f} Hz across ({y['damping_ratio']:.2f}): well "
-        "below the 100 Hz that 200 Hz sampling can show, and integrated exactly between samples."
-    )
-    return Finding(computed, derived(holds), reading)
+        "below the 100 Hz that 200 Hz sampling can show, and integrated exactly between samples."))  # fmt: skip
 
 
-def compliance_figure() -> Figure:
-    """Response of the wheel velocity to a force step, with the runtime at 200 Hz on it, and over frequency."""
+def _compliance_figure() -> Figure:
     time, hertz = np.linspace(0.0, 0.2, 801), np.geomspace(0.5, 100.0, 400)
     samples = np.arange(1, round(0.2 / PRINTED.sample_time) + 1) * PRINTED.sample_time
     runtime, force = SuspensionCompliance(table_of_estimator(PRINTED), PRINTED.sample_time), np.full(4, FORCE)
@@ -187,8 +177,7 @@ def compliance_figure() -> Figure:
         Axis("frequency of the force [Hz]", 0.5, 100.0, "log"),
         Axis("velocity amplitude [mm/s per kN]", 0.0),
     )
-    return Figure(
-        "suspension-compliance",
+    return Figure("suspension-compliance",
         "Suspension compliance (14) with Table I: velocity of a wheel against the body after a step of the tire force (left; "
         "lines: continuous model, dots: the runtime estimator at 200 Hz, exact for held forces) and its amplitude over the "
         f"frequency of the force (right; dotted: natural frequencies). A step of 3 kN moves a wheel at up to {fastest:.2f} "
@@ -266,33 +255,28 @@ def steady_curve(setting: Setting = PRINTED) -> Finding:
         "disturbance_at_most_slip_velocity": bounded,
         "contact_patch_m": {d: PATCH / tire[d].kappa.value for d in DIRECTIONS},
         "printed_units_consistent": printed, "corrected_units_consistent": corrected}  # fmt: skip
-    reading = (
+    return Finding(computed, derived(holds), (
         f"At {SPEED:g} rad/s the steady longitudinal force rises with sigma0/kappa = {stiffness['longitudinal']:.2f} "
         "per unit of slip and peaks at "
         + " and ".join(f"{f:.3f} at {at:.2f} m/s (theta = {road})" for road, (at, f) in peaks.items())
         + ". The friction term never exceeds the slip velocity, so it is a bounded disturbance. kappa must be in 1/m "
-        "and z in m: with the printed units s/m and 1 (1) adds unlike quantities."
-    )
-    return Finding(computed, derived(holds), reading)
+        "and z in m: with the printed units s/m and 1 (1) adds unlike quantities."))  # fmt: skip
 
 
-def table() -> Table:
-    """Tire constants, vehicle and gains, with the units that the equations need."""
+def _table() -> Table:
     rows: list[list[Cell]] = [
         [f"{name}, {d}", q.value, q.unit, PRINTED_UNITS.get(name, q.unit)]
         for d in DIRECTIONS for name, q in quantities(PRINTED.parameters.tire[d]).items()]  # fmt: skip
     rows += [[name.replace("_", " "), q.value, q.unit, q.unit] for name, q in PRINTED.parameters.vehicle.items()]
     for name, gain in (*PRINTED.gains.items(), ("longitudinal, high slip", PRINTED.high_slip)):
         rows += [[f"gain L{k + 1}, {name}", gain[k], unit, "not printed"] for k, unit in enumerate(("m/s", "m/s^2"))]
-    return Table(
-        "table-1",
+    return Table("table-1",
         "Table I of P3 with the gains of the road tests, as every result of this study uses them. The unit of kappa is "
         "corrected: with s/m the bristle equation (1) would add unlike quantities.",
         ("quantity", "value", "unit used", "unit printed"), rows)  # fmt: skip
 
 
-def friction_figure() -> Figure:
-    """Steady force over slip velocity, and the friction disturbance that the observers do not know."""
+def _friction_figure() -> Figure:
     v = np.linspace(0.0, 13.0, 1301)
     left, right = list[Mark](), list[Mark]()
     pairs = [(d, road) for d in DIRECTIONS for road in ROADS]
@@ -303,8 +287,7 @@ def friction_figure() -> Figure:
         if direction == "longitudinal":  # the softer lateral tire rises all the way
             left.append(dots(*peak(PRINTED, direction, road), color=colour, hollow=True))
     slip, share = "slip velocity v [m/s]", Axis("share |ϱ| / |v| [1]", 0.0, 1.0)
-    return Figure(
-        "lugre-curves",
+    return Figure("lugre-curves",
         f"Steady average lumped LuGre tire (1), (2) with Table I at {SPEED:g} rad/s (13.2 m/s): normalised force over slip "
         "velocity on a dry (θ = 1) and a slippery road (θ = 0.3), circles at the first maximum (left), and the friction term "
         "that the linear observer models treat as a disturbance, as a share of the slip velocity (right). It never exceeds "
@@ -316,6 +299,4 @@ def friction_figure() -> Figure:
         (9.2, 3.9), "below")  # fmt: skip
 
 
-TOPIC.show(
-    "vehicle", "Table I, loads, suspension and tire", 0.7, ("P3-26", "P3-susp", "P3-lugre"),
-    [table], [compliance_figure, friction_figure])  # fmt: skip
+TOPIC.show("vehicle", "Table I, loads, suspension and tire", 0.7, (), [_table], [_compliance_figure, _friction_figure])

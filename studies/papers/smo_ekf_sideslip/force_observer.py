@@ -8,18 +8,10 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.bounds.sliding_mode import (
-    OUTPUTS,
-    PUBLISHED,
-    SlidingModeGains,
-    linear_zone_matrix,
-    reaching_time,
-    sampled_radius,
-    sliding_mode_convergence,
-    smallest_zone_widths,
-)
+from analysis.bounds import sliding_mode
+from analysis.bounds.sliding_mode import OUTPUTS, PUBLISHED, SlidingModeGains, sliding_mode_convergence
 from estimators.arrays import FloatArray
-from studies.claim import ClaimVerdict, Finding, agrees, reproduced
+from studies.claim import ClaimVerdict, Finding, JsonValue, agrees, reproduced
 from studies.papers.smo_ekf_sideslip.inputs import CAR, LARGEST, PACKAGE, PRINTED, SAMPLE_TIME, WHEELBASE
 from studies.papers.topic import Topic
 from studies.plots import Axis, Contours, Figure, Level, Line, Map, Mark, Panel, Words, dots
@@ -32,7 +24,7 @@ FINE = 2e-5  # s, step of the simulated sliding motion
 RATE = sliding_mode_convergence(PUBLISHED, CAR).split_decay_rate  # 1/s, (A.12)
 WORST_MOMENT = float(CAR.front_axle_distance * LARGEST[1] + CAR.rear_axle_distance * LARGEST[2])  # N m, at the start
 WIDE, NARROW = (0.2, 1.0, 1.0), (0.05, 0.1, 0.1)  # rad/s, m/s^2, m/s^2: two readings
-LEAST = tuple(smallest_zone_widths(PUBLISHED, CAR, SAMPLE_TIME)[name] for name in OUTPUTS)
+LEAST = tuple(sliding_mode.smallest_zone_widths(PUBLISHED, CAR, SAMPLE_TIME)[name] for name in OUTPUTS)
 
 
 def error_motion(
@@ -68,12 +60,10 @@ def gain_condition(gains: SlidingModeGains = PUBLISHED) -> Finding:
     computed = {
         "omega5_N_s": float(exact), "omega5_exact": str(exact),
         "printed_relative_error": float((Fraction(gains[5]) - exact) / exact), "residual_Nm_s": float(residual)}  # fmt: skip
-    reading = (
+    return Finding(computed, reproduced(agrees(float(exact), gains[5], 0.5)), (
         f"(7) gives {float(exact):.3f} N/s; the printed {gains[5]:g} is rounded to thousands and leaves a residual of "
         f"{float(residual):g} N m/s in (A.11). It is harmless: on the sliding surface the equivalent value of the lateral "
-        "sign is zero, so the residual does not act there and the split decays at the same rate."
-    )
-    return Finding(computed, reproduced(agrees(float(exact), gains[5], 0.5)), reading)
+        "sign is zero, so the residual does not act there and the split decays at the same rate."))  # fmt: skip
 
 
 @TOPIC.claim("P5-A4")
@@ -89,14 +79,12 @@ def dominance(gains: SlidingModeGains = PUBLISHED) -> Finding:
         "yaw_moment_limit_Nm": found.yaw_moment_limit, "worst_start_Nm": WORST_MOMENT,
         "epsilon_yaw_rad_s2": found.yaw_margin, "epsilon_longitudinal_N_s": found.longitudinal_margin,
         "growth_where_printed_sign_is_zero_rad_s2": float(growth),
-        "reaching_time_from_60_kNm_s": reaching_time(SlidingModeGains(matrix), CAR, 0.0, 60_000.0)}  # fmt: skip
-    reading = (
+        "reaching_time_from_60_kNm_s": sliding_mode.reaching_time(SlidingModeGains(matrix), CAR, 0.0, 60_000.0)}  # fmt: skip
+    return Finding(computed, reproduced(found.holds and found.yaw_margin > 0.0 and growth > 0.0), (
         f"Omega_1 dominates while |L_1 x_2 - L_2 x_3| < {found.yaw_moment_limit / 1e3:g} kN m, the worst start from the "
         f"printed maxima has {WORST_MOMENT / 1e3:.2f} kN m; Omega_12 always dominates. So the condition is local, not global. "
         "(A.4) prints L_1 x_2 + L_2 x_3; with that sign it is no condition (an error with zero sum makes the yaw error "
-        "grow), (A.5) has the minus."
-    )
-    return Finding(computed, reproduced(found.holds and found.yaw_margin > 0.0 and growth > 0.0), reading)
+        "grow), (A.5) has the minus."))  # fmt: skip
 
 
 @TOPIC.claim("P5-A12")
@@ -120,8 +108,7 @@ def split_decay(gains: SlidingModeGains = PUBLISHED) -> Finding:
     return Finding(computed, reproduced(good), reading)
 
 
-def gain_conditions() -> Table:
-    """Each condition of Appendix A with its margin at the worst start."""
+def _gain_conditions() -> Table:
     found, g = sliding_mode_convergence(PUBLISHED, CAR, yaw_moment_error=WORST_MOMENT), PUBLISHED
     rows: list[list[Cell]] = [
         ["(A.4) Omega_1 > |L1 x2 - L2 x3| / I_z", "rad/s^2", round(found.yaw_margin, 4), found.yaw_margin > 0],
@@ -130,15 +117,13 @@ def gain_conditions() -> Table:
         ["(7) Omega_4 = -Omega_7", "N/s", g[4] + g[7], g[4] == -g[7]],
         ["(7) L1 Omega_5 = L2 Omega_8 (residual)", "N m/s", round(found.split_residual, 6), abs(found.split_residual) < 1e-6],
         ["(A.12) decay of the split", "1/s", round(found.split_decay_rate, 6), found.split_decay_rate > 0]]  # fmt: skip
-    return Table(
-        "gain-conditions",
+    return Table("gain-conditions",
         "Conditions of Appendix A with the printed gains, at the worst start that the printed maxima of Table 1 allow (|L1 "
         f"x2 - L2 x3| = {WORST_MOMENT / 1e3:.2f} kN m); (A.4) with the minus sign of (A.5). Margins in the unit given.",
         ("condition", "unit", "margin or value", "holds"), rows)  # fmt: skip
 
 
-def convergence() -> Figure:
-    """The errors of the four Lyapunov functions from the worst start, bare sign at a fine step."""
+def _convergence() -> Figure:
     path = error_motion(LARGEST * [0.5, 1.0, -1.0, 1.0], 1.2, FINE)
     time, start = FINE * np.arange(1, len(path) + 1), round(0.2 / FINE)
     thin = slice(None, None, 20)
@@ -153,8 +138,7 @@ def convergence() -> Figure:
         Line(time[thin], decay, f"exp(−{RATE:g} t), (A.12)", TRUTH, "dashed", 1.0),
         Level(y=30.0, label="limit of (A.4), 30 kN m", color=RED, dash="dotted", width=1.0),
     ]
-    return Figure(
-        "convergence",
+    return Figure("convergence",
         "Error of the sliding-mode observer from the worst start that the printed maxima allow (6.28 kN in front, −3.66 kN "
         "at the rear), printed gains, bare sign at 50 kHz, constant true forces. Left: the sum of the lateral forces and the "
         "longitudinal force are reached within 0.13 s; what remains is a wrong split between the axles. Right: that split "
@@ -168,7 +152,8 @@ def convergence() -> Figure:
 
 def radius(widths: Sequence[float]) -> float:
     """Spectral radius of the error inside the linear zones."""
-    return sampled_radius(linear_zone_matrix(PUBLISHED, CAR, dict(zip(OUTPUTS, widths, strict=True))), SAMPLE_TIME)
+    matrix = sliding_mode.linear_zone_matrix(PUBLISHED, CAR, dict(zip(OUTPUTS, widths, strict=True)))
+    return sliding_mode.sampled_radius(matrix, SAMPLE_TIME)
 
 
 def late_peaks(widths: Sequence[float] | None, starts: int = 400) -> FloatArray:
@@ -199,25 +184,20 @@ def sampled_switching(readings: Sequence[Sequence[float]] = (WIDE, NARROW)) -> F
         {"widths": list(w), "spectral_radius": r, "largest_force_after_3_s_N": force}
         for w, r, force in zip(readings, radii, forces, strict=True)
     ]
-    names = ("front_lateral", "rear_lateral", "longitudinal")
-    computed = {
-        "sign_peak_yaw_rate_rad_s": float(high[0]),
-        **{f"sign_peak_{name}_N": [float(low[k]), float(high[k])] for k, name in enumerate(names, 1)}, "zones": zones,
-        "least_widths": list(LEAST)}  # fmt: skip
+    computed: JsonValue = {"sign_peak_yaw_rate_rad_s": float(high[0]), "zones": zones, "least_widths": list(LEAST)}
+    for k, name in enumerate(("front_lateral", "rear_lateral", "longitudinal"), 1):
+        computed[f"sign_peak_{name}_N"] = [float(low[k]), float(high[k])]
     otherwise = ClaimVerdict.UNDER_SPECIFIED if min(radii) < 1.0 else ClaimVerdict.NOT_REPRODUCED
-    reading = (
+    return Finding(computed, reproduced(max(radii) < 1.0, otherwise), (
         f"The bare sign chatters at 100 Hz by up to {high[0]:.3f} rad/s and by force peaks that depend on the start (front up "
         f"to {high[1]:.0f} N, longitudinal {low[3]:.0f} to {high[3]:.0f} N). The widths of the linear zones are not printed "
         f"and decide: each has a lower limit (gain times half a sample: {LEAST[0]:.2f} rad/s, {LEAST[1]:.2f} and "
         f"{LEAST[2]:.2f} m/s^2). Two readings: "
         + "; ".join(f"{tuple(w)} gives a spectral radius of {r:.4f}" for w, r in zip(readings, radii, strict=True))
-        + "."
-    )
-    return Finding(computed, reproduced(max(radii) < 1.0, otherwise), reading)
+        + "."))  # fmt: skip
 
 
-def zone_table() -> Table:
-    """Readings of the unprinted widths."""
+def _zone_table() -> Table:
     rows: list[list[Cell]] = []
     above = tuple(1.1 * width for width in LEAST)
     cases = (("bare sign", None), ("at the limits", LEAST), ("10 % above the limits", above), ("used here", WIDE),
@@ -226,8 +206,7 @@ def zone_table() -> Table:
         yaw, *peaks = late_peaks(widths, starts=60).max(axis=0)
         known: list[Cell] = [round(float(w), 4) for w in (*widths, radius(widths))] if widths else [None] * 4
         rows.append([name, *known, round(float(yaw), 5), *(round(float(peak), 2) for peak in peaks)])
-    return Table(
-        "zone-widths",
+    return Table("zone-widths",
         "The observer at 100 Hz with different widths of the linear zones (P5 prints none): spectral radius inside the "
         "zones, and largest errors after 3 s over 60 starts within the printed maxima, true forces constant.",
         ("reading", "yaw width [rad/s]", "lateral width [m/s^2]", "longitudinal width [m/s^2]", "spectral radius [1]",
@@ -235,8 +214,7 @@ def zone_table() -> Table:
         rows)  # fmt: skip
 
 
-def chatter() -> Figure:
-    """Yaw rate and front force error at 100 Hz for the sign and two linear zones."""
+def _chatter() -> Figure:
     upper, lower = [], []
     for widths, title in ((None, "bare sign"), (WIDE, f"linear zone {WIDE}"), (NARROW, f"linear zone {NARROW}")):
         path = error_motion(LARGEST * [0.5, 1.0, -1.0, 1.0], 2.0, SAMPLE_TIME, widths)
@@ -249,8 +227,7 @@ def chatter() -> Figure:
         upper.append(Panel(marks, "", "yaw rate error [rad/s]" if first else "", title))
         force = [Line(time, path[:, 1] / 1e3, color=RED, width=1.0)]
         lower.append(Panel(force, "time [s]", "front force error [kN]" if first else ""))
-    return Figure(
-        "chatter",
+    return Figure("chatter",
         "The same start at 100 Hz with Euler steps: error of yaw rate and front lateral force with the bare sign, and with "
         "linear zones of two widths (rad/s, m/s², m/s²; P5 prints none). The sign chatters by 0.1 rad/s and several hundred "
         "newtons; zones wide enough converge smoothly, zones narrower than gain times half a sample keep chattering.",
@@ -281,8 +258,7 @@ def zone_widths(points: int) -> Figure:
         Level(x=critical, color=RED, dash="dotted", width=1.0),
         Words(0.94 * critical, 1.045, f"critical damping\n{critical:.2f} rad/s", RED, horizontal="right")]  # fmt: skip
     name = "width of the yaw rate zone [rad/s]"
-    return Figure(
-        "zone-widths",
+    return Figure("zone-widths",
         "Spectral radius of the observer error inside the linear zones at 100 Hz (longitudinal zone 1 m/s²). Left: black "
         "line radius 1, red unstable; dotted: the limits of each loop alone, Omega_1 T/2 = 0.05 rad/s and (Omega_5 + "
         "Omega_8) T/(2m) = 0.32 m/s². Circle: the widths used here; cross: a pair that chatters. Right: cut at 1 m/s²; above "
@@ -296,7 +272,19 @@ def zone_widths(points: int) -> Figure:
         size=(9.2, 3.9))  # fmt: skip
 
 
-def tracking() -> Figure:
+TOPIC.show(
+    "gains", "Gain conditions of Appendix A", 1.5, ("P5-gains", "P5-A4", "P5-A12"), [_gain_conditions], [_convergence]
+)
+
+
+@TOPIC.part("sampling", "100 Hz: chatter and linear zones", 2.5)
+def sampling(scope: Scope) -> PartResult:
+    """100 Hz and the widths of the linear zones."""
+    return PartResult(TOPIC.found("P5-100Hz"), [_zone_table()], [_chatter(), zone_widths(31 if scope.quick else 121)])
+
+
+@TOPIC.part("moving-forces", "The lag of the front-rear split", 0.2)
+def moving_forces(_: Scope) -> PartResult:
     """How well the split is followed while the true forces move."""
     frequency = np.geomspace(0.02, 5.0, 200)
     x = Axis("frequency of the slalom [Hz]", scale="log", ticks=(0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5))
@@ -313,8 +301,7 @@ def tracking() -> Figure:
         forces.append(Level(y=amplitude, color=RED, dash="dotted", width=1.1))
         text = f"mean {mean:g} % of {name} (Table 1)"
         forces.append(Words(5.0, 0.9 * amplitude, text, RED, horizontal="right", vertical="top"))
-    return Figure(
-        "tracking",
+    return PartResult(figures=[Figure("tracking",
         "What the proof of Appendix A leaves out: true forces that move. Left: share of the front-rear split that the "
         "observer misses in steady oscillation, printed gains, linear zones of three widths. Slow motion is followed with a "
         "lag of 0.29 s whatever the width. Right: the force error that follows on both axles for the printed largest yaw "
@@ -323,21 +310,4 @@ def tracking() -> Figure:
         "Left: three curves of the relative error rising with frequency to about one. Right: force error rising with the "
         "square of the frequency, crossed by two red lines.",
         [Panel([*shares, slow], x, Axis("split error / true split [1]", 0.02, 3.0, "log"), legend="lower right"),
-         Panel(forces, x, Axis("amplitude of the error of each axle force [N]", 5.0, 2e4, "log"))], size=(9.2, 3.6))  # fmt: skip
-
-
-TOPIC.show(
-    "gains", "Gain conditions of Appendix A", 1.5, ("P5-gains", "P5-A4", "P5-A12"), [gain_conditions], [convergence]
-)
-
-
-@TOPIC.part("sampling", "100 Hz: chatter and linear zones", 2.5)
-def sampling(scope: Scope) -> PartResult:
-    """100 Hz and the widths of the linear zones."""
-    return PartResult(TOPIC.found("P5-100Hz"), [zone_table()], [chatter(), zone_widths(31 if scope.quick else 121)])
-
-
-@TOPIC.part("moving-forces", "The lag of the front-rear split", 0.2)
-def moving_forces(_: Scope) -> PartResult:
-    """The lag of the split while the true forces move."""
-    return PartResult(figures=[tracking()])
+         Panel(forces, x, Axis("amplitude of the error of each axle force [N]", 5.0, 2e4, "log"))], (9.2, 3.6))])  # fmt: skip

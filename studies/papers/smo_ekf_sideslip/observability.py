@@ -15,7 +15,7 @@ from analysis.observability.lie_structure import generic_rank
 from estimators.arrays import FloatArray
 from studies.claim import Finding, reproduced
 from studies.papers.smo_ekf_sideslip.inputs import PACKAGE, SAMPLE_TIME
-from studies.papers.smo_ekf_sideslip.saturating_car import LINEAR, SimulatedRun, simulate, slalom, steady_turn
+from studies.papers.smo_ekf_sideslip.observers import LINEAR, SimulatedRun, simulate, slalom, steady_turn
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Line, Mark, Panel
 from studies.plots.colours import BLUE, RED
@@ -46,12 +46,10 @@ def force_model(model: NonlinearModel | None = None) -> Finding:
         "contains_steering_angle": steered, "rank_with_rear_longitudinal_force": with_rear.rank,
         "states_with_rear_longitudinal_force": len(both.states),
         "hidden_with_rear_longitudinal_force": list(with_rear.structure.describe())}  # fmt: skip
-    reading = (
+    return Finding(computed, reproduced(found.rank == len(chosen.states) and not steered), (
         "The steering angle is not in the model at all; the determinant of outputs and yaw acceleration is (L_1 + L_2) / "
         "(m^2 I_z) up to its sign, so the rank is 4 for every car, speed and steering angle. With the rear longitudinal "
-        "force as a fifth state one direction is lost and does not decay, which is why the paper neglects it."
-    )
-    return Finding(computed, reproduced(found.rank == len(chosen.states) and not steered), reading)
+        "force as a fifth state one direction is lost and does not decay, which is why the paper neglects it."))  # fmt: skip
 
 
 @TOPIC.claim("P5-ekf-obs")
@@ -70,13 +68,11 @@ def sideslip_model(model: NonlinearModel | None = None) -> Finding:
         "rank_in_a_steady_turn": steady_turn_rank(),
         "closed_form_of_rank_loss_proved": all(identity == 0 for identity in rank_loss_identities()),
         "acceleration_adds_no_rank": all(sp.simplify(entry) == 0 for entry in repeated)}  # fmt: skip
-    reading = (
+    return Finding(computed, reproduced(generic.rank == 3), (
         f"The rank is {generic.rank} at almost every state: 2 from the forces, the third from their rates. Outputs and their "
         "first derivatives lose it exactly where both slip angles follow beta_i' = -(V'/V) beta_i. So it is 2 for good in a "
         "steady turn at constant speed, where sideslip cannot be told from the two stiffnesses, and 1 straight ahead. The "
-        "slip angles must keep changing, as they do in a slalom."
-    )
-    return Finding(computed, reproduced(generic.rank == 3), reading)
+        "slip angles must keep changing, as they do in a slalom."))  # fmt: skip
 
 
 def steady_turn_rank() -> int:
@@ -135,8 +131,7 @@ def third_singular_value(run: SimulatedRun) -> FloatArray:
     return np.asarray(singular[:, 2] / singular[:, 0])
 
 
-def stiffness_observability() -> Figure:
-    """Third singular value in a slalom and in a steady turn."""
+def _stiffness_observability() -> Figure:
     slips, values = list[Mark](), list[Mark]()
     for steering, name, color in ((slalom, "slalom", BLUE), (steady_turn, "steady turn", RED)):
         run = simulate(steering, seconds=14.0, friction=LINEAR)
@@ -144,8 +139,7 @@ def stiffness_observability() -> Figure:
         slips.append(Line(run.time, np.degrees(run.slips[:, 1]), f"rear, {name}", color, "dashed", 1.0))
         values.append(Line(run.time, np.maximum(third_singular_value(run), 1e-9), name, color))
     value = Axis("third singular value / largest [1]", 1e-9, 10.0, "log")
-    return Figure(
-        "stiffness-observability",
+    return Figure("stiffness-observability",
         "When the sideslip filter can tell sideslip from stiffness: third singular value of the gradients of the two axle "
         "forces and of their rates (states in typical sizes), along a slalom and along a turn that becomes steady, linear "
         "axles as printed, both at constant 17 m/s. Straight ahead nothing is seen of the stiffnesses; in the steady turn "
@@ -157,6 +151,4 @@ def stiffness_observability() -> Figure:
          Panel(values, "time [s]", value, legend="upper left")], size=(9.2, 3.7), share_x="all")  # fmt: skip
 
 
-TOPIC.show(
-    "observability", "Observability of both models", 2.0, ("P5-obs", "P5-ekf-obs"), figures=[stiffness_observability]
-)
+TOPIC.show("observability", "Observability of both models", 2.0, figures=[_stiffness_observability])

@@ -49,29 +49,25 @@ def force_tables(tables: Mapping[str, Any] = PRINTED) -> Finding:
         "largest_mean_percent": mean, "largest_deviation_percent": deviation,
         "mean_by_mass_percent": {name: list(pair) for name, pair in mass.items()}, "least_sensitive_to_mass": least,
         "nominal_columns_agree_between_tables": agrees}  # fmt: skip
-    reading = (
+    holds = mean < LIMIT and deviation < LIMIT and least == "beta_2" and agrees
+    return Finding(computed, reproduced(holds), (
         f"Largest mean {mean:g} % and largest standard deviation {deviation:g} % of Tables 1 and 2, both below {LIMIT:g} %. "
         f"With 300 kg more or less F_y2 runs from {mass['F_y2'][0]:g} to {mass['F_y2'][1]:g} %, the rear sideslip from "
         f"{mass['beta_2'][0]:g} to {mass['beta_2'][1]:g} %: sideslip suffers least. The nominal columns of Tables 1, 3 and 5 "
-        "agree."
-    )
-    return Finding(computed, reproduced(mean < LIMIT and deviation < LIMIT and least == "beta_2" and agrees), reading)
+        "agree."))  # fmt: skip
 
 
-def printed_forces() -> Table:
-    """Tables 1 and 2."""
+def _printed_forces() -> Table:
     rows: list[list[Cell]] = [
         [test, name, *(row[key] for key in ("largest", "unit", "mean", "deviation")), max(row["mean"], row["deviation"]) < 6]
         for test, found in PRINTED.items()
         for name, row in found["forces"].items()]  # fmt: skip
-    return Table(
-        "tables-1-2",
+    return Table("tables-1-2",
         "Tables 1 and 2 of P5 as printed: errors (8) of the force observer in the two road tests, in percent of the maximum.",
         ("test", "quantity", "max", "unit", "mean [%]", "std [%]", "below 6 %"), rows)  # fmt: skip
 
 
-def printed_settings() -> Table:
-    """Tables 3 to 5."""
+def _printed_settings() -> Table:
     factors, changes = [f"stiffness x {k:g}" for k in FACTORS], [f"mass {k:+g} kg" for k in MASSES]
     found = [(n, test, "beta_2", PRINTED[test]["stiffness"], factors) for n, test in ((3, "slalom"), (4, "roundabout"))]
     found += [(5, "slalom", name, row, changes) for name, row in PRINTED["slalom"]["mass"].items()]
@@ -80,8 +76,7 @@ def printed_settings() -> Table:
         for number, test, name, row, settings in found
         for setting, mean, deviation in zip(settings, row["mean"], row["deviation"], strict=True)
     ]
-    return Table(
-        "tables-3-5",
+    return Table("tables-3-5",
         "Tables 3, 4 and 5 of P5 as printed: errors (8) with other settings of the stiffness and of the mass, in percent.",
         ("table", "test", "quantity", "setting", "mean [%]", "std [%]"), rows)  # fmt: skip
 
@@ -93,8 +88,7 @@ def burckhardt_force(slip: FloatArray, road: str, load: float) -> FloatArray:
     return np.asarray(np.sign(slip) * load * (c1 * (1.0 - np.exp(-c2 * s)) - c3 * s))
 
 
-def lateral_models() -> Figure:
-    """Fig. 9: linear, linear adaptive and Burckhardt."""
+def _lateral_models() -> Figure:
     load = CAR.mass * GRAVITY * CAR.rear_axle_distance / WHEELBASE
     slip, point = np.radians(np.linspace(0.0, 12.0, 241)), np.radians(6.0)
     secant = float(burckhardt_force(np.array(point), "dry asphalt", load)) / point
@@ -121,4 +115,4 @@ def lateral_models() -> Figure:
     )
 
 
-TOPIC.show("tables", "Tables 1 to 5 against the text", 0.2, (), [printed_forces, printed_settings], [lateral_models])
+TOPIC.show("tables", "Tables 1 to 5 against the text", 0.2, (), [_printed_forces, _printed_settings], [_lateral_models])

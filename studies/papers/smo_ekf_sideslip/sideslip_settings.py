@@ -7,8 +7,7 @@ import numpy as np
 from estimators.arrays import FloatArray
 from studies.claim import ClaimVerdict, Finding, reproduced
 from studies.papers.smo_ekf_sideslip.inputs import FACTORS, MASSES, PACKAGE, WHEELBASE, published_car
-from studies.papers.smo_ekf_sideslip.observers import Estimates, estimates
-from studies.papers.smo_ekf_sideslip.saturating_car import LINEAR, SimulatedRun, simulate, with_noise
+from studies.papers.smo_ekf_sideslip.observers import LINEAR, Estimates, SimulatedRun, estimates, simulate, with_noise
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Level, Line, Mark, Panel, Words, dots
 from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, RED, TRUTH
@@ -38,13 +37,11 @@ def fixed_stiffness(settings: tuple[float, ...] = FACTORS) -> Finding:
         "stiffness_factors": list(settings), "simulated_rear_sideslip_ratio": ratio,
         "steady_state_ratio": [1.0 / factor for factor in settings]}  # fmt: skip
     otherwise = ClaimVerdict.ERRATUM if low > 0 > high else ClaimVerdict.NOT_REPRODUCED
-    reading = (
+    return Finding(computed, reproduced(low > 0 and high > 0, otherwise), (
         "The measured force fixes C beta: sideslip comes out as 1/factor. Reduced stiffness overestimates it (factor "
         f"{settings[0]:g}: {ratio[0]:.2f} times the true rear sideslip in the simulated slalom), increased stiffness "
         f"underestimates it (factor {settings[-1]:g}: {ratio[-1]:.2f} times). The text says overestimated for both; the "
-        "second must read underestimated."
-    )
-    return Finding(computed, reproduced(low > 0 and high > 0, otherwise), reading)
+        "second must read underestimated."))  # fmt: skip
 
 
 def estimated_share(estimate: FloatArray, true: FloatArray) -> float:
@@ -98,8 +95,7 @@ def stiffness_table(run: SimulatedRun, fixed: Estimates, adaptive: Estimates) ->
         for name, found in (("fixed (ORL)", fixed), ("adaptive (EKF)", adaptive))
         for j, factor in enumerate(FACTORS)
     ]
-    return Table(
-        "stiffness-settings",
+    return Table("stiffness-settings",
         "Error (8) of the rear sideslip in the simulated slalom (saturating axles, no noise, from 5 s on), and the size of "
         "the estimate against the true one. A model, not the road test of Tables 3 and 4.",
         ("observer", "stiffness setting [1]", *ERRORS), rows)  # fmt: skip
@@ -112,8 +108,7 @@ def mass_table(run: SimulatedRun, found: Estimates) -> Table:
     for j, change in enumerate(MASSES):
         rows += [[change, f"F_y{i + 1}", *_error_cells(run, found.forces[:, j, i], true[:, i])] for i in (0, 1)]
         rows.append([change, "beta_2", *_error_cells(run, found.rear_sideslip[:, j], run.rear_sideslip)])
-    return Table(
-        "mass-settings",
+    return Table("mass-settings",
         "Error (8) in the simulated slalom by assumed mass, and the size of the estimate against the true one: forces scale "
         "with the mass (300 kg are 20.7 %), sideslip does not. A model, not the road test of Table 5.",
         ("mass change [kg]", "quantity", *ERRORS), rows)  # fmt: skip
@@ -138,8 +133,7 @@ def stiffness_figure(run: SimulatedRun, fixed: Estimates, adaptive: Estimates) -
         marks[0] = dots(run.time, secant[:, i] / 1e3, "true force / slip angle", GREY, ".", 2.0)
         y = Axis(f"{name} axle stiffness [kN/rad]", 0, 132)
         lower.append(Panel(marks, "time [s]", y, legend="upper left", columns=2))
-    return Figure(
-        "stiffness-settings",
+    return Figure("stiffness-settings",
         "Figs. 12 to 17 of P5 on a model: a slalom (17 m/s, straight for 5 s, lateral acceleration to 0.6 g) of a single "
         "track whose axles saturate, which the observers do not know. Force observer and filter with the stiffness set to "
         "0.5, 1 and 1.5 times the printed one. Above: with fixed stiffness the rear sideslip is too large for the soft "
@@ -164,8 +158,7 @@ def mass_figure(run: SimulatedRun, found: Estimates) -> Figure:
         span = high - low  # above it stands the legend
         x, y = Axis("time [s]", 5.0, run.time[-1]), Axis(label, low - 0.05 * span, high + 0.4 * span)
         panels.append(Panel(_curves(run, exact, values, labels), x, y, legend="upper left", columns=2))
-    return Figure(
-        "mass-settings",
+    return Figure("mass-settings",
         "Fig. 18 of P5 on a model: the same slalom with the assumed mass 300 kg too small, right, and 300 kg too large. "
         "Forces scale with the assumed mass (they are mass times measured acceleration); the rear sideslip hardly changes, "
         "because mass and force cancel in (10) and the adapted stiffness takes the rest.",
@@ -197,8 +190,7 @@ def zones(run: SimulatedRun, found: Estimates) -> Figure:
         plane.append(Level(y=level, color=GREY, dash="dotted"))
         plane.append(Words(5.4, level, text, horizontal="right", vertical="bottom"))
     background = backgrounds(run.time, kind, [("", color) for _, color in ZONES], alpha=0.35)
-    return Figure(
-        "zones",
+    return Figure("zones",
         "Figs. 10 and 11 of P5 on a model: estimated front lateral force over estimated front slip angle in a slalom with "
         "saturating axles (17 m/s, 0.6 g, noise on yaw rate and accelerations; stiffness set to 1.5 times the printed one), "
         "coloured by the zones that switch the covariances, with the threshold λ₁ = 1 kN (not printed). Right: the adapted "

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from studies.papers.smo_ekf_sideslip import (
-    force_observer,
-    observability,
-    printed_tables,
-    sideslip_settings,
-    truth_tests,
-)
+from studies.papers.smo_ekf_sideslip import force_observer, observability, printed_tables, road_tests, sideslip_settings
 from studies.study import Study
 
-TOPICS = force_observer, observability, printed_tables, sideslip_settings, truth_tests
+TOPICS = force_observer, observability, printed_tables, sideslip_settings, road_tests
 STUDY = Study(
     id="smo-ekf-sideslip",
     title="Axle forces by sliding mode, sideslip with adaptive cornering stiffness",

@@ -110,11 +110,11 @@ def axle_part(name: str, title: str, test: str, scope: Scope, tire: str = LUGRE)
     settings += [(mass, 1.0) for mass in MASSES if mass and "mass" in printed]
     run = run_axles(measured_runs((f"p5-{test}",), tire, scope, QUICK_SECONDS, SAMPLE_TIME), settings)
     measures: dict[str, float] = {}
-    found = [force_table(printed["forces"], run, measures), stiffness_table(printed["stiffness"], run, measures)]
-    drawings = [force_history(f"{name}-forces", title, run), stiffness_history(f"{name}-stiffness", title, run)]
+    found = [_force_table(printed["forces"], run, measures), _stiffness_table(printed["stiffness"], run, measures)]
+    drawings = [_force_history(f"{name}-forces", title, run), _stiffness_history(f"{name}-stiffness", title, run)]
     if "mass" in printed:
-        found.append(mass_table(printed["mass"], run, measures))
-        drawings.append(mass_history(f"{name}-mass", title, run))
+        found.append(_mass_table(printed["mass"], run, measures))
+        drawings.append(_mass_history(f"{name}-mass", title, run))
     front, rear = (2e-3 * value for value in run.tire.secant)
     about = (
         f"{conditions(run.drawn)} Believed: the truth's masses and lengths, and the secant of its tires at {USE:g} of the "
@@ -125,8 +125,7 @@ def axle_part(name: str, title: str, test: str, scope: Scope, tire: str = LUGRE)
     return PartResult(tables=tables, figures=drawings, measures=measures)
 
 
-def force_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
-    """Tables 1 and 2, and the forces without an observer."""
+def _force_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
     rows: list[list[Cell]] = []
     found = {"sliding mode": run.force_errors(run.forces[0.0]), "static split": run.force_errors(run.static)}
     peaks = np.abs(run.true_forces[run.counted]).max(axis=0)
@@ -144,8 +143,7 @@ def force_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, fl
     return Table("forces", caption, ("quantity", "unit", "printed peak", "peak", "estimate", *ERROR_COLUMNS), rows)
 
 
-def stiffness_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
-    """Tables 3 and 4, and the observer with fixed stiffness."""
+def _stiffness_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
     rows: list[list[Cell]] = []
     peak = round(float(np.degrees(np.abs(run.true_sideslip[run.counted]).max())), 2)
     for who, estimates in (("adaptive (EKF)", run.adaptive), ("fixed (ORL)", run.fixed)):
@@ -162,8 +160,7 @@ def stiffness_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str
     return Table("stiffness", caption, columns, rows)
 
 
-def mass_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
-    """Table 5."""
+def _mass_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
     rows: list[list[Cell]] = []
     for j, mass in enumerate(MASSES):
         errors = run.force_errors(run.forces[mass]) | {"beta_2": run.sideslip_errors(run.adaptive[mass, 1.0])}
@@ -174,8 +171,7 @@ def mass_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, flo
     return Table("mass", caption, ("quantity", "mass error [kg]", *ERROR_COLUMNS), rows)
 
 
-def force_history(name: str, title: str, run: AxleRun) -> Figure:
-    """Figs. 7 and 8, with the yaw rate."""
+def _force_history(name: str, title: str, run: AxleRun) -> Figure:
     time, panels = run.drawn.truth.time, []
     labels = ("$F_{y1}$ [kN]", "$F_{y2}$ [kN]", "$F_{x1}$ [kN]", "yaw rate [deg/s]")
     for k, label in enumerate(labels):
@@ -199,8 +195,7 @@ def _sideslip(run: AxleRun, estimates: Sequence[FloatArray], labels: Sequence[st
     return Panel(marks, y=Axis(y, -limit, limit), title=title)
 
 
-def stiffness_history(name: str, title: str, run: AxleRun) -> Figure:
-    """Figs. 12 to 17: rear sideslip with fixed and with adapted stiffness, and the stiffnesses."""
+def _stiffness_history(name: str, title: str, run: AxleRun) -> Figure:
     labels = [f"× {factor:g}" for _, factor in run.fixed]
     fixed, adapted, stiffness = ([found[s] for s in run.fixed] for found in (run.fixed, run.adaptive, run.stiffness))
     panels = [_sideslip(run, fixed, labels, "sideslip [deg]", "rear sideslip, stiffness fixed (ORL)"),
@@ -217,8 +212,7 @@ def stiffness_history(name: str, title: str, run: AxleRun) -> Figure:
         panels, (9.4, 6.2), columns=2, legend="below")  # fmt: skip
 
 
-def mass_history(name: str, title: str, run: AxleRun) -> Figure:
-    """Fig. 18: front force and rear sideslip by assumed mass."""
+def _mass_history(name: str, title: str, run: AxleRun) -> Figure:
     time, masses = run.drawn.truth.time, sorted(run.forces)
     labels = [f"m {mass:+g} kg" if mass else "m" for mass in masses]
     forces = setting_lines(time, [1e-3 * run.forces[mass][:, :, 0] for mass in masses], labels)
