@@ -61,9 +61,8 @@ class Topic:
             return PartResult(found(*claims), [make() for make in tables], [make() for make in figures], notes)
 
         first = next(iter(self.claims.values()))
-        run.__module__ = getattr(
-            first, "func", first
-        ).__module__  # whose code decides whether a stored result is still good
+        # The runner reads from a part's module whose code decides whether a stored result is still good.
+        run.__module__ = getattr(first, "func", first).__module__
         self.parts.append(Part(name, title, run, cost))
 
     def found(self, *names: str) -> list[Claim]:
