@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
 from studies.claim import Claim, ClaimFunction, JsonValue
 from studies.papers.published import printed, published_claims
-from studies.study import Part, PartFunction, Preparation
+from studies.plots import Figure
+from studies.study import Part, PartFunction, PartResult, Preparation, Scope, Table
 from synthesis.errors import SpecError
 
 C = TypeVar("C", bound=ClaimFunction)
@@ -48,6 +49,21 @@ class Topic:
             return run
 
         return register
+
+    def show(
+        self, name: str, title: str, cost: float = 1.0, claims: Sequence[str] = (),
+        tables: Sequence[Callable[[], Table]] = (), figures: Sequence[Callable[[], Figure]] = (), notes: Sequence[str] = (),
+    ) -> None:  # fmt: skip
+        """Register a part that is its claims (see `found`) and what makes its tables and figures, whatever the scope."""
+        found = self.found
+
+        def run(_: Scope) -> PartResult:
+            return PartResult(found(*claims), [make() for make in tables], [make() for make in figures], notes)
+
+        first = next(iter(self.claims.values()))
+        # The runner reads from a part's module whose code decides whether a stored result is still good.
+        run.__module__ = getattr(first, "func", first).__module__
+        self.parts.append(Part(name, title, run, cost))
 
     def found(self, *names: str) -> list[Claim]:
         """The claims ``names`` of this topic, all of them without a name, computed now."""

@@ -11,15 +11,12 @@ import sympy as sp
 
 from studies.claim import ClaimVerdict
 from studies.papers.resilient_velocity import (
-    boundedness,
     discretisation,
     drops,
-    example_3,
-    experiments,
-    norms,
+    error_dynamics,
     sensitivity,
+    study,
     switching,
-    tire,
     vehicle,
 )
 from studies.papers.resilient_velocity.inputs import PRINTED, Setting
@@ -46,23 +43,23 @@ def with_vehicle(**values: float) -> Setting:
 
 
 FLIPS = [
-    ("P3-ex1-eig", boundedness.eigenvalue, with_gain((1.18, 385.0)), ClaimVerdict.NOT_REPRODUCED),
-    ("P3-ex1-eig", boundedness.eigenvalue, with_tire("longitudinal", sigma1=1.001), ClaimVerdict.NOT_REPRODUCED),
-    ("P3-ex1-sym", boundedness.symmetric, replace(PRINTED, example_speed=33.5293), ClaimVerdict.REPRODUCED),
-    ("P3-ex1-T", boundedness.transformed, replace(PRINTED, example_speed=30.0), ClaimVerdict.REPRODUCED),
-    ("P3-ex1-Topt", boundedness.best_transform, with_gain((0.1, 387.0)), ClaimVerdict.NOT_REPRODUCED),
-    ("P3-prop1-young", boundedness.young, with_gain((-1.18, -387.0)), ClaimVerdict.NOT_REPRODUCED),
-    ("P3-fig2-x", norms.longitudinal, with_tire("longitudinal", sigma2=2.0), ClaimVerdict.NOT_REPRODUCED),
-    ("P3-fig2-y", norms.lateral, with_gain(lateral=(1.21, 2.0)), ClaimVerdict.NOT_REPRODUCED),
-    ("P3-fig2-nonexp", norms.non_expansive, with_gain((1.18, 1e5), (1.21, 5e3)), ClaimVerdict.REPRODUCED),
+    ("P3-ex1-eig", error_dynamics.eigenvalue, with_gain((1.18, 385.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-ex1-eig", error_dynamics.eigenvalue, with_tire("longitudinal", sigma1=1.001), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-ex1-sym", error_dynamics.symmetric, replace(PRINTED, example_speed=33.5293), ClaimVerdict.REPRODUCED),
+    ("P3-ex1-T", error_dynamics.transformed, replace(PRINTED, example_speed=30.0), ClaimVerdict.REPRODUCED),
+    ("P3-ex1-Topt", error_dynamics.best_transform, with_gain((0.1, 387.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-prop1-young", error_dynamics.young, with_gain((-1.18, -387.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-fig2-x", error_dynamics.longitudinal, with_tire("longitudinal", sigma2=2.0), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-fig2-y", error_dynamics.lateral, with_gain(lateral=(1.21, 2.0)), ClaimVerdict.NOT_REPRODUCED),
+    ("P3-fig2-nonexp", error_dynamics.non_expansive, with_gain((1.18, 1e5), (1.21, 5e3)), ClaimVerdict.REPRODUCED),
     ("P3-fig345", sensitivity.small_deviations, with_gain(lateral=(1.4, 16.8)), ClaimVerdict.NOT_REPRODUCED),
     ("P3-obs", sensitivity.rank_of_observability, with_tire("lateral", sigma1=0.2), ClaimVerdict.REPRODUCED),
     ("P3-20", switching.common_decay, replace(PRINTED, high_slip=(1.18, 380.0)), ClaimVerdict.REPRODUCED),
     ("P3-ex2-arb", switching.arbitrary_switching, replace(PRINTED, high_slip=(0.22, 1.0)), ClaimVerdict.NOT_REPRODUCED),
     ("P3-fig6", switching.markov_margin, replace(PRINTED, high_slip=(-0.22, -0.1)), ClaimVerdict.NOT_REPRODUCED),
     ("P3-kron", switching.orientation, with_gain((0.0, 0.0)), ClaimVerdict.NOT_REPRODUCED),
-    ("P3-ex3", example_3.twenty_percent, replace(PRINTED, example_drop=0.8), ClaimVerdict.UNDER_SPECIFIED),
-    ("P3-ex3-arb", example_3.any_pattern, with_gain((0.3, 1.0)), ClaimVerdict.REPRODUCED),
+    ("P3-ex3", drops.twenty_percent, replace(PRINTED, example_drop=0.8), ClaimVerdict.UNDER_SPECIFIED),
+    ("P3-ex3-arb", drops.any_pattern, with_gain((0.3, 1.0)), ClaimVerdict.REPRODUCED),
     ("P3-pcr", drops.critical_probability, replace(PRINTED, example_drop=0.6), ClaimVerdict.NOT_REPRODUCED),
     ("P3-pcr", drops.critical_probability, with_gain((-1.18, -387.0)), ClaimVerdict.NOT_REPRODUCED),
     ("P3-rem4", drops.detectable_mixture, with_gain((0.3, 387.0)), ClaimVerdict.NOT_REPRODUCED),
@@ -83,10 +80,10 @@ def test_a_changed_formula_changes_the_verdict(monkeypatch: pytest.MonkeyPatch) 
     """Claims without an input that could break them: break the statement instead."""
     other = with_tire("longitudinal", sigma2=3.0)
     other.__dict__["models"] = PRINTED.models  # the floor of one tire, the norm of another
-    assert norms.any_gain(other).verdict is ClaimVerdict.NOT_REPRODUCED
+    assert error_dynamics.any_gain(other).verdict is ClaimVerdict.NOT_REPRODUCED
     flat = np.ones(10**6)
     flat[0] = 0.0
-    assert experiments.normalised_errors({"longitudinal": flat, "lateral": flat}).verdict is ClaimVerdict.REPRODUCED
+    assert study.normalised_errors({"longitudinal": flat, "lateral": flat}).verdict is ClaimVerdict.REPRODUCED
     with monkeypatch.context() as patch:
         patch.setattr(drops, "FIG8_DROPS", (0.2, 0.2))
         assert drops.radius_under_drops().verdict is ClaimVerdict.REPRODUCED
@@ -94,8 +91,8 @@ def test_a_changed_formula_changes_the_verdict(monkeypatch: pytest.MonkeyPatch) 
         assert drops.exact_critical_probability().verdict is ClaimVerdict.NOT_REPRODUCED
         patch.setattr(vehicle, "residual", lambda formula: (sp.S(0),) * 3)
         assert vehicle.loads().verdict is ClaimVerdict.REPRODUCED
-        patch.setattr(tire, "PRINTED_UNITS", tire.CORRECTED_UNITS)
-        assert tire.steady_curve().verdict is ClaimVerdict.NOT_REPRODUCED
+        patch.setattr(vehicle, "PRINTED_UNITS", vehicle.CORRECTED_UNITS)
+        assert vehicle.steady_curve().verdict is ClaimVerdict.NOT_REPRODUCED
         patch.setattr(sensitivity, "CHANGE", 3.0)
         assert sensitivity.small_deviations().verdict is ClaimVerdict.REPRODUCED
 

@@ -14,29 +14,12 @@ from analysis.bounds.sliding_mode import PUBLISHED, SlidingModeGains
 from estimators.sideslip import CorneringModel, SlidingModeObserver
 from studies.claim import ClaimVerdict, Finding
 from studies.papers.published import published_claims
-from studies.papers.smo_ekf_sideslip import (
-    force_observer,
-    linear_zones,
-    observability,
-    printed_tables,
-    sideslip_settings,
-    truth_tests,
-)
-from studies.papers.smo_ekf_sideslip.force_observer import error_motion, split
-from studies.papers.smo_ekf_sideslip.inputs import (
-    CAR,
-    LARGEST,
-    MASS_SETTINGS,
-    PACKAGE,
-    PRINTED,
-    WHEELBASE,
-    published_car,
-)
-from studies.papers.smo_ekf_sideslip.linear_zones import NARROW, WIDE, split_tracking
+from studies.papers.smo_ekf_sideslip import force_observer, observability, printed_tables, road_tests, sideslip_settings
+from studies.papers.smo_ekf_sideslip.force_observer import NARROW, WIDE, error_motion, split, split_tracking
+from studies.papers.smo_ekf_sideslip.inputs import CAR, LARGEST, MASSES, PACKAGE, PRINTED, WHEELBASE, published_car
 from studies.papers.smo_ekf_sideslip.observability import third_singular_value
-from studies.papers.smo_ekf_sideslip.observers import estimates
+from studies.papers.smo_ekf_sideslip.observers import estimates, simulate, steady_turn
 from studies.papers.smo_ekf_sideslip.printed_tables import BURCKHARDT, burckhardt_force
-from studies.papers.smo_ekf_sideslip.saturating_car import simulate, steady_turn
 from studies.papers.smo_ekf_sideslip.sideslip_settings import (
     mass_figure,
     mass_table,
@@ -51,7 +34,7 @@ from synthesis.models.catalogue.single_track import axle_force_model
 from tests.support.study_checks import check_result, check_study, desk_parts
 from tests.support.study_reference import reference_claims
 
-TOPICS = (force_observer, linear_zones, observability, printed_tables, sideslip_settings, truth_tests)
+TOPICS = (force_observer, observability, printed_tables, sideslip_settings, road_tests)
 FUNCTIONS = {name: function for module in TOPICS for name, function in module.TOPIC.claims.items()}
 
 
@@ -157,12 +140,12 @@ class TestGains:
 class TestSampling:
     def test_verdict_follows_from_the_readings(self) -> None:
         assert finding("P5-100Hz").verdict is ClaimVerdict.UNDER_SPECIFIED
-        assert linear_zones.sampled_switching((WIDE, (0.3, 2.0, 2.0))).verdict is ClaimVerdict.REPRODUCED
-        assert linear_zones.sampled_switching((NARROW,)).verdict is ClaimVerdict.NOT_REPRODUCED
+        assert force_observer.sampled_switching((WIDE, (0.3, 2.0, 2.0))).verdict is ClaimVerdict.REPRODUCED
+        assert force_observer.sampled_switching((NARROW,)).verdict is ClaimVerdict.NOT_REPRODUCED
 
     def test_radius_is_that_of_the_runtime(self) -> None:
         observer = SlidingModeObserver(published_car(), widths=WIDE)
-        assert linear_zones.radius(WIDE) == pytest.approx(observer.spectral_radius, rel=1e-12)
+        assert force_observer.radius(WIDE) == pytest.approx(observer.spectral_radius, rel=1e-12)
 
     def test_motion_is_that_of_the_runtime(self) -> None:
         """The error of the runtime observer on constant true forces is the simulated one."""
@@ -331,13 +314,11 @@ def test_parts_stand_on_their_own(part) -> None:  # type: ignore[no-untyped-def]
 
 def test_settings_and_zones_on_a_short_drive() -> None:
     drive = simulate(seconds=6.5)
-    light, car, heavy = (published_car(mass_change=change) for change in MASS_SETTINGS)
+    light, car, heavy = (published_car(mass_change=change) for change in MASSES)
     run = estimates(drive, [light, car, heavy])
     drawings = [stiffness_figure(drive, run, run), mass_figure(drive, run), zones(drive, run)]
     check_result(PartResult((), [mass_table(drive, run), stiffness_table(drive, run, run)], drawings))
     late = drive.time > 6.0
     true = drive.body_forces()[late].sum(axis=1)
     ratio = [forces[late, :].sum(axis=1) @ true / (true @ true) for forces in np.moveaxis(run.forces, 1, 0)]
-    np.testing.assert_allclose(
-        ratio, 1.0 + np.array(MASS_SETTINGS) / 1447.0, rtol=0.02
-    )  # forces are mass times acceleration
+    np.testing.assert_allclose(ratio, 1.0 + np.array(MASSES) / 1447.0, rtol=0.02)  # forces are mass times acceleration

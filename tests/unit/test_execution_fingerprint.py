@@ -158,3 +158,11 @@ def test_the_shipped_studies_do_not_depend_on_how_they_are_shown() -> None:
     assert Marks(Registry(MODULES), QUICK).study("friction-floor") != Marks(Registry(MODULES), Scope()).study(
         "friction-floor"
     )
+
+
+def test_a_part_that_its_topic_shows_rests_on_the_module_of_its_claims_and_keeps_its_mark_when_it_ran() -> None:
+    part = next(p for p in Registry(MODULES).load("resilient-velocity").parts if p.name == "norms")
+    before = traits(part.run)
+    assert "studies.papers.resilient_velocity.error_dynamics" in before[0]
+    part.run(QUICK)
+    assert traits(part.run) == before

@@ -6,17 +6,20 @@ import numpy as np
 import pytest
 
 from estimators.velocity import SuspensionParameters
-from studies.papers.resilient_velocity.compliance_report import TESTS, hard_traction, residual_history, residual_table
-from studies.papers.resilient_velocity.compliance_trial import (
+from studies.papers.resilient_velocity.compliance import (
     INSIDE,
     PRINTED_WAY,
+    TESTS,
     WITHOUT,
     ComplianceTrial,
+    hard_traction,
     model_force,
+    residual_history,
+    residual_table,
     run_trial,
 )
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, PRINTED
-from studies.papers.resilient_velocity.tire import steady
+from studies.papers.resilient_velocity.vehicle import steady
 from studies.study import PartResult
 from studies.truth import Measured, Truth, draw, load_manoeuvre, load_vehicle, simulate_manoeuvres
 from studies.truth.sensors import PERFECT
@@ -42,9 +45,9 @@ def test_the_calculated_force_settles_at_that_of_the_steady_tire() -> None:
     )
     drawn = Measured(time, {"wheel_speed": np.full(shape, speed)}, (0,), truth, (1, 1))
     found = model_force(drawn, np.full((*shape, 2), slip))[0, 0, -1, 0]
-    closed = [float(steady(PRINTED, d, slip, road, speed).force) for d in DIRECTIONS]
+    closed = [float(steady(PRINTED, d, slip, road, speed)[0]) for d in DIRECTIONS]
     assert found == pytest.approx(closed, rel=1e-6)
-    icy = [float(steady(PRINTED, d, slip, 0.2, speed).force) for d in DIRECTIONS]
+    icy = [float(steady(PRINTED, d, slip, 0.2, speed)[0]) for d in DIRECTIONS]
     assert np.all(np.abs(found - icy) > 0.02)
 
 

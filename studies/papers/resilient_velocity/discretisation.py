@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 from analysis.markov.second_moment import spectral_radius
 from estimators.arrays import FloatArray
 from studies.claim import ClaimVerdict, Finding, JsonValue, reproduced
-from studies.papers.plain import by_speed
-from studies.papers.resilient_velocity.inputs import DIRECTIONS, PACKAGE, PRINTED, SPEEDS, Setting, printed_gain
+from studies.papers.plain import by_speed, column_table
+from studies.papers.resilient_velocity.inputs import PACKAGE, PRINTED, SPEEDS, Setting, printed_gain
 from studies.papers.topic import Topic
-from studies.study import PartResult, Scope, Table
-from synthesis.models.catalogue.corner import Direction, corner_velocity_model
+from studies.study import Table
+from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.discretise import zero_order_hold
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import load_parameter_set
@@ -57,8 +57,7 @@ def zero_order_hold_reading(setting: Setting = PRINTED) -> Finding:
     T, own = setting.sample_time, (setting.models["longitudinal"], setting.gains["longitudinal"])
     first = load_parameter_set("corner-estimation")
     earlier = (corner_velocity_model(first, "longitudinal", SPEEDS[-1]), printed_gain(first, "longitudinal"))
-    computed: dict[str, JsonValue] = {}
-    stable: dict[str, bool] = {}
+    computed, stable = dict[str, JsonValue](), dict[str, bool]()
     for name, update in READINGS.items():
         over = radii(*own, T, update, SPEEDS)
         stable[name.replace("_", " ")] = bool((over < 1.0).all())
@@ -66,31 +65,26 @@ def zero_order_hold_reading(setting: Setting = PRINTED) -> Finding:
         computed[f"{name}_largest"] = float(over.max())
     computed["gains_of_P1_innovation_held"] = by_speed(SHOWN, radii(*earlier, T, innovation_held, SHOWN))
     good, bad = (", ".join(name for name, ok in stable.items() if ok is wanted) for wanted in (True, False))
-    return Finding(
-        computed,
-        reproduced(
-            all(stable.values()), ClaimVerdict.UNDER_SPECIFIED if any(stable.values()) else ClaimVerdict.NOT_REPRODUCED
-        ),
+    reading = (
         f"At {1.0 / T:g} Hz the printed longitudinal gain is stable as: {good or 'nothing'}; unstable as: {bad or 'nothing'}. "
         f"Held innovation, which is (10) word for word, has the radius {computed['innovation_held']['0']:.2f} at standstill; "
-        "the closed loop must be discretised, exp((A - L C) T).",
+        "the closed loop must be discretised, exp((A - L C) T)."
     )
+    otherwise = ClaimVerdict.UNDER_SPECIFIED if any(stable.values()) else ClaimVerdict.NOT_REPRODUCED
+    return Finding(computed, reproduced(all(stable.values()), otherwise), reading)
 
 
-@TOPIC.part("sampling", "What the printed gains need from the discretisation", 0.3)
-def sampling(_: Scope) -> PartResult:
-    """The readings of (10), and all of them over the sample rate."""
-    pairs = [(d, name) for d in DIRECTIONS for name in READINGS]
-
-    def largest(rate: float, direction: Direction, name: str) -> float:
-        model, gain = PRINTED.models[direction], PRINTED.gains[direction]
-        return float(radii(model, gain, 1.0 / rate, READINGS[name], SPEEDS[::2]).max())
-
-    table = Table(
-        "sampling",
-        "Largest spectral radius of the error update over 0 to 140 rad/s with the printed gains, for four readings "
-        "of the discretisation; above 1 the observer diverges.",
-        ("sample rate [Hz]", *(f"{d}, {name.replace('_', ' ')} [1]" for d, name in pairs)),
-        [(rate, *(largest(rate, *pair) for pair in pairs)) for rate in SAMPLE_RATES],
+def _table() -> Table:
+    columns: dict[str, ArrayLike] = {"sample rate [Hz]": SAMPLE_RATES}
+    for d, model in PRINTED.models.items():
+        for name, update in READINGS.items():
+            found = [radii(model, PRINTED.gains[d], 1.0 / rate, update, SPEEDS[::2]).max() for rate in SAMPLE_RATES]
+            columns[f"{d}, {name.replace('_', ' ')} [1]"] = found
+    caption = (
+        "Largest spectral radius of the error update over 0 to 140 rad/s with the printed gains, for four readings of the "
+        "discretisation; above 1 the observer diverges."
     )
-    return PartResult(TOPIC.found(), [table])
+    return column_table("sampling", caption, columns)
+
+
+TOPIC.show("sampling", "What the printed gains need from the discretisation", 0.3, tables=[_table])

@@ -1,4 +1,4 @@
-"""Lost force measurements (24), (25): Figs 7 and 8, Remark 4, and the radius as a map over wheel speed and drop probability."""
+"""Lost force measurements (24), (25): Figs 7 and 8, Remark 4, Example 3, and the radius over wheel speed and drop probability."""
 
 from __future__ import annotations
 
@@ -7,38 +7,40 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from analysis.drops.frozen import critical_drop_probability, drop_radius, mean_square_stable_intervals
+from analysis.markov.second_moment import spectral_radius
 from analysis.markov.system import MarkovJumpSystem
+from analysis.switching.joint_spectral_radius import joint_spectral_radius
 from estimators.arrays import FloatArray
 from studies.claim import Finding, JsonValue, agrees, reproduced
-from studies.papers.plain import by_speed
-from studies.papers.published import printed
+from studies.papers.plain import by_speed, column_table, floats
 from studies.papers.resilient_velocity.inputs import (
     COLOUR,
     DIRECTIONS,
     FINE,
+    NOTE,
     PACKAGE,
     PRINTED,
     SPEED_AXIS,
     SPEEDS,
-    UPDATE_NOTE,
     Setting,
     crossing,
 )
 from studies.papers.topic import Topic
-from studies.papers.verdicts import derived, open_choice
+from studies.papers.verdicts import among_readings, derived, open_choice, partly
 from studies.plots import DASHES, Axis, Contours, Figure, Level, Line, Map, Mark, Panel, Words, dots
 from studies.plots.colours import CURVES, GREY, ORANGE
-from studies.study import PartResult, Scope, Table
+from studies.study import Table
 from synthesis.models.catalogue.corner import Direction
 
 TOPIC = Topic(PACKAGE)
 SLOW = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 25.0, 28.0)
 SHOWN, TABLE_SPEEDS = np.array([*SLOW, 60.0, 140.0]), np.array([*SLOW, 40.0, 80.0, 140.0])
-FIG8_SPEEDS = np.array([0.0, 40.0, 140.0])
-FIG8_DROPS = (0.2, 0.5, 0.8)
-PRINTED_RADIUS = printed(PACKAGE, "P3-ex3")
+FIG8_SPEEDS, FIG8_DROPS = np.array([0.0, 40.0, 140.0]), (0.2, 0.5, 0.8)
+EXAMPLE_SPEEDS = np.array([0.0, 10.0, 40.0, 140.0])
+PATTERN_SPEEDS = (1.0, 10.0, 20.0, 25.0, 30.0, 40.0, 80.0, 140.0)  # rad/s
+WIDTH = 1e-5  # relative width of the brackets of Example 3, and what counts as 1
+PRINTED_RADIUS = TOPIC.printed("P3-ex3")
 REMARK_SPEED, REMARK_DROP = 10.0, 0.6  # inside the stable range: p_cr = 0.706 there
-STEPS = 400
 LEVELS = {
     "longitudinal": (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.1),
     "lateral": (0.86, 0.88, 0.9, 0.92, 0.94, 0.96, 0.98),
@@ -92,35 +94,28 @@ def met_at(setting: Setting, direction: Direction, probability: float) -> float 
     return crossing(lambda w: float(radius(setting, direction, w, probability)[0]), PRINTED_RADIUS, SPEEDS[::5])
 
 
-def separates(open_loop: FloatArray, closed_loop: FloatArray, p: float) -> bool:
-    """Whether the drop probabilities with radius below 1 are exactly those below p."""
-    pieces = mean_square_stable_intervals(open_loop, closed_loop)
-    return len(pieces) == 1 and pieces[0][0] == 0.0 and agrees(pieces[0][1], p, 1e-9)
-
-
 @TOPIC.claim("P3-pcr")
 def critical_probability(setting: Setting = PRINTED) -> Finding:
     """One probability separates stable from unstable at every wheel speed, and Example 3 lies below it."""
     computed: dict[str, JsonValue] = {}
-    holds, lowest, words = True, {}, []
+    holds, lowest, words = True, dict[str, float](), list[str]()
     for direction in DIRECTIONS:
         found, start = critical(setting, direction, SPEEDS), harmless_from(setting, direction)
-        A0, A1 = updates(setting, direction, SPEEDS)
-        holds &= all(separates(a, b, float(p)) for a, b, p in zip(A0[::10], A1[::10], found[::10], strict=True))
+        for p, *pair in zip(found[::10], *updates(setting, direction, SPEEDS[::10]), strict=True):
+            stable = mean_square_stable_intervals(*pair)
+            holds &= len(stable) == 1 and stable[0][0] == 0.0 and agrees(stable[0][1], float(p), 1e-9)
         lowest[direction] = float(found.min())
         computed[direction] = by_speed(SHOWN, critical(setting, direction, SHOWN))
         computed[f"{direction}_is_1_from_rad_per_s"] = start
-        rest = "" if start is None else f", 1 from {start:.2f} rad/s on"
-        words.append(f"{direction} {found[0]:.3f} at standstill{rest}")
+        words.append(f"{direction} {found[0]:.3f} at standstill")
+        words[-1] += "" if start is None else f", 1 from {start:.2f} rad/s on"
     below = all(value > setting.example_drop for value in lowest.values())
-    reading = (
+    return Finding({**computed, "smallest": lowest}, reproduced(holds and below), (
         "Fig. 7 prints no numbers; what it says is checked, for exp(A T) while dropped and exp(A_e T) otherwise, T = 5 ms: "
         + ("one critical probability separates stable from unstable at every wheel speed" if holds else
            "no single probability separates")
         + f" ({'; '.join(words)}), and p = {setting.example_drop:g} of Example 3 lies "
-        + ("below it everywhere." if below else "above it somewhere.")
-    )  # fmt: skip
-    return Finding({**computed, "smallest": lowest}, reproduced(holds and below), reading)
+        + ("below it everywhere." if below else "above it somewhere.")))  # fmt: skip
 
 
 @TOPIC.claim("P3-pcr-exact")
@@ -136,13 +131,10 @@ def exact_critical_probability(setting: Setting = PRINTED) -> Finding:
         computed[f"{direction}_largest_difference_from_bisection"] = apart
         computed[f"{direction}_speeds_with_p_cr_1"] = int(one.sum())
         holds &= apart <= 1e-10 and bool(np.array_equal(found[1:] == 1.0, one))
-    return Finding(
-        computed,
-        derived(holds),
+    return Finding(computed, derived(holds), (
         "p_cr = 1/mu with mu the largest real eigenvalue of (I - S(A1))^-1 (S(A0) - S(A1)) on the 3 x 3 symmetric "
         "square; the integrator of A0 puts an exact root at p = 1, which is divided out, so a quadratic remains. "
-        "p_cr = 1 if and only if |e2' A1 [1/a, 1]'| <= 1, a = kappa R_e |omega|.",
-    )
+        "p_cr = 1 if and only if |e2' A1 [1/a, 1]'| <= 1, a = kappa R_e |omega|."))  # fmt: skip
 
 
 def bisected(A0: FloatArray, A1: FloatArray, steps: int = 50) -> FloatArray:
@@ -160,13 +152,14 @@ def bisected(A0: FloatArray, A1: FloatArray, steps: int = 50) -> FloatArray:
 def radius_under_drops(setting: Setting = PRINTED) -> Finding:
     """The drop probability of the figure is not stated."""
     readings = {p: {d: radius(setting, d, FIG8_SPEEDS, p) for d in DIRECTIONS} for p in FIG8_DROPS}
-    return Finding(
-        {f"{d}_p_{p:g}": by_speed(FIG8_SPEEDS, readings[p][d]) for d in DIRECTIONS for p in FIG8_DROPS},
-        open_choice([np.concatenate(list(readings[p].values())) for p in FIG8_DROPS], 1e-3),
+    computed = {f"{d}_p_{p:g}": by_speed(FIG8_SPEEDS, readings[p][d]) for d in DIRECTIONS for p in FIG8_DROPS}
+    reading = (
         "The drop probability of the figure is not stated: p = 0.2, 0.5 and 0.8 give different curves, at standstill "
         + ", ".join(f"{readings[p]['longitudinal'][0]:.3f}" for p in FIG8_DROPS)
-        + " longitudinally. The curve of any p follows from (22) with (25).",
+        + " longitudinally. The curve of any p follows from (22) with (25)."
     )
+    verdict = open_choice([np.concatenate(list(readings[p].values())) for p in FIG8_DROPS], 1e-3)
+    return Finding(computed, verdict, reading)
 
 
 @TOPIC.claim("P3-rem4")
@@ -179,117 +172,168 @@ def detectable_mixture(setting: Setting = PRINTED) -> Finding:
     mixed = float(drop_radius(A0, A1, REMARK_DROP))
     chance = [1.0 - REMARK_DROP, REMARK_DROP]
     system = MarkovJumpSystem(np.stack([A1, A0]), np.array([chance, chance]))
-    moment = np.trace(system.propagate_second_moment(np.eye(2), chance, STEPS), axis1=-2, axis2=-1).sum(-1)
-    growth = float((moment[STEPS] / moment[STEPS - 50]) ** (1.0 / 50.0))
-    everywhere = all(bool((critical(setting, d, SPEEDS) <= 1.0).all()) for d in DIRECTIONS)
-    stable = p_cr > REMARK_DROP and mixed < 1.0 and agrees(growth, mixed, 1e-9)
+    moment = np.trace(system.propagate_second_moment(np.eye(2), chance, 400), axis1=-2, axis2=-1).sum(-1)
+    growth = float((moment[-1] / moment[-51]) ** (1.0 / 50.0))
+    holds = integrator and alone == 1.0 and p_cr > REMARK_DROP and mixed < 1.0 and agrees(growth, mixed, 1e-9)
+    holds &= all(bool((critical(setting, d, SPEEDS) <= 1.0).all()) for d in DIRECTIONS)
     computed = {
         "radius_without_force": alone, "growth_of_second_moment_at_p_0.6_and_10_rad_per_s": growth,
-        "second_moment_radius": mixed, "p_cr_at_10_rad_per_s": p_cr,
-    }  # fmt: skip
-    return Finding(
-        computed,
-        derived(integrator and alone == 1.0 and stable and everywhere),
+        "second_moment_radius": mixed, "p_cr_at_10_rad_per_s": p_cr}  # fmt: skip
+    return Finding(computed, derived(holds), (
         "Without the force the velocity error is an exact integrator, eigenvalue 1, and does not decay by itself; "
         f"the mixture does: at {REMARK_SPEED:g} rad/s and p = {REMARK_DROP:g} the second moment falls by the factor "
-        f"{growth:.6f} a sample, which is the radius of (22).",
-    )
+        f"{growth:.6f} a sample, which is the radius of (22)."))  # fmt: skip
 
 
-@TOPIC.part("drops", "Lost force measurements (Figs 7 and 8)", 1.4)
-def figs_7_and_8(_: Scope) -> PartResult:
-    """Lost measurements: Figs 7 and 8, drawn and in numbers, and Remark 4."""
-    columns, names, p = [TABLE_SPEEDS], [], PRINTED.example_drop
+def tustin_radius(setting: Setting) -> FloatArray:
+    """Second-moment radius over `FINE` with (I - A_e T/2)^-1 (I + A_e T/2), longitudinal: it keeps stability, too."""
+    half = 0.5 * setting.sample_time * setting.error("longitudinal", FINE)[0]
+    update = np.asarray(np.linalg.solve(np.eye(2) - half, np.eye(2) + half), np.float64)
+    return drop_radius(setting.dropped("longitudinal", FINE), update, setting.example_drop)
+
+
+@TOPIC.claim("P3-ex3")
+def twenty_percent(setting: Setting = PRINTED) -> Finding:
+    """The print against every wheel speed, another discretisation, swapped probabilities and the lateral observer."""
+    p = setting.example_drop
+    found, other = radius(setting, "longitudinal", FINE, p), tustin_radius(setting)
+    swapped, lateral = met_at(setting, "longitudinal", 1.0 - p), met_at(setting, "lateral", p)
+    computed = {
+        "longitudinal": by_speed(EXAMPLE_SPEEDS, radius(setting, "longitudinal", EXAMPLE_SPEEDS, p)),
+        "range_over_0_to_140": [float(found.min()), float(found.max())],
+        "tustin_range_over_0_to_140": [float(other.min()), float(other.max())],
+        "with_p_0.8_met_at_rad_per_s": swapped, "lateral_met_at_rad_per_s": lateral}  # fmt: skip
+    reading = (
+        f"The wheel speed is not stated, but no wheel speed in 0..140 rad/s gives the print: {found.min():.4f} to "
+        f"{found.max():.4f} with the exact update, up to {other.max():.4f} with Tustin's. "
+        + ("" if swapped is None else f"It is met with the probabilities swapped (p = {1.0 - p:g}) at {swapped:.2f} rad/s")
+        + ("." if lateral is None else f", or by the lateral observer with p = {p:g} at {lateral:.2f} rad/s."))  # fmt: skip
+    verdict = among_readings(np.concatenate([found, other]), PRINTED_RADIUS, 5e-5)
+    return Finding(computed, verdict, reading)
+
+
+@TOPIC.claim("P3-ex3-arb")
+def any_pattern(setting: Setting = PRINTED) -> Finding:
+    """Proved brackets of the joint spectral radius of the received and the dropped update."""
+    A0, A1 = updates(setting, "longitudinal", PATTERN_SPEEDS)
+    found = [joint_spectral_radius(np.stack([b, a]), tolerance=WIDTH) for a, b in zip(A0, A1, strict=True)]
+    named = {f"{w:g}": bracket for w, bracket in zip(PATTERN_SPEEDS, found, strict=True)}
+    marginal = [j.lower >= 1.0 and j.upper <= 1.0 + WIDTH for j in found]
+    grows = {w: j for w, j in named.items() if j.lower > 1.0 + WIDTH}
+    always = spectral_radius(setting.dropped("longitudinal", FINE))
+    start = harmless_from(setting, "longitudinal")
+    computed = {
+        "joint_spectral_radius": {w: [j.lower, j.upper] for w, j in named.items()},
+        "worst_pattern_drops_to_one_update": {w: len(j.product) - 1 for w, j in grows.items()},
+        "marginal_from_rad_per_s": start, "radius_with_every_sample_lost": floats([always.min(), always.max()])}  # fmt: skip
+    worst = max(named, key=lambda w: named[w].lower)
+    below = (
+        f"; below, one update after several lost samples overshoots and a pattern grows, by {named[worst].lower:.3f} a "
+        f"sample at {worst} rad/s (proved from below and above)" if grows else
+        f"; no growing pattern was found elsewhere, and {len(found) - sum(marginal)} brackets stay open")  # fmt: skip
+    return Finding(computed, partly(all(marginal), any(marginal)), (
+        "With every sample lost the radius is 1 exactly, the integrator. Under any pattern of losses that is the worst only "
+        + ("at no wheel speed" if start is None else f"from {start:.2f} rad/s on")
+        + ("" if all(marginal) else below)
+        + ". The wheel speed of the example is not stated."))  # fmt: skip
+
+
+def _table() -> Table:
+    columns: dict[str, ArrayLike] = {"wheel speed [rad/s]": TABLE_SPEEDS}
+    p = PRINTED.example_drop
     for d in DIRECTIONS:
-        columns += [critical(PRINTED, d, TABLE_SPEEDS), radius(PRINTED, d, TABLE_SPEEDS, p)]
-        names += [f"{d}, critical drop probability [1]", f"{d}, radius at p = {p:g} [1]"]
-    table = Table(
-        "drops",
-        "Critical drop probability of the force measurement and second-moment radius at the drop probability of "
-        "Example 3, exact update at 200 Hz, printed gains.",
-        ("wheel speed [rad/s]", *names),
-        np.stack(columns, axis=1).tolist(),
+        columns[f"{d}, critical drop probability [1]"] = critical(PRINTED, d, TABLE_SPEEDS)
+        columns[f"{d}, radius at p = {p:g} [1]"] = radius(PRINTED, d, TABLE_SPEEDS, p)
+    caption = (
+        "Critical drop probability of the force measurement and second-moment radius at the drop probability of Example 3, "
+        "exact update at 200 Hz, printed gains."
     )
-    return PartResult(TOPIC.found(), [table], [critical_figure(), radius_figure(), map_figure()], [UPDATE_NOTE])
+    return column_table("drops", caption, columns)
 
 
-def critical_figure(setting: Setting = PRINTED) -> Figure:
-    """Fig. 7, whole range and near standstill."""
+def _critical_figure() -> Figure:
     near = np.linspace(0.0, 2.0, 201)
     panels: list[list[Mark]] = [[], []]
     for direction, dash in zip(DIRECTIONS, DASHES, strict=False):
-        colour, start = COLOUR[direction], harmless_from(setting, direction)
+        colour, start = COLOUR[direction], harmless_from(PRINTED, direction)
         for marks, speeds in zip(panels, (FINE, near), strict=True):
-            marks.append(Line(speeds, critical(setting, direction, speeds), direction, colour, dash, 1.9))
+            marks.append(Line(speeds, critical(PRINTED, direction, speeds), direction, colour, dash, 1.9))
         if start is not None:
             words = Words(start, 1.0, f"1 from {start:.2f} rad/s", colour, offset=(5, -13))
             panels[int(start <= near[-1])] += [dots(start, 1.0, color=colour, size=6, hollow=True), words]
-    p = setting.example_drop
+    p = PRINTED.example_drop
     panels[0].append(Level(y=p, label=f"p = {p:g} of Example 3", color=GREY, dash="dotted", width=1.0))
     y = Axis("critical drop probability [1]", 0.0, 1.05)
-    return Figure(
-        "fig-7-critical-drop-probability",
+    return Figure("fig-7-critical-drop-probability",
         "Fig. 7 regenerated: critical drop probability of the force measurement over the wheel speed, printed "
         "gains, exact update at 200 Hz. Below a curve the error is mean-square stable. It is 1, every loss below "
         "100 % is survived, from the circles on. Right: near standstill the lateral value is below 1 as well.",
         "Longitudinal curve rising from 0.577 at standstill to 1 at 28 rad/s, lateral curve rising from 0.957 to 1 "
         "within the first 0.84 rad/s.",
-        [
-            Panel(panels[0], SPEED_AXIS, y, "whole range", legend="center right"),
-            Panel(panels[1], Axis(SPEED_AXIS.label, 0.0, near[-1]), y, "near standstill"),
-        ],
-        size=(9.2, 3.7),
-    )
+        [Panel(panels[0], SPEED_AXIS, y, "whole range", legend="center right"),
+         Panel(panels[1], Axis(SPEED_AXIS.label, 0.0, near[-1]), y, "near standstill")], (9.2, 3.7))  # fmt: skip
 
 
-def radius_figure(setting: Setting = PRINTED) -> Figure:
-    """Fig. 8 for several drop probabilities, with the printed number of Example 3."""
-    panels, label, p = [], f"{PRINTED_RADIUS} of Example 3", setting.example_drop
+def _radius_figure() -> Figure:
+    panels, label, p = [], f"{PRINTED_RADIUS} of Example 3", PRINTED.example_drop
     for d, low, high, other in zip(DIRECTIONS, (0.0, 0.82), (1.25, 1.01), (1.0 - p, p), strict=True):
         marks: list[Mark] = [
-            Line(FINE, radius(setting, d, FINE, q), f"p = {q:g}", colour, dash)
+            Line(FINE, radius(PRINTED, d, FINE, q), f"p = {q:g}", colour, dash)
             for q, colour, dash in zip((0.2, 0.4, 0.5, 0.6, 0.8), CURVES, DASHES, strict=False)
         ]
         marks += [Level(y=1.0), Level(y=PRINTED_RADIUS, label=label, color=GREY, dash="dotted", width=1.0)]
-        met = met_at(setting, d, other)
+        met = met_at(PRINTED, d, other)
         if met is not None:
             marks.append(dots(met, PRINTED_RADIUS, color="0.1", size=6, hollow=True))
         panels.append(Panel(marks, SPEED_AXIS, Axis("second-moment radius ρ [1]", low, high), d))
-    return Figure(
-        "fig-8-radius-under-drops",
+    return Figure("fig-8-radius-under-drops",
         "Fig. 8 regenerated for five drop probabilities, as the paper does not state its own: spectral radius of the second "
         "moment of the error over the wheel speed, printed gains, exact update at 200 Hz. Above 1 the mean square grows. "
         "Dotted: the 0.9026 that Example 3 prints for the longitudinal observer at p = 0.2; the blue curve of the left panel "
         "never comes near it. Circles: where other readings meet it, p = 0.8 longitudinally and p = 0.2 laterally.",
         "Two panels of radius over wheel speed: longitudinal curves fall from up to 1.2 towards their drop "
         "probability, lateral curves, on a finer scale, rise slowly towards 1.",
-        panels,
-        size=(9.2, 3.9),
-        legend="below",
-        columns=6,
-    )
+        panels, (9.2, 3.9), "below", 6)  # fmt: skip
 
 
-def map_figure(setting: Setting = PRINTED) -> Figure:
-    """Radius over wheel speed and drop probability."""
+def _map_figure() -> Figure:
     probabilities = np.linspace(0.0, 1.0, 101)
     panels = []
     for d, label in zip(DIRECTIONS, ("", "second-moment radius ρ [1]"), strict=True):
-        found, border = radius(setting, d, SPEEDS, probabilities[:, None]), critical(setting, d, FINE)
+        found, border = radius(PRINTED, d, SPEEDS, probabilities[:, None]), critical(PRINTED, d, FINE)
         marks: list[Mark] = [
             Map(SPEEDS, probabilities, found, label, low=0.2, high=1.2),
             Contours(SPEEDS, probabilities, found, LEVELS[d], "white", width=0.7),
             Line(FINE, np.where(border < 1.0, border, np.nan), color=ORANGE, width=2.0),
         ]
         panels.append(Panel(marks, SPEED_AXIS, "drop probability p [1]", d, grid=False))
-    return Figure(
-        "radius-map",
+    return Figure("radius-map",
         "Second-moment radius of the error over wheel speed and drop probability, printed gains, exact update at "
         "200 Hz. Orange: the critical drop probability, radius 1; unstable above it. At p = 1 the radius is 1 "
         "everywhere, the integrator of the velocity error.",
         "Two maps; the longitudinal one has an unstable region in the upper left corner, below 28 rad/s and above "
         "58 to 100 per cent drops; the lateral one practically none.",
-        panels,
-        size=(9.2, 4.0),
-        share_y="all",
-    )
+        panels, (9.2, 4.0), share_y="all")  # fmt: skip
+
+
+def _readings_figure() -> Figure:
+    p, (x, y) = PRINTED.example_drop, COLOUR.values()
+    marks: list[Mark] = [
+        Line(FINE, radius(PRINTED, "longitudinal", FINE, p), "longitudinal, exact update", x, width=1.9),
+        Line(FINE, tustin_radius(PRINTED), "longitudinal, Tustin's update", x, "dashed"),
+        Line(FINE, radius(PRINTED, "lateral", FINE, p), "lateral, exact update", y, "dash-dot"),
+        Level(y=PRINTED_RADIUS, label=f"printed, {PRINTED_RADIUS}", color=GREY, dash="dotted", width=1.0),
+    ]
+    return Figure("example-3-readings",
+        f"Example 3 under the readings that its text allows: spectral radius of the second moment with {p:.0%} of "
+        "the force measurements lost, over the wheel speed, which is not stated. The printed 0.9026 belongs to the "
+        "lateral observer near 51 rad/s, not to the longitudinal gain that the example names.",
+        "Four lines over wheel speed; the two longitudinal ones fall from 0.47 and 0.88 and stay below the printed "
+        "level, the lateral one crosses it near 51 rad/s.",
+        Panel(marks, SPEED_AXIS, Axis("second-moment radius ρ [1]", 0.0, 1.0), legend="center right"), (7.2, 3.6))  # fmt: skip
+
+
+TOPIC.show(
+    "drops", "Lost force measurements (Figs 7 and 8)", 1.4, ("P3-pcr", "P3-pcr-exact", "P3-fig8", "P3-rem4"),
+    [_table], [_critical_figure, _radius_figure, _map_figure], [NOTE])  # fmt: skip
+TOPIC.show("example-3", "Example 3", 1.2, ("P3-ex3", "P3-ex3-arb"), figures=[_readings_figure])

@@ -26,7 +26,7 @@ SPEEDS = np.linspace(0.0, HIGHEST_SPEED, 141)
 FINE = np.linspace(0.0, HIGHEST_SPEED, 281)  # for curves
 SPEED_AXIS = Axis("wheel speed |ω| [rad/s]", 0.0, HIGHEST_SPEED)
 COLOUR: Mapping[Direction, str] = {"longitudinal": BLUE, "lateral": RED}
-UPDATE_NOTE = (
+NOTE = (
     "All sampled results use the exact closed-loop update e+ = exp((A - L C) T) e at T = 5 ms while the force is "
     "received and exp(A T) while it is lost. That is what the runtime observer does; the printed gains diverge if "
     "the innovation is sampled and held instead."
@@ -75,7 +75,7 @@ class Setting:
     def error(self, direction: Direction, speeds: ArrayLike, gain: Gain | None = None) -> tuple[FloatArray, FloatArray]:
         """A_e (g, 2, 2) and B_e (g, 2, 2) of (8), (13) at wheel speeds (g,) in rad/s, with the printed or another gain."""
         L = np.reshape(self.gains[direction] if gain is None else gain, (2, 1))
-        A_e, B_e = self.models[direction].on(_grid(speeds)).error_dynamics(L)
+        A_e, B_e = self.models[direction].on(np.atleast_1d(np.asarray(speeds, float))).error_dynamics(L)
         return A_e, np.asarray(B_e[..., :2])
 
     def sampled(self, direction: Direction, speeds: ArrayLike, gain: Gain | None = None) -> FloatArray:
@@ -84,11 +84,9 @@ class Setting:
 
     def dropped(self, direction: Direction, speeds: ArrayLike) -> FloatArray:
         """exp(A T_s) (g, 2, 2): the update without the force, (24)."""
-        return np.asarray(expm(self.sample_time * self.models[direction].on(_grid(speeds)).A))
-
-
-def _grid(speeds: ArrayLike) -> FloatArray:
-    return np.atleast_1d(np.asarray(speeds, float))
+        return np.asarray(
+            expm(self.sample_time * self.models[direction].on(np.atleast_1d(np.asarray(speeds, float))).A)
+        )
 
 
 def printed_gain(parameters: ParameterSet, direction: Direction, high_slip: bool = False) -> Gain:

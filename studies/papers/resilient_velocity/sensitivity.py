@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -15,18 +15,18 @@ from analysis.observability.rank_loss import rank_loss
 from analysis.perturbed import PerturbedModel, error_measure
 from analysis.sensitivity import OneAtATime, one_at_a_time
 from estimators.arrays import FloatArray
-from studies.claim import ClaimVerdict, Finding, JsonValue, reproduced
+from studies.claim import Finding, JsonValue, reproduced
 from studies.papers.resilient_velocity.inputs import DIRECTIONS, FINE, PACKAGE, PRINTED, SPEED_AXIS, SPEEDS, Setting
 from studies.papers.topic import Topic
-from studies.plots import DASHES, Figure, Level, Line, Mark, Panel
+from studies.papers.verdicts import partly
+from studies.plots import DASHES, Axis, Figure, Level, Line, Mark, Panel
 from studies.plots.colours import BLUE, GREEN, GREY, ORANGE, RED
-from studies.study import Cell, PartResult, Scope, Table
+from studies.study import Cell, Table
 from synthesis.models.catalogue.corner import Direction
 
 TOPIC = Topic(PACKAGE)
 CONSTANTS = ("sigma0", "sigma1", "sigma2", "kappa")
-FACTORS = (0.8, 1.2)
-CHANGE = 0.2
+FACTORS, CHANGE = (0.8, 1.2), 0.2
 SPEED = 40.0  # rad/s, of single values
 SEARCH = (0, 400)  # rad/s: rank loss is looked for beyond the range as well
 LOOK = {"sigma0": ("σ₀", BLUE), "sigma1": ("σ₁", RED), "sigma2": ("σ₂", GREEN), "kappa": ("κ", ORANGE)}
@@ -39,81 +39,57 @@ MEASURES: Mapping[str, tuple[str, Callable[[FloatArray, FloatArray], FloatArray]
 
 def deviations(setting: Setting, direction: Direction, speeds: FloatArray, name: str) -> OneAtATime:
     """One of `MEASURES`, and what moves it: axes (parameter, factor, wheel_speed)."""
-    unit, measure = MEASURES[name]
-    family = PerturbedModel(setting.models[direction])
-    return one_at_a_time(
-        error_measure(family, setting.gains[direction], measure, wheel_speed=speeds),
-        {key: family.nominal[key] for key in CONSTANTS},
-        FACTORS,
-        axes=(LabelledAxis("wheel_speed", speeds, "rad/s"),),
-        name=name,
-        unit=unit,
-    )
+    (unit, measure), family = MEASURES[name], PerturbedModel(setting.models[direction])
+    function = error_measure(family, setting.gains[direction], measure, wheel_speed=speeds)
+    nominal, axis = {key: family.nominal[key] for key in CONSTANTS}, LabelledAxis("wheel_speed", speeds, "rad/s")
+    return one_at_a_time(function, nominal, FACTORS, axes=(axis,), name=name, unit=unit)
 
 
-def largest_relative(found: OneAtATime) -> dict[str, float]:
-    """By constant: the largest |deviation| / |nominal value|."""
-    relative = np.abs(found.deviations.values) / np.abs(found.nominal.values)
-    return dict(zip(CONSTANTS, relative.max(axis=(1, 2)).tolist(), strict=True))
+def at_40(found: OneAtATime, constant: str) -> list[float]:
+    """The deviations by factor at 40 rad/s."""
+    return [found.deviations.at(parameter=constant, factor=f, wheel_speed=SPEED).item() for f in FACTORS]
 
 
 @TOPIC.claim("P3-fig345")
 def small_deviations(setting: Setting = PRINTED) -> Finding:
     """`small` is read as: no larger in proportion than the 20 % that caused it, and stable throughout."""
-    computed: dict[str, JsonValue] = {}
-    worst: dict[str, float] = {}
-    stable, lost = True, 0.0
+    computed, worst, stable, lost = dict[str, JsonValue](), dict[str, float](), True, 0.0
     for direction in DIRECTIONS:
         margin, norm = (deviations(setting, direction, SPEEDS, name) for name in MEASURES)
         stable &= bool((margin.values.values < 0.0).all())
         lost = float((margin.deviations.values / np.abs(margin.nominal.values)).max())  # of the last, the lateral one
-        large_margin, large_norm = largest_relative(margin), largest_relative(norm)
         computed[direction] = {
             "margin_per_s": margin.nominal.at(wheel_speed=SPEED).item(),
-            "margin_deviation_at_40_per_s": {
-                name: [margin.deviations.at(parameter=name, factor=f, wheel_speed=SPEED).item() for f in FACTORS]
-                for name in CONSTANTS
-            },
-            "largest_relative_margin_deviation": large_margin,
-            "largest_relative_norm_deviation": large_norm,
+            "margin_deviation_at_40_per_s": {name: at_40(margin, name) for name in CONSTANTS},
             "least_stable_margin_per_s": float(margin.values.values.max()),
             "largest_relative_margin_loss": lost,
         }
-        for kind, sizes in (("margin", large_margin), ("norm", large_norm)):
+        for kind, found in (("margin", margin), ("norm", norm)):
+            relative = (np.abs(found.deviations.values) / np.abs(found.nominal.values)).max(axis=(1, 2))
+            sizes = dict(zip(CONSTANTS, relative.tolist(), strict=True))
+            computed[direction][f"largest_relative_{kind}_deviation"] = sizes
             worst |= {f"{direction} {kind}, {constant}": size for constant, size in sizes.items()}
     large = {name: value for name, value in worst.items() if value > CHANGE}
     rest = max(value for name, value in worst.items() if not name.endswith("sigma1"))
-    verdict = reproduced(stable and not large, ClaimVerdict.PARTLY if stable else ClaimVerdict.NOT_REPRODUCED)
-    return Finding(
-        computed,
-        verdict,
+    return Finding(computed, partly(stable and not large, stable), (
         f"No number is printed; small is read as at most the {CHANGE:.0%} that caused it. "
         + ("Every perturbed observer stays stable" if stable else "A perturbed observer is unstable")
         + f", and sigma_0, sigma_2 and kappa move margin and norm by {rest:.1%} at most; but "
         + (", ".join(f"{name}: {value:.0%}" for name, value in large.items()) or "nothing moves by more")
         + f" of the nominal value. Most of it is gained; the most that is lost is {lost:.0%} of the lateral margin. "
-        "Only sigma_1 matters.",
-    )
+        "Only sigma_1 matters."))  # fmt: skip
 
 
-@TOPIC.part("sensitivity", "Tire constants off by 20 % (Figs 3 to 5)", 0.5)
-def figs_3_to_5(_: Scope) -> PartResult:
-    """The claim, the deviations at one wheel speed, and the curves."""
-    rows: list[tuple[Cell, ...]] = []
-    for direction in DIRECTIONS:
-        found = [deviations(PRINTED, direction, np.array([SPEED]), name).deviations for name in MEASURES]
-        for constant in CONSTANTS:
-            values = [d.at(parameter=constant, factor=f, wheel_speed=SPEED).item() for d in found for f in FACTORS]
-            rows.append((f"{direction}, {constant}", *values))
-    table = Table(
-        "deviations",
-        "What a tire constant that is 20 % too low or too high does to the stability margin (largest real part of "
-        f"the eigenvalues; positive deviations are towards instability) and to the H-infinity norm, at {SPEED:g} "
-        "rad/s with the printed gains.",
-        ("constant", "margin, -20 % [1/s]", "margin, +20 % [1/s]", "norm, -20 % [1]", "norm, +20 % [1]"),
-        rows,
-    )
-    return PartResult(TOPIC.found("P3-fig345"), [table], [deviation_figure(measure) for measure in MEASURES])
+def _table() -> Table:
+    rows: list[list[Cell]] = []
+    for d in DIRECTIONS:
+        found = [deviations(PRINTED, d, np.array([SPEED]), name) for name in MEASURES]
+        rows += [[f"{d}, {constant}", *(v for one in found for v in at_40(one, constant))] for constant in CONSTANTS]
+    return Table("deviations",
+        "What a tire constant that is 20 % too low or too high does to the stability margin (largest real part of the "
+        "eigenvalues; positive deviations are towards instability) and to the H-infinity norm, at "
+        f"{SPEED:g} rad/s with the printed gains.",
+        ("constant", "margin, -20 % [1/s]", "margin, +20 % [1/s]", "norm, -20 % [1]", "norm, +20 % [1]"), rows)  # fmt: skip
 
 
 WORDS = {
@@ -139,12 +115,12 @@ WORDS = {
 """Of the figures: name, caption, alternative."""
 
 
-def deviation_figure(measure: str, setting: Setting = PRINTED) -> Figure:
+def deviation_figure(measure: str) -> Figure:
     """Rows: direction; columns: sigma_1, which outweighs the rest, and the other constants on a scale of their own."""
     rows = []
     for direction in DIRECTIONS:
-        found = deviations(setting, direction, FINE, measure)
-        row, x = [], SPEED_AXIS if direction == DIRECTIONS[-1] else replace(SPEED_AXIS, label="")
+        found = deviations(PRINTED, direction, FINE, measure)
+        row, x = [], Axis(SPEED_AXIS.label if direction == DIRECTIONS[-1] else "", SPEED_AXIS.low, SPEED_AXIS.high)
         for title, constants in (("σ₁", ("sigma1",)), ("the other constants", ("sigma0", "sigma2", "kappa"))):
             marks: list[Mark] = [Level(y=0.0, color=GREY)]
             for constant in constants:
@@ -160,8 +136,7 @@ def deviation_figure(measure: str, setting: Setting = PRINTED) -> Figure:
 @TOPIC.claim("P3-obs")
 def rank_of_observability(setting: Setting = PRINTED) -> Finding:
     """The exact set on which the time-varying observability matrix (9) loses rank."""
-    computed: dict[str, dict[str, object]] = {}
-    lost_inside, detectable = [], True
+    computed, lost_inside, detectable = dict[str, JsonValue](), list[str](), True
     for direction in DIRECTIONS:
         model = setting.models[direction]
         loss = rank_loss(observability_matrix(model))
@@ -178,21 +153,15 @@ def rank_of_observability(setting: Setting = PRINTED) -> Finding:
             "hidden_mode": [str(m.eigenvalue) for m in frozen_modes(model.A, model.C) if m.eigenvalue != 0],
         }
     where = ", ".join(lost_inside)
-    return Finding(
-        computed,
-        reproduced(not lost_inside),
-        (f"Rank 2 is lost inside 0..140 rad/s: {where} at constant speed. " if lost_inside else "Rank 2 everywhere. ")
+    return Finding(computed, reproduced(not lost_inside), (
+        (f"Rank 2 is lost inside 0..140 rad/s: {where} at constant speed. " if where else "Rank 2 everywhere. ")
         + "det O_2 = (sigma_0 - sigma_1 a)(sigma_0 + sigma_2 a) + sigma_1 (sigma_1 + sigma_2) da/dt with a = kappa "
         "R_e omega vanishes on a curve in wheel speed and acceleration. "
-        + (
-            "What is lost is the bristle deflection, which decays, so the pair stays detectable."
-            if detectable
-            else "The pair is not detectable."
-        ),
-    )
+        + ("What is lost is the bristle deflection, which decays, so the pair stays detectable." if detectable else
+           "The pair is not detectable.")))  # fmt: skip
 
 
-@TOPIC.part("observability", "The observability rank", 1.1)
-def rank(_: Scope) -> PartResult:
-    """The rank condition (9)."""
-    return PartResult(TOPIC.found("P3-obs"))
+TOPIC.show(
+    "sensitivity", "Tire constants off by 20 % (Figs 3 to 5)", 0.5, ("P3-fig345",),
+    [_table], [partial(deviation_figure, measure) for measure in MEASURES])  # fmt: skip
+TOPIC.show("observability", "The observability rank", 1.1, ("P3-obs",))

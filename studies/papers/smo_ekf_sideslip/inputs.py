@@ -14,10 +14,10 @@ PRINTED = printed_numbers(PACKAGE)
 """Tables 1 to 5 by test (slalom, roundabout), then by kind: forces, stiffness, mass."""
 FORCES = ("F_y1", "F_y2", "F_x1", "yaw_rate")
 """Names of the quantities of Tables 1 and 2, in their order."""
-STIFFNESS_SETTINGS = (0.5, 1.0, 1.5)
-MASS_SETTINGS = (-300.0, 0.0, 300.0)  # kg
+FACTORS, MASSES = (0.5, 1.0, 1.5), (-300.0, 0.0, 300.0)
+"""What the assumed stiffness is multiplied with, and by how many kg the assumed mass is wrong: Tables 3 to 5."""
 SAMPLE_TIME = 0.01  # s
-PRINTED_GRAVITY = 9.81  # m/s^2, of the axle loads
+GRAVITY = 9.81  # m/s^2, of the axle loads
 CAR = Vehicle.of(PEUGEOT_307)
 WHEELBASE = CAR.front_axle_distance + CAR.rear_axle_distance  # m
 _FRONT, _REAR, _ALONG, _YAW = (PRINTED["slalom"]["forces"][name]["largest"] for name in FORCES)

@@ -15,19 +15,17 @@ from analysis.observability.lie_structure import generic_rank
 from estimators.arrays import FloatArray
 from studies.claim import Finding, reproduced
 from studies.papers.smo_ekf_sideslip.inputs import PACKAGE, SAMPLE_TIME
-from studies.papers.smo_ekf_sideslip.saturating_car import LINEAR, SimulatedRun, simulate, slalom, steady_turn
+from studies.papers.smo_ekf_sideslip.observers import LINEAR, SimulatedRun, simulate, slalom, steady_turn
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Line, Mark, Panel
 from studies.plots.colours import BLUE, RED
-from studies.study import PartResult, Scope
 from synthesis.models.catalogue.single_track import adaptive_stiffness_model, axle_force_model
 from synthesis.models.nonlinear import NonlinearModel
 
 TOPIC = Topic(PACKAGE)
 RANGES = {
     "sideslip": (-0.1, 0.1), "front_stiffness_change": (-2e4, 2e4), "rear_stiffness_change": (-2e4, 2e4),
-    "steering_angle": (-0.1, 0.1), "yaw_rate": (-0.5, 0.5), "speed": (5.0, 30.0), "front_force_x": (-3e3, 3e3),
-}  # fmt: skip
+    "steering_angle": (-0.1, 0.1), "yaw_rate": (-0.5, 0.5), "speed": (5.0, 30.0), "front_force_x": (-3e3, 3e3)}  # fmt: skip
 STATE_SIZE = np.array([0.05, 3e4, 3e4])  # rad, N/rad, N/rad
 FORCE_SIZE = np.array([2e3, 2e3, 2e4, 2e4])  # N and N/s
 
@@ -37,29 +35,21 @@ def force_model(model: NonlinearModel | None = None) -> Finding:
     """Rank of the force model, and of the one with a rear longitudinal force."""
     chosen = model or axle_force_model()
     found = LieRankTest(chosen).at(dict.fromkeys((s.name for s in chosen.states), 0))
-    both = axle_force_model(rear_longitudinal_force=True)
+    # Of [h_x; (h_x f_x) of the yaw rate] of the force model (linear: exact for every state).
+    usual, both = axle_force_model(), axle_force_model(rear_longitudinal_force=True)
+    H, A = (function.jacobian(list(usual.state_symbols)) for function in (usual.h, usual.f))
+    determinant = sp.factor(sp.Matrix.vstack(H, (H * A)[0, :]).det())
     with_rear = generic_rank(both, {s.name: (-1.0, 1.0) for s in both.states}, samples=1)
     steered = sp.Symbol("steering_angle") in (chosen.f.free_symbols | chosen.h.free_symbols)
     computed = {
-        "rank": found.rank, "states": len(chosen.states), "determinant": str(force_determinant()),
+        "rank": found.rank, "states": len(chosen.states), "determinant": str(determinant),
         "contains_steering_angle": steered, "rank_with_rear_longitudinal_force": with_rear.rank,
         "states_with_rear_longitudinal_force": len(both.states),
-        "hidden_with_rear_longitudinal_force": list(with_rear.structure.describe()),
-    }  # fmt: skip
-    reading = (
+        "hidden_with_rear_longitudinal_force": list(with_rear.structure.describe())}  # fmt: skip
+    return Finding(computed, reproduced(found.rank == len(chosen.states) and not steered), (
         "The steering angle is not in the model at all; the determinant of outputs and yaw acceleration is (L_1 + L_2) / "
         "(m^2 I_z) up to its sign, so the rank is 4 for every car, speed and steering angle. With the rear longitudinal "
-        "force as a fifth state one direction is lost and does not decay, which is why the paper neglects it."
-    )
-    return Finding(computed, reproduced(found.rank == len(chosen.states) and not steered), reading)
-
-
-def force_determinant() -> sp.Expr:
-    """Determinant of [h_x; (h_x f_x) of the yaw rate] of the force model (linear: exact for every state)."""
-    model = axle_force_model()
-    x = list(model.state_symbols)
-    H, A = model.h.jacobian(x), model.f.jacobian(x)
-    return sp.factor(sp.Matrix.vstack(H, (H * A)[0, :]).det())
+        "force as a fifth state one direction is lost and does not decay, which is why the paper neglects it."))  # fmt: skip
 
 
 @TOPIC.claim("P5-ekf-obs")
@@ -69,21 +59,20 @@ def sideslip_model(model: NonlinearModel | None = None) -> Finding:
     test = LieRankTest(adaptive_stiffness_model())
     zero = {"sideslip": 0, "front_stiffness_change": 0, "rear_stiffness_change": 0}
     ahead = {"steering_angle": 0, "yaw_rate": 0, "speed": 20, "front_force_x": 0}
+    H, *_ = gradients()  # m dy_3 = cos(delta) dy_1 + dy_2
+    repeated = H[2, :] * sp.Symbol("mass") - H[0, :] * sp.cos(sp.Symbol("steering_angle")) - H[1, :]
     computed = {
         "generic_rank": generic.rank, "rank_of_outputs_alone": generic.samples[0].by_order[0],
         "rank_with_first_derivatives": generic.samples[0].by_order[1], "rank_straight_ahead": test.at(zero, ahead).rank,
         "rank_as_a_turn_begins": test.at(zero, {**ahead, "yaw_rate": [0, "0.1"]}).rank,
         "rank_in_a_steady_turn": steady_turn_rank(),
         "closed_form_of_rank_loss_proved": all(identity == 0 for identity in rank_loss_identities()),
-        "acceleration_adds_no_rank": third_row_repeats(),
-    }  # fmt: skip
-    reading = (
+        "acceleration_adds_no_rank": all(sp.simplify(entry) == 0 for entry in repeated)}  # fmt: skip
+    return Finding(computed, reproduced(generic.rank == 3), (
         f"The rank is {generic.rank} at almost every state: 2 from the forces, the third from their rates. Outputs and their "
         "first derivatives lose it exactly where both slip angles follow beta_i' = -(V'/V) beta_i. So it is 2 for good in a "
         "steady turn at constant speed, where sideslip cannot be told from the two stiffnesses, and 1 straight ahead. The "
-        "slip angles must keep changing, as they do in a slalom."
-    )
-    return Finding(computed, reproduced(generic.rank == 3), reading)
+        "slip angles must keep changing, as they do in a slalom."))  # fmt: skip
 
 
 def steady_turn_rank() -> int:
@@ -92,14 +81,11 @@ def steady_turn_rank() -> int:
     K_1 = 20 and K_2 = 20 (m V^2 + K_1 L_1) / (20 L_2) kN/rad with V = 20 m/s balance the sideslip rate; the yaw moment is not
     zero, but the yaw rate is an input here and held.
     """
-    mass, front, rear, speed = (sp.Rational(text) for text in ("1447", "1.12", "1.46", "20"))
-    stiffness_front = sp.Integer(20000)
-    stiffness_rear = (mass * speed**2 + stiffness_front * front) / rear
-    changes = {
-        "front_stiffness_change": stiffness_front - 65000, "rear_stiffness_change": stiffness_rear - 50000
-    }  # fmt: skip
+    mass, front, rear, speed, K_1 = (sp.Rational(text) for text in ("1447", "1.12", "1.46", "20", "20000"))
+    K_2 = (mass * speed**2 + K_1 * front) / rear
+    state = {"sideslip": 0, "front_stiffness_change": K_1 - 65000, "rear_stiffness_change": K_2 - 50000}
     inputs = {"steering_angle": 0, "yaw_rate": sp.Rational(1, 5), "speed": speed, "front_force_x": 0}
-    return LieRankTest(adaptive_stiffness_model(), 4).at({"sideslip": 0, **changes}, inputs).rank
+    return LieRankTest(adaptive_stiffness_model(), 4).at(state, inputs).rank
 
 
 def gradients() -> tuple[sp.Matrix, sp.Matrix, list[sp.Expr]]:
@@ -115,8 +101,7 @@ def gradients() -> tuple[sp.Matrix, sp.Matrix, list[sp.Expr]]:
 
 def rank_loss_identities() -> list[sp.Expr]:
     r"""det [dF_1; dF_2; dF_i'] - K_i beta_(3-i) (beta_i' - g beta_i) for i = 1, 2: zero if the closed form is right."""
-    H, moved, (b1, b2) = gradients()
-    model = adaptive_stiffness_model()
+    (H, moved, (b1, b2)), model = gradients(), adaptive_stiffness_model()
     delta, _, v, drive = model.input_symbols
     beta, d1, d2 = model.state_symbols
     m, c1, c2 = sp.symbols("mass front_stiffness rear_stiffness")
@@ -125,32 +110,20 @@ def rank_loss_identities() -> list[sp.Expr]:
     g = -along / (m * v)
     found = []
     for i, (slip, other, stiffness) in enumerate(((b1, b2, k1), (b2, b1, k2))):
-        inputs = sum(slip.diff(u) * sp.Symbol(f"{u}_rate") for u in model.input_symbols)
-        rate = slip.diff(beta) * model.f[0] + inputs
+        rate = slip.diff(beta) * model.f[0] + sum(slip.diff(u) * sp.Symbol(f"{u}_rate") for u in model.input_symbols)
         det = H[0, :].cross(H[1, :]).dot(moved[i, :])
         found.append(sp.expand(det - stiffness * other * (rate - g * slip)))
     return found
 
 
-def third_row_repeats() -> bool:
-    """Whether the acceleration adds no rank: m dy_3 = cos(delta) dy_1 + dy_2 identically."""
-    H, _, _ = gradients()
-    difference = H[2, :] * sp.Symbol("mass") - H[0, :] * sp.cos(sp.Symbol("steering_angle")) - H[1, :]
-    return all(sp.simplify(entry) == 0 for entry in difference)
-
-
 def third_singular_value(run: SimulatedRun) -> FloatArray:
     """Third singular value over the first (n,) of [dF_1; dF_2; dF_1'; dF_2'] in typical sizes; no stiffness correction."""
-    H, moved, _ = gradients()
-    model = adaptive_stiffness_model()
+    (H, moved, _), model = gradients(), adaptive_stiffness_model()
     constants = {sp.Symbol(name): constant.value for name, constant in model.constants.items()}
     rows = sp.Matrix.vstack(H[:2, :], moved[:2, :]).subs(constants)
-    arguments = [
-        *model.state_symbols, *model.input_symbols, *(sp.Symbol(f"{symbol}_rate") for symbol in model.input_symbols)
-    ]  # fmt: skip
-    numeric = sp.lambdify(arguments, rows, "numpy", cse=True)
-    zero = np.zeros_like(run.time)
-    inputs = [run.steering, run.yaw_rate, run.speed, run.front_force_x]
+    moving = [sp.Symbol(f"{symbol}_rate") for symbol in model.input_symbols]
+    numeric = sp.lambdify([*model.state_symbols, *model.input_symbols, *moving], rows, "numpy", cse=True)
+    zero, inputs = np.zeros_like(run.time), [run.steering, run.yaw_rate, run.speed, run.front_force_x]
     rates = [np.gradient(value, SAMPLE_TIME) for value in inputs]
     samples = np.stack([run.sideslip, zero, zero, *inputs, *rates], axis=1)
     found = np.array([np.asarray(numeric(*sample), float) for sample in samples])
@@ -158,26 +131,15 @@ def third_singular_value(run: SimulatedRun) -> FloatArray:
     return np.asarray(singular[:, 2] / singular[:, 0])
 
 
-@TOPIC.part("observability", "Observability of both models", 2.0)
-def observability(_: Scope) -> PartResult:
-    """Ranks of both models."""
-    return PartResult(TOPIC.found(), (), [stiffness_observability()])
-
-
-def stiffness_observability() -> Figure:
-    """Third singular value in a slalom and in a steady turn."""
-    slips: list[Mark] = []
-    values: list[Mark] = []
+def _stiffness_observability() -> Figure:
+    slips, values = list[Mark](), list[Mark]()
     for steering, name, color in ((slalom, "slalom", BLUE), (steady_turn, "steady turn", RED)):
         run = simulate(steering, seconds=14.0, friction=LINEAR)
-        slips += [
-            Line(run.time, np.degrees(run.slips[:, 0]), f"front, {name}", color),
-            Line(run.time, np.degrees(run.slips[:, 1]), f"rear, {name}", color, "dashed", 1.0),
-        ]
+        slips.append(Line(run.time, np.degrees(run.slips[:, 0]), f"front, {name}", color))
+        slips.append(Line(run.time, np.degrees(run.slips[:, 1]), f"rear, {name}", color, "dashed", 1.0))
         values.append(Line(run.time, np.maximum(third_singular_value(run), 1e-9), name, color))
     value = Axis("third singular value / largest [1]", 1e-9, 10.0, "log")
-    return Figure(
-        "stiffness-observability",
+    return Figure("stiffness-observability",
         "When the sideslip filter can tell sideslip from stiffness: third singular value of the gradients of the two axle "
         "forces and of their rates (states in typical sizes), along a slalom and along a turn that becomes steady, linear "
         "axles as printed, both at constant 17 m/s. Straight ahead nothing is seen of the stiffnesses; in the steady turn "
@@ -185,9 +147,8 @@ def stiffness_observability() -> Figure:
         "softer tires. In the slalom it stays large.",
         "Left: slip angles over time, oscillating in the slalom and constant in the turn. Right: the singular value on a "
         "logarithmic scale, large throughout the slalom, falling steadily in the steady turn.",
-        [
-            Panel(slips, "time [s]", Axis("slip angle [deg]", high=9.0), legend="upper left", columns=2),
-            Panel(values, "time [s]", value, legend="upper left"),
-        ],
-        size=(9.2, 3.7), share_x="all",
-    )  # fmt: skip
+        [Panel(slips, "time [s]", Axis("slip angle [deg]", high=9.0), legend="upper left", columns=2),
+         Panel(values, "time [s]", value, legend="upper left")], size=(9.2, 3.7), share_x="all")  # fmt: skip
+
+
+TOPIC.show("observability", "Observability of both models", 2.0, figures=[_stiffness_observability])

@@ -11,18 +11,18 @@ from estimators.arrays import FloatArray
 from studies.claim import Finding, reproduced
 from studies.papers.smo_ekf_sideslip.inputs import (
     CAR,
-    MASS_SETTINGS,
+    FACTORS,
+    GRAVITY,
+    MASSES,
     PACKAGE,
     PRINTED,
-    PRINTED_GRAVITY,
-    STIFFNESS_SETTINGS,
     WHEELBASE,
     published_car,
 )
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Line, Mark, Panel, dots
 from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE, RED, TRUTH
-from studies.study import Cell, PartResult, Scope, Table
+from studies.study import Cell, Table
 
 TOPIC = Topic(PACKAGE)
 LIMIT = 6.0  # %
@@ -48,40 +48,27 @@ def force_tables(tables: Mapping[str, Any] = PRINTED) -> Finding:
     computed = {
         "largest_mean_percent": mean, "largest_deviation_percent": deviation,
         "mean_by_mass_percent": {name: list(pair) for name, pair in mass.items()}, "least_sensitive_to_mass": least,
-        "nominal_columns_agree_between_tables": agrees,
-    }  # fmt: skip
-    reading = (
+        "nominal_columns_agree_between_tables": agrees}  # fmt: skip
+    holds = mean < LIMIT and deviation < LIMIT and least == "beta_2" and agrees
+    return Finding(computed, reproduced(holds), (
         f"Largest mean {mean:g} % and largest standard deviation {deviation:g} % of Tables 1 and 2, both below {LIMIT:g} %. "
         f"With 300 kg more or less F_y2 runs from {mass['F_y2'][0]:g} to {mass['F_y2'][1]:g} %, the rear sideslip from "
         f"{mass['beta_2'][0]:g} to {mass['beta_2'][1]:g} %: sideslip suffers least. The nominal columns of Tables 1, 3 and 5 "
-        "agree."
-    )
-    return Finding(computed, reproduced(mean < LIMIT and deviation < LIMIT and least == "beta_2" and agrees), reading)
+        "agree."))  # fmt: skip
 
 
-@TOPIC.part("tables", "Tables 1 to 5 against the text", 0.2)
-def tables(_: Scope) -> PartResult:
-    """The printed tables against the text."""
-    return PartResult(TOPIC.found(), [printed_forces(), printed_settings()], [lateral_models()])
-
-
-def printed_forces() -> Table:
-    """Tables 1 and 2."""
+def _printed_forces() -> Table:
     rows: list[list[Cell]] = [
         [test, name, *(row[key] for key in ("largest", "unit", "mean", "deviation")), max(row["mean"], row["deviation"]) < 6]
         for test, found in PRINTED.items()
-        for name, row in found["forces"].items()
-    ]  # fmt: skip
-    return Table(
-        "tables-1-2",
+        for name, row in found["forces"].items()]  # fmt: skip
+    return Table("tables-1-2",
         "Tables 1 and 2 of P5 as printed: errors (8) of the force observer in the two road tests, in percent of the maximum.",
-        ("test", "quantity", "max", "unit", "mean [%]", "std [%]", "below 6 %"), rows,
-    )  # fmt: skip
+        ("test", "quantity", "max", "unit", "mean [%]", "std [%]", "below 6 %"), rows)  # fmt: skip
 
 
-def printed_settings() -> Table:
-    """Tables 3 to 5."""
-    factors, changes = [f"stiffness x {k:g}" for k in STIFFNESS_SETTINGS], [f"mass {k:+g} kg" for k in MASS_SETTINGS]
+def _printed_settings() -> Table:
+    factors, changes = [f"stiffness x {k:g}" for k in FACTORS], [f"mass {k:+g} kg" for k in MASSES]
     found = [(n, test, "beta_2", PRINTED[test]["stiffness"], factors) for n, test in ((3, "slalom"), (4, "roundabout"))]
     found += [(5, "slalom", name, row, changes) for name, row in PRINTED["slalom"]["mass"].items()]
     rows: list[list[Cell]] = [
@@ -89,11 +76,9 @@ def printed_settings() -> Table:
         for number, test, name, row, settings in found
         for setting, mean, deviation in zip(settings, row["mean"], row["deviation"], strict=True)
     ]
-    return Table(
-        "tables-3-5",
+    return Table("tables-3-5",
         "Tables 3, 4 and 5 of P5 as printed: errors (8) with other settings of the stiffness and of the mass, in percent.",
-        ("table", "test", "quantity", "setting", "mean [%]", "std [%]"), rows,
-    )  # fmt: skip
+        ("table", "test", "quantity", "setting", "mean [%]", "std [%]"), rows)  # fmt: skip
 
 
 def burckhardt_force(slip: FloatArray, road: str, load: float) -> FloatArray:
@@ -103,26 +88,22 @@ def burckhardt_force(slip: FloatArray, road: str, load: float) -> FloatArray:
     return np.asarray(np.sign(slip) * load * (c1 * (1.0 - np.exp(-c2 * s)) - c3 * s))
 
 
-def lateral_models() -> Figure:
-    """Fig. 9: linear, linear adaptive and Burckhardt."""
-    load = CAR.mass * PRINTED_GRAVITY * CAR.rear_axle_distance / WHEELBASE
+def _lateral_models() -> Figure:
+    load = CAR.mass * GRAVITY * CAR.rear_axle_distance / WHEELBASE
     slip, point = np.radians(np.linspace(0.0, 12.0, 241)), np.radians(6.0)
     secant = float(burckhardt_force(np.array(point), "dry asphalt", load)) / point
     marks: list[Mark] = [
         Line(np.degrees(slip), burckhardt_force(slip, road, load) / 1e3, f"Burckhardt, {road}", color)
         for road, color in zip(BURCKHARDT, (BLUE, ORANGE, GREEN, PURPLE), strict=True)
     ]
-
-    def straight(stiffness: float) -> FloatArray:
-        """Up to 10.4 kN, so that it ends below the legend."""
-        return np.where(stiffness * slip < 10.4e3, stiffness * slip / 1e3, np.nan)
-
-    linear = straight(published_car().front_stiffness)
-    marks += [
-        Line(np.degrees(slip), linear, "linear, C₁ = 65 kN/rad", TRUTH, "dashed", 1.2),
-        Line(np.degrees(slip), straight(secant), "linear adaptive, through dry asphalt at 6°", RED, width=1.2),
-        dots(6.0, secant * point / 1e3, color=RED),
-    ]
+    # Straight lines up to 10.4 kN, so that they end below the legend.
+    linear, adaptive = (
+        np.where(k * slip < 10.4e3, k * slip / 1e3, np.nan) for k in (published_car().front_stiffness, secant)
+    )
+    marks.append(Line(np.degrees(slip), linear, "linear, C₁ = 65 kN/rad", TRUTH, "dashed", 1.2))
+    marks.append(Line(np.degrees(slip), adaptive, "linear adaptive, through dry asphalt at 6°", RED, width=1.2))
+    marks.append(dots(6.0, secant * point / 1e3, color=RED))
+    x, y = Axis("front slip angle β₁ [deg]", 0, 12), Axis("front axle lateral force [kN]", 0, 13)
     return Figure(
         "lateral-models",
         "Fig. 9 of P5: lateral force of the front axle over its slip angle by the linear model with the printed stiffness, "
@@ -130,8 +111,8 @@ def lateral_models() -> Figure:
         f"static axle load of {load / 1e3:.1f} kN. P5 prints no Burckhardt values; the common ones are used. The adaptive "
         "model needs no road: its slope follows.",
         "Rising curves of force over slip angle: two straight lines and four saturating curves, snow far below asphalt.",
-        Panel(
-            marks, Axis("front slip angle β₁ [deg]", 0, 12), Axis("front axle lateral force [kN]", 0, 13),
-            legend="upper left", columns=2,
-        ),
-    )  # fmt: skip
+        Panel(marks, x, y, legend="upper left", columns=2),
+    )
+
+
+TOPIC.show("tables", "Tables 1 to 5 against the text", 0.2, (), [_printed_forces, _printed_settings], [_lateral_models])

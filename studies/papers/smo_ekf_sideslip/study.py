@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from studies.papers.smo_ekf_sideslip import (
-    force_observer,
-    linear_zones,
-    observability,
-    printed_tables,
-    sideslip_settings,
-    truth_tests,
-)
+from studies.papers.smo_ekf_sideslip import force_observer, observability, printed_tables, road_tests, sideslip_settings
 from studies.study import Study
 
+TOPICS = force_observer, observability, printed_tables, sideslip_settings, road_tests
 STUDY = Study(
     id="smo-ekf-sideslip",
     title="Axle forces by sliding mode, sideslip with adaptive cornering stiffness",
@@ -21,12 +15,5 @@ STUDY = Study(
         "Kalman filter on them estimates sideslip and corrects the cornering stiffness. Gain conditions, sampling, "
         "observability and tables are checked here."
     ),
-    parts=(
-        *force_observer.TOPIC.parts,
-        *linear_zones.TOPIC.parts,
-        *observability.TOPIC.parts,
-        *printed_tables.TOPIC.parts,
-        *sideslip_settings.TOPIC.parts,
-        *truth_tests.TOPIC.parts,
-    ),
+    parts=tuple(part for topic in TOPICS for part in topic.TOPIC.parts),
 )

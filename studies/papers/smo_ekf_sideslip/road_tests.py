@@ -12,14 +12,7 @@ import numpy as np
 from estimators.arrays import BoolArray, FloatArray
 from estimators.sideslip import SingleTrack
 from estimators.vehicle import VehicleParameters
-from studies.papers.smo_ekf_sideslip.inputs import (
-    FORCES,
-    MASS_SETTINGS,
-    PACKAGE,
-    PRINTED,
-    SAMPLE_TIME,
-    STIFFNESS_SETTINGS,
-)
+from studies.papers.smo_ekf_sideslip.inputs import FACTORS, FORCES, MASSES, PACKAGE, PRINTED, SAMPLE_TIME
 from studies.papers.smo_ekf_sideslip.observers import Signals, axle_forces, rear_sideslip
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Panel
@@ -35,8 +28,6 @@ from studies.trials.tire_curve import USE, TireFacts, tire_facts
 from studies.truth import Measured, Truth
 
 TOPIC = Topic(PACKAGE)
-RIGHT = 0.0, 1.0
-"""The setting without an error."""
 Setting = tuple[float, float]
 """kg by which the assumed mass is wrong, and factor on the assumed stiffness."""
 
@@ -52,7 +43,7 @@ class AxleRun:
     tire: TireFacts
     counted: BoolArray  # (n,)
     true_forces: FloatArray  # (n, 4)
-    true_sideslip: FloatArray  # (n,)
+    true_sideslip: FloatArray  # (n,), beta_2 as P5 (11) counts it: positive where the rear axle's force is
     forces: dict[float, FloatArray]
     static: FloatArray  # (S, n, 4), without an observer
     adaptive: dict[Setting, FloatArray]  # (S, n)
@@ -75,12 +66,6 @@ def true_axles(truth: Truth) -> FloatArray:
     forward, left = along * np.cos(steer) - across * np.sin(steer), along * np.sin(steer) + across * np.cos(steer)
     columns = (left[:, :2].sum(axis=1), left[:, 2:].sum(axis=1), forward[:, :2].sum(axis=1), truth["yaw_rate"][0])
     return np.stack(columns, axis=1)
-
-
-def true_rear_sideslip(truth: Truth, rear: float) -> FloatArray:
-    """beta_2 (n,), rad, as P5 (11) counts it: positive where the rear axle's force is."""
-    side = truth["vy"][0] - rear * truth["yaw_rate"][0]
-    return np.asarray(np.arctan2(-side, np.maximum(np.absolute(truth["vx"][0]), 0.1)))
 
 
 def single_track(car: VehicleParameters, tire: TireFacts, mass: float = 0.0, factor: float = 1.0) -> SingleTrack:
@@ -108,38 +93,41 @@ def run_axles(drawn: Measured, settings: Sequence[Setting]) -> AxleRun:
         return rear[:, 0], stiffness[:, 0]
 
     adapted = {setting: sideslip(setting, True) for setting in settings}
-    side = car.mass / car.wheelbase * ay
-    static = np.stack([side * car.rear_axle_distance, side * car.front_axle_distance, car.mass * ax, yaw_rate], axis=-1)
+    front, rear, side = car.front_axle_distance, car.rear_axle_distance, car.mass / car.wheelbase * ay
+    static = np.stack([side * rear, side * front, car.mass * ax, yaw_rate], axis=-1)
+    to_left = truth["vy"][0] - rear * truth["yaw_rate"][0]
     return AxleRun(
-        drawn, tire, at, true, true_rear_sideslip(truth, car.rear_axle_distance),
+        drawn, tire, at, true, np.arctan2(-to_left, np.maximum(np.absolute(truth["vx"][0]), 0.1)),
         {m: np.roll(state[:, 0], -1, axis=-1) for m, state in states.items()}, static[:, 0],
-        {setting: rear for setting, (rear, _) in adapted.items()},
-        {setting: stiffness for setting, (_, stiffness) in adapted.items()},
-        {setting: sideslip(setting, False)[0] for setting in settings if setting[0] == 0.0},
-    )  # fmt: skip
+        {setting: slip for setting, (slip, _) in adapted.items()}, {setting: k for setting, (_, k) in adapted.items()},
+        {setting: sideslip(setting, False)[0] for setting in settings if setting[0] == 0.0})  # fmt: skip
 
 
 def axle_part(name: str, title: str, test: str, scope: Scope, tire: str = LUGRE) -> PartResult:
     """Errors and histories of both blocks in the road test "slalom" or "roundabout", by assumed stiffness and mass."""
     printed = PRINTED[test]
-    settings = [(0.0, factor) for factor in STIFFNESS_SETTINGS]
-    settings += [(mass, 1.0) for mass in MASS_SETTINGS if mass and "mass" in printed]
+    settings = [(0.0, factor) for factor in FACTORS]
+    settings += [(mass, 1.0) for mass in MASSES if mass and "mass" in printed]
     run = run_axles(measured_runs((f"p5-{test}",), tire, scope, QUICK_SECONDS, SAMPLE_TIME), settings)
     measures: dict[str, float] = {}
-    found = [force_table(printed["forces"], run, measures), stiffness_table(printed["stiffness"], run, measures)]
-    drawings = [force_history(f"{name}-forces", title, run), stiffness_history(f"{name}-stiffness", title, run)]
+    found = [_force_table(printed["forces"], run, measures), _stiffness_table(printed["stiffness"], run, measures)]
+    drawings = [_force_history(f"{name}-forces", title, run), _stiffness_history(f"{name}-stiffness", title, run)]
     if "mass" in printed:
-        found.append(mass_table(printed["mass"], run, measures))
-        drawings.append(mass_history(f"{name}-mass", title, run))
-    about = _about(run)
+        found.append(_mass_table(printed["mass"], run, measures))
+        drawings.append(_mass_history(f"{name}-mass", title, run))
+    front, rear = (2e-3 * value for value in run.tire.secant)
+    about = (
+        f"{conditions(run.drawn)} Believed: the truth's masses and lengths, and the secant of its tires at {USE:g} of the "
+        f"static load, {front:.1f} and {rear:.1f} kN/rad an axle (the paper: 65 and 50). As in the paper accelerations are "
+        f"not corrected for roll, and the force observer starts from the greatest values. {PRINTED_TEST}"
+    )
     tables = [replace(t, name=f"{name}-{t.name}", caption=f"{title}: {t.caption} {about}") for t in found]
     return PartResult(tables=tables, figures=drawings, measures=measures)
 
 
-def force_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
-    """Tables 1 and 2, and the forces without an observer."""
+def _force_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
     rows: list[list[Cell]] = []
-    found = {"sliding mode": run.force_errors(run.forces[RIGHT[0]]), "static split": run.force_errors(run.static)}
+    found = {"sliding mode": run.force_errors(run.forces[0.0]), "static split": run.force_errors(run.static)}
     peaks = np.abs(run.true_forces[run.counted]).max(axis=0)
     for quantity, value in zip(FORCES, peaks, strict=True):
         own = printed[quantity]
@@ -155,18 +143,14 @@ def force_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, fl
     return Table("forces", caption, ("quantity", "unit", "printed peak", "peak", "estimate", *ERROR_COLUMNS), rows)
 
 
-def stiffness_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
-    """Tables 3 and 4, and the observer with fixed stiffness."""
+def _stiffness_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
     rows: list[list[Cell]] = []
     peak = round(float(np.degrees(np.abs(run.true_sideslip[run.counted]).max())), 2)
-    none = [None] * len(STIFFNESS_SETTINGS)
-    found = (
-        ("adaptive (EKF)", run.adaptive, printed["mean"], printed["deviation"]), ("fixed (ORL)", run.fixed, none, none),
-    )  # fmt: skip
-    for who, estimates, *paper in found:
-        for factor, *own in zip(STIFFNESS_SETTINGS, *paper, strict=True):
+    for who, estimates in (("adaptive (EKF)", run.adaptive), ("fixed (ORL)", run.fixed)):
+        for factor, *own in zip(FACTORS, printed["mean"], printed["deviation"], strict=True):
             errors = run.sideslip_errors(estimates[0.0, factor])
-            rows.append([who, factor, printed["largest"], peak, *errors.cells((own[0], own[1]))])
+            paper = (own[0], own[1]) if who == "adaptive (EKF)" else (None, None)
+            rows.append([who, factor, printed["largest"], peak, *errors.cells(paper)])
             measures |= errors.measures(f"beta_2, {who}, stiffness x {factor:g}")
     caption = (
         "errors (8) of the rear sideslip by believed cornering stiffness, adapted or fixed (the paper shows the fixed one in "
@@ -176,10 +160,9 @@ def stiffness_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str
     return Table("stiffness", caption, columns, rows)
 
 
-def mass_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
-    """Table 5."""
+def _mass_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
     rows: list[list[Cell]] = []
-    for j, mass in enumerate(MASS_SETTINGS):
+    for j, mass in enumerate(MASSES):
         errors = run.force_errors(run.forces[mass]) | {"beta_2": run.sideslip_errors(run.adaptive[mass, 1.0])}
         for quantity, paper in printed.items():
             rows.append([quantity, mass, *errors[quantity].cells((paper["mean"][j], paper["deviation"][j]))])
@@ -188,22 +171,12 @@ def mass_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, flo
     return Table("mass", caption, ("quantity", "mass error [kg]", *ERROR_COLUMNS), rows)
 
 
-def _about(run: AxleRun) -> str:
-    front, rear = (2e-3 * value for value in run.tire.secant)
-    return (
-        f"{conditions(run.drawn)} Believed: the truth's masses and lengths, and the secant of its tires at {USE:g} of the "
-        f"static load, {front:.1f} and {rear:.1f} kN/rad an axle (the paper: 65 and 50). As in the paper accelerations are "
-        f"not corrected for roll, and the force observer starts from the greatest values. {PRINTED_TEST}"
-    )
-
-
-def force_history(name: str, title: str, run: AxleRun) -> Figure:
-    """Figs. 7 and 8, with the yaw rate."""
+def _force_history(name: str, title: str, run: AxleRun) -> Figure:
     time, panels = run.drawn.truth.time, []
     labels = ("$F_{y1}$ [kN]", "$F_{y2}$ [kN]", "$F_{x1}$ [kN]", "yaw rate [deg/s]")
     for k, label in enumerate(labels):
         scale = float(np.degrees(1.0)) if k == 3 else 1e-3
-        found = estimate_lines(time, scale * run.forces[RIGHT[0]][:, :, k], "sliding mode", SETTINGS[1])
+        found = estimate_lines(time, scale * run.forces[0.0][:, :, k], "sliding mode", SETTINGS[1])
         marks = [truth_line(time, scale * run.true_forces[:, k]), *found]
         panels.append(Panel(marks, y=label, legend="" if k else "upper left", columns=2))
     return history(
@@ -211,13 +184,10 @@ def force_history(name: str, title: str, run: AxleRun) -> Figure:
         f"{title}: axle forces and yaw rate of the sliding-mode observer, as Figs. 7 and 8 of P5. It starts from the greatest "
         f"values of the drive. {BANDS}",
         "Four panels over time: front and rear lateral force, front longitudinal force, yaw rate, each with its estimate.",
-        panels, (9.0, 7.0),
-    )  # fmt: skip
+        panels, (9.0, 7.0))  # fmt: skip
 
 
-def _sideslip_panel(
-    run: AxleRun, estimates: Sequence[FloatArray], labels: Sequence[str], y: str, title: str = ""
-) -> Panel:
+def _sideslip(run: AxleRun, estimates: Sequence[FloatArray], labels: Sequence[str], y: str, title: str = "") -> Panel:
     """True rear sideslip where it counts, with the estimates (S, n)."""
     time, limit = run.drawn.truth.time, 1.9 * float(np.degrees(np.abs(run.true_sideslip[run.counted]).max()))
     true = truth_line(time, np.where(run.counted, np.degrees(run.true_sideslip), np.nan))
@@ -225,47 +195,35 @@ def _sideslip_panel(
     return Panel(marks, y=Axis(y, -limit, limit), title=title)
 
 
-def stiffness_history(name: str, title: str, run: AxleRun) -> Figure:
-    """Figs. 12 to 17: rear sideslip with fixed and with adapted stiffness, and the stiffnesses."""
+def _stiffness_history(name: str, title: str, run: AxleRun) -> Figure:
     labels = [f"× {factor:g}" for _, factor in run.fixed]
     fixed, adapted, stiffness = ([found[s] for s in run.fixed] for found in (run.fixed, run.adaptive, run.stiffness))
-    axles = [
-        Panel(
-            setting_lines(run.drawn.truth.time, [1e-3 * value[:, :, k] for value in stiffness], labels),
-            y=Axis("" if k else "stiffness [kN/rad]", 0.0), title=f"{axle} axle",
-        )
-        for k, axle in enumerate(("front", "rear"))
-    ]  # fmt: skip
+    panels = [_sideslip(run, fixed, labels, "sideslip [deg]", "rear sideslip, stiffness fixed (ORL)"),
+              _sideslip(run, adapted, labels, "", "rear sideslip, stiffness adapted (EKF)")]  # fmt: skip
+    for k, axle in enumerate(("front", "rear")):
+        marks = setting_lines(run.drawn.truth.time, [1e-3 * value[:, :, k] for value in stiffness], labels)
+        panels.append(Panel(marks, y=Axis("" if k else "stiffness [kN/rad]", 0.0), title=f"{axle} axle"))
     return history(
         name,
         f"{title}: rear sideslip with the believed stiffness times 0.5, 1 and 1.5, fixed and adapted, and the adapted "
         f"stiffness of both axles, as Figs. 12 to 17 of P5. {BANDS}",
         "Upper panels: rear sideslip over time for three settings, fixed left, adapted right. Lower panels: adapted "
         "stiffness of the axles.",
-        [
-            _sideslip_panel(run, fixed, labels, "sideslip [deg]", "rear sideslip, stiffness fixed (ORL)"),
-            _sideslip_panel(run, adapted, labels, "", "rear sideslip, stiffness adapted (EKF)"),
-            *axles,
-        ],
-        (9.4, 6.2), columns=2, legend="below",
-    )  # fmt: skip
+        panels, (9.4, 6.2), columns=2, legend="below")  # fmt: skip
 
 
-def mass_history(name: str, title: str, run: AxleRun) -> Figure:
-    """Fig. 18: front force and rear sideslip by assumed mass."""
+def _mass_history(name: str, title: str, run: AxleRun) -> Figure:
     time, masses = run.drawn.truth.time, sorted(run.forces)
     labels = [f"m {mass:+g} kg" if mass else "m" for mass in masses]
     forces = setting_lines(time, [1e-3 * run.forces[mass][:, :, 0] for mass in masses], labels)
-    force = Panel(
-        [truth_line(time, 1e-3 * run.true_forces[:, 0]), *forces], y="$F_{y1}$ [kN]", legend="upper left", columns=4
-    )
-    slip = _sideslip_panel(run, [run.adaptive[mass, 1.0] for mass in masses], labels, "rear sideslip [deg]")
+    marks = [truth_line(time, 1e-3 * run.true_forces[:, 0]), *forces]
+    force = Panel(marks, y="$F_{y1}$ [kN]", legend="upper left", columns=4)
+    slip = _sideslip(run, [run.adaptive[mass, 1.0] for mass in masses], labels, "rear sideslip [deg]")
     return history(
         name,
         f"{title}: front axle force and rear sideslip by believed mass, as Fig. 18 of P5. {BANDS}",
         "Front lateral force and rear sideslip over time for three believed masses.",
-        [force, slip], (9.0, 5.0),
-    )  # fmt: skip
+        [force, slip], (9.0, 5.0))  # fmt: skip
 
 
 MOTION = (
@@ -281,5 +239,4 @@ TOPIC.parts.extend([
     trial_part("slalom-driven", "Tables 1, 3 and 5 on the truth vehicle: slalom", _slalom, 43.0, quick=True),
     trial_part("slalom-other-tire", _OTHER_TITLE, _other_tire, 45.0, MAGIC_FORMULA),
     trial_part("roundabout-driven", "Tables 2 and 4 on the truth vehicle: roundabout", _roundabout, 43.0),
-    trial_part("motion", "Figs. 5 and 6 on the truth vehicle: path and accelerations", _motion, 5.0),
-])  # fmt: skip
+    trial_part("motion", "Figs. 5 and 6 on the truth vehicle: path and accelerations", _motion, 5.0)])  # fmt: skip
