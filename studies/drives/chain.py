@@ -80,11 +80,9 @@ def pipeline_of(
     assumptions = () if car.yaw_inertia else ("yaw inertia is not given: taken as m L_f L_r",)
     time, chosen = drive.sample_time, drive.estimators
     forces: dict[str, Callable[..., Any]] = {
-        "unknown-input": UnknownInputForceObserver,
-        "pid": DifferentiatedPid,
-        "unscented": WheelForceFilter,
+        "unknown-input": UnknownInputForceObserver, "pid": DifferentiatedPid, "unscented": WheelForceFilter,
         "linear": partial(WheelForceFilter, method="linear"),
-    }
+    }  # fmt: skip
     dynamic = chosen.vertical_load == "dynamic"
     method: Any = chosen.lateral_force
     weights = SlipWeights() if chosen.axle_weights == "slip" else None

@@ -111,15 +111,11 @@ class Vehicle(StrictTable):
         return VehicleParameters(
             mass=self.mass,
             yaw_inertia=self.yaw_inertia or self.mass * self.front_axle_distance * self.rear_axle_distance,
-            wheel_inertia=self.wheel_inertia or WHEEL_INERTIA,
-            front_axle_distance=self.front_axle_distance,
-            rear_axle_distance=self.rear_axle_distance,
-            cg_height=self.cg_height,
-            front_track=self.front_track,
-            rear_track=self.rear_track,
-            effective_radius=(self.effective_radius_front, self.effective_radius_rear),
+            wheel_inertia=self.wheel_inertia or WHEEL_INERTIA, front_axle_distance=self.front_axle_distance,
+            rear_axle_distance=self.rear_axle_distance, cg_height=self.cg_height, front_track=self.front_track,
+            rear_track=self.rear_track, effective_radius=(self.effective_radius_front, self.effective_radius_rear),
             rolling_resistance=self.rolling_resistance,
-        )
+        )  # fmt: skip
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
@@ -304,14 +300,11 @@ _YAW = ("yaw_inertia", "3900 kg*m^2")
 _STIFFNESS = (_YAW, ("cornering_stiffness_front", "160 kN/rad"), ("cornering_stiffness_rear", "180 kN/rad"))
 _TIRE = (*_STIFFNESS, ("relaxation_length", "0.5 m"))
 _PARAMETERS = {
-    ("lateral_force", "linear"): (_YAW,),
-    ("lateral_force", "unscented"): (_YAW,),
-    ("sideslip", "four-wheel-extended"): _TIRE,
-    ("sideslip", "four-wheel-unscented"): _TIRE,
-    ("sideslip", "adaptive-stiffness"): _STIFFNESS,
-    ("sideslip", "fixed-stiffness"): _STIFFNESS,
+    ("lateral_force", "linear"): (_YAW,), ("lateral_force", "unscented"): (_YAW,),
+    ("sideslip", "four-wheel-extended"): _TIRE, ("sideslip", "four-wheel-unscented"): _TIRE,
+    ("sideslip", "adaptive-stiffness"): _STIFFNESS, ("sideslip", "fixed-stiffness"): _STIFFNESS,
     ("sideslip", "sliding-mode"): _STIFFNESS,
-}
+}  # fmt: skip
 _STEERED = {(place, name) for place, name in _PARAMETERS if place == "sideslip"}
 _SIGNALS = {
     **dict.fromkeys((*_STEERED, ("lateral_force", "linear"), ("lateral_force", "unscented")), ("yaw_rate", "ay")),

@@ -71,13 +71,9 @@ def deviation(estimate: FloatArray, reference: FloatArray, unit: str) -> Deviati
     rms = float(np.sqrt(np.mean(error**2)))
     peak = float(np.max(np.abs(reference[both])))
     return Deviation(
-        samples=samples,
-        unit=unit,
-        nrms_percent=100.0 * rms / peak if peak > 0 else None,
-        rms=rms,
-        max_error=float(np.max(np.abs(error))),
-        reference_peak=peak,
-    )
+        samples=samples, unit=unit, nrms_percent=100.0 * rms / peak if peak > 0 else None, rms=rms,
+        max_error=float(np.max(np.abs(error))), reference_peak=peak,
+    )  # fmt: skip
 
 
 def lateral_motion(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: DriveFile) -> dict[str, dict[str, Any]]:
@@ -238,35 +234,25 @@ def evaluate(data: DriveData) -> dict[str, Any]:
     if chain is not None:
         given = (chain, data.log, data.inputs, data.drive)
         pipeline = {
-            "estimators": data.drive.estimators.model_dump(),
-            "rules": RULES,
-            "notes": notes(data.drive),
-            "signals": lateral_motion(*given) | forces(*given),
-            "flagged_samples": _counts(chain.flags, Flag),
-            "failed_checks": _counts(chain.checks, Check),
-            "assumptions": list(chain.assumptions),
-        }
+            "estimators": data.drive.estimators.model_dump(), "rules": RULES, "notes": notes(data.drive),
+            "signals": lateral_motion(*given) | forces(*given), "flagged_samples": _counts(chain.flags, Flag),
+            "failed_checks": _counts(chain.checks, Check), "assumptions": list(chain.assumptions),
+        }  # fmt: skip
     return {
-        "drive": data.drive.name,
-        "schedule": _schedule_entry(data.schedule),
-        "log": data.log.report,
-        "velocity": _velocity(data),
-        "force": _force(data),
-        "pipeline": pipeline,
+        "drive": data.drive.name, "schedule": _schedule_entry(data.schedule), "log": data.log.report,
+        "velocity": _velocity(data), "force": _force(data), "pipeline": pipeline,
         "flagged_samples": flag_counts(data.replay.flags),
         "force_sources": dict(zip(CORNERS, data.inputs.force_sources, strict=True)),
         "assumptions": [*data.assumptions, *data.inputs.assumptions],
-    }
+    }  # fmt: skip
 
 
 def _schedule_entry(schedule: GainSchedule) -> dict[str, Any]:
     box = schedule.parameter
     return {
-        "name": schedule.name,
-        "sha256": schedule.sha256,
-        "sample_time_s": schedule.sample_time,
+        "name": schedule.name, "sha256": schedule.sha256, "sample_time_s": schedule.sample_time,
         box.name: {"unit": box.unit, "range": [box.min, box.max], "rate": [box.rate_min, box.rate_max]},
-    }
+    }  # fmt: skip
 
 
 def _velocity(data: DriveData) -> dict[str, Any]:

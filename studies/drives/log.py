@@ -266,10 +266,8 @@ def _clock_offsets(drive: DriveFile, tracks: dict[str, _Track], report: dict[str
         offsets[entry.name] = offsets[entry.align.to] + sign * found.seconds
         report["logs"][entry.name]["clock_offset_s"] = offsets[entry.name]
         report["logs"][entry.name]["alignment"] = {
-            "to": entry.align.to,
-            "correlation": found.correlation,
-            "slope": found.slope,
-        }
+            "to": entry.align.to, "correlation": found.correlation, "slope": found.slope,
+        }  # fmt: skip
     return offsets
 
 

@@ -33,12 +33,9 @@ def tire_residual(found: Identification, direction: str, tire: Tire, limit: floa
         return None
     values = limited.fit.values()
     values |= {
-        "slip_stiffness": tire.sigma0.value / tire.kappa.value,
-        "relaxation_length": 1.0 / tire.kappa.value,
-        "damping_time": tire.sigma1.value / tire.sigma0.value,
-        "saturation": 0.0,
-        "bend": 0.0,
-    }
+        "slip_stiffness": tire.sigma0.value / tire.kappa.value, "relaxation_length": 1.0 / tire.kappa.value,
+        "damping_time": tire.sigma1.value / tire.sigma0.value, "saturation": 0.0, "bend": 0.0,
+    }  # fmt: skip
     mask = limited.model.mask(limit, values)
     if not mask.any():
         return None
@@ -146,8 +143,6 @@ def _residuals(found: Identification, direction: str) -> dict[str, Any]:
         if result is not None:
             force = result.force if np.isfinite(result.force) else None
             out[name] = {
-                "slip_velocity_rms_mps": result.velocity,
-                "normalised_force_rms": force,
-                "rows": result.samples,
-            }
+                "slip_velocity_rms_mps": result.velocity, "normalised_force_rms": force, "rows": result.samples,
+            }  # fmt: skip
     return out

@@ -33,15 +33,12 @@ def parameter_file(found: Identification) -> str:
     }
     how = front.source if front.source == rear.source else f"front: {front.source}; rear: {rear.source}"
     lines = [
-        f"id = {_text('identified-' + _slug(found.drive.name))}",
-        f"citation = {_text(', '.join(found.logs))}",
-        f"note = {_text(note(found))}",
-        "",
-        "[vehicle]",
+        f"id = {_text('identified-' + _slug(found.drive.name))}", f"citation = {_text(', '.join(found.logs))}",
+        f"note = {_text(note(found))}", "", "[vehicle]",
         *(_line(name, value, unit, drive) for name, (value, unit) in given.items()),
         _line("effective_radius", (front.value + rear.value) / 2, "m", f"mean of both axles; {how}"),
         *(_line(name, entry.value, entry.unit, entry.source) for name, entry in fitted.items()),
-    ]
+    ]  # fmt: skip
     for direction in ("longitudinal", "lateral"):
         if direction in found.base.tire:
             tire = tire_parameters(found, direction)

@@ -8,13 +8,9 @@ from dataclasses import dataclass
 from studies.claim import PAPERS, ClaimVerdict, JsonValue, paper_rank
 
 MARKS = {
-    ClaimVerdict.REPRODUCED: "✓",
-    ClaimVerdict.PARTLY: "½",
-    ClaimVerdict.NOT_REPRODUCED: "✗",
-    ClaimVerdict.ERRATUM: "!",
-    ClaimVerdict.UNDER_SPECIFIED: "?",
-    ClaimVerdict.DERIVED: "+",
-}
+    ClaimVerdict.REPRODUCED: "✓", ClaimVerdict.PARTLY: "½", ClaimVerdict.NOT_REPRODUCED: "✗", ClaimVerdict.ERRATUM: "!",
+    ClaimVerdict.UNDER_SPECIFIED: "?", ClaimVerdict.DERIVED: "+",
+}  # fmt: skip
 """A sign for each verdict, so that none is told by its colour alone."""
 
 MEANINGS = {

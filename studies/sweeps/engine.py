@@ -39,11 +39,7 @@ class SweepResult:
 
 
 def run_sweep(
-    sweep: Sweep,
-    out: Path,
-    executor: Executor | None = None,
-    resume: bool = False,
-    progress: Progress | None = None,
+    sweep: Sweep, out: Path, executor: Executor | None = None, resume: bool = False, progress: Progress | None = None
 ) -> SweepResult:
     """Compute what is missing, then the statistics.
 

@@ -100,18 +100,11 @@ def build_sweep(data: dict[str, Any], folder: Path, quick: bool = False) -> Swee
     measures = [read_kind(MEASURES, "id", entry, f"measures[{i}]") for i, entry in enumerate(spec.measures)]
     designs = small.designs if small else spec.designs
     return Sweep(
-        name=spec.name,
-        observers=observers,
-        measures=[measure.beside(folder).build() for measure in measures],
-        stages=[read_kind(DESIGNS, "kind", entry, f"designs[{i}]") for i, entry in enumerate(designs)],
-        vary=vary,
-        points=small.points if small else spec.grid.points,
-        bounds=spec.grid.range,
-        chunk=spec.chunk,
-        tolerance=spec.gate.tolerance,
-        tolerances=spec.gate.measures,
-        form="quick" if small else "full",
-    )
+        name=spec.name, observers=observers, measures=[measure.beside(folder).build() for measure in measures],
+        stages=[read_kind(DESIGNS, "kind", entry, f"designs[{i}]") for i, entry in enumerate(designs)], vary=vary,
+        points=small.points if small else spec.grid.points, bounds=spec.grid.range, chunk=spec.chunk,
+        tolerance=spec.gate.tolerance, tolerances=spec.gate.measures, form="quick" if small else "full",
+    )  # fmt: skip
 
 
 def _named(entry: Any) -> Any:

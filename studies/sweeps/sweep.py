@@ -135,14 +135,11 @@ class Sweep:
     def definition(self) -> dict[str, Any]:
         """What was asked, without today's values of constants and gains: these are what a baseline is to notice."""
         return {
-            "schema": SCHEMA,
-            "name": self.name,
-            "form": self.form,
+            "schema": SCHEMA, "name": self.name, "form": self.form,
             "subjects": {observer.name: self._asked(observer) for observer in self.observers},
             "measures": [{"name": m.name, "unit": m.unit, "better": m.better, **m.definition} for m in self.measures],
-            "designs": [stage.model_dump(mode="json") for stage in self.stages],
-            "chunk": self.chunk,
-        }
+            "designs": [stage.model_dump(mode="json") for stage in self.stages], "chunk": self.chunk,
+        }  # fmt: skip
 
     def _asked(self, observer: Observer) -> dict[str, Any]:
         """Sample time, ranges (relative ones as such) and grid of one observer."""

@@ -40,14 +40,11 @@ class LuGreParameters:
         x, y = quantities(along), quantities(across)
         given = {key: entry.value for key, entry in values.vehicle.items()}
         return cls(
-            sigma0=(x["sigma0"].value, y["sigma0"].value),
-            sigma1=(x["sigma1"].value, y["sigma1"].value),
-            sigma2=(x["sigma2"].value, y["sigma2"].value),
-            kappa=(x["kappa"].value, y["kappa"].value),
-            sliding=given.get("friction_sliding", cls.sliding),
-            static=given.get("friction_static", cls.static),
+            sigma0=(x["sigma0"].value, y["sigma0"].value), sigma1=(x["sigma1"].value, y["sigma1"].value),
+            sigma2=(x["sigma2"].value, y["sigma2"].value), kappa=(x["kappa"].value, y["kappa"].value),
+            sliding=given.get("friction_sliding", cls.sliding), static=given.get("friction_static", cls.static),
             stribeck=given.get("stribeck_velocity", cls.stribeck),
-        )
+        )  # fmt: skip
 
 
 class LuGreTire:

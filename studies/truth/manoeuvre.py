@@ -17,17 +17,7 @@ from studies.drives.quantities import Duration
 from studies.truth.course import Course
 from studies.truth.drivetrain import Assist
 from studies.truth.fleet import TIRES
-from studies.truth.profile import (
-    GRID,
-    Angles,
-    PathPiece,
-    Piece,
-    Shares,
-    Speeds,
-    Torques,
-    curvature,
-    sampled,
-)
+from studies.truth.profile import GRID, Angles, PathPiece, Piece, Shares, Speeds, Torques, curvature, sampled
 from studies.truth.record import Truth
 from studies.truth.road import Road
 from studies.truth.simulate import EVERYTHING, RECORD_TIME, STEP, simulate, simulate_in_processes
@@ -127,22 +117,12 @@ class Manoeuvre(StrictTable):
             if self.free_after is not None:
                 target[int(np.ceil(self.free_after / GRID)) :] = np.nan
         return Course(
-            name=self.name,
-            duration=self.duration,
-            initial_speed=self.speed,
-            tire=self.vehicle.tire,
-            steer=steer,
-            drive_torque=table(self.torque, "N*m"),
-            drive_share=table(self.throttle, "share"),
-            brake_torque=table(self.brake_torque, "N*m"),
-            brake_share=table(self.brake, "share"),
-            grade=table(self.road.grade, "rad"),
-            bank=table(self.road.bank, "rad"),
-            friction=self.road.coefficient,
-            zones=self.road.zones(),
-            speed=target,
-            curvature=curvature(self.path) if self.path else None,
-        )
+            name=self.name, duration=self.duration, initial_speed=self.speed, tire=self.vehicle.tire, steer=steer,
+            drive_torque=table(self.torque, "N*m"), drive_share=table(self.throttle, "share"),
+            brake_torque=table(self.brake_torque, "N*m"), brake_share=table(self.brake, "share"),
+            grade=table(self.road.grade, "rad"), bank=table(self.road.bank, "rad"), friction=self.road.coefficient,
+            zones=self.road.zones(), speed=target, curvature=curvature(self.path) if self.path else None,
+        )  # fmt: skip
 
 
 def shipped_manoeuvres(paper: str = "") -> dict[str, Path]:

@@ -74,13 +74,9 @@ def simulate(
         for name, value in part.items():
             signals[name][rows] = value
     return Truth(
-        np.asarray(record_time * np.arange(samples), dtype=np.float64),
-        signals,
-        tuple(c.name for c in courses),
-        np.array([c.duration for c in courses]),
-        tuple(vehicles),
-        tuple(c.tire for c in courses),
-    )
+        np.asarray(record_time * np.arange(samples), dtype=np.float64), signals, tuple(c.name for c in courses),
+        np.array([c.duration for c in courses]), tuple(vehicles), tuple(c.tire for c in courses),
+    )  # fmt: skip
 
 
 def _corner_axis(name: str) -> tuple[int, ...]:

@@ -104,12 +104,10 @@ def load_vehicle(name: str | Path, folder: Path = Path()) -> TruthVehicle:
     suspension = SuspensionParameters()
     if "suspension_stiffness_longitudinal" in given:
         suspension = SuspensionParameters(
-            stiffness_x=given["suspension_stiffness_longitudinal"],
-            stiffness_y=given["suspension_stiffness_lateral"],
-            damping_x=given["suspension_damping"],
-            damping_y=given["suspension_damping"],
+            stiffness_x=given["suspension_stiffness_longitudinal"], stiffness_y=given["suspension_stiffness_lateral"],
+            damping_x=given["suspension_damping"], damping_y=given["suspension_damping"],
             unsprung_mass=given["unsprung_mass"],
-        )
+        )  # fmt: skip
     return TruthVehicle(values.id, vehicle_parameters(values), LuGreParameters.of(values), suspension=suspension)
 
 

@@ -21,13 +21,9 @@ if TYPE_CHECKING:
 def environment() -> Environment:
     """Templates of this folder: everything is escaped, a misspelt name is an error."""
     made = Environment(
-        loader=PackageLoader("studies.report", "html"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+        loader=PackageLoader("studies.report", "html"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True, keep_trailing_newline=True,
+    )  # fmt: skip
     made.filters |= {"number": number, "cell": cell, "brief": brief, "prose": prose, "anchor": anchor, "label": label}
     made.filters["slug"] = slug
     made.globals |= {"verdicts": list(ClaimVerdict), "marks": MARKS, "meanings": MEANINGS}
