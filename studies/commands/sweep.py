@@ -22,7 +22,7 @@ from studies.sweeps.plots import plot_sweep
 from studies.sweeps.reports import junit as junit_xml
 from studies.sweeps.reports import markdown
 from studies.sweeps.spec import load_sweep
-from studies.sweeps.statistics import number
+from studies.sweeps.summary import number
 from synthesis.errors import SpecError
 
 DONE, SHRUNK, REFUSED = 0, 1, 2

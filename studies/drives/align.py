@@ -18,10 +18,8 @@ from scipy.optimize import minimize_scalar
 from estimators.arrays import FloatArray
 from studies.errors import LogError
 
-HALF_WINDOW = 0.05
-"""h in s: long enough for 100 Hz logs, short against a brake application."""
-LEAST_CORRELATION = 0.9
-"""Below this the two logs do not show the same drive."""
+HALF_WINDOW = 0.05  # h in s: long enough for 100 Hz logs, short against a brake application
+LEAST_CORRELATION = 0.9  # below this the two logs do not show the same drive
 
 
 @dataclass(frozen=True)

@@ -38,8 +38,7 @@ from studies.drives.prepare import CornerInputs
 from studies.drives.quantities import CORNERS
 from studies.errors import refused_at
 
-Progress = Callable[[float], None]
-"""Called with the fraction done."""
+Progress = Callable[[float], None]  # Called with the fraction done
 PROGRESS_STEPS = 50
 
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
 
-LEAST_LOAD = 0.05
-"""Share of the static load below which a wheel counts as lifted and its normalised force as unknown."""
+LEAST_LOAD = 0.05  # share of the static load below which a wheel counts as lifted and its normalised force as unknown
 
 
 def derivative(value: FloatArray, sample_time: float, lag: float) -> FloatArray:

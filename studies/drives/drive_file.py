@@ -33,8 +33,7 @@ from studies.drives.quantities import (
 )
 from synthesis.toml_file import StrictTable, load_toml
 
-WHEEL_INERTIA = 1.0
-"""kg m^2 where the drive has none: without torques it has nothing to act on."""
+WHEEL_INERTIA = 1.0  # kg m^2 where the drive has none: without torques it has nothing to act on
 
 
 def _a_time(unit: str) -> str:

@@ -100,10 +100,8 @@ def resample(time: FloatArray, value: FloatArray, grid: FloatArray, max_gap: flo
     return out
 
 
-LONGEST_GAP = 60.0
-"""s without a row: beyond it the clock has jumped, or it is another drive."""
-MOST_SAMPLES = 5_000_000
-"""Of the common grid, seven hours at 5 ms: all signals are held in memory."""
+LONGEST_GAP = 60.0  # s without a row: beyond it the clock has jumped, or it is another drive
+MOST_SAMPLES = 5_000_000  # of the common grid, seven hours at 5 ms: all signals are held in memory
 
 
 @dataclass(frozen=True)

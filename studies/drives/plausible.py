@@ -37,16 +37,12 @@ LIMITS: dict[str, Limit] = {
     **dict.fromkeys((f"torque_{corner}" for corner in CORNERS), Limit(50e3, ("N*m",))),
 }
 QUANTILE = 99.0
-FAST = 5.0
-"""m/s of V_x above which wheels roll: a start or a stop says little about units."""
-ROLLING = (0.7, 1.4)
-"""R_e w / V_x of all wheels, at the median of a drive."""
-ONE_WHEEL = (0.4, 2.5)
-"""The same of one wheel among good ones, which may spin or slide for most of a drive."""
+FAST = 5.0  # m/s of V_x above which wheels roll: a start or a stop says little about units
+ROLLING = (0.7, 1.4)  # R_e w / V_x of all wheels, at the median of a drive
+ONE_WHEEL = (0.4, 2.5)  # the same of one wheel among good ones, which may spin or slide for most of a drive
 STANDING = 0.012
 """R_e w / V_x below which a wheel is locked or its sensor dead: a fault, not a unit (the smallest one is 0.0175)."""
-ENOUGH = 20
-"""Samples of a wheel that make a median."""
+ENOUGH = 20  # samples of a wheel that make a median
 
 
 def check_plausible(

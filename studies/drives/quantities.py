@@ -15,8 +15,7 @@ from typing import Annotated
 import pint
 from pydantic import BeforeValidator
 
-CORNERS = ("fl", "fr", "rl", "rr")
-"""Corner order of every array: front left, front right, rear left, rear right."""
+CORNERS = ("fl", "fr", "rl", "rr")  # corner order of every array: front left, front right, rear left, rear right
 
 
 def _corners(name: str, unit: str) -> dict[str, str]:

@@ -19,10 +19,8 @@ _TIRE = {"sigma0": "sigma0", "sigma1": "sigma1", "sigma2": "sigma2", "kappa": "k
 Direction = Literal["longitudinal", "lateral"]
 OTHER_WHEEL = 0.10
 """Share by which a radius of the car may differ from that of a schedule: beyond it the schedule is another car's."""
-OTHER_PAIR = 0.01
-"""Share by which the radii of a longitudinal and a lateral schedule may differ: they are of one car."""
-SAME_WHEEL = 1e-3
-"""Share below which two radii are the same one, rounded."""
+OTHER_PAIR = 0.01  # share by which the radii of a longitudinal and a lateral schedule may differ: they are of one car
+SAME_WHEEL = 1e-3  # share below which two radii are the same one, rounded
 
 
 def load_schedule(name: str, folder: Path, sample_time: float, direction: Direction = "longitudinal") -> GainSchedule:

@@ -123,8 +123,7 @@ class Estimate:
         return self.unknowns[i].value(float(self.x[i]) - half), self.unknowns[i].value(float(self.x[i]) + half)
 
 
-PASSES = 2
-"""The first weighs the priors by a guess of the residual, the second by the residual of the first."""
+PASSES = 2  # the first weighs the priors by a guess of the residual, the second by the residual of the first
 
 COMMON = 4.0
 """Stretches that the common residual size counts as, where the few that tell a parameter have residuals of their own."""

@@ -21,8 +21,7 @@ from studies.identify.settings import IdentifySettings
 from studies.identify.slip_limit import LimitedFit, fit_low_slip
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
 
-BASE = "corner-estimation"
-"""The parameter set whose values stand where a log says nothing."""
+BASE = "corner-estimation"  # the parameter set whose values stand where a log says nothing
 
 
 @dataclass(frozen=True)

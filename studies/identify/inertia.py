@@ -24,10 +24,8 @@ from studies.identify.data import DriveSignals
 from studies.identify.estimate import Estimate, Rules, Unknown, estimate
 from studies.identify.settings import IdentifySettings
 
-STRAIGHT = 0.01
-"""rad of steering below which lateral forces hardly brake the car."""
-PASSES = 3
-"""The first weighs all rows alike, the others by the residual of the one before."""
+STRAIGHT = 0.01  # rad of steering below which lateral forces hardly brake the car
+PASSES = 3  # the first weighs all rows alike, the others by the residual of the one before
 
 
 def fit_inertia(data: DriveSignals, prior: float, settings: IdentifySettings) -> Estimate | None:

@@ -17,8 +17,7 @@ from estimators.arrays import BoolArray, FloatArray
 from studies.identify.estimate import Estimate, Rules, Unknown, estimate
 from studies.identify.settings import IdentifySettings
 
-NOTHING = 10.0
-"""Half width of ln C beyond which the widest range shows no trace of slip: the narrower ones have less."""
+NOTHING = 10.0  # half width of ln C beyond which the widest range shows no trace of slip: the narrower ones have less
 
 
 class SlipModel(Protocol):

@@ -48,9 +48,8 @@ class EstimatorNrms(MeasureSpec):
     def beside(self, folder: Path) -> EstimatorNrms:
         """File names relative to the sweep file."""
         if self.drive is not None and self.logs is not None:
-            return self.model_copy(
-                update={"drive": str(folder / self.drive), "logs": [str(folder / name) for name in self.logs]}
-            )
+            files = {"drive": str(folder / self.drive), "logs": [str(folder / name) for name in self.logs]}
+            return self.model_copy(update=files)
         own = str(self.manoeuvre).endswith(".toml")
         return self.model_copy(update={"manoeuvre": str(folder / str(self.manoeuvre))}) if own else self
 

@@ -75,8 +75,7 @@ class ObserverSpec(StrictTable):
             plant = polynomial_plant(schedule)
         else:
             raise SpecError(f"schedule '{self.schedule}': {unknown('model', name, CATALOGUE)}; leave out parameters")
-        gains = Gains(schedule.table, schedule.breakpoints)
-        origin = f"the schedule '{schedule.name}'"
+        gains, origin = Gains(schedule.table, schedule.breakpoints), f"the schedule '{schedule.name}'"
         proved = {name: float(c["value"]) for name, c in content["model"]["constants"].items()}
         return Observer(
             self.name or schedule.name, plant, gains, schedule.sample_time, origin, designed_from(content), proved,
@@ -100,9 +99,8 @@ def schedule_content(name: str, folder: Path) -> dict[str, Any]:
 def catalogue_model(content: dict[str, Any], parameters: ParameterSet | None) -> LpvModel:
     """The symbolic model of a schedule over the box that the schedule was proved for."""
     model, (entry,) = content["model"], content["scheduling"]
-    found = CATALOGUE[model["id"]](
-        parameters or _recorded(content), wheel_speed_maximum=entry["max"], wheel_speed_rate=entry["rate_max"]
-    )
+    limits = {"wheel_speed_maximum": entry["max"], "wheel_speed_rate": entry["rate_max"]}
+    found = CATALOGUE[model["id"]](parameters or _recorded(content), **limits)
     return found.with_range(entry["name"], entry["min"], entry["max"])
 
 
@@ -118,9 +116,7 @@ def _recorded(content: dict[str, Any]) -> ParameterSet:
 def designed_from(content: dict[str, Any]) -> ScheduleSpec | None:
     """The specification in a schedule's provenance, if it is one of ours."""
     spec = {k: v for k, v in content["provenance"].get("spec", {}).items() if k != "parameter_set"}
-    if not spec:
-        return None
-    return read_table(ScheduleSpec, spec, f"schedule '{content['name']}': provenance.spec")
+    return read_table(ScheduleSpec, spec, f"schedule '{content['name']}': provenance.spec") if spec else None
 
 
 def _parameters(name: str, folder: Path) -> ParameterSet:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from studies.sweeps.gate import GREW, HEADINGS, MOVED, Comparison
-from studies.sweeps.statistics import Statistic, Summary, number
+from studies.sweeps.summary import Statistic, Summary, number
 
 
 def markdown(summary: Summary, compared: Sequence[Comparison] | None = None, pictures: Sequence[str] = ()) -> str:

@@ -93,10 +93,7 @@ def build_sweep(data: dict[str, Any], folder: Path, quick: bool = False) -> Swee
     tables = [read_table(ObserverSpec, _named(entry), f"subjects[{i}]") for i, entry in enumerate(spec.subjects)]
     observers = [table.build(folder) for table in tables]
     common = _vary(spec.vary, "vary")
-    vary = {
-        observer.name: common if table.vary is None else table.vary
-        for observer, table in zip(observers, tables, strict=True)
-    }
+    vary = {o.name: common if t.vary is None else t.vary for o, t in zip(observers, tables, strict=True)}
     measures = [read_kind(MEASURES, "id", entry, f"measures[{i}]") for i, entry in enumerate(spec.measures)]
     designs = small.designs if small else spec.designs
     return Sweep(

@@ -17,8 +17,7 @@ from estimators.errors import unknown
 from studies.truth.layout import column
 from synthesis.errors import SpecError
 
-FRONT_SHARES = {"AWD": 0.5, "FWD": 1.0, "RWD": 0.0}
-"""Share of the drive torque that goes to the front axle."""
+FRONT_SHARES = {"AWD": 0.5, "FWD": 1.0, "RWD": 0.0}  # share of the drive torque that goes to the front axle
 
 
 @dataclass(frozen=True)
@@ -83,20 +82,14 @@ class Drivetrains:
         return limit
 
     def torques(
-        self,
-        drive: FloatArray,
-        brake: FloatArray,
-        slip: FloatArray,
-        speed: FloatArray,
-        wheel_speed: FloatArray,
-        h: float,
+        self, drive: FloatArray, brake: FloatArray, slip: FloatArray, speed: FloatArray, spin: FloatArray, h: float
     ) -> tuple[FloatArray, FloatArray]:
         """Drive and brake torque of each wheel (4, B), N m.
 
         From the sums asked for (B,), slips (4, B), |v| (B,) m/s, wheel speeds (4, B) rad/s and the step, s. A spinning
         wheel gets its share of the greatest power at most.
         """
-        power = self.power * self.share / np.maximum(np.absolute(wheel_speed), 1.0)
+        power = self.power * self.share / np.maximum(np.absolute(spin), 1.0)
         power = np.minimum(power, self.maximum * self.share)
         driven = np.minimum(np.maximum(drive * self.share, -power), power)
         braked = np.minimum(np.maximum(brake, 0.0), self.maximum_brake) * self.brake_share

@@ -68,13 +68,7 @@ class LuGreTire:
         return self.kappa * surface + self.sigma0 * (speed / grip), slide
 
     def forces(
-        self,
-        z: FloatArray,
-        dz: FloatArray,
-        slide: FloatArray,
-        _transport: FloatArray,
-        load: FloatArray,
-        _friction: FloatArray,
+        self, z: FloatArray, dz: FloatArray, slide: FloatArray, _w: FloatArray, load: FloatArray, _theta: FloatArray
     ) -> FloatArray:
         """F (2, 4, B), N, in the tire frame, from deflection (m), its rate and the slip velocity (m/s), load (4, B), N."""
         out: FloatArray = (self.sigma0 * z + self.sigma1 * dz + self.sigma2 * slide) * load

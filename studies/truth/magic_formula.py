@@ -47,9 +47,7 @@ class MagicFormulaParameters:
     relaxation_least: float = 0.002  # m
     damping: tuple[float, float] = (0.06, 0.06)  # slip per m/s at rest
     damping_speed: float = 2.5  # m/s
-    nominal_friction: float = (
-        1.1  # what `friction` = 1 means: mean of both peaks at nominal load; the peaks are over it
-    )
+    nominal_friction: float = 1.1  # what `friction` = 1 means, mean of both peaks at nominal load; peaks are over it
 
 
 class MagicFormulaTire:
@@ -88,12 +86,12 @@ class MagicFormulaTire:
         slip: FloatArray,
         _rate: FloatArray,
         slide: FloatArray,
-        transport: FloatArray,
+        W: FloatArray,
         load: FloatArray,
         friction: FloatArray,
     ) -> FloatArray:
         """F (2, 4, B), N, in the tire frame, from lagged slips, slip velocity (m/s), load (4, B), N, and friction."""
-        slow = np.maximum(1.0 - transport / self.damping_speed, 0.0)
+        slow = np.maximum(1.0 - W / self.damping_speed, 0.0)
         slip = slip + slow * self.damping * slide
         df = load / self.nominal_load - 1.0
         peak = np.maximum(self.peak + self.peak_load * df, 0.1) * (friction / self.nominal_friction)
