@@ -67,12 +67,8 @@ def find_offset(
     coarse = np.arange(low, high + HALF_WINDOW, HALF_WINDOW / 2)
     quality = [compare(float(offset))[0] for offset in coarse]
     best = float(coarse[int(np.argmax(quality))]) if quality else 0.0
-    fine = minimize_scalar(
-        lambda offset: -compare(float(offset))[0],
-        bounds=(best - HALF_WINDOW / 2, best + HALF_WINDOW / 2),
-        method="bounded",
-        options={"xatol": 1e-5},
-    )
+    near = (best - HALF_WINDOW / 2, best + HALF_WINDOW / 2)
+    fine = minimize_scalar(lambda t: -compare(float(t))[0], bounds=near, method="bounded", options={"xatol": 1e-5})
     seconds = float(fine.x)
     correlation, slope = compare(seconds)
     if correlation < LEAST_CORRELATION:

@@ -15,9 +15,8 @@ from estimators.arrays import FloatArray, IntArray
 from estimators.forces import vertical_loads
 from estimators.pipeline import Check
 from estimators.velocity import slip_ratio
-from studies.drives.baselines import held, integrated_acceleration, mean_over
 from studies.drives.chain import Chain
-from studies.drives.corner_inputs import shared_forces
+from studies.drives.corner_inputs import held, integrated_acceleration, mean_over, shared_forces
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.prepare import CornerInputs
@@ -95,9 +94,7 @@ def lateral_motion(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: Dri
 
 def _deviations(estimates: Mapping[str, FloatArray], reference: FloatArray, unit: str) -> dict[str, dict[str, Any]]:
     """Of the estimates that the drive has."""
-    return {
-        name: asdict(deviation(value, reference, unit)) for name, value in estimates.items() if np.isfinite(value).any()
-    }
+    return {name: asdict(deviation(v, reference, unit)) for name, v in estimates.items() if np.isfinite(v).any()}
 
 
 def reference_sideslip(log: DriveLog) -> FloatArray:
@@ -140,8 +137,7 @@ def forces(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: DriveFile) 
     reference, found, car = log.reference, {}, drive.vehicle
     ax, ay = log.signals["ax"], log.signals.get("ay", np.zeros_like(log.time))
     quasi_z = vertical_loads(car.parameters, ax, ay)
-    none = np.zeros(4, dtype=np.bool_)
-    quasi_x = shared_forces(ax, quasi_z, car.mass, np.zeros_like(quasi_z), none)
+    quasi_x = shared_forces(ax, quasi_z, car.mass, np.zeros_like(quasi_z), np.zeros(4, dtype=np.bool_))
     for k, corner in enumerate(CORNERS):
         along = {"pipeline": chain.force_x[:, k], "corner_input": inputs.force[:, k], "quasi_static": quasi_x[:, k]}
         up = {"pipeline": chain.force_z[:, k], "quasi_static": quasi_z[:, k]}
@@ -188,11 +184,10 @@ class DriveData:
     @cached_property
     def baselines(self) -> dict[str, FloatArray]:
         """V_x (n,) without an observer, m/s, by name."""
-        wheels = mean_over(self.inputs.surface_speed)
+        given = self.inputs
+        wheels = mean_over(given.surface_speed)
         start = float(wheels[np.flatnonzero(np.isfinite(wheels))[:1]].sum())
-        integrated = integrated_acceleration(
-            self.inputs.ax, self.inputs.yaw_rate, self.inputs.vy, self.drive.sample_time, start
-        )
+        integrated = integrated_acceleration(given.ax, given.yaw_rate, given.vy, self.drive.sample_time, start)
         return {"mean_wheel_speed": wheels, "integrated_acceleration": integrated}
 
     @cached_property

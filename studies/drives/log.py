@@ -149,17 +149,11 @@ def read_log(paths: Sequence[Path], drive: DriveFile) -> DriveLog:
 
     signals, reference = on_grid(drive.signals, "signals"), on_grid(drive.reference, "reference")
     check_plausible(drive, signals, reference, {name: path.name for name, path in files.items()})
+    missing = {name: int(np.count_nonzero(np.isnan(value))) for name, value in {**reference, **signals}.items()}
     report["grid"] = {
-        "samples": int(grid.size),
-        "sample_time_s": drive.sample_time,
-        "start_s": float(grid[0]),
-        "end_s": float(grid[-1]),
-        "missing_samples": {
-            name: int(np.count_nonzero(np.isnan(value)))
-            for name, value in {**reference, **signals}.items()
-            if np.isnan(value).any()
-        },
-    }
+        "samples": int(grid.size), "sample_time_s": drive.sample_time, "start_s": float(grid[0]),
+        "end_s": float(grid[-1]), "missing_samples": {name: count for name, count in missing.items() if count},
+    }  # fmt: skip
     return DriveLog(time=grid, signals=signals, reference=reference, report=report)
 
 
@@ -185,9 +179,8 @@ def assign_files(paths: Sequence[Path], entries: Sequence[LogFile]) -> dict[str,
         if len(matching) != 1:
             wanted = f"one file like '{entry.file}'" if entry.file else "one file"
             got = ", ".join(path.name for path in matching or paths) or "none"
-            fits = (
-                "" if matching else ", which is none" if all(path.is_file() for path in paths) else ", with none in it"
-            )
+            empty = ", which is none" if all(path.is_file() for path in paths) else ", with none in it"
+            fits = "" if matching else empty
             raise LogError(
                 f"log '{entry.name}' needs {wanted}, given: {got}{fits}; "
                 f"name one file for each log, or correct file of log '{entry.name}' in the drive file"

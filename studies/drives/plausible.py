@@ -82,9 +82,8 @@ def _check_rolling(
     fast = np.isfinite(vx) & (vx > FAST)
     ratio = surface[fast] / vx[fast, None]
     turning = np.isfinite(ratio) & (np.abs(ratio) > STANDING)
-    median = np.array(
-        [np.median(r[t]) if t.sum() >= ENOUGH else np.nan for r, t in zip(ratio.T, turning.T, strict=True)]
-    )
+    medians = (np.median(r[t]) if t.sum() >= ENOUGH else np.nan for r, t in zip(ratio.T, turning.T, strict=True))
+    median = np.array(list(medians))
     known = np.isfinite(median)
     strange = known & ~((median >= ONE_WHEEL[0]) & (median <= ONE_WHEEL[1]))
     if strange.any() and not strange[known].all():
@@ -109,9 +108,7 @@ def _odd_wheel(
     if not fitting and whole:
         given = factor_to(velocity.unit, "m/s")
         units = ("m/s", "km/h", "mph")
-        fitting = [
-            f'unit = "{unit}" for reference.vx' for unit in units if _rolls(ratio * given / factor_to(unit, "m/s"))
-        ]
+        fitting = [f'unit = "{u}" for reference.vx' for u in units if _rolls(ratio * given / factor_to(u, "m/s"))]
     if not fitting and _rolls(-ratio):
         fitting = [f'sign = "{"positive" if column.sign == "negative" else "negative"}"']
     return (

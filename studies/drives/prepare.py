@@ -71,9 +71,8 @@ def corner_inputs_of(log: DriveLog, drive: DriveFile) -> CornerInputs:
     wheel_acceleration = rate(wheel_speed)
     load = vertical_loads(car.parameters, ax, ay)
     force, sources = _forces(log, drive, wheel_speed, wheel_acceleration, load, radius)
-    free, per_speed = corner_acceleration_by_speed(
-        car.parameters, ax, ay, yaw_rate, rate(yaw_rate), vy, steer, rate(steer)
-    )
+    turning = yaw_rate, rate(yaw_rate)
+    free, per_speed = corner_acceleration_by_speed(car.parameters, ax, ay, *turning, vy, steer, rate(steer))
     return CornerInputs(
         time=log.time, wheel_speed=wheel_speed, radius=radius, wheel_acceleration=wheel_acceleration,
         vertical_load=load, force=force,
@@ -103,17 +102,12 @@ def _steer(log: DriveLog, drive: DriveFile, assumptions: list[str]) -> FloatArra
 
 
 def _forces(
-    log: DriveLog,
-    drive: DriveFile,
-    wheel_speed: FloatArray,
-    wheel_acceleration: FloatArray,
-    load: FloatArray,
-    radius: FloatArray,
+    log: DriveLog, drive: DriveFile, wheel_speed: FloatArray, dw: FloatArray, load: FloatArray, radius: FloatArray
 ) -> tuple[FloatArray, tuple[str, ...]]:
     """F_x per corner: wheel dynamics where the torque is known, what is left of m a_x shared by load elsewhere."""
     car = drive.vehicle
     dynamics = corner_inputs.wheel_forces(
-        _four(log, "torque"), wheel_speed, wheel_acceleration, load, car.wheel_inertia or 0.0, radius,
+        _four(log, "torque"), wheel_speed, dw, load, car.wheel_inertia or 0.0, radius,
         car.rolling_resistance, drive.observer.stopped_below,
     )  # fmt: skip
     known = np.array([f"torque_{corner}" in log.signals for corner in CORNERS])

@@ -70,22 +70,20 @@ def check_radii(drive: DriveFile, folder: Path) -> tuple[str, ...]:
     if drive.schedules.lateral is not None:
         named["lateral"] = drive.schedules.lateral
     found = {direction: _radius(name, folder, direction) for direction, name in named.items()}
-    assumptions = []
+    assumed = []
     for direction, radius in found.items():
         name = named[direction]
         if radius is None:
-            assumptions.append(
-                f"{direction} schedule '{name}' does not say for which effective_radius: taken as fitting"
-            )
+            assumed.append(f"{direction} schedule '{name}' does not say for which effective_radius: taken as fitting")
         else:
-            assumptions += _against_car(drive, direction, name, radius)
+            assumed += _against_car(drive, direction, name, radius)
     along, across = found["longitudinal"], found.get("lateral")
     if along is not None and across is not None and abs(across / along - 1.0) > OTHER_PAIR:
         raise SpecError(
             f"schedules: '{named['longitudinal']}' is for effective_radius = {along:g} m, "
             f"'{named['lateral']}' for {across:g} m; name two schedules of one car"
         )
-    return tuple(assumptions)
+    return tuple(assumed)
 
 
 def _against_car(drive: DriveFile, direction: Direction, name: str, radius: float) -> list[str]:

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from studies.drives.chain import Progress
 from studies.drives.drive_file import DriveFile, read_drive
 from studies.drives.log import DriveLog, read_log
+from studies.drives.replay import Progress
 from studies.identify.data import DriveSignals, drive_signals
 from studies.identify.estimate import Estimate
 from studies.identify.inertia import fit_inertia

@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.planar_exponential import planar_phi
 from estimators.arrays import BoolArray, FloatArray
-from studies.drives.baselines import held, mean_over
+from studies.drives.corner_inputs import held, mean_over
 from studies.drives.drive_file import read_drive
 from studies.drives.log import read_log
 from studies.drives.prepare import CornerInputs, corner_inputs_of
