@@ -9,8 +9,7 @@ from pathlib import Path
 from studies.commands.terminal import print_table, progress_bar
 from studies.execution.files import check_folder
 from studies.identify.identify import identify_drive
-from studies.identify.result import HEADER, content, rows, warnings
-from studies.identify.write import write_identification
+from studies.identify.result import HEADER, content, rows, warnings, write_identification
 
 
 def run_identify(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int:

@@ -88,39 +88,31 @@ def tire_parameters(found: Identification, direction: str) -> dict[str, Identifi
 
 def vehicle_parameters(found: Identification) -> dict[str, Identified]:
     """Effective radius per axle, wheel inertia, yaw inertia: identified, or as the drive file has them."""
-    car, name = found.drive.vehicle, f"drive file '{found.drive.name}'"
-    along = found.fits["longitudinal"]
+    car, name, logs = found.drive.vehicle, f"drive file '{found.drive.name}'", ", ".join(found.logs)
+    along, spin, across = found.fits["longitudinal"], found.inertia, found.fits.get("lateral")
+
+    def fitted(fit: Estimate, own: str, unit: str, prior: float, given: str, where: str) -> Identified:
+        """A radius is fitted relative to its ``prior``, everything else as it is; ``given`` says where the prior is from."""
+        yes, factor = fit.excited[own], prior if unit == "m" else 1.0
+        source = where if yes else f"not excited by {logs}; prior: {given}"
+        interval = _times(fit.interval(own), factor) if yes else None
+        value = factor * fit.value(own) if yes else prior
+        return Identified(value, unit, interval, yes, fit.samples, source, _finite(fit.half[own]))
+
     out: dict[str, Identified] = {}
     for axle, nominal in (("front", car.effective_radius_front), ("rear", car.effective_radius_rear)):
-        out[f"effective_radius_{axle}"] = _fitted(
-            found, along.fit, f"radius_{axle}", "m", nominal, name, _place(found, along)
-        )
-    plain = f"identified from {', '.join(found.logs)}"
-    prior = name if car.wheel_inertia is not None else found.base.id
-    spin = found.inertia
+        where = _place(found, along)
+        out[f"effective_radius_{axle}"] = fitted(along.fit, f"radius_{axle}", "m", nominal, name, where)
+    plain, prior = f"identified from {logs}", name if car.wheel_inertia is not None else found.base.id
     if spin is None:
         source = f"not excited: no torques; prior: {prior}"
         out["wheel_inertia"] = Identified(found.wheel_inertia, "kg*m^2", None, False, 0, source)
     else:
-        out["wheel_inertia"] = _fitted(found, spin, "wheel_inertia", "kg*m^2", found.wheel_inertia, prior, plain)
-    across = found.fits.get("lateral")
+        out["wheel_inertia"] = fitted(spin, "wheel_inertia", "kg*m^2", found.wheel_inertia, prior, plain)
     if across is not None:
-        given = "m L_f L_r" if car.yaw_inertia is None else name
-        out["yaw_inertia"] = _fitted(
-            found, across.fit, "yaw_inertia", "kg*m^2", yaw_inertia_prior(found.drive), given, plain
-        )
+        guess, given = yaw_inertia_prior(found.drive), "m L_f L_r" if car.yaw_inertia is None else name
+        out["yaw_inertia"] = fitted(across.fit, "yaw_inertia", "kg*m^2", guess, given, plain)
     return out
-
-
-def _fitted(
-    found: Identification, fit: Estimate, name: str, unit: str, prior: float, given: str, where: str
-) -> Identified:
-    """A radius is fitted relative to its ``prior``, everything else as it is; ``given`` says where the prior is from."""
-    yes, factor = fit.excited[name], prior if unit == "m" else 1.0
-    source = where if yes else f"not excited by {', '.join(found.logs)}; prior: {given}"
-    value = factor * fit.value(name) if yes else prior
-    interval = _times(fit.interval(name), factor) if yes else None
-    return Identified(value, unit, interval, yes, fit.samples, source, _finite(fit.half[name]))
 
 
 def _place(found: Identification, limited: LimitedFit) -> str:
