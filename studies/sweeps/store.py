@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.sensitivity.designs import Design
-from studies.execution.files import discard_unfinished, json_bytes, write_bytes
-from studies.execution.lock import only_run
+from studies.execution.files import discard_unfinished, json_bytes, only_run, write_bytes
 from studies.sweeps.manifest import differences, versions
 from studies.sweeps.measures import Measure
 from studies.sweeps.observer import Observer

@@ -78,8 +78,7 @@ class Drivetrains:
     def available(self, wheel_speed: FloatArray) -> FloatArray:
         """Greatest drive torque (B,), N m, at the mean speed of the driven wheels (4, B), rad/s: flat, then hyperbola."""
         mean = np.absolute((wheel_speed * self.share).sum(axis=0))
-        limit: FloatArray = np.minimum(self.maximum, self.power / np.maximum(mean, 1e-3))
-        return limit
+        return np.asarray(np.minimum(self.maximum, self.power / np.maximum(mean, 1e-3)))
 
     def torques(
         self, drive: FloatArray, brake: FloatArray, slip: FloatArray, speed: FloatArray, spin: FloatArray, h: float

@@ -71,5 +71,4 @@ class LuGreTire:
         self, z: FloatArray, dz: FloatArray, slide: FloatArray, _w: FloatArray, load: FloatArray, _theta: FloatArray
     ) -> FloatArray:
         """F (2, 4, B), N, in the tire frame, from deflection (m), its rate and the slip velocity (m/s), load (4, B), N."""
-        out: FloatArray = (self.sigma0 * z + self.sigma1 * dz + self.sigma2 * slide) * load
-        return out
+        return np.asarray((self.sigma0 * z + self.sigma1 * dz + self.sigma2 * slide) * load)

@@ -101,8 +101,7 @@ class MagicFormulaTire:
         angle = np.stack([slip[0], np.arctan(slip[1])])  # kappa and alpha: each weakens the other's force
         own = self.weight_fall * angle
         weight = np.cos(self.weight_shape * np.arctan(self.weight * angle[::-1] / np.sqrt(1.0 + own * own)))
-        out: FloatArray = pure * weight * load
-        return out
+        return np.asarray(pure * weight * load)
 
     def _stiffness(self, load: FloatArray, df: FloatArray) -> FloatArray:
         """B C D/F_z (2, 4, B): K_x = F_z (p_1 + p_2 df) exp(p_3 df), K_y = p_1 F_z0 sin(2 atan(F_z/(p_2 F_z0)))."""

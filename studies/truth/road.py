@@ -80,8 +80,7 @@ class _Layer:
 
 
 def _over(way: FloatArray, blend: FloatArray) -> FloatArray:
-    out: FloatArray = np.minimum(np.maximum(way / blend + 0.5, 0.0), 1.0)
-    return out
+    return np.asarray(np.minimum(np.maximum(way / blend + 0.5, 0.0), 1.0))
 
 
 _GROUPS = {

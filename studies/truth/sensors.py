@@ -200,8 +200,7 @@ def draw(truth: Truth, sensors: Sensors, seeds: Sequence[int], sample_time: floa
     The errors of a run depend on its seed, its manoeuvre and the signal alone, not on what else is drawn or how many:
     `numpy.random.SeedSequence` over the three. Of equal manoeuvres in one batch each has errors of its own.
 
-    Raises:
-        SpecError: no seeds, a sample time that is no multiple of the truth's, a signal that was not recorded.
+    Raises SpecError: no seeds, a sample time that is no multiple of the truth's, a signal that was not recorded.
     """
     every = round(sample_time / truth.sample_time)
     if every < 1 or abs(every * truth.sample_time - sample_time) > 1e-9:
