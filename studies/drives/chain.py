@@ -109,11 +109,7 @@ def _sideslip_of(drive: DriveFile, vehicle: VehicleParameters) -> Any:
 
 
 def run_chain(
-    log: DriveLog,
-    inputs: CornerInputs,
-    pipeline: EstimationPipeline,
-    assumptions: tuple[str, ...] = (),
-    progress: Progress = lambda _done: None,
+    log: DriveLog, inputs: CornerInputs, pipeline: EstimationPipeline, assumptions: tuple[str, ...], progress: Progress
 ) -> Chain:
     """Every sample through the pipeline; signals that the log lacks are not flagged, missing samples are."""
     n, signals = log.time.size, log.signals

@@ -124,9 +124,7 @@ CHOICES = {
     "velocity": ("fusion", "corners", "kinematic"),
     "corner_velocity": ("lpv", "gain-switched", "kalman-three-state", "kalman-two-state"),
     "axle_weights": ("equal", "slip"),
-    "sideslip": (
-        "none", "four-wheel-extended", "four-wheel-unscented", "adaptive-stiffness", "fixed-stiffness", "sliding-mode"
-    ),
+    "sideslip": ("none", "four-wheel-extended", "four-wheel-unscented", "adaptive-stiffness", "fixed-stiffness", "sliding-mode"),
 }  # fmt: skip
 """Names of the estimators."""
 
@@ -227,9 +225,8 @@ def check_signals(signals: Mapping[str, Column], vehicle: Vehicle) -> None:
         raise ValueError("vehicle.steering_ratio: missing, but hand_wheel is given; add it, such as 15.0")
     steering = [name for name in ("steering", "hand_wheel", "steer_fl", "steer_fr") if name in signals]
     if len(steering) > 1 and steering != ["steer_fl", "steer_fr"]:
-        raise ValueError(
-            f"signals: {' and '.join(steering)} say the same thing; keep steering, hand_wheel, or steer_fl and steer_fr"
-        )
+        keep = "keep steering, hand_wheel, or steer_fl and steer_fr"
+        raise ValueError(f"signals: {' and '.join(steering)} say the same thing; {keep}")
     for pair in (("steer_fl", "steer_fr"), ("steer_rl", "steer_rr")):
         given = [name for name in pair if name in signals]
         if len(given) == 1:

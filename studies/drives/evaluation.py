@@ -224,7 +224,11 @@ def moving_slip(surface_speed: FloatArray, wheel_velocity: FloatArray) -> FloatA
 
 def evaluate(data: DriveData) -> dict[str, Any]:
     """The content of metrics.json: deviations from the references that the log has, counted flags, assumptions."""
-    chain = data.chain
+    chain, used, box = data.chain, data.schedule, data.schedule.parameter
+    schedule = {
+        "name": used.name, "sha256": used.sha256, "sample_time_s": used.sample_time,
+        box.name: {"unit": box.unit, "range": [box.min, box.max], "rate": [box.rate_min, box.rate_max]},
+    }  # fmt: skip
     pipeline: dict[str, Any] = {}
     if chain is not None:
         given = (chain, data.log, data.inputs, data.drive)
@@ -234,19 +238,11 @@ def evaluate(data: DriveData) -> dict[str, Any]:
             "failed_checks": _counts(chain.checks, Check), "assumptions": list(chain.assumptions),
         }  # fmt: skip
     return {
-        "drive": data.drive.name, "schedule": _schedule_entry(data.schedule), "log": data.log.report,
+        "drive": data.drive.name, "schedule": schedule, "log": data.log.report,
         "velocity": _velocity(data), "force": _force(data), "pipeline": pipeline,
-        "flagged_samples": flag_counts(data.replay.flags),
+        "flagged_samples": {name: _counts(data.replay.flags[:, k], Flag) for k, name in enumerate(CORNERS)},
         "force_sources": dict(zip(CORNERS, data.inputs.force_sources, strict=True)),
         "assumptions": [*data.assumptions, *data.inputs.assumptions],
-    }  # fmt: skip
-
-
-def _schedule_entry(schedule: GainSchedule) -> dict[str, Any]:
-    box = schedule.parameter
-    return {
-        "name": schedule.name, "sha256": schedule.sha256, "sample_time_s": schedule.sample_time,
-        box.name: {"unit": box.unit, "range": [box.min, box.max], "rate": [box.rate_min, box.rate_max]},
     }  # fmt: skip
 
 
@@ -274,11 +270,7 @@ def _force(data: DriveData) -> dict[str, Any]:
     return found
 
 
-def flag_counts(flags: IntArray) -> dict[str, dict[str, int]]:
-    """How many samples of each corner carry each flag; flags that never rose are left out."""
-    return {corner: _counts(flags[:, k], Flag) for k, corner in enumerate(CORNERS)}
-
-
 def _counts(flags: IntArray, names: type[IntFlag]) -> dict[str, int]:
+    """How many samples carry each flag; flags that never rose are left out."""
     counted = {str(flag.name).lower(): int(np.count_nonzero(flags & flag.value)) for flag in names}
     return {name: count for name, count in counted.items() if count}

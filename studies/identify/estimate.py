@@ -22,6 +22,8 @@ from scipy.stats import t as student
 from estimators.arrays import BoolArray, FloatArray
 from studies.identify.autocorrelation import correlation_time, effective_stretches, long_run_covariance
 
+Residual = Callable[[Mapping[str, float]], FloatArray]  # rows (n, k) of the values by name
+
 
 @dataclass(frozen=True)
 class Unknown:
@@ -147,7 +149,7 @@ class Rules:
 
 @dataclass(frozen=True)
 class _Problem:
-    residual: Callable[[Mapping[str, float]], FloatArray]
+    residual: Residual
     mask: BoolArray
     unknowns: tuple[Unknown, ...]
     rules: Rules
@@ -183,7 +185,7 @@ class _Problem:
 
 
 def estimate(
-    residual: Callable[[Mapping[str, float]], FloatArray],
+    residual: Residual,
     mask: BoolArray,
     unknowns: Sequence[Unknown],
     rules: Rules,
@@ -271,7 +273,7 @@ def _covariance(problem: _Problem, active: BoolArray, x: FloatArray) -> Estimate
         J = jacobian[:, free]
         scores = np.zeros((mask.shape[0], free.size))
         np.add.at(scores, rows, J * e[:, None])
-        run = long_run_covariance(scores, problem.rules.correlation)
+        omega, bandwidth = long_run_covariance(scores, problem.rules.correlation)
         informed = np.array([problem.unknowns[i].informed for i in free], dtype=float)
         prior = np.diag(informed * size**2 * time)
         weak = 1e-6 * size**2 * np.eye(free.size)  # a direction of which nothing is known gets a thousand spreads
@@ -280,11 +282,11 @@ def _covariance(problem: _Problem, active: BoolArray, x: FloatArray) -> Estimate
         certain = np.sqrt(np.diag(prior) * size**2 * time + 1e-6 * size**4)[:, None] * inverse
         influence = J @ inverse
         known, white = certain.T @ certain, size**2 * time * influence.T @ influence
-        robust = inverse.T @ run.covariance @ inverse
+        robust = inverse.T @ omega @ inverse
         considered = np.array([problem.unknowns[i].considered for i in held])
         pull = inverse @ J.T @ (jacobian[:, held] * considered)
         sure = np.diag(known) + np.sum(pull**2, axis=1)
-        stretches = effective_stretches(influence, rows, max(run.bandwidth, problem.rules.correlation))
+        stretches = effective_stretches(influence, rows, max(bandwidth, problem.rules.correlation))
 
         def half_width(estimated: FloatArray, freedom: FloatArray | float) -> FloatArray:
             """Of variances that are in part estimated: the rest has no degrees of freedom to lose (Satterthwaite 1946)."""

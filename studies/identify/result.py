@@ -151,9 +151,10 @@ def parameter_file(found: Identification) -> str:
     lengths = ("front_axle_distance", "rear_axle_distance", "cg_height", "front_track", "rear_track")
     given = {"mass": (car.mass, "kg"), "wheel_base": (car.front_axle_distance + car.rear_axle_distance, "m")}
     given |= {name: (getattr(car, name), "m") for name in lengths}
+    slug = re.sub(r"[^a-z0-9]+", "-", found.drive.name.lower()).strip("-") or "car"
     how = front.source if front.source == rear.source else f"front: {front.source}; rear: {rear.source}"
     lines = [
-        f"id = {_text('identified-' + _slug(found.drive.name))}", f"citation = {_text(', '.join(found.logs))}",
+        f"id = {_text('identified-' + slug)}", f"citation = {_text(', '.join(found.logs))}",
         f"note = {_text(note(found))}", "", "[vehicle]",
         *(_line(name, value, unit, drive) for name, (value, unit) in given.items()),
         _line("effective_radius", (front.value + rear.value) / 2, "m", f"mean of both axles; {how}"),
@@ -190,10 +191,6 @@ def _line(name: str, value: float, unit: str, source: str) -> str:
 def _text(value: str) -> str:
     """A TOML basic string: JSON's escapes are a subset of TOML's, apart from DEL."""
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _slug(name: str) -> str:
-    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "car"
 
 
 def write_identification(found: Identification, out: Path) -> tuple[Path, ...]:

@@ -66,6 +66,5 @@ def scoreboard(claims: Sequence[dict[str, JsonValue]], names: Mapping[str, str])
     grouped: dict[str, list[dict[str, JsonValue]]] = {label: [] for label in labels}
     for claim in claims:
         grouped[labels[paper_rank(str(claim["paper"]))]].append(claim)
-    return Scoreboard(
-        tuple(PaperScore(paper, names.get(paper, ""), tuple(rows)) for paper, rows in grouped.items() if rows)
-    )
+    papers = (PaperScore(paper, names.get(paper, ""), tuple(rows)) for paper, rows in grouped.items() if rows)
+    return Scoreboard(tuple(papers))

@@ -10,9 +10,9 @@ from typing import Any
 from pydantic import Field
 
 from studies.execution.files import write_bytes
-from studies.sweeps.manifest import versions
 from studies.sweeps.summary import Statistic, Summary
 from studies.sweeps.sweep import Sweep
+from studies.sweeps.tables import versions
 from synthesis.errors import SpecError
 from synthesis.toml_file import StrictTable, read_table, read_toml
 

@@ -54,9 +54,7 @@ def _same_gains(now: Mapping[str, Any], before: Mapping[str, Any]) -> bool:
     return all(a.shape == b.shape and np.allclose(a, b, rtol=ROUNDING, atol=0.0) for a, b in pairs)
 
 
-def attribute(
-    sweep: Sweep, observer: Observer, measure: Measure, statistic: Statistic, before: Mapping[str, Any]
-) -> str:
+def attribute(sweep: Sweep, observer: Observer, measure: Measure, moved: Statistic, before: Mapping[str, Any]) -> str:
     """One sentence: what did most of the loss at the place of the statistic.
 
     The place is taken back to the baseline's values; then each change is made alone, and the one that costs most is named with
@@ -73,13 +71,13 @@ def attribute(
     def value(name: str, since: set[str]) -> float:
         """A parameter at the statistic's place with only the changes in `since` made."""
         now = observer.parameters[name].nominal
-        here = float(statistic.at.get(name, now))
+        here = float(moved.at.get(name, now))
         change = next((c for c in constants if c.name == name), None)
         if change is None or name in since or (name in ranges and not ranges[name].relative and here != now):
             return here
         return here * change.before / change.after if change.after else change.before
 
-    names = [n for n in observer.parameters if n in statistic.at or n in {c.name for c in constants}]
+    names = [n for n in observer.parameters if n in moved.at or n in {c.name for c in constants}]
     values = []
     for since in (set[str](), {c.name for c in found}, *({c.name} for c in found)):
         kept = "gains" in since or len(constants) == len(found)

@@ -101,7 +101,7 @@ class MeasureSpec(StrictTable):
         """The name without a name."""
         return self.id
 
-    def values(self, batch: Batch) -> FloatArray:
+    def _values(self, batch: Batch) -> FloatArray:
         """The number of every design and grid point, or of every design."""
         raise NotImplementedError
 
@@ -118,7 +118,7 @@ class MeasureSpec(StrictTable):
     def build(self) -> Measure:
         """The measure."""
         return Measure(
-            self.name or self.title, self.unit, self.better, self.values, self.limit, self.variance, self.definition(),
+            self.name or self.title, self.unit, self.better, self._values, self.limit, self.variance, self.definition(),
             self.check, self.prepare,
         )  # fmt: skip
 
@@ -136,8 +136,7 @@ class StabilityMargin(MeasureSpec):
     id: Literal["stability_margin"]
     unit: ClassVar[str] = "1/s"
 
-    def values(self, batch: Batch) -> FloatArray:
-        """The growth."""
+    def _values(self, batch: Batch) -> FloatArray:
         return batch.margin
 
 
@@ -158,11 +157,10 @@ class HinfNorm(MeasureSpec):
         """With both ends of the channel."""
         return f"hinf_norm {'+'.join(self.disturbances)} > {'+'.join(self.errors)}"
 
-    def values(self, batch: Batch) -> FloatArray:
-        """In closed form for two states and one signal at either end."""
+    def _values(self, batch: Batch) -> FloatArray:
         d, z = self.channel(batch.observer)
         A_e, B_e = batch.error
-        if A_e.shape[-1] == 2 and min(d.shape[1], len(z)) == 1:
+        if A_e.shape[-1] == 2 and min(d.shape[1], len(z)) == 1:  # in closed form
             return planar_hinf_norm(A_e, B_e @ d, z)[0]
         return hinf_norm(A_e, B_e @ d, z, tolerance=self.tolerance).norm
 
@@ -192,7 +190,7 @@ class SampledRadius(MeasureSpec):
     id: Literal["sampled_radius"]
     limit: ClassVar[float] = 1.0
 
-    def values(self, batch: Batch) -> FloatArray:
+    def _values(self, batch: Batch) -> FloatArray:
         """The eigenvalues of e^{A_e T} are the exponentials of those of A_e T: the margin serves, and is made so for K."""
         return np.asarray(np.exp(batch.observer.sample_time * batch.margin))
 
@@ -218,8 +216,7 @@ class SecondMomentRadius(_Dropping):
         """With probability and policy."""
         return f"second_moment_radius p {self.drop_probability:g} {self.policy}"
 
-    def values(self, batch: Batch) -> FloatArray:
-        """The radius."""
+    def _values(self, batch: Batch) -> FloatArray:
         modes = self._modes(batch)
         return drop_radius(modes.dropped, modes.received, self.drop_probability)
 
@@ -235,8 +232,7 @@ class CriticalDropProbability(_Dropping):
         """With the policy, unless it is the usual one."""
         return self.id if self.policy == "coast" else f"{self.id} {self.policy}"
 
-    def values(self, batch: Batch) -> FloatArray:
-        """The probability."""
+    def _values(self, batch: Batch) -> FloatArray:
         modes = self._modes(batch)
         return critical_drop_probability(modes.dropped, modes.received)
 

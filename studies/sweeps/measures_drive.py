@@ -114,8 +114,7 @@ class EstimatorNrms(MeasureSpec):
         """Drive or read once, where the sweep is started: the signals travel with it, workers need no files."""
         _ = self.recorded
 
-    def values(self, batch: Batch) -> FloatArray:
-        """One number a design."""
+    def _values(self, batch: Batch) -> FloatArray:
         from studies.sweeps.drive_replay import nrms
 
         return nrms(self.recorded, batch)

@@ -19,12 +19,11 @@ from typing import Any
 
 from analysis.sensitivity.designs import Design
 from studies.execution.files import discard_unfinished, json_bytes, only_run, write_bytes
-from studies.sweeps.manifest import differences, versions
 from studies.sweeps.measures import Measure
 from studies.sweeps.observer import Observer
 from studies.sweeps.plant import Grid
 from studies.sweeps.sweep import Chunk, Sweep
-from studies.sweeps.tables import PLACE, ChunkResult, columns_of
+from studies.sweeps.tables import PLACE, ChunkResult, columns_of, versions
 from synthesis.errors import SpecError
 
 MAGIC = b"PAR1"
@@ -87,11 +86,9 @@ class SweepFolder:
 
     def keep(self, done: ChunkResult) -> None:
         """Store a chunk; its rows last, for they say that it is there."""
-        made = differences(versions(), done.made_with)
-        if made:
-            raise SpecError(
-                f"a worker would give other bytes than this machine: {made[0]}; install the same everywhere"
-            )
+        odd = differences(versions(), done.made_with)
+        if odd:
+            raise SpecError(f"a worker would give other bytes than this machine: {odd[0]}; install the same everywhere")
         for file, data in ((self.envelope(done.chunk), done.envelope), (self.rows(done.chunk), done.rows)):
             file.parent.mkdir(parents=True, exist_ok=True)
             write_bytes(file, data, sync=data is done.rows)
@@ -99,6 +96,31 @@ class SweepFolder:
     def of(self, observer: int) -> list[Chunk]:
         """The chunks of one observer, in order."""
         return [chunk for chunk in self.sweep.chunks() if chunk.observer == observer]
+
+
+def differences(old: Any, new: Any, place: str = "") -> list[str]:
+    """Every difference as 'place was old, is now new'; empty if there is none."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        found = []
+        for key in dict.fromkeys([*old, *new]):
+            where = f"{place}.{key}" if place else str(key)
+            if key not in new:
+                found.append(f"{where} was {_short(old[key])}, is now missing")
+            elif key not in old:
+                found.append(f"{where} is new: {_short(new[key])}")
+            else:
+                found += differences(old[key], new[key], where)
+        return found
+    if isinstance(old, list | tuple) and isinstance(new, list | tuple):
+        if len(old) != len(new):
+            return [f"{place} had {len(old)} entries, has now {len(new)}"]
+        return [d for i, (a, b) in enumerate(zip(old, new, strict=True)) for d in differences(a, b, f"{place}[{i}]")]
+    return [] if old == new else [f"{place} was {_short(old)}, is now {_short(new)}"]
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
 
 
 @contextmanager

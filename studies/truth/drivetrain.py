@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -104,16 +104,11 @@ class _Assists:
     def __init__(self, assists: Sequence[Assist | None], sign: float) -> None:
         self.any, self.sign = any(a is not None for a in assists), sign
         self.on = np.array([a is not None for a in assists])
-        for entry in fields(Assist):
-            values = [getattr(a or Assist(), entry.name) for a in assists]
-            setattr(self, entry.name, np.array(values))
+        some = [a or Assist() for a in assists]
+        self.limit, self.release, self.apply, self.least, self.inactive_below = (
+            column(some, name) for name in ("limit", "release", "apply", "least", "inactive_below")
+        )
         self.restart()
-
-    limit: FloatArray
-    release: FloatArray
-    apply: FloatArray
-    least: FloatArray
-    inactive_below: FloatArray
 
     def restart(self) -> None:
         self.share: FloatArray = np.ones((4, self.on.size))

@@ -55,7 +55,6 @@ class Fleet:
         self.drag: FloatArray = 0.5 * AIR_DENSITY * column(bodies, "drag_area")
         self.rolling_resistance = column(bodies, "rolling_resistance")
         self.load_lag = column(bodies, "load_lag")
-        self._springs(vehicles)
         under = [v.suspension for v in vehicles]
         self.unsprung = column(under, "unsprung_mass")
         self.compliance_stiffness, self.compliance_damping = (
@@ -63,9 +62,6 @@ class Fleet:
             for kind in ("stiffness", "damping")
         )
         self.drivetrains = Drivetrains([v.drivetrain for v in vehicles])
-
-    def _springs(self, vehicles: Sequence[TruthVehicle]) -> None:
-        bodies = [v.chassis for v in vehicles]
         ride = np.array([[b.front_ride_frequency for b in bodies], [b.rear_ride_frequency for b in bodies]])
         speed = 2.0 * math.pi * np.repeat(ride, 2, axis=0)
         corner_mass = self.static_load / GRAVITY

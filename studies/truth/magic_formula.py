@@ -82,13 +82,7 @@ class MagicFormulaTire:
         return transport / sigma, slide / sigma
 
     def forces(
-        self,
-        slip: FloatArray,
-        _rate: FloatArray,
-        slide: FloatArray,
-        W: FloatArray,
-        load: FloatArray,
-        friction: FloatArray,
+        self, slip: FloatArray, _: FloatArray, slide: FloatArray, W: FloatArray, load: FloatArray, friction: FloatArray
     ) -> FloatArray:
         """F (2, 4, B), N, in the tire frame, from lagged slips, slip velocity (m/s), load (4, B), N, and friction."""
         slow = np.maximum(1.0 - W / self.damping_speed, 0.0)

@@ -92,15 +92,10 @@ class Manoeuvre(StrictTable):
         own = self.vehicle
         car = load_vehicle(own.parameters, folder)
         limits = ("maximum_torque", "maximum_power", "maximum_brake_torque")
-        given = {name: value for name in limits if (value := getattr(own, name)) is not None}
-        fitted = replace(
-            car.drivetrain,
-            **given,
-            layout=own.drivetrain,
-            traction_control=Assist() if own.traction_control == "poor" else None,
-            anti_lock=Assist() if own.anti_lock == "poor" else None,
-        )
-        return car.changed(drivetrain=fitted)
+        given: dict[str, Any] = {name: value for name in limits if (value := getattr(own, name)) is not None}
+        for name in ("traction_control", "anti_lock"):
+            given[name] = Assist() if getattr(own, name) == "poor" else None
+        return car.changed(drivetrain=replace(car.drivetrain, layout=own.drivetrain, **given))
 
     def course(self) -> Course:
         """As arrays."""

@@ -26,9 +26,7 @@ from studies.truth.stepper import Step, advance
 from studies.truth.vehicle import TruthVehicle
 from synthesis.errors import SpecError
 
-STEP = (
-    0.001  # s, by the convergence study of the tests: velocities are then right to 1e-4 m/s, wheel speeds to 1e-2 rad/s
-)
+STEP = 0.001  # s, by the convergence study of the tests: velocities right to 1e-4 m/s, wheel speeds to 1e-2 rad/s
 RECORD_TIME = 0.005  # s between samples, 200 Hz as in P1 to P3
 EVERYTHING = tuple(UNITS)
 

@@ -25,8 +25,7 @@ from studies.execution.processes import Finished, Serial
 from studies.sweeps.engine import run_sweep
 from studies.sweeps.measures import Measure
 from studies.sweeps.observer import Batch, Observer
-from studies.sweeps.observer_spec import ObserverSpec
-from studies.sweeps.spec import MEASURES, build_sweep
+from studies.sweeps.spec import MEASURES, ObserverSpec, build_sweep
 from studies.trials.sensors import TEST_CAR
 from studies.truth import draw, load_manoeuvre, simulate_manoeuvres, write_drive
 from synthesis.errors import SpecError
