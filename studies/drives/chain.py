@@ -10,16 +10,8 @@ from typing import Any
 import numpy as np
 
 from estimators import GainSchedule, forces
+from estimators import pipeline as parts
 from estimators.arrays import FloatArray, IntArray
-from estimators.pipeline import (
-    CornerObservers,
-    CornerVelocity,
-    DifferentiatedPid,
-    EstimationPipeline,
-    FourWheelSideslip,
-    StiffnessSideslip,
-    VehicleSignals,
-)
 from estimators.pipeline.corner_kinds import CornerKind
 from estimators.pipeline.pipeline import REAL_SENSORS
 from estimators.sideslip import FourWheel, SingleTrack
@@ -59,7 +51,7 @@ class Chain:
 @refused_at("estimators")
 def pipeline_of(
     drive: DriveFile, longitudinal: GainSchedule | CornerKind, lateral: GainSchedule | None = None
-) -> tuple[EstimationPipeline, tuple[str, ...]]:
+) -> tuple[parts.EstimationPipeline, tuple[str, ...]]:
     """The pipeline that the drive file asks for, for one car, and what had to be assumed.
 
     ``longitudinal``: the corner observers along the wheels, for this pipeline alone; they run where ``lateral`` is given.
@@ -70,16 +62,16 @@ def pipeline_of(
     assumptions = () if car.yaw_inertia else ("yaw inertia is not given: taken as m L_f L_r",)
     time, chosen = drive.sample_time, drive.estimators
     longitudinal_force: dict[str, Callable[..., Any]] = {
-        "unknown-input": forces.UnknownInputForceObserver, "pid": DifferentiatedPid,
+        "unknown-input": forces.UnknownInputForceObserver, "pid": parts.DifferentiatedPid,
         "unscented": forces.WheelForceFilter, "linear": partial(forces.WheelForceFilter, method="linear"),
     }  # fmt: skip
     method: Any = chosen.lateral_force
     weights = SlipWeights() if chosen.axle_weights == "slip" else None
-    corners = CornerObservers(vehicle, longitudinal, lateral, weights=weights) if lateral is not None else None
-    velocity: CornerVelocity | None = None  # the fusion; else a paper's own chain
+    corners = parts.CornerObservers(vehicle, longitudinal, lateral, weights=weights) if lateral is not None else None
+    velocity: parts.CornerVelocity | None = None  # the fusion; else a paper's own chain
     if chosen.velocity != "fusion" and corners is not None:
-        velocity = CornerVelocity(corners, KinematicKalman(time) if chosen.velocity == "kinematic" else None)
-    pipeline = EstimationPipeline(
+        velocity = parts.CornerVelocity(corners, KinematicKalman(time) if chosen.velocity == "kinematic" else None)
+    pipeline = parts.EstimationPipeline(
         vehicle,
         time,
         longitudinal_force=longitudinal_force[chosen.longitudinal_force](vehicle, time),
@@ -100,16 +92,20 @@ def _sideslip_of(drive: DriveFile, vehicle: VehicleParameters) -> Any:
         return None
     base = (vehicle.mass, vehicle.yaw_inertia, vehicle.front_axle_distance, vehicle.rear_axle_distance)
     if kind.endswith("stiffness") or kind == "sliding-mode":
-        car_model, sliding = SingleTrack(*base, front, rear), kind == "sliding-mode"
-        return StiffnessSideslip(car_model, drive.sample_time, adaptive=kind != "fixed-stiffness", sliding=sliding)
+        car_model, fixed, sliding = SingleTrack(*base, front, rear), kind == "fixed-stiffness", kind == "sliding-mode"
+        return parts.StiffnessSideslip(car_model, drive.sample_time, adaptive=not fixed, sliding=sliding)
     track, length = 0.5 * (vehicle.front_track + vehicle.rear_track), car.relaxation_length or 0.5
     wheels = FourWheel(*base, track, front / 2, rear / 2, length, length)
     method: Any = kind.removeprefix("four-wheel-")
-    return FourWheelSideslip(wheels, drive.sample_time, method=method)
+    return parts.FourWheelSideslip(wheels, drive.sample_time, method=method)
 
 
 def run_chain(
-    log: DriveLog, inputs: CornerInputs, pipeline: EstimationPipeline, assumptions: tuple[str, ...], progress: Progress
+    log: DriveLog,
+    inputs: CornerInputs,
+    pipeline: parts.EstimationPipeline,
+    assumptions: tuple[str, ...],
+    progress: Progress,
 ) -> Chain:
     """Every sample through the pipeline; signals that the log lacks are not flagged, missing samples are."""
     n, signals = log.time.size, log.signals
@@ -121,7 +117,7 @@ def run_chain(
     rows: list[tuple[Any, ...]] = []
     for k in range(n):
         extra = {name: value[k] for name, value in optional.items()}
-        step = pipeline.step(VehicleSignals(wheel[k], ax[k], ay[k], turn[k], steer[k], torque[k], **extra))
+        step = pipeline.step(parts.VehicleSignals(wheel[k], ax[k], ay[k], turn[k], steer[k], torque[k], **extra))
         part = np.nan if step.sideslip_step is None else step.sideslip_step.sideslip
         corner = np.nan if step.corners is None else step.corners.vy
         rows.append((

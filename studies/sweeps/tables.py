@@ -29,11 +29,9 @@ OTHERS = ("gainsmith", "numpy", "scipy", "sympy", "pyarrow")
 def versions() -> dict[str, str]:
     """By name; `code` covers every module that a measure of a file may use, so that an edit is never taken for a repeat."""
     return {
-        "code": Sources().fingerprint(None, ROOTS)[:16],
-        "python": platform.python_version(),
-        "machine": platform.machine(),
-        **{name: version(name) for name in OTHERS},
-    }
+        "code": Sources().fingerprint(None, ROOTS)[:16], "python": platform.python_version(),
+        "machine": platform.machine(), **{name: version(name) for name in OTHERS},
+    }  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -55,13 +53,9 @@ def compute(sweep: Sweep, chunk: Chunk) -> ChunkResult:
     seconds = perf_counter() - start
     names = [m.name for m in sweep.measures]
     return ChunkResult(
-        chunk,
-        encoded(row_table(found, chunk, sweep.stages[chunk.stage].kind, names)),
-        encoded(envelope_table(found, chunk)),
-        next((reason for reason in found.reason if reason), ""),
-        versions(),
-        seconds,
-    )
+        chunk, encoded(row_table(found, chunk, sweep.stages[chunk.stage].kind, names)), encoded(envelope_table(found, chunk)),
+        next((reason for reason in found.reason if reason), ""), versions(), seconds,
+    )  # fmt: skip
 
 
 def row_table(found: Evaluated, chunk: Chunk, kind: str, measures: Sequence[str]) -> Any:
