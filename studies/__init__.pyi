@@ -33,7 +33,7 @@ from .study import Study as Study
 from .study import Table as Table
 from .sweeps.engine import SweepResult as SweepResult
 from .sweeps.engine import run_sweep as run_sweep
-from .sweeps.measure import Measure as Measure
+from .sweeps.measures import Measure as Measure
 from .sweeps.observer import model_observer as model_observer
 from .sweeps.ranges import RangeSpec as RangeSpec
 from .sweeps.spec import load_sweep as load_sweep

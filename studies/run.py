@@ -7,9 +7,8 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from studies.execution.files import discard_unfinished, ready_folder, write_bytes, write_json
+from studies.execution.files import discard_unfinished, only_run, ready_folder, write_bytes, write_json
 from studies.execution.fingerprint import Sources
-from studies.execution.lock import only_run
 from studies.execution.processes import Processes
 from studies.parts.job import Job, compute
 from studies.parts.marks import Marks

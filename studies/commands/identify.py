@@ -9,8 +9,7 @@ from pathlib import Path
 from studies.commands.terminal import print_table, progress_bar
 from studies.execution.files import check_folder
 from studies.identify.identify import identify_drive
-from studies.identify.result import HEADER, content, rows, warnings
-from studies.identify.write import write_identification
+from studies.identify.result import HEADER, content, rows, warnings, write_identification
 
 
 def run_identify(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int:
@@ -24,12 +23,8 @@ def run_identify(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int
     if as_json:
         print(json.dumps(content(found), indent=1, allow_nan=False))
         return 0
-    print_table(
-        f"{found.drive.name}: identified",
-        HEADER,
-        rows(found),
-        caption=f"velocity reference: {found.velocity_reference}",
-    )
+    caption = f"velocity reference: {found.velocity_reference}"
+    print_table(f"{found.drive.name}: identified", HEADER, rows(found), caption=caption)
     for line in warnings(found):
         print(f"warning: {line}", file=sys.stderr)
     print(f"written to {out}")

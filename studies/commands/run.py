@@ -31,28 +31,18 @@ def summary_rows(result: RunResult) -> list[tuple[str, ...]]:
 def remarks(result: RunResult) -> list[str]:
     """What to know beside the table, one line each: rows marked (*) first, then everything that was assumed."""
     pipeline = result.metrics["pipeline"]
-    marked = [f"(*) {signal.replace('_', ' ')}: {text}" for signal, text in _shown(pipeline).items()]
+    shown = {name for name, found in pipeline.get("signals", {}).items() if any(e["samples"] for e in found.values())}
+    notes = pipeline.get("notes", {}).items()
+    marked = [f"(*) {signal.replace('_', ' ')}: {text}" for signal, text in notes if signal in shown]
     assumed = dict.fromkeys([*result.metrics["assumptions"], *pipeline.get("assumptions", [])])
     return [*marked, *(f"assumed: {text}" for text in assumed)]
 
 
-def _shown(pipeline: dict[str, Any]) -> dict[str, str]:
-    """Notes of the signals that have a row."""
-    signals = pipeline.get("signals", {})
-    notes: dict[str, str] = pipeline.get("notes", {})
-    return {
-        name: text for name, text in notes.items() if any(entry["samples"] for entry in signals.get(name, {}).values())
-    }
-
-
 def _cells(entry: dict[str, Any]) -> tuple[str, ...]:
     digits = {"m/s": 3, "rad": 4}.get(entry["unit"], 0)
-    sizes = [_number(entry[key], digits) for key in ("rms", "max_error", "reference_peak")]
-    return (_number(entry["nrms_percent"], 2), *sizes, entry["unit"], str(entry["samples"]))
-
-
-def _number(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"
+    shown = [("nrms_percent", 2), ("rms", digits), ("max_error", digits), ("reference_peak", digits)]
+    numbers = ["-" if entry[key] is None else f"{entry[key]:.{count}f}" for key, count in shown]
+    return (*numbers, entry["unit"], str(entry["samples"]))
 
 
 def run_log(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int:

@@ -103,11 +103,8 @@ def _rows(summary: RunSummary) -> Iterator[tuple[str, ...]]:
 
 def _content(summary: RunSummary, folder: Path) -> dict[str, Any]:
     return {
-        "out": str(folder),
-        "good": summary.good,
-        "parts": [
-            {"study": o.study, "part": o.part, "state": o.state, "seconds": o.seconds} for o in summary.outcomes
-        ],
+        "out": str(folder), "good": summary.good,
+        "parts": [{"study": o.study, "part": o.part, "state": o.state, "seconds": o.seconds} for o in summary.outcomes],
         "failures": [{"study": s, "part": p, "message": text} for s, p, text in summary.failures],
         "missing_claims": summary.missing_claims,
         "verdicts": {

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
-from studies.commands.terminal import progress_bar
+from studies.commands.terminal import print_table, progress_bar
 from studies.execution.cluster import Cluster
 from studies.execution.files import write_bytes
 from studies.execution.processes import Executor
@@ -22,10 +21,11 @@ from studies.sweeps.plots import plot_sweep
 from studies.sweeps.reports import junit as junit_xml
 from studies.sweeps.reports import markdown
 from studies.sweeps.spec import load_sweep
-from studies.sweeps.statistics import number
+from studies.sweeps.summary import number
 from synthesis.errors import SpecError
 
 DONE, SHRUNK, REFUSED = 0, 1, 2
+WIDTH = 200  # of tables, where the output is no terminal
 
 
 def run_sweep(
@@ -62,10 +62,8 @@ def run_sweep(
         pictures = _draw(result, before, compared)
     report = markdown(result.summary, compared, pictures)
     write_bytes(folder / "report.md", report.encode())
-    for path, data in (
-        (junit, junit_xml(sweep.name, result.summary, compared)),
-        (summary, markdown(result.summary, compared).encode()),
-    ):
+    reports = (junit_xml(sweep.name, result.summary, compared), markdown(result.summary, compared).encode())
+    for path, data in zip((junit, summary), reports, strict=True):
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
             write_bytes(path, data)
@@ -73,13 +71,16 @@ def run_sweep(
         print(json.dumps(_content(result, compared), indent=1, allow_nan=False))
     else:
         _print(result, compared, folder)
-    if result.count("designs without a number"):
-        words = f"{result.count('designs without a number')} designs have a measure that is not a number"
-        print(f"gainsmith: {words}{_first(result)}; they are listed in {folder / 'rows'}", file=sys.stderr)
-        return REFUSED
-    if result.count("invalid designs"):
-        words = f"{result.count('invalid designs')} of {result.count('designs')} designs are invalid"
-        print(f"gainsmith: {words}{_first(result)}; they are listed in {folder / 'rows'}", file=sys.stderr)
+    for kind, words in (
+        ("designs without a number", "designs have a measure that is not a number"),
+        ("invalid designs", f"of {result.count('designs')} designs are invalid"),
+    ):
+        if result.count(kind):
+            first = f" ({result.first_reason})" if result.first_reason else ""
+            listed = f"they are listed in {folder / 'rows'}"
+            print(f"gainsmith: {result.count(kind)} {words}{first}; {listed}", file=sys.stderr)
+            if kind == "designs without a number":
+                return REFUSED
     if update_baseline and baseline is not None:
         write_baseline(baseline, of_sweep(sweep, result.summary))
         print(f"baseline written to {baseline}", file=sys.stderr)
@@ -108,43 +109,30 @@ def _draw(result: SweepResult, before: Baseline | None, compared: list[Compariso
     return [str(path.relative_to(folder)) for path in drawn if path.suffix == ".svg"]
 
 
-def _first(result: SweepResult) -> str:
-    return f" ({result.first_reason})" if result.first_reason else ""
-
-
 def _print(result: SweepResult, compared: list[Comparison] | None, folder: Path) -> None:
-    console = Console(width=None if sys.stdout.isatty() else 200)
-    table = Table(title=f"Sweep {result.sweep.name}: {result.count('designs')} designs")
-    for i, heading in enumerate(("subject", "measure", "nominal", "median", "95 %", "99 %", "worst", "unit", "at")):
-        table.add_column(heading, justify="right" if 2 <= i <= 6 else "left")
+    rows = []
     for observer in result.sweep.observers:
         for measure in result.sweep.measures:
             found = [
                 result.summary.of(observer.name, measure.name, name)
                 for name in ("nominal", "median", "quantile 95 %", "quantile 99 %", "worst")
             ]
-            worst = found[-1]
             cells = ["" if f is None else number(f.value) for f in found]
-            table.add_row(observer.name, measure.name, *cells, measure.unit, worst.where() if worst else "")
-    console.print(table)
+            rows.append((observer.name, measure.name, *cells, measure.unit, found[-1].where() if found[-1] else ""))
+    title = f"Sweep {result.sweep.name}: {result.count('designs')} designs"
+    headings = ("subject", "measure", "nominal", "median", "95 %", "99 %", "worst", "unit", "at")
+    print_table(title, headings, rows, left=(0, 1, 7, 8), width=WIDTH)
+    console = Console(width=None if sys.stdout.isatty() else WIDTH)
     for note in result.summary.notes:
         console.print(note)
     if compared is not None:
-        _print_comparison(console, compared)
+        bad = [j.cells for j in compared if not j.good]
+        if bad:
+            title = f"{len(bad)} of {len(compared)} statistics shrank beyond their tolerance"
+            print_table(title, HEADINGS, bad, left=(0, 1, 2, 6, 7), width=WIDTH)
+        else:
+            console.print(f"nothing shrank: {len(compared)} statistics within their tolerance of the baseline")
     print(f"written to {folder}")
-
-
-def _print_comparison(console: Console, compared: list[Comparison]) -> None:
-    bad = [j for j in compared if not j.good]
-    if not bad:
-        console.print(f"nothing shrank: {len(compared)} statistics within their tolerance of the baseline")
-        return
-    table = Table(title=f"{len(bad)} of {len(compared)} statistics shrank beyond their tolerance")
-    for i, heading in enumerate(HEADINGS):
-        table.add_column(heading, justify="right" if 3 <= i <= 5 else "left")
-    for comparison in bad:
-        table.add_row(*comparison.cells)
-    console.print(table)
 
 
 def _content(result: SweepResult, compared: list[Comparison] | None) -> dict[str, Any]:

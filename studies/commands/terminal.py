@@ -16,15 +16,9 @@ def progress_bar(threaded: bool = True) -> Progress:
     Without a thread it is drawn at every ``update(refresh=True)``.
     """
     return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-        disable=not sys.stderr.isatty(),
-        transient=True,
-        auto_refresh=threaded,
-    )
+        TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(),
+        console=Console(stderr=True), disable=not sys.stderr.isatty(), transient=True, auto_refresh=threaded,
+    )  # fmt: skip
 
 
 def print_table(

@@ -18,10 +18,8 @@ from scipy.optimize import minimize_scalar
 from estimators.arrays import FloatArray
 from studies.errors import LogError
 
-HALF_WINDOW = 0.05
-"""h in s: long enough for 100 Hz logs, short against a brake application."""
-LEAST_CORRELATION = 0.9
-"""Below this the two logs do not show the same drive."""
+HALF_WINDOW = 0.05  # h in s: long enough for 100 Hz logs, short against a brake application
+LEAST_CORRELATION = 0.9  # below this the two logs do not show the same drive
 
 
 @dataclass(frozen=True)
@@ -69,12 +67,8 @@ def find_offset(
     coarse = np.arange(low, high + HALF_WINDOW, HALF_WINDOW / 2)
     quality = [compare(float(offset))[0] for offset in coarse]
     best = float(coarse[int(np.argmax(quality))]) if quality else 0.0
-    fine = minimize_scalar(
-        lambda offset: -compare(float(offset))[0],
-        bounds=(best - HALF_WINDOW / 2, best + HALF_WINDOW / 2),
-        method="bounded",
-        options={"xatol": 1e-5},
-    )
+    near = (best - HALF_WINDOW / 2, best + HALF_WINDOW / 2)
+    fine = minimize_scalar(lambda t: -compare(float(t))[0], bounds=near, method="bounded", options={"xatol": 1e-5})
     seconds = float(fine.x)
     correlation, slope = compare(seconds)
     if correlation < LEAST_CORRELATION:

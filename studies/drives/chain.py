@@ -9,24 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from estimators import GainSchedule
+from estimators import GainSchedule, forces
+from estimators import pipeline as parts
 from estimators.arrays import FloatArray, IntArray
-from estimators.forces import (
-    AttitudeObserver,
-    LateralForceEstimator,
-    UnknownInputForceObserver,
-    VerticalLoads,
-    WheelForceFilter,
-)
-from estimators.pipeline import (
-    CornerObservers,
-    CornerVelocity,
-    DifferentiatedPid,
-    EstimationPipeline,
-    FourWheelSideslip,
-    StiffnessSideslip,
-    VehicleSignals,
-)
 from estimators.pipeline.corner_kinds import CornerKind
 from estimators.pipeline.pipeline import REAL_SENSORS
 from estimators.sideslip import FourWheel, SingleTrack
@@ -36,11 +21,8 @@ from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.prepare import CornerInputs
 from studies.drives.quantities import CORNERS
+from studies.drives.replay import PROGRESS_STEPS, Progress
 from studies.errors import refused_at
-
-Progress = Callable[[float], None]
-"""Called with the fraction done."""
-PROGRESS_STEPS = 50
 
 
 @dataclass(frozen=True)
@@ -69,7 +51,7 @@ class Chain:
 @refused_at("estimators")
 def pipeline_of(
     drive: DriveFile, longitudinal: GainSchedule | CornerKind, lateral: GainSchedule | None = None
-) -> tuple[EstimationPipeline, tuple[str, ...]]:
+) -> tuple[parts.EstimationPipeline, tuple[str, ...]]:
     """The pipeline that the drive file asks for, for one car, and what had to be assumed.
 
     ``longitudinal``: the corner observers along the wheels, for this pipeline alone; they run where ``lateral`` is given.
@@ -79,26 +61,23 @@ def pipeline_of(
     vehicle, car = drive.vehicle.parameters, drive.vehicle
     assumptions = () if car.yaw_inertia else ("yaw inertia is not given: taken as m L_f L_r",)
     time, chosen = drive.sample_time, drive.estimators
-    forces: dict[str, Callable[..., Any]] = {
-        "unknown-input": UnknownInputForceObserver,
-        "pid": DifferentiatedPid,
-        "unscented": WheelForceFilter,
-        "linear": partial(WheelForceFilter, method="linear"),
-    }
-    dynamic = chosen.vertical_load == "dynamic"
+    longitudinal_force: dict[str, Callable[..., Any]] = {
+        "unknown-input": forces.UnknownInputForceObserver, "pid": parts.DifferentiatedPid,
+        "unscented": forces.WheelForceFilter, "linear": partial(forces.WheelForceFilter, method="linear"),
+    }  # fmt: skip
     method: Any = chosen.lateral_force
     weights = SlipWeights() if chosen.axle_weights == "slip" else None
-    corners = CornerObservers(vehicle, longitudinal, lateral, weights=weights) if lateral is not None else None
-    velocity: CornerVelocity | None = None  # the fusion; else a paper's own chain
+    corners = parts.CornerObservers(vehicle, longitudinal, lateral, weights=weights) if lateral is not None else None
+    velocity: parts.CornerVelocity | None = None  # the fusion; else a paper's own chain
     if chosen.velocity != "fusion" and corners is not None:
-        velocity = CornerVelocity(corners, KinematicKalman(time) if chosen.velocity == "kinematic" else None)
-    pipeline = EstimationPipeline(
+        velocity = parts.CornerVelocity(corners, KinematicKalman(time) if chosen.velocity == "kinematic" else None)
+    pipeline = parts.EstimationPipeline(
         vehicle,
         time,
-        longitudinal_force=forces[chosen.longitudinal_force](vehicle, time),
-        loads=VerticalLoads(vehicle, time, dynamic=dynamic),
-        attitude=AttitudeObserver(time) if chosen.attitude == "gyro" else None,
-        lateral_force=LateralForceEstimator(vehicle, time, method=method, measurement_deviation=REAL_SENSORS),
+        longitudinal_force=longitudinal_force[chosen.longitudinal_force](vehicle, time),
+        loads=forces.VerticalLoads(vehicle, time, dynamic=chosen.vertical_load == "dynamic"),
+        attitude=forces.AttitudeObserver(time) if chosen.attitude == "gyro" else None,
+        lateral_force=forces.LateralForceEstimator(vehicle, time, method=method, measurement_deviation=REAL_SENSORS),
         velocity=velocity,
         corner_observers=corners if velocity is None else None,
         sideslip=_sideslip_of(drive, vehicle),
@@ -113,50 +92,38 @@ def _sideslip_of(drive: DriveFile, vehicle: VehicleParameters) -> Any:
         return None
     base = (vehicle.mass, vehicle.yaw_inertia, vehicle.front_axle_distance, vehicle.rear_axle_distance)
     if kind.endswith("stiffness") or kind == "sliding-mode":
-        car_model, sliding = SingleTrack(*base, front, rear), kind == "sliding-mode"
-        return StiffnessSideslip(car_model, drive.sample_time, adaptive=kind != "fixed-stiffness", sliding=sliding)
+        car_model, fixed, sliding = SingleTrack(*base, front, rear), kind == "fixed-stiffness", kind == "sliding-mode"
+        return parts.StiffnessSideslip(car_model, drive.sample_time, adaptive=not fixed, sliding=sliding)
     track, length = 0.5 * (vehicle.front_track + vehicle.rear_track), car.relaxation_length or 0.5
     wheels = FourWheel(*base, track, front / 2, rear / 2, length, length)
     method: Any = kind.removeprefix("four-wheel-")
-    return FourWheelSideslip(wheels, drive.sample_time, method=method)
+    return parts.FourWheelSideslip(wheels, drive.sample_time, method=method)
 
 
 def run_chain(
     log: DriveLog,
     inputs: CornerInputs,
-    pipeline: EstimationPipeline,
-    assumptions: tuple[str, ...] = (),
-    progress: Progress = lambda _done: None,
+    pipeline: parts.EstimationPipeline,
+    assumptions: tuple[str, ...],
+    progress: Progress,
 ) -> Chain:
     """Every sample through the pipeline; signals that the log lacks are not flagged, missing samples are."""
     n, signals = log.time.size, log.signals
     nothing, zero = np.full(n, np.nan), np.zeros(n)
     torque = np.stack([signals.get(f"torque_{corner}", nothing) for corner in CORNERS], axis=-1)
-    ay, turn = signals.get("ay", zero), signals.get("yaw_rate", zero)
+    ax, ay, turn = signals["ax"], signals.get("ay", zero), signals.get("yaw_rate", zero)
+    wheel, steer = inputs.wheel_speed, inputs.steer
     optional = {name: signals[name] for name in ("az", "roll_rate", "pitch_rate") if name in signals}
     rows: list[tuple[Any, ...]] = []
     for k in range(n):
         extra = {name: value[k] for name, value in optional.items()}
-        step = pipeline.step(
-            VehicleSignals(inputs.wheel_speed[k], signals["ax"][k], ay[k], turn[k], inputs.steer[k], torque[k], **extra)
-        )
+        step = pipeline.step(parts.VehicleSignals(wheel[k], ax[k], ay[k], turn[k], steer[k], torque[k], **extra))
         part = np.nan if step.sideslip_step is None else step.sideslip_step.sideslip
         corner = np.nan if step.corners is None else step.corners.vy
-        forces = step.force_x, step.axle_force_y, step.force_z
-        wheels = step.slip, step.slip_angle
-        rows.append(
-            (
-                step.vx,
-                step.vy,
-                step.sideslip,
-                part,
-                corner,
-                *forces,
-                *wheels,
-                int(step.flags),
-                int(step.consistency.failed),
-            )
-        )
+        rows.append((
+            step.vx, step.vy, step.sideslip, part, corner, step.force_x, step.axle_force_y, step.force_z, step.slip,
+            step.slip_angle, int(step.flags), int(step.consistency.failed),
+        ))  # fmt: skip
         if k % max(1, n // PROGRESS_STEPS) == 0:
             progress(k / n)
     columns: list[Any] = [np.array(column) for column in zip(*rows, strict=True)]

@@ -1,4 +1,4 @@
-"""From recorded signals to the inputs of the four corner observers.
+"""From recorded signals to the inputs of the four corner observers, and the two velocities that any car has without one.
 
 Pure functions of arrays: n samples, four corners in the order fl, fr, rl, rr, SI units, frame x forward, y left, z up.
 Vertical load and force before friction: no road parameter enters anywhere. Source: P1 (1), (13)-(17) and section 6.
@@ -6,12 +6,13 @@ Vertical load and force before friction: no road parameter enters anywhere. Sour
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
 
-LEAST_LOAD = 0.05
-"""Share of the static load below which a wheel counts as lifted and its normalised force as unknown."""
+LEAST_LOAD = 0.05  # share of the static load below which a wheel counts as lifted and its normalised force as unknown
 
 
 def derivative(value: FloatArray, sample_time: float, lag: float) -> FloatArray:
@@ -73,3 +74,29 @@ def normalised_forces(force: FloatArray, vertical_load: FloatArray, static_load:
     """mu = F_x/F_z (n, 4), P1 (13); NaN where a wheel carries less than 5 % of ``static_load``, N."""
     lifted = vertical_load < LEAST_LOAD * static_load
     return np.where(lifted, np.nan, force / np.where(lifted, 1.0, vertical_load))
+
+
+def mean_over(values: FloatArray) -> FloatArray:
+    """Mean of (n, k) over k, of what is not missing; NaN where all of a row is. Of R_e w: wrong by the mean slip velocity."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Mean of empty slice", category=RuntimeWarning)
+        return np.asarray(np.nanmean(values, axis=1))
+
+
+def integrated_acceleration(
+    ax: FloatArray, yaw_rate: FloatArray, vy: FloatArray, sample_time: float, start: float
+) -> FloatArray:
+    """V_x(t) = V_x(0) + integral of (a_x + r V_y) dt, m/s, P1 notes 5, by the trapezoidal rule.
+
+    Drifts with sensor bias and road grade; a missing sample keeps the last known acceleration.
+    """
+    rate = held(ax + yaw_rate * vy)
+    steps = (rate[1:] + rate[:-1]) / 2 * sample_time
+    return start + np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def held(value: FloatArray) -> FloatArray:
+    """Missing samples replaced by the last known one (0 before the first)."""
+    known = np.isfinite(value)
+    last = np.maximum.accumulate(np.where(known, np.arange(value.size), -1))
+    return np.where(last >= 0, value[np.maximum(last, 0)], 0.0)

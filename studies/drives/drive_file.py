@@ -16,25 +16,11 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator, mod
 
 from estimators.errors import unknown
 from estimators.vehicle import VehicleParameters
-from studies.drives.quantities import (
-    CORNERS,
-    REFERENCES,
-    SIGNALS,
-    AngularSpeed,
-    Duration,
-    Inertia,
-    Lag,
-    Length,
-    Mass,
-    Offset,
-    Rate,
-    Stiffness,
-    factor_to,
-)
+from studies.drives import quantities as si
+from studies.drives.quantities import CORNERS, REFERENCES, SIGNALS, factor_to
 from synthesis.toml_file import StrictTable, load_toml
 
-WHEEL_INERTIA = 1.0
-"""kg m^2 where the drive has none: without torques it has nothing to act on."""
+WHEEL_INERTIA = 1.0  # kg m^2 where the drive has none: without torques it has nothing to act on
 
 
 def _a_time(unit: str) -> str:
@@ -62,22 +48,22 @@ class Align(StrictTable):
     to: str = Field(examples=["imu"])
     velocity: str = "vx"
     acceleration: str = "ax"
-    search: Duration | None = None
+    search: si.Duration | None = None
 
 
 class LogFile(StrictTable):
     """One log file: its clock, its rate, and the longest pause that may be bridged by interpolation."""
 
     name: str = Field(min_length=1, examples=["car"])
-    rate: Rate = Field(examples=["200 Hz"])
+    rate: si.Rate = Field(examples=["200 Hz"])
     file: str | None = None
     time: str = "time"
     time_unit: Annotated[str, AfterValidator(_a_time)] = "s"
     delimiter: str = Field(default=",", min_length=1, max_length=1)
-    max_gap: Duration | None = None
+    max_gap: si.Duration | None = None
     duplicates: Literal["mean", "last", "refuse"] = "mean"
     sort: bool = False
-    clock_offset: Offset = 0.0
+    clock_offset: si.Offset = 0.0
     align: Align | None = None
 
     @property
@@ -89,21 +75,21 @@ class LogFile(StrictTable):
 class Vehicle(StrictTable):
     """Rigid-body and wheel data, SI. Lengths are to the centre of gravity; tracks are wheel centre to wheel centre."""
 
-    mass: Mass = Field(examples=["1600 kg"])
-    front_axle_distance: Length = Field(examples=["1.4 m"])
-    rear_axle_distance: Length = Field(examples=["1.5 m"])
-    cg_height: Length = Field(examples=["0.55 m"])
-    front_track: Length = Field(examples=["1.6 m"])
-    rear_track: Length = Field(examples=["1.6 m"])
-    effective_radius_front: Length = Field(examples=["0.34 m"])
-    effective_radius_rear: Length = Field(examples=["0.34 m"])
-    wheel_inertia: Inertia | None = None
+    mass: si.Mass = Field(examples=["1600 kg"])
+    front_axle_distance: si.Length = Field(examples=["1.4 m"])
+    rear_axle_distance: si.Length = Field(examples=["1.5 m"])
+    cg_height: si.Length = Field(examples=["0.55 m"])
+    front_track: si.Length = Field(examples=["1.6 m"])
+    rear_track: si.Length = Field(examples=["1.6 m"])
+    effective_radius_front: si.Length = Field(examples=["0.34 m"])
+    effective_radius_rear: si.Length = Field(examples=["0.34 m"])
+    wheel_inertia: si.Inertia | None = None
     rolling_resistance: float = Field(default=0.0, ge=0.0, le=0.2, examples=[0.012])
     steering_ratio: float | None = Field(default=None, gt=0.0, examples=[15.0])
-    yaw_inertia: Inertia | None = None
-    cornering_stiffness_front: Stiffness | None = None  # of the axle, both wheels
-    cornering_stiffness_rear: Stiffness | None = None
-    relaxation_length: Length | None = None
+    yaw_inertia: si.Inertia | None = None
+    cornering_stiffness_front: si.Stiffness | None = None  # of the axle, both wheels
+    cornering_stiffness_rear: si.Stiffness | None = None
+    relaxation_length: si.Length | None = None
 
     @cached_property
     def parameters(self) -> VehicleParameters:
@@ -111,15 +97,11 @@ class Vehicle(StrictTable):
         return VehicleParameters(
             mass=self.mass,
             yaw_inertia=self.yaw_inertia or self.mass * self.front_axle_distance * self.rear_axle_distance,
-            wheel_inertia=self.wheel_inertia or WHEEL_INERTIA,
-            front_axle_distance=self.front_axle_distance,
-            rear_axle_distance=self.rear_axle_distance,
-            cg_height=self.cg_height,
-            front_track=self.front_track,
-            rear_track=self.rear_track,
-            effective_radius=(self.effective_radius_front, self.effective_radius_rear),
+            wheel_inertia=self.wheel_inertia or WHEEL_INERTIA, front_axle_distance=self.front_axle_distance,
+            rear_axle_distance=self.rear_axle_distance, cg_height=self.cg_height, front_track=self.front_track,
+            rear_track=self.rear_track, effective_radius=(self.effective_radius_front, self.effective_radius_rear),
             rolling_resistance=self.rolling_resistance,
-        )
+        )  # fmt: skip
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
@@ -130,8 +112,8 @@ class Vehicle(StrictTable):
 class Observer(StrictTable):
     """How the observer inputs are formed: lag of the differentiators, and when a wheel counts as stopped."""
 
-    derivative_lag: Lag = 0.01
-    stopped_below: AngularSpeed = 1.0
+    derivative_lag: si.Lag = 0.01
+    stopped_below: si.AngularSpeed = 1.0
 
 
 CHOICES = {
@@ -142,9 +124,7 @@ CHOICES = {
     "velocity": ("fusion", "corners", "kinematic"),
     "corner_velocity": ("lpv", "gain-switched", "kalman-three-state", "kalman-two-state"),
     "axle_weights": ("equal", "slip"),
-    "sideslip": (
-        "none", "four-wheel-extended", "four-wheel-unscented", "adaptive-stiffness", "fixed-stiffness", "sliding-mode"
-    ),
+    "sideslip": ("none", "four-wheel-extended", "four-wheel-unscented", "adaptive-stiffness", "fixed-stiffness", "sliding-mode"),
 }  # fmt: skip
 """Names of the estimators."""
 
@@ -197,50 +177,41 @@ def check_logs(logs: Sequence[LogFile]) -> None:
 def check_columns(signals: Mapping[str, Column], reference: Mapping[str, Column], logs: Sequence[LogFile]) -> None:
     """Every signal is a known one, has a unit that measures it, and says which log holds it."""
     names = [log.name for log in logs]
-    for table, known, columns in (("signals", SIGNALS, signals), ("reference", REFERENCES, reference)):
-        for name, column in columns.items():
-            _check_column(f"{table}.{name}", name, column, known, names)
-
-
-def _check_column(place: str, name: str, column: Column, known: dict[str, str], logs: list[str]) -> None:
-    if name not in known:
-        raise ValueError(f"{place}: {unknown('signal', name, known)}")
-    if column.factor == 0:
-        raise ValueError(f"{place}.factor: 0 is not a scale; use a finite number other than zero")
-    try:
-        column.scale(known[name])
-    except ValueError as error:
-        raise ValueError(f"{place}.unit: {error}") from error
-    if column.log is None and len(logs) > 1:
-        raise ValueError(f"{place}.log: missing; say which log holds column '{column.column}': {', '.join(logs)}")
-    if column.log is not None and column.log not in logs:
-        raise ValueError(f"{place}.log: {unknown('log', column.log, logs)}")
+    given = [("signals", SIGNALS, *each) for each in signals.items()]
+    given += [("reference", REFERENCES, *each) for each in reference.items()]
+    for table, known, name, column in given:
+        place = f"{table}.{name}"
+        if name not in known:
+            raise ValueError(f"{place}: {unknown('signal', name, known)}")
+        if column.factor == 0:
+            raise ValueError(f"{place}.factor: 0 is not a scale; use a finite number other than zero")
+        try:
+            column.scale(known[name])
+        except ValueError as error:
+            raise ValueError(f"{place}.unit: {error}") from error
+        if column.log is None and len(names) > 1:
+            raise ValueError(f"{place}.log: missing; say which log holds column '{column.column}': {', '.join(names)}")
+        if column.log is not None and column.log not in names:
+            raise ValueError(f"{place}.log: {unknown('log', column.log, names)}")
 
 
 def check_alignment(columns: Mapping[str, Column], logs: Sequence[LogFile]) -> None:
     """A log is aligned to one with a clock of its own: velocity in one of the two, acceleration in the other."""
     for log in logs:
-        if log.align is not None:
-            _check_alignment(f"log '{log.name}'.align", log, log.align, columns, logs)
-
-
-def _check_alignment(
-    place: str, log: LogFile, align: Align, columns: Mapping[str, Column], logs: Sequence[LogFile]
-) -> None:
-    others = [other.name for other in logs if other.name != log.name and other.align is None]
-    if align.to not in others:
-        raise ValueError(f"{place}.to: {unknown('log', align.to, others)} (a log with a clock of its own)")
-    if log.clock_offset != 0:
-        raise ValueError(f"{place}: clock_offset is given as well; keep one of the two")
-    for role in (align.velocity, align.acceleration):
-        if role not in columns:
-            raise ValueError(f"{place}: {unknown('signal', role, columns)}")
-    held = {columns[align.velocity].log, columns[align.acceleration].log}
-    if held != {log.name, align.to}:
-        raise ValueError(
-            f"{place}: one of {align.velocity}, {align.acceleration} must be in log '{log.name}', "
-            f"the other in '{align.to}'"
-        )
+        if log.align is None:
+            continue
+        place, align = f"log '{log.name}'.align", log.align
+        others = [other.name for other in logs if other.name != log.name and other.align is None]
+        if align.to not in others:
+            raise ValueError(f"{place}.to: {unknown('log', align.to, others)} (a log with a clock of its own)")
+        if log.clock_offset != 0:
+            raise ValueError(f"{place}: clock_offset is given as well; keep one of the two")
+        for role in (align.velocity, align.acceleration):
+            if role not in columns:
+                raise ValueError(f"{place}: {unknown('signal', role, columns)}")
+        if {columns[align.velocity].log, columns[align.acceleration].log} != {log.name, align.to}:
+            roles = f"one of {align.velocity}, {align.acceleration}"
+            raise ValueError(f"{place}: {roles} must be in log '{log.name}', the other in '{align.to}'")
 
 
 def check_signals(signals: Mapping[str, Column], vehicle: Vehicle) -> None:
@@ -254,9 +225,8 @@ def check_signals(signals: Mapping[str, Column], vehicle: Vehicle) -> None:
         raise ValueError("vehicle.steering_ratio: missing, but hand_wheel is given; add it, such as 15.0")
     steering = [name for name in ("steering", "hand_wheel", "steer_fl", "steer_fr") if name in signals]
     if len(steering) > 1 and steering != ["steer_fl", "steer_fr"]:
-        raise ValueError(
-            f"signals: {' and '.join(steering)} say the same thing; keep steering, hand_wheel, or steer_fl and steer_fr"
-        )
+        keep = "keep steering, hand_wheel, or steer_fl and steer_fr"
+        raise ValueError(f"signals: {' and '.join(steering)} say the same thing; {keep}")
     for pair in (("steer_fl", "steer_fr"), ("steer_rl", "steer_rr")):
         given = [name for name in pair if name in signals]
         if len(given) == 1:
@@ -278,40 +248,28 @@ def check_estimators(chosen: Estimators, signals: Mapping[str, Column], vehicle:
             f"schedules.lateral: missing, but estimators.velocity = '{chosen.velocity}' has V_y from nothing else; "
             'add it, such as lateral = "corner-estimation-lateral"'
         )
-    wanted = {name: str(getattr(chosen, name)) for name in chosen.model_fields_set}
-    for place, estimator in wanted.items():
+    for place, estimator in ((name, str(getattr(chosen, name))) for name in chosen.model_fields_set):
+        needs = f"missing, but estimators.{place} = '{estimator}' needs it"
         for parameter, example in _PARAMETERS.get((place, estimator), ()):
             if getattr(vehicle, parameter) is None:
-                raise ValueError(
-                    f"vehicle.{parameter}: missing, but estimators.{place} = '{estimator}' needs it; "
-                    f'add it, such as "{example}"'
-                )
+                raise ValueError(f'vehicle.{parameter}: {needs}; add it, such as "{example}"')
         for signal in _SIGNALS.get((place, estimator), ()):
             if signal not in signals:
-                raise ValueError(
-                    f"signals.{signal}: missing, but estimators.{place} = '{estimator}' needs it; {_add_signal(signal)}"
-                )
-        if (place, estimator) in _STEERED and not any(
-            name in signals for name in ("steering", "hand_wheel", "steer_fl")
-        ):
-            raise ValueError(
-                f"signals.steering: missing, but estimators.{place} = '{estimator}' needs it; {_add_signal('steering')}, "
-                "or hand_wheel, or steer_fl and steer_fr"
-            )
+                raise ValueError(f"signals.{signal}: {needs}; {_add_signal(signal)}")
+        if (place, estimator) in _STEERED and not {"steering", "hand_wheel", "steer_fl"} & signals.keys():
+            add = f"{_add_signal('steering')}, or hand_wheel, or steer_fl and steer_fr"
+            raise ValueError(f"signals.steering: {needs}; {add}")
 
 
 _YAW = ("yaw_inertia", "3900 kg*m^2")
 _STIFFNESS = (_YAW, ("cornering_stiffness_front", "160 kN/rad"), ("cornering_stiffness_rear", "180 kN/rad"))
 _TIRE = (*_STIFFNESS, ("relaxation_length", "0.5 m"))
 _PARAMETERS = {
-    ("lateral_force", "linear"): (_YAW,),
-    ("lateral_force", "unscented"): (_YAW,),
-    ("sideslip", "four-wheel-extended"): _TIRE,
-    ("sideslip", "four-wheel-unscented"): _TIRE,
-    ("sideslip", "adaptive-stiffness"): _STIFFNESS,
-    ("sideslip", "fixed-stiffness"): _STIFFNESS,
+    ("lateral_force", "linear"): (_YAW,), ("lateral_force", "unscented"): (_YAW,),
+    ("sideslip", "four-wheel-extended"): _TIRE, ("sideslip", "four-wheel-unscented"): _TIRE,
+    ("sideslip", "adaptive-stiffness"): _STIFFNESS, ("sideslip", "fixed-stiffness"): _STIFFNESS,
     ("sideslip", "sliding-mode"): _STIFFNESS,
-}
+}  # fmt: skip
 _STEERED = {(place, name) for place, name in _PARAMETERS if place == "sideslip"}
 _SIGNALS = {
     **dict.fromkeys((*_STEERED, ("lateral_force", "linear"), ("lateral_force", "unscented")), ("yaw_rate", "ay")),
@@ -326,7 +284,7 @@ class DriveFile(StrictTable):
     schema_: Literal["gainsmith.drive/1"] = Field(alias="schema", examples=["gainsmith.drive/1"])
     name: str = Field(min_length=1, examples=["brake test"])
     source: str = ""
-    sample_time: Duration = Field(examples=["5 ms"])
+    sample_time: si.Duration = Field(examples=["5 ms"])
     vehicle: Vehicle
     schedules: Schedules
     observer: Observer = Observer()

@@ -15,9 +15,8 @@ from estimators.arrays import FloatArray, IntArray
 from estimators.forces import vertical_loads
 from estimators.pipeline import Check
 from estimators.velocity import slip_ratio
-from studies.drives.baselines import held, integrated_acceleration, mean_over
 from studies.drives.chain import Chain
-from studies.drives.corner_inputs import shared_forces
+from studies.drives.corner_inputs import held, integrated_acceleration, mean_over, shared_forces
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.prepare import CornerInputs
@@ -71,13 +70,9 @@ def deviation(estimate: FloatArray, reference: FloatArray, unit: str) -> Deviati
     rms = float(np.sqrt(np.mean(error**2)))
     peak = float(np.max(np.abs(reference[both])))
     return Deviation(
-        samples=samples,
-        unit=unit,
-        nrms_percent=100.0 * rms / peak if peak > 0 else None,
-        rms=rms,
-        max_error=float(np.max(np.abs(error))),
-        reference_peak=peak,
-    )
+        samples=samples, unit=unit, nrms_percent=100.0 * rms / peak if peak > 0 else None, rms=rms,
+        max_error=float(np.max(np.abs(error))), reference_peak=peak,
+    )  # fmt: skip
 
 
 def lateral_motion(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: DriveFile) -> dict[str, dict[str, Any]]:
@@ -99,9 +94,7 @@ def lateral_motion(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: Dri
 
 def _deviations(estimates: Mapping[str, FloatArray], reference: FloatArray, unit: str) -> dict[str, dict[str, Any]]:
     """Of the estimates that the drive has."""
-    return {
-        name: asdict(deviation(value, reference, unit)) for name, value in estimates.items() if np.isfinite(value).any()
-    }
+    return {name: asdict(deviation(v, reference, unit)) for name, v in estimates.items() if np.isfinite(v).any()}
 
 
 def reference_sideslip(log: DriveLog) -> FloatArray:
@@ -144,8 +137,7 @@ def forces(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: DriveFile) 
     reference, found, car = log.reference, {}, drive.vehicle
     ax, ay = log.signals["ax"], log.signals.get("ay", np.zeros_like(log.time))
     quasi_z = vertical_loads(car.parameters, ax, ay)
-    none = np.zeros(4, dtype=np.bool_)
-    quasi_x = shared_forces(ax, quasi_z, car.mass, np.zeros_like(quasi_z), none)
+    quasi_x = shared_forces(ax, quasi_z, car.mass, np.zeros_like(quasi_z), np.zeros(4, dtype=np.bool_))
     for k, corner in enumerate(CORNERS):
         along = {"pipeline": chain.force_x[:, k], "corner_input": inputs.force[:, k], "quasi_static": quasi_x[:, k]}
         up = {"pipeline": chain.force_z[:, k], "quasi_static": quasi_z[:, k]}
@@ -192,11 +184,10 @@ class DriveData:
     @cached_property
     def baselines(self) -> dict[str, FloatArray]:
         """V_x (n,) without an observer, m/s, by name."""
-        wheels = mean_over(self.inputs.surface_speed)
+        given = self.inputs
+        wheels = mean_over(given.surface_speed)
         start = float(wheels[np.flatnonzero(np.isfinite(wheels))[:1]].sum())
-        integrated = integrated_acceleration(
-            self.inputs.ax, self.inputs.yaw_rate, self.inputs.vy, self.drive.sample_time, start
-        )
+        integrated = integrated_acceleration(given.ax, given.yaw_rate, given.vy, self.drive.sample_time, start)
         return {"mean_wheel_speed": wheels, "integrated_acceleration": integrated}
 
     @cached_property
@@ -233,40 +224,26 @@ def moving_slip(surface_speed: FloatArray, wheel_velocity: FloatArray) -> FloatA
 
 def evaluate(data: DriveData) -> dict[str, Any]:
     """The content of metrics.json: deviations from the references that the log has, counted flags, assumptions."""
-    chain = data.chain
+    chain, used, box = data.chain, data.schedule, data.schedule.parameter
+    schedule = {
+        "name": used.name, "sha256": used.sha256, "sample_time_s": used.sample_time,
+        box.name: {"unit": box.unit, "range": [box.min, box.max], "rate": [box.rate_min, box.rate_max]},
+    }  # fmt: skip
     pipeline: dict[str, Any] = {}
     if chain is not None:
         given = (chain, data.log, data.inputs, data.drive)
         pipeline = {
-            "estimators": data.drive.estimators.model_dump(),
-            "rules": RULES,
-            "notes": notes(data.drive),
-            "signals": lateral_motion(*given) | forces(*given),
-            "flagged_samples": _counts(chain.flags, Flag),
-            "failed_checks": _counts(chain.checks, Check),
-            "assumptions": list(chain.assumptions),
-        }
+            "estimators": data.drive.estimators.model_dump(), "rules": RULES, "notes": notes(data.drive),
+            "signals": lateral_motion(*given) | forces(*given), "flagged_samples": _counts(chain.flags, Flag),
+            "failed_checks": _counts(chain.checks, Check), "assumptions": list(chain.assumptions),
+        }  # fmt: skip
     return {
-        "drive": data.drive.name,
-        "schedule": _schedule_entry(data.schedule),
-        "log": data.log.report,
-        "velocity": _velocity(data),
-        "force": _force(data),
-        "pipeline": pipeline,
-        "flagged_samples": flag_counts(data.replay.flags),
+        "drive": data.drive.name, "schedule": schedule, "log": data.log.report,
+        "velocity": _velocity(data), "force": _force(data), "pipeline": pipeline,
+        "flagged_samples": {name: _counts(data.replay.flags[:, k], Flag) for k, name in enumerate(CORNERS)},
         "force_sources": dict(zip(CORNERS, data.inputs.force_sources, strict=True)),
         "assumptions": [*data.assumptions, *data.inputs.assumptions],
-    }
-
-
-def _schedule_entry(schedule: GainSchedule) -> dict[str, Any]:
-    box = schedule.parameter
-    return {
-        "name": schedule.name,
-        "sha256": schedule.sha256,
-        "sample_time_s": schedule.sample_time,
-        box.name: {"unit": box.unit, "range": [box.min, box.max], "rate": [box.rate_min, box.rate_max]},
-    }
+    }  # fmt: skip
 
 
 def _velocity(data: DriveData) -> dict[str, Any]:
@@ -293,11 +270,7 @@ def _force(data: DriveData) -> dict[str, Any]:
     return found
 
 
-def flag_counts(flags: IntArray) -> dict[str, dict[str, int]]:
-    """How many samples of each corner carry each flag; flags that never rose are left out."""
-    return {corner: _counts(flags[:, k], Flag) for k, corner in enumerate(CORNERS)}
-
-
 def _counts(flags: IntArray, names: type[IntFlag]) -> dict[str, int]:
+    """How many samples carry each flag; flags that never rose are left out."""
     counted = {str(flag.name).lower(): int(np.count_nonzero(flags & flag.value)) for flag in names}
     return {name: count for name, count in counted.items() if count}

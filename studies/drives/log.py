@@ -100,10 +100,8 @@ def resample(time: FloatArray, value: FloatArray, grid: FloatArray, max_gap: flo
     return out
 
 
-LONGEST_GAP = 60.0
-"""s without a row: beyond it the clock has jumped, or it is another drive."""
-MOST_SAMPLES = 5_000_000
-"""Of the common grid, seven hours at 5 ms: all signals are held in memory."""
+LONGEST_GAP = 60.0  # s without a row: beyond it the clock has jumped, or it is another drive
+MOST_SAMPLES = 5_000_000  # of the common grid, seven hours at 5 ms: all signals are held in memory
 
 
 @dataclass(frozen=True)
@@ -151,17 +149,11 @@ def read_log(paths: Sequence[Path], drive: DriveFile) -> DriveLog:
 
     signals, reference = on_grid(drive.signals, "signals"), on_grid(drive.reference, "reference")
     check_plausible(drive, signals, reference, {name: path.name for name, path in files.items()})
+    missing = {name: int(np.count_nonzero(np.isnan(value))) for name, value in {**reference, **signals}.items()}
     report["grid"] = {
-        "samples": int(grid.size),
-        "sample_time_s": drive.sample_time,
-        "start_s": float(grid[0]),
-        "end_s": float(grid[-1]),
-        "missing_samples": {
-            name: int(np.count_nonzero(np.isnan(value)))
-            for name, value in {**reference, **signals}.items()
-            if np.isnan(value).any()
-        },
-    }
+        "samples": int(grid.size), "sample_time_s": drive.sample_time, "start_s": float(grid[0]),
+        "end_s": float(grid[-1]), "missing_samples": {name: count for name, count in missing.items() if count},
+    }  # fmt: skip
     return DriveLog(time=grid, signals=signals, reference=reference, report=report)
 
 
@@ -187,9 +179,8 @@ def assign_files(paths: Sequence[Path], entries: Sequence[LogFile]) -> dict[str,
         if len(matching) != 1:
             wanted = f"one file like '{entry.file}'" if entry.file else "one file"
             got = ", ".join(path.name for path in matching or paths) or "none"
-            fits = (
-                "" if matching else ", which is none" if all(path.is_file() for path in paths) else ", with none in it"
-            )
+            empty = ", which is none" if all(path.is_file() for path in paths) else ", with none in it"
+            fits = "" if matching else empty
             raise LogError(
                 f"log '{entry.name}' needs {wanted}, given: {got}{fits}; "
                 f"name one file for each log, or correct file of log '{entry.name}' in the drive file"
@@ -266,10 +257,8 @@ def _clock_offsets(drive: DriveFile, tracks: dict[str, _Track], report: dict[str
         offsets[entry.name] = offsets[entry.align.to] + sign * found.seconds
         report["logs"][entry.name]["clock_offset_s"] = offsets[entry.name]
         report["logs"][entry.name]["alignment"] = {
-            "to": entry.align.to,
-            "correlation": found.correlation,
-            "slope": found.slope,
-        }
+            "to": entry.align.to, "correlation": found.correlation, "slope": found.slope,
+        }  # fmt: skip
     return offsets
 
 

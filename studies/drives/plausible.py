@@ -37,16 +37,12 @@ LIMITS: dict[str, Limit] = {
     **dict.fromkeys((f"torque_{corner}" for corner in CORNERS), Limit(50e3, ("N*m",))),
 }
 QUANTILE = 99.0
-FAST = 5.0
-"""m/s of V_x above which wheels roll: a start or a stop says little about units."""
-ROLLING = (0.7, 1.4)
-"""R_e w / V_x of all wheels, at the median of a drive."""
-ONE_WHEEL = (0.4, 2.5)
-"""The same of one wheel among good ones, which may spin or slide for most of a drive."""
+FAST = 5.0  # m/s of V_x above which wheels roll: a start or a stop says little about units
+ROLLING = (0.7, 1.4)  # R_e w / V_x of all wheels, at the median of a drive
+ONE_WHEEL = (0.4, 2.5)  # the same of one wheel among good ones, which may spin or slide for most of a drive
 STANDING = 0.012
 """R_e w / V_x below which a wheel is locked or its sensor dead: a fault, not a unit (the smallest one is 0.0175)."""
-ENOUGH = 20
-"""Samples of a wheel that make a median."""
+ENOUGH = 20  # samples of a wheel that make a median
 
 
 def check_plausible(
@@ -86,9 +82,8 @@ def _check_rolling(
     fast = np.isfinite(vx) & (vx > FAST)
     ratio = surface[fast] / vx[fast, None]
     turning = np.isfinite(ratio) & (np.abs(ratio) > STANDING)
-    median = np.array(
-        [np.median(r[t]) if t.sum() >= ENOUGH else np.nan for r, t in zip(ratio.T, turning.T, strict=True)]
-    )
+    medians = (np.median(r[t]) if t.sum() >= ENOUGH else np.nan for r, t in zip(ratio.T, turning.T, strict=True))
+    median = np.array(list(medians))
     known = np.isfinite(median)
     strange = known & ~((median >= ONE_WHEEL[0]) & (median <= ONE_WHEEL[1]))
     if strange.any() and not strange[known].all():
@@ -113,9 +108,7 @@ def _odd_wheel(
     if not fitting and whole:
         given = factor_to(velocity.unit, "m/s")
         units = ("m/s", "km/h", "mph")
-        fitting = [
-            f'unit = "{unit}" for reference.vx' for unit in units if _rolls(ratio * given / factor_to(unit, "m/s"))
-        ]
+        fitting = [f'unit = "{u}" for reference.vx' for u in units if _rolls(ratio * given / factor_to(u, "m/s"))]
     if not fitting and _rolls(-ratio):
         fitting = [f'sign = "{"positive" if column.sign == "negative" else "negative"}"']
     return (

@@ -8,15 +8,9 @@ from functools import partial
 import numpy as np
 
 from estimators.arrays import FloatArray
+from studies.drives import evaluation
 from studies.drives.chain import Chain
-from studies.drives.evaluation import (
-    AXLES,
-    LEAST_SPEED,
-    DriveData,
-    quasi_static_axle_forces,
-    reference_axle_force,
-    reference_sideslip,
-)
+from studies.drives.evaluation import AXLES, DriveData
 from studies.drives.quantities import CORNERS
 from studies.plots import ZERO, Figure, Line, Mark, Panel, colours
 
@@ -94,7 +88,7 @@ def lateral(data: DriveData, chain: Chain) -> Figure:
     if "vy" in reference:
         sideways.append(REFERENCE(time, reference["vy"]))
         if "vx" in reference:
-            angles.append(REFERENCE(time, np.degrees(reference_sideslip(data.log))))
+            angles.append(REFERENCE(time, np.degrees(evaluation.reference_sideslip(data.log))))
     if np.isfinite(chain.corner_vy).any():
         sideways.append(ESTIMATE(time, chain.corner_vy))
     sideways.append(PIPELINE(time, chain.vy))
@@ -108,11 +102,11 @@ def lateral(data: DriveData, chain: Chain) -> Figure:
 
 def axle_forces(data: DriveData, chain: Chain) -> Figure:
     """F_y of each axle, and what its share of m a_y is."""
-    time, rigid = data.log.time, quasi_static_axle_forces(data.log, data.drive)
+    time, rigid = data.log.time, evaluation.quasi_static_axle_forces(data.log, data.drive)
     scale, unit = _force_unit(chain.axle_force_y)
     panels = []
     for k, axle in enumerate(AXLES):
-        reference = reference_axle_force(data.log, axle)
+        reference = evaluation.reference_axle_force(data.log, axle)
         marks: list[Mark] = [] if reference is None else [REFERENCE(time, reference / scale)]
         marks += [QUASI_STATIC(time, rigid[:, k] / scale), PIPELINE(time, chain.axle_force_y[:, k] / scale)]
         panels.append((f"lateral force ({unit})", marks))
@@ -140,7 +134,7 @@ def _measured(data: DriveData, name: str, scale: float) -> list[Mark]:
 
 def _while_driving(chain: Chain, value: FloatArray) -> FloatArray:
     """NaN at standstill, where slips and angles mean nothing."""
-    return np.where(np.abs(chain.vx) >= LEAST_SPEED, value, np.nan)
+    return np.where(np.abs(chain.vx) >= evaluation.LEAST_SPEED, value, np.nan)
 
 
 def _force_unit(force: FloatArray) -> tuple[float, str]:

@@ -71,29 +71,15 @@ def corner_inputs_of(log: DriveLog, drive: DriveFile) -> CornerInputs:
     wheel_acceleration = rate(wheel_speed)
     load = vertical_loads(car.parameters, ax, ay)
     force, sources = _forces(log, drive, wheel_speed, wheel_acceleration, load, radius)
-    free, per_speed = corner_acceleration_by_speed(
-        car.parameters, ax, ay, yaw_rate, rate(yaw_rate), vy, steer, rate(steer)
-    )
+    turning = yaw_rate, rate(yaw_rate)
+    free, per_speed = corner_acceleration_by_speed(car.parameters, ax, ay, *turning, vy, steer, rate(steer))
     return CornerInputs(
-        time=log.time,
-        wheel_speed=wheel_speed,
-        radius=radius,
-        wheel_acceleration=wheel_acceleration,
-        vertical_load=load,
-        force=force,
-        normalised_force=corner_inputs.normalised_forces(force, load, car.mass * GRAVITY / 4),
-        free=free,
-        per_speed=per_speed,
-        steer=steer,
-        yaw_rate=yaw_rate,
-        ax=ax,
-        ay=ay,
-        vy=vy,
-        x=car.parameters.corner_x,
-        y=car.parameters.corner_y,
-        force_sources=sources,
-        assumptions=tuple(assumptions),
-    )
+        time=log.time, wheel_speed=wheel_speed, radius=radius, wheel_acceleration=wheel_acceleration,
+        vertical_load=load, force=force,
+        normalised_force=corner_inputs.normalised_forces(force, load, car.mass * GRAVITY / 4), free=free,
+        per_speed=per_speed, steer=steer, yaw_rate=yaw_rate, ax=ax, ay=ay, vy=vy, x=car.parameters.corner_x,
+        y=car.parameters.corner_y, force_sources=sources, assumptions=tuple(assumptions),
+    )  # fmt: skip
 
 
 def _four(log: DriveLog, name: str) -> FloatArray:
@@ -116,25 +102,14 @@ def _steer(log: DriveLog, drive: DriveFile, assumptions: list[str]) -> FloatArra
 
 
 def _forces(
-    log: DriveLog,
-    drive: DriveFile,
-    wheel_speed: FloatArray,
-    wheel_acceleration: FloatArray,
-    load: FloatArray,
-    radius: FloatArray,
+    log: DriveLog, drive: DriveFile, wheel_speed: FloatArray, dw: FloatArray, load: FloatArray, radius: FloatArray
 ) -> tuple[FloatArray, tuple[str, ...]]:
     """F_x per corner: wheel dynamics where the torque is known, what is left of m a_x shared by load elsewhere."""
     car = drive.vehicle
     dynamics = corner_inputs.wheel_forces(
-        _four(log, "torque"),
-        wheel_speed,
-        wheel_acceleration,
-        load,
-        car.wheel_inertia or 0.0,
-        radius,
-        car.rolling_resistance,
-        drive.observer.stopped_below,
-    )
+        _four(log, "torque"), wheel_speed, dw, load, car.wheel_inertia or 0.0, radius,
+        car.rolling_resistance, drive.observer.stopped_below,
+    )  # fmt: skip
     known = np.array([f"torque_{corner}" in log.signals for corner in CORNERS])
     sources = tuple("wheel dynamics" if k else "m*a_x shared by load" for k in known)
     if known.all():

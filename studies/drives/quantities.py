@@ -15,8 +15,7 @@ from typing import Annotated
 import pint
 from pydantic import BeforeValidator
 
-CORNERS = ("fl", "fr", "rl", "rr")
-"""Corner order of every array: front left, front right, rear left, rear right."""
+CORNERS = ("fl", "fr", "rl", "rr")  # corner order of every array: front left, front right, rear left, rear right
 
 
 def _corners(name: str, unit: str) -> dict[str, str]:
@@ -24,48 +23,25 @@ def _corners(name: str, unit: str) -> dict[str, str]:
 
 
 SIGNALS: dict[str, str] = {
-    **_corners("wheel_speed", "rad/s"),
-    **_corners("steer", "rad"),
-    **_corners("torque", "N*m"),
-    "steering": "rad",
-    "hand_wheel": "rad",
-    "ax": "m/s^2",
-    "ay": "m/s^2",
-    "az": "m/s^2",
-    "yaw_rate": "rad/s",
-    "roll_rate": "rad/s",
-    "pitch_rate": "rad/s",
-    "vy": "m/s",
-}
+    **_corners("wheel_speed", "rad/s"), **_corners("steer", "rad"), **_corners("torque", "N*m"), "steering": "rad",
+    "hand_wheel": "rad", "ax": "m/s^2", "ay": "m/s^2", "az": "m/s^2", "yaw_rate": "rad/s", "roll_rate": "rad/s",
+    "pitch_rate": "rad/s", "vy": "m/s",
+}  # fmt: skip
 """What the observers may use, and its SI unit."""
 
 REFERENCES: dict[str, str] = {
-    "vx": "m/s",
-    "vy": "m/s",
-    "ax": "m/s^2",
-    "yaw_rate": "rad/s",
-    **_corners("force_x", "N"),
-    **_corners("force_y", "N"),
-    **_corners("force_z", "N"),
-}
+    "vx": "m/s", "vy": "m/s", "ax": "m/s^2", "yaw_rate": "rad/s", **_corners("force_x", "N"),
+    **_corners("force_y", "N"), **_corners("force_z", "N"),
+}  # fmt: skip
 """What the estimates may be judged against, and its SI unit; never an input."""
 
 _UNIT = re.compile(r"(1/)?[A-Za-zµ°][A-Za-zµ°_]*([*/ ]+[A-Za-zµ°][A-Za-zµ°_]*|(\^|\*\*)-?[0-9])*")
 _QUANTITY = re.compile(r"\s*([-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]{1,3})?)\s*(.*?)\s*")
 _EXAMPLES = {
-    "s": "s, ms, us, min",
-    "Hz": "Hz, kHz",
-    "rad": "rad, deg",
-    "rad/s": "rad/s, deg/s, rpm",
-    "m/s": "m/s, km/h, mph",
-    "m/s^2": "m/s^2, standard_gravity",
-    "N": "N, kN",
-    "N/rad": "N/rad, kN/rad",
-    "N*m": "N*m, kN*m",
-    "kg": "kg, t",
-    "kg*m^2": "kg*m^2",
-    "m": "m, cm, mm",
-}
+    "s": "s, ms, us, min", "Hz": "Hz, kHz", "rad": "rad, deg", "rad/s": "rad/s, deg/s, rpm", "m/s": "m/s, km/h, mph",
+    "m/s^2": "m/s^2, standard_gravity", "N": "N, kN", "N/rad": "N/rad, kN/rad", "N*m": "N*m, kN*m", "kg": "kg, t",
+    "kg*m^2": "kg*m^2", "m": "m, cm, mm",
+}  # fmt: skip
 
 
 @functools.cache

@@ -13,9 +13,10 @@ from estimators.pipeline import CornerSample
 from estimators.pipeline.corner_kinds import CornerKind
 from estimators.velocity import slip_ratio
 from estimators.velocity.mapping import weighed
-from studies.drives.baselines import held, mean_over
+from studies.drives.corner_inputs import held, mean_over
 from studies.drives.prepare import CornerInputs
 
+Progress = Callable[[float], None]  # called with the fraction done
 PROGRESS_STEPS = 50
 
 
@@ -34,7 +35,7 @@ class Replay:
     flags: IntArray
 
 
-def replay(inputs: CornerInputs, observer: CornerKind, progress: Callable[[float], None] | None = None) -> Replay:
+def replay(inputs: CornerInputs, observer: CornerKind, progress: Progress = lambda _done: None) -> Replay:
     """Run the four observers; V_x of the last step enters the corner accelerations of the next, P1 notes 6.
 
     They start at rest relative to the road (z = v_r = 0) with the first sample. Wheel accelerations are backward
@@ -55,7 +56,7 @@ def replay(inputs: CornerInputs, observer: CornerKind, progress: Callable[[float
         relative[k], innovation[k], flags[k] = step.relative_velocity, step.innovation, step.flags
         seen = cg_velocity(gain[k] * (surface[k] - relative[k]) + shift[k])
         vx = float(seen) if np.isfinite(seen) else vx
-        if progress is not None and k % max(1, n // PROGRESS_STEPS) == 0:
+        if k % max(1, n // PROGRESS_STEPS) == 0:
             progress(k / n)
     corner = gain * (surface - relative) + shift
     return Replay(cg_velocity(corner), corner, relative, innovation, flags)

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from estimators.arrays import AnyArray
-from studies.drives.chain import Chain, Progress, pipeline_of, run_chain
+from studies.drives.chain import Chain, pipeline_of, run_chain
 from studies.drives.drive_file import read_drive
 from studies.drives.evaluation import DriveData, evaluate
 from studies.drives.log import read_log
 from studies.drives.plots import figures
 from studies.drives.prepare import corner_inputs_of
 from studies.drives.quantities import CORNERS
-from studies.drives.replay import replay
+from studies.drives.replay import Progress, replay
 from studies.drives.schedules import check_radii, corner_observer, load_schedule
 from studies.execution.files import check_folder, ready_folder, write_csv, write_json
 from studies.plots.save import write_figures
@@ -74,17 +74,12 @@ def estimate_columns(data: DriveData) -> Columns:
     """The columns of estimates.csv, SI, the unit in every name."""
     columns: Columns = {"time_s": data.log.time, "vx_mps": data.replay.velocity}
     columns |= {f"vx_{name}_mps": value for name, value in data.baselines.items()}
-    per_corner = {
-        "vx_{}_mps": data.replay.corner_velocity,
-        "relative_velocity_{}_mps": data.replay.relative_velocity,
-        "slip_{}": data.slip,
-        "force_x_{}_N": data.inputs.force,
-        "force_z_{}_N": data.inputs.vertical_load,
-        "normalised_force_{}": data.inputs.normalised_force,
-        "innovation_{}": data.replay.innovation,
+    columns |= _by_corner({
+        "vx_{}_mps": data.replay.corner_velocity, "relative_velocity_{}_mps": data.replay.relative_velocity,
+        "slip_{}": data.slip, "force_x_{}_N": data.inputs.force, "force_z_{}_N": data.inputs.vertical_load,
+        "normalised_force_{}": data.inputs.normalised_force, "innovation_{}": data.replay.innovation,
         "flags_{}": data.replay.flags,
-    }
-    columns |= _by_corner(per_corner)
+    })  # fmt: skip
     if data.chain is not None:
         columns |= chain_columns(data.chain)
     units = {"v": "mps", "a": "mps2", "y": "radps", "f": "N"}
@@ -95,23 +90,16 @@ def estimate_columns(data: DriveData) -> Columns:
 def chain_columns(chain: Chain) -> Columns:
     """The pipeline's columns of estimates.csv; those of parts that a drive did not ask for are left out."""
     columns: Columns = {
-        "pipeline_vx_mps": chain.vx,
-        "pipeline_vy_mps": chain.vy,
-        "pipeline_sideslip_rad": chain.sideslip,
-        "pipeline_force_y_front_N": chain.axle_force_y[:, 0],
-        "pipeline_force_y_rear_N": chain.axle_force_y[:, 1],
-        "pipeline_flags": chain.flags,
-        "pipeline_checks": chain.checks,
-    }
+        "pipeline_vx_mps": chain.vx, "pipeline_vy_mps": chain.vy, "pipeline_sideslip_rad": chain.sideslip,
+        "pipeline_force_y_front_N": chain.axle_force_y[:, 0], "pipeline_force_y_rear_N": chain.axle_force_y[:, 1],
+        "pipeline_flags": chain.flags, "pipeline_checks": chain.checks,
+    }  # fmt: skip
     parts = {"sideslip_part_rad": chain.sideslip_part, "corner_observers_vy_mps": chain.corner_vy}
     columns |= {name: value for name, value in parts.items() if np.isfinite(value).any()}
-    per_corner = {
-        "pipeline_force_x_{}_N": chain.force_x,
-        "pipeline_force_z_{}_N": chain.force_z,
-        "pipeline_slip_{}": chain.slip,
+    columns |= _by_corner({
+        "pipeline_force_x_{}_N": chain.force_x, "pipeline_force_z_{}_N": chain.force_z, "pipeline_slip_{}": chain.slip,
         "pipeline_slip_angle_{}_rad": chain.slip_angle,
-    }
-    columns |= _by_corner(per_corner)
+    })  # fmt: skip
     return columns
 
 

@@ -19,10 +19,8 @@ _TIRE = {"sigma0": "sigma0", "sigma1": "sigma1", "sigma2": "sigma2", "kappa": "k
 Direction = Literal["longitudinal", "lateral"]
 OTHER_WHEEL = 0.10
 """Share by which a radius of the car may differ from that of a schedule: beyond it the schedule is another car's."""
-OTHER_PAIR = 0.01
-"""Share by which the radii of a longitudinal and a lateral schedule may differ: they are of one car."""
-SAME_WHEEL = 1e-3
-"""Share below which two radii are the same one, rounded."""
+OTHER_PAIR = 0.01  # share by which the radii of a longitudinal and a lateral schedule may differ: they are of one car
+SAME_WHEEL = 1e-3  # share below which two radii are the same one, rounded
 
 
 def load_schedule(name: str, folder: Path, sample_time: float, direction: Direction = "longitudinal") -> GainSchedule:
@@ -72,22 +70,20 @@ def check_radii(drive: DriveFile, folder: Path) -> tuple[str, ...]:
     if drive.schedules.lateral is not None:
         named["lateral"] = drive.schedules.lateral
     found = {direction: _radius(name, folder, direction) for direction, name in named.items()}
-    assumptions = []
+    assumed = []
     for direction, radius in found.items():
         name = named[direction]
         if radius is None:
-            assumptions.append(
-                f"{direction} schedule '{name}' does not say for which effective_radius: taken as fitting"
-            )
+            assumed.append(f"{direction} schedule '{name}' does not say for which effective_radius: taken as fitting")
         else:
-            assumptions += _against_car(drive, direction, name, radius)
+            assumed += _against_car(drive, direction, name, radius)
     along, across = found["longitudinal"], found.get("lateral")
     if along is not None and across is not None and abs(across / along - 1.0) > OTHER_PAIR:
         raise SpecError(
             f"schedules: '{named['longitudinal']}' is for effective_radius = {along:g} m, "
             f"'{named['lateral']}' for {across:g} m; name two schedules of one car"
         )
-    return tuple(assumptions)
+    return tuple(assumed)
 
 
 def _against_car(drive: DriveFile, direction: Direction, name: str, radius: float) -> list[str]:

@@ -56,9 +56,8 @@ class Cluster:
             try:
                 threads = sum(client.nthreads().values())
                 if not threads:
-                    raise SpecError(
-                        f"--scheduler {self.address}: has no workers; start some with dask worker {self.address}"
-                    )
+                    remedy = f"start some with dask worker {self.address}"
+                    raise SpecError(f"--scheduler {self.address}: has no workers; {remedy}")
                 sent = client.submit(_same, shared, pure=False)  # once; made again if its worker is lost
                 left = iter(tasks)
 
@@ -73,9 +72,8 @@ class Cluster:
                     for more in islice(left, 1):
                         running.add(submit(more))
             except KilledWorker as error:
-                raise SpecError(
-                    f"--scheduler {self.address}: {error}; finished chunks are kept, use --resume"
-                ) from None
+                kept = "finished chunks are kept, use --resume"
+                raise SpecError(f"--scheduler {self.address}: {error}; {kept}") from None
             finally:
                 client.close(timeout=ANSWER)
 

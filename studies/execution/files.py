@@ -1,7 +1,8 @@
-"""Files and folders that are there whole or not at all: written beside their place, then renamed."""
+"""Files and folders that are there whole or not at all: written beside their place, then renamed; and a lock on a folder."""
 
 from __future__ import annotations
 
+import fcntl
 import json
 import math
 import os
@@ -19,7 +20,7 @@ from estimators.arrays import AnyArray
 from studies.claim import JsonValue
 from synthesis.errors import SpecError
 
-UNFINISHED = ".unfinished-"
+UNFINISHED, LOCK = ".unfinished-", ".lock"
 
 
 def check_folder(out: Path) -> None:
@@ -143,3 +144,24 @@ def _named(path: Path) -> Iterator[None]:
     except OSError as error:
         error.filename = error.filename or str(path)
         raise
+
+
+@contextmanager
+def only_run(folder: Path, busy: str = "another run writes here (process {holder})") -> Iterator[None]:
+    """Hold ``folder`` for this process; SpecError with the sentence ``busy`` when another process holds it.
+
+    A record lock belongs to the process: the system takes it back however the process ends, and forked workers do not
+    inherit it.
+    """
+    with (folder / LOCK).open("a+", encoding="ascii") as file:
+        try:
+            fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            file.seek(0)
+            words = busy.format(holder=file.read().strip() or "unknown")
+            raise SpecError(f"{folder}: {words}; wait for it or give another --out") from error
+        file.seek(0)
+        file.truncate()
+        file.write(str(os.getpid()))
+        file.flush()
+        yield

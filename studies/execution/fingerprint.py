@@ -32,8 +32,8 @@ class Sources:
     def __init__(self, root: Path = SOURCE_ROOT, packages: Iterable[str] = PACKAGES) -> None:
         self.root, self.packages = root, tuple(packages)
         self._file = cache(self._find)
-        self._digests: dict[Path, str] = {}
-        self._parsed: dict[str, frozenset[str]] = {}
+        self._digest = cache(lambda path: sha256(path.read_bytes()).hexdigest())
+        self._imports = cache(self._imported)
 
     def fingerprint(self, scope: object, modules: Iterable[str]) -> str:
         """Hexadecimal SHA-256 over what ``modules`` reach, the libraries and ``scope``.
@@ -69,11 +69,6 @@ class Sources:
         path = self.root.joinpath(*name.split("."))
         return next((file for file in (path.with_suffix(".py"), path / "__init__.py") if file.is_file()), None)
 
-    def _digest(self, path: Path) -> str:
-        if path not in self._digests:
-            self._digests[path] = sha256(path.read_bytes()).hexdigest()
-        return self._digests[path]
-
     def _data(self, folder: Path) -> Iterator[Path]:
         for path in folder.iterdir():
             if path.suffix in DATA:
@@ -81,19 +76,17 @@ class Sources:
             elif path.is_dir() and path.name[0] not in "._" and not any(path.glob("*.py")):
                 yield from self._data(path)
 
-    def _imports(self, name: str) -> frozenset[str]:
+    def _imported(self, name: str) -> frozenset[str]:
         """Own modules that a module imports."""
-        if name not in self._parsed:
-            found: set[str] = set()
-            if (file := self._file(name)) is not None:
-                text = file.read_text(encoding="utf-8")
-                found.update(named for named in QUOTED.findall(text) if self._file(named))
-                home = name if file.name == "__init__.py" else name.rpartition(".")[0]
-                with suppress(SyntaxError):  # half-edited: its text counts, it imports nothing
-                    for node in _imports_of(ast.parse(text)):
-                        found.update(self._targets(node, home))
-            self._parsed[name] = frozenset(found)
-        return self._parsed[name]
+        found: set[str] = set()
+        if (file := self._file(name)) is not None:
+            text = file.read_text(encoding="utf-8")
+            found.update(named for named in QUOTED.findall(text) if self._file(named))
+            home = name if file.name == "__init__.py" else name.rpartition(".")[0]
+            with suppress(SyntaxError):  # half-edited: its text counts, it imports nothing
+                for node in _imports_of(ast.parse(text)):
+                    found.update(self._targets(node, home))
+        return frozenset(found)
 
     def _targets(self, node: ast.Import | ast.ImportFrom, home: str) -> Iterator[str]:
         if isinstance(node, ast.Import):

@@ -61,11 +61,7 @@ class Processes:
     """
 
     def __init__(
-        self,
-        workers: int,
-        ahead: int = 3,
-        once: bool = False,
-        watch: Callable[[list[Any]], None] = lambda _: None,
+        self, workers: int, ahead: int = 3, once: bool = False, watch: Callable[[list[Any]], None] = lambda _: None
     ) -> None:
         self.workers, self.ahead, self.once, self.watch = workers, 1 if once else ahead, once, watch
 

@@ -23,23 +23,13 @@ file, and scales of its sensors: a stiffness is in units of their forces.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from estimators.arrays import FloatArray, IntArray
 
 
-@dataclass(frozen=True)
-class LongRun:
-    """Omega (p, p) and the bandwidth L in samples."""
-
-    covariance: FloatArray
-    bandwidth: int
-
-
-def long_run_covariance(scores: FloatArray, least_bandwidth: int) -> LongRun:
-    """Of the scores (n, p) over all n instants in time order; zero where nothing was used.
+def long_run_covariance(scores: FloatArray, least_bandwidth: int) -> tuple[FloatArray, int]:
+    """Omega (p, p) and bandwidth L, samples, of the scores (n, p) over all n instants in time order; zero where nothing was used.
 
     ``least_bandwidth`` is the correlation length that the prefilter alone brings, samples.
     """
@@ -50,7 +40,7 @@ def long_run_covariance(scores: FloatArray, least_bandwidth: int) -> LongRun:
     for lag in range(1, min(bandwidth, len(scores) - 1) + 1):
         gamma = scores[:-lag].T @ scores[lag:]
         omega += (1 - lag / (bandwidth + 1)) * (gamma + gamma.T)
-    return LongRun(omega * n / max(n - scores.shape[1], 1), bandwidth)
+    return omega * n / max(n - scores.shape[1], 1), bandwidth
 
 
 def _andrews(scores: FloatArray, n: int) -> float:
@@ -75,7 +65,7 @@ def correlation_time(residual: FloatArray, least_bandwidth: int) -> float:
     """
     total = residual.sum(axis=1, keepdims=True)
     power = float(np.sum(residual**2))
-    return float(long_run_covariance(total, least_bandwidth).covariance[0, 0]) / power if power > 0 else 1.0
+    return float(long_run_covariance(total, least_bandwidth)[0][0, 0]) / power if power > 0 else 1.0
 
 
 def effective_stretches(influence: FloatArray, rows: IntArray, length: int) -> FloatArray:

@@ -33,8 +33,7 @@ from studies.identify.prefilter import Prefilter, first_order_lag
 from studies.identify.settings import IdentifySettings
 from synthesis.models.parameter_set import Tire
 
-MOST_USED = 0.9
-"""s |mu| above this is a sliding wheel: no slip velocity belongs to its force."""
+MOST_USED = 0.9  # s |mu| above this is a sliding wheel: no slip velocity belongs to its force
 MOST_DAMPING = 0.01
 """s: bristles of rubber rest within a few ms; more is noise of the regressor that a slow filter would take away."""
 

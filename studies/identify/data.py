@@ -78,17 +78,9 @@ def drive_signals(log: DriveLog, drive: DriveFile, settings: IdentifySettings) -
     light = inputs.vertical_load < settings.least_load * drive.vehicle.mass * GRAVITY / 4
     slow = ~(np.abs(vx) >= settings.least_speed)
     signals = DriveSignals(
-        drive,
-        inputs,
-        prefilter,
-        vx,
-        vy,
-        measured is not None,
-        ay,
-        yaw_rate,
-        torque,
+        drive, inputs, prefilter, vx, vy, measured is not None, ay, yaw_rate, torque,
         held | light | slow[:, None] | ~known[:, None],
-    )
+    )  # fmt: skip
     _refuse_short(signals, slow | ~known, settings)
     return signals
 

@@ -22,6 +22,8 @@ from scipy.stats import t as student
 from estimators.arrays import BoolArray, FloatArray
 from studies.identify.autocorrelation import correlation_time, effective_stretches, long_run_covariance
 
+Residual = Callable[[Mapping[str, float]], FloatArray]  # rows (n, k) of the values by name
+
 
 @dataclass(frozen=True)
 class Unknown:
@@ -123,11 +125,8 @@ class Estimate:
         return self.unknowns[i].value(float(self.x[i]) - half), self.unknowns[i].value(float(self.x[i]) + half)
 
 
-PASSES = 2
-"""The first weighs the priors by a guess of the residual, the second by the residual of the first."""
-
-COMMON = 4.0
-"""Stretches that the common residual size counts as, where the few that tell a parameter have residuals of their own."""
+PASSES = 2  # the first weighs the priors by a guess of the residual, the second by the residual of the first
+COMMON = 4.0  # stretches that the common residual size counts as, where the few that tell a parameter have residuals of their own
 
 STOP: tuple[Any, ...] = ({"xtol": 1e-4, "ftol": 1e-3, "max_nfev": 40}, {"xtol": 1e-5, "ftol": 3e-5, "max_nfev": 40})
 """Of each pass. A few hundred independent rows: what is left below ``ftol`` is worth a hundredth of a standard deviation."""
@@ -150,7 +149,7 @@ class Rules:
 
 @dataclass(frozen=True)
 class _Problem:
-    residual: Callable[[Mapping[str, float]], FloatArray]
+    residual: Residual
     mask: BoolArray
     unknowns: tuple[Unknown, ...]
     rules: Rules
@@ -186,7 +185,7 @@ class _Problem:
 
 
 def estimate(
-    residual: Callable[[Mapping[str, float]], FloatArray],
+    residual: Residual,
     mask: BoolArray,
     unknowns: Sequence[Unknown],
     rules: Rules,
@@ -266,7 +265,7 @@ def _covariance(problem: _Problem, active: BoolArray, x: FloatArray) -> Estimate
     size, time = problem.size(x)
     singular = np.linalg.svd(jacobian, compute_uv=False) / (size * np.sqrt(time))
     free, held = np.flatnonzero(active), np.flatnonzero(~active)
-    covariance = np.diag(np.ones(x.size))
+    covariance = np.eye(x.size)
     rows = np.nonzero(mask)[0]
     freedom = max(e.size / time - free.size, 2.0)
     factors = np.full(x.size, student.ppf(0.5 + problem.rules.confidence / 2, freedom))
@@ -274,7 +273,7 @@ def _covariance(problem: _Problem, active: BoolArray, x: FloatArray) -> Estimate
         J = jacobian[:, free]
         scores = np.zeros((mask.shape[0], free.size))
         np.add.at(scores, rows, J * e[:, None])
-        run = long_run_covariance(scores, problem.rules.correlation)
+        omega, bandwidth = long_run_covariance(scores, problem.rules.correlation)
         informed = np.array([problem.unknowns[i].informed for i in free], dtype=float)
         prior = np.diag(informed * size**2 * time)
         weak = 1e-6 * size**2 * np.eye(free.size)  # a direction of which nothing is known gets a thousand spreads
@@ -283,21 +282,24 @@ def _covariance(problem: _Problem, active: BoolArray, x: FloatArray) -> Estimate
         certain = np.sqrt(np.diag(prior) * size**2 * time + 1e-6 * size**4)[:, None] * inverse
         influence = J @ inverse
         known, white = certain.T @ certain, size**2 * time * influence.T @ influence
-        robust = inverse.T @ run.covariance @ inverse
+        robust = inverse.T @ omega @ inverse
         considered = np.array([problem.unknowns[i].considered for i in held])
         pull = inverse @ J.T @ (jacobian[:, held] * considered)
         sure = np.diag(known) + np.sum(pull**2, axis=1)
-        stretches = effective_stretches(influence, rows, max(run.bandwidth, problem.rules.correlation))
-        confidence = problem.rules.confidence
-        plain = _half_width(np.diag(white), sure, freedom, confidence)
-        both = np.minimum(freedom, stretches + COMMON)
-        pooled = np.diag(white) + (np.diag(robust) - np.diag(white)) * stretches / (stretches + COMMON)
-        wide = np.maximum(
-            _half_width(np.diag(robust), sure, freedom, confidence), _half_width(pooled, sure, both, confidence)
-        )
-        grown = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(white), 1e-300), 1.0))
+        stretches = effective_stretches(influence, rows, max(bandwidth, problem.rules.correlation))
+
+        def half_width(estimated: FloatArray, freedom: FloatArray | float) -> FloatArray:
+            """Of variances that are in part estimated: the rest has no degrees of freedom to lose (Satterthwaite 1946)."""
+            whole = np.maximum(estimated + sure, 1e-300)
+            each = np.maximum(freedom / np.clip(estimated / whole, 1e-3, 1.0) ** 2, 1.0)
+            return np.asarray(student.ppf(0.5 + problem.rules.confidence / 2, each) * np.sqrt(whole))
+
+        plain, own = np.diag(white), np.diag(robust)
+        pooled = plain + (own - plain) * stretches / (stretches + COMMON)
+        wide = np.maximum(half_width(own, freedom), half_width(pooled, np.minimum(freedom, stretches + COMMON)))
+        grown = np.sqrt(np.maximum(own / np.maximum(plain, 1e-300), 1.0))
         covariance[np.ix_(free, free)] = white * np.outer(grown, grown) + known + pull @ pull.T
-        factors[free] = np.maximum(plain, wide) / np.sqrt(np.diag(covariance)[free])
+        factors[free] = np.maximum(half_width(plain, freedom), wide) / np.sqrt(np.diag(covariance)[free])
     half = factors * np.sqrt(np.diag(covariance)) * spread
     covariance *= np.outer(spread, spread)
     out = np.full(mask.shape, np.nan)
@@ -310,24 +312,13 @@ def _covariance(problem: _Problem, active: BoolArray, x: FloatArray) -> Estimate
     )  # fmt: skip
 
 
-def _half_width(estimated: FloatArray, sure: FloatArray, freedom: FloatArray | float, confidence: float) -> FloatArray:
-    """Of variances that are in part estimated: the rest has no degrees of freedom to lose (Satterthwaite 1946)."""
-    whole = np.maximum(estimated + sure, 1e-300)
-    each = np.maximum(freedom / np.clip(estimated / whole, 1e-3, 1.0) ** 2, 1.0)
-    return np.asarray(student.ppf(0.5 + confidence / 2, each) * np.sqrt(whole))
-
-
 def _nothing(problem: _Problem) -> Estimate:
     """No row is usable: everything is its prior, nothing is excited."""
     factor = float(student.ppf(0.5 + problem.rules.confidence / 2, 1e6))
     names = [u.name for u in problem.unknowns]
     half = {u.name: factor * u.spread for u in problem.unknowns}
-    empty, covariance, off = (
-        np.full(problem.mask.shape, np.nan),
-        np.diag(problem.spread**2),
-        dict.fromkeys(names, False),
-    )
-    factors, none = dict.fromkeys(names, factor), (0.0,) * len(names)
     return Estimate(
-        problem.unknowns, problem.prior_x, covariance, off, half, empty, 0, 0.0, 1.0, 0.0, factors, none
-    )  # in the order of the fields
+        problem.unknowns, problem.prior_x, np.diag(problem.spread**2), dict.fromkeys(names, False), half,
+        np.full(problem.mask.shape, np.nan), samples=0, rms=0.0, correlation=1.0, freedom=0.0,
+        factors=dict.fromkeys(names, factor), singular_values=(0.0,) * len(names),
+    )  # fmt: skip

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from studies.drives.chain import Progress
 from studies.drives.drive_file import DriveFile, read_drive
 from studies.drives.log import DriveLog, read_log
+from studies.drives.replay import Progress
 from studies.identify.data import DriveSignals, drive_signals
 from studies.identify.estimate import Estimate
 from studies.identify.inertia import fit_inertia
@@ -21,8 +21,7 @@ from studies.identify.settings import IdentifySettings
 from studies.identify.slip_limit import LimitedFit, fit_low_slip
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
 
-BASE = "corner-estimation"
-"""The parameter set whose values stand where a log says nothing."""
+BASE = "corner-estimation"  # the parameter set whose values stand where a log says nothing
 
 
 @dataclass(frozen=True)
@@ -61,8 +60,7 @@ def identify_drive(
 
     Raises SpecError (drive file, base set), LogError (logs), IdentifyError (no reference, standstill, too short), one line.
     """
-    description = read_drive(drive)
-    prior = load_parameter_set(base)
+    description, prior = read_drive(drive), load_parameter_set(base)
     log = read_log(logs, description)
     names = tuple(str(entry["file"]) for entry in log.report["logs"].values())
     return identify_log(log, description, prior, names, settings=settings, progress=progress)
@@ -80,7 +78,6 @@ def identify_log(
     """As :func:`identify_drive`, of a log that was read."""
     chosen = settings or IdentifySettings()
     data = drive_signals(log, drive, chosen)
-    correlation = data.filter.correlation
     prior = drive.vehicle.wheel_inertia or base.vehicle["wheel_inertia"].value
     spin = fit_inertia(data, prior, chosen)
     inertia = spin.value("wheel_inertia") if spin is not None and spin.excited["wheel_inertia"] else prior
@@ -88,16 +85,20 @@ def identify_log(
     fits: dict[str, LimitedFit] = {}
     absent: dict[str, str] = {}
     along = LongitudinalSlip(data, base.tire["longitudinal"], inertia, chosen, torque_delay(spin, chosen))
+    correlation = data.filter.correlation
     fits["longitudinal"] = fit_low_slip(along, chosen, correlation, lambda done: progress(0.1 + 0.45 * done))
-    missing = [name for name, there in _lateral_needs(data, base).items() if not there]
+    needs = {
+        "reference.vy": data.has_vy, "signals.ay": data.ay is not None, "signals.yaw_rate": data.yaw_rate is not None,
+        f"lateral tire of {base.id}": "lateral" in base.tire,
+    }  # fmt: skip
+    missing = [name for name, there in needs.items() if not there]
     if missing:
         absent["lateral"] = f"not fitted: {', '.join(missing)} missing"
     else:
         force = np.nan_to_num(wheel_force(data, inertia), nan=0.0)
         across = LateralSlip(data, base.tire["lateral"], force, yaw_inertia_prior(drive), chosen)
-        fits["lateral"] = fit_low_slip(
-            across, chosen, across.filter.correlation, lambda done: progress(0.55 + 0.45 * done)
-        )
+        correlation = across.filter.correlation
+        fits["lateral"] = fit_low_slip(across, chosen, correlation, lambda done: progress(0.55 + 0.45 * done))
     progress(1.0)
     return Identification(drive, base, names, data, chosen, fits, spin, inertia, absent)
 
@@ -108,15 +109,6 @@ def torque_delay(spin: Estimate | None, settings: IdentifySettings) -> tuple[flo
         return 0.0, settings.torque_delay
     found = spin.value("torque_delay"), spin.deviation(torque_delay=1.0)
     return found[0], min(math.hypot(found[1], settings.clock_skew), settings.torque_delay)
-
-
-def _lateral_needs(data: DriveSignals, base: ParameterSet) -> dict[str, bool]:
-    return {
-        "reference.vy": data.has_vy,
-        "signals.ay": data.ay is not None,
-        "signals.yaw_rate": data.yaw_rate is not None,
-        f"lateral tire of {base.id}": "lateral" in base.tire,
-    }
 
 
 def yaw_inertia_prior(drive: DriveFile) -> float:

@@ -24,10 +24,8 @@ from studies.identify.data import DriveSignals
 from studies.identify.estimate import Estimate, Rules, Unknown, estimate
 from studies.identify.settings import IdentifySettings
 
-STRAIGHT = 0.01
-"""rad of steering below which lateral forces hardly brake the car."""
-PASSES = 3
-"""The first weighs all rows alike, the others by the residual of the one before."""
+STRAIGHT = 0.01  # rad of steering below which lateral forces hardly brake the car
+PASSES = 3  # the first weighs all rows alike, the others by the residual of the one before
 
 
 def fit_inertia(data: DriveSignals, prior: float, settings: IdentifySettings) -> Estimate | None:
@@ -58,7 +56,8 @@ def fit_inertia(data: DriveSignals, prior: float, settings: IdentifySettings) ->
     floor = 10 * settings.residual_floor
     rules = Rules(settings.confidence, floor, data.filter.correlation, settings.least_freedom)
     mask = straight(data)
-    jumps = _between_samples(data)
+    jump = np.nan_to_num(np.diff(data.inputs.ax, prepend=data.inputs.ax[:1]))
+    jumps = data.filter.power(jump**2 / 12)[:, None]  # variance of F[a_x], m^2/s^4, by what a_x did between its samples
     trust = np.ones_like(jumps)
     for _ in range(PASSES):
 
@@ -68,12 +67,6 @@ def fit_inertia(data: DriveSignals, prior: float, settings: IdentifySettings) ->
         found = estimate(residual, mask, unknowns, rules)
         trust = np.asarray(1 / np.sqrt(1 + jumps / max(found.rms, floor) ** 2))
     return found
-
-
-def _between_samples(data: DriveSignals) -> FloatArray:
-    """Variance (n, 1) of F[a_x], m^2/s^4, by what a_x did between its samples."""
-    jump = np.diff(data.inputs.ax, prepend=data.inputs.ax[:1])
-    return data.filter.power(np.nan_to_num(jump) ** 2 / 12)[:, None]
 
 
 def straight(data: DriveSignals) -> BoolArray:

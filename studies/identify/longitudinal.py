@@ -45,18 +45,15 @@ class LongitudinalSlip:
         self, data: DriveSignals, tire: Tire, inertia: float, settings: IdentifySettings, delay: tuple[float, float]
     ) -> None:
         self.data, self.settings = data, settings
-        self.unknowns: tuple[Unknown, ...] = tire_unknowns(tire, settings)
-        reach = (-0.1, 0.1)
-        self.unknowns += tuple(
-            Unknown(name, 1.0, settings.radius_spread, settings.radius_width, reach) for name in RADII
-        )
-        inputs, load = data.inputs, data.load
-        side, late, damped = settings.side_spread, settings.pitch_frequency_spread, settings.pitch_damping_spread
-        self.unknowns += tuple(Unknown(name, 0.0, side, side, (-0.05, 0.05), positive=False) for name in SIDES)
-        self.unknowns += (
+        inputs, load, s = data.inputs, data.load, settings
+        side, late, damped = s.side_spread, s.pitch_frequency_spread, s.pitch_damping_spread
+        self.unknowns: tuple[Unknown, ...] = (
+            *tire_unknowns(tire, s),
+            *(Unknown(name, 1.0, s.radius_spread, s.radius_width, (-0.1, 0.1)) for name in RADII),
+            *(Unknown(name, 0.0, side, side, (-0.05, 0.05), positive=False) for name in SIDES),
             Unknown("torque_delay", delay[0], delay[1], delay[1], (-0.2, 0.2), positive=False),
-            Unknown("pitch_frequency", settings.pitch_frequency, late, late, (-1.5, 2.5)),
-            *(Unknown(name, settings.pitch_damping, damped, damped, (-2.0, 2.5)) for name in DAMPINGS),
+            Unknown("pitch_frequency", s.pitch_frequency, late, late, (-1.5, 2.5)),
+            *(Unknown(name, s.pitch_damping, damped, damped, (-2.0, 2.5)) for name in DAMPINGS),
         )
         self.along, self.surface = data.along, inputs.surface_speed
         self.torques_known = data.torque is not None
@@ -68,10 +65,8 @@ class LongitudinalSlip:
         self.viscous = tire.sigma2.value * (self.surface - self.along)
         self.mu = self.force / load - self.viscous
         car, g = data.drive.vehicle, GRAVITY
-        ends = np.array([car.rear_axle_distance, car.front_axle_distance]) / (
-            car.front_axle_distance + car.rear_axle_distance
-        )
-        self._static = np.repeat(ends * car.mass * g / 2, 2)
+        lengths = np.array([car.rear_axle_distance, car.front_axle_distance])
+        self._static = np.repeat(lengths / lengths.sum() * car.mass * g / 2, 2)
         self._least = 0.05 * car.mass * g / 4
         self.share = load / load.sum(axis=1, keepdims=True)
         ay = data.ay if data.ay is not None else np.zeros_like(data.vx)
@@ -137,12 +132,6 @@ def wheel_force(data: DriveSignals, inertia: float) -> FloatArray:
         known = np.zeros(4, dtype=bool)
         return shared_forces(inputs.ax, data.load, car.mass, nothing, known)
     return wheel_forces(
-        data.torque,
-        inputs.wheel_speed,
-        np.gradient(inputs.wheel_speed, data.step, axis=0),
-        data.load,
-        inertia,
-        inputs.radius,
-        car.rolling_resistance,
-        data.drive.observer.stopped_below,
-    )
+        data.torque, inputs.wheel_speed, np.gradient(inputs.wheel_speed, data.step, axis=0), data.load, inertia,
+        inputs.radius, car.rolling_resistance, data.drive.observer.stopped_below,
+    )  # fmt: skip

@@ -33,11 +33,10 @@ def tire_parameters(found: Identification, direction: str) -> dict[str, Identifi
     identified ratio, and sigma1 = T1*sigma0 keeps the damping time of the bristles (a sigma1 made for another sigma0 is
     another tire: at sigma0/sigma1 = kappa R|w| bristles leave the output, P1 notes 11 item 18).
     """
-    tire = found.base.tire[direction]
-    base = found.base.id
+    tire, base, prior = found.base.tire[direction], found.base.id, f"prior: {found.base.id}"
     limited = found.fits.get(direction)
     if limited is None:
-        why = f"prior: {base}; {found.absent.get(direction, 'not fitted')}"
+        why = f"{prior}; {found.absent.get(direction, 'not fitted')}"
         out = {n: Identified(q.value, q.unit, None, False, 0, why) for n, q in quantities(tire).items()}
         ratio = tire.sigma0.value / tire.kappa.value
         return {"slip_stiffness": Identified(ratio, "1", None, False, 0, why), **out}
@@ -49,8 +48,8 @@ def tire_parameters(found: Identification, direction: str) -> dict[str, Identifi
     time = fit.value("damping_time") if damped else tire.sigma1.value / tire.sigma0.value
     low, high = fit.interval("relaxation_length")
 
-    def entry(value: float, unit: str, interval: tuple[float, float], yes: bool, half: float, prior: str) -> Identified:
-        source = where if yes else f"not excited by {', '.join(found.logs)}; {prior}"
+    def entry(value: float, unit: str, interval: tuple[float, float], yes: bool, half: float, else_: str) -> Identified:
+        source = where if yes else f"not excited by {', '.join(found.logs)}; {else_}"
         return Identified(value, unit, interval if yes else None, yes, fit.samples, source, _finite(half))
 
     factor = max(fit.factors[name] for name in ("slip_stiffness", "relaxation_length"))
@@ -58,24 +57,21 @@ def tire_parameters(found: Identification, direction: str) -> dict[str, Identifi
     if not (stiff and relaxed):
         half0 = max(fit.half["slip_stiffness"], fit.half["relaxation_length"])
     sigma0 = ratio * kappa
-    follows = (
-        f"sigma0/kappa = {ratio:.4g} identified, times kappa of {base}" if stiff else f"kappa times ratio of {base}"
-    )
+    kept = f"sigma0/kappa = {ratio:.4g} identified, times kappa of {base}"
+    follows = kept if stiff else f"kappa times ratio of {base}"
     half1 = fit.half["damping_time"] / max(fit.value("damping_time"), 1e-12)
     keeps = f"sigma1/sigma0 = {1e3 * time:.3g} ms of {base}, times sigma0"
     return {
-        "slip_stiffness": entry(
-            ratio, "1", fit.interval("slip_stiffness"), stiff, fit.half["slip_stiffness"], f"prior: {base}"
-        ),
-        "kappa": entry(kappa, "1/m", (1 / high, 1 / max(low, 1e-9)), relaxed, fit.half["relaxation_length"], f"prior: {base}"),
+        "slip_stiffness": entry(ratio, "1", fit.interval("slip_stiffness"), stiff, fit.half["slip_stiffness"], prior),
+        "kappa": entry(kappa, "1/m", (1 / high, 1 / max(low, 1e-9)), relaxed, fit.half["relaxation_length"], prior),
         "sigma0": entry(
             sigma0, "1/m", (sigma0 * math.exp(-half0), sigma0 * math.exp(min(half0, 300.0))), stiff and relaxed, half0,
-            follows if stiff != relaxed else f"prior: {base}",
+            follows if stiff != relaxed else prior,
         ),
         "sigma1": entry(time * sigma0, "s/m", _times(fit.interval("damping_time"), sigma0), damped, half1, keeps),
         "sigma2": Identified(
             tire.sigma2.value, "s/m", None, False, fit.samples,
-            f"prior: {base}; viscous friction acts like slip stiffness and is not told from it",
+            f"{prior}; viscous friction acts like slip stiffness and is not told from it",
         ),
         "saturation": Identified(
             fit.value("saturation") if fit.excited["saturation"] else 0.0, "1",
@@ -88,39 +84,31 @@ def tire_parameters(found: Identification, direction: str) -> dict[str, Identifi
 
 def vehicle_parameters(found: Identification) -> dict[str, Identified]:
     """Effective radius per axle, wheel inertia, yaw inertia: identified, or as the drive file has them."""
-    car, name = found.drive.vehicle, f"drive file '{found.drive.name}'"
-    along = found.fits["longitudinal"]
+    car, name, logs = found.drive.vehicle, f"drive file '{found.drive.name}'", ", ".join(found.logs)
+    along, spin, across = found.fits["longitudinal"], found.inertia, found.fits.get("lateral")
+
+    def fitted(fit: Estimate, own: str, unit: str, prior: float, given: str, where: str) -> Identified:
+        """A radius is fitted relative to its ``prior``, everything else as it is; ``given`` says where the prior is from."""
+        yes, factor = fit.excited[own], prior if unit == "m" else 1.0
+        source = where if yes else f"not excited by {logs}; prior: {given}"
+        interval = _times(fit.interval(own), factor) if yes else None
+        value = factor * fit.value(own) if yes else prior
+        return Identified(value, unit, interval, yes, fit.samples, source, _finite(fit.half[own]))
+
     out: dict[str, Identified] = {}
     for axle, nominal in (("front", car.effective_radius_front), ("rear", car.effective_radius_rear)):
-        out[f"effective_radius_{axle}"] = _fitted(
-            found, along.fit, f"radius_{axle}", "m", nominal, name, _place(found, along)
-        )
-    plain = f"identified from {', '.join(found.logs)}"
-    prior = name if car.wheel_inertia is not None else found.base.id
-    spin = found.inertia
+        where = _place(found, along)
+        out[f"effective_radius_{axle}"] = fitted(along.fit, f"radius_{axle}", "m", nominal, name, where)
+    plain, prior = f"identified from {logs}", name if car.wheel_inertia is not None else found.base.id
     if spin is None:
         source = f"not excited: no torques; prior: {prior}"
         out["wheel_inertia"] = Identified(found.wheel_inertia, "kg*m^2", None, False, 0, source)
     else:
-        out["wheel_inertia"] = _fitted(found, spin, "wheel_inertia", "kg*m^2", found.wheel_inertia, prior, plain)
-    across = found.fits.get("lateral")
+        out["wheel_inertia"] = fitted(spin, "wheel_inertia", "kg*m^2", found.wheel_inertia, prior, plain)
     if across is not None:
-        given = "m L_f L_r" if car.yaw_inertia is None else name
-        out["yaw_inertia"] = _fitted(
-            found, across.fit, "yaw_inertia", "kg*m^2", yaw_inertia_prior(found.drive), given, plain
-        )
+        guess, given = yaw_inertia_prior(found.drive), "m L_f L_r" if car.yaw_inertia is None else name
+        out["yaw_inertia"] = fitted(across.fit, "yaw_inertia", "kg*m^2", guess, given, plain)
     return out
-
-
-def _fitted(
-    found: Identification, fit: Estimate, name: str, unit: str, prior: float, given: str, where: str
-) -> Identified:
-    """A radius is fitted relative to its ``prior``, everything else as it is; ``given`` says where the prior is from."""
-    yes, factor = fit.excited[name], prior if unit == "m" else 1.0
-    source = where if yes else f"not excited by {', '.join(found.logs)}; prior: {given}"
-    value = factor * fit.value(name) if yes else prior
-    interval = _times(fit.interval(name), factor) if yes else None
-    return Identified(value, unit, interval, yes, fit.samples, source, _finite(fit.half[name]))
 
 
 def _place(found: Identification, limited: LimitedFit) -> str:

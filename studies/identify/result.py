@@ -1,16 +1,26 @@
-"""What an identification found as plain data: identification.json, warnings, and the rows of a table."""
+"""What an identification found: plain data, warnings, rows of a table, the parameter file for `gainsmith schedules`, pictures."""
 
 from __future__ import annotations
 
+import json
+import re
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from studies.execution.files import ready_folder, whole_file, write_json
 from studies.identify.identify import Identification
 from studies.identify.parameters import Identified, tire_parameters, vehicle_parameters
+from studies.identify.plots import figures
 from studies.identify.slip_limit import LimitedFit
-from synthesis.models.parameter_set import Quantity, Tire
+from studies.plots.save import write_figures
+from synthesis.models.parameter_set import Quantity, Tire, load_parameter_set
+
+SCHEMA = "gainsmith.identification/1"
+HEADER = ("parameter", "value", "95 % interval", "unit", "excited", "rows")
+CONSTANTS = ("sigma0", "sigma1", "sigma2", "kappa")
 
 
 @dataclass(frozen=True)
@@ -33,12 +43,9 @@ def tire_residual(found: Identification, direction: str, tire: Tire, limit: floa
         return None
     values = limited.fit.values()
     values |= {
-        "slip_stiffness": tire.sigma0.value / tire.kappa.value,
-        "relaxation_length": 1.0 / tire.kappa.value,
-        "damping_time": tire.sigma1.value / tire.sigma0.value,
-        "saturation": 0.0,
-        "bend": 0.0,
-    }
+        "slip_stiffness": tire.sigma0.value / tire.kappa.value, "relaxation_length": 1.0 / tire.kappa.value,
+        "damping_time": tire.sigma1.value / tire.sigma0.value, "saturation": 0.0, "bend": 0.0,
+    }  # fmt: skip
     mask = limited.model.mask(limit, values)
     if not mask.any():
         return None
@@ -52,10 +59,6 @@ def tire_residual(found: Identification, direction: str, tire: Tire, limit: floa
         force=float(np.sqrt(np.mean(force**2))) if force.size else float("nan"),
         samples=int(mask.sum()),
     )
-
-
-SCHEMA = "gainsmith.identification/1"
-HEADER = ("parameter", "value", "95 % interval", "unit", "excited", "rows")
 
 
 def all_parameters(found: Identification) -> dict[str, dict[str, Identified]]:
@@ -77,15 +80,11 @@ def identified_tire(found: Identification, direction: str) -> Tire:
 
 def content(found: Identification) -> dict[str, Any]:
     """The content of identification.json."""
+    inputs = found.data.inputs
     return {
-        "schema": SCHEMA,
-        "drive": found.drive.name,
-        "logs": list(found.logs),
-        "base": found.base.id,
-        "velocity_reference": found.velocity_reference,
-        "force_sources": list(found.data.inputs.force_sources),
-        "assumptions": list(found.data.inputs.assumptions),
-        "confidence": found.settings.confidence,
+        "schema": SCHEMA, "drive": found.drive.name, "logs": list(found.logs), "base": found.base.id,
+        "velocity_reference": found.velocity_reference, "force_sources": list(inputs.force_sources),
+        "assumptions": list(inputs.assumptions), "confidence": found.settings.confidence,
         "parameters": {
             group: {name: asdict(entry) for name, entry in entries.items()}
             for group, entries in all_parameters(found).items()
@@ -93,7 +92,7 @@ def content(found: Identification) -> dict[str, Any]:
         "fits": {direction: _fit(limited) for direction, limited in found.fits.items()},
         "residuals": {direction: _residuals(found, direction) for direction in found.fits},
         "warnings": warnings(found),
-    }
+    }  # fmt: skip
 
 
 def warnings(found: Identification) -> list[str]:
@@ -123,18 +122,13 @@ def rows(found: Identification) -> list[tuple[str, ...]]:
 
 def _fit(limited: LimitedFit) -> dict[str, Any]:
     fit = limited.fit
+    values = {name: value for name, value in fit.values().items() if name.startswith("angle")}
     return {
         "slip_limit": limited.limit,
         "stiffness_by_slip_limit": {f"{limit:g}": value for limit, value in limited.tried.items()},
-        "rows": fit.samples,
-        "residual_rms_mps": fit.rms,
-        "residual_correlation_rows": fit.correlation,
-        "degrees_of_freedom": fit.freedom,
-        "singular_values": list(fit.singular_values),
-        "nuisances": {
-            u.name: u.value(float(x)) for u, x in zip(fit.unknowns, fit.x, strict=True) if u.name.startswith("angle")
-        },
-    }
+        "rows": fit.samples, "residual_rms_mps": fit.rms, "residual_correlation_rows": fit.correlation,
+        "degrees_of_freedom": fit.freedom, "singular_values": list(fit.singular_values), "nuisances": values,
+    }  # fmt: skip
 
 
 def _residuals(found: Identification, direction: str) -> dict[str, Any]:
@@ -142,12 +136,72 @@ def _residuals(found: Identification, direction: str) -> dict[str, Any]:
     out: dict[str, Any] = {}
     for name, tire in (("identified", identified_tire(found, direction)), (found.base.id, found.base.tire[direction])):
         result = tire_residual(found, direction, tire)
-        out[name] = None
-        if result is not None:
-            force = result.force if np.isfinite(result.force) else None
-            out[name] = {
-                "slip_velocity_rms_mps": result.velocity,
-                "normalised_force_rms": force,
-                "rows": result.samples,
-            }
+        out[name] = None if result is None else {
+            "slip_velocity_rms_mps": result.velocity,
+            "normalised_force_rms": result.force if np.isfinite(result.force) else None, "rows": result.samples,
+        }  # fmt: skip
     return out
+
+
+def parameter_file(found: Identification) -> str:
+    """TOML text. ``effective_radius``, which the corner models take, is the mean of both axles."""
+    car, drive = found.drive.vehicle, f"drive file '{found.drive.name}'"
+    fitted = vehicle_parameters(found)
+    front, rear = fitted["effective_radius_front"], fitted["effective_radius_rear"]
+    lengths = ("front_axle_distance", "rear_axle_distance", "cg_height", "front_track", "rear_track")
+    given = {"mass": (car.mass, "kg"), "wheel_base": (car.front_axle_distance + car.rear_axle_distance, "m")}
+    given |= {name: (getattr(car, name), "m") for name in lengths}
+    slug = re.sub(r"[^a-z0-9]+", "-", found.drive.name.lower()).strip("-") or "car"
+    how = front.source if front.source == rear.source else f"front: {front.source}; rear: {rear.source}"
+    lines = [
+        f"id = {_text('identified-' + slug)}", f"citation = {_text(', '.join(found.logs))}",
+        f"note = {_text(note(found))}", "", "[vehicle]",
+        *(_line(name, value, unit, drive) for name, (value, unit) in given.items()),
+        _line("effective_radius", (front.value + rear.value) / 2, "m", f"mean of both axles; {how}"),
+        *(_line(name, entry.value, entry.unit, entry.source) for name, entry in fitted.items()),
+    ]  # fmt: skip
+    for direction in ("longitudinal", "lateral"):
+        if direction in found.base.tire:
+            tire = tire_parameters(found, direction)
+            lines += ["", f"[tire.{direction}]", *(_entry(name, tire[name]) for name in CONSTANTS)]
+    return "\n".join(lines) + "\n"
+
+
+def note(found: Identification) -> str:
+    """What the file is, and what in it is not from the log."""
+    held = [
+        f"{direction} {name}"
+        for direction in found.base.tire
+        for name, entry in tire_parameters(found, direction).items()
+        if name in CONSTANTS and not entry.excited
+    ]
+    rest = f"; not excited, from {found.base.id}: {', '.join(held)}" if held else ""
+    return f"Identified by gainsmith with the velocity reference {found.velocity_reference}{rest}."
+
+
+def _entry(name: str, entry: Identified) -> str:
+    between = f", 95 % [{entry.interval[0]:.4g}, {entry.interval[1]:.4g}]" if entry.interval else ""
+    return _line(name, entry.value, entry.unit, entry.source + between)
+
+
+def _line(name: str, value: float, unit: str, source: str) -> str:
+    return f"{name} = {{ value = {value!r}, unit = {_text(unit)}, source = {_text(source)} }}"
+
+
+def _text(value: str) -> str:
+    """A TOML basic string: JSON's escapes are a subset of TOML's, apart from DEL."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def write_identification(found: Identification, out: Path) -> tuple[Path, ...]:
+    """Write everything to ``out`` and return the paths; the parameter file is read back before it gets its name.
+
+    Raises LogError when ``out`` cannot be written.
+    """
+    ready_folder(out)
+    paths = [out / "identified.toml", out / "identification.json"]
+    with whole_file(paths[0]) as beside:
+        beside.write_text(parameter_file(found), encoding="utf-8")
+        load_parameter_set(beside)
+    write_json(paths[1], content(found))
+    return (*paths, *write_figures(figures(found), out))

@@ -13,9 +13,7 @@ class IdentifySettings:
     """Raises IdentifyError naming every value that is not a finite number above zero, or limits that do not fall."""
 
     filter_lag: float = 0.02  # s, 8 Hz: above what a driver and a brake valve do, below the noise of a derivative
-    slow_lag: float = (
-        0.05  # s, 3 Hz: a car turns slower, and the noise of a yaw acceleration would pull at its coefficient
-    )
+    slow_lag: float = 0.05  # s, 3 Hz: a car turns slower, and noise of a yaw acceleration would pull at its coefficient
     settling: float = 8.0  # filter lags until a bad sample is forgotten: (1 + 8) exp(-8) = 3e-3 of it is left
     least_speed: float = 0.75  # m/s: below it a ring of 48 teeth gives less than one pulse in two filter lags
     least_seconds: float = 1.0  # s of usable driving: a hundred relaxation times at 12 m/s
@@ -39,9 +37,7 @@ class IdentifySettings:
     radius_spread: float = 0.015  # relative
     inertia_spread: float = 0.3  # relative
     saturation_spread: float = 0.5  # of s = 1/friction [1]: 0 is a tire straight up to its peak, 1 LuGre at friction 1
-    saturation_apart: float = (
-        1.5  # half widths of s from 0 at which a tire counts as bending like LuGre: three deviations
-    )
+    saturation_apart: float = 1.5  # half widths of s from 0 from which a tire bends like LuGre: three deviations
     curvature: float = 0.1  # of s [1] where it is not told: what load and camber bend, to first order in the force
     bend: float = 0.4  # c [1]: Magic Formulas at friction 1 have 0.4 to 0.7, LuGre has none
     bend_spread: float = 0.3  # of c [1]
@@ -50,14 +46,10 @@ class IdentifySettings:
     pitch_frequency_spread: float = 0.4  # natural logarithm
     pitch_damping: float = 0.45  # of critical: 0.3 to 0.7
     pitch_damping_spread: float = 0.5  # natural logarithm
-    torque_delay: float = (
-        0.01  # s between torque and acceleration in a log: bus cycles, and half a sample of a held torque
-    )
+    torque_delay: float = 0.01  # s between torque and acceleration in a log: bus cycles, half a sample of a held torque
     clock_skew: float = 0.001  # s between sensors of one bus
     side_spread: float = 0.003  # relative: left against right radius, by pressure and wear
-    axle_spread: float = (
-        0.05  # natural logarithm: stiffness of an axle against their mean, by load, camber and compliance
-    )
+    axle_spread: float = 0.05  # natural logarithm: stiffness of an axle against their mean: load, camber, compliance
     angle_spread: float = 0.01  # rad: zero of steering and of the sideslip reference
     drag_prior: float = 0.45  # N s^2/m^2: half air density, frontal area 2.4 m^2, coefficient 0.3
     drag_spread: float = 0.3

@@ -17,8 +17,7 @@ from estimators.arrays import BoolArray, FloatArray
 from studies.identify.estimate import Estimate, Rules, Unknown, estimate
 from studies.identify.settings import IdentifySettings
 
-NOTHING = 10.0
-"""Half width of ln C beyond which the widest range shows no trace of slip: the narrower ones have less."""
+NOTHING = 10.0  # half width of ln C beyond which the widest range shows no trace of slip: the narrower ones have less
 
 
 class SlipModel(Protocol):
@@ -55,9 +54,8 @@ def fit_low_slip(
     for k, limit in enumerate(settings.slip_limits):
         mask = model.mask(limit, values)
         same = bool(fits) and np.array_equal(mask, fits[-1].mask)
-        start = (
-            {u.name: float(x) for u, x in zip(fits[0].fit.unknowns, fits[-1].fit.x, strict=True)} if values else None
-        )
+        last = zip(model.unknowns, fits[-1].fit.x, strict=True) if values else ()
+        start = {u.name: float(x) for u, x in last} or None
         fit = fits[-1].fit if same else estimate(model.residual, mask, model.unknowns, rules, start)
         values = fit.values() if fit.excited["slip_stiffness"] else values
         fits.append(LimitedFit(model, limit, fit, mask, {}))

@@ -73,9 +73,8 @@ def record_study(
             failure = ", ".join(f"{what} '{name}' is already there" for what, name in names if (what, name) in taken)
             taken |= set(names)
         parts.append(PartRecord(part.name, part.title, None if failure else stored, failure))
-    record = StudyRecord(
-        study.id, study.title, study.paper, study.summary, marks.scope, marks.study(study.id), tuple(parts)
-    )
+    about = study.id, study.title, study.paper, study.summary
+    record = StudyRecord(*about, marks.scope, marks.study(study.id), tuple(parts))
     found = {str(claim["id"]) for claim in record.claims}
     missing = tuple(name for name in registry.claim_ids(study.id) if name not in found)
     left_out = tuple(part.title for part in study.parts if part not in chosen)

@@ -37,20 +37,12 @@ def write_study(record: StudyRecord, out: Path) -> None:
 def result_content(record: StudyRecord) -> dict[str, Any]:
     """``result.json``: what was computed, with which scope and sources, and what failed."""
     return {
-        "schema": SCHEMA,
-        "id": record.id,
-        "title": record.title,
-        "paper": record.paper,
-        "summary": record.summary,
+        "schema": SCHEMA, "id": record.id, "title": record.title, "paper": record.paper, "summary": record.summary,
         "scope": {"quick": record.scope.quick, "seeds": record.scope.seeds},
-        "gainsmith": version("gainsmith"),
-        "fingerprint": record.fingerprint,
+        "gainsmith": version("gainsmith"), "fingerprint": record.fingerprint,
         "parts": [
             {
-                "name": part.name,
-                "title": part.title,
-                "notes": part.stored.notes,
-                "measures": part.stored.measures,
+                "name": part.name, "title": part.title, "notes": part.stored.notes, "measures": part.stored.measures,
                 "claims": [claim["id"] for claim in part.stored.claims],
                 "tables": [
                     {"name": t["name"], "caption": t["caption"], "columns": t["columns"],
@@ -65,9 +57,7 @@ def result_content(record: StudyRecord) -> dict[str, Any]:
             for part in record.parts if part.stored is not None
         ],
         "failed": [{"part": part.name, "message": part.failure} for part in record.parts if part.stored is None],
-        "left_out": list(record.left_out),
-        "claims": record.claims,
-        "missing_claims": list(record.missing_claims),
+        "left_out": list(record.left_out), "claims": record.claims, "missing_claims": list(record.missing_claims),
     }  # fmt: skip
 
 

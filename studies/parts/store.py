@@ -57,9 +57,8 @@ def content_of(result: PartResult, fingerprint: str) -> dict[str, Any]:
     for table in result.tables:
         for number, row in enumerate(table.rows, 1):
             if len(row) != len(table.columns):
-                raise ValueError(
-                    f"table '{table.name}': row {number} has {len(row)} cells for {len(table.columns)} columns"
-                )
+                cells = f"{len(row)} cells for {len(table.columns)} columns"
+                raise ValueError(f"table '{table.name}': row {number} has {cells}")
     return {
         "fingerprint": fingerprint,
         "claims": [plain(claim.row(), f"claim {claim.published.id}") for claim in result.claims],
@@ -67,9 +66,7 @@ def content_of(result: PartResult, fingerprint: str) -> dict[str, Any]:
             {"name": t.name, "caption": t.caption, "columns": list(t.columns), "rows": plain(list(t.rows), t.name)}
             for t in result.tables
         ],
-        "figures": [
-            {"name": d.name, "caption": d.caption, "alternative": d.alternative} for d in result.figures
-        ],
+        "figures": [{"name": d.name, "caption": d.caption, "alternative": d.alternative} for d in result.figures],
         "notes": list(result.notes),
         "measures": plain(result.measures, "measures"),
     }  # fmt: skip

@@ -8,13 +8,9 @@ from dataclasses import dataclass
 from studies.claim import PAPERS, ClaimVerdict, JsonValue, paper_rank
 
 MARKS = {
-    ClaimVerdict.REPRODUCED: "✓",
-    ClaimVerdict.PARTLY: "½",
-    ClaimVerdict.NOT_REPRODUCED: "✗",
-    ClaimVerdict.ERRATUM: "!",
-    ClaimVerdict.UNDER_SPECIFIED: "?",
-    ClaimVerdict.DERIVED: "+",
-}
+    ClaimVerdict.REPRODUCED: "✓", ClaimVerdict.PARTLY: "½", ClaimVerdict.NOT_REPRODUCED: "✗", ClaimVerdict.ERRATUM: "!",
+    ClaimVerdict.UNDER_SPECIFIED: "?", ClaimVerdict.DERIVED: "+",
+}  # fmt: skip
 """A sign for each verdict, so that none is told by its colour alone."""
 
 MEANINGS = {
@@ -70,6 +66,5 @@ def scoreboard(claims: Sequence[dict[str, JsonValue]], names: Mapping[str, str])
     grouped: dict[str, list[dict[str, JsonValue]]] = {label: [] for label in labels}
     for claim in claims:
         grouped[labels[paper_rank(str(claim["paper"]))]].append(claim)
-    return Scoreboard(
-        tuple(PaperScore(paper, names.get(paper, ""), tuple(rows)) for paper, rows in grouped.items() if rows)
-    )
+    papers = (PaperScore(paper, names.get(paper, ""), tuple(rows)) for paper, rows in grouped.items() if rows)
+    return Scoreboard(tuple(papers))

@@ -10,9 +10,9 @@ from typing import Any
 from pydantic import Field
 
 from studies.execution.files import write_bytes
-from studies.sweeps.manifest import versions
-from studies.sweeps.statistics import Statistic, Summary
+from studies.sweeps.summary import Statistic, Summary
 from studies.sweeps.sweep import Sweep
+from studies.sweeps.tables import versions
 from synthesis.errors import SpecError
 from synthesis.toml_file import StrictTable, read_table, read_toml
 
@@ -86,7 +86,8 @@ def write_baseline(path: Path, baseline: Baseline) -> None:
         if statistic.observer != observer:
             observer = statistic.observer
             lines += ["", f'[figures."{observer}"]']
-        lines.append(f'"{_name(statistic)}" = {_statistic(statistic)}')
+        name = f"{statistic.measure} | {statistic.name}" if statistic.measure else statistic.name
+        lines.append(f'"{name}" = {_statistic(statistic)}')
     path.parent.mkdir(parents=True, exist_ok=True)
     write_bytes(path, ("\n".join(lines) + "\n").encode(), sync=True)
 
@@ -104,10 +105,6 @@ def read_baseline(path: Path) -> Baseline:
             statistics.append(Statistic(observer, measure, rest, **line.model_dump()))
     nominal = {name: entry.model_dump() for name, entry in found.nominal.items()}
     return Baseline(Summary(found.sweep, found.form, tuple(statistics), ()), found.sha256, nominal, found.made_with)
-
-
-def _name(statistic: Statistic) -> str:
-    return f"{statistic.measure} | {statistic.name}" if statistic.measure else statistic.name
 
 
 def _statistic(statistic: Statistic) -> str:

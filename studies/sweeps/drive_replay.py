@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.planar_exponential import planar_phi
 from estimators.arrays import BoolArray, FloatArray
-from studies.drives.baselines import held, mean_over
+from studies.drives.corner_inputs import held, mean_over
 from studies.drives.drive_file import read_drive
 from studies.drives.log import read_log
 from studies.drives.prepare import CornerInputs, corner_inputs_of
@@ -67,7 +67,8 @@ def replay_batch(batch: Batch, drive: Recorded, part: slice) -> FloatArray:
     inputs = drive.inputs
     columns = {name: column[part] for name, column in batch.columns.items()}
     count = len(next(iter(columns.values())))
-    share = _radius(batch.observer, columns, count)
+    nominal, radii = batch.observer.plant.parameters.get("effective_radius"), columns.get("effective_radius")
+    share = np.ones(count) if nominal is None or radii is None else radii / nominal.nominal  # over the nominal radius
     F, g, pull = _updates(batch.observer, columns, inputs, count)
     gain, shift = centre_map(inputs)
     weights = _weights(inputs)
@@ -98,14 +99,6 @@ def _weights(inputs: CornerInputs) -> FloatArray:
     gain, shift = centre_map(inputs)
     known = np.isfinite(gain * inputs.surface_speed + shift)
     return np.stack([cg_velocity(np.where(known, unit, np.nan)) for unit in np.eye(4)], axis=-1)
-
-
-def _radius(observer: Observer, columns: Mapping[str, FloatArray], count: int) -> FloatArray:
-    """The radius of every design over the nominal one (n,)."""
-    nominal = observer.plant.parameters.get("effective_radius")
-    if nominal is None or nominal.name not in columns:
-        return np.ones(count)
-    return columns[nominal.name] / nominal.nominal
 
 
 def _updates(

@@ -12,9 +12,8 @@ from pathlib import Path
 from studies.execution.files import json_bytes, write_bytes
 from studies.execution.processes import Executor, Processes, Serial, available_cores
 from studies.sweeps.reports import markdown
-from studies.sweeps.statistics import Summary
 from studies.sweeps.store import SUMMARY, SweepFolder, locked_folder
-from studies.sweeps.summary import summarise
+from studies.sweeps.summary import Summary, summarise
 from studies.sweeps.sweep import Chunk, Sweep
 from studies.sweeps.tables import compute
 from synthesis.errors import SpecError
@@ -39,11 +38,7 @@ class SweepResult:
 
 
 def run_sweep(
-    sweep: Sweep,
-    out: Path,
-    executor: Executor | None = None,
-    resume: bool = False,
-    progress: Progress | None = None,
+    sweep: Sweep, out: Path, executor: Executor | None = None, resume: bool = False, progress: Progress | None = None
 ) -> SweepResult:
     """Compute what is missing, then the statistics.
 

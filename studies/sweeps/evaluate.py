@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from analysis.errors import AnalysisError
 from analysis.sensitivity.worst import WorstCaseSearch, worst_case
 from estimators.arrays import FlagArray, FloatArray, IntArray
-from studies.sweeps.measure import Measure
+from studies.sweeps.measures import Measure
 from studies.sweeps.observer import Batch, Observer
 from studies.sweeps.plant import Grid
 from studies.sweeps.sweep import Chunk, Sweep
@@ -24,7 +24,6 @@ TIE = 1e-9  # relative
 REFUSALS = (AnalysisError, ModelError, ProblemError, np.linalg.LinAlgError)
 
 Answer = TypeVar("Answer")
-Rows: TypeAlias = IntArray
 
 
 @dataclass(frozen=True)
@@ -70,10 +69,10 @@ def evaluate(
     found = {m.name: np.full((count, len(grid)), np.nan) for m in measures}
     flat: set[str] = set()
 
-    def batch_of(rows: Rows) -> Batch:
+    def batch_of(rows: IntArray) -> Batch:
         return observer.at({name: column[rows] for name, column in columns.items()}, grid)
 
-    def fill(measure: Measure, rows: Rows, batch: Batch) -> None:
+    def fill(measure: Measure, rows: IntArray, batch: Batch) -> None:
         """One measure of some rows, NaN and the reason where it has no value."""
         out = found[measure.name]
         for part, values in _separate(lambda some: measure(batch if len(some) == len(rows) else batch_of(some)), rows):
@@ -107,7 +106,7 @@ def evaluate(
     return Evaluated(dict(columns), worst, place, envelopes, outcome, reason)
 
 
-def _separate(function: Callable[[Rows], Answer], rows: Rows) -> list[tuple[Rows, Answer | str]]:
+def _separate(function: Callable[[IntArray], Answer], rows: IntArray) -> list[tuple[IntArray, Answer | str]]:
     """function(rows) if it can be had at once; else in halves, down to single rows whose refusal is returned as text."""
     try:
         return [(rows, function(rows))]

@@ -1,12 +1,15 @@
-"""The measures that a sweep file can name: norms, radii, drop probabilities, over all designs and grid points at once."""
+"""What a measure is, and those that a file can name: norms, radii, drop probabilities, over all designs and points at once."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field
 
 from analysis.drops.frozen import critical_drop_probability, drop_radius
@@ -15,10 +18,72 @@ from analysis.norms.hinf import hinf_norm
 from analysis.norms.planar import planar_hinf_norm
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
-from studies.sweeps.measure import Measure
 from studies.sweeps.observer import Batch, Observer
 from synthesis.errors import SpecError
 from synthesis.toml_file import StrictTable
+
+
+def _nothing(*_observer: Observer) -> None:
+    pass
+
+
+@dataclass(frozen=True)
+class Measure:
+    """`function(batch)` returns (designs, grid), or (designs,) for a number that belongs to no place of the grid.
+
+    The batch holds the designs' parameter values, the observer (model, gains, sample time) and the grid, with all matrices made.
+    Infinite values are answers (an unstable design), NaN is an outcome of its own. A loss is measured relative to the distance
+    from `limit`, at which the measure becomes worthless (a margin of 0, a radius of 1). `variance` says what Sobol indices
+    speak of: the value, or its reciprocal for a measure that may be infinite. `definition` is what makes two measures the
+    same; `check` refuses an observer that the measure does not fit (SpecError). `prepare` makes what all chunks share, once,
+    before workers are started.
+    A function that must travel to other processes is one that a module defines, or a `functools.partial` of one.
+    """
+
+    name: str
+    unit: str
+    better: Literal["larger", "smaller"]
+    function: Callable[[Batch], ArrayLike]
+    limit: float = 0.0
+    variance: Literal["value", "reciprocal"] = "value"
+    definition: Mapping[str, Any] = field(default_factory=dict)
+    check: Callable[[Observer], None] = _nothing
+    prepare: Callable[[], None] = _nothing
+
+    def __call__(self, batch: Batch) -> FloatArray:
+        """The values (n, g) or (n,). Raises SpecError for any other shape."""
+        with np.errstate(all="ignore"):  # an unstable design overflows: that is an answer
+            values = np.asarray(self.function(batch), float)
+        if values.shape not in ((batch.count, len(batch.grid)), (batch.count,)):
+            raise SpecError(
+                f"measure '{self.name}' returned the shape {values.shape} for {batch.count} designs and {len(batch.grid)} "
+                "grid points; return (designs, grid) or (designs,)"
+            )
+        return values
+
+    @property
+    def sign(self) -> float:
+        """+1 where larger is worse: sign * value is to be kept small."""
+        return 1.0 if self.better == "smaller" else -1.0
+
+    def loss(self, before: float, after: float) -> float:
+        """How much of the distance from the limit was lost (positive) or won; inf for a measure that became worthless."""
+        if before == after:
+            return 0.0
+        if math.isnan(before) or math.isnan(after):
+            return math.inf if math.isnan(after) else -math.inf
+        if math.isinf(before) or math.isinf(after):
+            return self.sign * (math.inf if after > before else -math.inf)
+        distance = abs(before - self.limit)
+        change = self.sign * (after - before)
+        return change / distance if distance > 0.0 else math.copysign(math.inf, change)
+
+    def spread(self, values: FloatArray) -> FloatArray:
+        """What variance is taken of."""
+        if self.variance == "value":
+            return values
+        with np.errstate(divide="ignore"):
+            return 1.0 / values
 
 
 class MeasureSpec(StrictTable):
@@ -36,7 +101,7 @@ class MeasureSpec(StrictTable):
         """The name without a name."""
         return self.id
 
-    def values(self, batch: Batch) -> FloatArray:
+    def _values(self, batch: Batch) -> FloatArray:
         """The number of every design and grid point, or of every design."""
         raise NotImplementedError
 
@@ -53,7 +118,7 @@ class MeasureSpec(StrictTable):
     def build(self) -> Measure:
         """The measure."""
         return Measure(
-            self.name or self.title, self.unit, self.better, self.values, self.limit, self.variance, self.definition(),
+            self.name or self.title, self.unit, self.better, self._values, self.limit, self.variance, self.definition(),
             self.check, self.prepare,
         )  # fmt: skip
 
@@ -71,8 +136,7 @@ class StabilityMargin(MeasureSpec):
     id: Literal["stability_margin"]
     unit: ClassVar[str] = "1/s"
 
-    def values(self, batch: Batch) -> FloatArray:
-        """The growth."""
+    def _values(self, batch: Batch) -> FloatArray:
         return batch.margin
 
 
@@ -93,11 +157,10 @@ class HinfNorm(MeasureSpec):
         """With both ends of the channel."""
         return f"hinf_norm {'+'.join(self.disturbances)} > {'+'.join(self.errors)}"
 
-    def values(self, batch: Batch) -> FloatArray:
-        """In closed form for two states and one signal at either end."""
+    def _values(self, batch: Batch) -> FloatArray:
         d, z = self.channel(batch.observer)
         A_e, B_e = batch.error
-        if A_e.shape[-1] == 2 and min(d.shape[1], len(z)) == 1:
+        if A_e.shape[-1] == 2 and min(d.shape[1], len(z)) == 1:  # in closed form
             return planar_hinf_norm(A_e, B_e @ d, z)[0]
         return hinf_norm(A_e, B_e @ d, z, tolerance=self.tolerance).norm
 
@@ -127,7 +190,7 @@ class SampledRadius(MeasureSpec):
     id: Literal["sampled_radius"]
     limit: ClassVar[float] = 1.0
 
-    def values(self, batch: Batch) -> FloatArray:
+    def _values(self, batch: Batch) -> FloatArray:
         """The eigenvalues of e^{A_e T} are the exponentials of those of A_e T: the margin serves, and is made so for K."""
         return np.asarray(np.exp(batch.observer.sample_time * batch.margin))
 
@@ -153,8 +216,7 @@ class SecondMomentRadius(_Dropping):
         """With probability and policy."""
         return f"second_moment_radius p {self.drop_probability:g} {self.policy}"
 
-    def values(self, batch: Batch) -> FloatArray:
-        """The radius."""
+    def _values(self, batch: Batch) -> FloatArray:
         modes = self._modes(batch)
         return drop_radius(modes.dropped, modes.received, self.drop_probability)
 
@@ -170,8 +232,7 @@ class CriticalDropProbability(_Dropping):
         """With the policy, unless it is the usual one."""
         return self.id if self.policy == "coast" else f"{self.id} {self.policy}"
 
-    def values(self, batch: Batch) -> FloatArray:
-        """The probability."""
+    def _values(self, batch: Batch) -> FloatArray:
         modes = self._modes(batch)
         return critical_drop_probability(modes.dropped, modes.received)
 

@@ -34,8 +34,7 @@ class JointSpectralRadius(MeasureSpec):
     tolerance: float = Field(default=1e-2, gt=0, lt=1)
     limit: ClassVar[float] = 1.0
 
-    def values(self, batch: Batch) -> FloatArray:
-        """The bounds."""
+    def _values(self, batch: Batch) -> FloatArray:
         places = np.unique(np.linspace(0, len(batch.grid) - 1, self.speeds).round().astype(int))
         updates = batch.coast.received[:, places]
         return np.array([joint_spectral_radius(modes, self.tolerance).upper for modes in updates])
@@ -54,8 +53,7 @@ class CertifiedGamma(MeasureSpec):
     deployed: bool = False
     variance: ClassVar[Literal["value", "reciprocal"]] = "reciprocal"
 
-    def values(self, batch: Batch) -> FloatArray:
-        """The gains."""
+    def _values(self, batch: Batch) -> FloatArray:
         spec, model = _designable(batch.observer)
         found = []
         for row in range(batch.count):
@@ -94,8 +92,7 @@ class RankLossSpeed(MeasureSpec):
     better: ClassVar[Literal["larger", "smaller"]] = "larger"
     variance: ClassVar[Literal["value", "reciprocal"]] = "reciprocal"
 
-    def values(self, batch: Batch) -> FloatArray:
-        """The speeds."""
+    def _values(self, batch: Batch) -> FloatArray:
         known = batch.observer.plant.parameters
         constants = {name: column for name, column in batch.columns.items() if name in known}
         return np.broadcast_to(_rank_loss(batch.observer).lowest(constants), (batch.count,))

@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from estimators.arrays import FloatArray
-from studies.sweeps.drive_sources import DriveSource, LoggedDrive, TruthDrive
 from studies.sweeps.measures import MeasureSpec
 from studies.sweeps.observer import Batch, Observer
+from studies.sweeps.sweep import canonical
 from synthesis.errors import SpecError
 
+if TYPE_CHECKING:
+    from studies.sweeps.drive_replay import Recorded
+    from studies.truth import Manoeuvre
+
+TRUTH_TIME = 0.005  # s, sample time of a manoeuvre as it is measured
 MODEL_STATES = ("bristle_deflection", "relative_velocity")
 
 
@@ -48,9 +57,8 @@ class EstimatorNrms(MeasureSpec):
     def beside(self, folder: Path) -> EstimatorNrms:
         """File names relative to the sweep file."""
         if self.drive is not None and self.logs is not None:
-            return self.model_copy(
-                update={"drive": str(folder / self.drive), "logs": [str(folder / name) for name in self.logs]}
-            )
+            files = {"drive": str(folder / self.drive), "logs": [str(folder / name) for name in self.logs]}
+            return self.model_copy(update=files)
         own = str(self.manoeuvre).endswith(".toml")
         return self.model_copy(update={"manoeuvre": str(folder / str(self.manoeuvre))}) if own else self
 
@@ -60,32 +68,56 @@ class EstimatorNrms(MeasureSpec):
         return f"estimator_nrms {Path(self.drive or str(self.manoeuvre)).stem}"
 
     @cached_property
-    def source(self) -> DriveSource:
-        """The drive. Raises SpecError or LogError for what cannot be read, or has no reference."""
-        if self.drive is not None and self.logs is not None:
-            logged = LoggedDrive(Path(self.drive), tuple(Path(name) for name in self.logs))
-            logged.recorded  # noqa: B018  what is wrong with the files is said at once
-            return logged
+    def asked(self) -> Manoeuvre:
+        """The manoeuvre, cut. Raises SpecError for what cannot be read."""
         from studies.truth import load_manoeuvre
 
         found = load_manoeuvre(str(self.manoeuvre))
-        if self.seconds is not None:
-            found = found.model_copy(update={"duration": min(found.duration, self.seconds)})
-        return TruthDrive(found, self.seed, Path(str(self.manoeuvre)).parent)
+        return found.model_copy(update={"duration": min(found.duration, self.seconds or np.inf)})
+
+    @cached_property
+    def recorded(self) -> Recorded:
+        """The signals. Raises SpecError or LogError, one line, for what cannot be read or driven, or has no reference of V_x.
+
+        A manoeuvre takes about a second for every second of it, and is the same as `studies.truth.write_drive` and
+        `gainsmith run` on what it writes: the estimators know the true car.
+        """
+        from studies.sweeps.drive_replay import read_recorded  # reading logs takes imports that other sweeps need not
+
+        if self.drive is not None:
+            return read_recorded(Path(self.drive), [Path(name) for name in self.logs or ()])
+        from studies.trials.sensors import TEST_CAR
+        from studies.truth import draw, simulate_manoeuvres, write_drive
+
+        truth = simulate_manoeuvres([self.asked], [self.asked.truth_vehicle(Path(str(self.manoeuvre)).parent)])
+        with TemporaryDirectory() as folder:
+            log, file = write_drive(Path(folder), draw(truth, TEST_CAR, [self.seed], TRUTH_TIME))
+            return read_recorded(file, [log])
 
     def definition(self) -> Mapping[str, Any]:
-        """The drive."""
-        return {"id": self.id, **self.source.definition}
+        """Name of the drive, and a digest: of drive file and logs; or of manoeuvre, car and sensors, not of what they gave."""
+        if self.drive is not None:
+            _ = self.recorded  # what is wrong with the files is said at once
+            files = [Path(self.drive)]
+            for path in map(Path, self.logs or ()):
+                files += sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
+            digest = hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
+            return {"id": self.id, "drive": files[0].name, "sha256": digest}
+        from studies.trials.sensors import TEST_CAR
+
+        car = asdict(self.asked.truth_vehicle(Path(str(self.manoeuvre)).parent))
+        digest = hashlib.sha256(canonical([self.asked.model_dump(mode="json"), car, asdict(TEST_CAR)])).hexdigest()
+        asked = {"manoeuvre": self.asked.name, "seconds": self.asked.duration, "seed": self.seed}
+        return {"id": self.id, **asked, "sha256": digest}
 
     def prepare(self) -> None:
-        """Drive or read once."""
-        self.source.recorded  # noqa: B018
+        """Drive or read once, where the sweep is started: the signals travel with it, workers need no files."""
+        _ = self.recorded
 
-    def values(self, batch: Batch) -> FloatArray:
-        """One number a design."""
+    def _values(self, batch: Batch) -> FloatArray:
         from studies.sweeps.drive_replay import nrms
 
-        return nrms(self.source.recorded, batch)
+        return nrms(self.recorded, batch)
 
     def check(self, observer: Observer) -> None:
         """Longitudinal corner observers with the sample time of the drive."""
@@ -94,10 +126,11 @@ class EstimatorNrms(MeasureSpec):
         sizes = (inputs, len(plant.outputs), len(plant.box))
         if tuple(s.name for s in plant.states) != MODEL_STATES or sizes != (1, 1, 1) or "lateral" in title:
             raise SpecError(f"subject '{observer.name}': estimator_nrms is for longitudinal corner observers")
-        if abs(self.source.sample_time - observer.sample_time) > 1e-9:
+        time = TRUTH_TIME if self.drive is None else self.recorded.sample_time
+        if abs(time - observer.sample_time) > 1e-9:
             raise SpecError(
                 f"subject '{observer.name}': its sample time is {observer.sample_time:g} s, that of the drive of "
-                f"estimator_nrms is {self.source.sample_time:g} s; they must be the same"
+                f"estimator_nrms is {time:g} s; they must be the same"
             )
 
 

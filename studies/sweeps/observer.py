@@ -27,7 +27,7 @@ from synthesis.errors import SpecError
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Signal
 
-SAME = 1e-12  # relative: what a constant may differ by without being another
+ROUNDING = 1e-12  # relative: what a constant may differ by without being another
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ class Observer:
         found = []
         for name, value in (self.proved_for or {}).items():
             p = self.plant.parameters.get(name)
-            if p is not None and abs(p.nominal - value) > SAME * max(abs(p.nominal), abs(value)):
+            if p is not None and abs(p.nominal - value) > ROUNDING * max(abs(p.nominal), abs(value)):
                 found.append(f"{name} is {p.nominal:.6g} {p.unit}, {self.origin} was proved for {value:.6g} {p.unit}")
         return found
 
@@ -107,11 +107,10 @@ class Observer:
     def grid(self, points: int, bounds: Mapping[str, tuple[float, float]] | None = None) -> Grid:
         """Every combination of `points` values of each scheduling parameter, over its range or narrower `bounds`."""
         axes, box = [], self.plant.box
+        known = [p.name for p in box]
         for name in bounds or {}:
-            if name not in {p.name for p in box}:
-                raise SpecError(
-                    f"subject '{self.name}': {unknown('scheduling parameter', name, [p.name for p in box])}"
-                )
+            if name not in known:
+                raise SpecError(f"subject '{self.name}': {unknown('scheduling parameter', name, known)}")
         for p in box:
             low, high = (bounds or {}).get(p.name, (p.minimum, p.maximum))
             if not p.minimum <= low < high <= p.maximum:
@@ -122,19 +121,17 @@ class Observer:
             axes.append(np.linspace(low, high, points))
         mesh = np.meshgrid(*axes, indexing="ij")
         values = np.stack([m.ravel() for m in mesh], axis=1) if axes else np.empty((1, 0))
-        return Grid(tuple(p.name for p in box), tuple(p.unit for p in box), values)
+        return Grid(tuple(known), tuple(p.unit for p in box), values)
 
     def at(self, columns: Mapping[str, FloatArray], grid: Grid) -> Batch:
         """The designs of some columns (n,). Raises AnalysisError if one of them makes the model invalid."""
         own = {name: column for name, column in columns.items() if name in self.plant.parameters}
         for name, column in own.items():
-            nominal = self.plant.parameters[name].nominal
-            bad = ~np.isfinite(column) | (np.sign(column) != np.sign(nominal)) if nominal else ~np.isfinite(column)
+            p = self.plant.parameters[name]
+            bad = ~np.isfinite(column) | ((np.sign(column) != np.sign(p.nominal)) & (p.nominal != 0.0))
             if bad.any():
-                unit = self.plant.parameters[name].unit
-                raise AnalysisError(
-                    f"{name} = {column[bad][0]:.6g} {unit} has not the sign of its nominal value {nominal:.6g} {unit}"
-                )
+                words = f"has not the sign of its nominal value {p.nominal:.6g} {p.unit}"
+                raise AnalysisError(f"{name} = {column[bad][0]:.6g} {p.unit} {words}")
         count = max((len(column) for column in columns.values()), default=1)
         return Batch(self, grid, dict(columns), count, self.plant.at(own, grid), self._gains(columns, grid))
 
@@ -213,15 +210,13 @@ def model_observer(
     specification: ScheduleSpec | None = None,
 ) -> Observer:
     """An observer of any LpvModel: a constant gain (nx, ny), or a table (b, nx, ny) over `breakpoints` of its one parameter."""
-    table = checked_gain(model, gain)
+    table, where = checked_gain(model, gain), f"subject '{name}'"
     places = np.empty(0) if breakpoints is None else np.asarray(breakpoints, float)
     if table.shape[0] != len(places) if table.ndim == 3 else len(places):
-        raise SpecError(f"subject '{name}': a gain {table.shape} does not fit {len(places)} breakpoints")
+        raise SpecError(f"{where}: a gain {table.shape} does not fit {len(places)} breakpoints")
     if len(places) and (len(model.parameters) != 1 or not (np.diff(places) > 0.0).all() or len(places) < 2):
-        raise SpecError(
-            f"subject '{name}': a table needs one scheduling parameter and two or more ascending breakpoints"
-        )
+        raise SpecError(f"{where}: a table needs one scheduling parameter and two or more ascending breakpoints")
     if not 0.0 < sample_time < 1.0:
-        raise SpecError(f"subject '{name}': sample_time = {sample_time:g} s must lie between 0 and 1 s")
+        raise SpecError(f"{where}: sample_time = {sample_time:g} s must lie between 0 and 1 s")
     whole = table if table.ndim == 3 else table[None]
     return Observer(name, model_plant(model), Gains(whole, places), sample_time, "the gain", specification)

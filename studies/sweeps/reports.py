@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from studies.sweeps.gate import GREW, HEADINGS, MOVED, Comparison
-from studies.sweeps.statistics import Statistic, Summary, number
+from studies.sweeps.summary import Statistic, Summary, number
 
 
 def markdown(summary: Summary, compared: Sequence[Comparison] | None = None, pictures: Sequence[str] = ()) -> str:
@@ -38,9 +38,7 @@ def _verdict(compared: Sequence[Comparison]) -> list[str]:
 
 def _observer(summary: Summary, observer: str) -> list[str]:
     own = [f for f in summary.statistics if f.observer == observer]
-    counts = ", ".join(
-        f"{int(f.value)} {f.name}" for f in own if f.kind == "count" and (f.value or f.name == "designs")
-    )
+    counts = ", ".join(f"{f.value:.0f} {f.name}" for f in own if f.kind == "count" and (f.value or f.name == "designs"))
     lines = [f"## {observer}", "", counts, ""]
     values = [f for f in own if f.kind == "value"]
     if values:

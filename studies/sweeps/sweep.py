@@ -13,7 +13,7 @@ from analysis.errors import AnalysisError
 from analysis.sensitivity.box import Box
 from analysis.sensitivity.designs import Design, Nominal
 from analysis.sensitivity.worst import WorstCaseSearch
-from studies.sweeps.measure import Measure
+from studies.sweeps.measures import Measure
 from studies.sweeps.observer import Observer
 from studies.sweeps.plant import Grid
 from studies.sweeps.ranges import ParameterRange, RangeSpec, box_of, parameter_ranges
@@ -57,26 +57,18 @@ class Sweep:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stages", (Nominal(), *(s for s in self.stages if not isinstance(s, Nominal))))
-        for what, names in (
-            ("subject", [s.name for s in self.observers]),
-            ("measure", [m.name for m in self.measures]),
-        ):
+        where, measures = f"sweep '{self.name}'", [m.name for m in self.measures]
+        for what, names in (("subject", [s.name for s in self.observers]), ("measure", measures)):
             repeated = sorted({name for name in names if names.count(name) > 1})
             if not names or repeated:
-                raise SpecError(
-                    f"sweep '{self.name}': give at least one {what}, each with a name of its own; {repeated}"
-                )
+                raise SpecError(f"{where}: give at least one {what}, each with a name of its own; {repeated}")
         if self.chunk < 1 or self.points < 2:
-            raise SpecError(
-                f"sweep '{self.name}': chunk = {self.chunk} and points = {self.points} must be at least 1 and 2"
-            )
+            raise SpecError(f"{where}: chunk = {self.chunk} and points = {self.points} must be at least 1 and 2")
         for observer in self.observers:
             for measure in self.measures:
                 measure.check(observer)
                 if measure.name in observer.parameters or measure.name in RESERVED:
-                    raise SpecError(
-                        f"sweep '{self.name}': measure '{measure.name}' has the name of a column; rename it"
-                    )
+                    raise SpecError(f"{where}: measure '{measure.name}' has the name of a column; rename it")
             try:
                 for stage in self.stages:
                     stage.check(self.boxes[observer.name])
@@ -84,8 +76,8 @@ class Sweep:
                 raise SpecError(str(error)) from None
             self.grid(observer)
         for name in self.tolerances:
-            if name not in {m.name for m in self.measures}:
-                raise SpecError(f"sweep '{self.name}': tolerance for '{name}', which is no measure of it")
+            if name not in measures:
+                raise SpecError(f"{where}: tolerance for '{name}', which is no measure of it")
 
     @cached_property
     def ranges(self) -> dict[str, tuple[ParameterRange, ...]]:
@@ -135,14 +127,11 @@ class Sweep:
     def definition(self) -> dict[str, Any]:
         """What was asked, without today's values of constants and gains: these are what a baseline is to notice."""
         return {
-            "schema": SCHEMA,
-            "name": self.name,
-            "form": self.form,
+            "schema": SCHEMA, "name": self.name, "form": self.form,
             "subjects": {observer.name: self._asked(observer) for observer in self.observers},
             "measures": [{"name": m.name, "unit": m.unit, "better": m.better, **m.definition} for m in self.measures],
-            "designs": [stage.model_dump(mode="json") for stage in self.stages],
-            "chunk": self.chunk,
-        }
+            "designs": [stage.model_dump(mode="json") for stage in self.stages], "chunk": self.chunk,
+        }  # fmt: skip
 
     def _asked(self, observer: Observer) -> dict[str, Any]:
         """Sample time, ranges (relative ones as such) and grid of one observer."""

@@ -1,9 +1,12 @@
-"""Chunks as Parquet bytes: rows of designs, and the envelope over the grid."""
+"""Chunks as Parquet bytes: rows of designs, and the envelope over the grid; and what made them."""
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -12,12 +15,23 @@ import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
+from studies.execution.fingerprint import Sources
 from studies.sweeps.evaluate import Evaluated, evaluate_chunk
-from studies.sweeps.manifest import versions
 from studies.sweeps.sweep import Chunk, Sweep
 
 WORDS = ("stage", "outcome", "reason", "measure")  # a dictionary of columns of numbers costs more than it saves
 PLACE = " place"  # column of the grid point at which a measure is at its worst
+ROOTS = ("studies.sweeps.engine", "studies.sweeps.spec")  # all that a measure of a sweep file may use
+OTHERS = ("gainsmith", "numpy", "scipy", "sympy", "pyarrow")
+
+
+@cache
+def versions() -> dict[str, str]:
+    """By name; `code` covers every module that a measure of a file may use, so that an edit is never taken for a repeat."""
+    return {
+        "code": Sources().fingerprint(None, ROOTS)[:16], "python": platform.python_version(),
+        "machine": platform.machine(), **{name: version(name) for name in OTHERS},
+    }  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -39,13 +53,9 @@ def compute(sweep: Sweep, chunk: Chunk) -> ChunkResult:
     seconds = perf_counter() - start
     names = [m.name for m in sweep.measures]
     return ChunkResult(
-        chunk,
-        encoded(row_table(found, chunk, sweep.stages[chunk.stage].kind, names)),
-        encoded(envelope_table(found, chunk)),
-        next((reason for reason in found.reason if reason), ""),
-        versions(),
-        seconds,
-    )
+        chunk, encoded(row_table(found, chunk, sweep.stages[chunk.stage].kind, names)), encoded(envelope_table(found, chunk)),
+        next((reason for reason in found.reason if reason), ""), versions(), seconds,
+    )  # fmt: skip
 
 
 def row_table(found: Evaluated, chunk: Chunk, kind: str, measures: Sequence[str]) -> Any:

@@ -69,13 +69,11 @@ class Courses:
         w = k - low
         both = self._table[:, low : low + 2]
         row: FloatArray = both[:, 0] if w < 1e-9 else (1.0 - w) * both[:, 0] + w * both[:, 1]
-        out: FloatArray = row[:, self.which]
-        return out
+        return np.asarray(row[:, self.which])
 
     def bend(self, way: FloatArray) -> FloatArray:
         """Curvature (B,), 1/m, of the paths at the ways (B,), m."""
         k = np.clip(way / PATH_GRID, 0.0, self._bend.shape[1] - 1.001)
         low = k.astype(np.int64)
         w = k - low
-        out: FloatArray = (1.0 - w) * self._bend[self.which, low] + w * self._bend[self.which, low + 1]
-        return out
+        return np.asarray((1.0 - w) * self._bend[self.which, low] + w * self._bend[self.which, low + 1])

@@ -44,7 +44,8 @@ class Driver:
         drive = torque + share * available
         brake = brake + brake_share * trains.maximum_brake
         if courses.controls_speed:
-            drive, brake = self._speed(state, target, courses.at(middle + 0.02)[7], available, drive, brake, h)
+            pull, hold = self._speed(state, target, courses.at(middle + 0.02)[7], available, h)
+            drive, brake = drive + pull, brake + hold
         if courses.follows.any():
             steer = np.where(courses.follows, self._path(state, h), steer)
         angles = np.zeros((4, steer.size))
@@ -57,14 +58,7 @@ class Driver:
         return Controls(angles, driven, braked, courses.roads.friction(place, middle), grade, bank)
 
     def _speed(
-        self,
-        state: FloatArray,
-        target: FloatArray,
-        soon: FloatArray,
-        available: FloatArray,
-        drive: FloatArray,
-        brake: FloatArray,
-        h: float,
+        self, state: FloatArray, target: FloatArray, soon: FloatArray, available: FloatArray, h: float
     ) -> tuple[FloatArray, FloatArray]:
         on = np.isfinite(target)
         wanted = np.where(on, target, 0.0)
@@ -77,7 +71,7 @@ class Driver:
         rests = on & (np.absolute(wanted) < 0.05) & (np.absolute(state[B["vx"]]) < 0.3)
         pull = np.where(rests, 0.0, np.clip(force, 0.0, available))
         hold = np.where(rests, 0.5 * self.fleet.drivetrains.maximum_brake, np.maximum(-force, 0.0))
-        return drive + np.where(on, pull, 0.0), brake + np.where(on, hold, 0.0)
+        return np.where(on, pull, 0.0), np.where(on, hold, 0.0)
 
     def _path(self, state: FloatArray, h: float) -> FloatArray:
         vx, vy, r = state[B["vx"]], state[B["vy"]], state[B["yaw_rate"]]

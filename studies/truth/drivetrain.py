@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,8 +17,7 @@ from estimators.errors import unknown
 from studies.truth.layout import column
 from synthesis.errors import SpecError
 
-FRONT_SHARES = {"AWD": 0.5, "FWD": 1.0, "RWD": 0.0}
-"""Share of the drive torque that goes to the front axle."""
+FRONT_SHARES = {"AWD": 0.5, "FWD": 1.0, "RWD": 0.0}  # share of the drive torque that goes to the front axle
 
 
 @dataclass(frozen=True)
@@ -79,24 +78,17 @@ class Drivetrains:
     def available(self, wheel_speed: FloatArray) -> FloatArray:
         """Greatest drive torque (B,), N m, at the mean speed of the driven wheels (4, B), rad/s: flat, then hyperbola."""
         mean = np.absolute((wheel_speed * self.share).sum(axis=0))
-        limit: FloatArray = np.minimum(self.maximum, self.power / np.maximum(mean, 1e-3))
-        return limit
+        return np.asarray(np.minimum(self.maximum, self.power / np.maximum(mean, 1e-3)))
 
     def torques(
-        self,
-        drive: FloatArray,
-        brake: FloatArray,
-        slip: FloatArray,
-        speed: FloatArray,
-        wheel_speed: FloatArray,
-        h: float,
+        self, drive: FloatArray, brake: FloatArray, slip: FloatArray, speed: FloatArray, spin: FloatArray, h: float
     ) -> tuple[FloatArray, FloatArray]:
         """Drive and brake torque of each wheel (4, B), N m.
 
         From the sums asked for (B,), slips (4, B), |v| (B,) m/s, wheel speeds (4, B) rad/s and the step, s. A spinning
         wheel gets its share of the greatest power at most.
         """
-        power = self.power * self.share / np.maximum(np.absolute(wheel_speed), 1.0)
+        power = self.power * self.share / np.maximum(np.absolute(spin), 1.0)
         power = np.minimum(power, self.maximum * self.share)
         driven = np.minimum(np.maximum(drive * self.share, -power), power)
         braked = np.minimum(np.maximum(brake, 0.0), self.maximum_brake) * self.brake_share
@@ -112,16 +104,11 @@ class _Assists:
     def __init__(self, assists: Sequence[Assist | None], sign: float) -> None:
         self.any, self.sign = any(a is not None for a in assists), sign
         self.on = np.array([a is not None for a in assists])
-        for entry in fields(Assist):
-            values = [getattr(a or Assist(), entry.name) for a in assists]
-            setattr(self, entry.name, np.array(values))
+        some = [a or Assist() for a in assists]
+        self.limit, self.release, self.apply, self.least, self.inactive_below = (
+            column(some, name) for name in ("limit", "release", "apply", "least", "inactive_below")
+        )
         self.restart()
-
-    limit: FloatArray
-    release: FloatArray
-    apply: FloatArray
-    least: FloatArray
-    inactive_below: FloatArray
 
     def restart(self) -> None:
         self.share: FloatArray = np.ones((4, self.on.size))

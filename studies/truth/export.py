@@ -29,18 +29,11 @@ def write_drive(
     lateral: str | None = None,
     vehicle: VehicleParameters | None = None,
 ) -> tuple[Path, Path]:
-    """Write ``<manoeuvre>.csv`` and ``<manoeuvre>.toml`` to ``folder``; returns both paths (log, drive).
+    """Write ``<manoeuvre>.csv`` and ``<manoeuvre>.toml`` to ``folder``, made if needed; returns both paths (log, drive).
 
-    Args:
-        folder: made if needed.
-        measured: from `draw`; lost samples become empty cells.
-        seed, run: places in the batch of ``measured``.
-        longitudinal, lateral: gain schedules that the drive file names.
-        vehicle: what the estimators are told of the car; None: the truth.
-
-    Raises:
-        SpecError: a place outside the batch.
-        LogError: the folder cannot be written.
+    ``measured`` is from `draw`, lost samples become empty cells; ``seed`` and ``run`` are places in its batch; ``longitudinal``
+    and ``lateral`` are the gain schedules that the drive file names, ``vehicle`` is what the estimators are told of the car
+    (None: the truth). Raises SpecError for a place outside the batch, or a folder that cannot be written.
     """
     seeds, runs = measured.batch_shape
     if not (0 <= seed < seeds and 0 <= run < runs):
@@ -65,33 +58,18 @@ def write_drive(
     ready_folder(folder)
     log, drive = folder / f"{name}.csv", folder / f"{name}.toml"
     write_csv(log, columns)
-    car = vehicle or truth.vehicles[run].parameters
-    tire = truth.tires[run]
     text = [
         'schema = "gainsmith.drive/1"',
         f"name = {json.dumps(name)}",
-        f"source = {json.dumps(f'simulated truth on {tire} tires, seed {measured.seeds[seed]}')}",
-        f'sample_time = "{measured.sample_time!r} s"',
-        "",
-        "[vehicle]",
-        *_vehicle(car),
-        "",
-        "[schedules]",
-        f"longitudinal = {json.dumps(longitudinal)}",
+        f"source = {json.dumps(f'simulated truth on {truth.tires[run]} tires, seed {measured.seeds[seed]}')}",
+        f'sample_time = "{measured.sample_time!r} s"\n',
+        "[vehicle]", *_vehicle(vehicle or truth.vehicles[run].parameters),
+        f"\n[schedules]\nlongitudinal = {json.dumps(longitudinal)}",
         *([] if lateral is None else [f"lateral = {json.dumps(lateral)}"]),
-        "",
-        "[[log]]",
-        'name = "truth"',
-        f"file = {json.dumps(log.name)}",
-        'time = "t"',
-        f'rate = "{1.0 / measured.sample_time:.9g} Hz"',
-        "",
-        "[signals]",
-        *signals,
-        "",
-        "[reference]",
-        *references,
-    ]
+        f'\n[[log]]\nname = "truth"\nfile = {json.dumps(log.name)}\ntime = "t"',
+        f'rate = "{1.0 / measured.sample_time:.9g} Hz"\n',
+        "[signals]", *signals, "\n[reference]", *references,
+    ]  # fmt: skip
     with whole_file(drive) as beside:
         beside.write_text("\n".join(text) + "\n", encoding="utf-8")
     return log, drive
@@ -102,18 +80,11 @@ def _columns(name: str, value: FloatArray) -> list[tuple[str, FloatArray]]:
 
 
 def _vehicle(car: VehicleParameters) -> list[str]:
-    front, rear = car.radii[0], car.radii[2]
+    lengths = ("front_axle_distance", "rear_axle_distance", "cg_height", "front_track", "rear_track")
     quantities = {
-        "mass": (car.mass, "kg"),
-        "front_axle_distance": (car.front_axle_distance, "m"),
-        "rear_axle_distance": (car.rear_axle_distance, "m"),
-        "cg_height": (car.cg_height, "m"),
-        "front_track": (car.front_track, "m"),
-        "rear_track": (car.rear_track, "m"),
-        "effective_radius_front": (front, "m"),
-        "effective_radius_rear": (rear, "m"),
-        "wheel_inertia": (car.wheel_inertia, "kg*m^2"),
-        "yaw_inertia": (car.yaw_inertia, "kg*m^2"),
-    }
+        "mass": (car.mass, "kg"), **{name: (getattr(car, name), "m") for name in lengths},
+        "effective_radius_front": (car.radii[0], "m"), "effective_radius_rear": (car.radii[2], "m"),
+        "wheel_inertia": (car.wheel_inertia, "kg*m^2"), "yaw_inertia": (car.yaw_inertia, "kg*m^2"),
+    }  # fmt: skip
     lines = [f'{name} = "{value!r} {unit}"' for name, (value, unit) in quantities.items()]
     return [*lines, f"rolling_resistance = {car.rolling_resistance!r}"]

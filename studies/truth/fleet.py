@@ -17,11 +17,9 @@ from studies.truth.magic_formula import MagicFormulaTire
 from studies.truth.vehicle import TruthVehicle
 from synthesis.errors import SpecError
 
-AIR_DENSITY = 1.2
-"""kg/m^3"""
+AIR_DENSITY = 1.2  # kg/m^3
 Tire = LuGreTire | MagicFormulaTire
-TIRES = (LuGreTire.name, MagicFormulaTire.name)
-"""Names of the tire models."""
+TIRES = (LuGreTire.name, MagicFormulaTire.name)  # names of the tire models
 
 
 def tires_of(kind: str, vehicles: Sequence[TruthVehicle]) -> Tire:
@@ -57,19 +55,13 @@ class Fleet:
         self.drag: FloatArray = 0.5 * AIR_DENSITY * column(bodies, "drag_area")
         self.rolling_resistance = column(bodies, "rolling_resistance")
         self.load_lag = column(bodies, "load_lag")
-        self._springs(vehicles)
         under = [v.suspension for v in vehicles]
         self.unsprung = column(under, "unsprung_mass")
-        self.compliance_stiffness: FloatArray = np.repeat(
-            [[u.stiffness_x for u in under], [u.stiffness_y for u in under]], 4, axis=0
-        )
-        self.compliance_damping: FloatArray = np.repeat(
-            [[u.damping_x for u in under], [u.damping_y for u in under]], 4, axis=0
+        self.compliance_stiffness, self.compliance_damping = (
+            np.repeat([column(under, f"{kind}_{axis}") for axis in "xy"], 4, axis=0)
+            for kind in ("stiffness", "damping")
         )
         self.drivetrains = Drivetrains([v.drivetrain for v in vehicles])
-
-    def _springs(self, vehicles: Sequence[TruthVehicle]) -> None:
-        bodies = [v.chassis for v in vehicles]
         ride = np.array([[b.front_ride_frequency for b in bodies], [b.rear_ride_frequency for b in bodies]])
         speed = 2.0 * math.pi * np.repeat(ride, 2, axis=0)
         corner_mass = self.static_load / GRAVITY

@@ -42,8 +42,7 @@ WHEEL: Final = (
     "compliance_y_rate",
 )
 STATES: Final = len(BODY) + 4 * len(WHEEL)
-B: Final = {name: k for k, name in enumerate(BODY)}
-"""Row of each body state."""
+B: Final = {name: k for k, name in enumerate(BODY)}  # Row of each body state
 W: Final = {name: slice(len(BODY) + 4 * k, len(BODY) + 4 * k + 4) for k, name in enumerate(WHEEL)}
 """Rows fl, fr, rl, rr of each wheel state."""
 JACK: Final = slice(B["jack_front"], B["jack_rear"] + 1)

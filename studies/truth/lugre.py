@@ -40,14 +40,11 @@ class LuGreParameters:
         x, y = quantities(along), quantities(across)
         given = {key: entry.value for key, entry in values.vehicle.items()}
         return cls(
-            sigma0=(x["sigma0"].value, y["sigma0"].value),
-            sigma1=(x["sigma1"].value, y["sigma1"].value),
-            sigma2=(x["sigma2"].value, y["sigma2"].value),
-            kappa=(x["kappa"].value, y["kappa"].value),
-            sliding=given.get("friction_sliding", cls.sliding),
-            static=given.get("friction_static", cls.static),
+            sigma0=(x["sigma0"].value, y["sigma0"].value), sigma1=(x["sigma1"].value, y["sigma1"].value),
+            sigma2=(x["sigma2"].value, y["sigma2"].value), kappa=(x["kappa"].value, y["kappa"].value),
+            sliding=given.get("friction_sliding", cls.sliding), static=given.get("friction_static", cls.static),
             stribeck=given.get("stribeck_velocity", cls.stribeck),
-        )
+        )  # fmt: skip
 
 
 class LuGreTire:
@@ -71,14 +68,7 @@ class LuGreTire:
         return self.kappa * surface + self.sigma0 * (speed / grip), slide
 
     def forces(
-        self,
-        z: FloatArray,
-        dz: FloatArray,
-        slide: FloatArray,
-        _transport: FloatArray,
-        load: FloatArray,
-        _friction: FloatArray,
+        self, z: FloatArray, dz: FloatArray, slide: FloatArray, _w: FloatArray, load: FloatArray, _theta: FloatArray
     ) -> FloatArray:
         """F (2, 4, B), N, in the tire frame, from deflection (m), its rate and the slip velocity (m/s), load (4, B), N."""
-        out: FloatArray = (self.sigma0 * z + self.sigma1 * dz + self.sigma2 * slide) * load
-        return out
+        return np.asarray((self.sigma0 * z + self.sigma1 * dz + self.sigma2 * slide) * load)

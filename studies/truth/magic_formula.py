@@ -47,9 +47,7 @@ class MagicFormulaParameters:
     relaxation_least: float = 0.002  # m
     damping: tuple[float, float] = (0.06, 0.06)  # slip per m/s at rest
     damping_speed: float = 2.5  # m/s
-    nominal_friction: float = (
-        1.1  # what `friction` = 1 means: mean of both peaks at nominal load; the peaks are over it
-    )
+    nominal_friction: float = 1.1  # what `friction` = 1 means, mean of both peaks at nominal load; peaks are over it
 
 
 class MagicFormulaTire:
@@ -84,16 +82,10 @@ class MagicFormulaTire:
         return transport / sigma, slide / sigma
 
     def forces(
-        self,
-        slip: FloatArray,
-        _rate: FloatArray,
-        slide: FloatArray,
-        transport: FloatArray,
-        load: FloatArray,
-        friction: FloatArray,
+        self, slip: FloatArray, _: FloatArray, slide: FloatArray, W: FloatArray, load: FloatArray, friction: FloatArray
     ) -> FloatArray:
         """F (2, 4, B), N, in the tire frame, from lagged slips, slip velocity (m/s), load (4, B), N, and friction."""
-        slow = np.maximum(1.0 - transport / self.damping_speed, 0.0)
+        slow = np.maximum(1.0 - W / self.damping_speed, 0.0)
         slip = slip + slow * self.damping * slide
         df = load / self.nominal_load - 1.0
         peak = np.maximum(self.peak + self.peak_load * df, 0.1) * (friction / self.nominal_friction)
@@ -103,8 +95,7 @@ class MagicFormulaTire:
         angle = np.stack([slip[0], np.arctan(slip[1])])  # kappa and alpha: each weakens the other's force
         own = self.weight_fall * angle
         weight = np.cos(self.weight_shape * np.arctan(self.weight * angle[::-1] / np.sqrt(1.0 + own * own)))
-        out: FloatArray = pure * weight * load
-        return out
+        return np.asarray(pure * weight * load)
 
     def _stiffness(self, load: FloatArray, df: FloatArray) -> FloatArray:
         """B C D/F_z (2, 4, B): K_x = F_z (p_1 + p_2 df) exp(p_3 df), K_y = p_1 F_z0 sin(2 atan(F_z/(p_2 F_z0)))."""

@@ -17,17 +17,7 @@ from studies.drives.quantities import Duration
 from studies.truth.course import Course
 from studies.truth.drivetrain import Assist
 from studies.truth.fleet import TIRES
-from studies.truth.profile import (
-    GRID,
-    Angles,
-    PathPiece,
-    Piece,
-    Shares,
-    Speeds,
-    Torques,
-    curvature,
-    sampled,
-)
+from studies.truth.profile import GRID, Angles, PathPiece, Piece, Shares, Speeds, Torques, curvature, sampled
 from studies.truth.record import Truth
 from studies.truth.road import Road
 from studies.truth.simulate import EVERYTHING, RECORD_TIME, STEP, simulate, simulate_in_processes
@@ -102,15 +92,10 @@ class Manoeuvre(StrictTable):
         own = self.vehicle
         car = load_vehicle(own.parameters, folder)
         limits = ("maximum_torque", "maximum_power", "maximum_brake_torque")
-        given = {name: value for name in limits if (value := getattr(own, name)) is not None}
-        fitted = replace(
-            car.drivetrain,
-            **given,
-            layout=own.drivetrain,
-            traction_control=Assist() if own.traction_control == "poor" else None,
-            anti_lock=Assist() if own.anti_lock == "poor" else None,
-        )
-        return car.changed(drivetrain=fitted)
+        given: dict[str, Any] = {name: value for name in limits if (value := getattr(own, name)) is not None}
+        for name in ("traction_control", "anti_lock"):
+            given[name] = Assist() if getattr(own, name) == "poor" else None
+        return car.changed(drivetrain=replace(car.drivetrain, layout=own.drivetrain, **given))
 
     def course(self) -> Course:
         """As arrays."""
@@ -127,22 +112,12 @@ class Manoeuvre(StrictTable):
             if self.free_after is not None:
                 target[int(np.ceil(self.free_after / GRID)) :] = np.nan
         return Course(
-            name=self.name,
-            duration=self.duration,
-            initial_speed=self.speed,
-            tire=self.vehicle.tire,
-            steer=steer,
-            drive_torque=table(self.torque, "N*m"),
-            drive_share=table(self.throttle, "share"),
-            brake_torque=table(self.brake_torque, "N*m"),
-            brake_share=table(self.brake, "share"),
-            grade=table(self.road.grade, "rad"),
-            bank=table(self.road.bank, "rad"),
-            friction=self.road.coefficient,
-            zones=self.road.zones(),
-            speed=target,
-            curvature=curvature(self.path) if self.path else None,
-        )
+            name=self.name, duration=self.duration, initial_speed=self.speed, tire=self.vehicle.tire, steer=steer,
+            drive_torque=table(self.torque, "N*m"), drive_share=table(self.throttle, "share"),
+            brake_torque=table(self.brake_torque, "N*m"), brake_share=table(self.brake, "share"),
+            grade=table(self.road.grade, "rad"), bank=table(self.road.bank, "rad"), friction=self.road.coefficient,
+            zones=self.road.zones(), speed=target, curvature=curvature(self.path) if self.path else None,
+        )  # fmt: skip
 
 
 def shipped_manoeuvres(paper: str = "") -> dict[str, Path]:

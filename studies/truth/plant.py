@@ -79,8 +79,7 @@ class Plant:
 
     def transport(self, moving: Slide) -> FloatArray:
         """max(|R_e w|, |v_xt|, |v_yt|) (4, B), m/s: how fast the contact patch is renewed at least."""
-        out: FloatArray = np.maximum(np.absolute(moving.surface), np.absolute(moving.velocity).max(axis=0))
-        return out
+        return np.asarray(np.maximum(np.absolute(moving.surface), np.absolute(moving.velocity).max(axis=0)))
 
     def loads(self, state: FloatArray) -> FloatArray:
         """F_z (4, B), N."""
@@ -93,8 +92,7 @@ class Plant:
         # links cannot pull a wheel through the road: they take no more than the springs leave on it
         jack = np.minimum(np.maximum(state[JACK], -np.maximum(right, 0.0)), np.maximum(left, 0.0))
         load[0::2], load[1::2] = left - jack, right + jack
-        out: FloatArray = np.maximum(load, 0.0)
-        return out
+        return np.asarray(np.maximum(load, 0.0))
 
     def in_body_axes(self, tire: FloatArray, load: FloatArray, steered: SteerAngles) -> Forces:
         """Tire forces (2, 4, B) turned by the steering angle."""

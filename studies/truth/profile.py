@@ -18,29 +18,20 @@ from studies.drives import quantities
 from studies.drives.quantities import Duration, Length
 from synthesis.toml_file import StrictTable
 
-GRID = 0.005
-"""s, spacing of the tables."""
-PATH_GRID = 0.25
-"""m, spacing of curvature tables."""
+GRID = 0.005  # s, spacing of the tables
+PATH_GRID = 0.25  # m, spacing of curvature tables
 _SHARE = re.compile(r"[-+]?[0-9]*\.?[0-9]+( ?%)?")
 _NEEDS: dict[str, tuple[set[str], set[str]]] = {
-    "hold": ({"time"}, {"to"}),
-    "ramp": ({"time", "to"}, set()),
-    "smooth": ({"time", "to"}, set()),
-    "sine": ({"time", "amplitude", "period"}, set()),
-    "half-sine": ({"time", "amplitude"}, set()),
-    "pulses": ({"time", "amplitude", "period"}, {"duty"}),
-    "table": ({"times", "values", "unit"}, set()),
-}
+    "hold": ({"time"}, {"to"}), "ramp": ({"time", "to"}, set()), "smooth": ({"time", "to"}, set()),
+    "sine": ({"time", "amplitude", "period"}, set()), "half-sine": ({"time", "amplitude"}, set()),
+    "pulses": ({"time", "amplitude", "period"}, {"duty"}), "table": ({"times", "values", "unit"}, set()),
+}  # fmt: skip
 """Keys that each kind must have, and those that it may have."""
-BLEND = 5.0
-"""m over which the curvature changes between pieces: roads are no compasses, and drivers cannot jump."""
+BLEND = 5.0  # m over which the curvature changes between pieces: roads are no compasses, and drivers cannot jump
 _PATH_NEEDS = {
-    "straight": {"length"},
-    "arc": {"radius", "angle_deg"},
-    "lane-change": {"length", "offset"},
+    "straight": {"length"}, "arc": {"radius", "angle_deg"}, "lane-change": {"length", "offset"},
     "slalom": {"length", "wavelength", "offset"},
-}
+}  # fmt: skip
 
 
 def _check_keys(kind: str, given: Set[str], needs: Set[str], may: Set[str]) -> None:

@@ -77,14 +77,10 @@ class Truth:
         duration = self.duration[rows]
         keep = self.time <= duration.max() + 1e-9
         return Truth(
-            self.time[keep],
-            {name: value[rows][:, keep] for name, value in self.signals.items()},
-            tuple(self.names[k] for k in rows),
-            duration,
-            tuple(self.vehicles[k] for k in rows),
-            tuple(self.tires[k] for k in rows),
-            tuple(self.keys[k] for k in rows),
-        )
+            self.time[keep], {name: value[rows][:, keep] for name, value in self.signals.items()},
+            tuple(self.names[k] for k in rows), duration, tuple(self.vehicles[k] for k in rows),
+            tuple(self.tires[k] for k in rows), tuple(self.keys[k] for k in rows),
+        )  # fmt: skip
 
     def until(self, end: float) -> Truth:
         """The samples up to ``end``, s; runs that take longer end there."""
@@ -132,11 +128,6 @@ def read_truth(folder: Path, vehicles: Sequence[TruthVehicle]) -> Truth:
     if len(runs["names"]) != len(vehicles):
         raise SpecError(f"{folder}: {len(runs['names'])} runs, but {len(vehicles)} vehicles")
     return Truth(
-        time,
-        signals,
-        tuple(runs["names"]),
-        np.array(runs["duration"]),
-        tuple(vehicles),
-        tuple(runs["tires"]),
+        time, signals, tuple(runs["names"]), np.array(runs["duration"]), tuple(vehicles), tuple(runs["tires"]),
         tuple((int(a), int(b)) for a, b in runs["keys"]),
-    )
+    )  # fmt: skip

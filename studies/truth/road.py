@@ -67,11 +67,7 @@ class _Layer:
     def __init__(self, zones: Sequence[Zone]) -> None:
         self.friction = column(zones, "friction")
         self.corners = column(zones, "corners")
-        self._from, self._to, self._blend = (
-            column(zones, "from_place"),
-            column(zones, "to_place"),
-            column(zones, "blend"),
-        )
+        self._from, self._to, self._blend = (column(zones, name) for name in ("from_place", "to_place", "blend"))
         self._since, self._until = column(zones, "from_time"), column(zones, "to_time")
         self._placed = bool((self._from > -_EVER).any() or (self._to < _EVER).any())
 
@@ -84,8 +80,7 @@ class _Layer:
 
 
 def _over(way: FloatArray, blend: FloatArray) -> FloatArray:
-    out: FloatArray = np.minimum(np.maximum(way / blend + 0.5, 0.0), 1.0)
-    return out
+    return np.asarray(np.minimum(np.maximum(way / blend + 0.5, 0.0), 1.0))
 
 
 _GROUPS = {

@@ -142,6 +142,16 @@ class Ticks:
         if self.teeth < 1:
             raise SpecError(f"ticks.teeth = {self.teeth}: at least 1")
 
+    def count(self, angle: FloatArray, rng: np.random.Generator, drops: Drops) -> FloatArray:
+        """Ticks (n, 4) counted up to each sample, from a random position of the teeth; lost ones are NaN."""
+        counts = np.floor(angle * self.teeth / (2.0 * np.pi) + rng.random(angle.shape[1:]))
+        return np.where(drops.lost(rng, angle.shape[0], angle.shape[1:]), np.nan, counts)
+
+    def speeds(self, counts: FloatArray, sample_time: float) -> FloatArray:
+        """Wheel speeds, rad/s, of counts (S, B, n, 4)."""
+        meter = TickSpeed(self.teeth, sample_time, (*counts.shape[:2], 4), self.least_ticks, self.longest_window)
+        return np.stack([meter.step(counts[:, :, k]).speed for k in range(counts.shape[2])], axis=2)
+
 
 @dataclass(frozen=True)
 class Sensors:
@@ -155,8 +165,7 @@ class Sensors:
     ticks: Ticks | None = None  # wheel speed from an encoder instead of a noisy speed
 
 
-PERFECT = Sensors(Channel(), Channel(), Channel(), Channel(), Channel())
-"""Sensors without any error."""
+PERFECT = Sensors(Channel(), Channel(), Channel(), Channel(), Channel())  # sensors without any error
 
 
 @dataclass(frozen=True)
@@ -191,8 +200,7 @@ def draw(truth: Truth, sensors: Sensors, seeds: Sequence[int], sample_time: floa
     The errors of a run depend on its seed, its manoeuvre and the signal alone, not on what else is drawn or how many:
     `numpy.random.SeedSequence` over the three. Of equal manoeuvres in one batch each has errors of its own.
 
-    Raises:
-        SpecError: no seeds, a sample time that is no multiple of the truth's, a signal that was not recorded.
+    Raises SpecError: no seeds, a sample time that is no multiple of the truth's, a signal that was not recorded.
     """
     every = round(sample_time / truth.sample_time)
     if every < 1 or abs(every * truth.sample_time - sample_time) > 1e-9:
@@ -203,31 +211,18 @@ def draw(truth: Truth, sensors: Sensors, seeds: Sequence[int], sample_time: floa
     samples, shape = truth.time.size, (len(seeds), truth.size)
     signals: dict[str, FloatArray] = {}
     for name, source in SOURCES.items():
-        count = name == "wheel_speed" and sensors.ticks is not None
-        true = truth["wheel_angle" if count else source]
+        ticks = sensors.ticks if name == "wheel_speed" else None
+        true = truth[source if ticks is None else "wheel_angle"]
         out = np.empty((*shape, samples, *true.shape[2:]))
-        channel = getattr(sensors, _CHANNELS.get(name, name))
+        channel: Channel = getattr(sensors, _CHANNELS.get(name, name))
         for b in range(truth.size):
             for s, seed in enumerate(seeds):
                 rng = np.random.default_rng(np.random.SeedSequence((seed, *truth.keys[b], crc32(name.encode()))))
-                value = _counted(true[b], rng, sensors) if count else true[b]
-                out[s, b] = value if count else channel.read(value, rng, sample_time)
-        signals[name] = _speeds(out, sensors, sample_time) if count else out
+                read = (
+                    channel.read(true[b], rng, sample_time)
+                    if ticks is None
+                    else ticks.count(true[b], rng, channel.drops)
+                )
+                out[s, b] = read
+        signals[name] = out if ticks is None else ticks.speeds(out, sample_time)
     return Measured(truth.time, signals, tuple(seeds), truth, shape)
-
-
-def _counted(angle: FloatArray, rng: np.random.Generator, sensors: Sensors) -> FloatArray:
-    """Ticks (n, 4) counted up to each sample, from a random position of the teeth; lost ones are NaN."""
-    assert sensors.ticks is not None
-    start = rng.random(angle.shape[1:])
-    counts = np.floor(angle * sensors.ticks.teeth / (2.0 * np.pi) + start)
-    lost = sensors.wheel_speed.drops.lost(rng, angle.shape[0], angle.shape[1:])
-    return np.where(lost, np.nan, counts)
-
-
-def _speeds(counts: FloatArray, sensors: Sensors, sample_time: float) -> FloatArray:
-    assert sensors.ticks is not None
-    own = sensors.ticks
-    shape = (*counts.shape[:2], 4)
-    meter = TickSpeed(own.teeth, sample_time, shape, own.least_ticks, own.longest_window)
-    return np.stack([meter.step(counts[:, :, k]).speed for k in range(counts.shape[2])], axis=2)

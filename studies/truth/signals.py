@@ -36,8 +36,7 @@ WHEEL_UNITS: Final = {
 }  # fmt: skip
 """(B, n, 4) signals, fl fr rl rr. Forces, slips, wheel_vx and wheel_vy (of the wheel centre) in the tire frame. torque:
 drive minus brake as it acted, I_w w' = torque - rolling_torque - R_e force_x. slip, slip_angle as in P1 notes 1."""
-UNITS: Final = {**CAR_UNITS, **WHEEL_UNITS}
-"""Unit of every signal."""
+UNITS: Final = {**CAR_UNITS, **WHEEL_UNITS}  # Unit of every signal
 
 
 def signals_of(fleet: Fleet, step: Step, controls: Controls) -> dict[str, FloatArray]:

@@ -7,7 +7,7 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -26,10 +26,8 @@ from studies.truth.stepper import Step, advance
 from studies.truth.vehicle import TruthVehicle
 from synthesis.errors import SpecError
 
-STEP = 0.001
-"""s, by the convergence study of the tests: velocities are then right to 1e-4 m/s, wheel speeds to 1e-2 rad/s."""
-RECORD_TIME = 0.005
-"""s between samples, 200 Hz as in P1 to P3."""
+STEP = 0.001  # s, by the convergence study of the tests: velocities right to 1e-4 m/s, wheel speeds to 1e-2 rad/s
+RECORD_TIME = 0.005  # s between samples, 200 Hz as in P1 to P3
 EVERYTHING = tuple(UNITS)
 
 
@@ -45,17 +43,12 @@ def simulate(
 ) -> Truth:
     """Integrate B runs, `courses[b]` driven with `vehicles[b]`; returns the signals named in ``record``.
 
-    Args:
-        courses, vehicles: one of each for every run; equal courses cost once.
-        step: s, of the integration.
-        record_time: s between recorded samples, a multiple of ``step``.
-        record: names of `UNITS`.
-        until: s; None: to the end of the longest course.
-        progress: called with the fraction done.
+    One course and vehicle for every run; equal courses cost once. ``step`` of the integration and ``record_time`` between
+    recorded samples, a multiple of it, in s; ``record`` are names of `UNITS`; ``until`` in s, None: to the end of the longest
+    course; ``progress`` is called with the fraction done.
 
-    Raises:
-        SpecError: lists of different length, a step that does not divide the record time, an unknown signal.
-        SimulationError: a run that became infinite.
+    Raises SpecError for lists of different length, a step that does not divide the record time, an unknown signal, and
+    SimulationError for a run that became infinite.
     """
     if len(courses) != len(vehicles) or not courses:
         raise SpecError(f"{len(courses)} courses and {len(vehicles)} vehicles: give one vehicle for each course")
@@ -73,14 +66,14 @@ def simulate(
         part = _run([courses[k] for k in rows], [vehicles[k] for k in rows], samples, step, every, record, progress)
         for name, value in part.items():
             signals[name][rows] = value
-    return Truth(
-        np.asarray(record_time * np.arange(samples), dtype=np.float64),
-        signals,
-        tuple(c.name for c in courses),
-        np.array([c.duration for c in courses]),
-        tuple(vehicles),
-        tuple(c.tire for c in courses),
-    )
+    return _truth(np.asarray(record_time * np.arange(samples), dtype=np.float64), signals, courses, vehicles)
+
+
+def _truth(
+    time: FloatArray, signals: dict[str, FloatArray], courses: Sequence[Course], vehicles: Sequence[TruthVehicle]
+) -> Truth:
+    names, tires = tuple(c.name for c in courses), tuple(c.tire for c in courses)
+    return Truth(time, signals, names, np.array([c.duration for c in courses]), tuple(vehicles), tires)
 
 
 def _corner_axis(name: str) -> tuple[int, ...]:
@@ -134,21 +127,11 @@ def simulate_in_processes(
     parts = min(workers, len(courses))
     if parts < 2:
         return simulate(courses, vehicles, **options)
-    rows = [range(k * len(courses) // parts, (k + 1) * len(courses) // parts) for k in range(parts)]
-    longest = max(c.duration for c in courses)
-    work = [([courses[k] for k in r], [vehicles[k] for k in r], {**options, "until": longest}) for r in rows]
+    edges = [k * len(courses) // parts for k in range(parts + 1)]
+    options["until"] = max(c.duration for c in courses)
     forks = sys.platform == "linux" and threading.active_count() == 1
     with ProcessPoolExecutor(parts, mp_context=multiprocessing.get_context("fork" if forks else "spawn")) as pool:
-        done = list(pool.map(_work, work))
-    merged = {name: np.concatenate([part.signals[name] for part in done]) for name in done[0].signals}
-    names = tuple(name for part in done for name in part.names)
-    tires = tuple(tire for part in done for tire in part.tires)
-    duration = np.concatenate([part.duration for part in done])
-    return replace(
-        done[0], signals=merged, names=names, duration=duration, vehicles=tuple(vehicles), tires=tires, keys=()
-    )
-
-
-def _work(item: tuple[list[Course], list[TruthVehicle], dict[str, Any]]) -> Truth:
-    courses, vehicles, options = item
-    return simulate(courses, vehicles, **options)
+        running = [pool.submit(simulate, courses[a:b], vehicles[a:b], **options) for a, b in pairwise(edges)]
+        done = [part.result() for part in running]
+    signals = {name: np.concatenate([part.signals[name] for part in done]) for name in done[0].signals}
+    return _truth(done[0].time, signals, courses, vehicles)

@@ -59,59 +59,41 @@ class Step(NamedTuple):
     slide: Slide
 
 
-class _Spin(NamedTuple):
-    w: FloatArray
-    torque: FloatArray
-    rolling: FloatArray
-
-
 def advance(plant: Plant, state: FloatArray, controls: Controls, h: float) -> Step:
     """One step of ``h`` seconds under controls that are held over it (best: those at its middle)."""
+    car, tire, friction = plant.fleet, plant.tire, controls.friction
     steered = SteerAngles(np.sin(controls.steer), np.cos(controls.steer))
     start, load = plant.slide(state, steered), plant.loads(state)
-    z = state[DEFLECTION].reshape(2, 4, -1)
-    end_z, forces = _contact(plant, z, z, start, load, controls, steered, h)
-    spin = _wheels(plant, state, forces, controls, h)
-    guess = state + h * plant.body_rates(state, forces, spin.torque, controls)
-    guess[W["wheel_speed"]] = spin.w
-    end = plant.slide(guess, steered)
-    middle = Slide(*(0.5 * (a + b) for a, b in zip(start, end, strict=True)))
+    z, before = state[DEFLECTION].reshape(2, 4, -1), state[W["wheel_speed"]]
+
+    def contact(at: FloatArray, moving: Slide, load: FloatArray) -> tuple[FloatArray, Forces]:
+        """Deflections (2, 4, B) at the end of the step and mean forces over it; rates are taken at the deflections `at`."""
+        transport = plant.transport(moving)
+        a, push = tire.rates(at, moving.slip, np.absolute(moving.surface), transport, friction)
+        after, mean, rate = stepped_deflection(z, push, a, h)
+        return after, plant.in_body_axes(tire.forces(mean, rate, moving.slip, transport, load, friction), load, steered)
+
+    def wheels(forces: Forces) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Wheel speeds at the end of the step, and torque and rolling resistance as they acted."""
+        rolling = car.radius * car.rolling_resistance * forces.load
+        most = controls.brake + rolling
+        free = before + h * (controls.drive - car.radius * forces.tire[0]) / car.wheel_inertia
+        after = np.sign(free) * np.maximum(np.absolute(free) - h * most / car.wheel_inertia, 0.0)
+        hold = (free - after) * car.wheel_inertia / h
+        share = controls.brake / np.where(most > 0.0, most, 1.0)
+        return after, controls.drive - hold * share, hold * (1.0 - share)
+
+    end_z, forces = contact(z, start, load)
+    w, torque, rolling = wheels(forces)
+    guess = state + h * plant.body_rates(state, forces, torque, controls)
+    guess[W["wheel_speed"]] = w
+    middle = Slide(*(0.5 * (a + b) for a, b in zip(start, plant.slide(guess, steered), strict=True)))
     load = 0.5 * (load + plant.loads(guess))
-    end_z, forces = _contact(plant, z, 0.5 * (z + end_z), middle, load, controls, steered, h)
-    spin = _wheels(plant, state, forces, controls, h)
-    rates = plant.body_rates(0.5 * (state + guess), forces, spin.torque, controls)
+    end_z, forces = contact(0.5 * (z + end_z), middle, load)
+    w, torque, rolling = wheels(forces)
+    rates = plant.body_rates(0.5 * (state + guess), forces, torque, controls)
     out = state + h * rates
-    out[W["wheel_angle"]] += 0.5 * h * (state[W["wheel_speed"]] + spin.w)
-    out[W["wheel_speed"]] = spin.w
+    out[W["wheel_angle"]] += 0.5 * h * (before + w)
+    out[W["wheel_speed"]] = w
     out[DEFLECTION] = end_z.reshape(8, -1)
-    return Step(out, rates, forces, spin.torque, spin.rolling, middle)
-
-
-def _contact(
-    plant: Plant,
-    z: FloatArray,
-    at: FloatArray,
-    moving: Slide,
-    load: FloatArray,
-    controls: Controls,
-    steered: SteerAngles,
-    h: float,
-) -> tuple[FloatArray, Forces]:
-    """Deflections (2, 4, B) at the end of the step and mean forces over it; rates are taken at the deflections `at`."""
-    transport, tire = plant.transport(moving), plant.tire
-    a, push = tire.rates(at, moving.slip, np.absolute(moving.surface), transport, controls.friction)
-    after, mean, rate = stepped_deflection(z, push, a, h)
-    force = tire.forces(mean, rate, moving.slip, transport, load, controls.friction)
-    return after, plant.in_body_axes(force, load, steered)
-
-
-def _wheels(plant: Plant, state: FloatArray, forces: Forces, controls: Controls, h: float) -> _Spin:
-    """Wheel speeds at the end of the step, and the torques that acted."""
-    car, before = plant.fleet, state[W["wheel_speed"]]
-    rolling = car.radius * car.rolling_resistance * forces.load
-    most = controls.brake + rolling
-    free = before + h * (controls.drive - car.radius * forces.tire[0]) / car.wheel_inertia
-    after = np.sign(free) * np.maximum(np.absolute(free) - h * most / car.wheel_inertia, 0.0)
-    hold = (free - after) * car.wheel_inertia / h
-    share = controls.brake / np.where(most > 0.0, most, 1.0)
-    return _Spin(after, controls.drive - hold * share, hold * (1.0 - share))
+    return Step(out, rates, forces, torque, rolling, middle)

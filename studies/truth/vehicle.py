@@ -25,8 +25,7 @@ from synthesis.toml_file import shipped_files
 class Chassis:
     """Springs, dampers, inertias and drag of the body: typical of passenger cars, given by no sheet.
 
-    Raises:
-        SpecError: a value that is not finite and above zero (drag, rolling resistance, bars: zero or above).
+    Raises SpecError for a value that is not finite and above zero (drag, rolling resistance, bars: zero or above).
     """
 
     roll_inertia_ratio: float = 0.2  # I_x/I_z
@@ -95,8 +94,7 @@ def vehicle_parameters(values: ParameterSet) -> VehicleParameters:
 def load_vehicle(name: str | Path, folder: Path = Path()) -> TruthVehicle:
     """The truth vehicle of a parameter set: shipped with the models or with the truth by name, or a TOML file in ``folder``.
 
-    Raises:
-        SpecError: no such set, or values that no car has.
+    Raises SpecError: no such set, or values that no car has.
     """
     own = shipped_vehicles()
     values = load_parameter_set(own.get(str(name), name), folder)
@@ -104,12 +102,10 @@ def load_vehicle(name: str | Path, folder: Path = Path()) -> TruthVehicle:
     suspension = SuspensionParameters()
     if "suspension_stiffness_longitudinal" in given:
         suspension = SuspensionParameters(
-            stiffness_x=given["suspension_stiffness_longitudinal"],
-            stiffness_y=given["suspension_stiffness_lateral"],
-            damping_x=given["suspension_damping"],
-            damping_y=given["suspension_damping"],
+            stiffness_x=given["suspension_stiffness_longitudinal"], stiffness_y=given["suspension_stiffness_lateral"],
+            damping_x=given["suspension_damping"], damping_y=given["suspension_damping"],
             unsprung_mass=given["unsprung_mass"],
-        )
+        )  # fmt: skip
     return TruthVehicle(values.id, vehicle_parameters(values), LuGreParameters.of(values), suspension=suspension)
 
 

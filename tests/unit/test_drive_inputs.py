@@ -9,7 +9,7 @@ from estimators.forces import vertical_loads
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity import corner_acceleration_by_speed
 from studies.drives import corner_inputs as ci
-from studies.drives.baselines import held, integrated_acceleration, mean_over
+from studies.drives.corner_inputs import held, integrated_acceleration, mean_over
 from studies.drives.evaluation import moving_slip
 
 CAR = VehicleParameters(

@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import pytest
 
 from studies.claim import ClaimVerdict
-from studies.report.html.pictures import LARGEST_SVG, picture
+from studies.report.html.page import LARGEST_SVG, picture
 from studies.report.html.text import alignments, brief, cell, label, number, prose
 from studies.report.scoreboard import MARKS, MEANINGS, scoreboard
 from studies.report.scoreboard_picture import scoreboard_svg

@@ -23,10 +23,9 @@ from studies.drives.run import replay_drive
 from studies.errors import LogError
 from studies.execution.processes import Finished, Serial
 from studies.sweeps.engine import run_sweep
-from studies.sweeps.measure import Measure
+from studies.sweeps.measures import Measure
 from studies.sweeps.observer import Batch, Observer
-from studies.sweeps.observer_spec import ObserverSpec
-from studies.sweeps.spec import MEASURES, build_sweep
+from studies.sweeps.spec import MEASURES, ObserverSpec, build_sweep
 from studies.trials.sensors import TEST_CAR
 from studies.truth import draw, load_manoeuvre, simulate_manoeuvres, write_drive
 from synthesis.errors import SpecError

@@ -20,7 +20,7 @@ from studies.sweeps.engine import run_sweep
 from studies.sweeps.gate import Comparison, compare
 from studies.sweeps.reports import junit, markdown
 from studies.sweeps.spec import build_sweep, shipped_sweeps
-from studies.sweeps.statistics import UNPROVED, Summary
+from studies.sweeps.summary import UNPROVED, Summary
 from studies.sweeps.sweep import Sweep
 from synthesis.errors import SpecError
 from tests.support.sweep_cases import small, sweep

@@ -20,11 +20,10 @@ from analysis.sensitivity.designs import Sobol
 from estimators import GainSchedule, LpvVelocityObserver
 from estimators.schedule import SHIPPED, read_content, write_content
 from studies.sweeps.evaluate import INVALID, NOT_A_NUMBER, VALID, evaluate
-from studies.sweeps.measure import Measure
+from studies.sweeps.measures import Measure
 from studies.sweeps.observer import Batch, Observer, model_observer
-from studies.sweeps.observer_spec import ObserverSpec, designed_from
 from studies.sweeps.ranges import RangeSpec
-from studies.sweeps.spec import MEASURES
+from studies.sweeps.spec import MEASURES, ObserverSpec, designed_from
 from studies.sweeps.sweep import Sweep
 from synthesis.errors import SpecError
 from synthesis.models.catalogue.corner import corner_velocity_model

@@ -19,7 +19,7 @@ from studies.sweeps.sweep import Sweep
 from synthesis.errors import SpecError
 from tests.support.sweep_cases import contents, sweep
 
-FORKS = Path(__file__).with_name("sweep_forks.py")
+FORKS = Path(__file__).parents[1] / "support" / "sweep_forks.py"
 SMALL = """
 name = "small"
 description = "for tests"
