@@ -195,8 +195,7 @@ def comparison(name: str, scope: Scope) -> PartResult:
     note = (
         f"{tested.title}: {'prediction confirmed' if all_hold else 'PREDICTION NOT CONFIRMED'}. {trial.agreeing} of "
         f"{len(trial.rows)} intervals from {scope.seeds} seeds of the runtime observer hold the predicted value "
-        f"(simultaneous confidence {1.0 - MISS:.1%}: if the prediction is right, all do with at least this "
-        "probability)."
+        f"(simultaneous confidence {1.0 - MISS:.1%}: if the prediction is right, all do with at least this probability)."
     )
     measures = {"comparisons": float(len(trial.rows)), "agreeing": float(trial.agreeing)}
     return PartResult((), [_table(tested, trial, scope)], [_figure(tested, trial, scope)], [note], measures)

@@ -46,13 +46,12 @@ def overview(_: Scope) -> PartResult:
     )
     lateral = min(value for key, value in measures.items() if key.endswith("lateral"))
     note = (
-        f"On the P3 vehicle the shipped longitudinal schedule survives the loss of {shipped:.0f} % of the force "
-        f"samples at standstill and the printed gain {printed:.0f} %: smaller gains buy the difference. Lateral "
-        f"observers survive at least {lateral:.1%} at any wheel speed. The reason is one and the same: without the "
-        "force the deflection error integrates the velocity error, and the next sample received corrects the "
-        "velocity by gain times that deflection; slow rolling does not let the deflection relax meanwhile. A "
-        "runtime that used the last force again instead of coasting would never open its loop (column hold), but "
-        "its error would follow the motion of the car."
+        f"On the P3 vehicle the shipped longitudinal schedule survives the loss of {shipped:.0f} % of the force samples at "
+        f"standstill and the printed gain {printed:.0f} %: smaller gains buy the difference. Lateral observers survive at "
+        f"least {lateral:.1%} at any wheel speed. The reason is one and the same: without the force the deflection error "
+        "integrates the velocity error, and the next sample received corrects the velocity by gain times that deflection; "
+        "slow rolling does not let the deflection relax meanwhile. A runtime that used the last force again instead of "
+        "coasting would never open its loop (column hold), but its error would follow the motion of the car."
     )
     table = Table(
         "drop-tolerance",

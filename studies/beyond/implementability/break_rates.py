@@ -172,12 +172,11 @@ def rate_figure(curves: Curves) -> Figure:
         panels.append(Panel(marks, Axis("wheel speed [rad/s]", *WHEEL_SPEED), y, scheme))
     return Figure(
         "break-rates",
-        "Sample rate below which the error of the observer grows, over the wheel speed (held constant), for the "
-        "gains printed by P1 and P3 (solid) and the five shipped schedules (dashed). Forward Euler is limited by "
-        "the fastest pole; a sampled innovation breaks at low speed, where the tire force is stiffest; predicting "
-        "and then adding T·L breaks at high speed. Above the dotted line a curve means unstable at the 200 Hz of "
-        "the papers. Tustin, backward Euler and the exact closed-loop update of the runtime have no curve: they "
-        "never break.",
+        "Sample rate below which the error of the observer grows, over the wheel speed (held constant), for the gains "
+        "printed by P1 and P3 (solid) and the five shipped schedules (dashed). Forward Euler is limited by the fastest "
+        "pole; a sampled innovation breaks at low speed, where the tire force is stiffest; predicting and then adding T·L "
+        "breaks at high speed. Above the dotted line a curve means unstable at the 200 Hz of the papers. Tustin, backward "
+        "Euler and the exact closed-loop update of the runtime have no curve: they never break.",
         "Three panels of break rate over wheel speed on a logarithmic scale; longitudinal gains lie between 100 and "
         "900 Hz, lateral ones mostly below 200 Hz except for the third scheme.",
         panels,

@@ -88,9 +88,8 @@ def plane_figure(cases: Sequence[Case], points: int = 61) -> Figure:
         "which has the floor 1; grey: H₂ gain from white force noise. L₂ sets the decay and the noise, L₁ the fast "
         "pole, and friction hardly tells gains apart: between the dotted lines it is at its floor. White: "
         "unstable. Star and box: printed gains and ranges; black: the shipped schedules.",
-        "Four maps over L1 and L2 (logarithmic) with blue contours of the decay rate, nearly horizontal at low L2, "
-        "orange contours of the fastest pole, a red star for the printed gains and a black curve for the shipped "
-        "schedule.",
+        "Four maps over L1 and L2 (logarithmic) with blue contours of the decay rate, nearly horizontal at low L2, orange "
+        "contours of the fastest pole, a red star for the printed gains and a black curve for the shipped schedule.",
         [panels[k : k + 2] for k in range(0, len(panels), 2)],
         size=(10.0, 3.9 * ((len(cases) + 1) // 2)), legend="below",
     )  # fmt: skip
