@@ -21,14 +21,12 @@ def nrms(estimate: FloatArray, truth: FloatArray, least: float = 0.0) -> FloatAr
     peak = float(np.max(np.abs(truth)))
     if peak == 0.0 or not counted.any():
         return np.full(estimate.shape[0], np.nan)
-    error: FloatArray = np.sqrt(np.mean((estimate[:, counted] - truth[counted]) ** 2, axis=1))
-    return 100.0 * error / peak
+    return np.asarray(100.0 * np.sqrt(np.mean((estimate[:, counted] - truth[counted]) ** 2, axis=1)) / peak)
 
 
 def sample_errors(estimate: FloatArray, truth: FloatArray) -> FloatArray:
     """P4 (13), P5 (8): 100 |estimate - truth|/max |truth| at every sample, %, shape of ``estimate`` (S, n)."""
-    out: FloatArray = 100.0 * np.abs(estimate - truth) / float(np.max(np.abs(truth)))
-    return out
+    return np.asarray(100.0 * np.abs(estimate - truth) / float(np.max(np.abs(truth))))
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,6 @@ def known_spread(values: FloatArray) -> Spread:
 
 
 ERROR_COLUMNS = ("printed mean [%]", "mean [%]", "printed std [%]", "std [%]", "worst mean of a draw [%]")
-"""Of `SampleSpreads.cells`."""
 
 
 class SampleSpreads(NamedTuple):

@@ -18,8 +18,7 @@ from studies.trials.simulations import simulated_truth
 from studies.truth import Measured, Sensors, Truth, draw
 from synthesis.errors import SpecError
 
-QUICK_SECONDS = 4.0
-"""So much of each manoeuvre goes through the pipeline when quick."""
+QUICK_SECONDS = 4.0  # of each manoeuvre go through the pipeline when quick
 Parts = Callable[[VehicleParameters, float, tuple[int, ...]], Mapping[str, Any]]
 """(vehicle, sample time, batch shape) -> parts that replace those of the pipeline, by its argument names."""
 Reading = Callable[[PipelineStep], FloatArray]

@@ -37,7 +37,7 @@ def motion_part(name: str, rows: Sequence[MotionTest], scope: Scope, tire: str =
     """Histories, diagrams and extremes of every manoeuvre; nothing is estimated."""
     truth = simulated_truth(tuple(row.manoeuvre for row in rows), tire, scope)
     drawings = [drawing for row in rows for drawing in motion_drawings(name, truth, row)]
-    return PartResult(tables=[extremes(f"{name}-extremes", truth, rows)], figures=drawings)
+    return PartResult((), [extremes(f"{name}-extremes", truth, rows)], drawings)
 
 
 def motion_drawings(name: str, truth: Truth, row: MotionTest) -> list[Figure]:
@@ -54,15 +54,14 @@ def extremes(name: str, truth: Truth, rows: Sequence[MotionTest]) -> Table:
         manoeuvre = load_manoeuvre(row.manoeuvre)
         vx, *others = _signals(truth, row.manoeuvre)
         extreme = (vx.min(), vx.max(), *(np.abs(value).max() for value in others))
-        given = "; ".join(manoeuvre.given)
-        table.append([row.title, manoeuvre.where, given, *(round(float(value), 2) for value in extreme)])
+        cells = (round(float(value), 2) for value in extreme)
+        table.append([row.title, manoeuvre.where, "; ".join(manoeuvre.given), *cells])
     return Table(
         name,
         f"Extremes of the truth's motion on {truth.tires[0]} tires: accelerations at the centre of gravity along the road, yaw "
         "rate and steering of the front left wheel, beside what the paper gives of the test. What it does not give is ours.",
-        COLUMNS,
-        table,
-    )
+        COLUMNS, table,
+    )  # fmt: skip
 
 
 def _signals(truth: Truth, manoeuvre: str) -> tuple[FloatArray, ...]:
@@ -75,20 +74,17 @@ def _signals(truth: Truth, manoeuvre: str) -> tuple[FloatArray, ...]:
 def _history(name: str, truth: Truth, row: MotionTest) -> Figure:
     vx, ax, ay, turn, steer = _signals(truth, row.manoeuvre)
     time = truth.time[: vx.size]
+    alone = ((vx, "$V_x$ [m/s]", BLUE), (turn, "yaw rate [deg/s]", BLUE), (steer, "steering [deg]", ORANGE))
+    panels = [Panel([Line(time, value, color=color, width=1.2)], y=label) for value, label, color in alone]
     pull = [Line(time, ax, "$a_x$", BLUE, width=1.2), Line(time, ay, "$a_y$", RED, "dashed", 1.2)]
+    panels.insert(1, Panel(pull, y="[m/s$^2$]", legend="best", columns=2))
     return history(
         name,
         f"{row.title}: speed, accelerations at the centre of gravity along the road, yaw rate, and steering of the front left "
         f"wheel of the truth on {truth.tires[0]} tires.",
         f"Four panels over time for {row.title}: speed, longitudinal and lateral acceleration, yaw rate, steering angle.",
-        [
-            Panel([Line(time, vx, color=BLUE, width=1.2)], y="$V_x$ [m/s]"),
-            Panel(pull, y="[m/s$^2$]", legend="best", columns=2),
-            Panel([Line(time, turn, color=BLUE, width=1.2)], y="yaw rate [deg/s]"),
-            Panel([Line(time, steer, color=ORANGE, width=1.2)], y="steering [deg]"),
-        ],
-        (8.0, 5.2),
-    )
+        panels, (8.0, 5.2),
+    )  # fmt: skip
 
 
 def _course(name: str, truth: Truth, row: MotionTest) -> Figure:
@@ -101,12 +97,10 @@ def _course(name: str, truth: Truth, row: MotionTest) -> Figure:
         f"{row.title}: path of the centre of gravity from its start (dot), and longitudinal over lateral acceleration of the "
         f"truth on {truth.tires[0]} tires.",
         f"Left: the path of the car in the plane for {row.title}. Right: its accelerations in a g-g diagram.",
-        [
-            Panel(path, Axis("x [m]", margin=0.01), "y [m]", equal=True),
-            Panel(diagram, Axis("$a_y$ [g]", margin=0.01), "$a_x$ [g]", equal=True),
-        ],
-        size=(8.0, 3.6),
-    )
+        [Panel(path, Axis("x [m]", margin=0.01), "y [m]", equal=True),
+         Panel(diagram, Axis("$a_y$ [g]", margin=0.01), "$a_x$ [g]", equal=True)],
+        (8.0, 3.6),
+    )  # fmt: skip
 
 
 def _rear_wheels(name: str, truth: Truth, row: MotionTest) -> Figure:

@@ -31,16 +31,14 @@ QUANTILES = (0.5, 0.9, 0.99, 0.999)
 @TOPIC.part("any-gain", "The plant sets no limit", 0.2)
 def any_gain(_: Scope) -> PartResult:
     """Whether some constant gain survives 95 % drops, by plant and wheel speed."""
-    rows: list[list[Cell]] = []
-    proved = 0
+    rows, proved = list[list[Cell]](), 0
     for tested, speed in product([observer(name) for name in SHIPPED], SPEEDS):
         plant = tested.schedule.plant_at(np.array(speed))
         A = expm(tested.schedule.sample_time * plant.A)
-        found = certify_static_gain(A, plant.C, RARE)
-        kalman = kalman_critical_arrival(A, plant.C, tolerance=1e-2)
+        found, kalman = certify_static_gain(A, plant.C, RARE), kalman_critical_arrival(A, plant.C, tolerance=1e-2)
         proved += found.verdict is Verdict.CERTIFIED
-        limit = float(critical(tested.schedule, speed))
-        rows.append([tested.plant, speed, str(found.verdict), found.radius, kalman.upper, limit])
+        limits = kalman.upper, float(critical(tested.schedule, speed))
+        rows.append([tested.plant, speed, str(found.verdict), found.radius, *limits])
     table = Table(
         "any-gain",
         f"Whether some constant gain keeps the mean square of the error falling although only {RARE:.0%} of the "
@@ -83,7 +81,7 @@ def typical(scope: Scope) -> PartResult:
     channel = independent_drops(schedule.parameter.min, p)
     moment = system(schedule, channel).propagate_second_moment(np.outer(START, START), [1.0 - p, p], SAMPLES)
     exact = np.sqrt(moment[:, 0, :, 1, 1].sum(axis=-1))
-    time = 1e3 * schedule.sample_time * np.arange(SAMPLES + 1)
+    time = tested.step * np.arange(SAMPLES + 1)
     marks = [
         Line(time, exact, "root mean square, exact", "0.1", width=1.8),
         Line(time, np.sqrt((runs**2).mean(axis=1)), f"of {runs.shape[1]} runs", GREY, "dotted", 1.2),
@@ -91,8 +89,7 @@ def typical(scope: Scope) -> PartResult:
     for q, colour in zip(QUANTILES, (BLUE, GREEN, ORANGE, RED), strict=True):
         marks.append(Line(time, np.quantile(runs, q, axis=1), f"{q:.1%} of the runs below", colour, width=1.4))
     y = Axis("velocity error over its start [1]", 1e-6, max(10.0 * float(exact[-1]), 1e3), "log")
-    share = float((runs.max(axis=0) > 10.0).mean())
-    last = float(np.median(runs[-1]))
+    share, last = float((runs.max(axis=0) > 10.0).mean()), float(np.median(runs[-1]))
     figure = Figure(
         "mean-square-and-typical",
         f"{tested.title}, at standstill with {p:.0%} of the force samples lost, above the critical {p_cr:.0%}: size "
@@ -101,8 +98,7 @@ def typical(scope: Scope) -> PartResult:
         "is carried by ever rarer and larger bursts, so that an average over any number of runs (dotted) falls "
         "below it in the end.",
         "Quantile lines falling one after the other on a logarithmic scale, while the exact root mean square rises.",
-        Panel(marks, Axis("time [ms]", 0.0, time[-1]), y),
-        size=(7.2, 4.2), legend="below", columns=3,
+        Panel(marks, Axis("time [ms]", 0.0, time[-1]), y), (7.2, 4.2), "below", 3,
     )  # fmt: skip
     note = (
         f"Beyond the critical probability the mean square grows but a typical run does not: with {p:.0%} lost the "

@@ -64,7 +64,8 @@ def errors(scope: Scope) -> PartResult:
                f"UKF mean below {LIMIT:g} %", "UKF mean better", "UKF std better")  # fmt: skip
     values = [[*row.mean.values(), *row.deviation.values()] for row in TABLE_1]
     values.append([round(float(value), 3) for value in np.mean(values, axis=0)])
-    rows: list[list[Cell]] = [[row.quantity, row.largest, row.unit] for row in TABLE_1] + [["average", None, None]]
+    heads = [(row.quantity, row.largest, row.unit) for row in TABLE_1]
+    rows: list[list[Cell]] = [list(head) for head in (*heads, ("average", None, None))]
     for row, (ekf, ukf, ekf_spread, ukf_spread) in zip(rows, values, strict=True):
         row += [ekf, ukf, ekf_spread, ukf_spread, ukf < LIMIT, ukf < ekf, ukf_spread < ekf_spread]
     caption = (
