@@ -81,7 +81,8 @@ def _figures() -> list[Figure]:
             "critical-burst-length",
             "Losses in bursts (Gilbert-Elliott channel) at standstill, the worst wheel speed: mean burst length at which the "
             "mean square of the error starts to grow, over the share of lost samples, predicted, for the same seven observers. "
-            "Short bursts at the same loss rate are survived: it is the length of the gap that the deflection error integrates over.",
+            "Short bursts at the same loss rate are survived: it is the length of the gap that the deflection error integrates "
+            "over.",
             "Seven falling curves on a logarithmic scale, lateral observers four to six times above longitudinal ones, "
             "the printed longitudinal gain lowest.",
             Panel(edges, share, bursts, legend="upper right"), (8.4, 4.2)),

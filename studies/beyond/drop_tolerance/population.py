@@ -37,7 +37,7 @@ def simulate(
 
     def follow(lost: BoolArray) -> BoolArray:
         draw = generator.random((seeds, runs))
-        return np.where(lost, draw >= recovery, draw < failure)
+        return np.asarray(np.where(lost, draw >= recovery, draw < failure))
 
     def size(_: int, error: FloatArray, lost: BoolArray) -> FloatArray:
         return norm.of(error, lost)

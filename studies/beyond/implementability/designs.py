@@ -18,8 +18,7 @@ from synthesis.models.parameter_set import load_parameter_set
 
 WHEEL_SPEED = (0.0, 140.0)  # rad/s, the range of P1 Figs. 3 and 4
 PAPER_RATE = 200.0  # Hz, P1 and P3
-PRINTED_BY = ("corner-estimation", "resilient-velocity")
-"""Parameter sets of the papers whose printed gains are examined."""
+PRINTED_BY = ("corner-estimation", "resilient-velocity")  # parameter sets of these papers
 
 
 @dataclass(frozen=True)
@@ -34,9 +33,8 @@ class Design:
 
     def matrices(self, wheel_speed: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """A (g, 2, 2), L (g, 2, 1) and C (g, 1, 2) at wheel speeds (g,) in rad/s."""
-        points = np.atleast_1d(np.asarray(wheel_speed, float))
-        numeric = self.model.on(points)
-        return numeric.A, self.gain(points), numeric.C
+        numeric = self.model.on(wheel_speed)
+        return numeric.A, self.gain(wheel_speed), numeric.C
 
     def grid(self, points: int = 281) -> FloatArray:
         """Wheel speeds over the range, with every breakpoint of the gains."""
@@ -50,10 +48,9 @@ def printed_designs() -> tuple[Design, ...]:
     for name, (parameters, direction) in SHIPPED.items():
         if parameters in PRINTED_BY:
             gains, published = printed(parameters, direction)
+            variants = {"": gains, ", high slip": published.gains_high_slip}
             title = f"{PAPERS[parameters]} {direction}"
-            found.append(_constant(title, name, gains))
-            if published.gains_high_slip is not None:
-                found.append(_constant(f"{title}, high slip", name, published.gains_high_slip))
+            found += [_constant(title + slip, name, pair) for slip, pair in variants.items() if pair is not None]
     return tuple(found)
 
 
@@ -65,11 +62,6 @@ def shipped_designs() -> tuple[Design, ...]:
         schedule = GainSchedule.shipped(name)
         found.append(Design(f"schedule {name}", "shipped", _model(name), schedule.gain, schedule))
     return tuple(found)
-
-
-def with_sample_time(design: Design, sample_time: float) -> GainSchedule:
-    """The schedule of a design for another sample time [s]; gains and plant are as they were, nothing is proved for it."""
-    return replace(design.schedule, sample_time=sample_time)
 
 
 def _model(name: str) -> LpvModel:
