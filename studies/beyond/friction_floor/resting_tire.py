@@ -121,10 +121,10 @@ def theory(_: Scope) -> PartResult:
         "observer of this structure misses of the slip velocity is therefore s/(1 + s) with s = (sigma0/kappa) "
         "|slip|/friction, whatever its schedule: half of it already where the slip is friction over slip stiffness."
     )
-    values, fine, marks = load_parameter_set("corner-estimation"), np.geomspace(SLIPS[0], SLIPS[-1], 200), list[Mark]()
-    radius = values.vehicle["effective_radius"].value
+    shipped, fine, marks = load_parameter_set("corner-estimation"), np.geomspace(SLIPS[0], SLIPS[-1], 200), list[Mark]()
+    radius = shipped.vehicle["effective_radius"].value
     for theta, simulated, colour in zip(FRICTIONS, found[0].simulated[1], ROADS, strict=True):
-        line = missed_share(values.tire["longitudinal"], radius, WHEEL_SPEEDS[1], fine, theta)
+        line = missed_share(shipped.tire["longitudinal"], radius, WHEEL_SPEEDS[1], fine, theta)
         marks += [Line(100 * fine, 100 * line, f"friction {theta:g}", colour)]
         marks += [dots(100 * np.array(SLIPS), 100 * simulated, color=colour, size=4)]
     x, y = Axis("slip $v_r/(R_e\\omega)$ [%]", scale="log"), Axis("share of the slip velocity missed [%]", 0, 100)

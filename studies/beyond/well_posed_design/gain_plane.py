@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -20,7 +19,7 @@ TOPIC = Topic(PACKAGE)
 WHEEL_SPEEDS = 8
 
 
-def gain_plane(case: Case, points: int = 61) -> tuple[FloatArray, FloatArray, Achieved]:
+def gain_plane(case: Case, points: int) -> tuple[FloatArray, FloatArray, Achieved]:
     """L1 (m,) in m/s and L2 (m,) in m/s^2 around the printed gains and ranges, and what the pairs do, fields (m, m).
 
     L2 runs over two decades.
@@ -35,35 +34,23 @@ def gain_plane(case: Case, points: int = 61) -> tuple[FloatArray, FloatArray, Ac
 
 @TOPIC.part("gain-plane", "Printed and shipped gains on the map", 6.0)
 def planes(scope: Scope) -> PartResult:
-    """Constant gains, printed gains, shipped schedules."""
-    cases = all_cases()
-    table, figure = comparison_table(cases, 15 if scope.quick else 57), plane_figure(cases, 21 if scope.quick else 61)
-    return PartResult((), [table], [figure])
-
-
-def comparison_table(cases: Sequence[Case], points: int = 57) -> Table:
-    """Printed gains and shipped schedules by the same measures."""
-    rows: list[list[Cell]] = []
-    for case in cases:
+    """Printed gains and shipped schedules by the same measures; decay, fastest pole and noise of constant gains."""
+    rows, points = list[list[Cell]](), 15 if scope.quick else 57
+    for case in all_cases():
         grid = case.grid(points)
         shipped = achieved(case, GainSchedule.shipped(case.name).gain(grid)[..., 0], grid)
         for what, found in (("printed gains", printed_achieved(case, points)), ("shipped schedule", shipped)):
-            rows.append([case.title, what, *short([float(np.asarray(value)) for value in vars(found).values()])])
-    return Table(
+            rows.append([case.title, what, *short([float(value) for value in found])])
+    table = Table(
         "comparison",
         "Printed gains and shipped schedules by the same measures, at the worst constant wheel speed from 0 to 140 "
         "rad/s. Friction and force noise are at their static floors in nearly all rows; decay, fastest pole and "
         "broadband noise tell the gains apart.",
-        ("case", "gains", *COLUMNS),
-        rows,
-    )
-
-
-def plane_figure(cases: Sequence[Case], points: int = 61) -> Figure:
-    """Decay, fastest pole and noise of constant gains, with printed and shipped gains."""
+        ("case", "gains", *COLUMNS), rows,
+    )  # fmt: skip
     panels = []
-    for case in cases:
-        x, y, fields = gain_plane(case, points)
+    for case in all_cases():
+        x, y, fields = gain_plane(case, 21 if scope.quick else 61)
         darkest = 3.0 * float(printed_achieved(case).noise_density)
         decay, fastest = case.design.decay_rate, float(case.design.fastest_pole or 0.0)
         marks: list[Mark] = [Map(x, y, fields.noise_density.T, "H₂ gain, force noise [m/s·√Hz]", "Greys", 0.0, darkest)]
@@ -81,7 +68,7 @@ def plane_figure(cases: Sequence[Case], points: int = 61) -> Figure:
             dots(first[:1], second[:1], "shipped, at standstill", "black", size=6, hollow=True),
         ]
         panels.append(Panel(marks, "$L_1$ [m/s]", Axis("$L_2$ [m/s²]", scale="log"), case.title, grid=False))
-    return Figure(
+    figure = Figure(
         "gain-plane",
         "Constant gains and what they do at the worst constant wheel speed between 0 and 140 rad/s. Blue: slowest "
         "pole, the decay rate [1/s]; orange: fastest pole [1/s]; green: gain from friction to the velocity error, "
@@ -90,6 +77,6 @@ def plane_figure(cases: Sequence[Case], points: int = 61) -> Figure:
         "unstable. Star and box: printed gains and ranges; black: the shipped schedules.",
         "Four maps over L1 and L2 (logarithmic) with blue contours of the decay rate, nearly horizontal at low L2, orange "
         "contours of the fastest pole, a red star for the printed gains and a black curve for the shipped schedule.",
-        [panels[k : k + 2] for k in range(0, len(panels), 2)],
-        size=(10.0, 3.9 * ((len(cases) + 1) // 2)), legend="below",
+        [panels[:2], panels[2:]], (10.0, 7.8), "below",
     )  # fmt: skip
+    return PartResult((), [table], [figure])
