@@ -17,8 +17,7 @@ def nrms(estimate: FloatArray, truth: FloatArray, least: float = 0.0) -> FloatAr
 
     NaN where the truth never reaches ``least`` or stays 0.
     """
-    counted = np.abs(truth) >= least
-    peak = float(np.max(np.abs(truth)))
+    counted, peak = np.abs(truth) >= least, float(np.max(np.abs(truth)))
     if peak == 0.0 or not counted.any():
         return np.full(estimate.shape[0], np.nan)
     return np.asarray(100.0 * np.sqrt(np.mean((estimate[:, counted] - truth[counted]) ** 2, axis=1)) / peak)
@@ -61,8 +60,7 @@ def spread(values: FloatArray) -> Spread | None:
 
 def known_spread(values: FloatArray) -> Spread:
     """`spread` of values that are known in every run. Raises ValueError otherwise."""
-    found = spread(values)
-    if found is None:
+    if (found := spread(values)) is None:
         raise ValueError(f"none of {values.size} runs has a value")
     return found
 

@@ -53,8 +53,7 @@ def run_pipeline(drawn: Measured, readings: Mapping[str, Reading], parts: Parts 
     The inertial sensors are fixed to a body that rolls and pitches: an `AttitudeObserver` levels them unless ``parts`` bring
     another attitude (None: without).
     """
-    car = assumed_car(drawn)
-    time, shape = drawn.sample_time, drawn.batch_shape
+    car, time, shape = assumed_car(drawn), drawn.sample_time, drawn.batch_shape
     chosen = {"attitude": AttitudeObserver(time, shape), **(parts(car, time, shape) if parts else {})}
     pipeline = EstimationPipeline(car, time, shape, **chosen)
     found: dict[str, FloatArray] = {}

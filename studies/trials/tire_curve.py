@@ -44,10 +44,9 @@ def tire_facts(vehicle: TruthVehicle, kind: str, speed: float, friction: float) 
     """Read off `lateral_curve`. Raises SpecError on a road too slippery for the secant."""
     curve = lateral_curve(vehicle, kind, speed, friction)
     if curve.max(axis=1).min() <= USE:
-        message = f"the tires never reach {USE:g} of their load; use a road with more grip"
-        raise SpecError(f"friction = {friction:g}: {message}")
-    load = vehicle.parameters.static_loads[0::2]
-    rising = [int(np.argmax(row)) + 1 for row in curve]
+        remedy = "use a road with more grip"
+        raise SpecError(f"friction = {friction:g}: the tires never reach {USE:g} of their load; {remedy}")
+    load, rising = vehicle.parameters.static_loads[0::2], curve.argmax(axis=1) + 1
     angle = np.array([np.interp(USE, row[:top], ANGLES[:top]) for row, top in zip(curve, rising, strict=True)])
     length = 1.0 / vehicle.lugre.kappa[1] if kind == LuGreTire.name else vehicle.magic_formula.relaxation[1]
     found = (curve[:, 0] * load / ANGLES[0], USE * load / angle, curve.max(axis=1), (length, length))

@@ -87,23 +87,19 @@ COLUMNS = (
 def velocity_part(name: str, rows: Sequence[VelocityTest], parts: Parts, scope: Scope, tire: str = LUGRE) -> PartResult:
     """Errors of every manoeuvre of ``rows`` over the seeds of ``scope``, beside the printed ones."""
     drawn = measured_runs([row.manoeuvre for row in rows], tire, scope)
-    truth = drawn.truth
-    estimates = run_pipeline(drawn, READINGS, parts) | baselines(drawn)
-    sources = {"vx": {FUSION: "vx", OWN: "own_vx", WHEELS: WHEELS, INTEGRATED: INTEGRATED},
-               "vy": {FUSION: "vy", OWN: "own_vy"}}  # fmt: skip
+    truth, estimates = drawn.truth, run_pipeline(drawn, READINGS, parts) | baselines(drawn)
     table, measures = list[list[Cell]](), dict[str, float]()
     found: dict[str, list[dict[str, Spread]]] = {"vx": [], "vy": []}
     for row in rows:
         run, samples = run_of(truth, row.manoeuvre)
-        for signal, who_reads in sources.items():
-            true = truth[signal][run, samples]
-            errors = {who: spread(nrms(estimates[key][:, run, samples], true)) for who, key in who_reads.items()}
+        for signal, others in (("vx", {WHEELS: WHEELS, INTEGRATED: INTEGRATED}), ("vy", {})):
+            true, keys = truth[signal][run, samples], {FUSION: signal, OWN: f"own_{signal}"} | others
+            errors = {who: spread(nrms(estimates[key][:, run, samples], true)) for who, key in keys.items()}
             known = {who: error for who, error in errors.items() if error is not None}
-            own, fused, *others = (known[who].text() if who in known else None for who in LOOKS)
+            own, fused, *simple = (known[who].text() if who in known else None for who in LOOKS)
             worst = round(known[FUSION].worst, 2) if FUSION in known else None
-            printed = getattr(row, f"{signal}_peak"), getattr(row, signal)
-            peak = round(float(np.abs(true).max()), 3)
-            table.append([row.title, f"V_{signal[1]}", peak, *printed, own, fused, worst, *others])
+            peaks = round(float(np.abs(true).max()), 3), getattr(row, f"{signal}_peak")
+            table.append([row.title, f"V_{signal[1]}", *peaks, getattr(row, signal), own, fused, worst, *simple])
             measures |= {f"{row.manoeuvre} {signal} {who}": error.mean for who, error in known.items()}
             found[signal].append(known)
     caption = (

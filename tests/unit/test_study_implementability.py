@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -106,7 +108,7 @@ def test_implicit_and_exact_updates_never_break(scheme: str) -> None:
 
 def test_unstable_gains_are_refused() -> None:
     """Negative control: gains of the wrong sign have no break rate."""
-    wrong = Design("wrong sign", "printed", P1X.model, lambda points: -P1X.gain(points), P1X.schedule)
+    wrong = replace(P1X, schedule=replace(P1X.schedule, table=-P1X.schedule.table))
     with pytest.raises(AnalysisError, match="unstable already"):
         break_curve(wrong, "forward Euler", 5)
 
@@ -195,7 +197,7 @@ class TestSimulation:
 
 
 def test_printed_designs_are_the_printed_numbers() -> None:
-    gains = {design.name: tuple(design.gain(np.array([50.0]))[0, :, 0]) for design in printed_designs()}
+    gains = {design.name: tuple(design.schedule.gain(np.array([50.0]))[0, :, 0]) for design in printed_designs()}
     assert gains == {"P1 longitudinal": (0.68, 183.1), "P1 lateral": (1.11, 16.7), "P3 longitudinal": (1.18, 387.0),
                      "P3 longitudinal, high slip": (0.22, 0.1), "P3 lateral": (1.21, 16.8)}  # fmt: skip
     for design in (*printed_designs(), *shipped_designs()):

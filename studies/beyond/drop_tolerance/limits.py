@@ -45,8 +45,7 @@ def any_gain(_: Scope) -> PartResult:
         "force samples arrive (wheel speed held), its second-moment radius, the arrival rate that suffices for a "
         "Kalman filter (upper bound), and for comparison the critical drop probability of the shipped schedule.",
         ("plant", "wheel speed [rad/s]", "some gain at 5 % arrivals", "its radius [1]", "Kalman filter suffices from [1]",
-         "shipped schedule [1]"),
-        rows,
+         "shipped schedule [1]"), rows,
     )  # fmt: skip
     note = (
         f"{'Every' if proved == len(rows) else f'{proved} of {len(rows)}'} plant and wheel speed has a constant gain "
@@ -60,10 +59,8 @@ def runs_above(schedule: GainSchedule, p: float, runs: int, seed: int) -> FloatA
     """|velocity error| (samples + 1, runs) in m/s of the runtime observer at standstill with independent drops."""
     runtime = LpvVelocityObserver(schedule, (runs,))
     runtime.reset(state=START)
-    generator = np.random.default_rng(seed)
-    zero, speed = np.zeros(runs), np.full(runs, schedule.parameter.min)
-    out = np.empty((SAMPLES + 1, runs))
-    out[0] = abs(START[1])
+    generator, zero, speed = np.random.default_rng(seed), np.zeros(runs), np.full(runs, schedule.parameter.min)
+    out = np.full((SAMPLES + 1, runs), abs(START[1]))
     for k in range(SAMPLES):
         force = np.where(generator.random(runs) < p, np.nan, 0.0)
         out[k + 1] = np.abs(runtime.step(zero, force, speed).estimate[:, 1])
@@ -73,8 +70,7 @@ def runs_above(schedule: GainSchedule, p: float, runs: int, seed: int) -> FloatA
 @TOPIC.part("mean-and-typical", "What a growing mean square looks like", 1.2)
 def typical(scope: Scope) -> PartResult:
     """Quantiles of the error beyond the critical probability, beside its exact root mean square."""
-    tested = observer("printed-longitudinal")
-    schedule = tested.schedule
+    tested, schedule = observer("printed-longitudinal"), observer("printed-longitudinal").schedule
     p_cr = float(critical(schedule, schedule.parameter.min))
     p = p_cr + ABOVE * (1.0 - p_cr)
     runs = runs_above(schedule, p, 2_000 if scope.quick else 50 * scope.seeds, 7)

@@ -14,7 +14,7 @@ from analysis.drops.schedule import FrozenDropProbability, frozen_critical_proba
 from estimators import GainSchedule
 from estimators.arrays import BoolArray, FloatArray, IntArray
 from studies.beyond.drop_tolerance.comparison import MISS
-from studies.beyond.drop_tolerance.observers import NAMES, PACKAGE, QUICK, Observer, observer
+from studies.beyond.drop_tolerance.observers import NAMES, PACKAGE, QUICK, observer
 from studies.beyond.drop_tolerance.population import START, evolve
 from studies.papers.topic import Topic
 from studies.plots import Axis, ErrorBars, Figure, Line, Mark, Panel
@@ -73,7 +73,25 @@ def moving(name: str, scope: Scope) -> PartResult:
         "certified_drop_probability": proof.drop_probability, "comparisons": float(len(hold) + 1),
         "agreeing": float(int(hold.sum()) + falls),
     }  # fmt: skip
-    return PartResult((), [table], [_figure(tested, proof, sweep, scope)], [note], measures)
+    time = tested.step * np.arange(len(sweep.speed))
+    lower = np.minimum(sweep.half, 0.99 * sweep.seen)  # a bar below zero has no place on a logarithmic axis
+    energy: list[Mark] = [
+        Line(time, sweep.exact, "predicted", BLUE, width=1.8),
+        ErrorBars(time[at], sweep.seen, lower, sweep.half, "runtime observer", RED),
+    ]
+    y = Axis("mean energy over its start [1]", scale="log")
+    figure = Figure(
+        f"sweep-{name}",
+        f"{tested.title}, wheel speed sweeping through its range and back at ±800 rad/s² while "
+        f"{proof.drop_probability:.0%} of the force samples are lost: mean of the energy e'P(ω)e whose decrease at every sample "
+        f"is {proof.verdict!s} for any such motion. Line: exact second moment; points: the runtime observer, {scope.seeds} "
+        f"seeds, bars at {1.0 - MISS:.1%} simultaneous confidence. Below: the wheel speed.",
+        "A falling line on a logarithmic scale with points on it, above a V-shaped course of the wheel speed.",
+        [[Panel(energy, y=y, legend="upper right")],
+         [Panel([Line(time, sweep.speed, color=GREY)], "time [ms]", "|ω| [rad/s]")]],
+        (7.2, 4.4), share_x="all", heights=(3, 1),
+    )  # fmt: skip
+    return PartResult((), [table], [figure], [note], measures)
 
 
 for each in NAMES:
@@ -118,24 +136,3 @@ def run_sweep(schedule: GainSchedule, proof: MeanSquareSchedule, scope: Scope, s
     factor = float(student.ppf(1.0 - 0.5 * MISS / len(at), scope.seeds - 1))
     half = factor * seen.std(axis=1, ddof=1) / np.sqrt(scope.seeds)
     return Sweep(speed, np.array(exact) / exact[0], at, seen.mean(axis=1), half)
-
-
-def _figure(tested: Observer, proof: MeanSquareSchedule, sweep: Sweep, scope: Scope) -> Figure:
-    time = tested.step * np.arange(len(sweep.speed))
-    lower = np.minimum(sweep.half, 0.99 * sweep.seen)  # a bar below zero has no place on a logarithmic axis
-    energy: list[Mark] = [
-        Line(time, sweep.exact, "predicted", BLUE, width=1.8),
-        ErrorBars(time[sweep.at], sweep.seen, lower, sweep.half, "runtime observer", RED),
-    ]
-    y = Axis("mean energy over its start [1]", scale="log")
-    return Figure(
-        f"sweep-{tested.name}",
-        f"{tested.title}, wheel speed sweeping through its range and back at ±800 rad/s² while "
-        f"{proof.drop_probability:.0%} of the force samples are lost: mean of the energy e'P(ω)e whose decrease at "
-        f"every sample is {proof.verdict!s} for any such motion. Line: exact second moment; points: the runtime "
-        f"observer, {scope.seeds} seeds, bars at {1.0 - MISS:.1%} simultaneous confidence. Below: the wheel speed.",
-        "A falling line on a logarithmic scale with points on it, above a V-shaped course of the wheel speed.",
-        [[Panel(energy, y=y, legend="upper right")],
-         [Panel([Line(time, sweep.speed, color=GREY)], "time [ms]", "|ω| [rad/s]")]],
-        (7.2, 4.4), share_x="all", heights=(3, 1),
-    )  # fmt: skip

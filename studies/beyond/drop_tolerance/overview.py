@@ -30,8 +30,7 @@ def overview(_: Scope) -> PartResult:
         found = np.array([critical_bursts(tested.schedule, w, LOSS_RATES) for w in SEARCH], float)
         shortest = np.where(np.isnan(found), np.inf, found).min(axis=0)
         bursts = [float(b) * tested.step if np.isfinite(b) else None for b in shortest]
-        harmless = harmless_from(tested.schedule)
-        rows.append([tested.title, frozen.smallest, frozen.place, harmless, held, *bursts])
+        rows.append([tested.title, frozen.smallest, frozen.place, harmless_from(tested.schedule), held, *bursts])
         measures[f"critical_{name}"] = frozen.smallest
     shipped, printed = (100.0 * measures[f"critical_{n}-longitudinal"] for n in ("resilient-velocity", "printed"))
     lateral = min(value for key, value in measures.items() if key.endswith("lateral"))
@@ -50,8 +49,7 @@ def overview(_: Scope) -> PartResult:
         "the smallest probability if the last force were used again (hold), and the mean length of loss bursts at "
         "which stability is lost, at the worst wheel speed, by share of lost samples (empty: above 300 samples).",
         ("observer", "critical drop probability [1]", "at [rad/s]", "1 from [rad/s]", "hold [1]",
-         *(f"burst at {pi:.0%} loss [ms]" for pi in LOSS_RATES)),
-        rows,
+         *(f"burst at {pi:.0%} loss [ms]" for pi in LOSS_RATES)), rows,
     )  # fmt: skip
     return PartResult((), [table], _figures(), [note], measures)
 

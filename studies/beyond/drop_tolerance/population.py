@@ -47,15 +47,9 @@ def simulate(
 
 
 def evolve(
-    schedule: GainSchedule,
-    lost: BoolArray,
-    speed: Callable[[int], FloatArray],
-    follow: Callable[[BoolArray], BoolArray],
-    size: Callable[[int, FloatArray, BoolArray], FloatArray],
-    steps: int,
-    every: int,
-    generator: Generator,
-) -> FloatArray:
+    schedule: GainSchedule, lost: BoolArray, speed: Callable[[int], FloatArray], follow: Callable[[BoolArray], BoolArray],
+    size: Callable[[int, FloatArray, BoolArray], FloatArray], steps: int, every: int, generator: Generator,
+) -> FloatArray:  # fmt: skip
     """log of unbiased estimates of E size(k) at k = every, 2 every, ..., (steps // every, c, seeds).
 
     `lost` (c, seeds, runs) says which runs lose sample 0, `follow` which lose the next one; `speed(k)` is the wheel speed of

@@ -92,14 +92,19 @@ def launches(scope: Scope) -> list[Launch]:
 @TOPIC.part("launches", "Launches on five roads", 41.0)
 def simulation(scope: Scope) -> PartResult:
     """The truth vehicle on five roads."""
-    found, rows = launches(scope), list[list[Cell]]()
-    for launch in found:
+    found, rows, slips, shares = launches(scope), list[list[Cell]](), list[Mark](), list[Mark]()
+    for launch, colour in zip(found, ROADS, strict=True):
         known = np.isfinite(launch.predicted) & np.isfinite(launch.missed)
         own, fused = launch.errors["corner observers"], launch.errors["fusion"]
-        shares = (launch.slip.max(), np.median(launch.predicted[known]), np.median(launch.missed[known]))
+        percents = (launch.slip.max(), np.median(launch.predicted[known]), np.median(launch.missed[known]))
         errors = (launch.errors[name].text() for name in ESTIMATES)
         recovered = round(100 * (1 - fused.mean / own.mean), 1)
-        rows.append([launch.friction, *(round(100 * float(x), 1) for x in shares), *errors, recovered])
+        rows.append([launch.friction, *(round(100 * float(x), 1) for x in percents), *errors, recovered])
+        slips += [Line(launch.time, 100 * launch.slip, f"friction {launch.friction:g}", colour)]
+        shares += [
+            Line(launch.time, 100 * launch.predicted, color=colour, width=2.4, alpha=0.35),
+            Line(launch.time, 100 * launch.missed, color=colour, width=1.0),
+        ]
     columns = [
         "friction [1]", "largest mean slip [%]", "missed, closed form [%]", "missed, simulated [%]",
         *(f"{name} NRMS [%]" for name in ESTIMATES), "recovered by the fusion [%]",
@@ -110,20 +115,7 @@ def simulation(scope: Scope) -> PartResult:
         "observers that the fusion removes."
     )
     measures = {f"recovered at friction {row[0]}": float(row[-1] or 0.0) for row in rows}
-    table = Table("launches", caption, columns, rows)
-    return PartResult((), [table], [time_figure(found), error_figure(found)], (), measures)
-
-
-def time_figure(found: Sequence[Launch]) -> Figure:
-    """Slip and shares of every launch."""
-    slips, shares = list[Mark](), list[Mark]()
-    for launch, colour in zip(found, ROADS, strict=True):
-        slips += [Line(launch.time, 100 * launch.slip, f"friction {launch.friction:g}", colour)]
-        shares += [
-            Line(launch.time, 100 * launch.predicted, color=colour, width=2.4, alpha=0.35),
-            Line(launch.time, 100 * launch.missed, color=colour, width=1.0),
-        ]
-    return Figure(
+    over_time = Figure(
         "missed-over-time",
         "Launches on five roads. Below: what the corner observers miss of the slip velocity (thin), and the closed form at the "
         "slip and friction of the moment (wide), where slip exceeds 1 %.",
@@ -132,6 +124,8 @@ def time_figure(found: Sequence[Launch]) -> Figure:
          [Panel(shares, "time [s]", Axis("slip velocity missed [%]", 0, 110))]],
         (8.0, 5.2), share_x="all",
     )  # fmt: skip
+    table = Table("launches", caption, columns, rows)
+    return PartResult((), [table], [over_time, error_figure(found)], (), measures)
 
 
 def error_figure(found: Sequence[Launch]) -> Figure:

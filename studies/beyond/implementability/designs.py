@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Literal
@@ -23,18 +22,17 @@ PRINTED_BY = ("corner-estimation", "resilient-velocity")  # parameter sets of th
 
 @dataclass(frozen=True)
 class Design:
-    """Gains over the wheel speed with the model they belong to; `schedule` is what the runtime would read."""
+    """Gains over the wheel speed, as the runtime would read them, with the model they belong to."""
 
     name: str
     kind: Literal["printed", "shipped"]
     model: LpvModel
-    gain: Callable[[FloatArray], FloatArray]  # rad/s (g,) -> (g, 2, 1)
     schedule: GainSchedule
 
     def matrices(self, wheel_speed: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """A (g, 2, 2), L (g, 2, 1) and C (g, 1, 2) at wheel speeds (g,) in rad/s."""
         numeric = self.model.on(wheel_speed)
-        return numeric.A, self.gain(wheel_speed), numeric.C
+        return numeric.A, self.schedule.gain(wheel_speed), numeric.C
 
     def grid(self, points: int = 281) -> FloatArray:
         """Wheel speeds over the range, with every breakpoint of the gains."""
@@ -57,11 +55,8 @@ def printed_designs() -> tuple[Design, ...]:
 @cache
 def shipped_designs() -> tuple[Design, ...]:
     """The five schedules that come with the package, that for one direction alone last."""
-    found = []
-    for name in sorted(SHIPPED, key=lambda name: SHIPPED[name][0] not in PRINTED_BY):
-        schedule = GainSchedule.shipped(name)
-        found.append(Design(f"schedule {name}", "shipped", _model(name), schedule.gain, schedule))
-    return tuple(found)
+    names = sorted(SHIPPED, key=lambda name: SHIPPED[name][0] not in PRINTED_BY)
+    return tuple(Design(f"schedule {name}", "shipped", _model(name), GainSchedule.shipped(name)) for name in names)
 
 
 def _model(name: str) -> LpvModel:
@@ -73,4 +68,4 @@ def _constant(title: str, name: str, gains: tuple[float, ...]) -> Design:
     """Printed gains in the shape of a schedule, on the plant of the shipped one `name` with the same tires."""
     column, shipped = np.array(gains)[:, None], GainSchedule.shipped(name)
     schedule = replace(shipped, name=title, breakpoints=np.array(WHEEL_SPEED), table=np.stack([column, column]))
-    return Design(title, "printed", _model(name), lambda w: np.broadcast_to(column, (len(w), 2, 1)), schedule)
+    return Design(title, "printed", _model(name), schedule)

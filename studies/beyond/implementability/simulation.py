@@ -127,8 +127,7 @@ def confirmation(scope: Scope) -> PartResult:
         "computed break rate: factor by which the error changes in every sample. The last factor is that of the "
         "runtime's exact update at the lower rate.",
         ("design", "discretisation", "break rate [Hz]", "growth below [1]", "growth above [1]", "runtime below [1]",
-         "confirmed"),
-        rows,
+         "confirmed"), rows,
     )  # fmt: skip
     return PartResult((), [table], measures={"breaks confirmed": float(sum(bool(row[-1]) for row in rows))})
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 
 from estimators.arrays import FloatArray
@@ -54,14 +52,11 @@ def planes(scope: Scope) -> PartResult:
         darkest = 3.0 * float(printed_achieved(case).noise_density)
         decay, fastest = case.design.decay_rate, float(case.design.fastest_pole or 0.0)
         marks: list[Mark] = [Map(x, y, fields.noise_density.T, "H₂ gain, force noise [m/s·√Hz]", "Greys", 0.0, darkest)]
-        contours: list[tuple[FloatArray, list[float], str, Literal["solid", "dashed", "dotted"]]] = [
-            (fields.slowest, [decay * f for f in (0.25, 0.5, 1.0, 2.0, 4.0)], BLUE, "solid"),
-            (fields.fastest, [fastest * f for f in (0.5, 1.0, 2.0)], ORANGE, "dashed"),
-            (fields.friction, [1.001, 1.1], GREEN, "dotted"),
-        ]
-        marks += [Contours(x, y, field.T, levels, colour, dash, 1.2) for field, levels, colour, dash in contours]
         first, second = GainSchedule.shipped(case.name).table[:, :, 0].T
         marks += [
+            Contours(x, y, fields.slowest.T, [decay * f for f in (0.25, 0.5, 1.0, 2.0, 4.0)], BLUE, width=1.2),
+            Contours(x, y, fields.fastest.T, [fastest * f for f in (0.5, 1.0, 2.0)], ORANGE, "dashed", 1.2),
+            Contours(x, y, fields.friction.T, [1.001, 1.1], GREEN, "dotted", 1.2),
             Box(*case.printed_range, "printed range", RED, 1.2),
             dots(*case.printed, "printed gains", RED, "*", 12, edge="white"),
             Line(first, second, "shipped schedule", "black", marker="o", size=3, width=1.3),

@@ -37,7 +37,6 @@ LOOKS = {
 }  # fmt: skip
 LINES: dict[str, tuple[Dash, float]] = {EKF: ("solid", 1.9), UKF: ("dashed", 0.9)}
 QUICK_SECONDS = 6.5
-LAG = 0.1  # s, of the derivative of the speed
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ def level(drawn: Measured) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
     time, shape, speed = drawn.sample_time, drawn.batch_shape, rear_speed(drawn)
     attitude, vertical = AttitudeObserver(time, shape), VerticalLoads(assumed_car(drawn), time, shape)
-    slope, names = FilteredDerivative(time, LAG, shape), ("ax", "ay", "az", "yaw_rate", "roll_rate", "pitch_rate")
+    slope, names = FilteredDerivative(time, 0.1, shape), ("ax", "ay", "az", "yaw_rate", "roll_rate", "pitch_rate")
     loads, along, across = np.empty((*speed.shape, 4)), np.empty_like(speed), np.empty_like(speed)
     for k in range(drawn.time.size):
         v = speed[:, :, k]

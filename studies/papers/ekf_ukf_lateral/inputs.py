@@ -45,6 +45,5 @@ def model_with(outputs: Outputs = "y4 corrected") -> NonlinearModel:
 @cache
 def in_numbers(model: NonlinearModel) -> NonlinearModel:
     """The same model with its constants as exact rationals in the equations: inserted once, not at every evaluation."""
-    values = {sp.Symbol(name): sp.Rational(str(constant.value)) for name, constant in model.constants.items()}
-    f, h = (sp.Matrix(matrix).applyfunc(lambda entry: entry.xreplace(values)) for matrix in (model.f, model.h))
+    f, h = model.with_constants_inserted()
     return replace(model, f=f, h=h, constants={})

@@ -206,11 +206,6 @@ def hidden_split(scope: Scope) -> PartResult:
         "The paper sets lateral forces and sideslip to zero where it takes the model as unobservable. That is not needed: "
         "what is hidden decays with V / sigma by itself, so a filter stays bounded."
     )
-    return PartResult((), [Table("ranks", caption, columns, rows)], [pair_figure()], [note])
-
-
-def pair_figure() -> Figure:
-    """Two starts with another rear split: forces differ, outputs do not."""
     time, states, outputs = motion_pair()
     forces, measured = [], []
     for k, (name, width) in enumerate((("first", 2.6), ("second", 1.4))):
@@ -236,7 +231,7 @@ def pair_figure() -> Figure:
         (measured, Axis("measured [see legend]", high=9.5), "measured: the motions coincide"),
         (differences, Axis("difference of the motions [see legend]", FLOOR / 3, 1e4, "log"), "their difference"),
     )
-    return Figure(
+    figure = Figure(
         "twins",
         "Two motions of the eight-state model in the same slalom (20 m/s, ±3° at 0.7 Hz) that start with the same rear axle "
         "force and another split of it between left and right. Left: the rear forces differ. Middle: yaw rate and lateral "
@@ -246,3 +241,4 @@ def pair_figure() -> Figure:
         "difference on a logarithmic scale, a straight line for the force and rounding noise for the outputs.",
         [Panel(lines, "time [s]", y, title, legend="upper right") for lines, y, title in shown], (9.6, 3.7),
     )  # fmt: skip
+    return PartResult((), [Table("ranks", caption, columns, rows)], [figure], [note])
