@@ -15,9 +15,8 @@ from studies.claim import JsonValue, Published
 @cache
 def published_claims(package: str) -> Mapping[str, Published]:
     """The claims that ``package`` (a study's folder) keeps in its ``claims.toml``, by id, in the order of the file."""
-    return MappingProxyType(
-        {e["id"]: Published(**{"published": None, **e}) for e in _read(package, "claims.toml")["claims"]}
-    )
+    entries = _read(package, "claims.toml")["claims"]
+    return MappingProxyType({entry["id"]: Published(**{"published": None, **entry}) for entry in entries})
 
 
 def printed(package: str, name: str) -> JsonValue:

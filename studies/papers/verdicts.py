@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from studies.claim import ClaimVerdict, agrees
+from studies.claim import ClaimVerdict, agrees, reproduced
 
 
 def derived(holds: bool) -> ClaimVerdict:
@@ -17,9 +17,7 @@ def derived(holds: bool) -> ClaimVerdict:
 
 def erratum(printed_holds: bool, corrected_holds: bool) -> ClaimVerdict:
     """ERRATUM only if the printed form fails and the corrected one holds; a printed form that holds is REPRODUCED."""
-    if printed_holds:
-        return ClaimVerdict.REPRODUCED
-    return ClaimVerdict.ERRATUM if corrected_holds else ClaimVerdict.NOT_REPRODUCED
+    return reproduced(printed_holds, ClaimVerdict.ERRATUM if corrected_holds else ClaimVerdict.NOT_REPRODUCED)
 
 
 def under_specified(spread: float, smallest: float, holds: bool = True) -> ClaimVerdict:
@@ -27,16 +25,12 @@ def under_specified(spread: float, smallest: float, holds: bool = True) -> Claim
 
     When they do not, one value is determined and the claim stands or falls with `holds`.
     """
-    if spread > smallest:
-        return ClaimVerdict.UNDER_SPECIFIED
-    return ClaimVerdict.REPRODUCED if holds else ClaimVerdict.NOT_REPRODUCED
+    return ClaimVerdict.UNDER_SPECIFIED if spread > smallest else reproduced(holds)
 
 
 def partly(whole: bool, part: bool) -> ClaimVerdict:
     """REPRODUCED on the whole, PARTLY on a part that the paper names, else NOT_REPRODUCED."""
-    if whole:
-        return ClaimVerdict.REPRODUCED
-    return ClaimVerdict.PARTLY if part else ClaimVerdict.NOT_REPRODUCED
+    return reproduced(whole, ClaimVerdict.PARTLY if part else ClaimVerdict.NOT_REPRODUCED)
 
 
 def among_readings(values: Iterable[float], published: float, half_last_digit: float) -> ClaimVerdict:
@@ -46,13 +40,12 @@ def among_readings(values: Iterable[float], published: float, half_last_digit: f
     NOT_REPRODUCED.
     """
     array = np.asarray(list(values), float)
-    if all(agrees(float(v), published, half_last_digit) for v in array):
-        return ClaimVerdict.REPRODUCED
     inside = array.min() - half_last_digit <= published <= array.max() + half_last_digit
-    return ClaimVerdict.UNDER_SPECIFIED if inside else ClaimVerdict.NOT_REPRODUCED
+    otherwise = ClaimVerdict.UNDER_SPECIFIED if inside else ClaimVerdict.NOT_REPRODUCED
+    return reproduced(all(agrees(float(v), published, half_last_digit) for v in array), otherwise)
 
 
 def open_choice(readings: Iterable[ArrayLike], resolution: float) -> ClaimVerdict:
     """Nothing is printed to compare with: UNDER_SPECIFIED if the readings differ by more than `resolution`, else REPRODUCED."""
     stack = np.stack([np.asarray(r, float) for r in readings])
-    return ClaimVerdict.UNDER_SPECIFIED if np.ptp(stack, axis=0).max() > resolution else ClaimVerdict.REPRODUCED
+    return under_specified(float(np.ptp(stack, axis=0).max()), resolution)

@@ -17,18 +17,15 @@ def nrms(estimate: FloatArray, truth: FloatArray, least: float = 0.0) -> FloatAr
 
     NaN where the truth never reaches ``least`` or stays 0.
     """
-    counted = np.abs(truth) >= least
-    peak = float(np.max(np.abs(truth)))
+    counted, peak = np.abs(truth) >= least, float(np.max(np.abs(truth)))
     if peak == 0.0 or not counted.any():
         return np.full(estimate.shape[0], np.nan)
-    error: FloatArray = np.sqrt(np.mean((estimate[:, counted] - truth[counted]) ** 2, axis=1))
-    return 100.0 * error / peak
+    return np.asarray(100.0 * np.sqrt(np.mean((estimate[:, counted] - truth[counted]) ** 2, axis=1)) / peak)
 
 
 def sample_errors(estimate: FloatArray, truth: FloatArray) -> FloatArray:
     """P4 (13), P5 (8): 100 |estimate - truth|/max |truth| at every sample, %, shape of ``estimate`` (S, n)."""
-    out: FloatArray = 100.0 * np.abs(estimate - truth) / float(np.max(np.abs(truth)))
-    return out
+    return np.asarray(100.0 * np.abs(estimate - truth) / float(np.max(np.abs(truth))))
 
 
 @dataclass(frozen=True)
@@ -63,14 +60,12 @@ def spread(values: FloatArray) -> Spread | None:
 
 def known_spread(values: FloatArray) -> Spread:
     """`spread` of values that are known in every run. Raises ValueError otherwise."""
-    found = spread(values)
-    if found is None:
+    if (found := spread(values)) is None:
         raise ValueError(f"none of {values.size} runs has a value")
     return found
 
 
 ERROR_COLUMNS = ("printed mean [%]", "mean [%]", "printed std [%]", "std [%]", "worst mean of a draw [%]")
-"""Of `SampleSpreads.cells`."""
 
 
 class SampleSpreads(NamedTuple):

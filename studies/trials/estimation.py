@@ -18,8 +18,7 @@ from studies.trials.simulations import simulated_truth
 from studies.truth import Measured, Sensors, Truth, draw
 from synthesis.errors import SpecError
 
-QUICK_SECONDS = 4.0
-"""So much of each manoeuvre goes through the pipeline when quick."""
+QUICK_SECONDS = 4.0  # of each manoeuvre go through the pipeline when quick
 Parts = Callable[[VehicleParameters, float, tuple[int, ...]], Mapping[str, Any]]
 """(vehicle, sample time, batch shape) -> parts that replace those of the pipeline, by its argument names."""
 Reading = Callable[[PipelineStep], FloatArray]
@@ -54,8 +53,7 @@ def run_pipeline(drawn: Measured, readings: Mapping[str, Reading], parts: Parts 
     The inertial sensors are fixed to a body that rolls and pitches: an `AttitudeObserver` levels them unless ``parts`` bring
     another attitude (None: without).
     """
-    car = assumed_car(drawn)
-    time, shape = drawn.sample_time, drawn.batch_shape
+    car, time, shape = assumed_car(drawn), drawn.sample_time, drawn.batch_shape
     chosen = {"attitude": AttitudeObserver(time, shape), **(parts(car, time, shape) if parts else {})}
     pipeline = EstimationPipeline(car, time, shape, **chosen)
     found: dict[str, FloatArray] = {}

@@ -8,32 +8,26 @@ from estimators.arrays import BoolArray, FloatArray
 from studies.trials.estimation import assumed_car
 from studies.truth import Measured
 
-SAMPLE_TIME = 0.01
-"""s, P4 and P5: 100 Hz."""
-START = 1.0
-"""s left out of every error: observers that start from nothing."""
-LEAST_SPEED = 3.0
-"""m/s below which sideslip has no error."""
+SAMPLE_TIME = 0.01  # s, P4 and P5: 100 Hz
+START = 1.0  # s left out of every error: observers that start from nothing
+LEAST_SPEED = 3.0  # m/s, below which sideslip has no error
 PRINTED_TEST = "Printed values are those of the paper's road test with another driver, road and car."
 
 
 def rear_speed(drawn: Measured) -> FloatArray:
     """V_g (S, B, n), m/s: mean of the rear wheel speeds times the radius, P4 notes 4."""
-    out: FloatArray = (assumed_car(drawn).radius * drawn.signals["wheel_speed"])[..., 2:].mean(axis=-1)
-    return out
+    return np.asarray((assumed_car(drawn).radius * drawn.signals["wheel_speed"])[..., 2:].mean(axis=-1))
 
 
 def front_steer(drawn: Measured) -> FloatArray:
     """Steering angle of the front wheels (S, B, n), rad: mean of both."""
-    out: FloatArray = drawn.signals["steer"][..., :2].mean(axis=-1)
-    return out
+    return np.asarray(drawn.signals["steer"][..., :2].mean(axis=-1))
 
 
 def counted(drawn: Measured, run: int) -> BoolArray:
     """Samples (n,) of a run that count in errors: from `START` on, and not below `LEAST_SPEED`."""
     truth = drawn.truth
-    fast = np.absolute(truth["vx"][run]) >= LEAST_SPEED
-    return np.asarray(truth.valid[run] & (truth.time >= START) & fast)
+    return np.asarray(truth.valid[run] & (truth.time >= START) & (np.absolute(truth["vx"][run]) >= LEAST_SPEED))
 
 
 def conditions(drawn: Measured) -> str:

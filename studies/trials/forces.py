@@ -19,16 +19,13 @@ from studies.trials.histories import history
 from studies.trials.simulations import LUGRE
 from studies.truth import Truth
 
-LEAST = 1000.0
-"""N: samples below it are left out, and a force that never reaches it has no row."""
+LEAST = 1000.0  # N: samples below it are left out, and a force that never reaches it has no row
 AXLES = ("front axle", "rear axle")
 SHOWN = (("F_x", "force_x", CORNERS), ("F_y", "axle_force_y", AXLES), ("F_z", "force_z", CORNERS))
 READINGS: dict[str, Reading] = {
-    "own": lambda step: step.wheels.force,
-    "force_x": lambda step: step.force_x,
-    "axle_force_y": lambda step: step.axle_force_y,
-    "force_z": lambda step: step.force_z,
-}
+    "own": lambda step: step.wheels.force, "force_x": lambda step: step.force_x,
+    "axle_force_y": lambda step: step.axle_force_y, "force_z": lambda step: step.force_z,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -53,27 +50,21 @@ def force_part(
     truth = drawn.truth
     estimates = {method: run_pipeline(drawn, READINGS, parts) for method, parts in methods.items()}
     first = next(iter(estimates.values()))
-    table: list[list[Cell]] = []
-    measures: dict[str, float] = {}
+    compared = {signal: {"pipeline": first[key]} for signal, key, _ in SHOWN}
+    compared["F_x"] = {who: found["own"] for who, found in estimates.items()} | compared["F_x"]
+    at_rest = truth.vehicles[0].parameters.static_loads
+    compared["F_z"]["quasi-static"] = np.broadcast_to(at_rest, (1, *first["force_z"].shape[1:]))
+    table, measures = list[list[Cell]](), dict[str, float]()
     for row in rows:
         run, samples = run_of(truth, row.manoeuvre)
         for signal, key, places in SHOWN:
             for k, where in enumerate(places):
                 true = _true(truth, key, run)[samples, k]
-                found = {who: own["own"] for who, own in estimates.items()} if signal == "F_x" else {}
-                errors = {
-                    who: nrms(value[:, run, samples, k], true, LEAST)
-                    for who, value in (found | {"pipeline": first[key]}).items()
-                }
-                if signal == "F_z":
-                    at_rest = float(truth.vehicles[0].parameters.static_loads[k])
-                    errors["quasi-static"] = nrms(np.full((1, true.size), at_rest), true, LEAST)
                 peak = round(float(np.abs(true).max()))
-                for who, values in errors.items():
-                    error = spread(values)
+                for who, value in compared[signal].items():
+                    error = spread(nrms(value[:, run, samples, k], true, LEAST))
                     if error is not None:
-                        printed = row.printed.get((signal, where, who))
-                        cells = (peak, printed, error.text(), round(error.worst, 2))
+                        cells = (peak, row.printed.get((signal, where, who)), error.text(), round(error.worst, 2))
                         table.append([row.title, signal, where, who, *cells])
                         measures[f"{row.title}: {signal} {where}, {who}"] = error.mean
     caption = (
@@ -83,13 +74,13 @@ def force_part(
     )  # fmt: skip
     columns = ("manoeuvre", "force", "place", "estimate", "peak [N]", "printed NRMS [%]", "NRMS [%]", "worst run [%]")
     drawings = [_history(name, truth, row, first) for row in rows]
-    return PartResult(tables=[Table(f"{name}-errors", caption, columns, table)], figures=drawings, measures=measures)
+    return PartResult((), [Table(f"{name}-errors", caption, columns, table)], drawings, measures=measures)
 
 
 def _true(truth: Truth, key: str, run: int) -> FloatArray:
     """(n, k) N: of the corners, or of the axles for F_y."""
     if key == "axle_force_y":
-        return np.stack([truth["force_y"][run, :, :2].sum(axis=1), truth["force_y"][run, :, 2:].sum(axis=1)], axis=1)
+        return np.asarray(truth["force_y"][run].reshape(-1, 2, 2).sum(axis=-1))
     return np.asarray(truth[key][run])
 
 

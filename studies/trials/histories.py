@@ -14,8 +14,7 @@ from studies.plots import Axis, Band, Dash, ErrorBars, Figure, Line, Mark, Panel
 from studies.plots.colours import SETTINGS, TRUTH
 from studies.trials.accuracy import Spread
 
-BAND = (2.5, 97.5)
-"""Percentiles over the sensor draws."""
+BAND = (2.5, 97.5)  # percentiles over the sensor draws
 BANDS = "Lines: first sensor draw; bands: 95 % of all draws."
 
 
@@ -56,14 +55,12 @@ def backgrounds(
     time: FloatArray, state: FloatArray, looks: Sequence[tuple[str, str] | None], alpha: float = 1.0
 ) -> list[Mark]:
     """Stripes by the ``state`` (n,) of every sample, 0, 1, ...: label and colour of each state, None without one."""
-    found: list[Mark] = []
-    unnamed = set(looks)
-    step = time[1] - time[0]
+    found, unnamed, step = list[Mark](), set(looks), time[1] - time[0]
     for begin, end in pairwise([0, *(np.flatnonzero(np.diff(state)) + 1), len(state)]):
         look = looks[int(state[begin])]
         if look is not None:
-            label, color = look
-            found.append(Shade(time[begin], time[end - 1] + step, "x", label if look in unnamed else "", color, alpha))
+            label = look[0] if look in unnamed else ""
+            found.append(Shade(time[begin], time[end - 1] + step, "x", label, look[1], alpha))
             unnamed.discard(look)
     return found
 
@@ -73,8 +70,7 @@ def error_dots(rows: Sequence[Mapping[str, Spread]], looks: Mapping[str, tuple[s
     found: list[Mark] = []
     for who, (marker, color) in looks.items():
         at = [k for k, row in enumerate(rows) if who in row]
-        spreads = [rows[k][who] for k in at]
-        mean, low, high = (np.array([getattr(s, end) for s in spreads]) for end in ("mean", "low", "high"))
+        mean, low, high = (np.array([getattr(rows[k][who], end) for k in at]) for end in ("mean", "low", "high"))
         heights = dot_heights(at, who, looks)
         found.append(ErrorBars(mean, heights, mean - low, high - mean, who, color, marker, 5.0, flat=True))
     return found

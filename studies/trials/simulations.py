@@ -16,8 +16,7 @@ from studies.truth.record import read_truth, write_truth
 from synthesis.errors import SpecError
 
 LUGRE, MAGIC_FORMULA = "lugre", "magic-formula"
-QUICK_SECONDS = 12.0
-"""So much of each manoeuvre, from its start, when quick."""
+QUICK_SECONDS = 12.0  # of each manoeuvre, from its start, when quick
 
 
 def _manoeuvres(names: Iterable[str], tire: str, scope: Scope, seconds: float = math.inf) -> list[Manoeuvre]:
@@ -30,9 +29,7 @@ def _drive_all(tire: str, scope: Scope, folder: Path) -> None:
     write_truth(simulate_manoeuvres(_manoeuvres(shipped_manoeuvres(), tire, scope)), folder)
 
 
-SIMULATIONS = {
-    tire: Preparation(f"{tire}-tires", partial(_drive_all, tire), cost=40.0) for tire in (LUGRE, MAGIC_FORMULA)
-}
+SIMULATIONS = {t: Preparation(f"{t}-tires", partial(_drive_all, t), cost=40.0) for t in (LUGRE, MAGIC_FORMULA)}
 """Every shipped manoeuvre on one kind of tire."""
 
 

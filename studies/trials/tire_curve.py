@@ -12,10 +12,8 @@ from studies.truth.fleet import tires_of
 from studies.truth.lugre import LuGreTire
 from synthesis.errors import SpecError
 
-ANGLES: FloatArray = np.concatenate([[1e-4], np.linspace(2e-3, 0.4, 200)])
-"""rad: the first stands for the slope at rest."""
-USE = 0.4
-"""Share of the load at which the secant is read: ordinary cornering."""
+ANGLES: FloatArray = np.concatenate([[1e-4], np.linspace(2e-3, 0.4, 200)])  # rad, the first for the slope at rest
+USE = 0.4  # share of the load at which the secant is read: ordinary cornering
 
 
 class TireFacts(NamedTuple):
@@ -33,29 +31,23 @@ def lateral_curve(vehicle: TruthVehicle, kind: str, speed: float, friction: floa
     Positive for a positive angle, at static load: the deflection (or lagged slip) at rest is its source over its decay.
     """
     tire = tires_of(kind, [vehicle] * ANGLES.size)
-    shape = (4, ANGLES.size)
-    across = speed * np.tan(ANGLES)
+    shape, across = (4, ANGLES.size), speed * np.tan(ANGLES)
     slide: FloatArray = np.stack([np.zeros(shape), np.broadcast_to(across, shape)])
     surface, transport = np.full(shape, speed), np.broadcast_to(np.maximum(speed, across), shape)
     load = np.broadcast_to(vehicle.parameters.static_loads[:, None], shape)
     grip, nothing = np.full(shape, friction), np.zeros((2, *shape))
     decay, push = tire.rates(nothing, slide, surface, transport, grip)
-    force = tire.forces(push / decay, nothing, slide, transport, load, grip)
-    out: FloatArray = (force[1] / load)[0::2]
-    return out
+    return np.asarray((tire.forces(push / decay, nothing, slide, transport, load, grip)[1] / load)[0::2])
 
 
 def tire_facts(vehicle: TruthVehicle, kind: str, speed: float, friction: float) -> TireFacts:
     """Read off `lateral_curve`. Raises SpecError on a road too slippery for the secant."""
     curve = lateral_curve(vehicle, kind, speed, friction)
     if curve.max(axis=1).min() <= USE:
-        raise SpecError(
-            f"friction = {friction:g}: the tires never reach {USE:g} of their load; use a road with more grip"
-        )
-    load = vehicle.parameters.static_loads[0::2]
-    rising = [slice(0, int(np.argmax(row)) + 1) for row in curve]
-    angle = np.array([np.interp(USE, row[part], ANGLES[part]) for row, part in zip(curve, rising, strict=True)])
-    lugre = kind == LuGreTire.name
-    length = 1.0 / vehicle.lugre.kappa[1] if lugre else vehicle.magic_formula.relaxation[1]
+        remedy = "use a road with more grip"
+        raise SpecError(f"friction = {friction:g}: the tires never reach {USE:g} of their load; {remedy}")
+    load, rising = vehicle.parameters.static_loads[0::2], curve.argmax(axis=1) + 1
+    angle = np.array([np.interp(USE, row[:top], ANGLES[:top]) for row, top in zip(curve, rising, strict=True)])
+    length = 1.0 / vehicle.lugre.kappa[1] if kind == LuGreTire.name else vehicle.magic_formula.relaxation[1]
     found = (curve[:, 0] * load / ANGLES[0], USE * load / angle, curve.max(axis=1), (length, length))
     return TireFacts(*((float(front), float(rear)) for front, rear in found))

@@ -19,20 +19,16 @@ from studies.trials.accuracy import Spread, nrms, spread
 from studies.trials.estimation import INTEGRATED, WHEELS, Parts, Reading, baselines, measured_runs, run_of, run_pipeline
 from studies.trials.histories import error_dots, history, row_axis, truth_line
 from studies.trials.simulations import LUGRE
-from studies.truth import Measured
+from studies.truth import Truth
 from synthesis.models.parameter_set import load_parameter_set
 
 OWN, FUSION = "paper's observers", "fusion"
 LOOKS = {
-    OWN: ("s", colours.OWN_OBSERVERS),
-    FUSION: ("o", colours.FUSION),
-    WHEELS: ("^", colours.MEAN_WHEEL_SPEED),
-    INTEGRATED: ("v", colours.INTEGRATED_ACCELERATION),
-}
-COMPLIANCE_SPREAD = 0.2
-"""Relative spread of the slip compliances that the fusion gets: as well as a fit to logged signals knows them."""
-USED = 0.6
-"""Largest F_y/F_z of the fit of the side slip curve: what a car shows on a dry road before it slides."""
+    OWN: ("s", colours.OWN_OBSERVERS), FUSION: ("o", colours.FUSION),
+    WHEELS: ("^", colours.MEAN_WHEEL_SPEED), INTEGRATED: ("v", colours.INTEGRATED_ACCELERATION),
+}  # fmt: skip
+COMPLIANCE_SPREAD = 0.2  # relative, of the fusion's slip compliances: as well as a fit to logged signals knows them
+USED = 0.6  # largest F_y/F_z of the fit of the side slip curve: what a car shows on a dry road before it slides
 
 
 @dataclass(frozen=True)
@@ -63,13 +59,10 @@ def corner_observers(parameters: str) -> Parts:
     along, across = (tires[d].kappa.value / tires[d].sigma0.value for d in ("longitudinal", "lateral"))
     linear, cubic = side_slip_curve(across)
     settings = FusionSettings(
-        slip_compliance=along,
-        slip_compliance_spread=COMPLIANCE_SPREAD * along,
-        side_compliance=linear,
-        side_compliance_spread=COMPLIANCE_SPREAD * linear,
-        side_cubic=cubic,
-        side_cubic_spread=cubic,  # the fusion does not know the friction of the road
-    )
+        slip_compliance=along, slip_compliance_spread=COMPLIANCE_SPREAD * along,
+        side_compliance=linear, side_compliance_spread=COMPLIANCE_SPREAD * linear,
+        side_cubic=cubic, side_cubic_spread=cubic,  # the fusion does not know the friction of the road
+    )  # fmt: skip
 
     def parts(car: VehicleParameters, sample_time: float, shape: tuple[int, ...]) -> Mapping[str, Any]:
         forward, sideways = (GainSchedule.shipped(f"{parameters}-{d}") for d in ("longitudinal", "lateral"))
@@ -82,11 +75,9 @@ def corner_observers(parameters: str) -> Parts:
 
 
 READINGS: dict[str, Reading] = {
-    "vx": lambda step: step.vx,
-    "vy": lambda step: step.vy,
-    "own_vx": lambda step: step.corners.vx,
-    "own_vy": lambda step: step.corners.vy,
-}
+    "vx": lambda step: step.vx, "own_vx": lambda step: step.corners.vx,
+    "vy": lambda step: step.vy, "own_vy": lambda step: step.corners.vy,
+}  # fmt: skip
 COLUMNS = (
     "manoeuvre", "signal", "peak [m/s]", "printed peak [m/s]", "printed NRMS [%]", "paper's observers NRMS [%]",
     "fusion NRMS [%]", "fusion, worst run [%]", "mean wheel speed NRMS [%]", "integrated acceleration NRMS [%]",
@@ -96,27 +87,19 @@ COLUMNS = (
 def velocity_part(name: str, rows: Sequence[VelocityTest], parts: Parts, scope: Scope, tire: str = LUGRE) -> PartResult:
     """Errors of every manoeuvre of ``rows`` over the seeds of ``scope``, beside the printed ones."""
     drawn = measured_runs([row.manoeuvre for row in rows], tire, scope)
-    truth = drawn.truth
-    estimates = run_pipeline(drawn, READINGS, parts) | baselines(drawn)
-    sources = {"vx": {FUSION: "vx", OWN: "own_vx", WHEELS: WHEELS, INTEGRATED: INTEGRATED},
-               "vy": {FUSION: "vy", OWN: "own_vy"}}  # fmt: skip
-    table: list[list[Cell]] = []
-    measures: dict[str, float] = {}
+    truth, estimates = drawn.truth, run_pipeline(drawn, READINGS, parts) | baselines(drawn)
+    table, measures = list[list[Cell]](), dict[str, float]()
     found: dict[str, list[dict[str, Spread]]] = {"vx": [], "vy": []}
     for row in rows:
         run, samples = run_of(truth, row.manoeuvre)
-        for signal, who_reads in sources.items():
-            true = truth[signal][run, samples]
-            errors = {who: spread(nrms(estimates[key][:, run, samples], true)) for who, key in who_reads.items()}
+        for signal, others in (("vx", {WHEELS: WHEELS, INTEGRATED: INTEGRATED}), ("vy", {})):
+            true, keys = truth[signal][run, samples], {FUSION: signal, OWN: f"own_{signal}"} | others
+            errors = {who: spread(nrms(estimates[key][:, run, samples], true)) for who, key in keys.items()}
             known = {who: error for who, error in errors.items() if error is not None}
-            texts = {who: error.text() for who, error in known.items()}
+            own, fused, *simple = (known[who].text() if who in known else None for who in LOOKS)
             worst = round(known[FUSION].worst, 2) if FUSION in known else None
-            table.append(
-                [
-                    row.title, f"V_{signal[1]}", round(float(np.abs(true).max()), 3), getattr(row, f"{signal}_peak"),
-                    getattr(row, signal), texts.get(OWN), texts.get(FUSION), worst, texts.get(WHEELS), texts.get(INTEGRATED),
-                ]
-            )  # fmt: skip
+            peaks = round(float(np.abs(true).max()), 3), getattr(row, f"{signal}_peak")
+            table.append([row.title, f"V_{signal[1]}", *peaks, getattr(row, signal), own, fused, worst, *simple])
             measures |= {f"{row.manoeuvre} {signal} {who}": error.mean for who, error in known.items()}
             found[signal].append(known)
     caption = (
@@ -124,22 +107,18 @@ def velocity_part(name: str, rows: Sequence[VelocityTest], parts: Parts, scope: 
         f"(46): mean over {scope.seeds} sensor draws with its 95 % confidence interval. The printed values come from a test "
         "car on real roads; manoeuvres, speeds and frictions are those that the paper names, everything else is ours."
     )
-    drawings = [_dots(f"{name}-errors", rows, found), *(_history(name, drawn, row, estimates) for row in rows)]
-    return PartResult(tables=[Table(f"{name}-errors", caption, COLUMNS, table)], figures=drawings, measures=measures)
+    drawings = [_dots(f"{name}-errors", rows, found), *(_history(name, truth, row, estimates) for row in rows)]
+    return PartResult((), [Table(f"{name}-errors", caption, COLUMNS, table)], drawings, measures=measures)
 
 
 def _dots(name: str, rows: Sequence[VelocityTest], found: Mapping[str, Sequence[Mapping[str, Spread]]]) -> Figure:
     panels = []
     for signal, errors in found.items():
-        marks = error_dots(errors, LOOKS)
-        printed = [(value, k) for k, row in enumerate(rows) if (value := getattr(row, signal)) is not None]
-        if printed:
-            marks.append(
-                dots([value for value, _ in printed], [k for _, k in printed], "printed", colours.TRUTH, "|", 14.0)
-            )
-        panels.append(
-            Panel(marks, Axis(f"$V_{signal[1]}$ NRMS [% of the peak]", scale="log"), row_axis([r.title for r in rows]))
-        )
+        marks, at = error_dots(errors, LOOKS), [k for k, row in enumerate(rows) if getattr(row, signal) is not None]
+        if at:
+            marks.append(dots([getattr(rows[k], signal) for k in at], at, "printed", colours.TRUTH, "|", 14.0))
+        x = Axis(f"$V_{signal[1]}$ NRMS [% of the peak]", scale="log")
+        panels.append(Panel(marks, x, row_axis([row.title for row in rows])))
     return Figure(
         name,
         "Velocity errors by manoeuvre, mean over the sensor draws with 95 % interval; bars: printed values of the paper's "
@@ -149,22 +128,17 @@ def _dots(name: str, rows: Sequence[VelocityTest], found: Mapping[str, Sequence[
     )  # fmt: skip
 
 
-def _history(name: str, drawn: Measured, row: VelocityTest, estimates: Mapping[str, FloatArray]) -> Figure:
-    truth = drawn.truth
+def _history(name: str, truth: Truth, row: VelocityTest, estimates: Mapping[str, FloatArray]) -> Figure:
     run, samples = run_of(truth, row.manoeuvre)
     time = truth.time[samples]
 
-    def line(key: str, who: str, width: float) -> Mark:
+    def line(key: str, who: str, width: float = 0.9) -> Mark:
         return Line(time, estimates[key][0, run, samples], who, LOOKS[who][1], width=width)
 
     panels = []
-    for signal in ("vx", "vy"):
-        marks: list[Mark] = [line(WHEELS, WHEELS, 0.7)] if signal == "vx" else []
-        marks += [
-            truth_line(time, truth[signal][run, samples]),
-            line(f"own_{signal}", OWN, 0.9),
-            line(signal, FUSION, 0.9),
-        ]
+    for signal, first in (("vx", [line(WHEELS, WHEELS, 0.7)]), ("vy", [])):
+        true = truth_line(time, truth[signal][run, samples])
+        marks = [*first, true, line(f"own_{signal}", OWN), line(signal, FUSION)]
         panels.append(Panel(marks, y=f"$V_{signal[1]}$ [m/s]", legend="best" if signal == "vx" else "", columns=4))
     slips = [
         Line(time, 100.0 * truth["slip"][run, samples, k], corner, color, width=0.8)

@@ -18,17 +18,15 @@ from studies.beyond.well_posed_design.demands import (
     pole_limit,
     sweep,
 )
-from studies.beyond.well_posed_design.gain_plane import comparison_table, gain_plane, plane_figure
+from studies.beyond.well_posed_design.gain_plane import gain_plane
 from studies.beyond.well_posed_design.literal import (
     approach,
     explicit_family,
     floor,
     literal_design,
-    literal_figure,
-    literal_table,
 )
 from studies.beyond.well_posed_design.study import STUDY
-from studies.study import PartResult
+from studies.study import QUICK, Part
 from synthesis.errors import SpecError
 from tests.support.study_checks import check_result, check_study
 
@@ -180,13 +178,6 @@ def test_study_is_complete() -> None:
     assert (STUDY.id, STUDY.paper) == ("well-posed-design", "")
 
 
-def test_figures_and_tables_stand_on_their_own(literal, posed) -> None:  # type: ignore[no-untyped-def]
-    sweeps = [sweep(LONG, friction_bound, (1.02, 1.1), points=5), sweep(LATERAL, friction_bound, (1.02, 1.1), points=5)]
-    bound = DEMANDS[0]
-    drawings = [literal_figure((LONG, LATERAL), literal, posed), bound.figure(sweeps), plane_figure((LONG, LATERAL), 9)]
-    tables = [
-        literal_table((LONG, LATERAL), literal, posed),
-        bound.table(sweeps),
-        comparison_table((LONG,), 5),
-    ]
-    check_result(PartResult((), tables, drawings))
+@pytest.mark.parametrize("part", [p for p in STUDY.parts if p.name != "decay"], ids=lambda part: part.name)
+def test_parts_stand_on_their_own(part: Part) -> None:
+    check_result(part.run(QUICK))

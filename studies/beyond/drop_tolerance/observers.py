@@ -12,8 +12,7 @@ from studies.beyond.observers import PAPERS, SHIPPED, printed
 PACKAGE = "studies.beyond.drop_tolerance"
 PRINTED = {"printed-longitudinal": "longitudinal", "printed-lateral": "lateral"}
 NAMES = (*SHIPPED, *PRINTED)
-QUICK = ("corner-estimation-longitudinal",)
-"""Observers of a quick run; the overview has all of them."""
+QUICK = ("corner-estimation-longitudinal",)  # observers of a quick run; the overview has all of them
 SPEED_LABEL = "wheel speed |ω| [rad/s]"
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.random import Generator
 
 from estimators import GainSchedule, LpvVelocityObserver
 from estimators.arrays import BoolArray, FloatArray, IntArray
@@ -21,48 +22,34 @@ from studies.beyond.drop_tolerance.prediction import Channel, Norm
 
 EVERY = 4  # samples from one resampling to the next
 START = np.array([0.0, 1.0])  # m, m/s
-Lost = BoolArray
 
 
 def simulate(
-    schedule: GainSchedule,
-    channel: Channel,
-    norm: Norm,
-    steps: int,
-    seeds: int,
-    runs: int,
-    generator: np.random.Generator,
+    schedule: GainSchedule, channel: Channel, norm: Norm, steps: int, seeds: int, runs: int, generator: Generator
 ) -> FloatArray:
     """log of an unbiased estimate of E h(e(steps)) for each case and seed, (c, seeds); EVERY divides `steps`.
 
     Populations of `runs` runs for each of `seeds` seeds and every case; all cases see the same random numbers.
     """
-    shape = (len(channel.speed), seeds, runs)
-    column = (slice(None), None, None)
-    speed = np.ascontiguousarray(np.broadcast_to(channel.speed[column], shape))
-    failure, recovery = channel.failure[column], channel.recovery[column]
+    names = ("speed", "failure", "recovery", "loss_rate")
+    speed, failure, recovery, rate = (getattr(channel, name)[:, None, None] for name in names)
+    speed = np.ascontiguousarray(np.broadcast_to(speed, (len(speed), seeds, runs)))
 
-    def follow(lost: Lost) -> Lost:
+    def follow(lost: BoolArray) -> BoolArray:
         draw = generator.random((seeds, runs))
-        return np.where(lost, draw >= recovery, draw < failure)
+        return np.asarray(np.where(lost, draw >= recovery, draw < failure))
 
-    first = generator.random((seeds, runs)) < channel.loss_rate[column]
-    logs = evolve(
-        schedule, first, lambda _: speed, follow, lambda _, error, lost: norm.of(error, lost), steps, EVERY, generator
-    )
-    return np.asarray(logs[-1])
+    def size(_: int, error: FloatArray, lost: BoolArray) -> FloatArray:
+        return norm.of(error, lost)
+
+    first = generator.random((seeds, runs)) < rate
+    return np.asarray(evolve(schedule, first, lambda _: speed, follow, size, steps, EVERY, generator)[-1])
 
 
 def evolve(
-    schedule: GainSchedule,
-    lost: Lost,
-    speed: Callable[[int], FloatArray],
-    follow: Callable[[Lost], Lost],
-    size: Callable[[int, FloatArray, Lost], FloatArray],
-    steps: int,
-    every: int,
-    generator: np.random.Generator,
-) -> FloatArray:
+    schedule: GainSchedule, lost: BoolArray, speed: Callable[[int], FloatArray], follow: Callable[[BoolArray], BoolArray],
+    size: Callable[[int, FloatArray, BoolArray], FloatArray], steps: int, every: int, generator: Generator,
+) -> FloatArray:  # fmt: skip
     """log of unbiased estimates of E size(k) at k = every, 2 every, ..., (steps // every, c, seeds).
 
     `lost` (c, seeds, runs) says which runs lose sample 0, `follow` which lose the next one; `speed(k)` is the wheel speed of
@@ -91,8 +78,7 @@ def resampled(weights: FloatArray, offset: FloatArray) -> IntArray:
 
     weights (..., n) >= 0; offset in [0, 1), broadcasts to (..., 1).
     """
-    n = weights.shape[-1]
-    upper = np.cumsum(weights, axis=-1)
+    n, upper = weights.shape[-1], np.cumsum(weights, axis=-1)
     upper = upper / upper[..., -1:]
     rows = np.arange(upper.size // n).reshape(*upper.shape[:-1], 1)
     place = np.broadcast_to((np.arange(n) + offset) / n, upper.shape)

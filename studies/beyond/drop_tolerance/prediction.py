@@ -99,20 +99,18 @@ def critical_bursts(schedule: GainSchedule, speed: float, loss_rates: Sequence[f
     if not len(loss) or (np.diff(loss) <= 0.0).any():
         return [None] * len(loss_rates)
 
+    def recovery(failure: float) -> float:
+        return float(_critical_recovery(schedule, speed, np.array([failure]))[0])
+
     def excess(log_failure: float, loss_rate: float) -> float:
         failure = float(np.exp(log_failure))
-        recovery = float(_critical_recovery(schedule, speed, np.array([failure]))[0])
-        return failure / (failure + recovery) - loss_rate
+        return failure / (failure + recovery(failure)) - loss_rate
 
-    found: list[float | None] = []
-    for loss_rate in loss_rates:
-        if not loss[0] < loss_rate < loss[-1]:
-            found.append(None)
-            continue
-        failure = float(
-            np.exp(brentq(excess, math.log(FAILURES[0]), math.log(FAILURES[1]), args=(loss_rate,), xtol=1e-10))
-        )
-        found.append(1.0 / float(_critical_recovery(schedule, speed, np.array([failure]))[0]))
+    found: list[float | None] = [None] * len(loss_rates)
+    for k, loss_rate in enumerate(loss_rates):
+        if loss[0] < loss_rate < loss[-1]:
+            ends = math.log(FAILURES[0]), math.log(FAILURES[1])
+            found[k] = 1.0 / recovery(float(np.exp(brentq(excess, *ends, args=(loss_rate,), xtol=1e-10))))
     return found
 
 
@@ -145,16 +143,12 @@ def natural_norm(schedule: GainSchedule, channel: Channel) -> Norm:
     Any positive definite norm grows at the same rate in the end; in this one simulated sizes spread least.
     """
     jump = system(schedule, channel)
-    operator = jump.second_moment_operator
-    values, vectors = np.linalg.eig(np.swapaxes(operator, -1, -2))
+    values, vectors = np.linalg.eig(np.swapaxes(jump.second_moment_operator, -1, -2))
     leading = np.abs(values).argmax(axis=-1)
     left = np.take_along_axis(vectors, leading[:, None, None], axis=-1)[..., 0].real
     P = unpack(left.reshape(len(left), 2, -1), jump.size)
-    P = P * np.sign(np.trace(P.sum(axis=1), axis1=-2, axis2=-1))[:, None, None, None]
-    size = np.trace(P.sum(axis=1), axis1=-2, axis2=-1)[:, None, None, None]
-    return Norm(
-        np.asarray(P / size + FLOOR * np.eye(jump.size) * np.diagonal(P / size, axis1=-2, axis2=-1)[..., None, :])
-    )
+    P = P / np.trace(P.sum(axis=1), axis1=-2, axis2=-1)[:, None, None, None]  # of either sign: now positive
+    return Norm(np.asarray(P + FLOOR * np.eye(jump.size) * np.diagonal(P, axis1=-2, axis2=-1)[..., None, :]))
 
 
 def log_second_moment(

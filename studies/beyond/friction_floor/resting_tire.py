@@ -17,7 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import ArrayLike
 
 from analysis.norms.static_gain import static_gain
 from estimators.arrays import FloatArray
@@ -33,23 +33,19 @@ from synthesis.models.catalogue import corner_velocity_model
 from synthesis.models.parameter_set import Tire, load_parameter_set
 
 TOPIC = Topic("studies.beyond.friction_floor")
-FRICTIONS = (0.2, 0.35, 0.5, 0.8, 1.0)
-"""Of the roads, 1."""
+FRICTIONS = (0.2, 0.35, 0.5, 0.8, 1.0)  # of the roads, 1
 SLIPS = (0.003, 0.01, 0.02, 0.05, 0.1, 0.3, 1.0)
 WHEEL_SPEEDS = (15.0, 40.0, 90.0)  # rad/s
-SETTLED = 6.0
-"""s: sixty time constants of the slowest shipped observer."""
+SETTLED = 6.0  # s: sixty time constants of the slowest shipped observer
 
 
-def hidden_ratio(tire: Tire, slip: npt.ArrayLike, friction: npt.ArrayLike) -> FloatArray:
+def hidden_ratio(tire: Tire, slip: ArrayLike, friction: ArrayLike) -> FloatArray:
     """s = (sigma0/kappa) |lambda|/theta [1]: the slip that friction hides over the slip that deflects the bristles."""
     stiffness = tire.sigma0.value / tire.kappa.value
     return np.asarray(stiffness * np.abs(slip) / np.asarray(friction))
 
 
-def missed_share(
-    tire: Tire, radius: float, wheel_speed: npt.ArrayLike, slip: npt.ArrayLike, friction: npt.ArrayLike
-) -> FloatArray:
+def missed_share(tire: Tire, radius: float, wheel_speed: ArrayLike, slip: ArrayLike, friction: ArrayLike) -> FloatArray:
     """(v_r - v_r_hat)/v_r [1] at rest; ``wheel_speed`` rad/s, ``slip`` v_r/(R_e w), ``friction`` theta, broadcast."""
     s = hidden_ratio(tire, slip, friction)
     a = tire.kappa.value * radius * np.abs(np.asarray(wheel_speed))
@@ -57,7 +53,7 @@ def missed_share(
 
 
 def resting_force(
-    tire: Tire, radius: float, wheel_speed: npt.ArrayLike, slip: npt.ArrayLike, friction: npt.ArrayLike
+    tire: Tire, radius: float, wheel_speed: ArrayLike, slip: ArrayLike, friction: ArrayLike
 ) -> FloatArray:
     """mu = sigma0 z + sigma2 v_r of P1 (19) with the bristle at rest: what a force sensor would say."""
     speed = radius * np.asarray(wheel_speed)
@@ -66,7 +62,7 @@ def resting_force(
     return np.asarray(tire.sigma0.value * relative / rate + tire.sigma2.value * relative)
 
 
-def friction_curve(tire: LuGreParameters, relative: npt.ArrayLike) -> FloatArray:
+def friction_curve(tire: LuGreParameters, relative: ArrayLike) -> FloatArray:
     """g(v_r) [1] of P1 below (19) with exponent 0.5: falls from mu_s to mu_c over the Stribeck velocity; v_r in m/s."""
     fall = np.exp(-np.sqrt(np.abs(relative) / tire.stribeck))
     return np.asarray(tire.sliding + (tire.static - tire.sliding) * fall)
@@ -86,16 +82,14 @@ class Missed:
         return float(np.max(np.abs(self.predicted - self.simulated)))
 
 
-def missed_by(schedule_name: str, friction: npt.ArrayLike, slip: npt.ArrayLike) -> Missed:
+def missed_by(schedule_name: str, friction: ArrayLike, slip: ArrayLike) -> Missed:
     """Hold each resting tire for ``SETTLED`` s before the observer of the shipped schedule, all in one batch."""
-    schedule = GainSchedule.shipped(schedule_name)
-    values, direction = SHIPPED[schedule_name]
+    schedule, (values, direction) = GainSchedule.shipped(schedule_name), SHIPPED[schedule_name]
     parameters = load_parameter_set(values)
     tire, radius = parameters.tire[direction], parameters.vehicle["effective_radius"].value
     speed, theta, ratio = np.meshgrid(WHEEL_SPEEDS, friction, slip, indexing="ij")
     measured = resting_force(tire, radius, speed, ratio, theta)
-    observer = LpvVelocityObserver(schedule, speed.shape, stale_after=None)
-    still = np.zeros_like(speed)
+    observer, still = LpvVelocityObserver(schedule, speed.shape, stale_after=None), np.zeros_like(speed)
     for _ in range(round(SETTLED / schedule.sample_time) + 1):
         step = observer.step(still, measured, speed)
     true = ratio * radius * speed
@@ -106,8 +100,7 @@ def missed_by(schedule_name: str, friction: npt.ArrayLike, slip: npt.ArrayLike) 
 @TOPIC.part("theory", "The floor in closed form, and the runtime observers at rest", 15.0)
 def theory(_: Scope) -> PartResult:
     """Closed form against the runtime observer of every shipped schedule."""
-    rows: list[list[Cell]] = []
-    found = [missed_by(name, FRICTIONS, SLIPS) for name in SHIPPED]
+    rows, found = list[list[Cell]](), [missed_by(name, FRICTIONS, SLIPS) for name in SHIPPED]
     for missed in found:
         values, direction = SHIPPED[missed.schedule]
         model = corner_velocity_model(load_parameter_set(values), direction, wheel_speed_maximum=140.0)
@@ -128,26 +121,19 @@ def theory(_: Scope) -> PartResult:
         "observer of this structure misses of the slip velocity is therefore s/(1 + s) with s = (sigma0/kappa) "
         "|slip|/friction, whatever its schedule: half of it already where the slip is friction over slip stiffness."
     )
-    table = Table("shares", caption, columns, rows)
-    gap = max(missed.largest_gap for missed in found)
-    return PartResult((), [table], [share_figure(found[0])], [note], {"largest difference": gap})
-
-
-def share_figure(missed: Missed) -> Figure:
-    """Predicted lines, simulated points, of the longitudinal observer at the middle wheel speed."""
-    values = load_parameter_set("corner-estimation")
-    fine, marks = np.geomspace(SLIPS[0], SLIPS[-1], 200), list[Mark]()
-    radius = values.vehicle["effective_radius"].value
-    for theta, shares, colour in zip(FRICTIONS, missed.simulated[1], ROADS, strict=True):
-        line = missed_share(values.tire["longitudinal"], radius, WHEEL_SPEEDS[1], fine, theta)
+    shipped, fine, marks = load_parameter_set("corner-estimation"), np.geomspace(SLIPS[0], SLIPS[-1], 200), list[Mark]()
+    radius = shipped.vehicle["effective_radius"].value
+    for theta, simulated, colour in zip(FRICTIONS, found[0].simulated[1], ROADS, strict=True):
+        line = missed_share(shipped.tire["longitudinal"], radius, WHEEL_SPEEDS[1], fine, theta)
         marks += [Line(100 * fine, 100 * line, f"friction {theta:g}", colour)]
-        marks += [dots(100 * np.array(SLIPS), 100 * shares, color=colour, size=4)]
+        marks += [dots(100 * np.array(SLIPS), 100 * simulated, color=colour, size=4)]
     x, y = Axis("slip $v_r/(R_e\\omega)$ [%]", scale="log"), Axis("share of the slip velocity missed [%]", 0, 100)
-    return Figure(
+    figure = Figure(
         "missed-shares",
         f"Share of the slip velocity that the longitudinal corner observer misses at {WHEEL_SPEEDS[1]:g} rad/s: closed form "
         "(lines) and the runtime observer held before a resting tire (points). No gain changes the lines.",
         "Curves of the missed share rising with slip from near zero to near one hundred per cent, earlier on slippery roads.",
-        Panel(marks, x, y, legend="lower right"),
-        size=(6.4, 4.0),
-    )
+        Panel(marks, x, y, legend="lower right"), (6.4, 4.0),
+    )  # fmt: skip
+    gap = max(missed.largest_gap for missed in found)
+    return PartResult((), [Table("shares", caption, columns, rows)], [figure], [note], {"largest difference": gap})

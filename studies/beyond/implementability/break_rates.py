@@ -50,14 +50,12 @@ def first_breaks(design: Design, update: Update, wheel_speed: FloatArray) -> tup
     """
     A, L, C = design.matrices(wheel_speed)
     stable = jury_margin(update(A[:, None], L[:, None], C[:, None], SAMPLE_TIMES)) > 0.0
-    first = stable.argmin(axis=1)
-    lasting = stable.all(axis=1)
+    first, lasting = stable.argmin(axis=1), stable.all(axis=1)
     after = np.arange(len(SAMPLE_TIMES)) >= first[:, None]
     connected = not (stable & after)[~lasting].any()
     if (first[~lasting] == 0).any():
-        raise AnalysisError(
-            f"design '{design.name}' is unstable already at {SAMPLE_TIMES[0]:g} s; check the signs of its gains"
-        )
+        remedy = "check the signs of its gains"
+        raise AnalysisError(f"design '{design.name}' is unstable already at {SAMPLE_TIMES[0]:g} s; {remedy}")
     low, high = SAMPLE_TIMES[np.maximum(first - 1, 0)], SAMPLE_TIMES[first]
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
@@ -94,21 +92,16 @@ def break_curve(design: Design, scheme: str, points: int = 141) -> BreakCurve:
     best, place = float(times[k]), float(grid[k])
     for low, high in ((k - 1, k), (k, k + 1)):
         if low >= 0 and high < len(grid) and np.isfinite(times[[low, high]]).all():
-            inner = minimize_scalar(
-                lambda speed: _break_nearby(design, update, float(speed), times[k]),
-                bounds=(grid[low], grid[high]),
-                method="bounded",
-            )
+            nearby = partial(_break_nearby, design, update, near=times[k])
+            inner = minimize_scalar(nearby, bounds=(grid[low], grid[high]), method="bounded")
             if inner.fun < best:
                 best, place = float(inner.fun), float(inner.x)
     return BreakCurve(grid, times, 1.0 / best, place, connected)
 
 
-def unstable_wheel_speeds(
-    design: Design, scheme: str, sample_time: float, points: int = 561
-) -> tuple[tuple[float, float], ...]:
+def unstable_wheel_speeds(design: Design, scheme: str, sample_time: float) -> tuple[tuple[float, float], ...]:
     """Intervals of the wheel speed in rad/s on which the update is unstable at one sample time, edges by root finding."""
-    update, grid = UPDATES[scheme], design.grid(points)
+    update, grid = UPDATES[scheme], design.grid(561)
     A, L, C = design.matrices(grid)
     bad = jury_margin(update(A, L, C, np.full(len(grid), sample_time))) <= 0.0
     roots = [
@@ -119,15 +112,16 @@ def unstable_wheel_speeds(
     return tuple(zip(bounds[::2], bounds[1::2], strict=True))
 
 
-Curves = Mapping[tuple[str, str], BreakCurve]
-"""By names of design and scheme."""
+def break_curves(designs: Sequence[Design], points: int) -> dict[tuple[str, str], BreakCurve]:
+    """Of every breakable scheme, by the names of design and scheme."""
+    return {(d.name, s): break_curve(d, s, points) for s in BREAKABLE for d in designs}
 
 
 @TOPIC.part("break-rates", "Sample rates at which each discretisation breaks", 6.0)
 def rates(scope: Scope) -> PartResult:
-    """Exact break rates over the wheel speeds."""
-    designs, points = (*printed_designs(), *shipped_designs()), 36 if scope.quick else 141
-    curves = {(d.name, s): break_curve(d, s, points) for s in BREAKABLE for d in designs}
+    """Exact break rates over the wheel speeds; the worst of each design and scheme, and where it breaks."""
+    designs = (*printed_designs(), *shipped_designs())
+    curves = break_curves(designs, 36 if scope.quick else 141)
     measures = {f"break rate {name}, {scheme} [Hz]": curve.worst_rate for (name, scheme), curve in curves.items()}
     if not all(curve.connected for curve in curves.values()):
         raise AnalysisError("a discretisation becomes stable again at a lower rate: its break rate says too little")
@@ -136,27 +130,22 @@ def rates(scope: Scope) -> PartResult:
         "it: no second window was found. The wheel speed is held constant; what a moving wheel speed may do is "
         "proved for the shipped schedules with the exact update alone."
     )
-    return PartResult((), [rate_table(designs, curves)], [rate_figure(curves)], [note], measures)
-
-
-def rate_table(designs: Sequence[Design], curves: Curves) -> Table:
-    """Worst break rate of each design and scheme, and the wheel speed at which it breaks."""
     rows: list[list[Cell]] = []
     for design in designs:
         worst = [(c.worst_rate, c.worst_wheel_speed) for c in (curves[design.name, scheme] for scheme in BREAKABLE)]
         rows.append([design.name, *(round(value, 2) for pair in worst for value in pair)])
     columns = [text for scheme in BREAKABLE for text in (f"{scheme}: needs [Hz]", f"{scheme}: worst at [rad/s]")]
-    return Table(
+    table = Table(
         "break-rates",
         "Sample rate that each discretisation needs to be stable at every constant wheel speed from 0 to 140 "
         f"rad/s, and the wheel speed at which it breaks first, by root finding. {', '.join(LASTING)} are stable at "
         "every rate, as the continuous observers are.",
-        ["design", *columns],
-        rows,
-    )
+        ["design", *columns], rows,
+    )  # fmt: skip
+    return PartResult((), [table], [rate_figure(curves)], [note], measures)
 
 
-def rate_figure(curves: Curves) -> Figure:
+def rate_figure(curves: Mapping[tuple[str, str], BreakCurve]) -> Figure:
     """Break rate over the wheel speed, one panel for each scheme."""
     panels, ticks = [], (20, 50, 100, 200, 500, 1000)
     for k, scheme in enumerate(BREAKABLE):
@@ -164,22 +153,19 @@ def rate_figure(curves: Curves) -> Figure:
         for designs in (printed_designs(), shipped_designs()):
             for design, colour in zip(designs, (BLUE, RED, ORANGE, GREEN, PURPLE), strict=True):
                 curve, own = curves[design.name, scheme], design.kind == "shipped"
-                dash, width = DASHES[own], 1.1 if own else 1.8
-                marks.append(Line(curve.wheel_speed, curve.rate, design.name, colour, dash, width))
+                marks.append(Line(curve.wheel_speed, curve.rate, design.name, colour, DASHES[own], 1.1 if own else 1.8))
         if k == 1:
             marks.append(Words(2.0, 0.97 * PAPER_RATE, "200 Hz", vertical="top"))
         y = Axis("" if k else "sample rate below which it is unstable [Hz]", 20.0, 1200.0, "log", ticks)
         panels.append(Panel(marks, Axis("wheel speed [rad/s]", *WHEEL_SPEED), y, scheme))
     return Figure(
         "break-rates",
-        "Sample rate below which the error of the observer grows, over the wheel speed (held constant), for the "
-        "gains printed by P1 and P3 (solid) and the five shipped schedules (dashed). Forward Euler is limited by "
-        "the fastest pole; a sampled innovation breaks at low speed, where the tire force is stiffest; predicting "
-        "and then adding T·L breaks at high speed. Above the dotted line a curve means unstable at the 200 Hz of "
-        "the papers. Tustin, backward Euler and the exact closed-loop update of the runtime have no curve: they "
-        "never break.",
+        "Sample rate below which the error of the observer grows, over the wheel speed (held constant), for the gains "
+        "printed by P1 and P3 (solid) and the five shipped schedules (dashed). Forward Euler is limited by the fastest "
+        "pole; a sampled innovation breaks at low speed, where the tire force is stiffest; predicting and then adding T·L "
+        "breaks at high speed. Above the dotted line a curve means unstable at the 200 Hz of the papers. Tustin, backward "
+        "Euler and the exact closed-loop update of the runtime have no curve: they never break.",
         "Three panels of break rate over wheel speed on a logarithmic scale; longitudinal gains lie between 100 and "
         "900 Hz, lateral ones mostly below 200 Hz except for the third scheme.",
-        panels,
-        size=(10.0, 5.0), legend="below", share_y="all",
+        panels, (10.0, 5.0), "below", share_y="all",
     )  # fmt: skip

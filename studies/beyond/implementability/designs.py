@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Literal
@@ -18,25 +17,22 @@ from synthesis.models.parameter_set import load_parameter_set
 
 WHEEL_SPEED = (0.0, 140.0)  # rad/s, the range of P1 Figs. 3 and 4
 PAPER_RATE = 200.0  # Hz, P1 and P3
-PRINTED_BY = ("corner-estimation", "resilient-velocity")
-"""Parameter sets of the papers whose printed gains are examined."""
+PRINTED_BY = ("corner-estimation", "resilient-velocity")  # parameter sets of these papers
 
 
 @dataclass(frozen=True)
 class Design:
-    """Gains over the wheel speed with the model they belong to; `schedule` is what the runtime would read."""
+    """Gains over the wheel speed, as the runtime would read them, with the model they belong to."""
 
     name: str
     kind: Literal["printed", "shipped"]
     model: LpvModel
-    gain: Callable[[FloatArray], FloatArray]  # rad/s (g,) -> (g, 2, 1)
     schedule: GainSchedule
 
     def matrices(self, wheel_speed: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """A (g, 2, 2), L (g, 2, 1) and C (g, 1, 2) at wheel speeds (g,) in rad/s."""
-        points = np.atleast_1d(np.asarray(wheel_speed, float))
-        numeric = self.model.on(points)
-        return numeric.A, self.gain(points), numeric.C
+        numeric = self.model.on(wheel_speed)
+        return numeric.A, self.schedule.gain(wheel_speed), numeric.C
 
     def grid(self, points: int = 281) -> FloatArray:
         """Wheel speeds over the range, with every breakpoint of the gains."""
@@ -50,26 +46,17 @@ def printed_designs() -> tuple[Design, ...]:
     for name, (parameters, direction) in SHIPPED.items():
         if parameters in PRINTED_BY:
             gains, published = printed(parameters, direction)
+            variants = {"": gains, ", high slip": published.gains_high_slip}
             title = f"{PAPERS[parameters]} {direction}"
-            found.append(_constant(title, name, gains))
-            if published.gains_high_slip is not None:
-                found.append(_constant(f"{title}, high slip", name, published.gains_high_slip))
+            found += [_constant(title + slip, name, pair) for slip, pair in variants.items() if pair is not None]
     return tuple(found)
 
 
 @cache
 def shipped_designs() -> tuple[Design, ...]:
     """The five schedules that come with the package, that for one direction alone last."""
-    found = []
-    for name in sorted(SHIPPED, key=lambda name: SHIPPED[name][0] not in PRINTED_BY):
-        schedule = GainSchedule.shipped(name)
-        found.append(Design(f"schedule {name}", "shipped", _model(name), schedule.gain, schedule))
-    return tuple(found)
-
-
-def with_sample_time(design: Design, sample_time: float) -> GainSchedule:
-    """The schedule of a design for another sample time [s]; gains and plant are as they were, nothing is proved for it."""
-    return replace(design.schedule, sample_time=sample_time)
+    names = sorted(SHIPPED, key=lambda name: SHIPPED[name][0] not in PRINTED_BY)
+    return tuple(Design(f"schedule {name}", "shipped", _model(name), GainSchedule.shipped(name)) for name in names)
 
 
 def _model(name: str) -> LpvModel:
@@ -81,4 +68,4 @@ def _constant(title: str, name: str, gains: tuple[float, ...]) -> Design:
     """Printed gains in the shape of a schedule, on the plant of the shipped one `name` with the same tires."""
     column, shipped = np.array(gains)[:, None], GainSchedule.shipped(name)
     schedule = replace(shipped, name=title, breakpoints=np.array(WHEEL_SPEED), table=np.stack([column, column]))
-    return Design(title, "printed", _model(name), lambda w: np.broadcast_to(column, (len(w), 2, 1)), schedule)
+    return Design(title, "printed", _model(name), schedule)

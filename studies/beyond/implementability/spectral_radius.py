@@ -22,9 +22,9 @@ RATE_TICKS = (20, 50, 100, 200, 500, 1000, 2000)
 @TOPIC.part("printed", "Spectral radius of the printed gains", 1.5)
 def printed(scope: Scope) -> PartResult:
     """Spectral radius of the printed gains."""
-    designs = printed_designs()
-    figure = map_figure(designs, "map-printed", 41 if scope.quick else 141)
-    return PartResult((), [radius_table("spectral-radius-printed", designs)], [figure])
+    return PartResult(
+        (), [radius_table(printed_designs())], [map_figure(printed_designs(), 41 if scope.quick else 141)]
+    )
 
 
 @TOPIC.part("shipped", "Spectral radius of the shipped schedules", 1.5, quick=False)
@@ -36,18 +36,10 @@ def shipped(scope: Scope) -> PartResult:
         "limit of 600 1/s (longitudinal) and 300 1/s (lateral). They are not meant for, and longitudinally not "
         "stable in, the simpler updates at that rate."
     )
-    figure = map_figure(designs, "map-shipped", 41 if scope.quick else 141)
-    return PartResult((), [radius_table("spectral-radius-shipped", designs)], [figure], [note])
+    return PartResult((), [radius_table(designs)], [map_figure(designs, 41 if scope.quick else 141)], [note])
 
 
-@TOPIC.part("lasting-schemes", "What the schemes that never break cost", 0.3)
-def lasting(scope: Scope) -> PartResult:
-    """Schemes that never break."""
-    chosen = (*printed_designs()[:3], shipped_designs()[0])
-    return PartResult(figures=[lasting_figure(chosen, 41 if scope.quick else 121)])
-
-
-def radius_table(name: str, designs: Sequence[Design]) -> Table:
+def radius_table(designs: Sequence[Design]) -> Table:
     """Largest spectral radius over the wheel speeds, and the unstable wheel speeds at 200 Hz."""
     rows: list[list[Cell]] = []
     for design in designs:
@@ -58,21 +50,19 @@ def radius_table(name: str, designs: Sequence[Design]) -> Table:
             text = "; ".join(f"{low:.2f} to {high:.2f}" for low, high in unstable) or "none"
             rows.append([design.name, scheme, *(round(value, 4) for value in largest), text])
     return Table(
-        name,
+        f"spectral-radius-{designs[0].kind}",
         "Largest spectral radius over the wheel speeds 0 to 140 rad/s at five sample rates (above 1 the error grows "
         "by this factor in every sample), and the wheel speeds that are unstable at the 200 Hz of the papers.",
-        ("design", "discretisation", *(f"radius at {rate:g} Hz [1]" for rate in RATES), "unstable at 200 Hz [rad/s]"),
-        rows,
-    )
+        ("design", "discretisation", *(f"radius at {rate:g} Hz [1]" for rate in RATES), "unstable at 200 Hz [rad/s]"), rows,
+    )  # fmt: skip
 
 
-def map_figure(designs: Sequence[Design], name: str, points: int = 141) -> Figure:
+def map_figure(designs: Sequence[Design], points: int) -> Figure:
     """Spectral radius over wheel speed and sample rate: one row for each design, one column for each scheme."""
     speed, rate = np.linspace(*WHEEL_SPEED, points), np.geomspace(20.0, 2000.0, points)
-    rows = []
-    for place, design in enumerate(designs):
-        A, L, C = design.matrices(speed)
-        row = []
+    rows: list[list[Panel]] = []
+    for design in designs:
+        (A, L, C), row = design.matrices(speed), []
         for k, (scheme, update) in enumerate(BREAKABLE.items()):
             radius = spectral_radius(update(A[:, None], L[:, None], C[:, None], 1.0 / rate)).T
             marks: list[Mark] = [
@@ -81,27 +71,26 @@ def map_figure(designs: Sequence[Design], name: str, points: int = 141) -> Figur
                 Level(PAPER_RATE, color="black", dash="dotted", width=0.9),
             ]
             label = "" if k else f"{design.name.removeprefix('schedule ')}\nsample rate [Hz]"
-            x = "wheel speed [rad/s]" if place == len(designs) - 1 else ""
-            y = Axis(label, scale="log", ticks=RATE_TICKS)
-            row.append(Panel(marks, x, y, "" if place else scheme, grid=False))
+            x, y = "wheel speed [rad/s]" if design is designs[-1] else "", Axis(label, scale="log", ticks=RATE_TICKS)
+            row.append(Panel(marks, x, y, "" if rows else scheme, grid=False))
         rows.append(row)
     kind = "printed gains" if designs[0].kind == "printed" else "shipped schedules"
     return Figure(
-        name,
+        f"map-{designs[0].kind}",
         f"Spectral radius of one sample of the observer error for {kind}, over wheel speed and sample rate, in "
         "three discretisations. Red: the error grows; blue: it shrinks; black line: radius 1; dotted: the 200 Hz "
         "of the papers. The wheel speed is held constant.",
         "Grid of colour maps, red below a black line at low sample rates and blue above it; the line rises or "
         "falls with wheel speed depending on the scheme.",
-        rows,
-        size=(9.6, 1.0 + 1.95 * len(designs)), share_x="all", share_y="all", bar="log₁₀ of the spectral radius [1]",
+        rows, (9.6, 1.0 + 1.95 * len(designs)), share_x="all", share_y="all", bar="log₁₀ of the spectral radius [1]",
     )  # fmt: skip
 
 
-def lasting_figure(designs: Sequence[Design], points: int = 121) -> Figure:
+@TOPIC.part("lasting-schemes", "What the schemes that never break cost", 0.3)
+def lasting(scope: Scope) -> PartResult:
     """What the schemes that never break do to the slowest pole."""
-    rate, panels = np.geomspace(20.0, 2000.0, points), []
-    for k, design in enumerate(designs):
+    rate, panels = np.geomspace(20.0, 2000.0, 41 if scope.quick else 121), []
+    for k, design in enumerate((*printed_designs()[:3], shipped_designs()[0])):
         A, L, C = design.matrices(design.grid(29))
         slowest = (-np.log(spectral_radius(exact_closed_loop(A, L, C, 1e-4)))).min() / 1e-4
         marks: list[Mark] = [Level(x=PAPER_RATE, color="black", dash="dotted", width=0.9)]
@@ -111,7 +100,7 @@ def lasting_figure(designs: Sequence[Design], points: int = 121) -> Figure:
         x = Axis("sample rate [Hz]", scale="log", ticks=(20, 100, 500, 2000))
         y = Axis("" if k else "worst decay rate / continuous one [1]", 0.0, 1.6)
         panels.append(Panel(marks, x, y, design.name.removeprefix("schedule "), "" if k else "upper left"))
-    return Figure(
+    figure = Figure(
         "lasting-schemes",
         "Discretisations that are stable at every sample rate, and what they keep of the designed convergence: "
         "slowest decay rate over all wheel speeds, divided by that of the continuous observer. The exact "
@@ -119,6 +108,6 @@ def lasting_figure(designs: Sequence[Design], points: int = 121) -> Figure:
         "samples close to minus one, so the error rings and decays more slowly. Dotted: 200 Hz.",
         "One panel for each design with three curves over the sample rate; the exact one is constant at one, the "
         "others fall towards zero at low rates.",
-        panels,
-        size=(9.6, 3.7), share_y="all",
+        panels, (9.6, 3.7), share_y="all",
     )  # fmt: skip
+    return PartResult(figures=[figure])

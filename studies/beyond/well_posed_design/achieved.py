@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,12 +17,10 @@ COLUMNS = (
     "friction gain [1]", "force noise gain [m/s]", "H2 gain, white force noise [m/s sqrt(Hz)]", "acceleration gain [s]",
     "slowest pole [1/s]", "fastest pole [1/s]",
 )  # fmt: skip
-"""Of tables, in the order of the fields of `Achieved`."""
 
 
-@dataclass(frozen=True)
-class Achieved:
-    """Worst over the wheel speeds (held constant), arrays over the leading axes of the gains.
+class Achieved(NamedTuple):
+    """Worst over the wheel speeds (held constant), arrays over the leading axes of the gains; `COLUMNS` of tables.
 
     friction, noise: H-infinity gains to the velocity error, 1 and m/s per unit of normalised force; noise_density: its H2
     norm, m/s for white force noise of unit two-sided density, 1 per sqrt(Hz); acceleration in s; slowest and fastest
@@ -39,7 +37,6 @@ class Achieved:
 
 def achieved(case: Case, gains: FloatArray, wheel_speed: FloatArray) -> Achieved:
     """For gains (..., g, 2) at wheel speeds (g,) rad/s, one gain vector for each of them; NaN gains give NaN."""
-    gains = np.asarray(gains, float)
     lead, flat = gains.shape[:-2], gains.reshape(-1, 2, 1)
     points = np.tile(wheel_speed, len(flat) // len(wheel_speed))
     there = np.asarray(np.isfinite(flat).all(axis=(1, 2)))
@@ -56,14 +53,8 @@ def achieved(case: Case, gains: FloatArray, wheel_speed: FloatArray) -> Achieved
         return worst(error_hinf_norm(case.model, flat, points, (disturbance,), VELOCITY, tolerance=1e-8).norm)
 
     d, z = selection(case.model, ("force_noise",), VELOCITY)
-    return Achieved(
-        norm("friction"),
-        norm("force_noise"),
-        worst(h2_norm(A_e, B_e @ d, z)),
-        norm("acceleration_error"),
-        -worst(-poles.min(axis=-1)),
-        worst(poles.max(axis=-1)),
-    )
+    density, slowest, fastest = worst(h2_norm(A_e, B_e @ d, z)), -worst(-poles.min(axis=-1)), worst(poles.max(axis=-1))
+    return Achieved(norm("friction"), norm("force_noise"), density, norm("acceleration_error"), slowest, fastest)
 
 
 def printed_achieved(case: Case, points: int = 57) -> Achieved:

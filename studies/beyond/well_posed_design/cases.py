@@ -39,13 +39,11 @@ class Case:
 def case(name: str) -> Case:
     """By the name of a shipped specification. Raises SpecError if its parameter set prints no gains or ranges of them."""
     spec, folder = load_spec(name)
-    parameters = spec.parameter_set(folder)
-    direction = spec.model.id.removeprefix("corner-velocity-")
+    parameters, direction = spec.parameter_set(folder), spec.model.id.removeprefix("corner-velocity-")
     gains, published = printed(parameters, direction)
     if published.gain_range is None:
         raise SpecError(f"specification '{name}': its parameter set has no published gains with ranges to compare with")
-    first, second = published.gain_range
-    title = f"{PAPERS[parameters.id]} {direction}"
+    title, (first, second) = f"{PAPERS[parameters.id]} {direction}", published.gain_range
     return Case(name, title, spec.build_model(parameters), spec.observer_design(), gains, (first, second))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,11 +26,10 @@ Vary = Callable[[ObserverDesign, float], ObserverDesign]
 
 @dataclass(frozen=True)
 class Sweep:
-    """Demands (n,); gains (n, g, 2) over `wheel_speed` (g,); proved bounds of the design's own objective, NaN: infeasible."""
+    """Demands (n,); gains (n, g, 2) over g wheel speeds; proved bounds of the design's own objective, NaN: infeasible."""
 
     case: Case
     demand: FloatArray
-    wheel_speed: FloatArray
     gains: FloatArray
     gamma_lower: FloatArray
     gamma: FloatArray
@@ -43,9 +43,8 @@ class Sweep:
 
 def friction_bound(design: ObserverDesign, bound: float) -> ObserverDesign:
     """Bound of the friction channel (its floor is 1)."""
-    return replace(
-        design, channels=tuple(replace(c, bound=bound) if c.bound is not None else c for c in design.channels)
-    )
+    channels = tuple(c if c.bound is None else replace(c, bound=bound) for c in design.channels)
+    return replace(design, channels=channels)
 
 
 def decay_rate(design: ObserverDesign, rate: float) -> ObserverDesign:
@@ -66,24 +65,17 @@ def noise_weight(design: ObserverDesign, weight: float) -> ObserverDesign:
 
 def sweep(case: Case, vary: Vary, demands: Sequence[float], points: int = 29) -> Sweep:
     """Design for every demand; one that no gains of this degree meet leaves NaN. Raises ProblemError if none is met."""
-    grid = case.grid(points)
-    gains, lower, gamma = np.full((len(demands), points, 2), np.nan), [], []
+    grid, gains = case.grid(points), np.full((len(demands), points, 2), np.nan)
+    lower, gamma = np.full((2, len(demands)), np.nan)
     for k, demand in enumerate(demands):
-        try:
+        with suppress(ProblemError):
             found = design_observer(case.model, vary(case.design, demand))
-        except ProblemError:
-            lower.append(np.nan)
-            gamma.append(np.nan)
-            continue
-        gains[k] = found.gain(grid)[..., 0]
-        lower.append(np.nan if found.gamma_lower is None else found.gamma_lower)
-        gamma.append(found.gamma)
+            gains[k], gamma[k] = found.gain(grid)[..., 0], found.gamma
+            lower[k] = np.nan if found.gamma_lower is None else found.gamma_lower
     if not np.isfinite(gamma).any():
-        raise ProblemError(
-            f"{case.title}: no gains of degree {case.design.degree} meet any of the demands {list(demands)}"
-        )
-    real = achieved(case, gains, grid)
-    return Sweep(case, np.array(demands), grid, gains, np.array(lower), np.array(gamma), real)
+        degree = case.design.degree
+        raise ProblemError(f"{case.title}: no gains of degree {degree} meet any of the demands {list(demands)}")
+    return Sweep(case, np.array(demands), gains, lower, gamma, achieved(case, gains, grid))
 
 
 @dataclass(frozen=True)
@@ -102,9 +94,8 @@ class Demand:
 
     def run(self, scope: Scope) -> PartResult:
         """The part of the study."""
-        step = 3 if scope.quick else 1
-        values = (self.longitudinal, self.lateral)
-        sweeps = [sweep(case, self.vary, asked[::step]) for case, asked in zip(p1_cases(), values, strict=True)]
+        values = (asked[:: 3 if scope.quick else 1] for asked in (self.longitudinal, self.lateral))
+        sweeps = [sweep(case, self.vary, asked) for case, asked in zip(p1_cases(), values, strict=True)]
         return PartResult((), [self.table(sweeps)], [self.figure(sweeps)])
 
     def table(self, sweeps: Sequence[Sweep]) -> Table:
@@ -112,21 +103,16 @@ class Demand:
         rows: list[list[Cell]] = []
         for sweep in sweeps:
             for k, value in enumerate(sweep.demand):
-                if not sweep.feasible[k]:
-                    rows.append([sweep.case.title, float(value), False, *[None] * 12])
-                    continue
-                low, high = sweep.gains[k].min(axis=0), sweep.gains[k].max(axis=0)
-                gains = (low[0], high[0], low[1], high[1], sweep.gamma_lower[k], sweep.gamma[k])
-                real = [field[k] for field in vars(sweep.achieved).values()]
-                rows.append([sweep.case.title, float(value), True, *short(gains), *short(real)])
+                ends = np.stack([sweep.gains[k].min(axis=0), sweep.gains[k].max(axis=0)], axis=1).ravel()
+                values = (*ends, sweep.gamma_lower[k], sweep.gamma[k], *(field[k] for field in sweep.achieved))
+                rows.append([sweep.case.title, float(value), bool(sweep.feasible[k]), *short(values)])
         return Table(
             self.name,
             f"Designs of degree 1 for several values of one demand ({self.label}), everything else as shipped: ranges of "
             "the gains over the wheel speeds, the proved bound of the minimised channel with its lower bound, and what "
             "the gains do at the worst constant wheel speed.",
             ("case", self.label, "feasible", "L1 from [m/s]", "L1 to [m/s]", "L2 from [m/s^2]", "L2 to [m/s^2]",
-             "lower bound", "proved bound", *COLUMNS),
-            rows,
+             "lower bound", "proved bound", *COLUMNS), rows,
         )  # fmt: skip
 
     def figure(self, sweeps: Sequence[Sweep]) -> Figure:
@@ -142,9 +128,8 @@ class Demand:
             "Two rows of four panels over the varied demand: bands of both gains, the proved noise bound, and the "
             "broadband noise, with red lines for the printed gains.",
             [_row(sweep, self.offset, label if sweep is sweeps[-1] else "") for sweep in sweeps],
-            size=(10.6, 2.7 * len(sweeps) + 0.4),
-            legend="below",
-        )
+            (10.6, 2.7 * len(sweeps) + 0.4), "below",
+        )  # fmt: skip
 
 
 def _row(sweep: Sweep, offset: float, label: str) -> list[Panel]:
@@ -175,8 +160,7 @@ def _row(sweep: Sweep, offset: float, label: str) -> list[Panel]:
     if len(ticks) > MOST_TICKS:
         ticks = [tick for tick in ticks if float(np.log10(tick)).is_integer()]
     missing = [Level(x=place, color="0.6", width=4.0, alpha=0.4) for place in demand[~good]]
-    across = Axis(label, scale="log", ticks=ticks)
-    return [Panel([*missing, *shown], across, name) for name, shown in marks.items()]
+    return [Panel([*missing, *shown], Axis(label, scale="log", ticks=ticks), name) for name, shown in marks.items()]
 
 
 def _printed(value: float) -> Level:

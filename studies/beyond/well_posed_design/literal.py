@@ -7,7 +7,6 @@ bristle with sigma2/(sigma0 + sigma2 a), whatever L is. At standstill (a = 0) th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,112 +68,88 @@ class Approach:
         return self.growth_per_decade > GROWTH
 
 
-def approach(case: Case, design: ObserverDesign, backoffs: tuple[float, ...] = BACKOFFS) -> Approach:
+def approach(case: Case, design: ObserverDesign) -> Approach:
     """Minimise gamma, then the gain energy L'PL at every back-off from it. Raises ProblemError where a solve fails."""
     scale = observer_scale(case.model.polynomial, case.model.parameters)
     optimum = solve(observer_problem(case.model, design, scale), design.settings)
     if optimum.objective is None:
         raise ProblemError(f"model '{case.model.name}': {optimum.message}")
     gamma, largest = to_gamma(case.model, design, scale, optimum.objective), []
-    for backoff in backoffs:
+    for backoff in BACKOFFS:
         level = gamma * (1.0 + backoff)
         found = solve(energy_problem(case.model, design, scale, level), design.settings)
         if found.objective is None:
             raise ProblemError(f"model '{case.model.name}', back-off {backoff:g}: {found.message}")
         gains = ObserverGains(design, case.model, None, level, found, optimum, scale).gain(case.grid(57))
         largest.append(np.abs(gains[..., 0]).max(axis=0))
-    return Approach(gamma, np.array(backoffs), np.array(largest))
+    return Approach(gamma, np.array(BACKOFFS), np.array(largest))
 
 
 def explicit_family(case: Case, second_gains: FloatArray) -> FloatArray:
     """gamma (n,) of the literal channel for L = [1/sigma1, L2], the worst of all constant wheel speeds."""
-    first = 1.0 / case.model.constants["sigma1"].value
-    grid = case.grid(29)
-    return np.array(
-        [
-            error_hinf_norm(case.model, [first, second], grid, DISTURBANCES, ERRORS, tolerance=1e-13).norm.max()
-            for second in second_gains
-        ]
-    )
-
-
-Approaches = Mapping[tuple[str, int], Approach]
-"""By name of the case and degree."""
+    gains = ([1.0 / case.model.constants["sigma1"].value, second] for second in second_gains)
+    found = (error_hinf_norm(case.model, L, case.grid(29), DISTURBANCES, ERRORS, tolerance=1e-13) for L in gains)
+    return np.array([each.norm.max() for each in found])
 
 
 @TOPIC.part("literal", "The literal problem has infimum 1 and unbounded gains", 5.0)
 def literal(scope: Scope) -> PartResult:
-    """Infimum 1, approached with unbounded gains."""
-    cases, degrees = p1_cases(), DEGREES[:2] if scope.quick else DEGREES
-    found = {(case.name, degree): approach(case, literal_design(degree)) for case in cases for degree in degrees}
-    posed = {case.name: approach(case, case.design) for case in cases}
-    note = (
-        "The floor is exact: for every L the static gains from friction are -sigma0/(sigma0 + sigma2 a) to the "
-        "velocity and sigma2/(sigma0 + sigma2 a) to the bristle, at standstill together sqrt(1 + "
-        "(sigma2/sigma0)^2), 1 + 3e-12 for the longitudinal tire of P1."
-    )
-    measures = {f"growth per decade, {name}, degree {k}": value.growth_per_decade for (name, k), value in found.items()}
-    table, figure = literal_table(cases, found, posed), literal_figure(cases, found, posed)
-    return PartResult((), [table], [figure], [note], measures)
-
-
-def literal_table(cases: Sequence[Case], literal: Approaches, posed: Mapping[str, Approach]) -> Table:
-    """Infimum, floor and growth of the gains."""
-    rows: list[list[Cell]] = []
-    for case in cases:
+    """Infimum 1, approached with unbounded gains, beside the well-posed problem; and the explicit family."""
+    degrees, measures = DEGREES[:2] if scope.quick else DEGREES, dict[str, float]()
+    rows, panels, explicit, second = list[list[Cell]](), list[Panel](), list[Mark](), np.geomspace(1.0, 1e7, 43)
+    for case, colour in zip(p1_cases(), (BLUE, RED), strict=True):
+        found = {f"literal, degree {degree}": approach(case, literal_design(degree)) for degree in degrees}
         exact, free = floor(case)
-        found = [(f"literal, degree {degree}", value) for (name, degree), value in literal.items() if name == case.name]
-        for problem, approach in [*found, ("well-posed, degree 1", posed[case.name])]:
-            least: list[Cell] = [float(exact), free] if problem.startswith("literal") else [None, None]
-            ends: list[Cell] = [round(float(value), 3) for value in approach.gains[[0, -1], 1]]
-            growth = round(approach.growth_per_decade, 2)
-            rows.append([case.title, problem, *least, approach.gamma, *ends, growth, approach.unbounded])
-    return Table(
-        "ill-posed",
-        "The literal problem (minimise the gain from friction and acceleration error to both errors) beside the "
-        "well-posed one. The exact floor follows from static gains that no L changes; gamma is what the solver "
-        "finds; then the largest |L2| needed at a back-off of 10 % and of 0.1 %, and its growth for each decade of "
-        "back-off. More than 2 counts as unbounded.",
-        ("case", "problem", "exact floor of gamma [1]", "floor free of L", "gamma found [1 or m/s]", "|L2| at 10 % [m/s^2]",
-         "|L2| at 0.1 % [m/s^2]", "growth per decade [1]", "unbounded"),
-        rows,
-    )  # fmt: skip
-
-
-def literal_figure(cases: Sequence[Case], literal: Approaches, posed: Mapping[str, Approach]) -> Figure:
-    """Least gains on the way to the infimum, literal and well-posed; and the explicit family."""
-    panels, explicit, second = [], list[Mark](), np.geomspace(1.0, 1e7, 43)
-    for case, colour in zip(cases, (BLUE, RED), strict=True):
+        for (problem, each), degree in zip(found.items(), degrees, strict=True):
+            rows.append([case.title, problem, float(exact), free, *_growth(each)])
+            measures[f"growth per decade, {case.name}, degree {degree}"] = each.growth_per_decade
+        well = approach(case, case.design)
+        rows.append([case.title, "well-posed, degree 1", None, None, *_growth(well)])
         marks: list[Mark] = [
             Level(case.printed[1], color=RED, dash="dotted", width=1.0),
             Words(0.11, case.printed[1] * 1.06, "printed", RED),
         ]
-        degrees = sorted(degree for name, degree in literal if name == case.name)
-        for degree, shade in zip(degrees, (BLUE, ORANGE, GREEN, PURPLE), strict=False):
-            found = literal[case.name, degree]
-            marks.append(Line(found.backoffs, found.gains[:, 1], f"literal, degree {degree}", shade, marker="o"))
-        well = posed[case.name]
+        for (problem, each), shade in zip(found.items(), (BLUE, ORANGE, GREEN, PURPLE), strict=False):
+            marks.append(Line(each.backoffs, each.gains[:, 1], problem, shade, marker="o"))
         marks.append(Line(well.backoffs, well.gains[:, 1], "well-posed, degree 1", "black", "dashed", marker="s"))
-        most = max(approach.gains[:, 1].max() for (name, _), approach in literal.items() if name == case.name)
+        most = max(case.printed[1], *(each.gains[:, 1].max() for each in found.values()))
         x = Axis("distance from the infimum, γ/γ* − 1 [1]", 0.13, 8e-4, "log")
-        y = Axis("largest $|L_2|$ that is needed [m/s²]", high=18.0 * max(most, case.printed[1]), scale="log")
+        y = Axis("largest $|L_2|$ that is needed [m/s²]", high=18.0 * most, scale="log")
         panels.append(Panel(marks, x, y, case.title, "upper left"))
         ratio = case.model.constants["sigma2"].value / case.model.constants["sigma0"].value
         explicit += [
             Line(second, explicit_family(case, second) - 1.0, case.title, colour),
             Level(0.5 * ratio**2, color=colour, dash="dotted", width=0.9),
         ]
-    x = Axis("$L_2$ with $L_1 = 1/σ_1$ [m/s²]", scale="log")
-    y = Axis("γ − 1 at constant wheel speed [1]", scale="log")
-    return Figure(
-        "ill-posed",
-        "Minimising the gain of (30) to (32) alone does not determine gains. Left and middle: the least gains that "
-        "come within a given distance of the infimum γ* = 1 grow without bound as the distance shrinks, for every "
-        "degree of P and L; with the pole band and the channel bounds of the shipped design (black, distance from "
-        "its own optimum) they settle. Right: the gains L = [1/σ₁, L₂] come as close to 1 as one likes (dotted: "
-        "the exact floor), so at any γ above 1 all large L₂ are equally good.",
-        "Two panels with rising curves for the literal problem and a flat black curve for the well-posed one; a "
-        "third with two curves falling over ten decades to a floor.",
-        [*panels, Panel(explicit, x, y, "explicit gains", "upper right")],
-        size=(10.0, 3.9),
+    note = (
+        "The floor is exact: for every L the static gains from friction are -sigma0/(sigma0 + sigma2 a) to the "
+        "velocity and sigma2/(sigma0 + sigma2 a) to the bristle, at standstill together sqrt(1 + "
+        "(sigma2/sigma0)^2), 1 + 3e-12 for the longitudinal tire of P1."
     )
+    table = Table(
+        "ill-posed",
+        "The literal problem (minimise the gain from friction and acceleration error to both errors) beside the well-posed one. "
+        "The exact floor follows from static gains that no L changes; gamma is what the solver finds; then the largest |L2| "
+        "needed at a back-off of 10 % and of 0.1 %, and its growth for each decade of back-off. More than 2 counts as "
+        "unbounded.",
+        ("case", "problem", "exact floor of gamma [1]", "floor free of L", "gamma found [1 or m/s]", "|L2| at 10 % [m/s^2]",
+         "|L2| at 0.1 % [m/s^2]", "growth per decade [1]", "unbounded"), rows,
+    )  # fmt: skip
+    x, y = Axis("$L_2$ with $L_1 = 1/σ_1$ [m/s²]", scale="log"), Axis("γ − 1 at constant wheel speed [1]", scale="log")
+    figure = Figure(
+        "ill-posed",
+        "Minimising the gain of (30) to (32) alone does not determine gains. Left and middle: the least gains that come within a "
+        "given distance of the infimum γ* = 1 grow without bound as the distance shrinks, for every degree of P and L; with the "
+        "pole band and the channel bounds of the shipped design (black, distance from its own optimum) they settle. Right: the "
+        "gains L = [1/σ₁, L₂] come as close to 1 as one likes (dotted: the exact floor), so at any γ above 1 all large L₂ are "
+        "equally good.",
+        "Two panels with rising curves for the literal problem and a flat black curve for the well-posed one; a third with two "
+        "curves falling over ten decades to a floor.",
+        [*panels, Panel(explicit, x, y, "explicit gains", "upper right")], (10.0, 3.9),
+    )  # fmt: skip
+    return PartResult((), [table], [figure], [note], measures)
+
+
+def _growth(found: Approach) -> list[Cell]:
+    ends = (round(float(value), 3) for value in found.gains[[0, -1], 1])
+    return [found.gamma, *ends, round(found.growth_per_decade, 2), found.unbounded]

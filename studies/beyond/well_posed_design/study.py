@@ -6,13 +6,11 @@ from studies.beyond.well_posed_design import demands, gain_plane, literal
 from studies.study import Study
 
 STUDY = Study(
-    id="well-posed-design",
-    title="What determines the gains",
-    paper="",
-    summary=(
-        "Minimising the H-infinity gain of P1 and P3 alone has the infimum 1 and no gains. This study varies what a "
-        "well-posed design adds (friction bound, decay rate, pole limit, noise weight), shows how the gains follow, "
-        "and puts the printed gains on the map."
-    ),
-    parts=(*literal.TOPIC.parts, *demands.TOPIC.parts, *gain_plane.TOPIC.parts),
+    "well-posed-design",
+    "What determines the gains",
+    "",
+    "Minimising the H-infinity gain of P1 and P3 alone has the infimum 1 and no gains. This study varies what a well-posed "
+    "design adds (friction bound, decay rate, pole limit, noise weight), shows how the gains follow, and puts the printed "
+    "gains on the map.",
+    (*literal.TOPIC.parts, *demands.TOPIC.parts, *gain_plane.TOPIC.parts),
 )

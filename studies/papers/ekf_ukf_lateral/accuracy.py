@@ -47,11 +47,11 @@ def below_eight_percent(table: Sequence[Row] = TABLE_1) -> Finding:
         "ukf_better_means": sum(row.mean["ukf"] < row.mean["ekf"] for row in table),
         "ukf_better_deviations": sum(row.deviation["ukf"] < row.deviation["ekf"] for row in table), "rows": len(table),
     }  # fmt: skip
+    named = f" ({', '.join(above)})" if above else ""
     reading = (
-        f"{len(above)} of {len(table)} printed means of the unscented filter are at or above {LIMIT:g} %"
-        + (f" ({', '.join(above)})" if above else "")
-        + f"; their average is {computed['ukf_average_percent']:.2f} %, which is the only reading of 'globally' under which the "
-        f"statement could hold. The unscented filter is better in {computed['ukf_better_means']} means and "
+        f"{len(above)} of {len(table)} printed means of the unscented filter are at or above {LIMIT:g} %{named}; their average "
+        f"is {computed['ukf_average_percent']:.2f} %, which is the only reading of 'globally' under which the statement could "
+        f"hold. The unscented filter is better in {computed['ukf_better_means']} means and "
         f"{computed['ukf_better_deviations']} standard deviations of {len(table)}."
     )
     return Finding(computed, reproduced(not above), reading)
@@ -59,41 +59,24 @@ def below_eight_percent(table: Sequence[Row] = TABLE_1) -> Finding:
 
 @TOPIC.part("table-1", "Table I against the text", 0.2)
 def errors(scope: Scope) -> PartResult:
-    """Table I against the text."""
-    return PartResult(TOPIC.found(), [printed_table()], [error_figure()])
-
-
-def printed_table() -> Table:
-    """Table I, its averages, and the comparison with the text."""
+    """Table I, its averages, and the comparison with the text; means and deviations of both filters as bars."""
     columns = ("quantity", "max", "unit", "mean EKF [%]", "mean UKF [%]", "std EKF [%]", "std UKF [%]",
                f"UKF mean below {LIMIT:g} %", "UKF mean better", "UKF std better")  # fmt: skip
-
-    def line(quantity: str, largest: float | None, unit: str | None, errors: Sequence[float]) -> list[Cell]:
-        ekf, ukf, ekf_spread, ukf_spread = errors
-        return [quantity, largest, unit, *errors, ukf < LIMIT, ukf < ekf, ukf_spread < ekf_spread]
-
     values = [[*row.mean.values(), *row.deviation.values()] for row in TABLE_1]
-    rows = [line(row.quantity, row.largest, row.unit, found) for row, found in zip(TABLE_1, values, strict=True)]
-    rows.append(line("average", None, None, [round(float(value), 3) for value in np.mean(values, axis=0)]))
+    values.append([round(float(value), 3) for value in np.mean(values, axis=0)])
+    heads = [(row.quantity, row.largest, row.unit) for row in TABLE_1]
+    rows: list[list[Cell]] = [list(head) for head in (*heads, ("average", None, None))]
+    for row, (ekf, ukf, ekf_spread, ukf_spread) in zip(rows, values, strict=True):
+        row += [ekf, ukf, ekf_spread, ukf_spread, ukf < LIMIT, ukf < ekf, ukf_spread < ekf_spread]
     caption = (
         "Table I of P4 as printed (road test of a Peugeot 307, errors (13) in percent of the maximum), with its averages and "
         "whether the statement 'globally less than 8 %' holds."
     )
-    return Table("table-1", caption, columns, rows)
-
-
-def error_figure() -> Figure:
-    """Means and standard deviations of both filters, with the limit of the text."""
-    places = np.arange(len(TABLE_1))
-    names = {float(k): row.quantity.replace(" ", "\n", 1) for k, row in enumerate(TABLE_1)}
-
-    def bars(values: Sequence[dict[str, float]]) -> list[Mark]:
-        kinds = (("ekf", EXTENDED, "extended", -0.2), ("ukf", UNSCENTED, "unscented", 0.2))
-        return [
-            Bars(places + aside, [v[kind] for v in values], f"{label} Kalman filter", color, 0.38, numbers="%.4g")
-            for kind, color, label, aside in kinds
-        ]
-
+    bars: dict[str, list[Mark]] = {"mean": [], "deviation": []}
+    for what, marks in bars.items():
+        for kind, color, label, aside in (("ekf", EXTENDED, "extended", -0.2), ("ukf", UNSCENTED, "unscented", 0.2)):
+            places, found = np.arange(len(TABLE_1)) + aside, [getattr(row, what)[kind] for row in TABLE_1]
+            marks.append(Bars(places, found, f"{label} Kalman filter", color, 0.38, numbers="%.4g"))
     average = float(np.mean([row.mean["ukf"] for row in TABLE_1]))
     limits: list[Mark] = [
         Level(y=LIMIT, color=RED, width=1.2),
@@ -101,16 +84,16 @@ def error_figure() -> Figure:
         Level(y=average, color=UNSCENTED, dash="dotted", width=1.0),
         Words(-0.5, average - 0.75, f"unscented,\naverage {average:.2f} %", UNSCENTED, vertical="center"),
     ]
-    share, quantities = Axis("error, share of the largest value [%]", 0, 16.5), Axis(ticks=names)
-    panels = [
-        Panel([*bars([row.mean for row in TABLE_1]), *limits], quantities, share, "mean"),
-        Panel(bars([row.deviation for row in TABLE_1]), quantities, "", "standard deviation", legend="upper left"),
-    ]
-    return Figure(
+    share = Axis("error, share of the largest value [%]", 0, 16.5)
+    quantities = Axis(ticks={float(k): row.quantity.replace(" ", "\n", 1) for k, row in enumerate(TABLE_1)})
+    figure = Figure(
         "table-1",
         "Table I of P4 as printed: errors (13) of the two filters in the road test. Two of the five means of the unscented "
         "filter exceed the 8 % that the text calls a global bound; their average does not. The unscented filter is worse in "
         "the mean of F_y11 and in the deviation of F_y12.",
         "Grouped bars of the printed errors of both filters for four tire forces and sideslip, with a red line at 8 percent.",
-        panels, (9.2, 3.5), share_y="all",
+        [Panel([*bars["mean"], *limits], quantities, share, "mean"),
+         Panel(bars["deviation"], quantities, "", "standard deviation", legend="upper left")],
+        (9.2, 3.5), share_y="all",
     )  # fmt: skip
+    return PartResult(TOPIC.found(), [Table("table-1", caption, columns, rows)], [figure])

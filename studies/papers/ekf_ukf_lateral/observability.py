@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import get_args
 
 import numpy as np
 import sympy as sp
@@ -13,25 +14,15 @@ from analysis.observability.lie_structure import GenericRank, generic_rank
 from estimators.arrays import FloatArray
 from estimators.sideslip import FourWheelModel
 from studies.claim import Finding, reproduced
-from studies.papers.ekf_ukf_lateral.inputs import (
-    CAR,
-    LOADS,
-    PACKAGE,
-    STATE,
-    SUBSTITUTES_NOTE,
-    corrected_model,
-    in_numbers,
-    printed_output_model,
-    rear_difference_model,
-    substitute_car,
-)
+from studies.papers.ekf_ukf_lateral import inputs
+from studies.papers.ekf_ukf_lateral.inputs import CAR, LOADS, STATE, Outputs, in_numbers, model_with
 from studies.papers.topic import Topic
-from studies.plots import Axis, Dash, Figure, Level, Line, Map, Mark, Panel, Shade, Words, dots
+from studies.plots import DASHES, Axis, Figure, Level, Line, Map, Mark, Panel, Shade, Words, dots
 from studies.plots.colours import BLUE, GREEN, PURPLE, RED, TRUTH
 from studies.study import Cell, PartResult, Scope, Table
 from synthesis.models.nonlinear import NonlinearModel
 
-TOPIC = Topic(PACKAGE)
+TOPIC = Topic(inputs.PACKAGE)
 ORDER = 4  # Lie derivatives taken; the rank is complete after the first
 RANGES = {
     "yaw_rate": (-0.6, 0.6), "speed": (5.0, 40.0), "sideslip": (-0.05, 0.05),
@@ -56,15 +47,15 @@ def rank_of(model: NonlinearModel, straight: bool) -> GenericRank:
 
 
 @cache
-def rank_through_straight(rate: str = "0.1") -> int:
-    """The rank of the corrected model at zero steering that moves at `rate` in rad/s."""
-    return LieRankTest(in_numbers(corrected_model()), ORDER).at(STATE, {"steering_angle": [0, rate], **LOADS}).rank
+def rank_through_straight() -> int:
+    """The rank of the corrected model at zero steering that moves at 0.1 rad/s."""
+    return LieRankTest(in_numbers(model_with()), ORDER).at(STATE, {"steering_angle": [0, "0.1"], **LOADS}).rank
 
 
 def singular_at_standstill() -> bool:
     """Whether the model has no Taylor series at zero speed (sideslip rate divides by it)."""
     try:
-        LieRankTest(in_numbers(corrected_model()), 1).at({**STATE, "speed": 0}, {"steering_angle": "0.05", **LOADS})
+        LieRankTest(in_numbers(model_with()), 1).at({**STATE, "speed": 0}, {"steering_angle": "0.05", **LOADS})
     except AnalysisError:
         return True
     return False
@@ -85,12 +76,11 @@ def rear_split_is_hidden(model: NonlinearModel) -> bool:
 
 
 @TOPIC.claim("P4-obs")
-def rank_of_the_model(model: NonlinearModel | None = None) -> Finding:
-    """Rank while steering and at zero steering, of (11)-(12) with corrected y_4 (or of `model`), beside the printed y_4."""
-    chosen = model or corrected_model()
-    steering, straight = rank_of(chosen, False), rank_of(chosen, True)
-    printed = [rank_of(printed_output_model(), held).rank for held in (False, True)]
-    hidden = rear_split_is_hidden(chosen)
+def rank_of_the_model(outputs: Outputs = "y4 corrected") -> Finding:
+    """Rank while steering and at zero steering, of (11)-(12) with corrected y_4 (or other `outputs`), beside the printed y_4."""
+    steering, straight = (rank_of(model_with(outputs), held) for held in (False, True))
+    printed = [rank_of(model_with("y4 as printed"), held).rank for held in (False, True)]
+    hidden = rear_split_is_hidden(model_with(outputs))
     upper = 7 if hidden else 8
     computed = {
         "rank": steering.rank, "rank_upper_bound": upper, "rank_at_zero_steering": straight.rank,
@@ -117,11 +107,11 @@ def singular_values(steering: FloatArray, speed: FloatArray, printed: bool = Fal
     of y' is H A: eight rows, as many as states. `printed` takes y_4 of (12) as printed.
     """
     angle, v = np.broadcast_arrays(np.asarray(steering, float), np.asarray(speed, float))
-    x = np.broadcast_to([float(value) for value in STATE.values()], (*angle.shape, 8)).copy()
+    x = np.broadcast_to(inputs.STATES, (*angle.shape, 8)).copy()
     x[..., 1] = v
     step = 1e-4  # s; the Euler step is undone below, and T V / sigma stays below 1
-    loads = np.broadcast_to([float(value) for value in LOADS.values()], (*angle.shape, 4))
-    model = FourWheelModel.at(substitute_car(), step, angle, loads, 1e-3)
+    loads = np.broadcast_to(inputs.WHEEL_LOADS, (*angle.shape, 4))
+    model = FourWheelModel.at(CAR, step, angle, loads, 1e-3)
     A = (model.transition_jacobian(x) - np.eye(8)) / step
     H = model.measurement_jacobian(x)
     if printed:
@@ -133,12 +123,8 @@ def singular_values(steering: FloatArray, speed: FloatArray, printed: bool = Fal
 
 @TOPIC.part("observability", "Is the eight-state model observable?", 2.0)
 def observability(scope: Scope) -> PartResult:
-    """The claim, and a map of the rank."""
-    return PartResult(TOPIC.found(), (), [rank_figure(41 if scope.quick else 161)], [SUBSTITUTES_NOTE])
-
-
-def rank_figure(points: int = 161) -> Figure:
-    """Singular values over steering angle and speed."""
+    """The claim, and singular values over steering angle and speed."""
+    points = 41 if scope.quick else 161
     degrees, speed = np.linspace(-8.0, 8.0, points), np.geomspace(1.0, 40.0, max(points // 3, 12))
     angle, at_20 = np.radians(degrees), np.array(20.0)
     corrected, printed = (singular_values(angle, at_20, which) for which in (False, True))
@@ -156,14 +142,9 @@ def rank_figure(points: int = 161) -> Figure:
         Words(0.0, 2.0, "rank 6", "white", 9, offset=(6, 0)),
         Words(-7.5, 22.0, "rank 7", "white", 9),
     ]
-    steering = "steering angle of the front wheels [deg]"
-    size = Axis("singular value / largest [1]", FLOOR / 3, 1e-1, "log")
+    x, size = "steering angle of the front wheels [deg]", Axis("singular value / largest [1]", FLOOR / 3, 1e-1, "log")
     heights = Axis("speed [m/s]", scale="log", ticks=[1, 2, 5, 10, 20, 40])
-    panels = [
-        Panel(curves, steering, size, "at 20 m/s, steering held", legend="center right"),
-        Panel(colours, steering, heights, "7th singular value, y₄ corrected", grid=False),
-    ]
-    return Figure(
+    figure = Figure(
         "observability",
         "Observability of the eight-state model in a left bend (yaw rate 0.25 rad/s, forces 1.1 to 2.2 kN): singular values "
         "of the gradients of the four outputs and of their first derivatives, states and outputs in typical sizes. Left: the "
@@ -172,29 +153,29 @@ def rank_figure(points: int = 161) -> Figure:
         "and speed; speed moves it little, steering decides.",
         "Left: three curves over the steering angle; one stays at rounding level, two drop sharply at zero steering. Right: "
         "colour map over steering angle and speed with a dark vertical valley at zero steering.",
-        panels, (9.2, 3.9), widths=(1.15, 1.0),
+        [Panel(curves, x, size, "at 20 m/s, steering held", legend="center right"),
+         Panel(colours, x, heights, "7th singular value, y₄ corrected", grid=False)],
+        (9.2, 3.9), widths=(1.15, 1.0),
     )  # fmt: skip
+    return PartResult(TOPIC.found(), (), [figure], [inputs.SUBSTITUTES_NOTE])
 
 
-def motion_pair(
-    seconds: float = 1.5, front: bool = False, steered: bool = True
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def motion_pair(seconds: float = 1.5, front: bool = False, steered: bool = True) -> tuple[FloatArray, ...]:
     """Time (n,) in s, states (n, 2, 8) and outputs (n, 2, 4) of a slalom at 20 m/s from two starts.
 
     They differ in the rear left-right split (or, with `front`, the front one). Not `steered`: straight ahead with held
     steering, where the front split is hidden as well.
     """
-    car, left = substitute_car(), 3 if front else 5
-    x = np.zeros((2, 8))
+    left, x = 3 if front else 5, np.zeros((2, 8))
     x[:, 1], x[:, 7] = 20.0, 300.0
     x[1, left], x[1, left + 1] = SPLIT, -SPLIT
     time = np.arange(0.0, seconds, STEP)
     steering = np.radians(3.0) * np.sin(2.0 * np.pi * 0.7 * time) * steered
-    ahead, behind = CAR["front_axle_distance"], CAR["rear_axle_distance"]
-    loads = CAR["mass"] * 9.81 / (2 * (ahead + behind)) * np.tile([behind, behind, ahead, ahead], (2, 1))  # at rest
+    ahead, behind = CAR.front_axle_distance, CAR.rear_axle_distance
+    loads = CAR.mass * 9.81 / (2 * (ahead + behind)) * np.tile([behind, behind, ahead, ahead], (2, 1))  # at rest
     states, outputs = np.empty((len(time), 2, 8)), np.empty((len(time), 2, 4))
     for k, angle in enumerate(steering):
-        model = FourWheelModel.at(car, STEP, np.full(2, angle), loads, 1.0)
+        model = FourWheelModel.at(CAR, STEP, np.full(2, angle), loads, 1.0)
         states[k], outputs[k] = x, model.measurement(x)
         x = model.transition(x)
     return time, states, outputs
@@ -203,26 +184,13 @@ def motion_pair(
 @TOPIC.part("hidden-split", "What no sensor tells apart", 1.0, quick=False)
 def hidden_split(scope: Scope) -> PartResult:
     """What each variant of the model hides, and two motions that measure the same."""
-    note = (
-        "The paper sets lateral forces and sideslip to zero where it takes the model as unobservable. That is not needed: "
-        "what is hidden decays with V / sigma by itself, so a filter stays bounded."
-    )
-    return PartResult((), [rank_table()], [pair_figure()], [note])
-
-
-def rank_table() -> Table:
-    """Model, situation, rank and what is hidden."""
     rows: list[list[Cell]] = []
-    for name, model in (
-        ("y4 corrected", corrected_model()),
-        ("y4 as printed", printed_output_model()),
-        ("y4 corrected, F_y22 measured as well", rear_difference_model()),
-    ):
+    for outputs in get_args(Outputs):
         for situation, straight in (("steering", False), ("steering held at zero", True)):
-            found = rank_of(model, straight)
+            found = rank_of(model_with(outputs), straight)
             hidden = found.structure
             decays = LAG if hidden.proved and hidden.basis.cols else "-"
-            rows.append([name, situation, found.rank, "; ".join(hidden.describe()) or "nothing", decays])
+            rows.append([outputs, situation, found.rank, "; ".join(hidden.describe()) or "nothing", decays])
     at_rest = "no Taylor series: the sideslip rate divides by the speed" if singular_at_standstill() else "regular"
     rows[2:2] = [
         ["y4 corrected", "steering through zero at 0.1 rad/s", rank_through_straight(), "force_rl - force_rr", LAG],
@@ -234,40 +202,36 @@ def rank_table() -> Table:
         "part dies out by itself."
     )
     columns = ("output equation", "situation", "rank of 8 [1]", "hidden direction", "decays with")
-    return Table("ranks", caption, columns, rows)
-
-
-def pair_figure() -> Figure:
-    """Two starts with another rear split: forces differ, outputs do not."""
+    note = (
+        "The paper sets lateral forces and sideslip to zero where it takes the model as unobservable. That is not needed: "
+        "what is hidden decays with V / sigma by itself, so a filter stays bounded."
+    )
     time, states, outputs = motion_pair()
     forces, measured = [], []
-    styles: tuple[tuple[str, Dash, float], ...] = (("first", "solid", 2.6), ("second", "dashed", 1.4))
-    for k, (name, dash, width) in enumerate(styles):
-        for side, wheel, color in (("left", 5, BLUE), ("right", 6, RED)):
-            force = states[:, k, wheel] / 1e3
-            forces.append(Line(time, force, f"rear {side}, {name} motion", color, dash, width))
-        for what, values, color in (
-            ("yaw rate [0.1 rad/s]", 10.0 * outputs[:, k, 0], GREEN),
-            ("acceleration [m/s²]", outputs[:, k, 3], PURPLE),
-        ):
-            measured.append(Line(time, values, f"{what}, {name}", color, dash, width))
+    for k, (name, width) in enumerate((("first", 2.6), ("second", 1.4))):
+        yaw, lateral = 10.0 * outputs[:, k, 0], outputs[:, k, 3]
+        forces += [
+            Line(time, states[:, k, 5] / 1e3, f"rear left, {name} motion", BLUE, DASHES[k], width),
+            Line(time, states[:, k, 6] / 1e3, f"rear right, {name} motion", RED, DASHES[k], width),
+        ]
+        measured += [
+            Line(time, yaw, f"yaw rate [0.1 rad/s], {name}", GREEN, DASHES[k], width),
+            Line(time, lateral, f"acceleration [m/s²], {name}", PURPLE, DASHES[k], width),
+        ]
     split = np.abs(np.diff(states[:, :, 5], axis=1)[:, 0])
     seen = np.abs(np.diff(outputs, axis=1)[:, 0]).max(axis=1)
-    lag = np.exp(-time * 20.0 / CAR["rear_relaxation"])
+    lag = np.exp(-time * 20.0 / CAR.rear_relaxation)
     differences = [
         Line(time, np.maximum(split / split[0], FLOOR), "rear left force / 800 N", BLUE, width=2.6),
         Line(time, lag, "exp(−t V / σ₂)", TRUTH, "dashed", 1.0),
         dots(time, np.maximum(seen, FLOOR), "outputs, largest [SI units]", GREEN, ".", 2),
     ]
-    panels = [
-        Panel(lines, "time [s]", y, title, legend="upper right")
-        for lines, y, title in (
-            (forces, Axis("lateral force [kN]", high=3.4), "not measured: rear forces"),
-            (measured, Axis("measured [see legend]", high=9.5), "measured: the motions coincide"),
-            (differences, Axis("difference of the motions [see legend]", FLOOR / 3, 1e4, "log"), "their difference"),
-        )
-    ]
-    return Figure(
+    shown = (
+        (forces, Axis("lateral force [kN]", high=3.4), "not measured: rear forces"),
+        (measured, Axis("measured [see legend]", high=9.5), "measured: the motions coincide"),
+        (differences, Axis("difference of the motions [see legend]", FLOOR / 3, 1e4, "log"), "their difference"),
+    )
+    figure = Figure(
         "twins",
         "Two motions of the eight-state model in the same slalom (20 m/s, ±3° at 0.7 Hz) that start with the same rear axle "
         "force and another split of it between left and right. Left: the rear forces differ. Middle: yaw rate and lateral "
@@ -275,5 +239,6 @@ def pair_figure() -> Figure:
         "outputs agree to rounding. So the rear split cannot be observed; what filters report of it is the tire model's.",
         "Three panels over time: rear forces of two motions that start apart and merge; outputs that coincide; the "
         "difference on a logarithmic scale, a straight line for the force and rounding noise for the outputs.",
-        panels, (9.6, 3.7),
+        [Panel(lines, "time [s]", y, title, legend="upper right") for lines, y, title in shown], (9.6, 3.7),
     )  # fmt: skip
+    return PartResult((), [Table("ranks", caption, columns, rows)], [figure], [note])

@@ -7,14 +7,7 @@ import sympy as sp
 
 from estimators.sideslip import FourWheelModel
 from studies.claim import Finding
-from studies.papers.ekf_ukf_lateral.inputs import (
-    LOADS,
-    PACKAGE,
-    STATE,
-    corrected_model,
-    printed_output_model,
-    substitute_car,
-)
+from studies.papers.ekf_ukf_lateral.inputs import CAR, PACKAGE, STATES, WHEEL_LOADS, Outputs, model_with
 from studies.papers.topic import Topic
 from studies.papers.verdicts import erratum
 from studies.study import Cell, PartResult, Scope, Table
@@ -34,10 +27,9 @@ def acceleration_mismatch(model: NonlinearModel) -> sp.Expr:
 
 
 @TOPIC.claim("P4-y4")
-def lateral_output(printed: NonlinearModel | None = None) -> Finding:
+def lateral_output(printed: Outputs = "y4 as printed") -> Finding:
     """Both forms of y_4 against the acceleration that the states of (11) have."""
-    wrong = acceleration_mismatch(printed or printed_output_model())
-    right = acceleration_mismatch(corrected_model())
+    wrong, right = (acceleration_mismatch(model_with(outputs)) for outputs in (printed, "y4 corrected"))
     computed = {"printed_minus_true": str(wrong), "corrected_minus_true": str(right), "term": "x8 sin(u1)"}
     reading = (
         "By the force balance (1) the term is F_x1 sin(delta) = x_8 sin(u_1). With it y_4 equals the acceleration of the "
@@ -48,27 +40,21 @@ def lateral_output(printed: NonlinearModel | None = None) -> Finding:
 
 @TOPIC.part("output-equation", "The measured lateral acceleration", 1.5)
 def output_equation(scope: Scope) -> PartResult:
-    """The last output of (12)."""
-    return PartResult(TOPIC.found(), [output_table()])
-
-
-def output_table() -> Table:
     """Lateral acceleration by both forms of y_4 in the same bend, for several drive forces and steering angles."""
-    car, state = substitute_car(), np.array([float(value) for value in STATE.values()])
-    loads = np.array([float(value) for value in LOADS.values()])
+    state = STATES.copy()
     rows: list[list[Cell]] = []
     for degrees in (1.0, 3.0, 8.0):
         for drive in (-3000.0, 700.0, 3000.0):
             angle, state[7] = np.radians(degrees), drive
-            right = FourWheelModel.at(car, 0.01, np.array(angle), loads, 1.0).measurement(state)[3]
-            printed = right + (state[5] - drive) * np.sin(angle) / car.mass
+            right = FourWheelModel.at(CAR, 0.01, np.array(angle), WHEEL_LOADS, 1.0).measurement(state)[3]
+            printed = right + (state[5] - drive) * np.sin(angle) / CAR.mass
             rows.append([degrees, drive, *(round(float(value), 4) for value in (right, printed, printed - right))])
-    caption = (
+    table = Table(
+        "output-equation",
         "What the misprint in y4 of (12) costs: lateral acceleration of the same bend (front forces 1.4 and 2.2 kN, rear 1.1 "
         "and 1.7 kN) with the corrected term x8 sin(u1) and with the printed x6 sin(u1). The error is (F_y21 - F_x1) "
-        "sin(delta) / m."
-    )
-    columns = (
-        "steering angle [deg]", "front drive force [N]", "a_y corrected [m/s^2]", "a_y as printed [m/s^2]", "error [m/s^2]",
+        "sin(delta) / m.",
+        ("steering angle [deg]", "front drive force [N]", "a_y corrected [m/s^2]", "a_y as printed [m/s^2]", "error [m/s^2]"),
+        rows,
     )  # fmt: skip
-    return Table("output-equation", caption, columns, rows)
+    return PartResult(TOPIC.found(), [table])

@@ -23,7 +23,7 @@ from synthesis.models.discretise import zero_order_hold
 TOPIC = Topic(PACKAGE)
 SPEED = 20.0  # m/s
 LOADS = {"load_fl": 4000.0, "load_fr": 4000.0, "load_rl": 3100.0, "load_rr": 3100.0}  # linear tires: of no consequence
-STIFFNESS = CAR["front_stiffness"]  # N/rad, one tire
+STIFFNESS = CAR.front_stiffness  # N/rad, one tire
 
 
 @cache
@@ -63,10 +63,9 @@ def tire_sign(printed_sign: int = -1) -> Finding:
 
 def single_track(force_sign: int, speed: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """A (..., 2, 2) and b (..., 2, 1) of sideslip and yaw rate under steering: the linear single track in closed form."""
-    front, rear = 2.0 * force_sign * CAR["front_stiffness"], 2.0 * force_sign * CAR["rear_stiffness"]
-    a, b, m, inertia = (CAR[name] for name in ("front_axle_distance", "rear_axle_distance", "mass", "yaw_inertia"))
-    v = np.asarray(speed, float)
-    moment = a * front - b * rear
+    front, rear = 2.0 * force_sign * CAR.front_stiffness, 2.0 * force_sign * CAR.rear_stiffness
+    a, b, m, inertia = CAR.front_axle_distance, CAR.rear_axle_distance, CAR.mass, CAR.yaw_inertia
+    v, moment = np.asarray(speed, float), a * front - b * rear
     A, B = np.empty((*v.shape, 2, 2)), np.empty((*v.shape, 2, 1))
     A[..., 0, 0], A[..., 0, 1] = -(front + rear) / (m * v), -1.0 - moment / (m * v**2)
     A[..., 1, 0], A[..., 1, 1] = -moment / inertia, -(a**2 * front + b**2 * rear) / (inertia * v)
@@ -79,27 +78,10 @@ def single_track_poles(force_sign: int, speed: ArrayLike) -> FloatArray:
     return np.sort(np.linalg.eigvals(single_track(force_sign, speed)[0]).real, axis=-1)
 
 
-def step_response(force_sign: int, steering: float, seconds: float = 2.0) -> tuple[FloatArray, FloatArray]:
-    """Time (n,) [s] and yaw rate (n,) [rad/s] of the single track at `SPEED` after a step of `steering` [rad]."""
-    step = 0.01
-    Phi, Gamma = zero_order_hold(*single_track(force_sign, SPEED), step)
-    time = np.arange(0.0, seconds, step)
-    x, yaw = np.zeros(2), np.empty(len(time))
-    for k in range(len(time)):
-        yaw[k] = x[1]
-        x = Phi @ x + Gamma[:, 0] * steering
-    return time, yaw
-
-
-@TOPIC.part("tire", "The Dugoff tire and the sign of its force")
-def tire(scope: Scope) -> PartResult:
-    """The Dugoff tire and its sign."""
-    return PartResult(TOPIC.found(), (), [dugoff_figure(), sign_figure()], [SUBSTITUTES_NOTE])
-
-
 def dugoff_figure() -> Figure:
     """Fig. 1 of P4: force over slip angle, for loads and for frictions."""
     slip = np.radians(np.linspace(-20.0, 20.0, 801))
+    degrees = np.degrees(slip)
     panels: list[Panel] = []
     for title, cases in (
         ("dry road (μ = 1), three loads", [(1.0, load, f"$F_z$ = {load / 1e3:g} kN") for load in (2e3, 4e3, 6e3)]),
@@ -107,16 +89,15 @@ def dugoff_figure() -> Figure:
     ):
         marks: list[Mark] = []
         for (friction, load, label), color in zip(cases, (BLUE, ORANGE, GREEN), strict=True):
-            limit = friction * load / 1e3  # kN
-            force = dugoff_force(STIFFNESS, np.tan(slip), np.array(friction * load / (2.0 * STIFFNESS)))
-            knee = np.degrees(np.arctan(friction * load / (2.0 * STIFFNESS)))
+            # kN, and tan of the slip angle at λ = 1
+            limit, knee = friction * load / 1e3, friction * load / (2.0 * STIFFNESS)
+            at = np.degrees(np.arctan(knee))
             marks += [
-                Line(np.degrees(slip), force / 1e3, label, color, width=1.8),
+                Line(degrees, dugoff_force(STIFFNESS, np.tan(slip), np.array(knee)) / 1e3, label, color, width=1.8),
                 Level(y=limit, color=color, dash="dotted"),
-                dots([-knee, knee], [-0.5 * limit, 0.5 * limit], color=color),
+                dots([-at, at], [-0.5 * limit, 0.5 * limit], color=color),
             ]
-        linear = STIFFNESS * np.tan(slip) / 1e3
-        marks.append(Line(np.degrees(slip), linear, r"$C_α\,\tan α$", TRUTH, "dashed", 0.9))
+        marks.append(Line(degrees, STIFFNESS * np.tan(slip) / 1e3, r"$C_α\,\tan α$", TRUTH, "dashed", 0.9))
         force_axis = Axis("lateral force [kN]" if not panels else "", -6.6, 6.6)
         panels.append(Panel(marks, "slip angle α [deg]", force_axis, title, legend="lower right"))
     return Figure(
@@ -131,28 +112,32 @@ def dugoff_figure() -> Figure:
     )  # fmt: skip
 
 
-def sign_figure() -> Figure:
-    """Poles over speed and the response to a steering step, for both signs."""
-    speed = np.linspace(5.0, 40.0, 141)
+@TOPIC.part("tire", "The Dugoff tire and the sign of its force")
+def tire(scope: Scope) -> PartResult:
+    """The Dugoff tire; poles over speed and the response to a steering step, for both signs of its force."""
+    speed, step = np.linspace(5.0, 40.0, 141), 0.01  # m/s, s
+    time = np.arange(0.0, 2.0, step)
     left: list[Mark] = [
         ZERO, Level(x=SPEED, color="0.5", dash="dotted"), Words(SPEED + 0.4, 15.0, f"{SPEED:g} m/s", "0.35"),
     ]  # fmt: skip
     right: list[Mark] = [ZERO]
     for sign, color, label in ((1, BLUE, "plus (corrected)"), (-1, RED, "minus (as printed)")):
         left.append(Line(speed, single_track_poles(sign, speed), label, color, width=1.6))
-        time, yaw = step_response(sign, np.radians(1.0))
+        Phi, Gamma = zero_order_hold(*single_track(sign, SPEED), step)
+        x, yaw = np.zeros(2), np.empty(len(time))
+        for k in range(len(time)):
+            yaw[k], x = x[1], Phi @ x + Gamma[:, 0] * np.radians(1.0)
         right.append(Line(time, np.degrees(yaw), label, color, width=1.6))
     poles, turn = Axis("real part of the poles [1/s]", -20, 20), Axis("yaw rate [deg/s]", -12.0, 12.0)
-    panels = [
-        Panel(left, "speed [m/s]", poles, legend="lower right"),
-        Panel(right, "time [s]", turn, f"step of 1° to the left at {SPEED:g} m/s", legend="upper right"),
-    ]
-    return Figure(
+    figure = Figure(
         "force-sign",
         "What the sign in (3) decides, on the linear single track of the same car (P5 values). Left: with the printed minus "
         "both poles lie in the right half plane at every speed, with the plus in the left one. Right: after a steering step "
         "to the left the corrected car turns left and settles; with the printed sign it turns right and diverges.",
         "Left: poles over speed, blue below zero, red above. Right: yaw rate after a step, blue settles at a positive value, "
         "red runs away to negative values.",
-        panels, (9.2, 3.5),
+        [Panel(left, "speed [m/s]", poles, legend="lower right"),
+         Panel(right, "time [s]", turn, f"step of 1° to the left at {SPEED:g} m/s", legend="upper right")],
+        (9.2, 3.5),
     )  # fmt: skip
+    return PartResult(TOPIC.found(), (), [dugoff_figure(), figure], [SUBSTITUTES_NOTE])
