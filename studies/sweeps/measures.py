@@ -17,9 +17,9 @@ from analysis.drops.modes import DropModes, DropPolicy
 from analysis.norms.hinf import hinf_norm
 from analysis.norms.planar import planar_hinf_norm
 from estimators.arrays import FloatArray
-from estimators.errors import unknown
 from studies.sweeps.observer import Batch, Observer
 from synthesis.errors import SpecError
+from synthesis.models.selection import selection
 from synthesis.toml_file import StrictTable
 
 
@@ -171,17 +171,7 @@ class HinfNorm(MeasureSpec):
 
     def channel(self, observer: Observer) -> tuple[FloatArray, FloatArray]:
         """d (nd, k) feeding the disturbances and z (j, nx) reading the state errors. Raises SpecError."""
-        plant, found = observer.plant, []
-        for what, names, signals in (
-            ("disturbance", self.disturbances, plant.disturbances),
-            ("state", self.errors, plant.states),
-        ):
-            known = [s.name for s in signals]
-            for name in names:
-                if name not in known:
-                    raise SpecError(f"subject '{observer.name}': {unknown(what, name, known)}")
-            found.append(np.eye(len(known))[[known.index(name) for name in names]])
-        return found[0].T, found[1]
+        return selection(observer.plant, self.disturbances, self.errors, f"subject '{observer.name}'", SpecError)
 
 
 class SampledRadius(MeasureSpec):

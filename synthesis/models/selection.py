@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
-from synthesis.models.lpv import LpvModel
+from synthesis.models.param import Signal
+
+
+class Named(Protocol):
+    """What has disturbances and states by name."""
+
+    @property
+    def disturbances(self) -> Sequence[Signal]: ...  # noqa: D102
+    @property
+    def states(self) -> Sequence[Signal]: ...  # noqa: D102
 
 
 def selection(
-    model: LpvModel, disturbances: Sequence[str], errors: Sequence[str], owner: str, error: type[Exception]
+    model: Named, disturbances: Sequence[str], errors: Sequence[str], owner: str, error: type[Exception]
 ) -> tuple[FloatArray, FloatArray]:
     """d (nd, k) that feeds the named disturbances and z (j, nx) that reads the named state errors, in that order.
 
