@@ -197,7 +197,7 @@ def histories(name: str, run: FourWheelRun) -> list[Figure]:
 
     slips = {who: np.degrees(run.sideslip[who]) for who in (STEADY, PIPELINE, EKF, UKF)}
     used, seen = used_friction(run.true("force_y"), run.true("force_z")), used_friction(run.forces[UKF], run.loads)
-    limits = [Level(y, label=name, color=colours.LIMIT, dash="dotted") for y, name in ((limit, "limit"), (-limit, ""))]
+    limits = [Level(y, label=text, color=colours.LIMIT, dash="dotted") for y, text in ((limit, "limit"), (-limit, ""))]
     return [
         history(f"{name}-forces",
             f"Figs. 6 and 7 of P4 {on}: lateral forces of the four wheels, positive to the left. {BANDS}",
