@@ -86,7 +86,7 @@ class EstimatorNrms(MeasureSpec):
 
         if self.drive is not None:
             return read_recorded(Path(self.drive), [Path(name) for name in self.logs or ()])
-        from studies.trials.sensors import TEST_CAR
+        from studies.trials.estimation import TEST_CAR
         from studies.truth import draw, simulate_manoeuvres, write_drive
 
         truth = simulate_manoeuvres([self.asked], [self.asked.truth_vehicle(Path(str(self.manoeuvre)).parent)])
@@ -103,7 +103,7 @@ class EstimatorNrms(MeasureSpec):
                 files += sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
             digest = hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
             return {"id": self.id, "drive": files[0].name, "sha256": digest}
-        from studies.trials.sensors import TEST_CAR
+        from studies.trials.estimation import TEST_CAR
 
         car = asdict(self.asked.truth_vehicle(Path(str(self.manoeuvre)).parent))
         digest = hashlib.sha256(canonical([self.asked.model_dump(mode="json"), car, asdict(TEST_CAR)])).hexdigest()

@@ -13,9 +13,9 @@ from estimators.pipeline import EstimationPipeline
 from estimators.pipeline.result import PipelineStep
 from estimators.vehicle import VehicleParameters
 from studies.study import Scope
-from studies.trials.sensors import TEST_CAR
 from studies.trials.simulations import simulated_truth
 from studies.truth import Measured, Sensors, Truth, draw
+from studies.truth.sensors import Channel
 from synthesis.errors import SpecError
 
 QUICK_SECONDS = 4.0  # of each manoeuvre go through the pipeline when quick
@@ -25,6 +25,12 @@ Reading = Callable[[PipelineStep], FloatArray]
 """Takes one signal out of a step."""
 
 WHEELS, INTEGRATED = "mean wheel speed", "integrated acceleration"
+TEST_CAR = Sensors(
+    wheel_speed=Channel(noise=0.05), acceleration=Channel(noise=0.05, bias=0.15, scale=0.01),
+    rate=Channel(noise=0.002, bias=0.002, scale=0.01), steer=Channel(noise=0.002), torque=Channel(scale=0.02))  # fmt: skip
+"""Those of every trial, for which the project's accuracy targets are stated: white noise of 0.05 rad/s, 0.05 m/s^2, 0.002 rad/s,
+0.002 rad; per run, standard deviations: bias 0.15 m/s^2 and 0.002 rad/s, scale 1 % of the inertial sensors and 2 % of each
+wheel's torque."""
 
 
 def measured_runs(
@@ -32,11 +38,6 @@ def measured_runs(
 ) -> Measured:
     """Sensor draws (S, B) of the named manoeuvres on one kind of tire; when quick, of the first ``seconds`` of each."""
     return draw(simulated_truth(tuple(names), tire, scope, seconds), TEST_CAR, range(scope.seeds), sample_time)
-
-
-def measured(truth: Truth, seeds: Sequence[int], sensors: Sensors) -> Measured:
-    """Sensor draws of every run of ``truth``, batch (S, B)."""
-    return draw(truth, sensors, seeds)
 
 
 def assumed_car(drawn: Measured) -> VehicleParameters:

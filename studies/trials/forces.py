@@ -24,8 +24,7 @@ AXLES = ("front axle", "rear axle")
 SHOWN = (("F_x", "force_x", CORNERS), ("F_y", "axle_force_y", AXLES), ("F_z", "force_z", CORNERS))
 READINGS: dict[str, Reading] = {
     "own": lambda step: step.wheels.force, "force_x": lambda step: step.force_x,
-    "axle_force_y": lambda step: step.axle_force_y, "force_z": lambda step: step.force_z,
-}  # fmt: skip
+    "axle_force_y": lambda step: step.axle_force_y, "force_z": lambda step: step.force_z}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -70,8 +69,7 @@ def force_part(
     caption = (
         f"Force errors on the truth vehicle, NRMS in % of the peak as P1 (46), where the force exceeds {LEAST:g} N: mean over "
         f"{scope.seeds} sensor draws with its 95 % confidence interval, and the worst draw. Quasi-static: the load at rest. "
-        "The printed values come from a test car or another simulator."
-    )  # fmt: skip
+        "The printed values come from a test car or another simulator.")  # fmt: skip
     columns = ("manoeuvre", "force", "place", "estimate", "peak [N]", "printed NRMS [%]", "NRMS [%]", "worst run [%]")
     drawings = [_history(name, truth, row, first) for row in rows]
     return PartResult((), [Table(f"{name}-errors", caption, columns, table)], drawings, measures=measures)
@@ -96,9 +94,7 @@ def _history(name: str, truth: Truth, row: ForceTest, estimates: Mapping[str, Fl
                 Line(time, 1e-3 * estimates[key][0, run, samples, k], where, color, width=0.8),
             ]
         panels.append(Panel(marks, y=f"${signal}$ [kN]", legend="best", columns=4))
-    return history(
-        f"{name}-{row.manoeuvre}",
+    return history(f"{name}-{row.manoeuvre}",
         f"{row.title}: forces of the truth (wide) and of the pipeline (thin), first sensor draw.",
         f"Time histories of longitudinal, lateral and vertical tire forces with their estimates for {row.title}.",
-        panels, (8.0, 5.6),
-    )  # fmt: skip
+        panels, (8.0, 5.6))  # fmt: skip

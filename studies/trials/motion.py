@@ -19,8 +19,7 @@ from studies.truth import Truth, load_manoeuvre
 
 COLUMNS = (
     "manoeuvre", "shown in", "the paper gives", "V_x, least [m/s]", "V_x, greatest [m/s]", "|a_x|, greatest [m/s^2]",
-    "|a_y|, greatest [m/s^2]", "|yaw rate|, greatest [deg/s]", "steering at the wheels, greatest [deg]",
-)  # fmt: skip
+    "|a_y|, greatest [m/s^2]", "|yaw rate|, greatest [deg/s]", "steering at the wheels, greatest [deg]")  # fmt: skip
 REAR = (("force_x", 1e-3, "$F_x$ [kN]"), ("torque", 1.0, "torque [N m]"), ("wheel_speed", 1.0, "wheel speed [rad/s]"))
 
 
@@ -50,12 +49,10 @@ def extremes(name: str, truth: Truth, rows: Sequence[MotionTest]) -> Table:
         extreme = (vx.min(), vx.max(), *(np.abs(value).max() for value in others))
         cells = (round(float(value), 2) for value in extreme)
         table.append([row.title, manoeuvre.where, "; ".join(manoeuvre.given), *cells])
-    return Table(
-        name,
+    return Table(name,
         f"Extremes of the truth's motion on {truth.tires[0]} tires: accelerations at the centre of gravity along the road, yaw "
         "rate and steering of the front left wheel, beside what the paper gives of the test. What it does not give is ours.",
-        COLUMNS, table,
-    )  # fmt: skip
+        COLUMNS, table)  # fmt: skip
 
 
 def _signals(truth: Truth, manoeuvre: str) -> tuple[FloatArray, ...]:
@@ -74,36 +71,30 @@ def motion_drawings(name: str, truth: Truth, row: MotionTest) -> list[Figure]:
     panels = [Panel([Line(time, value, color=color, width=1.2)], y=label) for value, label, color in alone]
     pull = [Line(time, ax, "$a_x$", BLUE, width=1.2), Line(time, ay, "$a_y$", RED, "dashed", 1.2)]
     panels.insert(1, Panel(pull, y="[m/s$^2$]", legend="best", columns=2))
-    found = [history(
-        f"{name}-{row.manoeuvre}",
+    found = [history(f"{name}-{row.manoeuvre}",
         f"{row.title}: speed, accelerations at the centre of gravity along the road, yaw rate, and steering of the front left "
         f"wheel of {on}.",
         f"Four panels over time for {row.title}: speed, longitudinal and lateral acceleration, yaw rate, steering angle.",
-        panels, (8.0, 5.2),
-    )]  # fmt: skip
+        panels, (8.0, 5.2))]  # fmt: skip
     if row.course:
         path = [Line(truth["x"][k, samples], truth["y"][k, samples], color=BLUE, width=1.3), dots(0.0, 0.0, color=BLUE)]
         diagram = [Line(ay / GRAVITY, ax / GRAVITY, color=RED, width=0.9)]
-        found.append(Figure(
-            f"{name}-course-{row.manoeuvre}",
+        found.append(Figure(f"{name}-course-{row.manoeuvre}",
             f"{row.title}: path of the centre of gravity from its start (dot), and longitudinal over lateral acceleration of "
             f"{on}.",
             f"Left: the path of the car in the plane for {row.title}. Right: its accelerations in a g-g diagram.",
             [Panel(path, Axis("x [m]", margin=0.01), "y [m]", equal=True),
              Panel(diagram, Axis("$a_y$ [g]", margin=0.01), "$a_x$ [g]", equal=True)],
-            (8.0, 3.6),
-        ))  # fmt: skip
+            (8.0, 3.6)))  # fmt: skip
     if row.rear:
         panels = []
         for signal, scale, label in REAR:
             left, right = (scale * truth[signal][k, samples, corner] for corner in (2, 3))
             marks = [Line(time, left, CORNERS[2], BLUE, width=1.0), Line(time, right, CORNERS[3], RED, "dashed", 1.0)]
             panels.append(Panel(marks, y=label, legend="" if panels else "best", columns=2))
-        found.append(history(
-            f"{name}-rear-{row.manoeuvre}",
+        found.append(history(f"{name}-rear-{row.manoeuvre}",
             f"{row.title}: longitudinal force, torque and speed of the rear wheels of {on}; torques are those that act at the "
             "wheels, drive less brakes.",
             f"Three panels over time for {row.title}: force, torque and speed of the rear left and the rear right wheel.",
-            panels, (8.0, 4.6),
-        ))  # fmt: skip
+            panels, (8.0, 4.6)))  # fmt: skip
     return found

@@ -25,8 +25,7 @@ from synthesis.models.parameter_set import load_parameter_set
 OWN, FUSION = "paper's observers", "fusion"
 LOOKS = {
     OWN: ("s", colours.OWN_OBSERVERS), FUSION: ("o", colours.FUSION),
-    WHEELS: ("^", colours.MEAN_WHEEL_SPEED), INTEGRATED: ("v", colours.INTEGRATED_ACCELERATION),
-}  # fmt: skip
+    WHEELS: ("^", colours.MEAN_WHEEL_SPEED), INTEGRATED: ("v", colours.INTEGRATED_ACCELERATION)}  # fmt: skip
 COMPLIANCE_SPREAD = 0.2  # relative, of the fusion's slip compliances: as well as a fit to logged signals knows them
 USED = 0.6  # largest F_y/F_z of the fit of the side slip curve: what a car shows on a dry road before it slides
 
@@ -76,12 +75,10 @@ def corner_observers(parameters: str) -> Parts:
 
 READINGS: dict[str, Reading] = {
     "vx": lambda step: step.vx, "own_vx": lambda step: step.corners.vx,
-    "vy": lambda step: step.vy, "own_vy": lambda step: step.corners.vy,
-}  # fmt: skip
+    "vy": lambda step: step.vy, "own_vy": lambda step: step.corners.vy}  # fmt: skip
 COLUMNS = (
     "manoeuvre", "signal", "peak [m/s]", "printed peak [m/s]", "printed NRMS [%]", "paper's observers NRMS [%]",
-    "fusion NRMS [%]", "fusion, worst run [%]", "mean wheel speed NRMS [%]", "integrated acceleration NRMS [%]",
-)  # fmt: skip
+    "fusion NRMS [%]", "fusion, worst run [%]", "mean wheel speed NRMS [%]", "integrated acceleration NRMS [%]")  # fmt: skip
 
 
 def velocity_part(name: str, rows: Sequence[VelocityTest], parts: Parts, scope: Scope, tire: str = LUGRE) -> PartResult:
@@ -119,13 +116,11 @@ def _dots(name: str, rows: Sequence[VelocityTest], found: Mapping[str, Sequence[
             marks.append(dots([getattr(rows[k], signal) for k in at], at, "printed", colours.TRUTH, "|", 14.0))
         x = Axis(f"$V_{signal[1]}$ NRMS [% of the peak]", scale="log")
         panels.append(Panel(marks, x, row_axis([row.title for row in rows])))
-    return Figure(
-        name,
+    return Figure(name,
         "Velocity errors by manoeuvre, mean over the sensor draws with 95 % interval; bars: printed values of the paper's "
         "own car.",
         "Dot plot of normalised velocity errors of the paper's observers, the fusion and two baselines for every manoeuvre.",
-        panels, size=(8.0, 1.6 + 0.45 * len(rows)), legend="below", columns=3, share_y="row",
-    )  # fmt: skip
+        panels, size=(8.0, 1.6 + 0.45 * len(rows)), legend="below", columns=3, share_y="row")  # fmt: skip
 
 
 def _history(name: str, truth: Truth, row: VelocityTest, estimates: Mapping[str, FloatArray]) -> Figure:
@@ -144,9 +139,7 @@ def _history(name: str, truth: Truth, row: VelocityTest, estimates: Mapping[str,
         Line(time, 100.0 * truth["slip"][run, samples, k], corner, color, width=0.8)
         for k, (corner, color) in enumerate(zip(CORNERS, colours.CORNERS, strict=True))
     ]
-    return history(
-        f"{name}-{row.manoeuvre}",
+    return history(f"{name}-{row.manoeuvre}",
         f"{row.title}: velocities at the centre of gravity and wheel slip, first sensor draw.",
         f"Time histories of longitudinal and lateral velocity with estimates, and of the four wheel slips, for {row.title}.",
-        [*panels, Panel(slips, y="wheel slip [%]", legend="best", columns=4)], (8.0, 5.0),
-    )  # fmt: skip
+        [*panels, Panel(slips, y="wheel slip [%]", legend="best", columns=4)], (8.0, 5.0))  # fmt: skip

@@ -26,7 +26,7 @@ from studies.sweeps.engine import run_sweep
 from studies.sweeps.measures import Measure
 from studies.sweeps.observer import Batch, Observer
 from studies.sweeps.spec import MEASURES, ObserverSpec, build_sweep
-from studies.trials.sensors import TEST_CAR
+from studies.trials.estimation import TEST_CAR
 from studies.truth import draw, load_manoeuvre, simulate_manoeuvres, write_drive
 from synthesis.errors import SpecError
 from synthesis.toml_file import read_table

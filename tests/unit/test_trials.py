@@ -12,11 +12,11 @@ from studies.plots import ErrorBars, Panel, Shade
 from studies.registry import MODULES, load_study
 from studies.study import PartResult, Scope
 from studies.trials.accuracy import Spread, known_spread, nrms, sample_spreads, spread
-from studies.trials.estimation import assumed_car, baselines, measured, run_of, run_pipeline
+from studies.trials.estimation import assumed_car, baselines, run_of, run_pipeline
 from studies.trials.histories import backgrounds, dot_heights, error_dots, history
 from studies.trials.simulations import LUGRE, MAGIC_FORMULA, SIMULATIONS, simulated_truth, trial_part
 from studies.trials.velocities import USED, side_slip_curve
-from studies.truth import PERFECT, Truth, load_manoeuvre, simulate_manoeuvres
+from studies.truth import PERFECT, Truth, draw, load_manoeuvre, simulate_manoeuvres
 from studies.truth.record import read_truth, write_truth
 from synthesis.errors import SpecError
 
@@ -103,7 +103,7 @@ def test_a_part_gets_the_tire_that_it_needs() -> None:
 def test_perfect_sensors_leave_small_errors_and_biased_ones_do_not(truth: Truth) -> None:
     row, samples = run_of(truth, "p1-lane-change-dry")
     true = truth["vx"][row, samples]
-    drawn = measured(truth, range(2), PERFECT)
+    drawn = draw(truth, PERFECT, range(2))
     exact = run_pipeline(drawn, {"vx": lambda step: step.vx})["vx"][:, row, samples]
     assert nrms(exact, true).max() < 0.5
     halved = replace(drawn, signals=drawn.signals | {"wheel_speed": 0.5 * drawn.signals["wheel_speed"]})
@@ -112,7 +112,7 @@ def test_perfect_sensors_leave_small_errors_and_biased_ones_do_not(truth: Truth)
 
 
 def test_baselines_follow_their_formulas(truth: Truth) -> None:
-    drawn = measured(truth, range(1), PERFECT)
+    drawn = draw(truth, PERFECT, range(1))
     found = baselines(drawn)
     radius, ax, time = assumed_car(drawn).radius, drawn.signals["ax"], drawn.sample_time
     k = 100
@@ -126,7 +126,7 @@ def test_runs_of_different_cars_are_not_played_together() -> None:
         [load_manoeuvre(n).model_copy(update={"duration": 0.05}) for n in ("p1-launch-split", "p4-bends-dry")]
     )
     with pytest.raises(SpecError, match="p1-launch-split, p4-bends-dry drive different cars"):
-        assumed_car(measured(both, range(1), PERFECT))
+        assumed_car(draw(both, PERFECT, range(1)))
     with pytest.raises(SpecError, match="manoeuvre 'p9' was not driven"):
         run_of(both, "p9")
 

@@ -16,10 +16,9 @@ from studies.plots import Axis, ErrorBars, Figure, Line, Mark, Panel
 from studies.plots.colours import FUSION, INTEGRATED_ACCELERATION, MEAN_WHEEL_SPEED, OWN_OBSERVERS, ROADS
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import Spread, known_spread, nrms
-from studies.trials.estimation import Reading, baselines, measured, run_of, run_pipeline
-from studies.trials.sensors import TEST_CAR
+from studies.trials.estimation import TEST_CAR, Reading, baselines, run_of, run_pipeline
 from studies.trials.velocities import corner_observers
-from studies.truth import Truth, load_manoeuvre, simulate_manoeuvres
+from studies.truth import Truth, draw, load_manoeuvre, simulate_manoeuvres
 from studies.truth.road import Road
 from synthesis.models.parameter_set import load_parameter_set
 
@@ -69,7 +68,7 @@ class Launch:
 def launches(scope: Scope) -> list[Launch]:
     """The estimates on all roads, computed in one batch."""
     truth = launched(scope.quick)
-    drawn = measured(truth, range(scope.seeds), TEST_CAR)
+    drawn = draw(truth, TEST_CAR, range(scope.seeds))
     estimates = run_pipeline(drawn, READINGS, corner_observers("corner-estimation"))
     velocities = estimates | baselines(drawn)
     tire, car = load_parameter_set("corner-estimation").tire["longitudinal"], truth.vehicles[0]

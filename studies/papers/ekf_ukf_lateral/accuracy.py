@@ -45,16 +45,14 @@ def below_eight_percent(table: Sequence[Row] = TABLE_1) -> Finding:
         "ukf_means_percent": ukf, "ukf_average_percent": sum(ukf) / len(ukf),
         "ekf_average_percent": sum(ekf) / len(ekf), "rows_above_limit": above,
         "ukf_better_means": sum(row.mean["ukf"] < row.mean["ekf"] for row in table),
-        "ukf_better_deviations": sum(row.deviation["ukf"] < row.deviation["ekf"] for row in table), "rows": len(table),
-    }  # fmt: skip
+        "ukf_better_deviations": sum(row.deviation["ukf"] < row.deviation["ekf"] for row in table),
+        "rows": len(table)}  # fmt: skip
     named = f" ({', '.join(above)})" if above else ""
-    reading = (
+    return Finding(computed, reproduced(not above), (
         f"{len(above)} of {len(table)} printed means of the unscented filter are at or above {LIMIT:g} %{named}; their average "
         f"is {computed['ukf_average_percent']:.2f} %, which is the only reading of 'globally' under which the statement could "
         f"hold. The unscented filter is better in {computed['ukf_better_means']} means and "
-        f"{computed['ukf_better_deviations']} standard deviations of {len(table)}."
-    )
-    return Finding(computed, reproduced(not above), reading)
+        f"{computed['ukf_better_deviations']} standard deviations of {len(table)}."))  # fmt: skip
 
 
 @TOPIC.part("table-1", "Table I against the text", 0.2)
@@ -68,10 +66,9 @@ def errors(scope: Scope) -> PartResult:
     rows: list[list[Cell]] = [list(head) for head in (*heads, ("average", None, None))]
     for row, (ekf, ukf, ekf_spread, ukf_spread) in zip(rows, values, strict=True):
         row += [ekf, ukf, ekf_spread, ukf_spread, ukf < LIMIT, ukf < ekf, ukf_spread < ekf_spread]
-    caption = (
+    table = Table("table-1",
         "Table I of P4 as printed (road test of a Peugeot 307, errors (13) in percent of the maximum), with its averages and "
-        "whether the statement 'globally less than 8 %' holds."
-    )
+        "whether the statement 'globally less than 8 %' holds.", columns, rows)  # fmt: skip
     bars: dict[str, list[Mark]] = {"mean": [], "deviation": []}
     for what, marks in bars.items():
         for kind, color, label, aside in (("ekf", EXTENDED, "extended", -0.2), ("ukf", UNSCENTED, "unscented", 0.2)):
@@ -82,18 +79,15 @@ def errors(scope: Scope) -> PartResult:
         Level(y=LIMIT, color=RED, width=1.2),
         Words(-0.5, LIMIT + 0.15, f"{LIMIT:g} % of the text", RED),
         Level(y=average, color=UNSCENTED, dash="dotted", width=1.0),
-        Words(-0.5, average - 0.75, f"unscented,\naverage {average:.2f} %", UNSCENTED, vertical="center"),
-    ]
+        Words(-0.5, average - 0.75, f"unscented,\naverage {average:.2f} %", UNSCENTED, vertical="center")]  # fmt: skip
     share = Axis("error, share of the largest value [%]", 0, 16.5)
     quantities = Axis(ticks={float(k): row.quantity.replace(" ", "\n", 1) for k, row in enumerate(TABLE_1)})
-    figure = Figure(
-        "table-1",
+    figure = Figure("table-1",
         "Table I of P4 as printed: errors (13) of the two filters in the road test. Two of the five means of the unscented "
         "filter exceed the 8 % that the text calls a global bound; their average does not. The unscented filter is worse in "
         "the mean of F_y11 and in the deviation of F_y12.",
         "Grouped bars of the printed errors of both filters for four tire forces and sideslip, with a red line at 8 percent.",
         [Panel([*bars["mean"], *limits], quantities, share, "mean"),
          Panel(bars["deviation"], quantities, "", "standard deviation", legend="upper left")],
-        (9.2, 3.5), share_y="all",
-    )  # fmt: skip
-    return PartResult(TOPIC.found(), [Table("table-1", caption, columns, rows)], [figure])
+        (9.2, 3.5), share_y="all")  # fmt: skip
+    return PartResult(TOPIC.found(), [table], [figure])

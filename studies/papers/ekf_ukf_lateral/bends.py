@@ -17,13 +17,13 @@ from estimators.vehicle import CORNERS, VehicleParameters
 from studies.papers.ekf_ukf_lateral.accuracy import TABLE_1
 from studies.plots import Axis, Dash, Figure, Level, Mark, Panel, colours, dots
 from studies.study import Cell, PartResult, Scope, Table
+from studies.trials import filter_inputs
 from studies.trials.accuracy import ERROR_COLUMNS, SampleSpreads, known_spread, sample_errors, sample_spreads
 from studies.trials.estimation import assumed_car, measured_runs, run_pipeline
-from studies.trials.filter_inputs import PRINTED_TEST, SAMPLE_TIME, conditions, counted, front_steer, rear_speed
+from studies.trials.filter_inputs import PRINTED_TEST, SAMPLE_TIME, USE, TireFacts, conditions, tire_facts
 from studies.trials.histories import BANDS, dot_heights, error_dots, estimate_lines, history, row_axis, truth_line
 from studies.trials.motion import MotionTest, motion_part
 from studies.trials.simulations import MAGIC_FORMULA, trial_part
-from studies.trials.tire_curve import USE, TireFacts, tire_facts
 from studies.truth import Measured
 
 MANOEUVRE = "p4-bends-dry"
@@ -33,8 +33,7 @@ SHARE, NO_SLIP, STEADY = "m a_y shared by load", "no slip at the rear", "steady 
 KINDS: dict[str, Literal["extended", "unscented"]] = {EKF: "extended", UKF: "unscented"}
 LOOKS = {
     EKF: ("s", colours.EXTENDED), UKF: ("o", colours.UNSCENTED), PIPELINE: ("D", colours.PIPELINE),
-    SHARE: ("^", colours.STEADY), STEADY: ("v", colours.STEADY),
-}  # fmt: skip
+    SHARE: ("^", colours.STEADY), STEADY: ("v", colours.STEADY)}  # fmt: skip
 LINES: dict[str, tuple[Dash, float]] = {EKF: ("solid", 1.9), UKF: ("dashed", 0.9)}
 QUICK_SECONDS = 6.5
 
@@ -70,8 +69,7 @@ def four_wheel_car(car: VehicleParameters, tire: TireFacts, at_rest: bool) -> Fo
     front, rear = tire.slope if at_rest else tire.secant
     return FourWheel(
         car.mass, car.yaw_inertia, car.front_axle_distance, car.rear_axle_distance, 0.5 * (car.front_track + car.rear_track),
-        front, rear, *tire.relaxation, friction=float(np.mean(tire.peak)),
-    )  # fmt: skip
+        front, rear, *tire.relaxation, friction=float(np.mean(tire.peak)))  # fmt: skip
 
 
 def level(drawn: Measured) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -80,7 +78,7 @@ def level(drawn: Measured) -> tuple[FloatArray, FloatArray, FloatArray]:
     The paper's own (earlier work) uses suspension deflections; here roll and pitch come from gyros led back by
     accelerometers, with the motion of the car from `rear_speed` and the yaw rate.
     """
-    time, shape, speed = drawn.sample_time, drawn.batch_shape, rear_speed(drawn)
+    time, shape, speed = drawn.sample_time, drawn.batch_shape, filter_inputs.rear_speed(drawn)
     attitude, vertical = AttitudeObserver(time, shape), VerticalLoads(assumed_car(drawn), time, shape)
     slope, names = FilteredDerivative(time, 0.1, shape), ("ax", "ay", "az", "yaw_rate", "roll_rate", "pitch_rate")
     loads, along, across = np.empty((*speed.shape, 4)), np.empty_like(speed), np.empty_like(speed)
@@ -100,7 +98,7 @@ def run_four_wheel(drawn: Measured) -> FourWheelRun:
     as a linear one does.
     """
     car, truth, shape = assumed_car(drawn), drawn.truth, drawn.batch_shape
-    speed, steer, (loads, ax, ay) = rear_speed(drawn), front_steer(drawn), level(drawn)
+    speed, steer, (loads, ax, ay) = filter_inputs.rear_speed(drawn), filter_inputs.front_steer(drawn), level(drawn)
     friction = float(truth["friction"][0].mean())
     tire = tire_facts(truth.vehicles[0], truth.tires[0], float(truth["vx"][0].mean()), friction)
     yaw_rate = drawn.signals["yaw_rate"]
@@ -123,7 +121,7 @@ def run_four_wheel(drawn: Measured) -> FourWheelRun:
     ours = run_pipeline(drawn, {"force_y": lambda step: step.force_y, "sideslip": lambda step: step.sideslip})
     forces[PIPELINE] = ours["force_y"][:, 0]
     sideslip |= {NO_SLIP: free[:, 0], STEADY: (free - slipping)[:, 0], PIPELINE: ours["sideslip"][:, 0]}
-    return FourWheelRun(drawn, forces, sideslip, loads[:, 0], counted(drawn, 0), tire)
+    return FourWheelRun(drawn, forces, sideslip, loads[:, 0], filter_inputs.counted(drawn, 0), tire)
 
 
 def four_wheel_part(name: str, scope: Scope, tire: str) -> PartResult:
@@ -158,8 +156,8 @@ def four_wheel_part(name: str, scope: Scope, tire: str) -> PartResult:
         Table(f"{name}-difference",
               "How much larger the error of the extended filter is than that of the unscented one with the same model, noise and "
               f"start, in percentage points, compared draw by draw. {about_run}",
-              ("quantity", "printed mean [points]", "mean [points]", "printed std [points]", "std [points]"), differences),
-    ]  # fmt: skip
+              ("quantity", "printed mean [points]", "mean [points]", "printed std [points]", "std [points]"),
+              differences)]  # fmt: skip
     return PartResult((), tables, [dot_figure(f"{name}-errors", found), *histories(name, run)], measures=measures)
 
 
@@ -169,19 +167,15 @@ def dot_figure(name: str, found: Sequence[Mapping[str, SampleSpreads]]) -> Figur
     for title, key in (("mean", "mean"), ("standard deviation", "deviation")):
         marks = error_dots([{who: getattr(error, key) for who, error in errors.items()} for errors in found], LOOKS)
         for who in KINDS:
-            own, heights = (
-                [getattr(row, key)[who.lower()] for row in TABLE_1],
-                dot_heights(range(len(found)), who, LOOKS),
-            )
+            own = [getattr(row, key)[who.lower()] for row in TABLE_1]
+            heights = dot_heights(range(len(found)), who, LOOKS)
             marks.append(dots(own, heights, f"{who} as printed", LOOKS[who][1], LOOKS[who][0], 8.0, hollow=True))
         panels.append(Panel(marks, Axis(f"{title} of the error (13) [% of the peak]", 0.0), rows))
-    return Figure(
-        name,
+    return Figure(name,
         "Errors of lateral forces and sideslip on the truth vehicle (filled, with 95 % confidence interval) and as printed "
         "(open). EKF and UKF have the same model, noise and start.",
         "Dot plot: mean and standard deviation of the error for four lateral forces and the sideslip, by estimate.",
-        panels, size=(8.6, 4.4), legend="below", share_y="row",
-    )  # fmt: skip
+        panels, size=(8.6, 4.4), legend="below", share_y="row")  # fmt: skip
 
 
 def histories(name: str, run: FourWheelRun) -> list[Figure]:
@@ -201,31 +195,23 @@ def histories(name: str, run: FourWheelRun) -> list[Figure]:
             panels.append(Panel(marks, y="" if k % 2 else label, title=corner, legend="" if k else "best", columns=2))
         return panels
 
-    slip = shown(
-        np.degrees(run.true("sideslip")), {w: np.degrees(run.sideslip[w]) for w in (STEADY, PIPELINE, EKF, UKF)}
-    )
+    slips = {who: np.degrees(run.sideslip[who]) for who in (STEADY, PIPELINE, EKF, UKF)}
     used, seen = used_friction(run.true("force_y"), run.true("force_z")), used_friction(run.forces[UKF], run.loads)
-    limits = [
-        Level(y, label=label, color=colours.LIMIT, dash="dotted") for y, label in ((limit, "limit"), (-limit, ""))
-    ]
+    limits = [Level(y, label=text, color=colours.LIMIT, dash="dotted") for y, text in ((limit, "limit"), (-limit, ""))]
     return [
-        history(
-            f"{name}-forces",
+        history(f"{name}-forces",
             f"Figs. 6 and 7 of P4 {on}: lateral forces of the four wheels, positive to the left. {BANDS}",
             "Four panels of lateral force over time, front wheels above, rear wheels below, with estimates of both filters.",
             corners("$F_y$ [kN]", 1e-3 * run.true("force_y"), {w: 1e-3 * run.forces[w] for w in (EKF, UKF, PIPELINE)}),
             (9.0, 5.4), columns=2, share_y="row"),
-        history(
-            f"{name}-sideslip",
+        history(f"{name}-sideslip",
             f"Fig. 8 of P4 {on}: sideslip at the centre of gravity, positive to the left. {BANDS}",
             "Sideslip over time: truth, both filters, the pipeline and the formula of a linear car in a steady turn.",
-            [Panel(slip, y="sideslip [deg]", legend="best", columns=3)], (8.0, 3.2)),
-        history(
-            f"{name}-used-friction",
+            [Panel(shown(np.degrees(run.true("sideslip")), slips), y="sideslip [deg]", legend="best", columns=3)], (8.0, 3.2)),
+        history(f"{name}-used-friction",
             f"Fig. 9 of P4 {on}: used lateral friction (14) of the four wheels, and the greatest that the tire has.",
             "Four panels of lateral force over vertical load with the unscented filter's estimate and the friction limit.",
-            corners("$F_y/F_z$", used, {UKF: seen}, *limits), (9.0, 4.6), columns=2, share_y="all"),
-    ]  # fmt: skip
+            corners("$F_y/F_z$", used, {UKF: seen}, *limits), (9.0, 4.6), columns=2, share_y="all")]  # fmt: skip
 
 
 MOTION = (MotionTest(MANOEUVRE, "Right, left and right bend, dry (Fig. 5)", course=True),)
@@ -234,5 +220,4 @@ PARTS = (
     trial_part("table-1-other-tire", "Table I on a tire with another shape: Magic Formula with slip lag",
                partial(four_wheel_part, "bends-other-tire"), 53.0, MAGIC_FORMULA),
     trial_part("motion", "Fig. 5 on the truth vehicle: path, speed, steering, g-g diagram",
-               partial(motion_part, "motion", MOTION), 5.0),
-)  # fmt: skip
+               partial(motion_part, "motion", MOTION), 5.0))  # fmt: skip

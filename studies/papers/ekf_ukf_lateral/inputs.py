@@ -23,8 +23,7 @@ SUBSTITUTES_NOTE = (
 # A left bend at 20 m/s and about 0.5 g: loads and forces are larger on the right. In exact numbers, and as arrays.
 STATE: Mapping[str, Any] = {
     "yaw_rate": "0.25", "speed": 20, "sideslip": "0.01", "force_fl": 1400, "force_fr": 2200, "force_rl": 1100,
-    "force_rr": 1700, "front_force_x": 700,
-}  # fmt: skip
+    "force_rr": 1700, "front_force_x": 700}  # fmt: skip
 LOADS: Mapping[str, Any] = {"load_fl": 3200, "load_fr": 4800, "load_rl": 2400, "load_rr": 3700}
 STATES, WHEEL_LOADS = (np.array(list(values.values()), float) for values in (STATE, LOADS))
 Outputs = Literal["y4 corrected", "y4 as printed", "y4 corrected, F_y22 measured as well"]

@@ -27,8 +27,7 @@ ORDER = 4  # Lie derivatives taken; the rank is complete after the first
 RANGES = {
     "yaw_rate": (-0.6, 0.6), "speed": (5.0, 40.0), "sideslip": (-0.05, 0.05),
     **dict.fromkeys(("force_fl", "force_fr", "force_rl", "force_rr", "front_force_x"), (-4e3, 4e3)),
-    "steering_angle": (-0.2, 0.2), **dict.fromkeys(LOADS, (1e3, 6e3)),
-}  # fmt: skip
+    "steering_angle": (-0.2, 0.2), **dict.fromkeys(LOADS, (1e3, 6e3))}  # fmt: skip
 # Typical sizes of the states and of the outputs (and of their rates), to compare singular values.
 STATE_SIZE = np.array([0.4, 8.0, 0.1, 2000.0, 2000.0, 1500.0, 1500.0, 2000.0])
 OUTPUT_SIZE = np.array([0.4, 8.0, 3.0, 3.0])
@@ -87,8 +86,7 @@ def rank_of_the_model(outputs: Outputs = "y4 corrected") -> Finding:
         "rank_steering_through_zero": rank_through_straight(), "hidden_directions": list(steering.structure.describe()),
         "hidden_directions_at_zero_steering": list(straight.structure.describe()),
         "singular_at_zero_speed": singular_at_standstill(), "rank_with_y4_as_printed": printed[0],
-        "rank_with_y4_as_printed_at_zero_steering": printed[1],
-    }  # fmt: skip
+        "rank_with_y4_as_printed_at_zero_steering": printed[1]}  # fmt: skip
     reading = f"The rank is {steering.rank} at almost every state and {straight.rank} while driving straight ahead."
     if hidden:
         reading += (
@@ -134,18 +132,15 @@ def observability(scope: Scope) -> PartResult:
         Line(degrees, np.maximum(corrected[:, 7], FLOOR), "8th, y₄ corrected", BLUE, "dotted"),
         Line(degrees, np.maximum(printed[:, 7], FLOOR), "8th, y₄ as printed", RED, "dashed"),
         Shade(FLOOR / 3, 1e-14),
-        Words(0.98, 0.07, "zero up to rounding", horizontal="right", relative=True),
-    ]
+        Words(0.98, 0.07, "zero up to rounding", horizontal="right", relative=True)]  # fmt: skip
     colours: list[Mark] = [
         Map(degrees, speed, np.log10(np.maximum(field, 1e-9)), "log₁₀ (value / largest) [1]", "viridis", -7.0),
         Level(x=0.0, color=RED, width=1.6),
         Words(0.0, 2.0, "rank 6", "white", 9, offset=(6, 0)),
-        Words(-7.5, 22.0, "rank 7", "white", 9),
-    ]
+        Words(-7.5, 22.0, "rank 7", "white", 9)]  # fmt: skip
     x, size = "steering angle of the front wheels [deg]", Axis("singular value / largest [1]", FLOOR / 3, 1e-1, "log")
     heights = Axis("speed [m/s]", scale="log", ticks=[1, 2, 5, 10, 20, 40])
-    figure = Figure(
-        "observability",
+    figure = Figure("observability",
         "Observability of the eight-state model in a left bend (yaw rate 0.25 rad/s, forces 1.1 to 2.2 kN): singular values "
         "of the gradients of the four outputs and of their first derivatives, states and outputs in typical sizes. Left: the "
         "eighth value is zero at every steering angle, so the rank is 7, not 8; the seventh vanishes at zero steering, rank "
@@ -155,8 +150,7 @@ def observability(scope: Scope) -> PartResult:
         "colour map over steering angle and speed with a dark vertical valley at zero steering.",
         [Panel(curves, x, size, "at 20 m/s, steering held", legend="center right"),
          Panel(colours, x, heights, "7th singular value, y₄ corrected", grid=False)],
-        (9.2, 3.9), widths=(1.15, 1.0),
-    )  # fmt: skip
+        (9.2, 3.9), widths=(1.15, 1.0))  # fmt: skip
     return PartResult(TOPIC.found(), (), [figure], [inputs.SUBSTITUTES_NOTE])
 
 
@@ -196,12 +190,11 @@ def hidden_split(scope: Scope) -> PartResult:
         ["y4 corrected", "steering through zero at 0.1 rad/s", rank_through_straight(), "force_rl - force_rr", LAG],
         ["y4 corrected", "standstill", None, at_rest, "-"],
     ]
-    caption = (
+    ranks = Table("ranks",
         "Lie-derivative rank of the eight-state model at random states (20 Lie rows, 320-bit ball arithmetic: a rank is "
         "proved from below; what is hidden is proved symbolically). 'Decays with' is the rate in 1/s at which the hidden "
-        "part dies out by itself."
-    )
-    columns = ("output equation", "situation", "rank of 8 [1]", "hidden direction", "decays with")
+        "part dies out by itself.",
+        ("output equation", "situation", "rank of 8 [1]", "hidden direction", "decays with"), rows)  # fmt: skip
     note = (
         "The paper sets lateral forces and sideslip to zero where it takes the model as unobservable. That is not needed: "
         "what is hidden decays with V / sigma by itself, so a filter stays bounded."
@@ -231,14 +224,12 @@ def hidden_split(scope: Scope) -> PartResult:
         (measured, Axis("measured [see legend]", high=9.5), "measured: the motions coincide"),
         (differences, Axis("difference of the motions [see legend]", FLOOR / 3, 1e4, "log"), "their difference"),
     )
-    figure = Figure(
-        "twins",
+    figure = Figure("twins",
         "Two motions of the eight-state model in the same slalom (20 m/s, ±3° at 0.7 Hz) that start with the same rear axle "
         "force and another split of it between left and right. Left: the rear forces differ. Middle: yaw rate and lateral "
         "acceleration do not, nor do the other outputs. Right: the split dies out with V/σ₂ = 40 1/s by itself while the "
         "outputs agree to rounding. So the rear split cannot be observed; what filters report of it is the tire model's.",
         "Three panels over time: rear forces of two motions that start apart and merge; outputs that coincide; the "
         "difference on a logarithmic scale, a straight line for the force and rounding noise for the outputs.",
-        [Panel(lines, "time [s]", y, title, legend="upper right") for lines, y, title in shown], (9.6, 3.7),
-    )  # fmt: skip
-    return PartResult((), [Table("ranks", caption, columns, rows)], [figure], [note])
+        [Panel(lines, "time [s]", y, title, legend="upper right") for lines, y, title in shown], (9.6, 3.7))  # fmt: skip
+    return PartResult((), [ranks], [figure], [note])

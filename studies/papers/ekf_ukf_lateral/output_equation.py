@@ -10,7 +10,7 @@ from studies.claim import Finding
 from studies.papers.ekf_ukf_lateral.inputs import CAR, PACKAGE, STATES, WHEEL_LOADS, Outputs, model_with
 from studies.papers.topic import Topic
 from studies.papers.verdicts import erratum
-from studies.study import Cell, PartResult, Scope, Table
+from studies.study import Cell, Table
 from synthesis.models.nonlinear import NonlinearModel
 
 TOPIC = Topic(PACKAGE)
@@ -31,30 +31,25 @@ def lateral_output(printed: Outputs = "y4 as printed") -> Finding:
     """Both forms of y_4 against the acceleration that the states of (11) have."""
     wrong, right = (acceleration_mismatch(model_with(outputs)) for outputs in (printed, "y4 corrected"))
     computed = {"printed_minus_true": str(wrong), "corrected_minus_true": str(right), "term": "x8 sin(u1)"}
-    reading = (
+    return Finding(computed, erratum(wrong == 0, right == 0), (
         "By the force balance (1) the term is F_x1 sin(delta) = x_8 sin(u_1). With it y_4 equals the acceleration of the "
-        "states identically; with the printed x_6 the two differ by (F_y21 - F_x1) sin(delta) / m."
-    )
-    return Finding(computed, erratum(wrong == 0, right == 0), reading)
+        "states identically; with the printed x_6 the two differ by (F_y21 - F_x1) sin(delta) / m."))  # fmt: skip
 
 
-@TOPIC.part("output-equation", "The measured lateral acceleration", 1.5)
-def output_equation(scope: Scope) -> PartResult:
-    """Lateral acceleration by both forms of y_4 in the same bend, for several drive forces and steering angles."""
-    state = STATES.copy()
-    rows: list[list[Cell]] = []
+def _table() -> Table:
+    state, rows = STATES.copy(), list[list[Cell]]()
     for degrees in (1.0, 3.0, 8.0):
         for drive in (-3000.0, 700.0, 3000.0):
             angle, state[7] = np.radians(degrees), drive
             right = FourWheelModel.at(CAR, 0.01, np.array(angle), WHEEL_LOADS, 1.0).measurement(state)[3]
             printed = right + (state[5] - drive) * np.sin(angle) / CAR.mass
             rows.append([degrees, drive, *(round(float(value), 4) for value in (right, printed, printed - right))])
-    table = Table(
-        "output-equation",
+    return Table("output-equation",
         "What the misprint in y4 of (12) costs: lateral acceleration of the same bend (front forces 1.4 and 2.2 kN, rear 1.1 "
         "and 1.7 kN) with the corrected term x8 sin(u1) and with the printed x6 sin(u1). The error is (F_y21 - F_x1) "
         "sin(delta) / m.",
         ("steering angle [deg]", "front drive force [N]", "a_y corrected [m/s^2]", "a_y as printed [m/s^2]", "error [m/s^2]"),
-        rows,
-    )  # fmt: skip
-    return PartResult(TOPIC.found(), [table])
+        rows)  # fmt: skip
+
+
+TOPIC.show("output-equation", "The measured lateral acceleration", 1.5, tables=[_table])

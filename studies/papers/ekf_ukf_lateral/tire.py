@@ -50,15 +50,13 @@ def tire_sign(printed_sign: int = -1) -> Finding:
     slowest = float(printed_lagged.max()), float(corrected_lagged.max())
     computed = {
         "speed_m_s": SPEED, "poles_printed_1_s": printed.tolist(), "poles_corrected_1_s": corrected.tolist(),
-        "largest_pole_printed_with_relaxation_1_s": slowest[0], "largest_pole_corrected_with_relaxation_1_s": slowest[1],
-    }  # fmt: skip
-    reading = (
+        "largest_pole_printed_with_relaxation_1_s": slowest[0],
+        "largest_pole_corrected_with_relaxation_1_s": slowest[1]}  # fmt: skip
+    stable = max(printed.max(), slowest[0]) < 0.0, max(corrected.max(), slowest[1]) < 0.0
+    return Finding(computed, erratum(*stable), (
         "With the slip angles of (2) a left turn has positive slip and needs a positive force. The printed minus turns every "
         f"restoring force around: both poles of the single track at {SPEED:g} m/s are unstable. The plus sign gives two "
-        "stable ones."
-    )
-    stable = max(printed.max(), slowest[0]) < 0.0, max(corrected.max(), slowest[1]) < 0.0
-    return Finding(computed, erratum(*stable), reading)
+        "stable ones."))  # fmt: skip
 
 
 def single_track(force_sign: int, speed: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -100,16 +98,14 @@ def dugoff_figure() -> Figure:
         marks.append(Line(degrees, STIFFNESS * np.tan(slip) / 1e3, r"$C_α\,\tan α$", TRUTH, "dashed", 0.9))
         force_axis = Axis("lateral force [kN]" if not panels else "", -6.6, 6.6)
         panels.append(Panel(marks, "slip angle α [deg]", force_axis, title, legend="lower right"))
-    return Figure(
-        "dugoff",
+    return Figure("dugoff",
         "The Dugoff tire of (3) to (5) without longitudinal slip, with the plus sign that (1) and (2) need and a cornering "
         "stiffness of 32.5 kN/rad. Dots: λ = 1, where the tire stops being linear, always at half of the friction limit "
         "μF_z; dotted: that limit, which is approached like μF_z (1 − λ/2) and never passed. P4 shows the generic curve as "
         "Fig. 1 and prints no tire values.",
         "Two panels of S-shaped curves of lateral force over slip angle: higher load or friction gives a higher plateau; all "
         "share the slope at the origin.",
-        panels, (9.2, 3.7), share_y="all",
-    )  # fmt: skip
+        panels, (9.2, 3.7), share_y="all")  # fmt: skip
 
 
 @TOPIC.part("tire", "The Dugoff tire and the sign of its force")
@@ -117,10 +113,8 @@ def tire(scope: Scope) -> PartResult:
     """The Dugoff tire; poles over speed and the response to a steering step, for both signs of its force."""
     speed, step = np.linspace(5.0, 40.0, 141), 0.01  # m/s, s
     time = np.arange(0.0, 2.0, step)
-    left: list[Mark] = [
-        ZERO, Level(x=SPEED, color="0.5", dash="dotted"), Words(SPEED + 0.4, 15.0, f"{SPEED:g} m/s", "0.35"),
-    ]  # fmt: skip
-    right: list[Mark] = [ZERO]
+    mark = Words(SPEED + 0.4, 15.0, f"{SPEED:g} m/s", "0.35")
+    left, right = list[Mark]([ZERO, Level(x=SPEED, color="0.5", dash="dotted"), mark]), list[Mark]([ZERO])
     for sign, color, label in ((1, BLUE, "plus (corrected)"), (-1, RED, "minus (as printed)")):
         left.append(Line(speed, single_track_poles(sign, speed), label, color, width=1.6))
         Phi, Gamma = zero_order_hold(*single_track(sign, SPEED), step)
@@ -129,8 +123,7 @@ def tire(scope: Scope) -> PartResult:
             yaw[k], x = x[1], Phi @ x + Gamma[:, 0] * np.radians(1.0)
         right.append(Line(time, np.degrees(yaw), label, color, width=1.6))
     poles, turn = Axis("real part of the poles [1/s]", -20, 20), Axis("yaw rate [deg/s]", -12.0, 12.0)
-    figure = Figure(
-        "force-sign",
+    figure = Figure("force-sign",
         "What the sign in (3) decides, on the linear single track of the same car (P5 values). Left: with the printed minus "
         "both poles lie in the right half plane at every speed, with the plus in the left one. Right: after a steering step "
         "to the left the corrected car turns left and settles; with the printed sign it turns right and diverges.",
@@ -138,6 +131,5 @@ def tire(scope: Scope) -> PartResult:
         "red runs away to negative values.",
         [Panel(left, "speed [m/s]", poles, legend="lower right"),
          Panel(right, "time [s]", turn, f"step of 1° to the left at {SPEED:g} m/s", legend="upper right")],
-        (9.2, 3.5),
-    )  # fmt: skip
+        (9.2, 3.5))  # fmt: skip
     return PartResult(TOPIC.found(), (), [dugoff_figure(), figure], [SUBSTITUTES_NOTE])

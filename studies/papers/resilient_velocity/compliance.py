@@ -27,11 +27,10 @@ from studies.plots import ZERO, Axis, Dash, Figure, Line, Mark, Panel
 from studies.plots.colours import BLUE, GREY, ORANGE, RED
 from studies.study import Cell, PartResult, Scope, Table
 from studies.trials.accuracy import known_spread, nrms
-from studies.trials.estimation import Reading, assumed_car, measured, run_of, run_pipeline
+from studies.trials.estimation import TEST_CAR, Reading, assumed_car, run_of, run_pipeline
 from studies.trials.histories import estimate_lines, history, truth_line
-from studies.trials.sensors import TEST_CAR
 from studies.trials.simulations import LUGRE, simulated_truth
-from studies.truth import Measured
+from studies.truth import Measured, draw
 from studies.truth.stepper import stepped_deflection
 
 WITHOUT, PRINTED_WAY, INSIDE = "without", "as (15) is printed", "in the observer's input"
@@ -91,9 +90,8 @@ class CompliantCorners:
         """One sample, as `CornerObservers.step`."""
         _, steer, ax, _, _, use_x, use_y, _ = signals
         load, total = self.loads.load, self.loads.load.sum(axis=-1, keepdims=True)
-        shared = (
-            self.sets[0].vehicle.mass * np.asarray(ax)[..., None] / total
-        )  # as the pipeline does for a stopped wheel
+        # As the pipeline does for a stopped wheel.
+        shared = self.sets[0].vehicle.mass * np.asarray(ax)[..., None] / total
         use_all = np.where(np.isfinite(use_x), use_x, shared)
         force = vehicle_frame(CornerVectors(use_all * load, use_y * load), steer)
         before = self.compliance.state[..., 1]
@@ -189,8 +187,7 @@ class Shown(NamedTuple):
 
 TESTS = (
     Shown("p3-launch-split", "harsh launch (Fig. 10)", "smaller with, in hard traction", (0, 1, 2, 3), 0),
-    Shown("p3-acceleration-in-turn-dry", "acceleration in a turn (Fig. 12)", "curves alone", (0, 1), 1),
-)
+    Shown("p3-acceleration-in-turn-dry", "acceleration in a turn (Fig. 12)", "curves alone", (0, 1), 1))  # fmt: skip
 BOUNDS: tuple[float, float] = tuple(printed(PACKAGE, "P3-nrms"))
 """%, of V_x and V_y: the text of the paper."""
 STYLES: tuple[tuple[str, Dash, float], ...] = ((GREY, "solid", 1.8), (RED, "dashed", 1.0), (BLUE, "solid", 0.9))
@@ -200,7 +197,7 @@ WAY_COLUMNS = ("without [%]", "as (15) is printed [%]", "in the input [%]")
 def compliance_part(name: str, tests: Sequence[Shown], scope: Scope, tire: str = LUGRE) -> PartResult:
     """Every test with the three ways: forces and velocities."""
     truth = simulated_truth(tuple(test.manoeuvre for test in tests), tire, scope, seconds=4.0)
-    trial = run_trial(measured(truth, range(scope.seeds), TEST_CAR))
+    trial = run_trial(draw(truth, TEST_CAR, range(scope.seeds)))
     forces, measures = residual_table(f"{name}-forces", trial, tests)
     figures = [residual_history(f"{name}-{test.manoeuvre}", trial, test) for test in tests]
     figures += [wheel_history(f"wheels-{test.manoeuvre}", trial, test) for test in tests if test.direction == 0]
@@ -243,19 +240,16 @@ def residual_table(name: str, trial: ComplianceTrial, tests: Sequence[Shown]) ->
                 *(cell for change in changes for cell in (change.text(), change.high < 0.0)),
                 round(float(_rms(compliance)), 4), round(float(missed), 4)])  # fmt: skip
             measures |= {f"{test.manoeuvre} {CORNERS[corner]} {way}": float(error[way].mean()) for way in WAYS}
-    caption = (
+    return Table(name,
         "Measured minus calculated normalised force, RMS in % of the peak of F/F_z under hard traction (drive torque above "
         f"{HARD:g} N m, V_x above {LEAST_SPEED:g} m/s): mean over {len(trial.drawn.seeds)} sensor draws with its 95 % "
         "confidence interval. Measured: the estimated forces; calculated: LuGre tire (1), (2) with Table I and the road's "
         "true friction at the observers' slip velocity - without compliance, with psi' taken from it as (15) is printed, and "
         "with psi'' in the input of the observers. Change: draw by draw, in percentage points; smaller: the interval lies "
-        "below zero. The paper prints curves without numbers."
-    )
-    columns = (
-        "test", "force", "peak of F/F_z [1]", "the paper says", *WAY_COLUMNS,
-        "change by (15) [points]", "smaller by (15)", "change by the input [points]", "smaller by the input",
-        "RMS of psi' [m/s]", "RMS error of psi' [m/s]")  # fmt: skip
-    return Table(name, caption, columns, rows), measures
+        "below zero. The paper prints curves without numbers.",
+        ("test", "force", "peak of F/F_z [1]", "the paper says", *WAY_COLUMNS, "change by (15) [points]", "smaller by (15)",
+         "change by the input [points]", "smaller by the input", "RMS of psi' [m/s]", "RMS error of psi' [m/s]"),
+        rows), measures  # fmt: skip
 
 
 def _rms(error: FloatArray) -> FloatArray:
@@ -273,8 +267,7 @@ def velocity_table(name: str, trial: ComplianceTrial, tests: Sequence[Shown]) ->
             changes = [known_spread(found[way] - found[WITHOUT]).text(3) for way in WAYS[1:]]
             known: list[Cell] = [test.title, f"V_{signal[1]}", round(float(np.abs(true).max()), 3), BOUNDS[k]]
             rows.append([*known, *(known_spread(found[way]).text() for way in WAYS), *changes])
-    return Table(
-        name,
+    return Table(name,
         "Velocity of the centre of gravity from the corner observers, NRMS in % of the peak as P1 (46): mean over "
         f"{len(trial.drawn.seeds)} sensor draws with its 95 % confidence interval. As (15) is printed, psi' is added on the way "
         "to the centre of gravity; with psi'' in the observers' input it is taken from the wheel centre's velocity. Changes "
@@ -305,8 +298,7 @@ def residual_history(name: str, trial: ComplianceTrial, test: Shown) -> Figure:
         residual = Axis(f"$\\Delta f_{{n{axis}}}$ [1]", -limit, limit)
         rows.append([Panel([*left, ZERO], x, residual, CORNERS[corner]), Panel(right, x, f"$\\dot\\psi_{axis}$ [m/s]")])
     direction, size = DIRECTIONS[k], (9.4, 1.2 + 1.55 * len(test.corners))
-    return Figure(
-        name,
+    return Figure(name,
         f"{test.title}: {direction} force of the wheels, measured minus calculated, over the vertical load (left), "
         "with and without the suspension compliance, and the velocity of the wheel against the body (right). First sensor draw.",
         f"Rows of two panels over time, one for each corner: the difference of the {direction} forces for three ways of "
@@ -327,8 +319,7 @@ def wheel_history(name: str, trial: ComplianceTrial, test: Shown) -> Figure:
         wheel = Line(time, surface[0], "$R_e\\omega$", GREY, width=0.8)
         marks = [true, wheel, *estimate_lines(time, centre, "$R_e\\omega-\\hat V_{rx}$", RED)]
         panels.append(Panel(marks, y="speed [m/s]" if corner % 2 == 0 else "", title=CORNERS[corner]))
-    return history(
-        name,
+    return history(name,
         f"{test.title.replace('10', '9')}: surface speed of the wheels, velocity of their centres along the car, and the corner "
         "observers' estimate of it, as Fig. 9 of P3. Lines: first sensor draw; band: 95 % of all draws. On ice the wheels spin "
         "and their observers follow them: what friction hides of the slip, no gain brings back.",

@@ -65,13 +65,11 @@ def zero_order_hold_reading(setting: Setting = PRINTED) -> Finding:
         computed[f"{name}_largest"] = float(over.max())
     computed["gains_of_P1_innovation_held"] = by_speed(SHOWN, radii(*earlier, T, innovation_held, SHOWN))
     good, bad = (", ".join(name for name, ok in stable.items() if ok is wanted) for wanted in (True, False))
-    reading = (
+    otherwise = ClaimVerdict.UNDER_SPECIFIED if any(stable.values()) else ClaimVerdict.NOT_REPRODUCED
+    return Finding(computed, reproduced(all(stable.values()), otherwise), (
         f"At {1.0 / T:g} Hz the printed longitudinal gain is stable as: {good or 'nothing'}; unstable as: {bad or 'nothing'}. "
         f"Held innovation, which is (10) word for word, has the radius {computed['innovation_held']['0']:.2f} at standstill; "
-        "the closed loop must be discretised, exp((A - L C) T)."
-    )
-    otherwise = ClaimVerdict.UNDER_SPECIFIED if any(stable.values()) else ClaimVerdict.NOT_REPRODUCED
-    return Finding(computed, reproduced(all(stable.values()), otherwise), reading)
+        "the closed loop must be discretised, exp((A - L C) T)."))  # fmt: skip
 
 
 def _table() -> Table:
@@ -80,11 +78,9 @@ def _table() -> Table:
         for name, update in READINGS.items():
             found = [radii(model, PRINTED.gains[d], 1.0 / rate, update, SPEEDS[::2]).max() for rate in SAMPLE_RATES]
             columns[f"{d}, {name.replace('_', ' ')} [1]"] = found
-    caption = (
+    return column_table("sampling",
         "Largest spectral radius of the error update over 0 to 140 rad/s with the printed gains, for four readings of the "
-        "discretisation; above 1 the observer diverges."
-    )
-    return column_table("sampling", caption, columns)
+        "discretisation; above 1 the observer diverges.", columns)  # fmt: skip
 
 
 TOPIC.show("sampling", "What the printed gains need from the discretisation", 0.3, tables=[_table])

@@ -13,18 +13,8 @@ from analysis.switching.joint_spectral_radius import joint_spectral_radius
 from estimators.arrays import FloatArray
 from studies.claim import Finding, JsonValue, agrees, reproduced
 from studies.papers.plain import by_speed, column_table, floats
-from studies.papers.resilient_velocity.inputs import (
-    COLOUR,
-    DIRECTIONS,
-    FINE,
-    NOTE,
-    PACKAGE,
-    PRINTED,
-    SPEED_AXIS,
-    SPEEDS,
-    Setting,
-    crossing,
-)
+from studies.papers.resilient_velocity import inputs
+from studies.papers.resilient_velocity.inputs import COLOUR, DIRECTIONS, FINE, PRINTED, SPEED_AXIS, SPEEDS, Setting
 from studies.papers.topic import Topic
 from studies.papers.verdicts import among_readings, derived, open_choice, partly
 from studies.plots import DASHES, Axis, Contours, Figure, Level, Line, Map, Mark, Panel, Words, dots
@@ -32,7 +22,7 @@ from studies.plots.colours import CURVES, GREY, ORANGE
 from studies.study import Table
 from synthesis.models.catalogue.corner import Direction
 
-TOPIC = Topic(PACKAGE)
+TOPIC = Topic(inputs.PACKAGE)
 SLOW = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 25.0, 28.0)
 SHOWN, TABLE_SPEEDS = np.array([*SLOW, 60.0, 140.0]), np.array([*SLOW, 40.0, 80.0, 140.0])
 FIG8_SPEEDS, FIG8_DROPS = np.array([0.0, 40.0, 140.0]), (0.2, 0.5, 0.8)
@@ -91,7 +81,7 @@ def harmless_from(setting: Setting, direction: Direction) -> float | None:
 
 def met_at(setting: Setting, direction: Direction, probability: float) -> float | None:
     """A wheel speed in rad/s at which the radius is what Example 3 prints."""
-    return crossing(lambda w: float(radius(setting, direction, w, probability)[0]), PRINTED_RADIUS, SPEEDS[::5])
+    return inputs.crossing(lambda w: float(radius(setting, direction, w, probability)[0]), PRINTED_RADIUS, SPEEDS[::5])
 
 
 @TOPIC.claim("P3-pcr")
@@ -153,13 +143,11 @@ def radius_under_drops(setting: Setting = PRINTED) -> Finding:
     """The drop probability of the figure is not stated."""
     readings = {p: {d: radius(setting, d, FIG8_SPEEDS, p) for d in DIRECTIONS} for p in FIG8_DROPS}
     computed = {f"{d}_p_{p:g}": by_speed(FIG8_SPEEDS, readings[p][d]) for d in DIRECTIONS for p in FIG8_DROPS}
-    reading = (
+    verdict = open_choice([np.concatenate(list(readings[p].values())) for p in FIG8_DROPS], 1e-3)
+    return Finding(computed, verdict, (
         "The drop probability of the figure is not stated: p = 0.2, 0.5 and 0.8 give different curves, at standstill "
         + ", ".join(f"{readings[p]['longitudinal'][0]:.3f}" for p in FIG8_DROPS)
-        + " longitudinally. The curve of any p follows from (22) with (25)."
-    )
-    verdict = open_choice([np.concatenate(list(readings[p].values())) for p in FIG8_DROPS], 1e-3)
-    return Finding(computed, verdict, reading)
+        + " longitudinally. The curve of any p follows from (22) with (25)."))  # fmt: skip
 
 
 @TOPIC.claim("P3-rem4")
@@ -244,11 +232,9 @@ def _table() -> Table:
     for d in DIRECTIONS:
         columns[f"{d}, critical drop probability [1]"] = critical(PRINTED, d, TABLE_SPEEDS)
         columns[f"{d}, radius at p = {p:g} [1]"] = radius(PRINTED, d, TABLE_SPEEDS, p)
-    caption = (
+    return column_table("drops",
         "Critical drop probability of the force measurement and second-moment radius at the drop probability of Example 3, "
-        "exact update at 200 Hz, printed gains."
-    )
-    return column_table("drops", caption, columns)
+        "exact update at 200 Hz, printed gains.", columns)  # fmt: skip
 
 
 def _critical_figure() -> Figure:
@@ -304,8 +290,7 @@ def _map_figure() -> Figure:
         marks: list[Mark] = [
             Map(SPEEDS, probabilities, found, label, low=0.2, high=1.2),
             Contours(SPEEDS, probabilities, found, LEVELS[d], "white", width=0.7),
-            Line(FINE, np.where(border < 1.0, border, np.nan), color=ORANGE, width=2.0),
-        ]
+            Line(FINE, np.where(border < 1.0, border, np.nan), color=ORANGE, width=2.0)]  # fmt: skip
         panels.append(Panel(marks, SPEED_AXIS, "drop probability p [1]", d, grid=False))
     return Figure("radius-map",
         "Second-moment radius of the error over wheel speed and drop probability, printed gains, exact update at "
@@ -322,8 +307,7 @@ def _readings_figure() -> Figure:
         Line(FINE, radius(PRINTED, "longitudinal", FINE, p), "longitudinal, exact update", x, width=1.9),
         Line(FINE, tustin_radius(PRINTED), "longitudinal, Tustin's update", x, "dashed"),
         Line(FINE, radius(PRINTED, "lateral", FINE, p), "lateral, exact update", y, "dash-dot"),
-        Level(y=PRINTED_RADIUS, label=f"printed, {PRINTED_RADIUS}", color=GREY, dash="dotted", width=1.0),
-    ]
+        Level(y=PRINTED_RADIUS, label=f"printed, {PRINTED_RADIUS}", color=GREY, dash="dotted", width=1.0)]  # fmt: skip
     return Figure("example-3-readings",
         f"Example 3 under the readings that its text allows: spectral radius of the second moment with {p:.0%} of "
         "the force measurements lost, over the wheel speed, which is not stated. The printed 0.9026 belongs to the "
@@ -335,5 +319,5 @@ def _readings_figure() -> Figure:
 
 TOPIC.show(
     "drops", "Lost force measurements (Figs 7 and 8)", 1.4, ("P3-pcr", "P3-pcr-exact", "P3-fig8", "P3-rem4"),
-    [_table], [_critical_figure, _radius_figure, _map_figure], [NOTE])  # fmt: skip
+    [_table], [_critical_figure, _radius_figure, _map_figure], [inputs.NOTE])  # fmt: skip
 TOPIC.show("example-3", "Example 3", 1.2, ("P3-ex3", "P3-ex3-arb"), figures=[_readings_figure])

@@ -241,11 +241,9 @@ def _table() -> Table:
         columns[f"{d}, both disturbances [1]"] = norms(PRINTED, d, speeds)
         columns[f"{d}, friction only [1]"] = norms(PRINTED, d, speeds, "friction")
         columns[f"{d}, floor of any gain [1]"] = floor(PRINTED, d, speeds)
-    caption = (
+    return column_table("norms",
         "H-infinity norm of the error dynamics with the printed gains: from both disturbances of (8), (13) to both errors, from "
-        "friction alone, and the floor that no gain can lower."
-    )
-    return column_table("norms", caption, columns)
+        "friction alone, and the floor that no gain can lower.", columns)  # fmt: skip
 
 
 def _norm_figure() -> Figure:
@@ -258,8 +256,7 @@ def _norm_figure() -> Figure:
             Level(y=1.0, color=GREY),
             Line(SPEEDS, both, "friction and acceleration error", BLUE, width=1.9),
             Line(SPEEDS, norms(PRINTED, d, SPEEDS, "friction"), "friction alone", RED, "dashed"),
-            dots(sparse, floor(PRINTED, d, sparse), "floor of any gain", "0.1", "x"),
-        ]
+            dots(sparse, floor(PRINTED, d, sparse), "floor of any gain", "0.1", "x")]  # fmt: skip
         for speed in norm_crosses_one(PRINTED, d):
             words = Words(speed, 1.0, f"1 at {speed:.1f} rad/s", BLUE, offset=(12.0 if speed < 70 else -4.0, 11.0))
             marks += [dots(speed, 1.0, color=BLUE, size=6, hollow=True), words]

@@ -84,9 +84,8 @@ class Setting:
 
     def dropped(self, direction: Direction, speeds: ArrayLike) -> FloatArray:
         """exp(A T_s) (g, 2, 2): the update without the force, (24)."""
-        return np.asarray(
-            expm(self.sample_time * self.models[direction].on(np.atleast_1d(np.asarray(speeds, float))).A)
-        )
+        numeric = self.models[direction].on(np.atleast_1d(np.asarray(speeds, float)))
+        return np.asarray(expm(self.sample_time * numeric.A))
 
 
 def printed_gain(parameters: ParameterSet, direction: Direction, high_slip: bool = False) -> Gain:

@@ -110,8 +110,7 @@ WORDS = {
         "resonate above 126 rad/s and the norm rises by up to 0.048. Curves of σ₂ and κ coincide. Mind the scales.",
         "Four panels of small, nearly straight deviations; in the lateral panel of sigma 1 the curve for plus 20 "
         "per cent turns up steeply above 126 rad/s.",
-    ),
-}
+    )}  # fmt: skip
 """Of the figures: name, caption, alternative."""
 
 

@@ -110,8 +110,7 @@ def _window_figure() -> Figure:
     marks: list[Mark] = [
         Band(FINE, normal[0], normal[1], "normal gain [1.18, 387] proved", BLUE, 0.25),
         Band(FINE, high_slip[0], high_slip[1], "high-slip gain [0.22, 0.1] proved", RED, 0.5),
-        Level(y=PRINTED.similarity, label=f"γ = {PRINTED.similarity:g} of Proposition 1", width=1.2),
-    ]
+        Level(y=PRINTED.similarity, label=f"γ = {PRINTED.similarity:g} of Proposition 1", width=1.2)]  # fmt: skip
     threshold = common_function_from(PRINTED)
     if threshold is not None:
         words = f"no common quadratic\nfunction of any kind\nbelow {threshold:.1f} rad/s"
@@ -192,12 +191,10 @@ def _polynomial(modes: FloatArray, tenths: IntArray, left: bool = True) -> Any:
 
 def _table() -> Table:
     found = margins(PRINTED, STAYS, CHAIN_SPEEDS)
-    caption = (
-        "Margin 1 - rho of mean-square stability with the transition matrix (23): rows by the probability of staying in high "
-        "slip, columns by wheel speed."
-    )
     speeds = {f"{w:g} rad/s": column for w, column in zip(CHAIN_SPEEDS, found.T, strict=True)}
-    return column_table("markov-margins", caption, {"probability of staying [1]": STAYS} | speeds)
+    return column_table("markov-margins",
+        "Margin 1 - rho of mean-square stability with the transition matrix (23): rows by the probability of staying in high "
+        "slip, columns by wheel speed.", {"probability of staying [1]": STAYS} | speeds)  # fmt: skip
 
 
 def _markov_figure() -> Figure:
@@ -221,13 +218,6 @@ def _markov_figure() -> Figure:
 
 
 TOPIC.show(
-    "switching",
-    "Switching the two gains in any order",
-    0.2,
-    ("P3-20", "P3-ex2-arb"),
-    (),
-    [_window_figure],
-    [NOTE],
-)
+    "switching", "Switching the two gains in any order", 0.2, ("P3-20", "P3-ex2-arb"), (), [_window_figure], [NOTE])  # fmt: skip
 TOPIC.show(
     "markov", "Switching by a Markov chain (Fig. 6)", 0.2, ("P3-fig6", "P3-kron"), [_table], [_markov_figure])  # fmt: skip

@@ -173,10 +173,7 @@ def _compliance_figure() -> Figure:
         right += [Line(hertz, amplitude, direction, colour, dash, 1.7), Level(x=natural, color=colour, dash="dotted")]
         right.append(Words(natural, 8.0 + 22.0 * k, words, colour, offset=(3, 0)))
     title, x, y = f"force step of {FORCE / 1e3:g} kN", "time after the step [ms]", "wheel against body [m/s]"
-    frequency, size = (
-        Axis("frequency of the force [Hz]", 0.5, 100.0, "log"),
-        Axis("velocity amplitude [mm/s per kN]", 0.0),
-    )
+    frequency = Axis("frequency of the force [Hz]", 0.5, 100.0, "log")
     return Figure("suspension-compliance",
         "Suspension compliance (14) with Table I: velocity of a wheel against the body after a step of the tire force (left; "
         "lines: continuous model, dots: the runtime estimator at 200 Hz, exact for held forces) and its amplitude over the "
@@ -185,7 +182,7 @@ def _compliance_figure() -> Figure:
         "Left: two damped oscillations, the longitudinal one peaking at 0.44 m/s. Right: two resonance curves with "
         "equal peaks at 12.9 and 19.6 Hz.",
         [Panel(left, x, y, title, legend="upper right"),
-         Panel(right, frequency, size, "frequency response")], (9.2, 3.7))  # fmt: skip
+         Panel(right, frequency, Axis("velocity amplitude [mm/s per kN]", 0.0), "frequency response")], (9.2, 3.7))  # fmt: skip
 
 
 def stribeck(setting: Setting, velocity: ArrayLike) -> FloatArray:
@@ -229,9 +226,8 @@ def peak(setting: Setting, direction: Direction, road: float) -> tuple[float, fl
 def consistent(units: dict[str, str]) -> bool:
     """Whether every term of z' = v_r - kappa R_e |omega| z has one dimension."""
     registry: pint.UnitRegistry[float] = pint.UnitRegistry()
-    kappa, z, slip, radius, speed = (
-        registry.Quantity(1.0, u) for u in (units["kappa"], units["z"], "m/s", "m", "rad/s")
-    )
+    named = units["kappa"], units["z"], "m/s", "m", "rad/s"
+    kappa, z, slip, radius, speed = (registry.Quantity(1.0, unit) for unit in named)
     change = z / registry.Quantity(1.0, "s")
     return all(term.check(change.dimensionality) for term in (slip, kappa * radius * speed * z))
 

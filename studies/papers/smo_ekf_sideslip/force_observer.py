@@ -99,13 +99,11 @@ def split_decay(gains: SlidingModeGains = PUBLISHED) -> Finding:
     computed = {
         "decay_rate_1_s": float(exact), "decay_rate_exact": str(exact), "time_constant_s": float(1 / exact),
         "simulated_decay_1_s": float(-slope), "epsilon_lateral_N_s": lateral_margin}  # fmt: skip
-    reading = (
+    good = exact > 0 and lateral_margin > 0.0 and abs(-slope / float(exact) - 1.0) < 1e-3
+    return Finding(computed, reproduced(good), (
         f"The split error decays at Omega_4 (L_1 + L_2) / (Omega_1 I_z) = {exact} = {float(exact):g} 1/s (time constant "
         f"{float(1 / exact):.3f} s), in the simulated sliding motion at {-slope:.4f} 1/s: far slower than the sum of the "
-        "forces, which is reached in finite time. Proved for constant true forces only."
-    )
-    good = exact > 0 and lateral_margin > 0.0 and abs(-slope / float(exact) - 1.0) < 1e-3
-    return Finding(computed, reproduced(good), reading)
+        "forces, which is reached in finite time. Proved for constant true forces only."))  # fmt: skip
 
 
 def _gain_conditions() -> Table:
@@ -136,8 +134,7 @@ def _convergence() -> Figure:
     marks: list[Mark] = [
         Line(time[thin], moment[thin], "|L₁x₂ − L₂x₃| simulated", BLUE),
         Line(time[thin], decay, f"exp(−{RATE:g} t), (A.12)", TRUTH, "dashed", 1.0),
-        Level(y=30.0, label="limit of (A.4), 30 kN m", color=RED, dash="dotted", width=1.0),
-    ]
+        Level(y=30.0, label="limit of (A.4), 30 kN m", color=RED, dash="dotted", width=1.0)]  # fmt: skip
     return Figure("convergence",
         "Error of the sliding-mode observer from the worst start that the printed maxima allow (6.28 kN in front, −3.66 kN "
         "at the rear), printed gains, bare sign at 50 kHz, constant true forces. Left: the sum of the lateral forces and the "
@@ -245,8 +242,7 @@ def zone_widths(points: int) -> Figure:
         Map(yaw, across, np.log10(np.clip(field, None, 10.0)), "log₁₀ of the spectral radius [1]", "RdBu_r", -0.3, 0.3),
         Contours(yaw, across, field, [1.0], TRUTH, width=1.4, numbers=""),
         limit,
-        Level(y=LEAST[1], color=GREY, dash="dotted", width=1.2),
-    ]
+        Level(y=LEAST[1], color=GREY, dash="dotted", width=1.2)]  # fmt: skip
     for widths, marker, color in ((WIDE, "o", "black"), (NARROW, "X", "white")):
         plane.append(dots(*widths[:2], color=TRUTH, marker=marker, size=7.0, hollow=True))
         plane.append(Words(1.25 * widths[0], widths[1], f"{radius(widths):.3g}", color, vertical="center"))

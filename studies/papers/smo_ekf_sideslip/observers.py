@@ -12,14 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from estimators import sideslip
 from estimators.arrays import FloatArray
-from estimators.sideslip import (
-    AdaptiveStiffnessObserver,
-    FixedStiffnessObserver,
-    SingleTrack,
-    SlidingModeObserver,
-    wheel_axes,
-)
+from estimators.sideslip import SingleTrack, SlidingModeObserver, wheel_axes
 from studies.papers.smo_ekf_sideslip.inputs import CAR, GRAVITY, SAMPLE_TIME, WHEELBASE, published_car
 
 LINEAR = 1e9  # friction so large that the axles are linear: an observer with the right stiffness has no model error
@@ -49,7 +44,7 @@ def rear_sideslip(
     car: SingleTrack, signals: Signals, state: FloatArray, adaptive: bool = True
 ) -> tuple[FloatArray, FloatArray]:
     """beta_2 (..., n), rad, and stiffness of both axles (..., n, 2), N/rad, by block 2 from the states of block 1."""
-    kind = AdaptiveStiffnessObserver if adaptive else FixedStiffnessObserver
+    kind = sideslip.AdaptiveStiffnessObserver if adaptive else sideslip.FixedStiffnessObserver
     shape = signals.yaw_rate.shape
     observer = kind(car, shape[:-1], SAMPLE_TIME)
     forces = wheel_axes(state, signals.steering)  # P5 (9)

@@ -9,30 +9,19 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from studies.claim import Finding, reproduced
-from studies.papers.smo_ekf_sideslip.inputs import (
-    CAR,
-    FACTORS,
-    GRAVITY,
-    MASSES,
-    PACKAGE,
-    PRINTED,
-    WHEELBASE,
-    published_car,
-)
+from studies.papers.smo_ekf_sideslip import inputs
+from studies.papers.smo_ekf_sideslip.inputs import CAR, FACTORS, MASSES, PRINTED
 from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Line, Mark, Panel, dots
 from studies.plots.colours import BLUE, GREEN, ORANGE, PURPLE, RED, TRUTH
 from studies.study import Cell, Table
 
-TOPIC = Topic(PACKAGE)
+TOPIC = Topic(inputs.PACKAGE)
 LIMIT = 6.0  # %
 # Burckhardt's c1, c2, c3 as commonly tabulated (Burckhardt 1993; Kiencke and Nielsen 2005); P5 names the model, not the values.
 BURCKHARDT = {
-    "dry asphalt": (1.2801, 23.99, 0.52),
-    "wet asphalt": (0.857, 33.822, 0.347),
-    "dry cobblestone": (1.3713, 6.4565, 0.6691),
-    "snow": (0.1946, 94.129, 0.0646),
-}
+    "dry asphalt": (1.2801, 23.99, 0.52), "wet asphalt": (0.857, 33.822, 0.347),
+    "dry cobblestone": (1.3713, 6.4565, 0.6691), "snow": (0.1946, 94.129, 0.0646)}  # fmt: skip
 
 
 @TOPIC.claim("P5-tabs")
@@ -89,7 +78,7 @@ def burckhardt_force(slip: FloatArray, road: str, load: float) -> FloatArray:
 
 
 def _lateral_models() -> Figure:
-    load = CAR.mass * GRAVITY * CAR.rear_axle_distance / WHEELBASE
+    load = CAR.mass * inputs.GRAVITY * CAR.rear_axle_distance / inputs.WHEELBASE
     slip, point = np.radians(np.linspace(0.0, 12.0, 241)), np.radians(6.0)
     secant = float(burckhardt_force(np.array(point), "dry asphalt", load)) / point
     marks: list[Mark] = [
@@ -97,22 +86,19 @@ def _lateral_models() -> Figure:
         for road, color in zip(BURCKHARDT, (BLUE, ORANGE, GREEN, PURPLE), strict=True)
     ]
     # Straight lines up to 10.4 kN, so that they end below the legend.
-    linear, adaptive = (
-        np.where(k * slip < 10.4e3, k * slip / 1e3, np.nan) for k in (published_car().front_stiffness, secant)
-    )
+    stiffnesses = inputs.published_car().front_stiffness, secant
+    linear, adaptive = (np.where(k * slip < 10.4e3, k * slip / 1e3, np.nan) for k in stiffnesses)
     marks.append(Line(np.degrees(slip), linear, "linear, C₁ = 65 kN/rad", TRUTH, "dashed", 1.2))
     marks.append(Line(np.degrees(slip), adaptive, "linear adaptive, through dry asphalt at 6°", RED, width=1.2))
     marks.append(dots(6.0, secant * point / 1e3, color=RED))
     x, y = Axis("front slip angle β₁ [deg]", 0, 12), Axis("front axle lateral force [kN]", 0, 13)
-    return Figure(
-        "lateral-models",
+    return Figure("lateral-models",
         "Fig. 9 of P5: lateral force of the front axle over its slip angle by the linear model with the printed stiffness, "
         "the linear adaptive model (the secant at the present slip angle) and Burckhardt's model on several roads, at the "
         f"static axle load of {load / 1e3:.1f} kN. P5 prints no Burckhardt values; the common ones are used. The adaptive "
         "model needs no road: its slope follows.",
         "Rising curves of force over slip angle: two straight lines and four saturating curves, snow far below asphalt.",
-        Panel(marks, x, y, legend="upper left", columns=2),
-    )
+        Panel(marks, x, y, legend="upper left", columns=2))  # fmt: skip
 
 
 TOPIC.show("tables", "Tables 1 to 5 against the text", 0.2, (), [_printed_forces, _printed_settings], [_lateral_models])

@@ -18,13 +18,13 @@ from studies.papers.topic import Topic
 from studies.plots import Axis, Figure, Panel
 from studies.plots.colours import SETTINGS
 from studies.study import Cell, PartResult, Scope, Table
+from studies.trials import filter_inputs
 from studies.trials.accuracy import ERROR_COLUMNS, SampleSpreads, sample_spreads
 from studies.trials.estimation import assumed_car, measured_runs
-from studies.trials.filter_inputs import PRINTED_TEST, conditions, counted, front_steer, rear_speed
+from studies.trials.filter_inputs import PRINTED_TEST, USE, TireFacts, conditions, tire_facts
 from studies.trials.histories import BANDS, estimate_lines, history, setting_lines, truth_line
 from studies.trials.motion import MotionTest, motion_part
 from studies.trials.simulations import LUGRE, MAGIC_FORMULA, QUICK_SECONDS, trial_part
-from studies.trials.tire_curve import USE, TireFacts, tire_facts
 from studies.truth import Measured, Truth
 
 TOPIC = Topic(PACKAGE)
@@ -79,11 +79,11 @@ def run_axles(drawn: Measured, settings: Sequence[Setting]) -> AxleRun:
 
     Block 1 starts at the greatest true values as in the paper.
     """
-    car, truth, at = assumed_car(drawn), drawn.truth, counted(drawn, 0)
+    car, truth, at = assumed_car(drawn), drawn.truth, filter_inputs.counted(drawn, 0)
     speed, friction = float(truth["vx"][0][at].mean()), float(truth["friction"][0].mean())
     tire = tire_facts(truth.vehicles[0], truth.tires[0], speed, friction)
     yaw_rate, ay, ax = (drawn.signals[name] for name in ("yaw_rate", "ay", "ax"))
-    signals = Signals(yaw_rate, ay, ax, front_steer(drawn), rear_speed(drawn))
+    signals = Signals(yaw_rate, ay, ax, filter_inputs.front_steer(drawn), filter_inputs.rear_speed(drawn))
     true = true_axles(truth)
     start = np.roll(true.max(axis=0), 1)  # the observer's state begins with the yaw rate
     states = {m: axle_forces(single_track(car, tire, m), signals, start) for m in dict.fromkeys(m for m, _ in settings)}
@@ -136,11 +136,10 @@ def _force_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, f
             paper = (own["mean"], own["deviation"]) if who == "sliding mode" else (None, None)
             rows.append([quantity, own["unit"], own["largest"], peak, who, *errors[quantity].cells(paper)])
             measures |= errors[quantity].measures(f"{quantity}, {who}")
-    caption = (
-        "errors (8) of the axle forces (body axes) and of the yaw rate. Static split: m a_y on the axles as in a steady "
-        "turn, m a_x in front, and the gyro as it is."
-    )
-    return Table("forces", caption, ("quantity", "unit", "printed peak", "peak", "estimate", *ERROR_COLUMNS), rows)
+    return Table("forces",
+        "errors (8) of the axle forces (body axes) and of the yaw rate. Static split: m a_y on the axles as in a steady turn, "
+        "m a_x in front, and the gyro as it is.",
+        ("quantity", "unit", "printed peak", "peak", "estimate", *ERROR_COLUMNS), rows)  # fmt: skip
 
 
 def _stiffness_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
@@ -152,12 +151,10 @@ def _stiffness_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[st
             paper = (own[0], own[1]) if who == "adaptive (EKF)" else (None, None)
             rows.append([who, factor, printed["largest"], peak, *errors.cells(paper)])
             measures |= errors.measures(f"beta_2, {who}, stiffness x {factor:g}")
-    caption = (
-        "errors (8) of the rear sideslip by believed cornering stiffness, adapted or fixed (the paper shows the fixed one in "
-        "figures alone)."
-    )
     columns = ("observer", "stiffness setting", "printed peak [deg]", "peak [deg]", *ERROR_COLUMNS)
-    return Table("stiffness", caption, columns, rows)
+    return Table("stiffness",
+        "errors (8) of the rear sideslip by believed cornering stiffness, adapted or fixed (the paper shows the fixed one in "
+        "figures alone).", columns, rows)  # fmt: skip
 
 
 def _mass_table(printed: Mapping[str, Any], run: AxleRun, measures: dict[str, float]) -> Table:
@@ -179,8 +176,7 @@ def _force_history(name: str, title: str, run: AxleRun) -> Figure:
         found = estimate_lines(time, scale * run.forces[0.0][:, :, k], "sliding mode", SETTINGS[1])
         marks = [truth_line(time, scale * run.true_forces[:, k]), *found]
         panels.append(Panel(marks, y=label, legend="" if k else "upper left", columns=2))
-    return history(
-        name,
+    return history(name,
         f"{title}: axle forces and yaw rate of the sliding-mode observer, as Figs. 7 and 8 of P5. It starts from the greatest "
         f"values of the drive. {BANDS}",
         "Four panels over time: front and rear lateral force, front longitudinal force, yaw rate, each with its estimate.",
@@ -203,8 +199,7 @@ def _stiffness_history(name: str, title: str, run: AxleRun) -> Figure:
     for k, axle in enumerate(("front", "rear")):
         marks = setting_lines(run.drawn.truth.time, [1e-3 * value[:, :, k] for value in stiffness], labels)
         panels.append(Panel(marks, y=Axis("" if k else "stiffness [kN/rad]", 0.0), title=f"{axle} axle"))
-    return history(
-        name,
+    return history(name,
         f"{title}: rear sideslip with the believed stiffness times 0.5, 1 and 1.5, fixed and adapted, and the adapted "
         f"stiffness of both axles, as Figs. 12 to 17 of P5. {BANDS}",
         "Upper panels: rear sideslip over time for three settings, fixed left, adapted right. Lower panels: adapted "
@@ -219,8 +214,7 @@ def _mass_history(name: str, title: str, run: AxleRun) -> Figure:
     marks = [truth_line(time, 1e-3 * run.true_forces[:, 0]), *forces]
     force = Panel(marks, y="$F_{y1}$ [kN]", legend="upper left", columns=4)
     slip = _sideslip(run, [run.adaptive[mass, 1.0] for mass in masses], labels, "rear sideslip [deg]")
-    return history(
-        name,
+    return history(name,
         f"{title}: front axle force and rear sideslip by believed mass, as Fig. 18 of P5. {BANDS}",
         "Front lateral force and rear sideslip over time for three believed masses.",
         [force, slip], (9.0, 5.0))  # fmt: skip
@@ -228,15 +222,13 @@ def _mass_history(name: str, title: str, run: AxleRun) -> Figure:
 
 MOTION = (
     MotionTest("p5-slalom", "Slalom, dry (Fig. 5)", course=True),
-    MotionTest("p5-roundabout", "Roundabout, dry (Fig. 6)", course=True),
-)
-_slalom = partial(axle_part, "slalom", "Slalom", "slalom")
-_other_tire = partial(axle_part, "slalom-other-tire", "Slalom, other tire", "slalom")
-_OTHER_TITLE = "Tables 1, 3 and 5 on a tire with another shape: Magic Formula with slip lag"
-_roundabout = partial(axle_part, "roundabout", "Roundabout", "roundabout")
-_motion = partial(motion_part, "motion", MOTION)
+    MotionTest("p5-roundabout", "Roundabout, dry (Fig. 6)", course=True))  # fmt: skip
 TOPIC.parts.extend([
-    trial_part("slalom-driven", "Tables 1, 3 and 5 on the truth vehicle: slalom", _slalom, 43.0, quick=True),
-    trial_part("slalom-other-tire", _OTHER_TITLE, _other_tire, 45.0, MAGIC_FORMULA),
-    trial_part("roundabout-driven", "Tables 2 and 4 on the truth vehicle: roundabout", _roundabout, 43.0),
-    trial_part("motion", "Figs. 5 and 6 on the truth vehicle: path and accelerations", _motion, 5.0)])  # fmt: skip
+    trial_part("slalom-driven", "Tables 1, 3 and 5 on the truth vehicle: slalom",
+               partial(axle_part, "slalom", "Slalom", "slalom"), 43.0, quick=True),
+    trial_part("slalom-other-tire", "Tables 1, 3 and 5 on a tire with another shape: Magic Formula with slip lag",
+               partial(axle_part, "slalom-other-tire", "Slalom, other tire", "slalom"), 45.0, MAGIC_FORMULA),
+    trial_part("roundabout-driven", "Tables 2 and 4 on the truth vehicle: roundabout",
+               partial(axle_part, "roundabout", "Roundabout", "roundabout"), 43.0),
+    trial_part("motion", "Figs. 5 and 6 on the truth vehicle: path and accelerations",
+               partial(motion_part, "motion", MOTION), 5.0)])  # fmt: skip

@@ -56,9 +56,8 @@ TOPIC.show("fixed-stiffness", "In which direction a fixed stiffness errs", 2.0)
 def stiffness_part(scope: Scope) -> PartResult:
     """Three settings of the stiffness, fixed and adaptive."""
     run, cars = _slalom(scope), [published_car(stiffness_factor=factor) for factor in FACTORS]
-    fixed, adaptive = estimates(run, cars, adaptive=False), estimates(run, cars)
-    tables, drawings = [stiffness_table(run, fixed, adaptive)], [stiffness_figure(run, fixed, adaptive)]
-    return PartResult((), tables, drawings, [MODEL_NOTE])
+    both = estimates(run, cars, adaptive=False), estimates(run, cars)
+    return PartResult((), [stiffness_table(run, *both)], [stiffness_figure(run, *both)], [MODEL_NOTE])
 
 
 @TOPIC.part("zones", "Zones of the sideslip filter", 2.0)
