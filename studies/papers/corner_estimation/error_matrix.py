@@ -97,9 +97,8 @@ def error_matrix(scope: Scope) -> PartResult:
     caption = f"Poles of the velocity observer error A - L C with the printed gains {gains} at constant wheel speed."
     figure = Figure(
         "poles",
-        "Real parts of the two poles of the velocity observer error over wheel speed, with the printed gains. With "
-        "entry (1,2) of A0 as printed, without its one, a pole lies at zero at standstill (dot): nothing could be "
-        "proved. P1 (26).",
+        "Real parts of the two poles of the velocity observer error over wheel speed, with the printed gains. With entry (1,2) "
+        "of A0 as printed, without its one, a pole lies at zero at standstill (dot): nothing could be proved. P1 (26).",
         "Two panels, longitudinal and lateral. Corrected poles stay below zero; the printed ones reach zero at standstill.",
         panels, legend="below",
     )  # fmt: skip

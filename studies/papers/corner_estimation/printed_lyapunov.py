@@ -156,10 +156,9 @@ def printed_slopes_are_multi_convex(slopes: dict[Direction, list[list[str]]] | N
     lowest = [low for d in CORNERS for low, _ in computed[d]["eigenvalues"].values()]
     shown = "; ".join("{} {:.3g}, {:.3g}".format(d, *computed[d]["eigenvalues"]["primal"]) for d in CORNERS)
     reading = (
-        "Column 2 of A1 is zero, so entry (2,2) of the condition is zero and its determinant is minus the square "
-        "of entry (1,2): it can hold only if that entry vanishes. Eigenvalues of the condition as printed: "
-        f"{shown}. Of {len(lowest)} readings (two matrices, as printed, exchanged, dual, adjugate) "
-        f"{sum(low >= 0.0 for low in lowest)} meet it."
+        "Column 2 of A1 is zero, so entry (2,2) of the condition is zero and its determinant is minus the square of entry "
+        f"(1,2): it can hold only if that entry vanishes. Eigenvalues of the condition as printed: {shown}. Of {len(lowest)} "
+        f"readings (two matrices, as printed, exchanged, dual, adjugate) {sum(low >= 0.0 for low in lowest)} meet it."
     )
     return Finding(computed, reproduced(all(holds)), reading)
 
@@ -175,9 +174,8 @@ def printed_lyapunov(scope: Scope) -> PartResult:
         worst = float(np.nanmax(offered.growth(np.linspace(0.0, STATED_SPEED, 361))))
         rows.append([NUMBERS[direction], direction, name, found.everywhere, where, worst])
     caption = (
-        f"The printed Lyapunov matrices in four readings, judged exactly on 0 to {STATED_SPEED:g} rad/s at wheel "
-        "accelerations of +-800 rad/s^2: where all inequalities hold, and the largest growth rate of V on a grid "
-        "of 0.5 rad/s."
+        f"The printed Lyapunov matrices in four readings, judged exactly on 0 to {STATED_SPEED:g} rad/s at wheel accelerations "
+        "of +-800 rad/s^2: where all inequalities hold, and the largest growth rate of V on a grid of 0.5 rad/s."
     )
     columns = ["matrix", "direction", "reading", "holds on the whole range", "holds on [rad/s]",
                "largest growth rate [1/s]"]  # fmt: skip

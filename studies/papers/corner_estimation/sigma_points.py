@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_discrete_are
@@ -21,39 +20,28 @@ from studies.study import PartResult, Scope, Table
 
 TOPIC = topic()
 BETA = 2  # of P1 and P2
+SPREAD = Fraction(3)  # N + eta = epsilon^2 N = tau^2
 SIZES = (3, 1)  # states of the lateral filter of P1, and of the force filter of P2
 STEP = 0.005  # s
 Form = Literal["printed", "corrected"]
 FORMS: tuple[Form, Form] = ("printed", "corrected")
 
 
-@dataclass(frozen=True)
-class Weights:
-    """W0m, W0c and the common weight of the 2 N outer points; tau^2 = N + eta."""
+class Weights(NamedTuple):
+    """W0m, W0c, the weight of the 2 N outer points; the sum of the mean's and the variance per axis, which must be one."""
 
-    size: int
     centre_mean: Fraction
     centre_spread: Fraction
     outer: Fraction
-    tau_squared: Fraction
-
-    @property
-    def total(self) -> Fraction:
-        """What the weights of the mean add up to; must be one."""
-        return self.centre_mean + 2 * self.size * self.outer
-
-    @property
-    def second_moment(self) -> Fraction:
-        """Variance of the sigma points along one axis over that of the density, 2 W_i tau^2; must be one."""
-        return 2 * self.outer * self.tau_squared
+    total: Fraction
+    second_moment: Fraction
 
 
 def weights(size: int, form: Form) -> Weights:
     """For N states with epsilon^2 = 3/N: W_i = (N + eta)/2 as printed, 1/(2 (N + eta)) corrected."""
-    epsilon_squared, spread = Fraction(3, size), Fraction(3)  # N + eta = epsilon^2 N
-    centre = (spread - size) / spread
-    outer = spread / 2 if form == "printed" else 1 / (2 * spread)
-    return Weights(size, centre, centre + 1 - epsilon_squared + BETA, outer, spread)
+    centre = (SPREAD - size) / SPREAD
+    outer = SPREAD / 2 if form == "printed" else 1 / (2 * SPREAD)
+    return Weights(centre, centre + 1 - SPREAD / size + BETA, outer, centre + 2 * size * outer, 2 * outer * SPREAD)
 
 
 @TOPIC.claim("P1-ukf")
@@ -62,17 +50,17 @@ def sums_of_the_weights(printed_form: Form = "printed", sizes: tuple[int, ...] =
     wrong, right = ([weights(n, form) for n in sizes] for form in (printed_form, FORMS[1]))
     entries = {"outer_weight": "outer", "sum_of_mean_weights": "total", "second_moment": "second_moment"}
     computed = {
-        f"N={w.size}": {
-            "N_plus_eta": float(w.tau_squared), "centre_weights": [float(w.centre_mean), float(w.centre_spread)],
+        f"N={size}": {
+            "N_plus_eta": float(SPREAD), "centre_weights": [float(w.centre_mean), float(w.centre_spread)],
             **{name: {"printed": float(getattr(printed, of)), "corrected": float(getattr(w, of))}
                for name, of in entries.items()},
         }
-        for printed, w in zip(wrong, right, strict=True)
+        for size, printed, w in zip(sizes, wrong, right, strict=True)
     }  # fmt: skip
-    sums = ", ".join(f"{w.total} for N = {w.size}" for w in wrong)
+    sums = ", ".join(f"{w.total} for N = {size}" for size, w in zip(sizes, wrong, strict=True))
     reading = (
         f"(N + eta)/2 gives mean weights that add up to {sums}. 1/(2 (N + eta)) gives {right[0].outer}, "
-        f"a sum of {right[0].total} and the right second moment, with tau = sqrt({right[0].tau_squared})."
+        f"a sum of {right[0].total} and the right second moment, with tau = sqrt({SPREAD})."
     )
     good = [all(w.total == 1 and w.second_moment == 1 for w in form) for form in (wrong, right)]
     return Finding(computed, erratum(*good), reading)
@@ -95,12 +83,11 @@ def filter_lag(process: float, measurement: float, newtons: float) -> float:
 def sigma_weights(scope: Scope) -> PartResult:
     """Weights of both papers in both forms, and the lag of the filter in every reading of its covariances."""
     found = {(f"N = {n}", form): weights(n, form) for n, form in product(SIZES, FORMS)}
-    entries = ("centre_mean", "centre_spread", "outer", "total", "second_moment")
     weight_table = Table(
         "sigma-weights",
         "Sigma point weights with epsilon = sqrt(3/N), beta = 2 in rational numbers; sum and second moment must be one.",
         ["states", "form", "W0 of the mean", "W0 of the covariance", "W_i", "sum of the mean weights", "second moment"],
-        [[*names, *(str(getattr(w, entry)) for entry in entries)] for names, w in found.items()],
+        [[*names, *map(str, w)] for names, w in found.items()],
     )
     units = (("N", 1.0), ("kN", 1e3))
     readings = (entry.values() for entry in printed_numbers(PACKAGE)["force_filter"]["readings"])

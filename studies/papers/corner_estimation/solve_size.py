@@ -56,7 +56,6 @@ def one_by_one(relaxed: RelaxedProblem) -> Any:
 
 def expressions(problem: Any) -> int:
     """Nodes in the expression trees of all constraints: the layer visits each before the solver sees anything."""
-
     stack, count = list(problem.constraints), 0
     while stack:
         stack += stack.pop().args

@@ -18,21 +18,18 @@ from studies.papers.corner_estimation import (
     wheel_force,
 )
 from studies.papers.corner_estimation.inputs import PARAMETERS
-from studies.papers.parameter_table import parameter_part
-from studies.study import Part, Study
+from studies.papers.topic import constants_part
+from studies.study import Study
 from studies.trials.forces import ForceTest, differentiated_pid, force_part
 from studies.trials.motion import MotionTest, motion_part
 from studies.trials.simulations import MAGIC_FORMULA, trial_part
 from studies.trials.velocities import VelocityTest, corner_observers, velocity_part
 
-CONSTANTS = "Vehicle and tire constants of P1, as every result of this study uses them."
-TOPICS = (
-    error_matrix.TOPIC, printed_lyapunov.TOPIC, quadratic_stability.TOPIC, conditioning.TOPIC, hinf_design.TOPIC,
-    solve_size.TOPIC, wheel_force.TOPIC, sigma_points.TOPIC, observability.TOPIC, loads.TOPIC, accuracy.TOPIC,
-)  # fmt: skip
-CLAIMS = {name: compute for topic in TOPICS for name, compute in topic.claims.items()}
-"""What computes each claim, by its id."""
-
+TOPICS = [topic.TOPIC for topic in (
+    error_matrix, printed_lyapunov, quadratic_stability, conditioning, hinf_design, solve_size, wheel_force, sigma_points,
+    observability, loads, accuracy,
+)]  # fmt: skip
+CLAIMS = {name: compute for topic in TOPICS for name, compute in topic.claims.items()}  # by the id of the claim
 OBSERVERS = corner_observers(PARAMETERS)
 # Table III: NRMS in % and peaks in m/s of V_x and V_y.
 ALL_WHEEL = (
@@ -62,6 +59,7 @@ MOTION = (
     MotionTest("p1-acceleration-left-turn-wet-dry", "Acceleration and left turn, wet to dry (Fig. 13)"),
 )
 
+CONSTANTS = constants_part(PARAMETERS, "Vehicle and tire constants of P1, as every result of this study uses them.")
 EXPERIMENTS = (
     trial_part("table-3-all-wheel-drive", "Table III on the truth vehicle: all-wheel drive",
                 partial(velocity_part, "all-wheel-drive", ALL_WHEEL, OBSERVERS), cost=55.0, quick=True),
@@ -84,9 +82,5 @@ STUDY = Study(
     "Forces at each wheel from spin and planar dynamics, normalised and fed to a two-state bristle observer at each "
     "corner, with gains scheduled over wheel speed. Recomputed: the error dynamics and their Lyapunov proofs, the "
     "H-infinity design and its gains, the force observers, loads, observability and the accuracy that the text claims.",
-    (
-        Part("parameters", "Table I: vehicle and tire", partial(parameter_part, PARAMETERS, CONSTANTS), 0.1),
-        *(part for topic in TOPICS for part in topic.parts),
-        *EXPERIMENTS,
-    ),
+    (CONSTANTS, *(part for topic in TOPICS for part in topic.parts), *EXPERIMENTS),
 )

@@ -11,7 +11,6 @@ from pint import UnitRegistry
 from studies.claim import Finding, reproduced
 from studies.papers.longitudinal_speed.inputs import parameters, speed_model, topic
 from studies.papers.verdicts import erratum
-from studies.study import PartResult, Scope
 
 TOPIC = topic()
 
@@ -32,9 +31,8 @@ def descriptor_form(M: tuple[tuple[int, ...], ...] = ((1, 0, 0), (0, 1, 0), (0, 
                 "third_row_minus_derivative_of_the_first": str(mismatch)}  # fmt: skip
     same = sp.Matrix(model.A) == A and sp.Matrix(model.B) == B
     reading = (
-        f"M^-1 gives B = {computed['B']}' and {'leaves' if same else 'does not leave'} A as it is; the third row is z'' = "
-        f"V_r' - kappa R_e w' z - kappa R_e w z', which differs from d/dt of the bristle equation by {mismatch} (friction "
-        "left out)."
+        f"M^-1 gives B = {computed['B']}' and {'leaves' if same else 'does not leave'} A as it is; the third row is z'' = V_r' "
+        f"- kappa R_e w' z - kappa R_e w z', which differs from d/dt of the bristle equation by {mismatch} (friction left out)."
     )
     return Finding(computed, reproduced(mismatch == 0 and same), reading)
 
@@ -76,7 +74,4 @@ def effective_radius(printed: dict[str, float] | None = None) -> Finding:
     return Finding(computed, erratum(values["table"] == values["text"], values["table"] == sister), reading)
 
 
-@TOPIC.part("model", "Model, patch constant and radius")
-def model(scope: Scope) -> PartResult:
-    """The model as printed, the patch constant and the radius."""
-    return PartResult(TOPIC.found())
+TOPIC.show("model", "Model, patch constant and radius")

@@ -69,12 +69,8 @@ def rank_over_the_region(accelerations: tuple[object, ...] = (0, 1, "-5")) -> Fi
 @cache
 def histories() -> tuple[inputs.WheelRecord, ...]:
     """Wheel speed histories of the kinds that Fig. 1 covers, 6 s each; constant speed is ours."""
-    return (
-        inputs.launch(2.0, 6.0),
-        inputs.slalom(45.0, 4.0, 0.5, 6.0),
-        inputs.braking(80.0, 25.0, 6.0),
-        inputs.constant(40.0, 1200),
-    )
+    turning = inputs.slalom(45.0, 4.0, 0.5, 6.0)
+    return inputs.launch(2.0, 6.0), turning, inputs.braking(80.0, 25.0, 6.0), inputs.constant(40.0, 1200)
 
 
 def gramian_rank(record: inputs.WheelRecord) -> Ranks:

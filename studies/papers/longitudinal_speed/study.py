@@ -19,23 +19,22 @@ from studies.papers.longitudinal_speed.accuracy import FORCES, LOADS
 from studies.papers.longitudinal_speed.inputs import PARAMETERS
 from studies.papers.longitudinal_speed.speed_trial import speed_part
 from studies.papers.longitudinal_speed.truth_records import truth_part
-from studies.papers.parameter_table import parameter_part
-from studies.study import Part, Study
+from studies.papers.topic import constants_part
+from studies.study import Study
 from studies.trials.estimation import Parts
 from studies.trials.forces import ForceTest, force_part
 from studies.trials.motion import MotionTest, motion_part
 from studies.trials.simulations import trial_part
 
-CONSTANTS = (
+CONSTANTS = constants_part(
+    PARAMETERS,
     "Vehicle and tire constants of P2, as every result of this study uses them; of the two radii that it prints, 0.35 m in "
-    "the text and 0.33 m in Table I, that of the text."
+    "the text and 0.33 m in Table I, that of the text.",
 )
-TOPICS = (
-    model.TOPIC, observability.TOPIC, stochastic_observability.TOPIC, steady_filter.TOPIC,
-    unknown_input_observer.TOPIC, slip_threshold.TOPIC, accuracy.TOPIC,
-)  # fmt: skip
-CLAIMS = {name: compute for topic in TOPICS for name, compute in topic.claims.items()}
-"""What computes each claim, by its id."""
+TOPICS = [topic.TOPIC for topic in (
+    model, observability, stochastic_observability, steady_filter, unknown_input_observer, slip_threshold, accuracy,
+)]  # fmt: skip
+CLAIMS = {name: compute for topic in TOPICS for name, compute in topic.claims.items()}  # by the id of the claim
 
 
 def _printed(k: int) -> dict[tuple[str, str, str], float]:
@@ -76,8 +75,6 @@ MOTION = (
     MotionTest("p2-brake-in-turn-snow", "Braking in a turn and accelerating, snow (Fig. 12)"),
     MotionTest("p2-harsh-steering-ice", "Harsh steering, snow and ice (Fig. 12)"),
 )
-
-
 OBSERVERS: dict[str, Parts] = {
     # in its linear form: the model is linear, so both are equal to round-off, and this one is faster
     "UKF": lambda car, step, shape: {"longitudinal_force": WheelForceFilter(car, step, (*shape, 4), method="linear")},
@@ -91,8 +88,7 @@ EXPERIMENTS = (
                 partial(speed_part, "fig-9", FIG_9), 79.0),
     trial_part("speed-fig-10", "Figs. 10 and 11 on the truth vehicle: wet, then dry",
                 partial(speed_part, "fig-10", FIG_10), 54.0, quick=True),
-    trial_part("speed-fig-12", "Figs. 12 and 13 on the truth vehicle: snow and ice",
-                partial(speed_part, "fig-12", FIG_12), 69.0),
+    trial_part("speed-fig-12", "Figs. 12 and 13 on the truth vehicle: snow and ice", partial(speed_part, "fig-12", FIG_12), 69.0),
     trial_part("tests-driven", "Figs. 1 to 3 on the truth vehicle: gramian and unknown start", truth_part, 8.0),
     trial_part("motion", "Figs. 7, 8, 10 and 12 on the truth vehicle: accelerations, yaw rate, rear wheels",
                 partial(motion_part, "motion", MOTION), 5.0),
@@ -105,9 +101,5 @@ STUDY = Study(
     "Wheel forces from a simple unknown-input observer or a UKF, normalised and fed to a three-state time-varying Kalman "
     "filter at each wheel. Recomputed: the model, its observability, what an unknown initial state does to the filter, the "
     "recursions of the appendix, the bound of the force observer, the slip threshold and the accuracy that the text claims.",
-    (
-        Part("parameters", "Table I: vehicle and tire", partial(parameter_part, PARAMETERS, CONSTANTS), 0.1),
-        *(part for topic in TOPICS for part in topic.parts),
-        *EXPERIMENTS,
-    ),
+    (CONSTANTS, *(part for topic in TOPICS for part in topic.parts), *EXPERIMENTS),
 )
