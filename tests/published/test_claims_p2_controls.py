@@ -8,25 +8,24 @@ import pytest
 
 from studies.claim import ClaimVerdict, Finding
 from studies.papers.longitudinal_speed import (
-    accuracy,
     model,
     observability,
     slip_threshold,
     steady_filter,
     stochastic_observability,
+    study,
     unknown_input_observer,
 )
 from studies.papers.longitudinal_speed.inputs import constant
-from studies.papers.longitudinal_speed.study import CLAIMS
 from tests.support.p2_findings import finding
 
 
 def without_the_worse_cells() -> Finding:
-    rows = [list(row) for row in accuracy.FORCES]
+    rows = [list(row) for row in study.FORCES]
     for row in rows:
         for k in (1, 3, 5):
             row[k + 1] = max(row[k + 1], row[k] + 0.01)
-    return accuracy.force_table(rows)
+    return study.force_table(rows)
 
 
 CONTROLS: dict[str, tuple[Callable[[], Finding], ClaimVerdict]] = {
@@ -49,7 +48,7 @@ CONTROLS: dict[str, tuple[Callable[[], Finding], ClaimVerdict]] = {
 
 
 def test_every_claim_can_fall() -> None:
-    assert set(CONTROLS) == set(CLAIMS)
+    assert set(CONTROLS) == set(study.CLAIMS)
 
 
 @pytest.mark.parametrize("name", CONTROLS)

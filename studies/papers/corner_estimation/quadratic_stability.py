@@ -42,7 +42,7 @@ def diagonal_proof(corner: Corner, box: Box, weight: int | None = None) -> dict[
     lows, highs = zip(*map(admissible, matrices), strict=True)
     low, high = max(lows), min(highs)
     if weight is None:
-        weight = _round(float(np.sqrt(low * high))) if 0.0 < low < high else 1
+        weight = round(float(f"{np.sqrt(low * high):.2g}")) if 0.0 < low < high else 1
     proved = all(decreases(matrix, weight) for matrix in matrices)
     return {"weights_of_diag_w_1": [low, high], "weight": weight, "proved_exactly": proved}
 
@@ -73,12 +73,6 @@ def decreases(A_e: sp.Matrix, weight: int) -> bool:
     P = sp.diag(weight, 1)
     total = -(A_e.T * P + P * A_e)
     return bool(total[0, 0] > 0 and total.det() > 0)
-
-
-def _round(value: float, digits: int = 2) -> int:
-    """To so many significant digits."""
-    step = int(10 ** max(int(np.floor(np.log10(value))) + 1 - digits, 0))
-    return round(value / step) * step
 
 
 @TOPIC.claim("P1-aqs-feas")

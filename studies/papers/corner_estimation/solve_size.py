@@ -26,6 +26,7 @@ from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import solve
 
 TOPIC = topic()
+Layer = Callable[[RelaxedProblem], Any]
 
 
 def conic_problem(points: int, degree: int) -> tuple[LmiProblem, LmiSettings]:
@@ -61,9 +62,6 @@ def expressions(problem: Any) -> int:
         stack += stack.pop().args
         count += 1
     return count
-
-
-Layer = Callable[[RelaxedProblem], Any]
 
 
 @TOPIC.claim("P1-hinf-time")

@@ -39,7 +39,8 @@ def slip_threshold(width: sp.Expr = PRINTED_WIDTH) -> Finding:
     printed, right = limits(width), limits(CORRECTED_WIDTH)
     (low, high), corrected = map(float, printed), [*map(float, right)]
     runtime = [float(adaptive_threshold(v, LOWER, UPPER, STEEPNESS)) for v in (0.0, 1e9)]
-    sizes = {"printed": [low, high], "corrected": corrected, "runtime": runtime}
+    found = {"printed": [low, high], "corrected": corrected, "runtime": runtime}
+    computed = {"lambda_l": LOWER, "lambda_u": UPPER, **found}
     reading = (
         f"With phi_e as printed the threshold is lambda_u - 1/(lambda_u - lambda_l) = {low:.4f} without excitation, for "
         f"lambda_l = {LOWER:g}, lambda_u = {UPPER:g}: every slip would count as high. With its reciprocal it is exactly "
@@ -48,11 +49,7 @@ def slip_threshold(width: sp.Expr = PRINTED_WIDTH) -> Finding:
         else f"With this phi_e the threshold runs from {low:.4g} to {high:.4g}."
     )
     runtime_holds = abs(runtime[0] - LOWER) < 1e-12 and abs(runtime[1] - UPPER) < 1e-12
-    return Finding(
-        {"lambda_l": LOWER, "lambda_u": UPPER, **sizes},
-        erratum(printed == LIMITS, right == LIMITS and runtime_holds),
-        reading,
-    )
+    return Finding(computed, erratum(printed == LIMITS, right == LIMITS and runtime_holds), reading)
 
 
 @TOPIC.part("high-slip", "Adaptive slip threshold")
