@@ -9,16 +9,14 @@ import pytest
 from studies.claim import ClaimVerdict, Finding
 from studies.papers.corner_estimation import (
     accuracy,
-    conditioning,
     error_matrix,
+    force_observers,
     hinf_design,
     loads,
     observability,
     printed_lyapunov,
     quadratic_stability,
-    sigma_points,
     solve_size,
-    wheel_force,
 )
 from studies.papers.corner_estimation.inputs import DESIGNS, PACKAGE, parameters
 from studies.papers.corner_estimation.study import CLAIMS
@@ -81,7 +79,7 @@ CONTROLS: dict[str, tuple[Callable[[], Finding], ClaimVerdict]] = {
         ),
         ClaimVerdict.NOT_REPRODUCED,
     ),
-    "P1-aqs-scale": (lambda: conditioning.scaling(scaled=False), ClaimVerdict.NOT_REPRODUCED),
+    "P1-aqs-scale": (lambda: quadratic_stability.scaling(scaled=False), ClaimVerdict.NOT_REPRODUCED),
     "P1-30-sign": (lambda: hinf_design.sign_of_the_disturbance(-1), ClaimVerdict.REPRODUCED),
     "P1-hinf-gamma": (lambda: hinf_design.least_gamma_by_degree(20, tolerance=1e-9), ClaimVerdict.NOT_REPRODUCED),
     "P1-hinf-figs": (
@@ -90,10 +88,10 @@ CONTROLS: dict[str, tuple[Callable[[], Finding], ClaimVerdict]] = {
     ),
     # a count that does not grow with the points: the inequalities by name instead of one by one
     "P1-hinf-time": (lambda: solve_size.solve_size(10, walked=lambda problem: 2), ClaimVerdict.NOT_REPRODUCED),
-    "P1-ukf": (lambda: sigma_points.sums_of_the_weights("corrected"), ClaimVerdict.REPRODUCED),
+    "P1-ukf": (lambda: force_observers.sums_of_the_weights("corrected"), ClaimVerdict.REPRODUCED),
     "P1-loads": (heavier, ClaimVerdict.NOT_REPRODUCED),
-    "P1-pid-K": (lambda: wheel_force.wheel_error((1.8, -11.4)), ClaimVerdict.NOT_REPRODUCED),
-    "P1-prop1": (lambda: wheel_force.force_bound(eta3=20.0), ClaimVerdict.NOT_REPRODUCED),
+    "P1-pid-K": (lambda: force_observers.wheel_error((1.8, -11.4)), ClaimVerdict.NOT_REPRODUCED),
+    "P1-prop1": (lambda: force_observers.force_bound(eta3=20.0), ClaimVerdict.NOT_REPRODUCED),
     "P1-O3": (lambda: observability.lateral_force_rank("none"), ClaimVerdict.NOT_REPRODUCED),
     "P1-tab3": (
         lambda: accuracy.velocity_table([r for r in printed_numbers(PACKAGE)["table_3"]["rows"] if r[0] == "AWD"]),

@@ -9,7 +9,6 @@ import pytest
 from studies.claim import ClaimVerdict, Finding
 from studies.papers.longitudinal_speed import (
     model,
-    observability,
     slip_threshold,
     steady_filter,
     stochastic_observability,
@@ -32,7 +31,7 @@ CONTROLS: dict[str, tuple[Callable[[], Finding], ClaimVerdict]] = {
     "P2-19M": (lambda: model.descriptor_form(((1, 0, 0), (0, 1, 0), (0, 1, 1))), ClaimVerdict.NOT_REPRODUCED),
     "P2-kappa": (lambda: model.patch_constant("7/(6 L)"), ClaimVerdict.REPRODUCED),
     "P2-Re": (lambda: model.effective_radius({"table": 0.33, "text": 0.33}), ClaimVerdict.REPRODUCED),
-    "P2-O3": (lambda: observability.rank_over_the_region((1, "-5")), ClaimVerdict.REPRODUCED),
+    "P2-O3": (lambda: model.rank_over_the_region((1, "-5")), ClaimVerdict.REPRODUCED),
     "P2-test1": (lambda: stochastic_observability.time_of_test_1({"one reading": 0.015}), ClaimVerdict.NOT_REPRODUCED),
     # a wheel at rest leaves an integrator that no sample sees
     "P2-test2": (

@@ -6,16 +6,14 @@ from functools import partial
 
 from studies.papers.corner_estimation import (
     accuracy,
-    conditioning,
     error_matrix,
+    force_observers,
     hinf_design,
     loads,
     observability,
     printed_lyapunov,
     quadratic_stability,
-    sigma_points,
     solve_size,
-    wheel_force,
 )
 from studies.papers.corner_estimation.inputs import PARAMETERS
 from studies.papers.topic import constants_part
@@ -26,8 +24,7 @@ from studies.trials.simulations import MAGIC_FORMULA, trial_part
 from studies.trials.velocities import VelocityTest, corner_observers, velocity_part
 
 TOPICS = [topic.TOPIC for topic in (
-    error_matrix, printed_lyapunov, quadratic_stability, conditioning, hinf_design, solve_size, wheel_force, sigma_points,
-    observability, loads, accuracy,
+    error_matrix, printed_lyapunov, quadratic_stability, hinf_design, solve_size, force_observers, observability, loads, accuracy,
 )]  # fmt: skip
 CLAIMS = {name: compute for topic in TOPICS for name, compute in topic.claims.items()}  # by the id of the claim
 OBSERVERS = corner_observers(PARAMETERS)
@@ -65,8 +62,7 @@ EXPERIMENTS = (
                 partial(velocity_part, "all-wheel-drive", ALL_WHEEL, OBSERVERS), cost=55.0, quick=True),
     trial_part("table-3-rear-wheel-drive", "Table III on the truth vehicle: rear-wheel drive",
                 partial(velocity_part, "rear-wheel-drive", REAR_WHEEL, OBSERVERS), cost=70.0),
-    trial_part("table-3-oval", "Table III on the truth vehicle: oval",
-                partial(velocity_part, "oval", OVAL, OBSERVERS), cost=50.0),
+    trial_part("table-3-oval", "Table III on the truth vehicle: oval", partial(velocity_part, "oval", OVAL, OBSERVERS), 50.0),
     trial_part("table-3-other-tire", "Table III on a tire that no estimator knows: Magic Formula with slip lag",
                 partial(velocity_part, "other-tire", ALL_WHEEL, OBSERVERS), cost=58.0, tire=MAGIC_FORMULA),
     trial_part("forces", "Figs. 6 to 8 on the truth vehicle: forces",
@@ -76,11 +72,9 @@ EXPERIMENTS = (
 )  # fmt: skip
 
 STUDY = Study(
-    PARAMETERS,
-    "Corner-based estimation of tire forces and vehicle velocities",
-    "P1",
+    PARAMETERS, "Corner-based estimation of tire forces and vehicle velocities", "P1",
     "Forces at each wheel from spin and planar dynamics, normalised and fed to a two-state bristle observer at each "
     "corner, with gains scheduled over wheel speed. Recomputed: the error dynamics and their Lyapunov proofs, the "
     "H-infinity design and its gains, the force observers, loads, observability and the accuracy that the text claims.",
     (CONSTANTS, *(part for topic in TOPICS for part in topic.parts), *EXPERIMENTS),
-)
+)  # fmt: skip

@@ -13,7 +13,6 @@ from estimators.vehicle import CORNERS
 from studies.claim import Finding
 from studies.papers.longitudinal_speed import (
     model,
-    observability,
     slip_threshold,
     steady_filter,
     stochastic_observability,
@@ -159,15 +158,13 @@ EXPERIMENTS = (
                 partial(motion_part, "motion", MOTION), 5.0),
 )  # fmt: skip
 
-EARLIER = (model, observability, stochastic_observability, steady_filter, unknown_input_observer, slip_threshold)
+EARLIER = (model, stochastic_observability, steady_filter, unknown_input_observer, slip_threshold)
 TOPICS = [*(earlier.TOPIC for earlier in EARLIER), TOPIC]
 CLAIMS = {name: compute for each in TOPICS for name, compute in each.claims.items()}  # by the id of the claim
 STUDY = Study(
-    PARAMETERS,
-    "Longitudinal speed estimation robust to road conditions",
-    "P2",
+    PARAMETERS, "Longitudinal speed estimation robust to road conditions", "P2",
     "Wheel forces from a simple unknown-input observer or a UKF, normalised and fed to a three-state time-varying Kalman "
     "filter at each wheel. Recomputed: the model, its observability, what an unknown initial state does to the filter, the "
     "recursions of the appendix, the bound of the force observer, the slip threshold and the accuracy that the text claims.",
     (CONSTANTS, *(part for each in TOPICS for part in each.parts), *EXPERIMENTS),
-)
+)  # fmt: skip

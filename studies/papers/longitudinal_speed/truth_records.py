@@ -9,7 +9,7 @@ import numpy as np
 
 from estimators.velocity.slip import LEAST_SPEED
 from studies.papers.longitudinal_speed.inputs import SAMPLE_TIME, WheelRecord, speed_model
-from studies.papers.longitudinal_speed.observability import Ranks, gramian_rank, rank_panels
+from studies.papers.longitudinal_speed.model import Ranks, gramian_rank, rank_panels
 from studies.papers.longitudinal_speed.stochastic_observability import TOPIC, both_tests, covariance_panels
 from studies.plots import DASHES, Axis, Figure, colours
 from studies.study import Cell, PartResult, Scope, Table
