@@ -9,12 +9,11 @@ import pytest
 from studies.claim import ClaimVerdict, Finding
 from studies.papers.corner_estimation import (
     accuracy,
-    error_matrix,
+    error_dynamics,
     force_observers,
     hinf_design,
     loads,
     observability,
-    printed_lyapunov,
     quadratic_stability,
     solve_size,
 )
@@ -33,36 +32,36 @@ def heavier() -> Finding:
 
 CONTROLS: dict[str, tuple[Callable[[], Finding], ClaimVerdict]] = {
     "P1-26": (
-        lambda: error_matrix.entry_of_the_error_matrix(1 - error_matrix.L1 * error_matrix.P1),
+        lambda: error_dynamics.entry_of_the_error_matrix(1 - error_dynamics.L1 * error_dynamics.P1),
         ClaimVerdict.REPRODUCED,
     ),
-    "P1-C-abs": (lambda: error_matrix.absolute_value(signed=False), ClaimVerdict.REPRODUCED),
+    "P1-C-abs": (lambda: error_dynamics.absolute_value(signed=False), ClaimVerdict.REPRODUCED),
     # the dual matrix turned round is a true primal one: P = adj(Q) of the longitudinal print
     "P1-29-primal": (
-        lambda: printed_lyapunov.primal(
+        lambda: error_dynamics.primal(
             "longitudinal",
             [[["80379.0", "-115.35"], ["-115.35", "1.2176"]], [["-67.969", "0.2227"], ["0.2227", "-0.0011"]]],
         ),
         ClaimVerdict.REPRODUCED,
     ),
     "P1-41-primal": (
-        lambda: printed_lyapunov.primal("lateral", [[["67000", "0"], ["0", "1"]], [["0", "0"], ["0", "0"]]]),
+        lambda: error_dynamics.primal("lateral", [[["67000", "0"], ["0", "1"]], [["0", "0"], ["0", "0"]]]),
         ClaimVerdict.REPRODUCED,
     ),
     # not positive definite any more
     "P1-29-dual": (
-        lambda: printed_lyapunov.dual(
+        lambda: error_dynamics.dual(
             "longitudinal",
             [[["1.2176", "315.35"], ["315.35", "80379.0"]], [["-0.0011", "-0.2227"], ["-0.2227", "-67.969"]]],
         ),
         ClaimVerdict.NOT_REPRODUCED,
     ),
     "P1-41-dual": (
-        lambda: printed_lyapunov.dual("lateral", [[["1", "0"], ["0", "67000"]], [["0", "0"], ["0", "0"]]]),
+        lambda: error_dynamics.dual("lateral", [[["1", "0"], ["0", "67000"]], [["0", "0"], ["0", "0"]]]),
         ClaimVerdict.REPRODUCED,
     ),
     "P1-mc": (
-        lambda: printed_lyapunov.printed_slopes_are_multi_convex(
+        lambda: error_dynamics.printed_slopes_are_multi_convex(
             {d: [["0", "0"], ["0", "0"]] for d in ("longitudinal", "lateral")}
         ),
         ClaimVerdict.REPRODUCED,

@@ -1,7 +1,4 @@
-"""The force observers: P1-pid-K and P1-prop1, the longitudinal one (2)-(8) and its bound; P1-ukf, the lateral filter.
-
-Of the latter sigma point weights and covariances (P1 notes 3), as printed and corrected.
-"""
+"""P1-pid-K, P1-prop1: the longitudinal force observer (2)-(8) and its bound; P1-ukf: sigma points of the lateral filter."""
 
 from __future__ import annotations
 

@@ -6,12 +6,11 @@ from functools import partial
 
 from studies.papers.corner_estimation import (
     accuracy,
-    error_matrix,
+    error_dynamics,
     force_observers,
     hinf_design,
     loads,
     observability,
-    printed_lyapunov,
     quadratic_stability,
     solve_size,
 )
@@ -24,7 +23,7 @@ from studies.trials.simulations import MAGIC_FORMULA, trial_part
 from studies.trials.velocities import VelocityTest, corner_observers, velocity_part
 
 TOPICS = [topic.TOPIC for topic in (
-    error_matrix, printed_lyapunov, quadratic_stability, hinf_design, solve_size, force_observers, observability, loads, accuracy,
+    error_dynamics, quadratic_stability, hinf_design, solve_size, force_observers, observability, loads, accuracy,
 )]  # fmt: skip
 CLAIMS = {name: compute for topic in TOPICS for name, compute in topic.claims.items()}  # by the id of the claim
 OBSERVERS = corner_observers(PARAMETERS)

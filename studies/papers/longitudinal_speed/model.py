@@ -1,7 +1,4 @@
-"""The model of P2. P2-19M, P2-kappa, P2-Re: its form, patch constant and radius; P2-O3: its observability.
-
-Rank of the time-varying observability matrix (24), symbolically, and of the gramian (A1) along wheel speeds.
-"""
+"""P2-19M, P2-kappa, P2-Re: the model, its patch constant and radius; P2-O3: the ranks of (24) and of the gramian (A1)."""
 
 from __future__ import annotations
 
