@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TypeVar
 
 from studies.claim import Claim, ClaimFunction, JsonValue
 from studies.papers.published import printed, published_claims
 from studies.plots import Figure
-from studies.study import Part, PartFunction, PartResult, Preparation, Scope, Table
+from studies.study import Cell, Part, PartFunction, PartResult, Preparation, Scope, Table
 from synthesis.errors import SpecError
+from synthesis.models.parameter_set import load_parameter_set, quantities
 
 C = TypeVar("C", bound=ClaimFunction)
 P = TypeVar("P", bound=PartFunction)
@@ -72,3 +74,17 @@ class Topic:
     def printed(self, name: str) -> JsonValue:
         """What the paper prints for the claim ``name``."""
         return printed(self.package, name)
+
+
+def constants_part(parameters: str, caption: str) -> Part:
+    """Table I: every constant of the shipped set ``parameters``, with the place where it is printed."""
+    return Part("parameters", "Table I: vehicle and tire", partial(_constants, parameters, caption), 0.1)
+
+
+def _constants(parameters: str, caption: str, _: Scope) -> PartResult:
+    found = load_parameter_set(parameters)
+    entries = {name.replace("_", " "): quantity for name, quantity in found.vehicle.items()}
+    for direction, tire in found.tire.items():
+        entries |= {f"{name}, {direction}": quantity for name, quantity in quantities(tire).items()}
+    rows: list[tuple[Cell, ...]] = [(name, q.value, q.unit, q.source) for name, q in entries.items()]
+    return PartResult(tables=[Table("table-1", caption, ("quantity", "value", "unit", "printed in"), rows)])

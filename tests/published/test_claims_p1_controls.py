@@ -9,16 +9,13 @@ import pytest
 from studies.claim import ClaimVerdict, Finding
 from studies.papers.corner_estimation import (
     accuracy,
-    conditioning,
-    error_matrix,
+    error_dynamics,
+    force_observers,
     hinf_design,
     loads,
     observability,
-    printed_lyapunov,
     quadratic_stability,
-    sigma_points,
     solve_size,
-    wheel_force,
 )
 from studies.papers.corner_estimation.inputs import DESIGNS, PACKAGE, parameters
 from studies.papers.corner_estimation.study import CLAIMS
@@ -35,36 +32,36 @@ def heavier() -> Finding:
 
 CONTROLS: dict[str, tuple[Callable[[], Finding], ClaimVerdict]] = {
     "P1-26": (
-        lambda: error_matrix.entry_of_the_error_matrix(1 - error_matrix.L1 * error_matrix.P1),
+        lambda: error_dynamics.entry_of_the_error_matrix(1 - error_dynamics.L1 * error_dynamics.P1),
         ClaimVerdict.REPRODUCED,
     ),
-    "P1-C-abs": (lambda: error_matrix.absolute_value(signed=False), ClaimVerdict.REPRODUCED),
+    "P1-C-abs": (lambda: error_dynamics.absolute_value(signed=False), ClaimVerdict.REPRODUCED),
     # the dual matrix turned round is a true primal one: P = adj(Q) of the longitudinal print
     "P1-29-primal": (
-        lambda: printed_lyapunov.primal(
+        lambda: error_dynamics.primal(
             "longitudinal",
             [[["80379.0", "-115.35"], ["-115.35", "1.2176"]], [["-67.969", "0.2227"], ["0.2227", "-0.0011"]]],
         ),
         ClaimVerdict.REPRODUCED,
     ),
     "P1-41-primal": (
-        lambda: printed_lyapunov.primal("lateral", [[["67000", "0"], ["0", "1"]], [["0", "0"], ["0", "0"]]]),
+        lambda: error_dynamics.primal("lateral", [[["67000", "0"], ["0", "1"]], [["0", "0"], ["0", "0"]]]),
         ClaimVerdict.REPRODUCED,
     ),
     # not positive definite any more
     "P1-29-dual": (
-        lambda: printed_lyapunov.dual(
+        lambda: error_dynamics.dual(
             "longitudinal",
             [[["1.2176", "315.35"], ["315.35", "80379.0"]], [["-0.0011", "-0.2227"], ["-0.2227", "-67.969"]]],
         ),
         ClaimVerdict.NOT_REPRODUCED,
     ),
     "P1-41-dual": (
-        lambda: printed_lyapunov.dual("lateral", [[["1", "0"], ["0", "67000"]], [["0", "0"], ["0", "0"]]]),
+        lambda: error_dynamics.dual("lateral", [[["1", "0"], ["0", "67000"]], [["0", "0"], ["0", "0"]]]),
         ClaimVerdict.REPRODUCED,
     ),
     "P1-mc": (
-        lambda: printed_lyapunov.printed_slopes_are_multi_convex(
+        lambda: error_dynamics.printed_slopes_are_multi_convex(
             {d: [["0", "0"], ["0", "0"]] for d in ("longitudinal", "lateral")}
         ),
         ClaimVerdict.REPRODUCED,
@@ -81,7 +78,7 @@ CONTROLS: dict[str, tuple[Callable[[], Finding], ClaimVerdict]] = {
         ),
         ClaimVerdict.NOT_REPRODUCED,
     ),
-    "P1-aqs-scale": (lambda: conditioning.scaling(scaled=False), ClaimVerdict.NOT_REPRODUCED),
+    "P1-aqs-scale": (lambda: quadratic_stability.scaling(scaled=False), ClaimVerdict.NOT_REPRODUCED),
     "P1-30-sign": (lambda: hinf_design.sign_of_the_disturbance(-1), ClaimVerdict.REPRODUCED),
     "P1-hinf-gamma": (lambda: hinf_design.least_gamma_by_degree(20, tolerance=1e-9), ClaimVerdict.NOT_REPRODUCED),
     "P1-hinf-figs": (
@@ -90,10 +87,10 @@ CONTROLS: dict[str, tuple[Callable[[], Finding], ClaimVerdict]] = {
     ),
     # a count that does not grow with the points: the inequalities by name instead of one by one
     "P1-hinf-time": (lambda: solve_size.solve_size(10, walked=lambda problem: 2), ClaimVerdict.NOT_REPRODUCED),
-    "P1-ukf": (lambda: sigma_points.sums_of_the_weights("corrected"), ClaimVerdict.REPRODUCED),
+    "P1-ukf": (lambda: force_observers.sums_of_the_weights("corrected"), ClaimVerdict.REPRODUCED),
     "P1-loads": (heavier, ClaimVerdict.NOT_REPRODUCED),
-    "P1-pid-K": (lambda: wheel_force.wheel_error((1.8, -11.4)), ClaimVerdict.NOT_REPRODUCED),
-    "P1-prop1": (lambda: wheel_force.force_bound(eta3=20.0), ClaimVerdict.NOT_REPRODUCED),
+    "P1-pid-K": (lambda: force_observers.wheel_error((1.8, -11.4)), ClaimVerdict.NOT_REPRODUCED),
+    "P1-prop1": (lambda: force_observers.force_bound(eta3=20.0), ClaimVerdict.NOT_REPRODUCED),
     "P1-O3": (lambda: observability.lateral_force_rank("none"), ClaimVerdict.NOT_REPRODUCED),
     "P1-tab3": (
         lambda: accuracy.velocity_table([r for r in printed_numbers(PACKAGE)["table_3"]["rows"] if r[0] == "AWD"]),

@@ -12,9 +12,9 @@ import pytest
 
 from analysis.norms.hinf import hinf_norm
 from studies.claim import ClaimVerdict
+from studies.papers.corner_estimation.force_observers import filter_lag
 from studies.papers.corner_estimation.hinf_design import OMEGA, fitted, optima, schedule, signed_model, velocity_floor
 from studies.papers.corner_estimation.inputs import CORNERS, PACKAGE, Corner
-from studies.papers.corner_estimation.sigma_points import filter_lag
 from studies.papers.corner_estimation.solve_size import expressions, one_by_one, relaxed_problem, solve_size
 from studies.papers.published import printed_numbers
 from synthesis.lmi.relaxation import RelaxedProblem

@@ -8,32 +8,30 @@ import pytest
 
 from studies.claim import ClaimVerdict, Finding
 from studies.papers.longitudinal_speed import (
-    accuracy,
     model,
-    observability,
     slip_threshold,
     steady_filter,
     stochastic_observability,
+    study,
     unknown_input_observer,
 )
 from studies.papers.longitudinal_speed.inputs import constant
-from studies.papers.longitudinal_speed.study import CLAIMS
 from tests.support.p2_findings import finding
 
 
 def without_the_worse_cells() -> Finding:
-    rows = [list(row) for row in accuracy.FORCES]
+    rows = [list(row) for row in study.FORCES]
     for row in rows:
         for k in (1, 3, 5):
             row[k + 1] = max(row[k + 1], row[k] + 0.01)
-    return accuracy.force_table(rows)
+    return study.force_table(rows)
 
 
 CONTROLS: dict[str, tuple[Callable[[], Finding], ClaimVerdict]] = {
     "P2-19M": (lambda: model.descriptor_form(((1, 0, 0), (0, 1, 0), (0, 1, 1))), ClaimVerdict.NOT_REPRODUCED),
     "P2-kappa": (lambda: model.patch_constant("7/(6 L)"), ClaimVerdict.REPRODUCED),
     "P2-Re": (lambda: model.effective_radius({"table": 0.33, "text": 0.33}), ClaimVerdict.REPRODUCED),
-    "P2-O3": (lambda: observability.rank_over_the_region((1, "-5")), ClaimVerdict.REPRODUCED),
+    "P2-O3": (lambda: model.rank_over_the_region((1, "-5")), ClaimVerdict.REPRODUCED),
     "P2-test1": (lambda: stochastic_observability.time_of_test_1({"one reading": 0.015}), ClaimVerdict.NOT_REPRODUCED),
     # a wheel at rest leaves an integrator that no sample sees
     "P2-test2": (
@@ -49,7 +47,7 @@ CONTROLS: dict[str, tuple[Callable[[], Finding], ClaimVerdict]] = {
 
 
 def test_every_claim_can_fall() -> None:
-    assert set(CONTROLS) == set(CLAIMS)
+    assert set(CONTROLS) == set(study.CLAIMS)
 
 
 @pytest.mark.parametrize("name", CONTROLS)

@@ -21,7 +21,7 @@ from studies.papers.longitudinal_speed.inputs import (
     speed_model,
     structures,
 )
-from studies.papers.longitudinal_speed.observability import gramian_rank, histories, speed_observability
+from studies.papers.longitudinal_speed.model import gramian_rank, histories, speed_observability
 from studies.papers.longitudinal_speed.steady_filter import filter_response
 from studies.papers.longitudinal_speed.stochastic_observability import STRUCTURES, both_tests
 from studies.papers.longitudinal_speed.unknown_input_observer import bounds, worst_runs

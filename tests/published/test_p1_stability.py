@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimators.arrays import FloatArray
+from studies.papers.corner_estimation.error_dynamics import Certificate, Reading, certificate, convexity
 from studies.papers.corner_estimation.inputs import CORNERS
-from studies.papers.corner_estimation.printed_lyapunov import Certificate, Reading, certificate, convexity
 from synthesis.design.stability import Form, GainBox, affine_quadratic_stability
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from studies.papers.longitudinal_speed.observability import gramian_rank
+from studies.papers.longitudinal_speed.model import gramian_rank
 from studies.papers.longitudinal_speed.truth_records import begun, rank_table, start_table, wheel_record
 from studies.trials.motion import MotionTest
 from studies.truth import Truth, load_manoeuvre

@@ -14,7 +14,7 @@ from studies.papers.corner_estimation.inputs import PACKAGE, topic
 from studies.papers.published import printed_numbers
 from studies.papers.verdicts import under_specified
 from studies.plots import Axis, Bars, Figure, Level, Line, Mark, Panel, colours
-from studies.study import PartResult, Scope, Table
+from studies.study import Table
 
 TOPIC = topic()
 TABLE_3 = printed_numbers(PACKAGE)["table_3"]
@@ -64,14 +64,6 @@ def weight_readings(names_axle: bool = False) -> Finding:
     return Finding(computed, under_specified(spread, 1e-9, needed[mean] == sp.Rational(1, 2)), reading)
 
 
-@TOPIC.part("accuracy", "Accuracy claims and axle weights", 2.0)
-def accuracy(scope: Scope) -> PartResult:
-    """Table III against the text, and the axle weights."""
-    what = "velocity errors at the centre of gravity, measured on the road by its authors"
-    table = Table("table-3", f"Table III of P1 as printed: {what}.", TABLE_3["columns"], TABLE_3["rows"])
-    return PartResult(TOPIC.found(), [table], [table_figure(), axle_weight_figure()])
-
-
 def table_figure() -> Figure:
     """Table III beside the limit that the text states."""
     rows = TABLE_3["rows"]
@@ -113,3 +105,9 @@ def axle_weight_figure() -> Figure:
         "Two curves that cross at one half at the threshold, and one that starts at one half without slip.",
         Panel(marks, x, Axis("weight of the front axle [1]", 0.0, 1.0), legend="center right"), size=(4.8, 3.4),
     )  # fmt: skip
+
+
+CAPTION = "Table III of P1 as printed: velocity errors at the centre of gravity, measured on the road by its authors."
+PRINTED = Table("table-3", CAPTION, TABLE_3["columns"], TABLE_3["rows"])
+SHOWN = [table_figure, axle_weight_figure]
+TOPIC.show("accuracy", "Accuracy claims and axle weights", 2.0, tables=[lambda: PRINTED], figures=SHOWN)

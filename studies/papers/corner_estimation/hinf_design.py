@@ -134,10 +134,7 @@ def least_gamma_by_degree(points: int = POINTS, tolerance: float = 2e-5) -> Find
     return Finding(computed, derived(distance <= tolerance and proved), reading)
 
 
-@TOPIC.part("hinf-sign", "The sign in the H-infinity inequality", 2.0)
-def hinf_sign(scope: Scope) -> PartResult:
-    """The sign in (30)."""
-    return PartResult(TOPIC.found("P1-30-sign"))
+TOPIC.show("hinf-sign", "The sign in the H-infinity inequality", 2.0, ["P1-30-sign"])
 
 
 @TOPIC.part("hinf-optimum", "The optimum of the H-infinity problem", 6.0)
@@ -148,8 +145,8 @@ def hinf_optimum(scope: Scope) -> PartResult:
     columns, rows = ["degree f"], [[degree] for degree in DEGREES]
     for d in CORNERS:
         columns += [f"{d} gamma [1]", f"{d} largest L2 returned [m/s^2]"]
-        for k, row in enumerate(rows):
-            row += [found["gamma"][d][k], found["largest_L2_returned"][d][k]]
+        for row, *values in zip(rows, found["gamma"][d], found["largest_L2_returned"][d], strict=True):
+            row.extend(values)
     caption = (
         "Least gamma of (30) (sign corrected, C_e = I, both disturbances) on 140 wheel speeds in [0, 140] rad/s at wheel "
         "accelerations of +-800 rad/s^2. The exact infimum is 1; the returned gains are the solver's, not the problem's."
@@ -241,13 +238,12 @@ def plotted_gains(degree: int = 1, outputs: Mapping[str, tuple[str, ...]] = OUTP
     printed_problem = all(all(computed[direction]["C_e = I"]["on_the_axes"]) for direction in CORNERS)
     x, y = (computed[direction]["Kalman filter"] for direction in CORNERS)
     reading = (
-        f"C_e is not printed: the L2 that minimising gamma returns for {', '.join(outputs)} differ by a factor of "
-        f"up to {1.0 + spread:.2g}; for C_e = I the least gain energy grows without bound towards the optimum in "
-        f"{sum(open_gains)} of {len(open_gains)} directions. A penalty on force noise, which the paper does not "
-        f"state, determines the gains: a steady Kalman filter through the printed gains at {FIT_SPEED:g} rad/s has "
-        f"L1x {x['L1'][0]:.3f} to {x['L1'][1]:.3f}, L2x {x['L2'][0]:.4g}, L1y {y['L1'][0]:.3f} to {y['L1'][1]:.3f}, "
-        f"L2y {y['L2'][0]:.3g}, all on the axes. The figures' titles name L/(1 + L1 sigma1), the form for an output "
-        "with the observer's own derivative."
+        f"C_e is not printed: the L2 that minimising gamma returns for {', '.join(outputs)} differ by a factor of up to "
+        f"{1.0 + spread:.2g}; for C_e = I the least gain energy grows without bound towards the optimum in {sum(open_gains)} "
+        f"of {len(open_gains)} directions. A penalty on force noise, which the paper does not state, determines the gains: a "
+        f"steady Kalman filter through the printed gains at {FIT_SPEED:g} rad/s has L1x {x['L1'][0]:.3f} to {x['L1'][1]:.3f}, "
+        f"L2x {x['L2'][0]:.4g}, L1y {y['L1'][0]:.3f} to {y['L1'][1]:.3f}, L2y {y['L2'][0]:.3g}, all on the axes. The figures' "
+        "titles name L/(1 + L1 sigma1), the form for an output with the observer's own derivative."
     )
     return Finding(computed, under_specified(spread, 0.01, printed_problem), reading)
 
@@ -265,8 +261,8 @@ def gain_curves(scope: Scope) -> PartResult:
         "output C_e, and those of the steady Kalman filter that passes through the printed gains at 70 rad/s; "
         "whether all stay on the axes of Figs 3 and 4."
     )
-    columns = ["direction", "problem", "L1 at 0 [m/s]", "L1 at 140 [m/s]", "L2 at 0 [m/s^2]", "L2 at 140 [m/s^2]",
-               "on the axes"]  # fmt: skip
+    ends = (f"L{i} at {w} [{unit}]" for i, unit in ((1, "m/s"), (2, "m/s^2")) for w in (0, 140))
+    columns = ["direction", "problem", *ends, "on the axes"]
     return PartResult(claims, [Table("gains-by-reading", caption, columns, rows)], [gain_figure()])
 
 

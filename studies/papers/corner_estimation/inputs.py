@@ -75,17 +75,17 @@ class Corner:
     @property
     def gains(self) -> tuple[float, ...]:
         """The gains that the stability claims are about."""
-        return _given(self._published.gains, f"{self.direction} gains in '{self.name}'")
+        return self._given(self._published.gains, "gains")
 
     @property
     def box(self) -> tuple[tuple[float, float], ...]:
         """The box of gains: (lowest, highest) of L1 and of L2."""
-        return _given(self._published.gain_box, f"{self.direction} gain box in '{self.name}'")
+        return self._given(self._published.gain_box, "gain box")
 
     @property
     def lyapunov(self) -> list[list[list[str]]]:
         """[P0, P1] of (29) or (41) as printed decimals."""
-        matrix = _given(self._published.lyapunov, f"{self.direction} Lyapunov matrix in '{self.name}'")
+        matrix = self._given(self._published.lyapunov, "Lyapunov matrix")
         return [[list(row) for row in coefficient] for coefficient in matrix]
 
     def error_matrices(self, omega: ArrayLike) -> FloatArray:
@@ -94,13 +94,12 @@ class Corner:
 
     @property
     def _published(self) -> Published:
-        return _given(parameters(self.name).tire[self.direction].published, f"{self.direction} design in '{self.name}'")
+        return self._given(parameters(self.name).tire[self.direction].published, "design")
 
-
-def _given(value: T | None, what: str) -> T:
-    if value is None:
-        raise SpecError(f"no {what} is printed")
-    return value
+    def _given(self, value: T | None, what: str) -> T:
+        if value is None:
+            raise SpecError(f"no {self.direction} {what} in '{self.name}' is printed")
+        return value
 
 
 # The printed gains that the stability claims are about: of P1 and of P3.

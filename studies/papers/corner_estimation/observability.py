@@ -85,9 +85,8 @@ def force_figure() -> Figure:
     for angle in (0.02, 0.08):
         at = np.rad2deg(angle), abs(float(function(angle))) / full
         marks += [dots(*at, color=colours.RED), Words(*at, f"{angle:g} rad: {at[1]:.1e}", offset=(8, -10))]
-    x, y = (
-        Axis(label, scale="log") for label in ("steering angle [deg]", "determinant, share of its value at 90° [1]")
-    )
+    labels = "steering angle [deg]", "determinant, share of its value at 90° [1]"
+    x, y = (Axis(label, scale="log") for label in labels)
     return Figure(
         "force-observability",
         "Determinant of the output matrix of the lateral force model (outputs a_x, a_y and yaw acceleration) over "

@@ -26,6 +26,7 @@ from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import solve
 
 TOPIC = topic()
+Layer = Callable[[RelaxedProblem], Any]
 
 
 def conic_problem(points: int, degree: int) -> tuple[LmiProblem, LmiSettings]:
@@ -56,15 +57,11 @@ def one_by_one(relaxed: RelaxedProblem) -> Any:
 
 def expressions(problem: Any) -> int:
     """Nodes in the expression trees of all constraints: the layer visits each before the solver sees anything."""
-
     stack, count = list(problem.constraints), 0
     while stack:
         stack += stack.pop().args
         count += 1
     return count
-
-
-Layer = Callable[[RelaxedProblem], Any]
 
 
 @TOPIC.claim("P1-hinf-time")

@@ -6,33 +6,26 @@ from functools import partial
 
 from studies.papers.corner_estimation import (
     accuracy,
-    conditioning,
-    error_matrix,
+    error_dynamics,
+    force_observers,
     hinf_design,
     loads,
     observability,
-    printed_lyapunov,
     quadratic_stability,
-    sigma_points,
     solve_size,
-    wheel_force,
 )
 from studies.papers.corner_estimation.inputs import PARAMETERS
-from studies.papers.parameter_table import parameter_part
-from studies.study import Part, Study
+from studies.papers.topic import constants_part
+from studies.study import Study
 from studies.trials.forces import ForceTest, differentiated_pid, force_part
 from studies.trials.motion import MotionTest, motion_part
 from studies.trials.simulations import MAGIC_FORMULA, trial_part
 from studies.trials.velocities import VelocityTest, corner_observers, velocity_part
 
-CONSTANTS = "Vehicle and tire constants of P1, as every result of this study uses them."
-TOPICS = (
-    error_matrix.TOPIC, printed_lyapunov.TOPIC, quadratic_stability.TOPIC, conditioning.TOPIC, hinf_design.TOPIC,
-    solve_size.TOPIC, wheel_force.TOPIC, sigma_points.TOPIC, observability.TOPIC, loads.TOPIC, accuracy.TOPIC,
-)  # fmt: skip
-CLAIMS = {name: compute for topic in TOPICS for name, compute in topic.claims.items()}
-"""What computes each claim, by its id."""
-
+TOPICS = [topic.TOPIC for topic in (
+    error_dynamics, quadratic_stability, hinf_design, solve_size, force_observers, observability, loads, accuracy,
+)]  # fmt: skip
+CLAIMS = {name: compute for topic in TOPICS for name, compute in topic.claims.items()}  # by the id of the claim
 OBSERVERS = corner_observers(PARAMETERS)
 # Table III: NRMS in % and peaks in m/s of V_x and V_y.
 ALL_WHEEL = (
@@ -62,13 +55,13 @@ MOTION = (
     MotionTest("p1-acceleration-left-turn-wet-dry", "Acceleration and left turn, wet to dry (Fig. 13)"),
 )
 
+CONSTANTS = constants_part(PARAMETERS, "Vehicle and tire constants of P1, as every result of this study uses them.")
 EXPERIMENTS = (
     trial_part("table-3-all-wheel-drive", "Table III on the truth vehicle: all-wheel drive",
                 partial(velocity_part, "all-wheel-drive", ALL_WHEEL, OBSERVERS), cost=55.0, quick=True),
     trial_part("table-3-rear-wheel-drive", "Table III on the truth vehicle: rear-wheel drive",
                 partial(velocity_part, "rear-wheel-drive", REAR_WHEEL, OBSERVERS), cost=70.0),
-    trial_part("table-3-oval", "Table III on the truth vehicle: oval",
-                partial(velocity_part, "oval", OVAL, OBSERVERS), cost=50.0),
+    trial_part("table-3-oval", "Table III on the truth vehicle: oval", partial(velocity_part, "oval", OVAL, OBSERVERS), 50.0),
     trial_part("table-3-other-tire", "Table III on a tire that no estimator knows: Magic Formula with slip lag",
                 partial(velocity_part, "other-tire", ALL_WHEEL, OBSERVERS), cost=58.0, tire=MAGIC_FORMULA),
     trial_part("forces", "Figs. 6 to 8 on the truth vehicle: forces",
@@ -78,15 +71,9 @@ EXPERIMENTS = (
 )  # fmt: skip
 
 STUDY = Study(
-    PARAMETERS,
-    "Corner-based estimation of tire forces and vehicle velocities",
-    "P1",
+    PARAMETERS, "Corner-based estimation of tire forces and vehicle velocities", "P1",
     "Forces at each wheel from spin and planar dynamics, normalised and fed to a two-state bristle observer at each "
     "corner, with gains scheduled over wheel speed. Recomputed: the error dynamics and their Lyapunov proofs, the "
     "H-infinity design and its gains, the force observers, loads, observability and the accuracy that the text claims.",
-    (
-        Part("parameters", "Table I: vehicle and tire", partial(parameter_part, PARAMETERS, CONSTANTS), 0.1),
-        *(part for topic in TOPICS for part in topic.parts),
-        *EXPERIMENTS,
-    ),
-)
+    (CONSTANTS, *(part for topic in TOPICS for part in topic.parts), *EXPERIMENTS),
+)  # fmt: skip

@@ -39,13 +39,8 @@ def slip_threshold(width: sp.Expr = PRINTED_WIDTH) -> Finding:
     printed, right = limits(width), limits(CORRECTED_WIDTH)
     (low, high), corrected = map(float, printed), [*map(float, right)]
     runtime = [float(adaptive_threshold(v, LOWER, UPPER, STEEPNESS)) for v in (0.0, 1e9)]
-    computed = {
-        "lambda_l": LOWER,
-        "lambda_u": UPPER,
-        "printed": [low, high],
-        "corrected": corrected,
-        "runtime": runtime,
-    }
+    found = {"printed": [low, high], "corrected": corrected, "runtime": runtime}
+    computed = {"lambda_l": LOWER, "lambda_u": UPPER, **found}
     reading = (
         f"With phi_e as printed the threshold is lambda_u - 1/(lambda_u - lambda_l) = {low:.4f} without excitation, for "
         f"lambda_l = {LOWER:g}, lambda_u = {UPPER:g}: every slip would count as high. With its reciprocal it is exactly "

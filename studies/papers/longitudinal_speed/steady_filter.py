@@ -169,8 +169,7 @@ def covariances(scope: Scope) -> PartResult:
     caption = f"Steady Kalman filter at {SPEED:g} rad/s and 200 Hz for the readings of the printed scalar covariances, Q = q S."
     columns = ["S", "mode", "velocity gain [m/s]", "slowest time constant [s]"]
     table = Table("covariance-readings", caption, columns, rows)
-    points = 10 if scope.quick else 28
-    speeds = np.linspace(5.0, 140.0, points)
+    speeds = np.linspace(5.0, 140.0, 10 if scope.quick else 28)
     found = [np.array([filter_response(float(w), *reading) for w in speeds]) for reading in READINGS]
     names = [f"S = {structure}, {mode.replace('_', ' ')}" for structure, mode in READINGS]
     looks = [(name, colours.CURVES[k // 2], DASHES[k % 2]) for k, name in enumerate(names)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from estimators.velocity.slip import LEAST_SPEED
 from studies.papers.longitudinal_speed.inputs import SAMPLE_TIME, WheelRecord, speed_model
-from studies.papers.longitudinal_speed.observability import Ranks, gramian_rank, rank_panels
+from studies.papers.longitudinal_speed.model import Ranks, gramian_rank, rank_panels
 from studies.papers.longitudinal_speed.stochastic_observability import TOPIC, both_tests, covariance_panels
 from studies.plots import DASHES, Axis, Figure, colours
 from studies.study import Cell, PartResult, Scope, Table
@@ -96,9 +96,8 @@ def rank_table(records: Sequence[WheelRecord], ranks: Sequence[Ranks]) -> Table:
         "gramian-driven",
         f"Numerical rank of V(0, N) of P2 (A1) along the front left wheel of truth drives, first {SECONDS:g} s at 200 Hz. The "
         "paper finds 3 in all tests, except for launches while the wheel stands.",
-        ("manoeuvre", f"faster than {LEAST_SPEED:g} m/s from [s]", "first rank", "last rank", "rank 3 from [s]"),
-        rows,
-    )
+        ("manoeuvre", f"faster than {LEAST_SPEED:g} m/s from [s]", "first rank", "last rank", "rank 3 from [s]"), rows,
+    )  # fmt: skip
 
 
 def start_table(records: Sequence[WheelRecord]) -> Table:
@@ -116,13 +115,5 @@ def start_table(records: Sequence[WheelRecord]) -> Table:
         f"changes its speed by {CHANGES:g} rad/s^2: time until M is exactly zero (Fig. 2 of the paper: "
         f"{TOPIC.printed('P2-test1')} s), greatest eigenvalue of N and when, and at the end of {STARTS * SAMPLE_TIME:g} s, by "
         "rank tolerance (Q = 2.5e-3 I, R = 1e-3).",
-        [
-            "manoeuvre",
-            "rank tolerance",
-            "M = 0 after [s]",
-            "peak of lambda_max(N)",
-            "at [s]",
-            "lambda_max(N) at the end",
-        ],
-        rows,
-    )
+        ["manoeuvre", "rank tolerance", "M = 0 after [s]", "peak of lambda_max(N)", "at [s]", "lambda_max(N) at the end"], rows,
+    )  # fmt: skip

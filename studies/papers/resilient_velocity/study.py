@@ -80,11 +80,8 @@ for name, title, run, cost, tire in (
 
 TOPICS = (*(m.TOPIC for m in (error_dynamics, sensitivity, switching, drops, discretisation, vehicle)), TOPIC)
 STUDY = Study(
-    "resilient-velocity",
-    "Resilient corner-based velocity estimation",
-    "P3",
-    "Pirani et al.: two-state corner observers for slip velocity, their boundedness, H∞ norms and sensitivity, "
-    "switched gains, and force measurements that are lost. Its examples, claims and figures are recomputed from "
-    "Table I and the printed gains.",
+    "resilient-velocity", "Resilient corner-based velocity estimation", "P3",
+    "Pirani et al.: two-state corner observers for slip velocity, their boundedness, H∞ norms and sensitivity, switched gains, "
+    "and force measurements that are lost. Its examples, claims and figures are recomputed from Table I and the printed gains.",
     tuple(part for topic in TOPICS for part in topic.parts),
-)
+)  # fmt: skip

@@ -7,13 +7,9 @@ from studies.study import Study
 
 TOPICS = force_observer, observability, printed_tables, sideslip_settings, road_tests
 STUDY = Study(
-    id="smo-ekf-sideslip",
-    title="Axle forces by sliding mode, sideslip with adaptive cornering stiffness",
-    paper="P5",
-    summary=(
-        "Baffet, Charara, Lechner (2009): a sliding-mode observer estimates axle forces without a tire model; an extended "
-        "Kalman filter on them estimates sideslip and corrects the cornering stiffness. Gain conditions, sampling, "
-        "observability and tables are checked here."
-    ),
-    parts=tuple(part for topic in TOPICS for part in topic.TOPIC.parts),
-)
+    "smo-ekf-sideslip", "Axle forces by sliding mode, sideslip with adaptive cornering stiffness", "P5",
+    "Baffet, Charara, Lechner (2009): a sliding-mode observer estimates axle forces without a tire model; an extended Kalman "
+    "filter on them estimates sideslip and corrects the cornering stiffness. Gain conditions, sampling, observability and "
+    "tables are checked here.",
+    tuple(part for topic in TOPICS for part in topic.TOPIC.parts),
+)  # fmt: skip
