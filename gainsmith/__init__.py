@@ -20,8 +20,9 @@ def hidden_by() -> tuple[str, str] | None:
     home = Path(__file__).resolve().parents[1]
     for name in PACKAGES:
         spec = find_spec(name)
-        places = [Path(place).resolve() for place in (spec.submodule_search_locations or []) if spec] if spec else []
-        found = places or ([Path(spec.origin).resolve()] if spec and spec.origin else [])
+        folders = (spec.submodule_search_locations if spec else None) or ()
+        file = [spec.origin] if spec and spec.origin and not folders else []
+        found = [Path(place).resolve() for place in (*folders, *file)]
         if home / name not in found:
             return name, str(found[0]) if found else "nothing"
     return None

@@ -91,7 +91,8 @@ def _check(
         place = [int(i) for i in np.argwhere(crossing)[worst]]
         raise AnalysisError(
             f"critical drop probability of pair {place}: the radius at p = {at[worst, 0, 0]:.6g} is {radius[worst]:.9g}, not 1; "
-            "scale the states so that both matrices have entries of one size"
+            "balanced, the pair is still nearly defective, and "
+            "the rounding of its entries alone moves the answer: bracket it with drop_radius"
         )
 
 

@@ -98,7 +98,8 @@ def critical_recovery_probability(open_loop: ArrayLike, closed_loop: ArrayLike, 
         if not (np.abs(radius - 1.0) <= CHECK).all():
             raise AnalysisError(
                 f"critical recovery probability: the radius at an answer is {radius[np.abs(radius - 1.0).argmax()]:.9g}, not 1; "
-                "scale the states so that both matrices have entries of one size"
+                "balanced, the pair is still nearly defective, and "
+                "the rounding of its entries alone moves the answer: bracket it with stability_region"
             )
     return np.asarray(critical)
 
