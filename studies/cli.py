@@ -9,27 +9,47 @@ from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
+from textwrap import indent
+from typing import NoReturn
 
-DONE, BAD, REFUSED = 0, 1, 2
+from studies.commands.help import HELP, Paragraphs
+from studies.commands.outcome import REFUSED, refuse, run, speak_safely
+
+
+class Parser(argparse.ArgumentParser):
+    """What is wrong with the arguments in one line, and where to read on."""
+
+    def error(self, message: str) -> NoReturn:
+        """Exit with the code of bad input."""
+        refuse(f"{message}; see {self.prog} --help")
+        sys.exit(REFUSED)
 
 
 def parser() -> argparse.ArgumentParser:
     """All commands and their arguments; the names of the arguments are those of the command's function."""
-    top = argparse.ArgumentParser(
+    top = Parser(
         prog="gainsmith",
         description="Observer gain schedules that carry their own proof.",
-        epilog="Exit codes: 0 done and good, 1 done and bad (refuted, drift), 2 bad input.",
+        epilog="Exit codes: 0 done and good, 1 done and bad (refuted, drift), 2 bad input, 130 interrupted, 143 terminated. "
+        "`gainsmith COMMAND --help` says what a command does, what it writes, and shows an example.",
     )
     top.add_argument("--version", action="version", version=f"gainsmith {version('gainsmith')}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
-    def command(name: str, text: str, function: str) -> argparse.ArgumentParser:
-        new = commands.add_parser(name, help=text)
+    def command(name: str, function: str) -> argparse.ArgumentParser:
+        said = HELP[name]
+        new = commands.add_parser(
+            name,
+            help=said.text,
+            description=said.description,
+            epilog="example" + ("s" if "\n" in said.example else "") + ":\n" + indent(said.example, "  "),
+            formatter_class=Paragraphs,
+        )
         new.set_defaults(function=function)
         new.add_argument("--json", action="store_true", dest="as_json", help="machine-readable output")
         return new
 
-    schedules = command("schedules", "design, prove and write gain schedules", "schedules.run_schedules")
+    schedules = command("schedules", "schedules.run_schedules")
     schedules.add_argument("specs", nargs="*", metavar="SPEC", help="shipped name or .toml file (default: all shipped)")
     schedules.add_argument("--out", type=Path, metavar="DIR", help="where schedules are (default: schedules)")
     schedules.add_argument(
@@ -37,11 +57,13 @@ def parser() -> argparse.ArgumentParser:
     )
     schedules.add_argument("--figures", type=Path, metavar="DIR", help="draw gains beside the published ranges")
 
-    certify = command("certify", "re-prove schedule files without a solver", "certify.run_certify")
-    certify.add_argument("files", nargs="+", type=Path, metavar="FILE")
+    certify = command("certify", "certify.run_certify")
+    certify.add_argument(
+        "files", nargs="+", type=Path, metavar="FILE", help="schedule file, or the name of a shipped one"
+    )
 
-    run = command("run", "replay a recorded drive through the observers", "run.run_log")
-    identify = command("identify", "fit tire, radius and wheel inertia to a recorded drive", "identify.run_identify")
+    run = command("run", "run.run_log")
+    identify = command("identify", "identify.run_identify")
     for reader, text in (
         (run, "estimates, metrics and plots"),
         (identify, "parameter file, fit and residual pictures"),
@@ -54,7 +76,7 @@ def parser() -> argparse.ArgumentParser:
         )
         reader.add_argument("--out", required=True, type=Path, metavar="DIR", help=f"where {text} go")
 
-    study = command("study", "recompute the papers and the studies beyond them", "study.run_study")
+    study = command("study", "study.run_study")
     study.add_argument("studies", nargs="*", metavar="ID", help="studies to run (see gainsmith list)")
     study.add_argument("--all", action="store_true", dest="every", help="every study")
     study.add_argument("--quick", action="store_true", help="few seeds and coarse grids")
@@ -64,7 +86,7 @@ def parser() -> argparse.ArgumentParser:
         "--out", type=Path, metavar="DIR", help="where results and report.html go (default: out/studies)"
     )
 
-    sweep = command("sweep", "margins under parameter changes, against a committed baseline", "sweep.run_sweep")
+    sweep = command("sweep", "sweep.run_sweep")
     sweep.add_argument("spec", metavar="SPEC", help="shipped name or .toml file")
     place = sweep.add_mutually_exclusive_group()
     place.add_argument("--workers", type=int, metavar="N", help="processes (default: all cores)")
@@ -81,36 +103,26 @@ def parser() -> argparse.ArgumentParser:
     sweep.add_argument("--junit", type=Path, metavar="FILE", help="the gate as JUnit XML")
     sweep.add_argument("--summary", type=Path, metavar="FILE", help="the gate as Markdown")
 
-    command(
-        "list",
-        "what is shipped: specifications, parameter sets, models, schedules, studies, sweeps",
-        "listing.run_list",
-    )
+    command("list", "listing.run_list")
+    command("doctor", "doctor.run_doctor")
     return top
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
+    speak_safely()
     chosen = vars(parser().parse_args(arguments))
     # Work is spread over processes and the matrices are tiny: more threads of linear algebra only cost time.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    from estimators.errors import GainsmithError
-
-    del chosen["command"]
+    command = chosen.pop("command")
     module, function = chosen.pop("function").split(".")
-    try:
+
+    def work() -> int:
         code: int = getattr(import_module(f"studies.commands.{module}"), function)(**chosen)
-    except GainsmithError as error:
-        print(f"gainsmith: {error}", file=sys.stderr)
-        return REFUSED
-    except OSError as error:
-        print(
-            f"gainsmith: {error.filename or 'file'}: {error.strerror}; free space or choose another folder",
-            file=sys.stderr,
-        )
-        return REFUSED
-    return code
+        return code
+
+    return run(command, work)
 
 
 if __name__ == "__main__":

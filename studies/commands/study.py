@@ -50,12 +50,7 @@ def run_study(
         def progress(done: float, running: str) -> None:
             bar.update(task, completed=done, description=running[:60] or "waiting", refresh=True)
 
-        try:
-            summary = run_studies(ids, folder, scope, count, registry, progress)
-        except KeyboardInterrupt:
-            bar.stop()
-            print("gainsmith: interrupted; the same command goes on where it stopped", file=sys.stderr)
-            return 1
+        summary = run_studies(ids, folder, scope, count, registry, progress)
     if as_json:
         print(json.dumps(_content(summary, folder), indent=1))
     else:

@@ -37,4 +37,5 @@ def print_table(
         table.add_column(heading, justify="left" if i in left else "right", no_wrap=no_wrap)
     for row in rows:
         table.add_row(*row)
-    Console(width=None if sys.stdout.isatty() else width).print(table)
+    # Cells are data: "[m/s]" is a unit and no style.
+    Console(width=None if sys.stdout.isatty() else width, markup=False, emoji=False, highlight=False).print(table)

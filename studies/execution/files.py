@@ -151,17 +151,25 @@ def only_run(folder: Path, busy: str = "another run writes here (process {holder
     """Hold ``folder`` for this process; SpecError with the sentence ``busy`` when another process holds it.
 
     A record lock belongs to the process: the system takes it back however the process ends, and forked workers do not
-    inherit it.
+    inherit it. The lock's file goes with the run; who opened one that was just removed opens the next.
     """
-    with (folder / LOCK).open("a+", encoding="ascii") as file:
-        try:
-            fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            file.seek(0)
-            words = busy.format(holder=file.read().strip() or "unknown")
-            raise SpecError(f"{folder}: {words}; wait for it or give another --out") from error
-        file.seek(0)
-        file.truncate()
-        file.write(str(os.getpid()))
-        file.flush()
-        yield
+    lock = folder / LOCK
+    while True:
+        with lock.open("a+", encoding="ascii") as file:
+            try:
+                fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                file.seek(0)
+                words = busy.format(holder=file.read().strip() or "unknown")
+                raise SpecError(f"{folder}: {words}; wait for it or give another --out") from error
+            if not (lock.exists() and os.path.samestat(os.fstat(file.fileno()), lock.stat())):
+                continue
+            try:
+                file.seek(0)
+                file.truncate()
+                file.write(str(os.getpid()))
+                file.flush()
+                yield
+            finally:
+                lock.unlink(missing_ok=True)
+            return

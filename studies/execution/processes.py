@@ -7,7 +7,7 @@ import signal
 import sys
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import chain, count
 from multiprocessing import get_context
@@ -21,6 +21,7 @@ from warnings import catch_warnings, simplefilter
 from synthesis.errors import SpecError
 
 TICK = 0.2  # s between two looks at the progress bar
+ENDING = (signal.SIGINT, signal.SIGTERM)
 Function = Callable[[Any, Any], Any]
 Task = TypeVar("Task")
 Value = TypeVar("Value")
@@ -134,7 +135,8 @@ class _Pool:
             if task is None:
                 return
             if len(self.workers) < self.settings.workers and (not self.workers or self._idlest().tasks):
-                self.workers.append(_Worker(self.function, self.shared, self.settings.once))
+                with _signals_held():  # or a worker is lost between its fork and this list, and nobody ends it
+                    self.workers.append(_Worker(self.function, self.shared, self.settings.once))
             self._idlest().give(task)
 
     def _idlest(self) -> _Worker:
@@ -154,9 +156,10 @@ class _Pool:
                     yield finished
                 self.hand_out()
         finally:
-            for worker in self.workers:
-                worker.process.kill()
-                worker.process.join()
+            with _signals_held():
+                for worker in self.workers:
+                    worker.process.kill()
+                    worker.process.join()
 
     def _dismiss(self, worker: _Worker) -> None:
         worker.pipe.close()
@@ -165,9 +168,21 @@ class _Pool:
         self.left = chain([task for task, _ in worker.tasks], self.left)
 
 
+@contextmanager
+def _signals_held() -> Iterator[None]:
+    """A request to end waits until this is over."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _serve(function: Function, shared: Any, once: bool, parent: Connection) -> None:
     """A worker's life: function(shared, task) for each task, until it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt means
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # a fork would have the parent's
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
     Thread(target=_end_with_parent, daemon=True).start()
     while True:
         try:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import fcntl
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
 import pytest
 
-from studies.execution.files import check_folder, ready_folder, whole_file, write_csv, write_json
+from studies.execution.files import LOCK, check_folder, only_run, ready_folder, whole_file, write_csv, write_json
 from synthesis.errors import SpecError
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
@@ -47,3 +53,46 @@ def test_a_folder_that_cannot_be_is_known_before_there_is_anything_to_write(tmp_
 def test_folders_are_made_with_their_parents(tmp_path: Path) -> None:
     ready_folder(tmp_path / "a" / "b")
     assert (tmp_path / "a" / "b").is_dir()
+
+
+HOLDER = """
+import sys
+from pathlib import Path
+from studies.execution.files import only_run
+with only_run(Path(sys.argv[1])):
+    print("held", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_a_folder_is_held_by_one_run_and_left_clean(tmp_path: Path) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLDER, str(tmp_path)],
+        cwd=ROOT,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as other:
+        assert other.stdout is not None and other.stdout.readline() == "held\n"
+        with pytest.raises(SpecError, match=rf"another run writes here \(process {other.pid}\)"), only_run(tmp_path):
+            raise AssertionError("two runs in one folder")
+        other.communicate("", timeout=60)
+    with only_run(tmp_path):
+        assert [path.name for path in tmp_path.iterdir()] == [LOCK]
+    assert not list(tmp_path.iterdir())
+
+
+def test_who_locked_a_file_that_was_just_removed_takes_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lockf, removed = fcntl.lockf, []
+
+    def slow(file: Any, flags: int) -> None:
+        lockf(file, flags)
+        if not removed:  # the run before ended between our look and our lock
+            removed.append(file.fileno())
+            (tmp_path / LOCK).unlink()
+
+    monkeypatch.setattr("studies.execution.files.fcntl.lockf", slow)
+    with only_run(tmp_path):
+        assert removed and (tmp_path / LOCK).exists()

@@ -70,12 +70,15 @@ def test_good_runs_end_with_zero_and_failed_parts_with_one(
     assert fakes(tmp_path / "out", "beta") == 0
 
 
-def test_an_interrupt_is_one_line_and_ends_the_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("sent", "word"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "terminated")])
+def test_a_signal_is_one_line_and_ends_the_workers(
+    sent: signal.Signals, word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv(VARIABLE, str(tmp_path))
     code = (
-        "import sys; from pathlib import Path; from studies.commands.study import run_study;"
-        "from tests.support.study_fakes.registry import REGISTRY;"
-        "sys.exit(run_study(['slow'], False, True, 1, None, Path(sys.argv[1]), False, REGISTRY))"
+        "import sys; from pathlib import Path; from studies.commands.outcome import run;"
+        "from studies.commands.study import run_study; from tests.support.study_fakes.registry import REGISTRY;"
+        "sys.exit(run('study', lambda: run_study(['slow'], False, True, 1, None, Path(sys.argv[1]), False, REGISTRY)))"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", code, str(tmp_path / "out")], cwd=ROOT, stderr=subprocess.PIPE, text=True
@@ -83,9 +86,9 @@ def test_an_interrupt_is_one_line_and_ends_the_workers(tmp_path: Path, monkeypat
     while not (waiting := list(tmp_path.glob("slow-second.*"))):
         assert process.poll() is None
         time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(sent)
     message = process.communicate(timeout=300)[1]
-    assert process.returncode == 1
-    assert message == "gainsmith: interrupted; the same command goes on where it stopped\n"
+    assert process.returncode == 128 + sent
+    assert message == f"gainsmith: {word}; the same command goes on where it stopped\n"
     with pytest.raises(ProcessLookupError):
         os.kill(int(waiting[0].suffix[1:]), 0)

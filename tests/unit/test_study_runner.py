@@ -64,8 +64,7 @@ def append(path: Path) -> None:
 
 
 def tree(folder: Path) -> dict[str, bytes]:
-    found = {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
-    return {name: content for name, content in found.items() if name != ".lock"}
+    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
 def test_results_are_stored_as_the_study_gave_them(run: Run, tmp_path: Path) -> None:

@@ -1,0 +1,111 @@
+"""What `gainsmith COMMAND --help` says beside its arguments: what the command does, what it writes, and an example."""
+
+from __future__ import annotations
+
+import argparse
+from typing import NamedTuple
+
+
+class Paragraphs(argparse.HelpFormatter):
+    """Paragraphs are filled to the width of the terminal; examples stay as they are."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        return "\n\n".join(
+            paragraph
+            if paragraph.startswith("example")
+            else super(Paragraphs, self)._fill_text(paragraph, width, indent)
+            for paragraph in text.split("\n\n")
+        )
+
+
+class Help(NamedTuple):
+    """`text` after its name in the list of commands; the rest on its own page."""
+
+    text: str
+    description: str
+    example: str
+
+
+HELP = {
+    "schedules": Help(
+        "design, prove and write gain schedules",
+        """\
+Designs the gains that each specification asks for, tabulates and rounds them, and proves every claim for that table:
+for all parameter values in the range, all rates in their bounds, and the update that the runtime performs.
+
+Writes DIR/NAME.json, a gainsmith.schedule/2 file: model, plant, breakpoints, gains, claims with their proofs,
+provenance. A stored file that is proved again, and is as good as what was found now, is kept to the byte. Nothing
+unproved is written.""",
+        """\
+gainsmith schedules                               all shipped ones into ./schedules
+gainsmith schedules my-observer.toml --out out    from a specification of your own
+gainsmith schedules --out schedules --check       in CI: exit 1 if a claim fails, or can be had better""",
+    ),
+    "certify": Help(
+        "re-prove schedule files without a solver",
+        """\
+Proves every claim of a schedule from the file alone, in ball arithmetic: plant from formulas, constants and units,
+gains as they are stored and interpolated. A claim that fails is named with its place; it is called refuted only where
+the loop itself breaks it.
+
+Writes nothing.""",
+        """\
+gainsmith certify out/my-observer.json
+gainsmith certify longitudinal-speed              a shipped schedule by its name""",
+    ),
+    "run": Help(
+        "replay a recorded drive through the observers",
+        """\
+Reads one log or several that belong together, runs the pipeline of forces, velocities and sideslip over them as a car
+would, and compares with the references and the baselines that the drive file names.
+
+Writes into DIR: estimates.csv (one row a sample: time, estimates, standard deviations, flags), metrics.json, and
+plots as SVG and PNG. SI units, ISO axes: x forward, y left, z up.""",
+        "gainsmith run LOG.csv --drive DRIVE.toml --out out/run",
+    ),
+    "identify": Help(
+        "fit tire, radius and wheel inertia to a recorded drive",
+        """\
+Fits slip stiffness, relaxation, damping, effective radii and wheel inertia to a log, with confidence intervals. What
+the log does not excite stays at its prior and is named.
+
+Writes into DIR: identified.toml (a parameter set that a specification takes as it is), fit.json, and pictures of the
+residuals.""",
+        "gainsmith identify LOG.csv --drive DRIVE.toml --out out/car",
+    ),
+    "study": Help(
+        "recompute the papers and the studies beyond them",
+        """\
+Recomputes every number, table and figure of a paper, and says which claims hold. Parts that are stored already, and
+whose sources have not changed, are kept; an interrupted run goes on where it stopped.
+
+Writes into DIR: report.html, claims.json, and for each study its tables (CSV), figures (SVG, PNG) and results (JSON).""",
+        """\
+gainsmith study P1 P3 --quick                     few seeds, coarse grids
+gainsmith study --all --out out/studies""",
+    ),
+    "sweep": Help(
+        "margins under parameter changes, against a committed baseline",
+        """\
+Evaluates margins of observers over many designs, draws of parameters or corners of their box, and compares each
+statistic with a baseline. Same bytes for any number of workers; memory does not grow with the number of designs.
+
+Writes into DIR: rows/*.parquet (every design), summary.json, report.md and pictures; with --junit and --summary the
+gate for a CI.""",
+        """\
+gainsmith sweep tire-vehicle --quick --baseline studies/sweeps/baselines/tire-vehicle.quick.toml
+gainsmith sweep my-sweep.toml --workers 4 --resume""",
+    ),
+    "list": Help(
+        "what is shipped: specifications, parameter sets, models, schedules, studies, sweeps",
+        "Lists what comes with the package, by the names that other commands take. Writes nothing.",
+        "gainsmith list --json",
+    ),
+    "doctor": Help(
+        "what is installed, and whether it works",
+        """\
+Shows versions, solvers and extras, solves a small problem with each solver, and re-proves a shipped schedule. Exit 1
+if something that is needed does not work. Writes nothing.""",
+        "gainsmith doctor",
+    ),
+}
