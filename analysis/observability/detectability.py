@@ -34,7 +34,7 @@ class Detectability:
     of relative size `precision`; None where the distance alone shows that every such pair has one. REFUTED: the numbers as they
     stand, in exact arithmetic, have a hidden mode that does not decay (`exact`); or a pair within the precision hides a part
     of the state of which a mode grows whatever the rounding. INCONCLUSIVE: undecided at this precision: a mode that does not
-    decay is hidden, or a hidden mode is on the border of stability, in some pair within it, or no proof was found; `reason` says which.
+    decay is hidden, or a hidden mode is on the border of stability, in some pair within it, or no proof was found (`reason`).
 
     `lower` and `upper` enclose the distance to an undetectable pair relative to |A| and |C|, in balanced units; `mode` attains
     the upper one. `hidden_modes` (1/s or per sample) are those of what the staircase form leaves at this precision.

@@ -10,8 +10,10 @@ import numpy as np
 import sympy as sp
 
 from analysis.errors import AnalysisError
+from analysis.observability.exact_expression import exact
 from analysis.observability.pair_balance import balanced_pair
 from analysis.observability.pairs import observed_pair, unit_pair, without_dust
+from analysis.observability.real_roots import numerator
 from analysis.observability.staircase import separate
 from estimators.arrays import BoolArray, ComplexArray, FloatArray
 
@@ -80,7 +82,8 @@ def hautus_test(
     if not tolerance > 0.0:
         raise AnalysisError(f"tolerance = {tolerance} must be positive")
     n, lead = A.shape[-1], A.shape[:-2]
-    pairs, outputs = A.reshape(-1, n, n), C.reshape(-1, *C.shape[-2:])
+    count = int(np.prod(lead))
+    pairs, outputs = A.reshape(count, n, n), C.reshape(count, *C.shape[-2:])
     found = _modes(pairs, outputs, time, tolerance)
     clean = without_dust(pairs, outputs)
     dusty = np.flatnonzero((clean[0] != pairs).any(axis=(-2, -1)) | (clean[1] != outputs).any(axis=(-2, -1)))
@@ -141,13 +144,19 @@ def _smallest(A: FloatArray, C: FloatArray | None, points: ComplexArray) -> Floa
 
 @dataclass(frozen=True, eq=False)
 class FrozenMode:
-    """A symbolic mode of a held pair: `hidden_if` vanishes where its outputs C v lose rank; `always` if they must."""
+    """A symbolic mode of a held pair: `hidden_if` vanishes where its outputs C v lose rank; `always` if they must.
+
+    `leftover` are the maximal minors divided by `hidden_if`: where all of them vanish together the mode is hidden as well (fewer
+    dimensions); empty if they cannot. Eigenvalues that differ as expressions may meet at a point: one output cannot tell two
+    eigenvectors there, and `rank_loss` of the frozen matrix has that set.
+    """
 
     eigenvalue: sp.Expr
     vectors: sp.ImmutableMatrix
     outputs: sp.ImmutableMatrix
     hidden_if: sp.Expr
     always: bool
+    leftover: tuple[sp.Expr, ...] = ()
 
 
 def frozen_modes(A: sp.Matrix, C: sp.Matrix) -> tuple[FrozenMode, ...]:
@@ -156,7 +165,7 @@ def frozen_modes(A: sp.Matrix, C: sp.Matrix) -> tuple[FrozenMode, ...]:
     More eigenvectors to one eigenvalue than outputs: one combination is always hidden. With more outputs than vectors `hidden_if`
     is the greatest common divisor of the maximal minors.
     """
-    A, C = sp.Matrix(A), sp.Matrix(C)
+    A, C = sp.Matrix(exact("A", A)), sp.Matrix(exact("C", C))
     if A.rows != A.cols or C.cols != A.rows:
         raise AnalysisError(f"A has the shape {A.shape} and C {C.shape}; A must be (nx, nx) and C (ny, nx)")
     modes = []
@@ -164,15 +173,24 @@ def frozen_modes(A: sp.Matrix, C: sp.Matrix) -> tuple[FrozenMode, ...]:
         vectors = sp.Matrix.hstack(*basis).applyfunc(sp.factor)
         outputs = (C * vectors).applyfunc(lambda e: sp.factor(sp.together(e)))
         always = outputs.rank(simplify=True) < len(basis)
+        leftover: tuple[sp.Expr, ...] = ()
         if always:
             condition = sp.Integer(0)
         else:
             chosen = combinations(range(outputs.rows), len(basis))
-            minors = [outputs.extract(list(rows), list(range(len(basis)))).det() for rows in chosen]
-            condition = sp.factor(sp.gcd_list([sp.numer(sp.together(minor)) for minor in minors]))
+            minors = [numerator(outputs.extract(list(rows), list(range(len(basis)))).det()) for rows in chosen]
+            minors = [minor for minor in minors if minor != 0]
+            condition = sp.factor(sp.gcd_list(minors))
+            rest = [sp.cancel(minor / condition) for minor in minors]
+            leftover = tuple(rest) if all(minor.free_symbols for minor in rest) else ()
         modes.append(
             FrozenMode(
-                sp.factor(eigenvalue), sp.ImmutableMatrix(vectors), sp.ImmutableMatrix(outputs), condition, always
+                sp.factor(eigenvalue),
+                sp.ImmutableMatrix(vectors),
+                sp.ImmutableMatrix(outputs),
+                condition,
+                always,
+                leftover,
             )
         )
     return tuple(modes)

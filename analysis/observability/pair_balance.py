@@ -18,10 +18,11 @@ SWEEPS = 60
 def balanced_pair(A: FloatArray, C: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """(D^-1 A D, F C D, d, f) for stacks A (..., n, n), C (..., m, n): D = diag(d) (..., n), F = diag(f) (..., m)."""
     n, m, lead = A.shape[-1], C.shape[-2], A.shape[:-2]
-    flat_A, flat_C = np.abs(A).reshape(-1, n, n), np.abs(C).reshape(-1, m, n)
-    states, outputs = np.zeros((len(flat_A), n)), np.zeros((len(flat_A), m))
+    count = int(np.prod(lead))
+    flat_A, flat_C = np.abs(A).reshape(count, n, n), np.abs(C).reshape(count, m, n)
+    states, outputs = np.zeros((count, n)), np.zeros((count, m))
     patterns = np.concatenate([flat_A, flat_C], axis=1) > 0.0
-    kinds, which = np.unique(patterns.reshape(len(flat_A), -1), axis=0, return_inverse=True)
+    kinds, which = np.unique(patterns.reshape(count, (n + m) * n), axis=0, return_inverse=True)
     for number, kind in enumerate(kinds):
         here = np.flatnonzero(which.ravel() == number)
         pattern = kind.reshape(n + m, n)

@@ -26,8 +26,10 @@ def observed_pair(A: Any, C: ArrayLike | None, discrete: object = None) -> tuple
     if C is None:
         raise AnalysisError("C is missing; give A and C, or a system object with both")
     A, C = square("A", A), as_stack("C", C)
-    if C.shape[-1] != A.shape[-1]:
-        raise AnalysisError(f"C has the shape {C.shape}; A {A.shape} needs {A.shape[-1]} columns")
+    if C.shape[-1] != A.shape[-1] or not C.shape[-2]:
+        raise AnalysisError(
+            f"C has the shape {C.shape}; A {A.shape} needs {A.shape[-1]} columns, and at least one row (of zeros)"
+        )
     lead = leading({"A": A, "C": C})
     return np.broadcast_to(A, (*lead, *A.shape[-2:])), np.broadcast_to(C, (*lead, *C.shape[-2:])), time
 
@@ -38,8 +40,10 @@ def driven_pair(A: Any, B: ArrayLike | None, discrete: object = None) -> tuple[F
     if B is None:
         raise AnalysisError("B is missing; give A and B, or a system object with both")
     A, B = square("A", A), as_stack("B", B)
-    if B.shape[-2] != A.shape[-1]:
-        raise AnalysisError(f"B has the shape {B.shape}; A {A.shape} needs {A.shape[-1]} rows")
+    if B.shape[-2] != A.shape[-1] or not B.shape[-1]:
+        raise AnalysisError(
+            f"B has the shape {B.shape}; A {A.shape} needs {A.shape[-1]} rows, and at least one column (of zeros)"
+        )
     lead = leading({"A": A, "B": B})
     A, B = np.broadcast_to(A, (*lead, *A.shape[-2:])), np.broadcast_to(B, (*lead, *B.shape[-2:]))
     return np.swapaxes(A, -1, -2), np.swapaxes(B, -1, -2), time
