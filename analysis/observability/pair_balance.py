@@ -13,6 +13,7 @@ import numpy as np
 from estimators.arrays import BoolArray, FloatArray, IntArray
 
 SWEEPS = 60
+LIMIT = 1000.0  # of an exponent: double precision ends at 1023
 
 
 def balanced_pair(A: FloatArray, C: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -97,4 +98,5 @@ def _scaled(A: FloatArray, e: FloatArray) -> FloatArray:
 def _to_level(C: FloatArray, e: FloatArray, level: FloatArray) -> FloatArray:
     """Exponents of F: the largest entry of every output's row to the level."""
     largest = (C * np.exp2(e)[:, None, :]).max(axis=-1)
-    return np.where(largest > 0.0, np.rint(level[:, None] - np.log2(np.where(largest > 0.0, largest, 1.0))), 0.0)
+    exponent = np.rint(level[:, None] - np.log2(np.where(largest > 0.0, largest, 1.0)))
+    return np.where(largest > 0.0, np.clip(exponent, -LIMIT, LIMIT), 0.0)
