@@ -90,6 +90,19 @@ def test_decimals_are_the_fractions_they_say() -> None:
     assert exact("A", [[sp.Float("0.1000000000000000000001", 30)]])[0] != sp.Rational(1, 10)
 
 
+def test_a_direction_that_only_the_samples_hide_is_not_proved() -> None:
+    """Too few derivatives, one point instead of a box, an irrational direction: rank 1 in the samples, and no proof."""
+    box = {"x": (0.5, 1.5), "y": (0.5, 1.5)}
+    short = generic_rank(nonlinear([y, 0], [x]), box, order=0)
+    assert (short.rank, short.structure.basis.cols, short.structure.proved) == (1, 1, False)
+    point = generic_rank(nonlinear([0, 0], [x**2 + y**2]), {"x": (1, 1), "y": (1, 1)})
+    assert (point.rank, point.structure.basis.cols, point.structure.proved) == (1, 1, False)
+    slanted = generic_rank(nonlinear([0, 0], [x + sp.sqrt(2) * y]), box)
+    assert (slanted.rank, slanted.structure.basis.cols, slanted.structure.proved) == (1, 0, False)
+    flat = generic_rank(nonlinear([0, 0], [x + y]), box, order=0)
+    assert (flat.rank, flat.structure.proved) == (1, True)
+
+
 @pytest.mark.parametrize(("entry", "word"), [(sp.I, "complex"), (sp.nan, "not a finite"), (sp.oo, "not a finite")])
 def test_entries_that_are_no_real_numbers_are_refused(entry: Any, word: str) -> None:
     for call in (

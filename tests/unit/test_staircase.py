@@ -23,6 +23,7 @@ from analysis import (
 )
 from analysis.errors import AnalysisError
 from analysis.observability.exact_hidden import hidden_is_stable, hidden_polynomial, is_hurwitz
+from analysis.observability.growing_part import growing_mode, least_seen
 from analysis.observability.hautus_distance import Region, below, border_clear
 from analysis.observability.pair_balance import balanced_pair
 from analysis.observability.pairs import without_dust
@@ -188,6 +189,8 @@ def test_rounding_in_the_place_of_a_zero_is_no_sensor() -> None:
     assert clean[0, 1] == 0.0 and outputs[0, 0] == 0.0
     kept, _ = without_dust(np.array([[0.0, 1e-17], [1.0, 0.0]]), np.eye(2))
     assert kept[0, 1] == 1e-17  # the largest of its row
+    kept, _ = without_dust(np.array([[1.0, 1e-17], [0.0, 1e-17]]), np.eye(2))
+    assert kept[0, 1] == 1e-17  # the largest of its column
 
 
 def test_the_precision_of_the_data_decides() -> None:
@@ -225,6 +228,7 @@ def test_the_proofs_refuse_what_is_false() -> None:
     assert proved_distance(-F, *nothing, -np.diag([1.0, 10.0]), False) == 0.0
     assert proved_distance(0.5 * np.eye(2), *nothing, np.eye(2), True) == pytest.approx(0.5, rel=1e-12)
     assert proved_distance(1.5 * np.eye(2), *nothing, np.eye(2), True) == 0.0
+    assert proved_distance(np.diag([-1.0, 1.0]), *nothing, np.diag([1.0, -1.0]), False) == 0.0  # Q > 0, P is not
     gain = np.array([[3.0], [4.0]])
     assert proved_distance(
         -np.eye(2) + gain @ [[1.0, 0.0]], np.array([[1.0, 0.0]]), gain, np.eye(2), False
@@ -233,6 +237,52 @@ def test_the_proofs_refuse_what_is_false() -> None:
     assert border_clear(np.array([[0.5, -2.0], [2.0, 0.5]]), False, 0.4)
     assert not border_clear(np.array([[0.5, -2.0], [2.0, 0.5]]), False, 0.6)
     assert border_clear(np.diag([1.5, 0.2]), True, 0.4) and not border_clear(np.diag([-1.5, 0.2]), True, 0.6)
+
+
+def test_a_growing_part_is_hidden_and_clear_of_the_border() -> None:
+    A, first = np.diag([1.0, -1.0]), np.eye(2)[:, :1]
+    assert growing_mode(A, np.array([[0.0, 1.0]]), [first], False, 1e-9) == 1.0
+    assert growing_mode(A, np.array([[1.0, 1.0]]), [first], False, 1e-9) is None  # it is seen
+    assert growing_mode(np.array([[1e-9]]), np.zeros((1, 1)), [np.eye(1)], False, 1e-10) == 1e-9
+    assert growing_mode(np.array([[1e-9]]), np.zeros((1, 1)), [np.eye(1)], False, 1e-8) is None  # it may as well decay
+    turning = np.array([[0.5, -2.0], [2.0, 0.5]])
+    found = growing_mode(turning, np.zeros((1, 2)), list(least_seen(turning, np.zeros((1, 2)), 0.5 + 2j)), False, 1e-9)
+    assert found is not None and found.real == pytest.approx(0.5) and abs(found.imag) == pytest.approx(2.0)
+
+
+def test_a_weak_coupling_before_a_hidden_part_does_not_hide_the_refutation() -> None:
+    """The staircase divides by the coupling 1e-6 and loses the hidden part in rounding; the least seen direction has it."""
+    A, C = np.array([[-1.0, 1e-6, 0.0], [0.5, -2.0, 0.0], [1.0, 1.0, 1.5]]), np.eye(3)[:1]
+    for seed in range(6):
+        found = detectable(*rotated(A, C, seed))
+        assert found.verdict is Verdict.REFUTED and "1.5" in found.reason
+        A[2, 2] = -1.5
+        assert detectable(*rotated(A, C, seed)).verdict is Verdict.CERTIFIED
+        A[2, 2] = 1.5
+
+
+def test_a_chain_of_weak_couplings_hides_a_mode_from_the_hautus_test() -> None:
+    """Each coupling 1e-5 counts, the mode 3 shows by their product 5e-11 alone; at 1e-3 it shows enough."""
+    for e, hidden in ((1e-5, True), (1e-3, False)):
+        A = np.diag([1.0, 2.0, 3.0]) + e * (np.eye(3, k=1) + np.eye(3, k=-1))
+        found = hautus_test(A, np.eye(3)[:1])
+        np.testing.assert_array_equal(found.hidden, hidden & (found.eigenvalues.real > 2.5))
+
+
+@pytest.mark.parametrize("angle", [1e-9, 1e-6, 0.7])
+def test_a_slightly_turned_double_integrator_is_never_detectable(angle: float) -> None:
+    """At 1e-9 an entry of 1e-18 beside 1 would be dust, and without it the pair would be observable."""
+    U = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    for shift in (0.0, 1.0):
+        A, C = U @ np.array(VELOCITY[0]) @ U.T + shift * np.eye(2), np.array(VELOCITY[1]) @ U.T
+        assert detectable(A, C, shift == 1.0).verdict is Verdict.INCONCLUSIVE
+        assert hautus_test(A, C, shift == 1.0).undecided
+
+
+def test_gains_bound_the_distance_to_unobservability_over_both_half_planes() -> None:
+    """The mode that is nearly hidden decays: a gain for (A, C) alone knows nothing of it."""
+    found = distance_to_unobservability(np.diag([-1.0, 2.0]), [[1e-2, 1.0]], evaluations=4)
+    assert found.upper < 2e-2 and 0.0 < found.lower < 0.9 * found.upper
 
 
 def test_exact_stability_of_what_is_hidden() -> None:
@@ -263,6 +313,8 @@ def test_balancing_keeps_zeros_and_rounds_nothing() -> None:
         np.testing.assert_array_equal(np.frexp(factor)[0], 0.5)
     np.testing.assert_array_equal(near, A * d[:, None, :] / d[:, :, None])
     np.testing.assert_array_equal(outputs, C * d[:, None, :] * f[:, :, None])
+    beside = np.abs(near) * (1.0 - np.eye(4))
+    assert np.abs(np.log2(beside.sum(axis=-1) / beside.sum(axis=-2))).max() <= 1.5
     assert np.abs(near).max() < 100.0 * np.median(np.abs(near)) and np.abs(outputs).max() <= 2.0 * np.abs(near).max()
 
 
