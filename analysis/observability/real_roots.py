@@ -28,7 +28,8 @@ def real_roots(expression: sp.Expr, symbol: sp.Symbol, inside: Range | None = No
     """Real roots, ascending; those of polynomials as exact numbers, others as solved by sympy or to 30 digits.
 
     `inside` is a closed range, which other functions than polynomials need: all their roots there are isolated in ball
-    arithmetic, or, where that cannot decide (a double root, a kink), taken as solved by sympy. Raises AnalysisError where the expression vanishes everywhere, and where roots cannot be told apart.
+    arithmetic, or, where that cannot decide (a double root, a kink), taken as solved by sympy. Raises AnalysisError where the
+    expression vanishes everywhere, and where roots cannot be told apart.
     """
     upper, lower = sp.fraction(sp.cancel(sp.together(expression)))
     if upper == 0:

@@ -24,7 +24,7 @@ from analysis import (
 from analysis.errors import AnalysisError
 from analysis.observability.exact_hidden import hidden_is_stable, hidden_polynomial, is_hurwitz
 from analysis.observability.growing_part import growing_mode, least_seen
-from analysis.observability.hautus_distance import Region, below, border_clear
+from analysis.observability.hautus_distance import Region, below, border_clear, least
 from analysis.observability.pair_balance import balanced_pair
 from analysis.observability.pairs import without_dust
 from analysis.observability.witness_gain import proved_distance
@@ -78,6 +78,9 @@ def test_the_tolerance_of_a_staircase_is_relative_to_a_and_to_c() -> None:
     assert observability_staircase(A, C, tolerance=1e-5).order == 1
     assert observability_staircase(1e9 * A, 1e-9 * C, tolerance=1e-5).order == 1
     assert observability_staircase(A, 0.0 * C).stages == ()
+    assert (
+        observability_staircase([[-1.0, 0.0], [1e-10, -2.0]], C).order == 2
+    )  # exact but for rounding, if nothing is said
     assert observability_staircase(A, C, tolerance=1e-5).residual == pytest.approx(1e-6 / np.linalg.norm(A, 2))
 
 
@@ -120,6 +123,23 @@ def test_both_sides_of_a_distance_against_a_general_minimiser(discrete: bool) ->
         found = distance_to_undetectability(A, C, discrete, gap=0.02)
         assert found.lower <= best * (1 + 1e-9) and found.upper == pytest.approx(best, rel=1e-6)
         assert found.lower > 0.95 * best
+
+
+def test_subdivision_needs_no_good_upper_bound() -> None:
+    """Started from a value that is too high, it neither passes the minimum over nor claims more than it."""
+    A, C = np.diag([1.0, 0.1]), np.array([[1e-3, 1.0]])  # the minimum is at the edge of the region, |z| = |A|
+    lower, upper, place = below(A, C, Region.RIGHT, 0.5, 0.05, 20_000)
+    exact = distance_to_unobservability(A, C, gap=1e-3)
+    assert 0.9 * exact.upper < lower <= exact.upper <= upper < 1.1 * exact.upper
+    assert place is not None and abs(place - 1.0) < 2e-3
+    draw = np.random.default_rng(8)
+    for _ in range(6):
+        A, C = draw.normal(size=(3, 3)), draw.normal(size=(1, 3))
+        for region in Region:
+            least_value = least(A, C, region)[0]
+            lower, upper, _ = below(A, C, region, 1.5 * least_value, 0.05, 20_000)
+            assert 0.94 * upper < lower <= least_value * (1 + 1e-9) and upper < 1.06 * least_value
+    assert least(*map(np.array, POSITION), Region.PLANE)[0] == pytest.approx(np.sqrt(0.75), rel=1e-6)  # beside a saddle
 
 
 def test_the_lower_side_of_a_hidden_chain_comes_from_a_gain() -> None:
