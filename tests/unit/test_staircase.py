@@ -223,6 +223,17 @@ def test_the_precision_of_the_data_decides() -> None:
     assert detectable(slow, outputs, precision=1e-3).verdict is Verdict.INCONCLUSIVE
 
 
+def test_certified_means_a_distance_above_the_precision() -> None:
+    A, C = np.array([[0.5, 0.4], [-0.3, 0.2]]), np.array([[1.0, 0.3]])
+    verdicts = set()
+    for precision in np.geomspace(1e-3, 0.9, 25):
+        found = detectable(A, C, precision=float(precision))
+        verdicts.add(found.verdict)
+        assert found.verdict is not Verdict.CERTIFIED or found.lower > precision
+        assert found.lower <= found.upper
+    assert len(verdicts) > 1
+
+
 def test_discrete_time_is_judged_by_the_unit_circle() -> None:
     for mode, verdict in (
         (0.9, Verdict.CERTIFIED),
@@ -248,6 +259,8 @@ def test_the_proofs_refuse_what_is_false() -> None:
     assert proved_distance(-F, *nothing, -np.diag([1.0, 10.0]), False) == 0.0
     assert proved_distance(0.5 * np.eye(2), *nothing, np.eye(2), True) == pytest.approx(0.5, rel=1e-12)
     assert proved_distance(1.5 * np.eye(2), *nothing, np.eye(2), True) == 0.0
+    slanted = np.array([[0.5, 50.0], [0.0, 0.5]])  # 0.005 in the corner makes it unstable
+    assert 1e-3 < proved_distance(slanted, *nothing, np.diag([1.0, 1e4]), True) <= 0.005
     assert proved_distance(np.diag([-1.0, 1.0]), *nothing, np.diag([1.0, -1.0]), False) == 0.0  # Q > 0, P is not
     gain = np.array([[3.0], [4.0]])
     assert proved_distance(
