@@ -95,7 +95,8 @@ def _isolated(factor: sp.Expr, symbol: sp.Symbol, inside: Range) -> tuple[sp.Exp
         low, high = (ball(sp.Rational(end)) if end.is_Rational else arb(str(sp.N(end, 60))) for end in inside)
         edge = (high - low) * arb(2) ** -80  # roots at the ends belong to the range
         pieces = arb_series.find_roots(value, (low - edge).mid(), (high + edge).mid(), maxn=PIECES)
-        return tuple(_narrowed(value, a.mid(), b.mid()) for a, b in pieces)
+        found = [_narrowed(value, a.mid(), b.mid()) for a, b in pieces]
+    return tuple(inside[0] if root < inside[0] else inside[1] if root > inside[1] else root for root in found)
 
 
 def _narrowed(value: Callable[[Any], Any], low: Any, high: Any) -> sp.Float:

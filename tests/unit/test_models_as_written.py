@@ -148,6 +148,11 @@ def test_roots_inside_a_range(condition: Any, roots: tuple[Any, ...]) -> None:
     np.testing.assert_allclose([float(root) for root in found], [float(root) for root in roots], atol=1e-15, rtol=1e-14)
 
 
+def test_a_root_at_the_end_of_a_range_belongs_to_it() -> None:
+    found = real_roots(sp.sin(p) - p / 2, p, (sp.Integer(0), sp.Integer(2)))
+    np.testing.assert_allclose([float(root) for root in found], [0.0, 1.8954942670339809], atol=1e-20, rtol=1e-14)
+
+
 def test_factors_and_roots_say_what_they_cannot() -> None:
     assert loss((p - 1) / (p + 3)).factors == (p - 1,)
     assert loss(sp.sin(p) * (p - 1)).factors == (p - 1, sp.sin(p))

@@ -273,8 +273,8 @@ def test_the_proofs_refuse_what_is_false() -> None:
 
 
 def test_a_growing_part_is_hidden_and_clear_of_the_border() -> None:
-    A, first = np.diag([1.0, -1.0]), np.eye(2)[:, :1]
-    assert growing_mode(A, np.array([[0.0, 1.0]]), [first], False, 1e-9) == 1.0
+    A, first = np.diag([5.0, -1.0]), np.eye(2)[:, :1]
+    assert growing_mode(A, np.array([[0.0, 1.0]]), [first], False, 1e-9) == 5.0
     assert growing_mode(A, np.array([[1.0, 1.0]]), [first], False, 1e-9) is None  # it is seen
     assert growing_mode(np.array([[1e-9]]), np.zeros((1, 1)), [np.eye(1)], False, 1e-10) == 1e-9
     assert growing_mode(np.array([[1e-9]]), np.zeros((1, 1)), [np.eye(1)], False, 1e-8) is None  # it may as well decay
@@ -357,6 +357,8 @@ def test_groups_of_states_are_sized_by_where_they_lead() -> None:
     near, outputs, _, _ = balanced_pair(A, np.array([[1e-7, 0.0, 0.0]]))
     assert np.diag(near).tolist() == [-2.0, -1.0, -1.0] and (near == 0.0).sum() == 4
     np.testing.assert_allclose(np.log2([near[0, 1], near[2, 1], outputs[0, 0]]), 1.0, atol=0.51)
+    _, outputs, _, _ = balanced_pair(np.array([[-1.0, 1e6], [0.0, -1.0]]), np.eye(2))
+    np.testing.assert_allclose(np.log2(np.diag(outputs)), 0.0, atol=0.51)  # rows are sized once more after the groups
     both, _, _, _ = balanced_pair(np.stack([A, np.eye(3)]), np.array([[[1e-7, 0.0, 0.0]], [[1.0, 1.0, 1e9]]]))
     np.testing.assert_array_equal(both[0], near)
 
