@@ -139,7 +139,9 @@ def test_subdivision_needs_no_good_upper_bound() -> None:
             least_value = least(A, C, region)[0]
             lower, upper, _ = below(A, C, region, 1.5 * least_value, 0.05, 20_000)
             assert 0.94 * upper < lower <= least_value * (1 + 1e-9) and upper < 1.06 * least_value
-    assert least(*map(np.array, POSITION), Region.PLANE)[0] == pytest.approx(np.sqrt(0.75), rel=1e-6)  # beside a saddle
+    assert least(np.array(POSITION[0]), np.array(POSITION[1]), Region.PLANE)[0] == pytest.approx(
+        np.sqrt(0.75), rel=1e-6
+    )  # beside a saddle
 
 
 def test_the_lower_side_of_a_hidden_chain_comes_from_a_gain() -> None:
