@@ -99,6 +99,9 @@ def test_a_direction_that_only_the_samples_hide_is_not_proved() -> None:
     assert (point.rank, point.structure.basis.cols, point.structure.proved) == (1, 1, False)
     slanted = generic_rank(nonlinear([0, 0], [x + sp.sqrt(2) * y]), box)
     assert (slanted.rank, slanted.structure.basis.cols, slanted.structure.proved) == (1, 0, False)
+    tiny = [x + y, x + y + y / sp.Integer(10) ** 30]  # two outputs that differ by a hair, and by nothing
+    assert generic_rank(nonlinear([0, 0], tiny), box).rank == 2
+    assert generic_rank(nonlinear([0, 0], [x + y, 2 * x + 2 * y]), box).rank == 1
     flat = generic_rank(nonlinear([0, 0], [x + y]), box, order=0)
     assert (flat.rank, flat.structure.proved) == (1, True)
 

@@ -298,6 +298,7 @@ def test_a_weak_coupling_before_a_hidden_part_does_not_hide_the_refutation() -> 
 
 def test_a_chain_of_weak_couplings_hides_a_mode_from_the_hautus_test() -> None:
     """Each coupling 1e-5 counts, the mode 3 shows by their product 5e-11 alone; at 1e-3 it shows enough."""
+    assert hautus_test([[2.0]], [[-3.0]]).distance == pytest.approx(1.0, rel=1e-15)  # in units of |A| and |C|
     for e, hidden in ((1e-5, True), (1e-3, False)):
         A = np.diag([1.0, 2.0, 3.0]) + e * (np.eye(3, k=1) + np.eye(3, k=-1))
         found = hautus_test(A, np.eye(3)[:1])
