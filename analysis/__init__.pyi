@@ -53,6 +53,14 @@ from .norms.hinf import stability_margin as stability_margin
 from .norms.observer_error import error_hinf_norm as error_hinf_norm
 from .norms.static_gain import StaticGain as StaticGain
 from .norms.static_gain import static_gain as static_gain
+from .observability.detectability import Detectability as Detectability
+from .observability.detectability import detectable as detectable
+from .observability.detectability import stabilizable as stabilizable
+from .observability.distance import HiddenModeDistance as HiddenModeDistance
+from .observability.distance import distance_to_uncontrollability as distance_to_uncontrollability
+from .observability.distance import distance_to_undetectability as distance_to_undetectability
+from .observability.distance import distance_to_unobservability as distance_to_unobservability
+from .observability.distance import distance_to_unstabilizability as distance_to_unstabilizability
 from .observability.gramians import Gramians as Gramians
 from .observability.gramians import controllability_gramian as controllability_gramian
 from .observability.gramians import growing_observability as growing_observability
@@ -76,6 +84,9 @@ from .observability.modes import hautus_test as hautus_test
 from .observability.rank_loss import RankLoss as RankLoss
 from .observability.rank_loss import rank_loss as rank_loss
 from .observability.rank_loss_speeds import RankLossSpeeds as RankLossSpeeds
+from .observability.staircase import Staircase as Staircase
+from .observability.staircase import controllability_staircase as controllability_staircase
+from .observability.staircase import observability_staircase as observability_staircase
 from .observability.stochastic import StochasticObservability as StochasticObservability
 from .observability.stochastic import stochastic_observability as stochastic_observability
 from .observability.stochastic import stochastic_observability_along as stochastic_observability_along

@@ -21,6 +21,8 @@ def as_stack(name: str, array: ArrayLike, ndim: int = 2) -> FloatArray:
     """
     try:
         given = np.asarray(array)
+        if any(map(np.ma.is_masked, array if isinstance(array, list | tuple) else (array,))):
+            raise AnalysisError(f"{name} has masked entries; fill or remove them before the analysis")
         if np.iscomplexobj(given):
             raise AnalysisError(f"{name} is complex; give real matrices (stack real and imaginary parts)")
         out: Any = np.asarray(given, dtype=float)

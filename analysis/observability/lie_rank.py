@@ -12,6 +12,7 @@ import sympy as sp
 from flint import arb, arb_mat, arb_series
 
 from analysis.errors import AnalysisError
+from analysis.observability.exact_expression import exact, in_cases
 from analysis.observability.lie_series import Evaluator, ball, series_arithmetic
 from analysis.observability.matrix import exact_number
 from estimators.arrays import FloatArray
@@ -65,7 +66,7 @@ class LieRankTest:
 
     @cached_property
     def _jacobians(self) -> tuple[Evaluator, Evaluator]:
-        f, h = self.model.with_constants_inserted()
+        f, h = exact_model(self.model)
         states = self.model.state_symbols
         gradients = [e.diff(s) for g in (f, h) for e in g for s in states]
         return Evaluator(list(f)), Evaluator(gradients)
@@ -128,6 +129,12 @@ class LieRankTest:
             rank, residual = ball_rank(rows[: (k + 1) * ny])
             by_order.append(rank)
         return LieRank(tuple(by_order), self.names, _null_space(rows, by_order[-1]), residual, rows)
+
+
+def exact_model(model: NonlinearModel) -> tuple[sp.ImmutableMatrix, sp.ImmutableMatrix]:
+    """f and h with constants inserted, decimals as fractions and kinks (abs, max) as cases."""
+    f, h = (in_cases(exact(f"model '{model.name}'", side)) for side in model.with_constants_inserted())
+    return f, h
 
 
 def ball_rank(rows: list[list[Any]]) -> tuple[int, float]:

@@ -22,7 +22,21 @@ FUNCTIONS: Mapping[type, Callable[[Series], Series]] = {
     sp.atan: lambda s: s.atan(),
     sp.exp: lambda s: s.exp(),
     sp.log: lambda s: s.log(),
+    sp.asin: lambda s: s.asin(),
+    sp.acos: lambda s: s.acos(),
+    sp.cot: lambda s: s.cos() / s.sin(),
+    sp.sec: lambda s: 1 / s.cos(),
+    sp.csc: lambda s: 1 / s.sin(),
+    sp.sinh: lambda s: (s.exp() - (-s).exp()) / 2,
+    sp.cosh: lambda s: (s.exp() + (-s).exp()) / 2,
+    sp.tanh: lambda s: 1 - 2 / ((2 * s).exp() + 1),
+    sp.coth: lambda s: 1 + 2 / ((2 * s).exp() - 1),
+    sp.asinh: lambda s: (s + (s * s + 1).sqrt()).log(),
+    sp.acosh: lambda s: (s + (s - 1).sqrt() * (s + 1).sqrt()).log(),
+    sp.atanh: lambda s: ((1 + s) / (1 - s)).log() / 2,
+    sp.erf: lambda s: s.erf(),
 }
+NUMBERS: Mapping[Any, Callable[[], Any]] = {sp.pi: arb.pi, sp.E: arb.const_e}
 LOGICAL = (sp.core.relational.Relational, sp.And, sp.Or, sp.Not)
 
 
@@ -77,6 +91,8 @@ def _value(expression: sp.Expr, known: Mapping[str, Series]) -> Series:
         return known[str(expression)]
     if expression.is_Rational:
         return arb_series([ball(expression)])
+    if expression in NUMBERS:
+        return arb_series([NUMBERS[expression]()])
     if isinstance(expression, sp.Piecewise):
         return _branch(expression, known)
     if isinstance(expression, sp.Pow):
@@ -92,16 +108,17 @@ def _value(expression: sp.Expr, known: Mapping[str, Series]) -> Series:
             f"'{expression.func.__name__}' has no series here; known: {', '.join(sorted(f.__name__ for f in FUNCTIONS))}, "
             "powers and Piecewise"
         )
-    return _finite(function(arguments[0]), expression)
+    try:
+        return _finite(function(arguments[0]), expression)
+    except ZeroDivisionError:
+        raise AnalysisError(f"{expression} has no Taylor series at this point; the model is singular here") from None
 
 
 def _power(expression: sp.Pow, known: Mapping[str, Series]) -> Series:
     base, exponent = expression.args
     value = _value(base, known)
-    if not exponent.is_Rational:
-        raise AnalysisError(f"{expression} has an exponent that is no number; write it with exp and log")
-    if exponent.q not in (1, 2):
-        raise AnalysisError(f"{expression}: only whole and half powers have a series here")
+    if not (exponent.is_Rational and exponent.q in (1, 2)):  # b^e = exp(e log b) for b > 0
+        return _finite((_value(exponent, known) * value.log()).exp(), expression)
     root = value if exponent.q == 1 else _finite(value.sqrt(), expression)
     out = reduce(mul, [root] * abs(int(exponent.p)))
     if exponent.p > 0:

@@ -11,7 +11,8 @@ import numpy as np
 import sympy as sp
 
 from analysis.errors import AnalysisError
-from analysis.observability.lie_rank import LieRank, LieRankTest, ball_rank
+from analysis.observability.lie_rank import LieRank, LieRankTest, ball_rank, exact_model
+from analysis.observability.matrix import exact_number
 from synthesis.models.nonlinear import NonlinearModel
 
 Range = tuple[float, float]
@@ -71,6 +72,8 @@ def generic_rank(
     for name in (*test.names, *test.input_names):
         if name not in ranges:
             raise AnalysisError(f"model '{model.name}': no range for '{name}'; give one for every state and input")
+        if np.size(ranges[name]) != 2 or not all(exact_number(name, end).is_real for end in ranges[name]):
+            raise AnalysisError(f"model '{model.name}': the range {ranges[name]} of '{name}' needs two real ends")
         if not ranges[name][0] <= ranges[name][1]:
             raise AnalysisError(f"model '{model.name}': the range {ranges[name]} of '{name}' is reversed")
     if samples < 1:
@@ -158,7 +161,7 @@ def _rounded(value: Fraction) -> Fraction:
 def _dynamics(model: NonlinearModel, basis: sp.Matrix, fixed: Mapping[str, float]) -> sp.Matrix | None:
     """K of f_x V = V K if that and h_x V = 0 hold identically, inputs of no width at their value; None otherwise."""
     values = {sp.Symbol(name): sp.Rational(str(float(v))) for name, v in fixed.items()}
-    f, h = (g.subs(values) for g in model.with_constants_inserted())
+    f, h = (g.subs(values) for g in exact_model(model))
     states = list(model.state_symbols)
     if any(sp.simplify(entry) != 0 for entry in h.jacobian(states) * basis):
         return None

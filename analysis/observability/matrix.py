@@ -11,10 +11,10 @@ from itertools import combinations
 import sympy as sp
 
 from analysis.errors import AnalysisError
+from analysis.observability.exact_expression import exact
 from estimators.errors import unknown
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter
-from synthesis.models.symbols import plain
 
 MOST_MINORS = 5000
 
@@ -160,9 +160,9 @@ def observability_of(
 
     With an empty `motion` the result is marked frozen. Raises AnalysisError for shapes that do not fit and blocks < 1.
     """
-    A, C = plain(sp.Matrix(A)), plain(sp.Matrix(C))
+    A, C = exact("A", A), exact("C", C)
     motion = (
-        dict(zip(*(plain(sp.Matrix(list(side))) for side in (motion.keys(), motion.values())), strict=True))
+        dict(zip(*(exact("motion", list(side)) for side in (motion.keys(), motion.values())), strict=True))
         if motion
         else {}
     )

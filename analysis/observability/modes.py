@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
@@ -10,9 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
-from analysis.checks import as_stack, leading, square
 from analysis.errors import AnalysisError
-from analysis.state_space import given_system
+from analysis.observability.exact_expression import exact
+from analysis.observability.pair_balance import balanced_pair
+from analysis.observability.pairs import observed_pair, unit_pair, without_dust
+from analysis.observability.real_roots import numerator
+from analysis.observability.staircase import separate
 from estimators.arrays import BoolArray, ComplexArray, FloatArray
 
 if TYPE_CHECKING:
@@ -21,11 +23,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class HautusTest:
-    r"""The Popov-Belevitch-Hautus test of frozen pairs: is [A - lambda I; C] of full column rank at every eigenvalue?
+    r"""Which modes of frozen pairs are hidden: the Popov-Belevitch-Hautus test behind a staircase form.
 
-    All arrays (..., n), in the order of `eigenvalues` [1/s, or 1 for discrete time]. `distance` is the smallest
-    singular value of [(A - lambda I)/|A|; C/|C|]: 0 means that the mode is never seen. `hidden` is distance below the
-    tolerance; `decays` and `grows` are certain, and a mode that does neither is on the border within the tolerance.
+    All arrays (..., n), in the order of `eigenvalues` [1/s, or 1 for discrete time]: first those of what is seen, then those
+    of the unobservable subspace, as many as it has dimensions. `distance` is the smallest singular value of [A - lambda I; C] in
+    units of |A| and |C|, of the seen part for its own modes: 0 means that the mode is never seen. `hidden` are the modes of the
+    unobservable subspace and those with a distance below the tolerance. `decays` and `grows` are certain: the border of
+    stability is further away than the tolerance; a mode that does neither is on the border at this precision.
     A frozen test says nothing of a pair that varies: use gramians or the time-varying matrix for that.
     """
 
@@ -69,62 +73,90 @@ def hautus_test(
 ) -> HautusTest:
     r"""Test stacks A (..., n, n), C (..., m, n), or a system object in the place of A (`analysis.state_space`).
 
+    Rank decisions count singular values above `tolerance` in units of |A| and |C|, after balancing (`pair_balance`), so that
+    units decide nothing. The eigenvalues of a k-fold defective mode err by (rounding)^(1/k); the unobservable subspace is found
+    without them, and its own eigenvalues do not mix with the others. For one pair with three verdicts ask `detectable`.
     Raises AnalysisError for shapes that do not fit and values not finite.
-
-    A k-fold defective eigenvalue comes out of any algorithm with errors of up to (rounding)^(1/k), while the mean of the k is
-    accurate to rounding. So beside every eigenvalue the means of it with its nearest neighbours are looked at, as far as rounding
-    explains their spread: a singular value at any point at all bounds the distance to a pair with a hidden mode.
     """
-    A, _, C, _, discrete = given_system(A, C=C, discrete=discrete)
-    if C is None:
-        raise AnalysisError("C is missing; give A and C, or a system object with both")
-    A, C = square("A", A), as_stack("C", C)
-    if C.shape[-1] != A.shape[-1]:
-        raise AnalysisError(f"C has the shape {C.shape}; A {A.shape} needs {A.shape[-1]} columns")
+    A, C, time = observed_pair(A, C, discrete)
     if not tolerance > 0.0:
         raise AnalysisError(f"tolerance = {tolerance} must be positive")
-    lead = leading({"A": A, "C": C})
+    n, lead = A.shape[-1], A.shape[:-2]
+    count = int(np.prod(lead))
+    pairs, outputs = A.reshape(count, n, n), C.reshape(count, *C.shape[-2:])
+    found = _modes(pairs, outputs, time, tolerance)
+    clean = without_dust(pairs, outputs)
+    dusty = np.flatnonzero((clean[0] != pairs).any(axis=(-2, -1)) | (clean[1] != outputs).any(axis=(-2, -1)))
+    if len(dusty):  # entries that are rounding may hide as well as show: the worse answer counts
+        other = _modes(clean[0][dusty], clean[1][dusty], time, tolerance)
+        worse = other.hidden.sum(axis=-1) > found.hidden[dusty].sum(axis=-1)
+        for name in ("eigenvalues", "distance", "hidden", "decays", "grows"):
+            getattr(found, name)[dusty[worse]] = getattr(other, name)[worse]
+    shape = (*lead, n)
+    hidden, decays, grows = (f.reshape(shape) for f in (found.hidden, found.decays, found.grows))
+    return HautusTest(found.eigenvalues.reshape(shape), found.distance.reshape(shape), hidden, decays, grows, tolerance)
+
+
+def _modes(A: FloatArray, C: FloatArray, discrete: bool, tolerance: float) -> HautusTest:
+    """The test of pairs A (count, n, n), C (count, m, n) as they stand."""
     n = A.shape[-1]
-    A = np.broadcast_to(A, (*lead, n, n))
-    C = np.broadcast_to(C, (*lead, *C.shape[-2:]))
-    size = np.linalg.norm(A, 2, axis=(-2, -1))[..., None]
-    seen = np.linalg.norm(C, 2, axis=(-2, -1))[..., None, None]
-    size, seen = np.where(size > 0.0, size, 1.0), np.where(seen > 0.0, seen, 1.0)
-    eigenvalues = np.linalg.eigvals(A).astype(complex)
-    distance, where = np.full((*lead, n), np.inf), eigenvalues.copy()
-    for candidates in _cluster_means(eigenvalues, size[..., None]):
-        shifted = (A[..., None, :, :] - candidates[..., None, None] * np.eye(n)) / size[..., None, None]
-        outputs = np.broadcast_to((C / seen)[..., None, :, :], (*lead, n, *C.shape[-2:]))
-        found = np.linalg.svd(np.concatenate([shifted, outputs], -2), compute_uv=False)[..., -1]
-        better = found < distance
-        distance, where = np.where(better, found, distance), np.where(better, candidates, where)
-    beyond = np.abs(where) - 1.0 if discrete else where.real
-    border = tolerance * size
-    return HautusTest(where, distance, distance < tolerance, beyond < -border, beyond > border, tolerance)
+    near_A, near_C, _, _ = balanced_pair(A, C)
+    pairs, outputs, size = unit_pair(near_A, near_C)
+    size = size[..., 0]
+    parts = separate(pairs, outputs, tolerance)
+    moved, sees = np.swapaxes(parts.transform, -1, -2) @ pairs @ parts.transform, outputs @ parts.transform
+    eigenvalues = np.zeros((len(pairs), n), complex)
+    distance, clear = np.zeros((len(pairs), n)), np.zeros((len(pairs), n))
+    for order in (int(r) for r in np.unique(n - parts.hidden)):
+        here = n - parts.hidden == order
+        for part in (slice(0, order), slice(order, n)):
+            block, whole = moved[here][:, part, part], part.start > 0
+            found = np.linalg.eigvals(block).astype(complex)
+            eigenvalues[here, part] = found
+            # Beside hidden modes their seen copies are judged on the seen part alone: the pair as a whole hides that eigenvalue.
+            pair, output = (moved[here], sees[here]) if whole else (block, sees[here][:, :, part])
+            distance[here, part] = _smallest(pair, output, found)
+            clear[here, part] = _smallest(block, None, _border(found, size[here], discrete))
+    hidden = (np.arange(n) >= n - parts.hidden[:, None]) | (distance < tolerance)
+    modes = np.asarray(eigenvalues * size, complex)
+    beyond = np.abs(modes) - 1.0 if discrete else modes.real
+    certain = clear > tolerance
+    return HautusTest(modes, distance, hidden, (beyond < 0.0) & certain, (beyond > 0.0) & certain, tolerance)
 
 
-def _cluster_means(eigenvalues: ComplexArray, size: FloatArray) -> Iterator[ComplexArray]:
-    """Each eigenvalue, then its means with the 1, 2, ... nearest others where rounding explains their distance, (..., n)."""
-    n = eigenvalues.shape[-1]
-    apart = np.abs(eigenvalues[..., :, None] - eigenvalues[..., None, :])
-    order = np.argsort(apart, axis=-1, kind="stable")
-    near = np.take_along_axis(np.broadcast_to(eigenvalues[..., None, :], apart.shape), order, -1)
-    spread = np.take_along_axis(apart, order, -1)
-    means = np.cumsum(near, axis=-1) / np.arange(1, n + 1)
-    for k in range(n):
-        allowed = spread[..., k] <= 30.0 * np.finfo(float).eps ** (1.0 / (k + 1)) * size[..., 0]
-        yield np.where(allowed, means[..., k], eigenvalues)
+def _border(eigenvalues: ComplexArray, size: FloatArray, discrete: bool) -> ComplexArray:
+    """The nearest point of the border of stability, in units of |A|."""
+    if not discrete:
+        return np.asarray(1j * eigenvalues.imag)
+    length = np.abs(eigenvalues)
+    return np.asarray(np.where(length > 0.0, eigenvalues / np.where(length > 0.0, length, 1.0), 1.0) / size)
+
+
+def _smallest(A: FloatArray, C: FloatArray | None, points: ComplexArray) -> FloatArray:
+    """The smallest singular values of [A - z I; C], z (count, k), as (count, k)."""
+    if not points.shape[-1]:
+        return np.zeros(points.shape)
+    matrix = A[:, None] - points[..., None, None] * np.eye(A.shape[-1])
+    if C is not None:
+        matrix = np.concatenate([matrix, np.broadcast_to(C[:, None], (*points.shape, *C.shape[-2:]))], axis=-2)
+    return np.asarray(np.linalg.svd(matrix, compute_uv=False)[..., -1])
 
 
 @dataclass(frozen=True, eq=False)
 class FrozenMode:
-    """A symbolic mode of a held pair: `hidden_if` vanishes where its outputs C v lose rank; `always` if they must."""
+    """A symbolic mode of a held pair: `hidden_if` vanishes where its outputs C v lose rank; `always` if they must.
+
+    `leftover` are the maximal minors divided by `hidden_if`: where all of them vanish together the mode is hidden as well (fewer
+    dimensions); empty if they cannot. Eigenvalues that differ as expressions may meet at a point: one output cannot tell two
+    eigenvectors there, and `rank_loss` of the frozen matrix has that set.
+    """
 
     eigenvalue: sp.Expr
     vectors: sp.ImmutableMatrix
     outputs: sp.ImmutableMatrix
     hidden_if: sp.Expr
     always: bool
+    leftover: tuple[sp.Expr, ...] = ()
 
 
 def frozen_modes(A: sp.Matrix, C: sp.Matrix) -> tuple[FrozenMode, ...]:
@@ -133,7 +165,7 @@ def frozen_modes(A: sp.Matrix, C: sp.Matrix) -> tuple[FrozenMode, ...]:
     More eigenvectors to one eigenvalue than outputs: one combination is always hidden. With more outputs than vectors `hidden_if`
     is the greatest common divisor of the maximal minors.
     """
-    A, C = sp.Matrix(A), sp.Matrix(C)
+    A, C = sp.Matrix(exact("A", A)), sp.Matrix(exact("C", C))
     if A.rows != A.cols or C.cols != A.rows:
         raise AnalysisError(f"A has the shape {A.shape} and C {C.shape}; A must be (nx, nx) and C (ny, nx)")
     modes = []
@@ -141,15 +173,24 @@ def frozen_modes(A: sp.Matrix, C: sp.Matrix) -> tuple[FrozenMode, ...]:
         vectors = sp.Matrix.hstack(*basis).applyfunc(sp.factor)
         outputs = (C * vectors).applyfunc(lambda e: sp.factor(sp.together(e)))
         always = outputs.rank(simplify=True) < len(basis)
+        leftover: tuple[sp.Expr, ...] = ()
         if always:
             condition = sp.Integer(0)
         else:
             chosen = combinations(range(outputs.rows), len(basis))
-            minors = [outputs.extract(list(rows), list(range(len(basis)))).det() for rows in chosen]
-            condition = sp.factor(sp.gcd_list([sp.numer(sp.together(minor)) for minor in minors]))
+            minors = [numerator(outputs.extract(list(rows), list(range(len(basis)))).det()) for rows in chosen]
+            minors = [minor for minor in minors if minor != 0]
+            condition = sp.factor(sp.gcd_list(minors))
+            rest = [sp.cancel(minor / condition) for minor in minors]
+            leftover = tuple(rest) if all(minor.free_symbols for minor in rest) else ()
         modes.append(
             FrozenMode(
-                sp.factor(eigenvalue), sp.ImmutableMatrix(vectors), sp.ImmutableMatrix(outputs), condition, always
+                sp.factor(eigenvalue),
+                sp.ImmutableMatrix(vectors),
+                sp.ImmutableMatrix(outputs),
+                condition,
+                always,
+                leftover,
             )
         )
     return tuple(modes)

@@ -9,6 +9,7 @@ import sympy as sp
 
 from analysis.errors import AnalysisError
 from analysis.observability.matrix import ObservabilityMatrix, exact_number
+from analysis.observability.real_roots import numerator, real_roots
 from estimators.errors import unknown
 
 Interval = tuple[sp.Expr, sp.Expr]
@@ -33,7 +34,7 @@ class RankLoss:
     @property
     def factors(self) -> tuple[sp.Expr, ...]:
         """The irreducible factors of the condition that are not constant, each a piece of the set."""
-        return tuple(sorted((f for f, _ in sp.factor_list(self.condition)[1]), key=sp.count_ops))
+        return tuple(sorted((f for f, _ in sp.factor_list(numerator(self.condition))[1]), key=sp.count_ops))
 
     def curve(self, solved_for: str) -> tuple[sp.Expr, ...]:
         """The set as a graph: every solution of the condition for one parameter or rate."""
@@ -41,16 +42,16 @@ class RankLoss:
         return tuple(sp.factor(s) for s in sp.solve(self.condition, symbol))
 
     def roots(self, parameter: str, values: Mapping[str, object] | None = None) -> tuple[sp.Expr, ...]:
-        """Exact real roots in one parameter, everything else fixed by `values`; a symbol not named there is held at 0."""
-        symbol = self._symbol(parameter)
-        given = {sp.Symbol(name): exact_number(name, v) for name, v in (values or {}).items()}
-        rest = {s: sp.Integer(0) for s in self.condition.free_symbols - {symbol} - set(given)}
-        return _real_roots(self.condition.subs({**rest, **given}), symbol)
+        """Real roots in one parameter, everything else fixed by `values`; a symbol not named there is held at 0.
+
+        Raises AnalysisError where the condition is no polynomial: its roots may be without end (`roots_inside` has a range).
+        """
+        return real_roots(self._at(parameter, values), self._symbol(parameter))
 
     def roots_inside(self, parameter: str, values: Mapping[str, object] | None = None) -> tuple[sp.Expr, ...]:
         """The roots within the range of the model's parameter."""
-        low, high = self._range(parameter)
-        return tuple(r for r in self.roots(parameter, values) if low <= r <= high)
+        low, high = (exact_number(parameter, end) for end in self._range(parameter))
+        return real_roots(self._at(parameter, values), self._symbol(parameter), (low, high))
 
     def interval_over_rates(
         self, parameter: str, rates: tuple[object, object] | None = None, search: tuple[object, object] | None = None
@@ -62,7 +63,7 @@ class RankLoss:
         """
         symbol = self._symbol(parameter)
         others = self.condition.free_symbols - {symbol}
-        if len(others) != 1 or sp.degree(self.condition, next(iter(others))) != 1:
+        if len(others) != 1 or not _is_linear(self.condition, next(iter(others))):
             raise AnalysisError(
                 f"{self.matrix.name}: the condition in {', '.join(sorted(map(str, others))) or 'no rate'} is not linear in one "
                 "rate; fix the other symbols or use curve()"
@@ -75,14 +76,19 @@ class RankLoss:
                 raise AnalysisError(f"{self.matrix.name}: '{parameter}' has no rate bounds; give rates=(low, high)")
             rates = (found.rate_minimum, found.rate_maximum)
         slow, fast = (exact_number("rate", v) for v in rates)
-        slope = sp.Poly(self.condition, rate).coeff_monomial(rate)
-        cuts = {low, high}
-        for expression in (self.condition.subs(rate, slow), self.condition.subs(rate, fast), slope):
-            cuts |= {root for root in _real_roots(expression, symbol) if low < root < high}
-        offset = self.condition.subs(rate, 0)
+        slope, offset = sp.Poly(self.condition, rate).all_coeffs()
+        common = sp.gcd(slope, offset)  # where it vanishes rank is lost at every rate
+        always = set(real_roots(common, symbol, (low, high)))
+        slope, offset = sp.cancel(slope / common), sp.cancel(offset / common)
+        cuts = {low, high} | always
+        for expression in (slope * slow + offset, slope * fast + offset, slope):
+            if expression != 0:
+                cuts |= set(real_roots(expression, symbol, (low, high)))
 
         def lost(value: sp.Expr) -> bool:
             """Whether slope rate + offset = 0 for some rate in its bounds."""
+            if value in always:
+                return True
             a, b = (sp.simplify(e.subs(symbol, value)) for e in (slope, offset))
             return bool(b == 0 if a == 0 else slow <= -b / a <= fast)
 
@@ -97,6 +103,12 @@ class RankLoss:
                 if middle is not None and lost(middle):
                     pieces[-1] = (pieces[-1][0], after)
         return tuple(pieces)
+
+    def _at(self, parameter: str, values: Mapping[str, object] | None) -> sp.Expr:
+        symbol = self._symbol(parameter)
+        given = {self._symbol(name): exact_number(name, v) for name, v in (values or {}).items()}
+        rest = {s: sp.Integer(0) for s in self.condition.free_symbols - {symbol} - set(given)}
+        return self.condition.subs({**rest, **given})
 
     def _symbol(self, name: str) -> sp.Symbol:
         if sp.Symbol(name) not in self.condition.free_symbols:
@@ -118,6 +130,7 @@ def rank_loss(matrix: ObservabilityMatrix, values: Mapping[str, object] | None =
     minors = matrix.minors(values)
     if not minors:
         return RankLoss(sp.Integer(0), (), True, matrix.frozen, matrix)
+    minors = tuple(numerator(minor) for minor in minors)
     common = minors[0]
     for minor in minors[1:]:
         common = sp.gcd(common, minor)
@@ -127,8 +140,5 @@ def rank_loss(matrix: ObservabilityMatrix, values: Mapping[str, object] | None =
     return RankLoss(condition, () if complete else leftover, False, matrix.frozen, matrix)
 
 
-def _real_roots(expression: sp.Expr, symbol: sp.Symbol) -> tuple[sp.Expr, ...]:
-    if symbol not in expression.free_symbols:
-        return ()
-    polynomial = sp.Poly(sp.numer(sp.together(expression)), symbol)
-    return tuple(dict.fromkeys(sp.real_roots(polynomial)))
+def _is_linear(expression: sp.Expr, symbol: sp.Symbol) -> bool:
+    return bool(expression.is_polynomial(symbol) and sp.Poly(expression, symbol).degree() == 1)
