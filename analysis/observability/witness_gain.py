@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from warnings import catch_warnings, simplefilter
+
 import numpy as np
 
 from estimators.arrays import FloatArray
@@ -24,7 +26,8 @@ def witness_gain(
     best, chosen = 0.0, None
     for weight in WEIGHTS:
         try:
-            with np.errstate(all="ignore"):
+            with np.errstate(all="ignore"), catch_warnings():
+                simplefilter("ignore", RuntimeWarning)  # scipy perturbs a singular equation: P is judged below
                 noise = weight * np.eye(m)
                 if discrete:
                     X = linalg.solve_discrete_are(A.T, C.T, np.eye(n), noise)
