@@ -25,7 +25,6 @@ from synthesis.certificate.proof import Proof, prove
 from synthesis.design.deploy import deploy
 from synthesis.design.export import export, schedule_content
 from synthesis.design.hinf_observer import channel_matrices
-from synthesis.models.parameter_set import ParameterSet
 
 # A stored claim may be worse than a fresh one by this share: levels are searched in steps, and solvers differ.
 WORSE = 0.02
@@ -77,9 +76,9 @@ def run_spec(name: str, out: Path, check: bool = False) -> ScheduleRun:
     """Design, deploy, prove and write one schedule; with `check` compare only. Raises GainsmithError."""
     start = perf_counter()
     spec, folder = load_spec(name)
-    parameters = spec.parameter_set(folder)
-    deployment = deploy(spec.design(spec.build_model(parameters)), spec.deploy_settings())
-    content = schedule_content(deployment, spec.name, spec.description, spec.resolved(parameters))
+    plant = spec.plant(folder)
+    deployment = deploy(spec.design(plant.model), spec.deploy_settings())
+    content = schedule_content(deployment, spec.name, spec.description, spec.resolved(plant))
     loop, model = deployment.loop, deployment.gains.model
     least = tuple(frozen_gain(loop, *channel_matrices(model, channel)) for channel in deployment.gains.design.channels)
     path = out / f"{spec.name}.json"
@@ -93,7 +92,7 @@ def run_spec(name: str, out: Path, check: bool = False) -> ScheduleRun:
         proofs = tuple(export(path, content))
         state, message = "written", ""
     seconds = perf_counter() - start
-    published = _published_range(parameters, spec.model.id)
+    published = plant.published_gains
     return ScheduleRun(spec.name, state, seconds, message, content, proofs or fresh, published, least, moved)
 
 
@@ -135,7 +134,3 @@ def _moved(old: dict[str, Any], new: dict[str, Any]) -> float | None:
         return None
     return float((np.abs(after - before).max(axis=0) / np.abs(before).max(axis=0)).max())
 
-
-def _published_range(parameters: ParameterSet, model: str) -> tuple[tuple[float, float], ...] | None:
-    tire = parameters.tire.get(model.removeprefix("corner-velocity-"))
-    return None if tire is None or tire.published is None else tire.published.gain_range

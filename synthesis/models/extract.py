@@ -176,10 +176,14 @@ def _array(matrix: PolynomialMatrix) -> FloatArray:
 def _check_denominator(where: str, parameters: Sequence[SchedulingParameter], denominator: PolynomialMatrix) -> None:
     if not any(denominator.degrees) or sign_on_box(denominator.balls()).positive:
         return
-    found = prove_positive(MatrixPolynomial(_array(denominator)[..., None]))
+    size = MatrixPolynomial(_array(denominator)[..., None])
+    found = prove_positive(size)
     if not found.proved:
+        bad, good = np.array(found.place), np.zeros(len(parameters))  # one in the middle: it vanishes in between
+        for _ in range(60):
+            between = (bad + good) / 2
+            bad, good = (bad, between) if size.at(between[None])[0, 0, 0, 0] > 0.0 else (between, good)
         place = ", ".join(
-            f"{p.name} = {p.middle + p.half_width * u:.4g} {p.unit}"
-            for p, u in zip(parameters, found.place, strict=True)
+            f"{p.name} = {p.middle + p.half_width * u:.4g} {p.unit}" for p, u in zip(parameters, bad, strict=True)
         )
         raise ModelError(f"{where}: a denominator vanishes inside the range, near {place}; shrink the range")

@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import dataclass
 from functools import lru_cache
+from keyword import iskeyword
 
 from synthesis.errors import ModelError
 from synthesis.models.formula import shown
@@ -46,7 +47,9 @@ def check_unit(unit: str, where: str) -> str:
 def check_name(name: str, what: str) -> None:
     """Raise ModelError for a name that cannot be a symbol."""
     if not name.isidentifier():
-        raise ModelError(f"{what} '{name}' needs a name of letters, digits and underscores, like wheel_speed")
+        raise ModelError(f"{what} '{shown(name)}' needs a name of letters, digits and underscores, like wheel_speed")
+    if iskeyword(name):
+        raise ModelError(f"{what} '{name}' has a name that a formula cannot use; write {name}_ or another one")
 
 
 @dataclass(frozen=True)
