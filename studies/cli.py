@@ -29,6 +29,16 @@ def parser() -> argparse.ArgumentParser:
         new.add_argument("--json", action="store_true", dest="as_json", help="machine-readable output")
         return new
 
+    new = command("new", "write a commented model file and its specification, to start from", "new.run_new")
+    new.add_argument("name", metavar="NAME", help="of the model: letters, digits and hyphens")
+    new.add_argument("--out", type=Path, metavar="DIR", help="where they go (default: here)")
+
+    model = command(
+        "model", "show a model file: poles, observability, controllability over its range", "model.run_model"
+    )
+    model.add_argument("file", metavar="FILE", help="model file (.toml), or the name of an example")
+    model.add_argument("--out", type=Path, metavar="DIR", help="draw them into DIR")
+
     schedules = command("schedules", "design, prove and write gain schedules", "schedules.run_schedules")
     schedules.add_argument("specs", nargs="*", metavar="SPEC", help="shipped name or .toml file (default: all shipped)")
     schedules.add_argument("--out", type=Path, metavar="DIR", help="where schedules are (default: schedules)")

@@ -19,6 +19,7 @@ import numpy as np
 from estimators.errors import GainsmithError
 from estimators.schedule import read_content
 from studies.execution.processes import available_cores, in_order
+from studies.preflight import check_before_design
 from studies.spec import load_spec
 from synthesis.certificate.frozen import frozen_gain
 from synthesis.certificate.proof import Proof, prove
@@ -77,6 +78,7 @@ def run_spec(name: str, out: Path, check: bool = False) -> ScheduleRun:
     start = perf_counter()
     spec, folder = load_spec(name)
     plant = spec.plant(folder)
+    check_before_design(spec, plant.model)
     deployment = deploy(spec.design(plant.model), spec.deploy_settings())
     content = schedule_content(deployment, spec.name, spec.description, spec.resolved(plant))
     loop, model = deployment.loop, deployment.gains.model
@@ -133,4 +135,3 @@ def _moved(old: dict[str, Any], new: dict[str, Any]) -> float | None:
     if before.shape != after.shape:
         return None
     return float((np.abs(after - before).max(axis=0) / np.abs(before).max(axis=0)).max())
-

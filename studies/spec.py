@@ -23,6 +23,9 @@ from synthesis.toml_file import StrictTable, find_toml, read_table, read_toml, s
 from synthesis.toml_places import Places
 
 
+OBSERVER = "-observer"  # ends the name of an example's specification
+
+
 class ModelSpec(StrictTable):
     """A model file of your own, or a model of the catalogue with its parameter values and its box."""
 
@@ -159,12 +162,27 @@ def shipped_specs() -> dict[str, Path]:
     return shipped_files("studies", "specs")
 
 
+def shipped_examples() -> dict[str, Path]:
+    """The model files of the examples by name; the specification of each is beside it (NAME-observer)."""
+    return {name: path for name, path in _examples().items() if not name.endswith(OBSERVER)}
+
+
+def _examples() -> dict[str, Path]:
+    return shipped_files("studies", "examples")
+
+
+def find_model(name: str | Path) -> Path:
+    """A model file by its path, or an example by its name. Raises SpecError for an unknown name."""
+    return find_toml(name, shipped_examples(), "model")
+
+
 def load_spec(name: str | Path) -> tuple[ScheduleSpec, Path]:
-    """A shipped specification by name or one of your own by path; returns it with its folder.
+    """A shipped specification (of a schedule or an example) by name, or one of your own by path; returns it with its folder.
 
     Raises SpecError with the file, the key and what is wrong.
     """
-    path = find_toml(name, shipped_specs(), "specification")
+    observers = {name: path for name, path in _examples().items() if name.endswith(OBSERVER)}
+    path = find_toml(name, {**shipped_specs(), **observers}, "specification")
     data = read_toml(path, "specification")
     if "matrices" in data:
         raise SpecError(f'{path.name}: is a model file; a specification names it: file = "{path.name}" in [model]')
