@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
+import sympy as sp
 
 from analysis.observability.hidden_modes import undetectable_mode
 from estimators.arrays import FloatArray
@@ -60,10 +61,11 @@ def _check_channels(design: ObserverDesign) -> None:
 
 def _check_effect(model: LpvModel, design: ObserverDesign, forces: list[FloatArray]) -> None:
     """A channel through which nothing comes has the gain zero, whatever the gains of the observer are."""
+    effects = sp.Matrix.vstack(model.E, model.F)
     for channel, force in zip(design.channels, forces, strict=True):
         for name, column in zip(channel.disturbances, force.T, strict=True):
             place = int(np.argmax(column))
-            if not any(model.E[:, place]) and not any(model.F[:, place]):
+            if not any(effects[:, place]):
                 raise ProblemError(
                     f"channel '{channel.name}': disturbance '{name}' acts on no state and no output of model '{model.name}'; "
                     "give it a column in E or F, or leave it out"

@@ -22,7 +22,6 @@ from synthesis.models.parameter_set import ParameterSet, load_parameter_set
 from synthesis.toml_file import StrictTable, find_toml, read_table, read_toml, shipped_files
 from synthesis.toml_places import Places
 
-
 OBSERVER = "-observer"  # ends the name of an example's specification
 
 

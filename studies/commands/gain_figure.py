@@ -30,7 +30,13 @@ def gain_figure(run: ScheduleRun) -> Figure:
     panels = []
     for place in list(np.ndindex(states, outputs))[:MOST_PANELS]:
         marks: list[Mark] = [
-            Line(breakpoints, gains[:, *place], label, DEPLOYED if len(curves) == 1 else CURVES[k], marker="o")
+            Line(
+                breakpoints,
+                gains[(slice(None), *place)],
+                label,
+                DEPLOYED if len(curves) == 1 else CURVES[k],
+                marker="o",
+            )
             for k, (label, gains) in enumerate(curves)
         ]
         if run.published is not None and outputs == 1:
@@ -38,7 +44,7 @@ def gain_figure(run: ScheduleRun) -> Figure:
             marks.insert(0, Shade(low, high, "y", f"published range {low:g} to {high:g}", PRINTED_BAND))
         x = Axis(f"{first['name'].replace('_', ' ')} [{first['unit']}]", breakpoints[0], breakpoints[-1])
         index = "".join(str(i + 1) for i in (place if outputs > 1 else place[:1]))
-        flat = all(gains[:, *place].min() >= 0.0 for _, gains in curves)
+        flat = all(gains[(slice(None), *place)].min() >= 0.0 for _, gains in curves)
         y = Axis(f"{symbol}$_{{{index}}}$ [{units[place[0]][place[1]]}]", low=0.0 if flat else None)
         panels.append(Panel(marks, x, y, legend="best"))
     across = min(ACROSS, len(panels)) if len(panels) != 4 else 2
@@ -59,9 +65,13 @@ def _curves(content: dict[str, Any]) -> list[tuple[str, FloatArray]]:
     table, others = np.array(content["gain"]["table"]), content["scheduling"][1:]
     if not others:
         return [("deployed, proved", table)]
-    middle = tuple(len(p["breakpoints"]) // 2 for p in others[1:])
+    for p in others[1:]:
+        table = np.take(table, len(p["breakpoints"]) // 2, axis=2)
     second, count = others[0], len(others[0]["breakpoints"])
     return [
-        (f"{second['name'].replace('_', ' ')} {second['breakpoints'][k]:g} {second['unit']}", table[:, k, *middle])
+        (
+            f"{second['name'].replace('_', ' ')} {second['breakpoints'][k]:g} {second['unit']}",
+            table[:, k],
+        )
         for k in dict.fromkeys((0, count // 2, count - 1))
     ]
