@@ -32,8 +32,8 @@ class LpvModel:
     Matrices are sympy matrices whose symbols are the names of `parameters` and `constants`, polynomial or rational in
     the parameters. A disturbance whose column of E is zero is measurement noise. B, D, E and F default to zero.
 
-    Raises ModelError for a stray symbol, a shape that does not fit, a parameter that never appears, a dependence that
-    is not rational, a denominator that vanishes inside the range, and repeated names.
+    Raises ModelError for a stray symbol, a shape that does not fit, a parameter or constant that never appears, a
+    dependence that is not rational, a denominator that vanishes inside the range, and repeated names.
     """
 
     name: str
@@ -93,6 +93,9 @@ class LpvModel:
         idle = sorted({p.name for p in self.parameters} - used)
         if idle:
             raise ModelError(f"model '{self.name}': parameter(s) {', '.join(idle)} appear in no matrix; remove them")
+        idle = sorted(set(self.constants) - used)
+        if idle:
+            raise ModelError(f"model '{self.name}': constant(s) {', '.join(idle)} appear in no matrix; remove them")
 
     @cached_property
     def exact(self) -> ExactModel:
