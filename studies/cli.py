@@ -36,7 +36,7 @@ def parser() -> argparse.ArgumentParser:
     model = command(
         "model", "show a model file: poles, observability, controllability over its range", "model.run_model"
     )
-    model.add_argument("file", metavar="FILE", help="model file (.toml), or the name of an example")
+    model.add_argument("file", metavar="FILE", help="model file or specification (.toml), or a shipped name")
     model.add_argument("--out", type=Path, metavar="DIR", help="draw them into DIR")
 
     schedules = command("schedules", "design, prove and write gain schedules", "schedules.run_schedules")

@@ -170,9 +170,13 @@ def _examples() -> dict[str, Path]:
     return shipped_files("studies", "examples")
 
 
-def find_model(name: str | Path) -> Path:
-    """A model file by its path, or an example by its name. Raises SpecError for an unknown name."""
-    return find_toml(name, shipped_examples(), "model")
+def any_model(name: str | Path) -> LpvModel:
+    """The model of a model file, of a specification, or of an example or shipped specification by name. Raises GainsmithError."""
+    path = find_toml(name, {**shipped_specs(), **_examples()}, "model")
+    if "matrices" not in (data := read_toml(path, "model")) and "design" in data:
+        spec, folder = load_spec(path)
+        return spec.plant(folder).model
+    return load_model(path)
 
 
 def load_spec(name: str | Path) -> tuple[ScheduleSpec, Path]:

@@ -13,9 +13,8 @@ from studies.commands.model_overview import Overview, overview
 from studies.commands.terminal import print_table
 from studies.execution.files import ready_folder
 from studies.plots.save import write_figures
-from studies.spec import find_model
+from studies.spec import any_model
 from synthesis.design.export import formula
-from synthesis.exchange.model_file import load_model
 from synthesis.models.extract import MATRICES
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter
@@ -23,7 +22,7 @@ from synthesis.models.param import SchedulingParameter
 
 def run_model(file: str, out: Path | None, as_json: bool) -> int:
     """Print the model and, with `out`, draw it. Raises GainsmithError with file, line and column for a file that is no model."""
-    found = overview(load_model(find_model(file)))
+    found = overview(any_model(file))
     drawn = []
     if out is not None:
         ready_folder(out)

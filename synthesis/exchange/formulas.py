@@ -13,8 +13,9 @@ import sympy as sp
 
 from synthesis.certificate.units import NUMBER, Dimension, check_entry, dimension
 from synthesis.errors import ModelError
+from synthesis.exchange.extent import NAME, Extent, number
 from synthesis.exchange.model_table import ModelFile
-from synthesis.models.formula import parse, read, used
+from synthesis.models.formula import parse, read, shown, used
 from synthesis.models.param import Signal, check_name
 from synthesis.toml_places import Path, Places
 
@@ -34,6 +35,7 @@ class Formulas:
         self.with_units = any(unit != "1" for unit in (*named.values(), *signals))
         self.units = {name: dimension(unit, f"{file}: unit of {name}") for name, unit in named.items()}
         self.expressions: dict[str, sp.Expr] = {name: sp.Symbol(name) for name in named}
+        self.extents: dict[str, Extent] = dict.fromkeys(named, NAME)
         self.needs: dict[str, set[str]] = {}  # of every definition
         self.mentioned: set[str] = set()
         for kind in ("constants", "definitions"):
@@ -48,6 +50,7 @@ class Formulas:
         text = getattr(self.table.matrices, key)[i][j]
         tree = self._placed(path, text, lambda: parse(text, place))
         self.mentioned |= used(tree)
+        self._extent(tree, text, path, place)
         expression = self._expression(tree, text, path, place)
         if self.with_units:
             self._unit(tree, text, path, place)
@@ -86,27 +89,37 @@ class Formulas:
             ) from None
         for name in order:
             path, text, place = ("definitions", name), self.table.definitions[name], f"definitions.{name}"
+            self.extents[name] = self._extent(trees[name], text, path, place)
             self.expressions[name] = self._expression(trees[name], text, path, place)
             if self.with_units:
                 self.units[name] = self._unit(trees[name], text, path, place)
 
+    def _extent(self, tree: ast.expr, text: str, path: Path, place: str) -> Extent:
+        return self._placed(
+            path, text, lambda: self._worded(lambda: read(tree, text.strip(), self.extents, number, place), text, place)
+        )
+
     def _expression(self, tree: ast.expr, text: str, path: Path, place: str) -> sp.Expr:
         found: sp.Expr = self._placed(path, text, lambda: read(tree, text.strip(), self.expressions, _rational, place))
         if found.has(sp.zoo, sp.nan):
-            raise ModelError(f"{self.file}:{self.places.at(path)}: {place}: '{text.strip()}' divides by zero")
+            raise ModelError(f"{self.file}:{self.places.at(path)}: {place}: '{shown(text.strip())}' divides by zero")
         return found
 
     def _unit(self, tree: ast.expr, text: str, path: Path, place: str) -> Dimension:
-        def found() -> Dimension:
-            try:
-                return read(tree, text.strip(), self.units, _number, place)
-            except ModelError as error:
-                words = str(error)
-                if not words.startswith(place):  # from a sum of two units, which knows no place
-                    raise ModelError(f"{place}: '{text.strip()}' {words}", error.offset) from None
-                raise
+        return self._placed(
+            path, text, lambda: self._worded(lambda: read(tree, text.strip(), self.units, _number, place), text, place)
+        )
 
-        return self._placed(path, text, found)
+    @staticmethod
+    def _worded(action: Callable[[], Value], text: str, place: str) -> Value:
+        """Do it; an error of the arithmetic, which knows no place, gets the formula in front."""
+        try:
+            return action()
+        except ModelError as error:
+            words = str(error)
+            if words.startswith(place):
+                raise
+            raise ModelError(f"{place}: '{shown(text.strip())}' {words}", error.offset) from None
 
     def _placed(self, path: Path, text: str, action: Callable[[], Value]) -> Value:
         """Do it; an error gets file, line and column."""

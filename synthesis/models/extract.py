@@ -88,6 +88,14 @@ def extract(
     generators = [sp.Symbol(p.name) for p in parameters]
     values = {sp.Symbol(name): sp.Rational(str(c.value)) for name, c in constants.items()}
     matrices = {key: symbolic[key].subs(values) for key in MATRICES}
+    zeros = {symbol for symbol, value in values.items() if value == 0}
+    for key, matrix in matrices.items():
+        for (i, j), entry in zip(np.ndindex(*matrix.shape), matrix, strict=True):
+            if entry.has(sp.zoo, sp.nan) and zeros & symbolic[key][i, j].free_symbols:
+                names = ", ".join(sorted(str(s) for s in zeros & symbolic[key][i, j].free_symbols))
+                raise ModelError(
+                    f"{where}: {key}[{i},{j}] = {symbolic[key][i, j]} divides by zero: {names} = 0; give another value"
+                )
     fractions = {
         key: [[_fraction(entry, generators, f"{where}: {key}[{i},{j}]") for j, entry in enumerate(row)]
               for i, row in enumerate(matrix.tolist())]

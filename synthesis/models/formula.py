@@ -109,14 +109,11 @@ def read(
                 base = value(left) if power >= 0 else quotient(literal(Fraction(1)), value(left), left)
                 found = literal(Fraction(1))
                 for _ in range(abs(power)):
-                    found = found * base
+                    found = placed(lambda a=found: a * base, left)
                 return found
             case ast.BinOp(left, operator, right):
-                try:
-                    return combined(value(left), operator, value(right), right)
-                except ModelError as error:
-                    error.offset = right.col_offset if error.offset is None else error.offset
-                    raise
+                above, below = value(left), value(right)
+                return placed(lambda: combined(above, operator, below, right), right)
             case ast.UnaryOp(ast.USub(), operand):
                 return literal(Fraction(-1)) * value(operand)
             case ast.UnaryOp(_, operand):
@@ -133,6 +130,13 @@ def read(
             case ast.Constant():
                 return literal(number(node, text, where))
         raise ModelError(f"{where}: '{shown(text)}' is not a formula")
+
+    def placed(action: Callable[[], Any], node: ast.expr) -> Any:
+        try:
+            return action()
+        except ModelError as error:
+            error.offset = node.col_offset if error.offset is None else error.offset
+            raise
 
     def combined(above: Any, operator: ast.operator, below: Any, right: ast.expr) -> Any:
         match operator:

@@ -14,7 +14,7 @@ from synthesis.models.formula import shown
 # Names, 1, products, quotients and single powers: a tower like 9**9**9 would be worked out by pint, digit by digit.
 _POWER = r"(?:\*\*|\^) ?(?:[+-]?\d{1,2}(?:\.\d{1,4})?(?![\w.])|\([+-]?\d{1,2}(?:[/.]\d{1,4})?\))(?! ?(?:\*\*|\^))"
 _UNIT = re.compile(rf"(?>[A-Za-zµμΩ°%][A-Za-z0-9_µμΩ°%]*+|1(?![\w.])|{_POWER}|[*/() ])++")
-LARGEST_POWER, LONGEST_UNIT = 100, 64
+LARGEST_POWER, LONGEST_UNIT, LONGEST_NAME = 100, 64, 64
 
 
 @lru_cache(maxsize=1)
@@ -46,7 +46,7 @@ def check_unit(unit: str, where: str) -> str:
 
 def check_name(name: str, what: str) -> None:
     """Raise ModelError for a name that cannot be a symbol."""
-    if not name.isidentifier():
+    if not (name.isidentifier() and name.isascii() and len(name) <= LONGEST_NAME):
         raise ModelError(f"{what} '{shown(name)}' needs a name of letters, digits and underscores, like wheel_speed")
     if iskeyword(name):
         raise ModelError(f"{what} '{name}' has a name that a formula cannot use; write {name}_ or another one")

@@ -13,7 +13,7 @@ from analysis.observability.hidden_modes import undetectable_mode, unstabilisabl
 from analysis.observability.matrix import controllability_matrix
 from analysis.observability.range_rank import controllability_over_range, observability_over_range
 from studies.cli import main
-from studies.spec import shipped_examples
+from studies.spec import any_model, shipped_examples
 from synthesis.exchange.model_file import load_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Constant, SchedulingParameter, Signal
@@ -47,6 +47,20 @@ def test_the_printed_form_names_units_and_curves(capsys: pytest.CaptureFixture[s
     assert "resistance = 3.6 ohm (motulator" in text and "none faster than 478.4 1/s" in text
     # By hand: both currents have -(R/Ld + R/Lq)/2 as real part, so 85.29 1/s, where the speed is not small.
     assert "-85.29 + 470.8j" in text
+
+
+def test_specifications_show_their_model_and_where_rank_is_lost(capsys: pytest.CaptureFixture[str]) -> None:
+    """Ends of the interval of P3's lateral corner by the determinant of [C; C A + dC/dp p'] in floats, differences for d/dp."""
+    assert main(["model", "resilient-velocity-lateral"]) == 0
+    assert "wheel_speed 31.28 to 41.25 rad/s; detectable: yes" in capsys.readouterr().out
+    own = any_model("resilient-velocity-lateral")
+    for speed, rate_bound in ((31.28, -800.0), (41.25, 800.0)):
+        signs = []
+        for near in (speed - 0.02, speed + 0.02):
+            at, later = own.on([near]), own.on([near + 1e-3])
+            row = at.C[0] @ at.A[0] + (later.C[0] - at.C[0]) / 1e-3 * rate_bound
+            signs.append(np.linalg.det(np.vstack([at.C[0], row])) > 0.0)
+        assert signs[0] != signs[1]
 
 
 def test_files_that_are_no_model_end_with_two(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

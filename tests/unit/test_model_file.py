@@ -113,6 +113,9 @@ REFUSED = {  # what is changed, into what, where the refusal points to (empty: t
     "name twice": ('name = "force"', 'name = "damping"', "damping.value", "'damping' is the name of one of the disturbances"),
     "keyword": ("mass = {", "lambda = {", "{ value = 2.1", "has a name that a formula cannot use"),
     "unit": ('"position", unit = "m"', '"position", unit = "mtr"', '{ name = "position"', "'mtr' is not a unit"),
+    "zero mass": ("value = 2.1", "value = 0.0", "", r"A\[1,0\] = -stiffness/mass divides by zero: mass = 0"),
+    "no ASCII": ("mass = {", '"m\u00e4ss" = {', "{ value = 2.1", "needs a name of letters, digits and underscores"),
+    "grows": ('"-2*square + square"', '"-((((2*square)**16)**16)**16)"', "square)**16)**16", "grows beyond 5000 operations"),
     "not TOML": ("[matrices]", "[matrices", "", "not a TOML file"),
     "specification": ("[matrices]", "[design]", "", "is a specification, not a model"),
 }  # fmt: skip
@@ -129,6 +132,14 @@ def test_refused_with_place_and_remedy(case: str, tmp_path: Path) -> None:
     with pytest.raises(GainsmithError, match=rf"^own\.toml:{place}.*({words})") as caught:
         load(text, tmp_path)
     assert "\n" not in str(caught.value)
+
+
+def test_doubling_definitions_are_refused_at_once(tmp_path: Path) -> None:
+    """Thirty of them would be 2^30 operations."""
+    doubling = "\n".join(f'd{i} = "d{i - 1} + d{i - 1}"' for i in range(1, 31))
+    text = TEXT.replace("[matrices]", f'd0 = "square"\n{doubling}\n\n[matrices]').replace('"pull"', '"d30 + pull"')
+    with pytest.raises(ModelError, match=r"definitions\.d1[12]: .* grows beyond 5000 operations"):
+        load(text, tmp_path)
 
 
 def test_a_denominator_that_vanishes_names_the_value(tmp_path: Path) -> None:
