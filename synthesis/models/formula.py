@@ -11,6 +11,8 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from functools import partial
+from operator import mul
 from typing import Any, TypeVar
 
 from synthesis.errors import ModelError
@@ -109,7 +111,7 @@ def read(
                 base = value(left) if power >= 0 else quotient(literal(Fraction(1)), value(left), left)
                 found = literal(Fraction(1))
                 for _ in range(abs(power)):
-                    found = placed(lambda a=found: a * base, left)
+                    found = placed(partial(mul, found, base), left)
                 return found
             case ast.BinOp(left, operator, right):
                 above, below = value(left), value(right)

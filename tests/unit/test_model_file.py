@@ -115,7 +115,7 @@ REFUSED = {  # what is changed, into what, where the refusal points to (empty: t
     "unit": ('"position", unit = "m"', '"position", unit = "mtr"', '{ name = "position"', "'mtr' is not a unit"),
     "zero mass": ("value = 2.1", "value = 0.0", "", r"A\[1,0\] = -stiffness/mass divides by zero: mass = 0"),
     "no ASCII": ("mass = {", '"m\u00e4ss" = {', "{ value = 2.1", "needs a name of letters, digits and underscores"),
-    "grows": ('"-2*square + square"', '"-((((2*square)**16)**16)**16)"', "square)**16)**16", "grows beyond 5000 operations"),
+    "grows": ('"-2*square + square"', '"-((((2*square)**16)**16)**16)"', "(2*square)**16", "grows beyond 5000 operations"),
     "not TOML": ("[matrices]", "[matrices", "", "not a TOML file"),
     "specification": ("[matrices]", "[design]", "", "is a specification, not a model"),
 }  # fmt: skip
