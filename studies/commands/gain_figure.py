@@ -25,7 +25,7 @@ def gain_figure(run: ScheduleRun) -> Figure:
     breakpoints = np.array(first["breakpoints"])
     units = GainSchedule.from_content(run.content).gain_units
     symbol = "$L$" if run.content["update"]["kind"] == "held" else "$K$"
-    curves = _curves(run.content)
+    curves = curves_of(run.content)
     states, outputs = curves[0][1].shape[1:]
     panels = []
     for place in list(np.ndindex(states, outputs))[:MOST_PANELS]:
@@ -60,7 +60,7 @@ def gain_figure(run: ScheduleRun) -> Figure:
     )  # fmt: skip
 
 
-def _curves(content: dict[str, Any]) -> list[tuple[str, FloatArray]]:
+def curves_of(content: dict[str, Any]) -> list[tuple[str, FloatArray]]:
     """Label and gains (breakpoints, states, outputs) of every curve."""
     table, others = np.array(content["gain"]["table"]), content["scheduling"][1:]
     if not others:

@@ -7,7 +7,7 @@ import sympy as sp
 
 from analysis.observability.matrix import rate_symbol
 from studies.commands.model_overview import Overview, Side
-from studies.plots import Axis, Box, ColouredDots, Contours, Figure, Level, Mark, Panel
+from studies.plots import Axis, Box, ColouredDots, Contours, Figure, Level, Line, Mark, Panel
 from studies.plots.colours import BLUE, RED
 from synthesis.models.param import SchedulingParameter
 
@@ -23,30 +23,30 @@ def model_figure(found: Overview) -> Figure:
         panels.append(_plane(found, found.controllability, "Controllability"))
     title = f"{model.name}: frozen poles, and where rank is lost"
     return Figure(
-        model.name, title, "Poles in the complex plane coloured by the first parameter; curves on which rank is lost.",
-        panels, size=(4.3 * len(panels), 3.7), title=title,
+        model.name, title, "Poles over the first parameter; curves on which rank is lost beside the admissible box.",
+        panels, size=(4.3 * len(panels), 3.9), title=title,
     )  # fmt: skip
 
 
 def _poles(found: Overview) -> Panel:
-    poles = found.line_poles
-    span = [max(float(np.abs(part).max()), 1e-9) for part in (poles.real, poles.imag)]
+    """In the complex plane; real ones over the first parameter."""
+    poles, parameters = found.line_poles, found.model.parameters
+    if parameters and not np.abs(poles.imag).any():
+        first = parameters[0]
+        marks: list[Mark] = [Level(y=0.0), Line(found.line[:, 0], poles.real, "", BLUE)]
+        x = Axis(_label(first.name, first.unit), first.minimum, first.maximum)
+        return Panel(marks, x, Axis("pole [1/s]", margin=0.08), "Poles, all real")
+    values = np.broadcast_to(found.line[:, :1] if parameters else np.zeros((1, 1)), poles.shape)
+    label = _label(parameters[0].name, parameters[0].unit) if parameters else ""
+    dots = ColouredDots(poles.real.ravel(), poles.imag.ravel(), values.ravel(), label, size=7.0)
     real, imaginary = Axis("real part [1/s]", margin=0.08), Axis("imaginary part [1/s]", margin=0.08)
-    marks: list[Mark] = [Level(x=0.0), Level(y=0.0)]
-    if found.model.parameters:
-        first = found.model.parameters[0]
-        values = np.broadcast_to(found.line[:, :1], poles.shape)
-        label = _label(first.name, first.unit)
-        marks.append(ColouredDots(poles.real.ravel(), poles.imag.ravel(), values.ravel(), label, size=7.0))
-    else:
-        marks.append(ColouredDots(poles.real.ravel(), poles.imag.ravel(), np.zeros(poles.size), "", size=7.0))
-    return Panel(marks, real, imaginary, "Poles" if min(span) > 0 else "Poles, all zero")
+    return Panel([Level(x=0.0), Level(y=0.0), dots], real, imaginary, "Poles")
 
 
 def _plane(found: Overview, side: Side, title: str) -> Panel:
     parameters = found.model.parameters
     if not parameters:
-        return Panel([], title=f"{title}: {_note(side)}", grid=False)
+        return Panel([], title=f"{title}\n{_note(side)}", grid=False)
     first = parameters[0]
     symbol, free = sp.Symbol(first.name), side.rank.loss.condition.free_symbols if side.rank.loss else set()
     second = next((p for p in parameters[1:] if sp.Symbol(p.name) in free), None)
@@ -69,7 +69,8 @@ def _plane(found: Overview, side: Side, title: str) -> Panel:
             if z.min() < 0.0 < z.max():
                 marks.append(Contours(x, y, z / np.abs(z).max(), [0.0], RED, width=1.6, numbers=""))
                 shown = True
-    heading = f"{title}: {_note(side, shown)}"
+    held = free - {symbol, other} if shown else set()
+    heading = f"{title}\n{_note(side, shown)}" + (", other rates zero" if held else "")
     return Panel(marks, Axis(_label(first.name, first.unit), x[0], x[-1]), Axis(y_label, y[0], y[-1]), heading)
 
 
