@@ -85,6 +85,7 @@ def test_missing_and_drifting() -> None:
     ("text", "box", "wanted"),
     [
         (sp.sin(lean), [(-1.0, 4.0)], 1.0),
+        (lean**6, [(-1.0, 1.0)], 1.0),  # all derivatives but the last vanish in the middle
         (sp.exp(-lean) - lean**2, [(-1.0, 2.0)], 4.0 - np.exp(-2.0)),
         (sp.sqrt(lean + 1) * sp.atan(rate), [(0.0, 3.0), (-1.0, 1.0)], 2.0 * np.pi / 4),
         (sp.cos(lean) - 1 + lean**2 / 2, [(-0.1, 0.1)], 1 - np.cos(0.1) - 0.005),

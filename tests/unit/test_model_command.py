@@ -81,6 +81,8 @@ def test_rank_over_the_range(low: float) -> None:
     found = observability_over_range(model(sp.Matrix([[0, p], [0, 0]]), sp.Matrix([[1, 0]]), low=low))
     assert found.verdict == ("full" if low else "lost")
     assert found.loss is not None and found.loss.factors == (p,)
+    negative = observability_over_range(model(sp.Matrix([[0, p - 5], [0, 0]]), sp.Matrix([[1, 0]]), low=low))
+    assert negative.verdict == "full"
 
 
 def test_rates_make_a_frozen_loss_observable_and_the_other_way_round() -> None:
@@ -115,6 +117,10 @@ def test_hidden_modes_are_named_with_their_place() -> None:
     assert "the mode at 2 1/s (x1) at p = 2 1" in hidden.words
     dual = unstabilisable_mode(model(A.T, C, C.T))
     assert dual is not None and dual.eigenvalue == pytest.approx(2.0)
+    two = unstabilisable_mode(
+        model(sp.diag(1, 2), sp.Matrix([[0, 1]]), sp.Matrix([1, p - 2]))
+    )  # C hides the other mode
+    assert two is not None and two.eigenvalue == pytest.approx(2.0) and two.states == ("x1",)
     assert undetectable_mode(model(A.subs(p, p + 4), C)) is None
     assert unstabilisable_mode(model(A.T.subs(p, p + 4), C, C.T)) is None
 
