@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from estimators.errors import GainsmithError
 from synthesis.errors import ModelError
 from synthesis.exchange.model_file import load_model
 from synthesis.exchange.model_text import model_text, save_model
+from synthesis.exchange.model_units import check_units
 from synthesis.models.catalogue.longitudinal_speed import longitudinal_speed_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import load_parameter_set
@@ -88,6 +90,17 @@ def test_written_and_read_back(tmp_path: Path) -> None:
         assert same(model, back)
         assert model_text(back) == model_text(model)
     assert not same(load(TEXT.replace("2.1", "2.2"), tmp_path), load(TEXT, tmp_path))
+
+
+def test_models_built_in_python_are_checked_on_request() -> None:
+    """The longitudinal speed model fits; with its radius in newtons it does not."""
+    model = longitudinal_speed_model(load_parameter_set("longitudinal-speed"))
+    check_units(model)
+    wrong = {**model.constants, "effective_radius": replace(model.constants["effective_radius"], unit="N")}
+    with pytest.raises(
+        ModelError, match=r"matrices\.A\[0\]\[0\]: .* has the unit kilogram.*, its place needs second\^-1"
+    ):
+        check_units(replace(model, constants=wrong))
 
 
 REFUSED = {  # what is changed, into what, where the refusal points to (empty: to the file), and its words
