@@ -68,12 +68,16 @@ from .observability.gramians import observability_gramian as observability_grami
 from .observability.gramians import sampled_sequence as sampled_sequence
 from .observability.gramians import sliding_controllability as sliding_controllability
 from .observability.gramians import sliding_observability as sliding_observability
+from .observability.hidden_modes import HiddenMode as HiddenMode
+from .observability.hidden_modes import undetectable_mode as undetectable_mode
+from .observability.hidden_modes import unstabilisable_mode as unstabilisable_mode
 from .observability.lie_rank import LieRank as LieRank
 from .observability.lie_rank import LieRankTest as LieRankTest
 from .observability.lie_structure import GenericRank as GenericRank
 from .observability.lie_structure import StructuralDirections as StructuralDirections
 from .observability.lie_structure import generic_rank as generic_rank
 from .observability.matrix import ObservabilityMatrix as ObservabilityMatrix
+from .observability.matrix import controllability_matrix as controllability_matrix
 from .observability.matrix import frozen_observability_matrix as frozen_observability_matrix
 from .observability.matrix import observability_matrix as observability_matrix
 from .observability.matrix import observability_of as observability_of
@@ -81,6 +85,9 @@ from .observability.modes import FrozenMode as FrozenMode
 from .observability.modes import HautusTest as HautusTest
 from .observability.modes import frozen_modes as frozen_modes
 from .observability.modes import hautus_test as hautus_test
+from .observability.range_rank import RangeRank as RangeRank
+from .observability.range_rank import controllability_over_range as controllability_over_range
+from .observability.range_rank import observability_over_range as observability_over_range
 from .observability.rank_loss import RankLoss as RankLoss
 from .observability.rank_loss import rank_loss as rank_loss
 from .observability.rank_loss_speeds import RankLossSpeeds as RankLossSpeeds

@@ -49,6 +49,14 @@ def parser() -> argparse.ArgumentParser:
         new.add_argument("--json", action="store_true", dest="as_json", help="machine-readable output")
         return new
 
+    new = command("new", "new.run_new")
+    new.add_argument("name", metavar="NAME", help="of the model: letters, digits and hyphens")
+    new.add_argument("--out", type=Path, metavar="DIR", help="where they go (default: here)")
+
+    model = command("model", "model.run_model")
+    model.add_argument("file", metavar="FILE", help="model file or specification (.toml), or a shipped name")
+    model.add_argument("--out", type=Path, metavar="DIR", help="draw them into DIR")
+
     schedules = command("schedules", "schedules.run_schedules")
     schedules.add_argument("specs", nargs="*", metavar="SPEC", help="shipped name or .toml file (default: all shipped)")
     schedules.add_argument("--out", type=Path, metavar="DIR", help="where schedules are (default: schedules)")

@@ -19,13 +19,13 @@ import numpy as np
 from estimators.errors import GainsmithError
 from estimators.schedule import read_content
 from studies.execution.processes import available_cores, in_order
+from studies.preflight import check_before_design
 from studies.spec import load_spec
 from synthesis.certificate.frozen import frozen_gain
 from synthesis.certificate.proof import Proof, prove
 from synthesis.design.deploy import deploy
 from synthesis.design.export import export, schedule_content
 from synthesis.design.hinf_observer import channel_matrices
-from synthesis.models.parameter_set import ParameterSet
 
 # A stored claim may be worse than a fresh one by this share: levels are searched in steps, and solvers differ.
 WORSE = 0.02
@@ -77,9 +77,10 @@ def run_spec(name: str, out: Path, check: bool = False) -> ScheduleRun:
     """Design, deploy, prove and write one schedule; with `check` compare only. Raises GainsmithError."""
     start = perf_counter()
     spec, folder = load_spec(name)
-    parameters = spec.parameter_set(folder)
-    deployment = deploy(spec.design(spec.build_model(parameters)), spec.deploy_settings())
-    content = schedule_content(deployment, spec.name, spec.description, spec.resolved(parameters))
+    plant = spec.plant(folder)
+    check_before_design(spec, plant.model)
+    deployment = deploy(spec.design(plant.model), spec.deploy_settings())
+    content = schedule_content(deployment, spec.name, spec.description, spec.resolved(plant))
     loop, model = deployment.loop, deployment.gains.model
     least = tuple(frozen_gain(loop, *channel_matrices(model, channel)) for channel in deployment.gains.design.channels)
     path = out / f"{spec.name}.json"
@@ -93,7 +94,7 @@ def run_spec(name: str, out: Path, check: bool = False) -> ScheduleRun:
         proofs = tuple(export(path, content))
         state, message = "written", ""
     seconds = perf_counter() - start
-    published = _published_range(parameters, spec.model.id)
+    published = plant.published_gains
     return ScheduleRun(spec.name, state, seconds, message, content, proofs or fresh, published, least, moved)
 
 
@@ -134,8 +135,3 @@ def _moved(old: dict[str, Any], new: dict[str, Any]) -> float | None:
     if before.shape != after.shape:
         return None
     return float((np.abs(after - before).max(axis=0) / np.abs(before).max(axis=0)).max())
-
-
-def _published_range(parameters: ParameterSet, model: str) -> tuple[tuple[float, float], ...] | None:
-    tire = parameters.tire.get(model.removeprefix("corner-velocity-"))
-    return None if tire is None or tire.published is None else tire.published.gain_range

@@ -2,30 +2,48 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from estimators.errors import unknown
 from synthesis.design.deploy import DeploySettings
 from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
 from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.errors import SpecError
+from synthesis.exchange.model_file import load_model
+from synthesis.exchange.model_text import model_text
 from synthesis.lmi.settings import LmiSettings
 from synthesis.models.catalogue import CATALOGUE
 from synthesis.models.lpv import LpvModel
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
-from synthesis.toml_file import StrictTable, find_toml, load_toml, shipped_files
+from synthesis.toml_file import StrictTable, find_toml, read_table, read_toml, shipped_files
+from synthesis.toml_places import Places
+
+OBSERVER = "-observer"  # ends the name of an example's specification
 
 
 class ModelSpec(StrictTable):
-    """Which model of the catalogue, with which parameter values, over which box."""
+    """A model file of your own, or a model of the catalogue with its parameter values and its box."""
 
-    id: str
-    parameters: str
-    wheel_speed_maximum: float = Field(gt=0)
-    wheel_speed_rate: float = Field(ge=0)
+    file: str | None = Field(default=None, examples=["plant.toml"])
+    id: str | None = None
+    parameters: str | None = None
+    wheel_speed_maximum: float | None = Field(default=None, gt=0)
+    wheel_speed_rate: float | None = Field(default=None, ge=0)
+
+    @model_validator(mode="after")
+    def _one_or_the_other(self) -> Self:
+        catalogue = ("id", "parameters", "wheel_speed_maximum", "wheel_speed_rate")
+        given = [key for key in catalogue if getattr(self, key) is not None]
+        if self.file is not None and given:
+            raise ValueError(f"{given[0]} stands beside file; a model file says everything of its model, so remove it")
+        if self.file is None and len(given) < len(catalogue):
+            missing = next(key for key in catalogue if key not in given)
+            raise ValueError(f'{missing} is missing; add it, or name a model file: file = "plant.toml"')
+        return self
 
 
 class ChannelSpec(StrictTable):
@@ -59,6 +77,22 @@ class DeploySpec(StrictTable):
     interpolation_cost: float = 0.01
 
 
+@dataclass(frozen=True)
+class Plant:
+    """The model that a specification is about, with the parameter set that it was built from, if it was."""
+
+    model: LpvModel
+    parameters: ParameterSet | None
+
+    @property
+    def published_gains(self) -> tuple[tuple[float, float], ...] | None:
+        """The range of gains that the source of a catalogue model prints."""
+        if self.parameters is None:
+            return None
+        tire = self.parameters.tire.get(self.model.name.removeprefix("corner-velocity-"))
+        return None if tire is None or tire.published is None else tire.published.gain_range
+
+
 class ScheduleSpec(StrictTable):
     """A whole specification."""
 
@@ -68,14 +102,25 @@ class ScheduleSpec(StrictTable):
     gains: DesignSpec = Field(alias="design")
     deploy: DeploySpec
 
+    def plant(self, folder: Path = Path()) -> Plant:
+        """The model: a file beside the specification, or one of the catalogue."""
+        if self.model.file is None:
+            parameters = self.parameter_set(folder)
+            return Plant(self.build_model(parameters), parameters)
+        if Path(self.model.file).suffix != ".toml":
+            raise SpecError(f"spec '{self.name}': model.file '{self.model.file}' is not a .toml file; give its path")
+        return Plant(load_model(folder / self.model.file), None)
+
     def parameter_set(self, folder: Path = Path()) -> ParameterSet:
-        """The parameter values: a shipped set by name, or a TOML file beside the specification."""
+        """The parameter values of a catalogue model: a shipped set by name, or a TOML file beside the specification."""
+        if self.model.parameters is None:
+            raise SpecError(f"spec '{self.name}': its model is the file {self.model.file}, which has no parameter set")
         return load_parameter_set(self.model.parameters, folder)
 
     def build_model(self, parameters: ParameterSet) -> LpvModel:
-        """The LPV model over its box."""
+        """The catalogue model over its box."""
         if self.model.id not in CATALOGUE:
-            raise SpecError(f"spec '{self.name}': {unknown('model', self.model.id, CATALOGUE)}")
+            raise SpecError(f"spec '{self.name}': {unknown('model', str(self.model.id), CATALOGUE)}")
         return CATALOGUE[self.model.id](
             parameters, wheel_speed_maximum=self.model.wheel_speed_maximum, wheel_speed_rate=self.model.wheel_speed_rate
         )
@@ -102,12 +147,13 @@ class ScheduleSpec(StrictTable):
         """As the deployment takes it."""
         return DeploySettings(self.deploy.sample_time, self.deploy.dtype, self.deploy.interpolation_cost)
 
-    def resolved(self, parameters: ParameterSet) -> dict[str, Any]:
-        """The specification with the parameter values in it: what the digest in a schedule file speaks of."""
-        return {
-            **self.model_dump(mode="json", by_alias=True),
-            "parameter_set": parameters.model_dump(mode="json", exclude_none=True),
-        }
+    def resolved(self, plant: Plant) -> dict[str, Any]:
+        """The specification with the values of its model in it: what the digest in a schedule file speaks of."""
+        own = self.model_dump(mode="json", by_alias=True)
+        own["model"] = {key: value for key, value in own["model"].items() if value is not None}
+        if plant.parameters is None:
+            return {**own, "model_text": model_text(plant.model).splitlines()}
+        return {**own, "parameter_set": plant.parameters.model_dump(mode="json", exclude_none=True)}
 
 
 def shipped_specs() -> dict[str, Path]:
@@ -115,10 +161,32 @@ def shipped_specs() -> dict[str, Path]:
     return shipped_files("studies", "specs")
 
 
+def shipped_examples() -> dict[str, Path]:
+    """The model files of the examples by name; the specification of each is beside it (NAME-observer)."""
+    return {name: path for name, path in _examples().items() if not name.endswith(OBSERVER)}
+
+
+def _examples() -> dict[str, Path]:
+    return shipped_files("studies", "examples")
+
+
+def any_model(name: str | Path) -> LpvModel:
+    """The model of a model file, of a specification, or of an example or shipped specification by name. Raises GainsmithError."""
+    path = find_toml(name, {**shipped_specs(), **_examples()}, "model")
+    if "matrices" not in (data := read_toml(path, "model")) and "design" in data:
+        spec, folder = load_spec(path)
+        return spec.plant(folder).model
+    return load_model(path)
+
+
 def load_spec(name: str | Path) -> tuple[ScheduleSpec, Path]:
-    """A shipped specification by name or one of your own by path; returns it with its folder.
+    """A shipped specification (of a schedule or an example) by name, or one of your own by path; returns it with its folder.
 
     Raises SpecError with the file, the key and what is wrong.
     """
-    path = find_toml(name, shipped_specs(), "specification")
-    return load_toml(path, ScheduleSpec, "specification"), path.parent
+    observers = {name: path for name, path in _examples().items() if name.endswith(OBSERVER)}
+    path = find_toml(name, {**shipped_specs(), **observers}, "specification")
+    data = read_toml(path, "specification")
+    if "matrices" in data:
+        raise SpecError(f'{path.name}: is a model file; a specification names it: file = "{path.name}" in [model]')
+    return read_table(ScheduleSpec, data, path.name, Places(path.read_text(encoding="utf-8"))), path.parent

@@ -18,6 +18,9 @@ from .design.well_posedness import well_posedness as well_posedness
 from .errors import ModelError as ModelError
 from .errors import ProblemError as ProblemError
 from .errors import SpecError as SpecError
+from .exchange.model_file import load_model as load_model
+from .exchange.model_text import save_model as save_model
+from .exchange.model_units import check_units as check_units
 from .lmi.problem import LmiProblem as LmiProblem
 from .lmi.result import LmiResult as LmiResult
 from .lmi.result import Margin as Margin

@@ -6,7 +6,14 @@ from estimators.errors import GainsmithError
 
 
 class ModelError(GainsmithError):
-    """A model that is not fully defined: stray symbol, wrong shape, missing unit or range."""
+    """A model that is not fully defined: stray symbol, wrong shape, missing unit or range.
+
+    `offset` is the character of a formula at which it fails, where that is known.
+    """
+
+    def __init__(self, message: str, offset: int | None = None) -> None:
+        super().__init__(message)
+        self.offset = offset
 
 
 class SpecError(GainsmithError):

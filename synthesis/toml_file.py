@@ -19,6 +19,7 @@ from pydantic_core import ErrorDetails
 
 from estimators.errors import unknown
 from synthesis.errors import SpecError
+from synthesis.toml_places import Places
 
 
 class StrictTable(BaseModel):
@@ -62,13 +63,15 @@ def load_toml(path: Path, model: type[_Table], what: str) -> _Table:
     return read_table(model, read_toml(path, what), path.name)
 
 
-def read_table(model: type[_Table], data: object, where: str) -> _Table:
-    """One table. Raises SpecError, one line, that starts with ``where`` it stands."""
+def read_table(model: type[_Table], data: object, where: str, places: Places | None = None) -> _Table:
+    """One table. Raises SpecError, one line, that starts with ``where`` it stands: with line and column if `places` are given."""
     if not isinstance(data, dict):
         raise SpecError(f"{where}: is {data!r}; give a table")
     try:
         return model.model_validate(data)
     except ValidationError as error:
+        if places is not None:
+            where = f"{where}:{places.at(_complaints(error)[0]['loc'])}"
         raise SpecError(f"{where}: {first_error(error, model)}") from error
 
 
@@ -86,10 +89,13 @@ def first_error(error: ValidationError, model: type[BaseModel]) -> str:
 
     An unknown key comes before a missing one: it is nearly always the missing one, misspelt.
     """
-    complaints = error.errors(include_url=False)
-    complaints.sort(key=lambda item: item["type"] != "extra_forbidden")
+    complaints = _complaints(error)
     more = f" (and {len(complaints) - 1} more)" if len(complaints) > 1 else ""
     return _sentence(complaints[0], model) + more
+
+
+def _complaints(error: ValidationError) -> list[ErrorDetails]:
+    return sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")
 
 
 def _sentence(complaint: ErrorDetails, model: type[BaseModel]) -> str:

@@ -130,17 +130,36 @@ def observability_matrix(
             if name not in names:
                 raise AnalysisError(f"model '{model.name}': {unknown('parameter', name, names)}")
     rows = blocks or len(model.states)
+    out = observability_of(model.A, model.C, _steps(names, rows, motion or {}), rows, [s.name for s in model.states])
+    return _of_model(model, out, frozen=False)
+
+
+def controllability_matrix(model: LpvModel, blocks: int | None = None) -> ObservabilityMatrix:
+    r"""The time-varying controllability matrix [psi_1, psi_2, ..]', psi_1 = B, psi_{i+1} = A psi_i - d(psi_i)/dt, by its dual.
+
+    It is the observability matrix of x' = -A' x, y = B' x (Silverman & Meadows 1967), so its rows are those of the transpose up
+    to sign, and where it loses rank some direction of the state cannot be reached. Raises AnalysisError without inputs.
+    """
+    if not model.inputs:
+        raise AnalysisError(f"model '{model.name}' has no inputs: nothing of it can be controlled")
+    rows = blocks or len(model.states)
+    steps = _steps([p.name for p in model.parameters], rows, {})
+    out = observability_of(-model.A.T, model.B.T, steps, rows, [s.name for s in model.states])  # type: ignore[union-attr]
+    return _of_model(model, out, frozen=False)
+
+
+def _steps(names: list[str], rows: int, motion: Mapping[str, str]) -> dict[sp.Symbol, sp.Expr]:
+    """What the time derivative of every symbol is."""
     steps: dict[sp.Symbol, sp.Expr] = {}
     for name in names:
         previous = sp.Symbol(name)
-        if name in (motion or {}):
-            steps[previous] = sp.Symbol((motion or {})[name])
+        if name in motion:
+            steps[previous] = sp.Symbol(motion[name])
             continue
         for order in range(1, rows + 1):
             steps[previous] = rate_symbol(name, order)
             previous = rate_symbol(name, order)
-    out = observability_of(model.A, model.C, steps, rows, [s.name for s in model.states])
-    return _of_model(model, out, frozen=False)
+    return steps
 
 
 def frozen_observability_matrix(model: LpvModel, blocks: int | None = None) -> ObservabilityMatrix:

@@ -27,6 +27,27 @@ class Help(NamedTuple):
 
 
 HELP = {
+    "new": Help(
+        "write a commented model file and its specification, to start from",
+        """\
+Writes DIR/NAME.toml, a model (signals, parameters with range and rate, constants with units, matrices as formulas), and
+DIR/NAME-observer.toml, a specification of its observer. Both run as they are, and say in comments what to change.""",
+        """\
+gainsmith new my-plant
+gainsmith model my-plant.toml --out out/model
+gainsmith schedules my-plant-observer.toml --out out/schedules""",
+    ),
+    "model": Help(
+        "show a model file: poles, observability, controllability over its range",
+        """\
+Reads a model file, checks every formula in its units, and prints the model, its poles over the range of the parameters, and
+whether it is observable and controllable there: proved, or with the values at which a rank is lost.
+
+Writes pictures of poles and rank loss into DIR if --out is given.""",
+        """\
+gainsmith model my-plant.toml --out out/model
+gainsmith model pmsm                              a shipped example""",
+    ),
     "schedules": Help(
         "design, prove and write gain schedules",
         """\

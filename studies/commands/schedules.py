@@ -9,55 +9,32 @@ from typing import Any
 
 import numpy as np
 
-from estimators.schedule import GainSchedule
+from studies.commands.gain_figure import gain_figure
 from studies.commands.terminal import print_table, progress_bar
-from studies.plots import Axis, Figure, Line, Mark, Panel, Shade
-from studies.plots.colours import DEPLOYED, PRINTED_BAND
 from studies.plots.save import save_figure
+from studies.preflight import check_before_design
 from studies.schedules import ScheduleRun, regenerate
 from studies.spec import load_spec, shipped_specs
 
 HEADINGS = (
-    "schedule", "update", "points", "first gain", "published", "second gain", "published", "friction", "noise",
-    "decay", "drops", "state", "s",
+    "schedule", "update", "points", "gain of", "deployed", "published", "channel", "gain", "decay", "drops", "state", "s",
 )  # fmt: skip
 CAPTION = (
-    "friction, noise: gain of the update to the velocity error, lower bound .. proved for the deployed table at any "
-    "admissible rate; decay of the update [1/s] and drop probability: proved"
+    "gain of a channel: that of the update, lower bound .. proved for the deployed table at any admissible rate; decay of the "
+    "update [1/s] and drop probability: proved"
 )
-
-
-def gain_figure(run: ScheduleRun) -> Figure:
-    """Every gain as it is deployed (points and straight lines), the published range shaded behind it."""
-    parameter = run.content["scheduling"][0]
-    breakpoints = np.array(parameter["breakpoints"])
-    table = np.array(run.content["gain"]["table"])[..., 0]
-    units = GainSchedule.from_content(run.content).gain_units
-    symbol = "$L$" if run.content["update"]["kind"] == "held" else "$K$"
-    panels = []
-    for i, gains in enumerate(table.T):
-        marks: list[Mark] = [Line(breakpoints, gains, "deployed, proved", DEPLOYED, marker="o")]
-        if run.published is not None:
-            low, high = run.published[i]
-            marks.insert(0, Shade(low, high, "y", f"published range {low:g} to {high:g}", PRINTED_BAND))
-        x = Axis(f"{parameter['name'].replace('_', ' ')} [{parameter['unit']}]", breakpoints[0], breakpoints[-1])
-        panels.append(Panel(marks, x, Axis(f"{symbol}$_{i + 1}$ [{units[i][0]}]", low=0.0), legend="best"))
-    decay = next(p.level for p in run.proofs if p.kind in ("internal update", "sampled error"))
-    title = f"{run.name}: update decays at {decay:g} 1/s, proved over the whole range and rate box"
-    return Figure(
-        run.name,
-        title,
-        "Each gain as straight lines between its breakpoints, over the published range.",
-        panels,
-        size=(4.4 * len(panels), 3.4), title=title,
-    )  # fmt: skip
+LEFT = ("schedule", "update", "gain of", "channel", "state")
+CHANNEL = "update: gain "
+LONGEST_CHANNEL = 44
+MOST_GAINS = 8  # in the table of a terminal
 
 
 def run_schedules(specs: list[str], out: Path | None, check: bool, figures: Path | None, as_json: bool) -> int:
     """Regenerate (or check) schedules, print a table; 0 good, 1 drift or refused design."""
     names = specs or list(shipped_specs())
     for name in names:
-        load_spec(name)  # bad input is refused before anything is designed or written
+        spec, place = load_spec(name)  # bad input is refused before anything is designed or written
+        check_before_design(spec, spec.plant(place).model)
     folder = out or Path("schedules")
     pending = regenerate(names, folder, check)
     runs: list[ScheduleRun] = []
@@ -74,9 +51,13 @@ def run_schedules(specs: list[str], out: Path | None, check: bool, figures: Path
     if as_json:
         print(json.dumps([_row(run) for run in runs], indent=1))
     else:
-        print_table(
-            "Gain schedules", HEADINGS, map(_cells, runs), left=(0, 1, 11), caption=CAPTION, no_wrap=True, width=190
-        )
+        shown = [
+            i for i, heading in enumerate(HEADINGS) if heading != "published" or any(run.published for run in runs)
+        ]
+        names, rows = [HEADINGS[i] for i in shown], [_cells(run) for run in runs]
+        left = [k for k, name in enumerate(names) if name in LEFT]
+        cells = [[row[i] for i in shown] for row in rows]
+        print_table("Gain schedules", names, cells, left=left, caption=CAPTION, no_wrap=True, width=200)
         for run in runs:
             if run.message:
                 print(f"{run.name}: {run.message}", file=sys.stderr)
@@ -85,25 +66,37 @@ def run_schedules(specs: list[str], out: Path | None, check: bool, figures: Path
 
 def _cells(run: ScheduleRun) -> tuple[str, ...]:
     if not run.content:
-        return (run.name, *[""] * 10, run.state, f"{run.seconds:.1f}")
-    gains = np.array(run.content["gain"]["table"])[..., 0]
-    proved = {kind: [p.level for p in run.proofs if p.kind == kind] for kind in {p.kind for p in run.proofs}}
-    bands = [f"{low:g}..{high:g}" for low, high in run.published or ((np.nan, np.nan),) * 2]
-    levels = proved.get("sampled gain", [])
-    channels = [f"{low:.4g}..{level:.4g}" for low, level in zip(run.least, levels, strict=False)] or ["", ""]
-    decay = (proved.get("internal update") or proved.get("sampled error") or [np.nan])[0]
+        return (run.name, *[""] * 9, run.state, f"{run.seconds:.1f}")
+    table = np.array(run.content["gain"]["table"])
+    model, axes = run.content["model"], tuple(range(table.ndim - 2))
+    low, high = table.min(axis=axes), table.max(axis=axes)
+    places = list(np.ndindex(*low.shape))
+    several = len(model["outputs"]) > 1
+    names = [model["states"][i]["name"] + (f" from y{j + 1}" if several else "") for i, j in places]
+    ranges = [f"{low[place]:.4g}..{high[place]:.4g}" for place in places]
+    bands = [f"{a:g}..{b:g}" for a, b in run.published or ()]
+    channels = [(_short(p.claim.removeprefix(CHANNEL)), p.level) for p in run.proofs if p.kind == "sampled gain"]
+    gains = [f"{least:.4g}..{level:.4g}" for least, (_, level) in zip(run.least, channels, strict=False)]
+    proved = {p.kind: p.level for p in run.proofs}
+    decay = proved.get("internal update", proved.get("sampled error", np.nan))
     drops = proved.get("drop probability")
+    columns = (names, ranges, bands, [name for name, _ in channels], gains)
     return (
-        run.name, run.content["update"]["kind"], str(len(gains)),
-        f"{gains[:, 0].min():.3f}..{gains[:, 0].max():.3f}", bands[0],
-        f"{gains[:, 1].min():.1f}..{gains[:, 1].max():.1f}", bands[1],
-        channels[0], channels[-1], f"{decay:g}", f"{drops[0]:g}" if drops else "none",
-        run.state, f"{run.seconds:.1f}",
+        run.name, run.content["update"]["kind"], "x".join(map(str, table.shape[:-2])),
+        *("\n".join(column[:MOST_GAINS]) for column in columns),
+        f"{decay:g}", f"{drops:g}" if drops else "none", run.state, f"{run.seconds:.1f}",
     )  # fmt: skip
 
 
+def _short(channel: str) -> str:
+    """Of many disturbances the first; `--json` and `certify` have all."""
+    first, _, rest = channel.partition(" + ")
+    return channel if len(channel) <= LONGEST_CHANNEL or not rest else f"{first} + .. ->{channel.rpartition('->')[2]}"
+
+
 def _row(run: ScheduleRun) -> dict[str, Any]:
-    gains = np.array(run.content["gain"]["table"])[..., 0].T if run.content else np.empty((0, 0))
+    table = np.array(run.content["gain"]["table"]) if run.content else np.empty((1, 0, 0))
+    gains = table.reshape(-1, table.shape[-2] * table.shape[-1]).T
     return {
         "name": run.name, "state": run.state, "good": run.good, "message": run.message, "gains_moved": run.moved,
         "seconds": run.seconds, "gain_range": [[float(g.min()), float(g.max())] for g in gains],

@@ -23,7 +23,7 @@ def progress_bar(threaded: bool = True) -> Progress:
 
 def print_table(
     title: str,
-    headings: Sequence[str],
+    headings: Iterable[str],
     rows: Iterable[Sequence[str]],
     *,
     left: Collection[int] = (0,),

@@ -88,6 +88,14 @@ def extract(
     generators = [sp.Symbol(p.name) for p in parameters]
     values = {sp.Symbol(name): sp.Rational(str(c.value)) for name, c in constants.items()}
     matrices = {key: symbolic[key].subs(values) for key in MATRICES}
+    zeros = {symbol for symbol, value in values.items() if value == 0}
+    for key, matrix in matrices.items():
+        for (i, j), entry in zip(np.ndindex(*matrix.shape), matrix, strict=True):
+            if entry.has(sp.zoo, sp.nan) and zeros & symbolic[key][i, j].free_symbols:
+                names = ", ".join(sorted(str(s) for s in zeros & symbolic[key][i, j].free_symbols))
+                raise ModelError(
+                    f"{where}: {key}[{i},{j}] = {symbolic[key][i, j]} divides by zero: {names} = 0; give another value"
+                )
     fractions = {
         key: [[_fraction(entry, generators, f"{where}: {key}[{i},{j}]") for j, entry in enumerate(row)]
               for i, row in enumerate(matrix.tolist())]
@@ -105,7 +113,13 @@ def extract(
     denominator = sp.expand(denominator / size)  # one where the range has its middle: positive if it has no root
     exact = {}
     for key, rows in fractions.items():
-        numerators = [[sp.expand(sp.cancel(above * denominator / below)) for above, below in row] for row in rows]
+        numerators = [
+            [
+                above if denominator == below == 1 else sp.expand(sp.cancel(above * denominator / below))
+                for above, below in row
+            ]
+            for row in rows
+        ]
         exact[key] = _polynomial(numerators, matrices[key].shape, generators, parameters)
     below = _polynomial([[denominator]], (1, 1), generators, parameters)
     _check_denominator(where, parameters, below)
@@ -133,7 +147,10 @@ def _fraction(entry: sp.Expr, generators: list[sp.Symbol], where: str) -> tuple[
     if entry.has(sp.nan, sp.oo, -sp.oo, sp.zoo, sp.I):
         raise ModelError(f"{where} = {entry} is not a finite real expression")
     written = entry.replace(lambda e: e.is_Float, lambda e: sp.Rational(str(e)))
-    above, below = sp.fraction(sp.cancel(sp.together(written)))
+    if written.is_polynomial(*generators):  # by its form: the way through fractions takes ten times as long
+        above, below = sp.expand(written), sp.Integer(1)
+    else:
+        above, below = sp.fraction(sp.cancel(sp.together(written)))
     for part in (above, below):
         if not part.is_polynomial(*generators):
             raise ModelError(f"{where} = {entry} is neither polynomial nor rational in the parameters")
@@ -176,10 +193,14 @@ def _array(matrix: PolynomialMatrix) -> FloatArray:
 def _check_denominator(where: str, parameters: Sequence[SchedulingParameter], denominator: PolynomialMatrix) -> None:
     if not any(denominator.degrees) or sign_on_box(denominator.balls()).positive:
         return
-    found = prove_positive(MatrixPolynomial(_array(denominator)[..., None]))
+    size = MatrixPolynomial(_array(denominator)[..., None])
+    found = prove_positive(size)
     if not found.proved:
+        bad, good = np.array(found.place), np.zeros(len(parameters))  # one in the middle: it vanishes in between
+        for _ in range(60):
+            between = (bad + good) / 2
+            bad, good = (bad, between) if size.at(between[None])[0, 0, 0, 0] > 0.0 else (between, good)
         place = ", ".join(
-            f"{p.name} = {p.middle + p.half_width * u:.4g} {p.unit}"
-            for p, u in zip(parameters, found.place, strict=True)
+            f"{p.name} = {p.middle + p.half_width * u:.4g} {p.unit}" for p, u in zip(parameters, bad, strict=True)
         )
         raise ModelError(f"{where}: a denominator vanishes inside the range, near {place}; shrink the range")

@@ -11,6 +11,8 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from functools import partial
+from operator import mul
 from typing import Any, TypeVar
 
 from synthesis.errors import ModelError
@@ -31,8 +33,11 @@ def parse(text: str, where: str) -> ast.expr:
         raise ModelError(f"{where}: a formula is one line of ASCII text of 1 to {LONGEST} characters")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, MemoryError, RecursionError):
-        raise ModelError(f"{where}: '{shown(text)}' is not a formula of names, numbers, + - * / and **") from None
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+        place = getattr(error, "offset", None)
+        raise ModelError(
+            f"{where}: '{shown(text)}' is not a formula of names, numbers, + - * / and **", place - 1 if place else None
+        ) from None
     _check(tree, text.strip(), where)
     return tree
 
@@ -44,7 +49,8 @@ def _check(tree: ast.expr, text: str, where: str) -> None:
         match node:
             case ast.BinOp(left, ast.Pow(), right):
                 if exponent(right) is None:
-                    raise ModelError(f"{where}: exponents are integers from -{POWER} to {POWER} in '{shown(text)}'")
+                    words = f"{where}: exponents are integers from -{POWER} to {POWER} in '{shown(text)}'"
+                    raise ModelError(words, right.col_offset)
                 waiting.append(left)
             case ast.BinOp(left, ast.Add() | ast.Sub() | ast.Mult() | ast.Div(), right):
                 waiting += [left, right]
@@ -57,7 +63,8 @@ def _check(tree: ast.expr, text: str, where: str) -> None:
             case _:
                 raise ModelError(
                     f"{where}: '{shown(ast.get_source_segment(text, node) or text)}' is not allowed in a formula; "
-                    "use names, numbers, + - * / and ** with an integer"
+                    "use names, numbers, + - * / and ** with an integer",
+                    getattr(node, "col_offset", None),
                 )
 
 
@@ -79,11 +86,13 @@ def number(node: ast.Constant, text: str, where: str) -> Fraction:
     if size == 0.0 and not segment.lower().partition("e")[0].strip("0."):
         return Fraction(0)  # 0e-1000000000 included
     if len(segment) > DIGITS or not 1e-100 <= size <= 1e100:
-        raise ModelError(f"{where}: the number '{shown(segment)}' is beyond 1e100 or {DIGITS} characters")
+        raise ModelError(
+            f"{where}: the number '{shown(segment)}' is beyond 1e100 or {DIGITS} characters", node.col_offset
+        )
     try:
         return Fraction(segment)
     except ValueError:
-        raise ModelError(f"{where}: '{shown(segment)}' is not a decimal number") from None
+        raise ModelError(f"{where}: '{shown(segment)}' is not a decimal number", node.col_offset) from None
 
 
 def read(
@@ -91,43 +100,61 @@ def read(
 ) -> Value:
     """The formula in the arithmetic of `names`; `literal` makes a value of a number.
 
-    Raises ModelError for a name that is not known, and for a division by zero.
+    Raises ModelError for a name that is not known, and for a division by zero; its offset, and that of an error of the
+    arithmetic, is where the operand stands.
     """
 
     def value(node: ast.expr) -> Any:
         match node:
             case ast.BinOp(left, ast.Pow(), right):
                 power = exponent(right) or 0
-                base = value(left) if power >= 0 else quotient(literal(Fraction(1)), value(left))
+                base = value(left) if power >= 0 else quotient(literal(Fraction(1)), value(left), left)
                 found = literal(Fraction(1))
                 for _ in range(abs(power)):
-                    found = found * base
+                    found = placed(partial(mul, found, base), left)
                 return found
-            case ast.BinOp(left, ast.Add(), right):
-                return value(left) + value(right)
-            case ast.BinOp(left, ast.Sub(), right):
-                return value(left) - value(right)
-            case ast.BinOp(left, ast.Mult(), right):
-                return value(left) * value(right)
-            case ast.BinOp(left, ast.Div(), right):
-                return quotient(value(left), value(right))
+            case ast.BinOp(left, operator, right):
+                above, below = value(left), value(right)
+                return placed(lambda: combined(above, operator, below, right), right)
             case ast.UnaryOp(ast.USub(), operand):
                 return literal(Fraction(-1)) * value(operand)
             case ast.UnaryOp(_, operand):
                 return value(operand)
             case ast.Name(name):
                 if name not in names:
-                    raise ModelError(f"{where}: '{shown(name)}' is neither a constant nor a scheduling parameter")
+                    from difflib import get_close_matches  # needed for a refusal alone
+
+                    close = get_close_matches(name, list(names), n=1)
+                    hint = f"; did you mean {close[0]}?" if close else ""
+                    words = f"{where}: '{shown(name)}' is neither a constant nor a scheduling parameter{hint}"
+                    raise ModelError(words, node.col_offset)
                 return names[name]
             case ast.Constant():
                 return literal(number(node, text, where))
         raise ModelError(f"{where}: '{shown(text)}' is not a formula")
 
-    def quotient(above: Any, below: Any) -> Any:
+    def placed(action: Callable[[], Any], node: ast.expr) -> Any:
+        try:
+            return action()
+        except ModelError as error:
+            error.offset = node.col_offset if error.offset is None else error.offset
+            raise
+
+    def combined(above: Any, operator: ast.operator, below: Any, right: ast.expr) -> Any:
+        match operator:
+            case ast.Add():
+                return above + below
+            case ast.Sub():
+                return above - below
+            case ast.Mult():
+                return above * below
+        return quotient(above, below, right)
+
+    def quotient(above: Any, below: Any, right: ast.expr) -> Any:
         try:
             return above / below
         except ZeroDivisionError:
-            raise ModelError(f"{where}: division by zero in '{shown(text)}'") from None
+            raise ModelError(f"{where}: division by zero in '{shown(text)}'", right.col_offset) from None
 
     try:
         return value(tree)  # type: ignore[no-any-return]

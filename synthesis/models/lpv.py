@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -14,6 +14,9 @@ from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from synthesis.errors import ModelError
 from synthesis.models.extract import MATRICES, ExactModel, PolynomialModel, extract, in_floats
+from synthesis.models.from_grid import Fit, from_systems, grid_fields, with_noise
+from synthesis.models.from_jacobian import jacobian_fields
+from synthesis.models.nonlinear import NonlinearModel
 from synthesis.models.numeric import NumericModel, evaluate
 from synthesis.models.param import Constant, SchedulingParameter, Signal
 from synthesis.models.symbols import plain
@@ -29,8 +32,8 @@ class LpvModel:
     Matrices are sympy matrices whose symbols are the names of `parameters` and `constants`, polynomial or rational in
     the parameters. A disturbance whose column of E is zero is measurement noise. B, D, E and F default to zero.
 
-    Raises ModelError for a stray symbol, a shape that does not fit, a parameter that never appears, a dependence that
-    is not rational, a denominator that vanishes inside the range, and repeated names.
+    Raises ModelError for a stray symbol, a shape that does not fit, a parameter or constant that never appears, a
+    dependence that is not rational, a denominator that vanishes inside the range, and repeated names.
     """
 
     name: str
@@ -90,6 +93,9 @@ class LpvModel:
         idle = sorted({p.name for p in self.parameters} - used)
         if idle:
             raise ModelError(f"model '{self.name}': parameter(s) {', '.join(idle)} appear in no matrix; remove them")
+        idle = sorted(set(self.constants) - used)
+        if idle:
+            raise ModelError(f"model '{self.name}': constant(s) {', '.join(idle)} appear in no matrix; remove them")
 
     @cached_property
     def exact(self) -> ExactModel:
@@ -132,6 +138,136 @@ class LpvModel:
                     f"{p.name} = {column[bad[0]]:.6g} {p.unit} is outside [{p.minimum:g}, {p.maximum:g}] {p.unit} "
                     f"(grid point {bad[0]}); widen the model's range or stay inside it"
                 )
+
+    @classmethod
+    def from_grid(
+        cls,
+        name: str,
+        source: str,
+        parameters: Sequence[SchedulingParameter],
+        points: Mapping[str, ArrayLike] | ArrayLike,
+        systems: object = None,
+        *,
+        A: ArrayLike | None = None,
+        B: ArrayLike | None = None,
+        C: ArrayLike | None = None,
+        D: ArrayLike | None = None,
+        E: ArrayLike | None = None,
+        F: ArrayLike | None = None,
+        states: tuple[Signal, ...] | None = None,
+        inputs: tuple[Signal, ...] | None = None,
+        outputs: tuple[Signal, ...] | None = None,
+        disturbances: tuple[Signal, ...] = (),
+        measurement_noise: bool = False,
+        degree: int | Sequence[int] | None = None,
+        fit: Fit = "polynomial",
+        tolerance: float = 0.01,
+        sizes: Mapping[str, float] | None = None,
+    ) -> LpvModel:
+        r"""A model fitted to tables of its matrices, or to `control.StateSpace` systems, at the points of a rectilinear grid.
+
+        `points` maps every parameter to its grid line, with tables (g_1, .., g_p, rows, columns); or lists all points (g, p) in
+        any order, with tables (g, rows, columns). A matrix without these axes is the same everywhere. Of `systems` (one for every
+        point) the columns of B and D are the inputs, then the disturbances; signals default to their labels, with the unit 1.
+        `measurement_noise` adds one disturbance to every output.
+
+        Entries become Chebyshev polynomials (least squares), stored as exact rationals: of `degree`, or of the lowest degree that
+        leaves no entry off by more than `tolerance` of its largest value (at most half as many as points, so that points are left
+        to tell). `fit` says what the plant is between the points: "polynomial", the fit itself; "piecewise-linear", straight
+        lines, so that the residual is bounded over the whole range.
+
+        The residual enters the model as a stated uncertainty (`synthesis.models.fitted`): for each row that is off, a disturbance
+        `NAME_fit_error` between -1 and 1 with a constant `NAME_fit_error_size`; name these disturbances in the channels of a
+        design. `sizes` are the largest magnitudes of the states, inputs and disturbances that the residual multiplies.
+
+        Raises ModelError for points that are no grid, tables that do not fit, a range beyond the grid, a fit beyond the
+        tolerance, and an error left without sizes.
+        """
+        given = {"states": states, "inputs": inputs, "outputs": outputs, "disturbances": disturbances}
+        tables: dict[str, Any] = {"A": A, "B": B, "C": C, "D": D, "E": E, "F": F}
+        if systems is not None:
+            if any(value is not None for value in tables.values()):
+                raise ModelError(f"model '{name}': give systems or matrices, not both")
+            tables, signals = from_systems(systems, f"model '{name}'", given)
+            if isinstance(points, Mapping):  # systems come in a row
+                counts = [len(np.atleast_1d(np.asarray(points[p.name]))) for p in parameters if p.name in points]
+                if len(tables["A"]) != np.prod(counts):
+                    raise ModelError(
+                        f"model '{name}': {len(tables['A'])} systems for a grid of {int(np.prod(counts))} points"
+                    )
+                tables = {key: table.reshape(*counts, *table.shape[1:]) for key, table in tables.items()}
+        else:
+            if A is None or C is None or states is None or outputs is None:
+                raise ModelError(f"model '{name}': give A and C with states and outputs, or systems")
+            signals = {key: value or () for key, value in given.items()}
+        if measurement_noise:
+            tables, signals = with_noise(tables, signals)
+        return cls(**grid_fields(name, source, parameters, points, tables, signals, degree, fit, tolerance, sizes))
+
+    @classmethod
+    def from_jacobian(
+        cls,
+        model: NonlinearModel,
+        parameters: Sequence[SchedulingParameter],
+        trim: Mapping[str, Any],
+        *,
+        disturbances: Sequence[str] = (),
+        drifting: Sequence[str] = (),
+        measurement_noise: bool = False,
+        degree: int | None = None,
+        tolerance: float = 1e-3,
+        sizes: Mapping[str, float] | None = None,
+    ) -> LpvModel:
+        r"""The Jacobian of a nonlinear model along a family of trims, in deviations from them.
+
+        `trim` gives every state and input as a number or as a sympy expression in the scheduling parameters and constants; the
+        derivatives of all states must vanish on it, except those named in `drifting`. Inputs named in `disturbances` become such;
+        `measurement_noise` adds one to every output. What the moving trim itself adds, d(trim)/dp p', is not part of the model.
+
+        Entries that are rational in the parameters stay symbolic. Others become polynomials in Chebyshev form, of `degree` or of
+        the lowest one that is off by at most `tolerance` of the entry's size; the residual is bounded over the whole range in
+        ball arithmetic and enters as in `from_grid`, with `sizes` for the deviations that it multiplies.
+
+        Raises ModelError for unknown names, a trim that is no equilibrium (state, place), and a fit beyond the tolerance.
+        """
+        return cls(
+            **jacobian_fields(
+                model, parameters, trim, disturbances, drifting, measurement_noise, degree, tolerance, sizes
+            )
+        )
+
+    def to_control(self, point: ArrayLike = (), disturbances: bool = False) -> Any:
+        """The plant at one parameter value (p,) as `control.StateSpace` in continuous time, signals by their names.
+
+        Inputs are `inputs`, and behind them, if asked for, `disturbances` (E and F). Raises ModelError for a value outside the
+        range, and for a plant that has no column to show.
+        """
+        import control  # half a second: paid by those who use it
+
+        at = self.on(np.asarray(point, float).reshape(1, -1))
+        signals = (*self.inputs, *(self.disturbances if disturbances else ()))
+        if not signals:
+            raise ModelError(
+                f"model '{self.name}' has no inputs, which control.StateSpace needs; pass disturbances=True"
+            )
+        B, D = (
+            np.concatenate([first[0], second[0]], -1) if disturbances else first[0]
+            for first, second in ((at.B, at.E), (at.D, at.F))
+        )
+        names = ([s.name for s in group] for group in (self.states, signals, self.outputs))
+        states, inputs, outputs = names
+        return control.StateSpace(
+            at.A[0],
+            B,
+            at.C[0],
+            D,
+            0,
+            states=states,
+            inputs=inputs,
+            outputs=outputs,
+            name=self.name,
+            remove_useless_states=False,
+        )
 
     def with_range(self, name: str, minimum: float, maximum: float) -> LpvModel:
         """The same model with another range of one parameter."""

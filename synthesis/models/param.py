@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import dataclass
 from functools import lru_cache
+from keyword import iskeyword
 
 from synthesis.errors import ModelError
 from synthesis.models.formula import shown
@@ -13,7 +14,7 @@ from synthesis.models.formula import shown
 # Names, 1, products, quotients and single powers: a tower like 9**9**9 would be worked out by pint, digit by digit.
 _POWER = r"(?:\*\*|\^) ?(?:[+-]?\d{1,2}(?:\.\d{1,4})?(?![\w.])|\([+-]?\d{1,2}(?:[/.]\d{1,4})?\))(?! ?(?:\*\*|\^))"
 _UNIT = re.compile(rf"(?>[A-Za-zµμΩ°%][A-Za-z0-9_µμΩ°%]*+|1(?![\w.])|{_POWER}|[*/() ])++")
-LARGEST_POWER, LONGEST_UNIT = 100, 64
+LARGEST_POWER, LONGEST_UNIT, LONGEST_NAME = 100, 64, 64
 
 
 @lru_cache(maxsize=1)
@@ -45,8 +46,10 @@ def check_unit(unit: str, where: str) -> str:
 
 def check_name(name: str, what: str) -> None:
     """Raise ModelError for a name that cannot be a symbol."""
-    if not name.isidentifier():
-        raise ModelError(f"{what} '{name}' needs a name of letters, digits and underscores, like wheel_speed")
+    if not (name.isidentifier() and name.isascii() and len(name) <= LONGEST_NAME):
+        raise ModelError(f"{what} '{shown(name)}' needs a name of letters, digits and underscores, like wheel_speed")
+    if iskeyword(name):
+        raise ModelError(f"{what} '{name}' has a name that a formula cannot use; write {name}_ or another one")
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ class Case:
 def case(name: str) -> Case:
     """By the name of a shipped specification. Raises SpecError if its parameter set prints no gains or ranges of them."""
     spec, folder = load_spec(name)
-    parameters, direction = spec.parameter_set(folder), spec.model.id.removeprefix("corner-velocity-")
+    parameters, direction = spec.parameter_set(folder), str(spec.model.id).removeprefix("corner-velocity-")
     gains, published = printed(parameters, direction)
     if published.gain_range is None:
         raise SpecError(f"specification '{name}': its parameter set has no published gains with ranges to compare with")

@@ -1,0 +1,88 @@
+"""What can be refused before a design is begun: names, units, form of the file to be written, hidden modes, singular problems."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import sympy as sp
+
+from analysis.observability.hidden_modes import undetectable_mode
+from estimators.arrays import FloatArray
+from estimators.schedule import check_content
+from studies.spec import ScheduleSpec
+from synthesis.certificate.content import subject_of
+from synthesis.design.deploy import Deployment
+from synthesis.design.export import schedule_content
+from synthesis.design.hinf_observer import ObserverDesign, ObserverGains, channel_matrices
+from synthesis.errors import ProblemError
+from synthesis.models.lpv import LpvModel
+
+RANK = 1e-9  # of the largest singular value: less is no noise at all
+
+
+def check_before_design(spec: ScheduleSpec, model: LpvModel) -> None:
+    """Raise GainsmithError, one line, for what no solver can change."""
+    design = spec.observer_design()
+    forces = [channel_matrices(model, channel)[0] for channel in design.channels]  # refuses names that are not known
+    _check_channels(design)
+    _check_effect(model, design, forces)
+    hidden = undetectable_mode(model)
+    if hidden is not None:
+        raise ProblemError(
+            f"model '{model.name}' is not detectable: {hidden.words} does not decay and does not show in the output(s) "
+            f"{', '.join(o.name for o in model.outputs)}; measure it, or shrink the range"
+        )
+    if design.fastest_pole is None and spec.deploy.update == "held":
+        _check_noise(model, forces)
+    check_file(spec, model)
+
+
+def check_file(spec: ScheduleSpec, model: LpvModel) -> None:
+    """The file with a table of zeros in it, before hours are spent on the gains: form, limits, formulas, units."""
+    lines = tuple(np.array([p.minimum, p.maximum]) for p in model.parameters)
+    table = np.zeros((*map(len, lines), len(model.states), len(model.outputs)))
+    gains = SimpleNamespace(model=model, update=spec.deploy.update, design=spec.observer_design())
+    blank = Deployment(cast(ObserverGains, gains), spec.deploy_settings(), lines, table, (), 0.0)
+    content = schedule_content(blank, spec.name, spec.description)
+    where = f"model '{model.name}' cannot be exported"
+    check_content(content, where)
+    subject_of(content, where)
+
+
+def _check_channels(design: ObserverDesign) -> None:
+    for channel in design.channels:
+        for what, names in (("disturbance", channel.disturbances), ("error", channel.errors)):
+            twice = next((name for name in names if names.count(name) > 1), None)
+            if twice is not None:
+                raise ProblemError(f"channel '{channel.name}' has the {what} '{twice}' twice; remove one")
+
+
+def _check_effect(model: LpvModel, design: ObserverDesign, forces: list[FloatArray]) -> None:
+    """A channel through which nothing comes has the gain zero, whatever the gains of the observer are."""
+    effects = sp.Matrix.vstack(model.E, model.F)
+    for channel, force in zip(design.channels, forces, strict=True):
+        for name, column in zip(channel.disturbances, force.T, strict=True):
+            place = int(np.argmax(column))
+            if not any(effects[:, place]):
+                raise ProblemError(
+                    f"channel '{channel.name}': disturbance '{name}' acts on no state and no output of model '{model.name}'; "
+                    "give it a column in E or F, or leave it out"
+                )
+
+
+def _check_noise(model: LpvModel, forces: list[FloatArray]) -> None:
+    """Without noise on some combination of outputs, gains grow without bound while the level falls: a singular problem."""
+    corners = np.stack(np.meshgrid(*[[p.minimum, p.middle, p.maximum] for p in model.parameters], indexing="ij"), -1)
+    F = model.on(corners.reshape(-1, len(model.parameters))).F @ np.hstack(forces)
+    size = np.linalg.norm(F, axis=-1, keepdims=True)
+    scaled = F / np.where(size > 0.0, size, 1.0)  # outputs in units of their noise
+    values, names = np.linalg.svd(scaled, compute_uv=False), [o.name for o in model.outputs]
+    rank = (values > RANK * np.maximum(values[:, :1], 1e-300)).sum(axis=-1).min() if F.shape[-1] else 0
+    if rank < len(names):
+        free = [name for name, row in zip(names, size[..., 0].T, strict=True) if not row.all()] or names
+        raise ProblemError(
+            f"model '{model.name}': no channel has noise on {', '.join(free)}, so the gains have no bound; put measurement "
+            "noise into a channel, or give fastest_pole"
+        )
