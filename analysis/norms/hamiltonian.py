@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from analysis.errors import AnalysisError
 from analysis.norms.frequency_response import Systems, largest_gain, read_systems, sigma_max
+from analysis.norms.stability import stability
 from estimators.arrays import BoolArray, ComplexArray, FloatArray
 
 # How near to the imaginary axis an eigenvalue must be to be looked at: far above rounding. Each one is then decided by
@@ -48,23 +49,6 @@ def _blocks(systems: Systems, gamma: FloatArray) -> tuple[FloatArray, FloatArray
     return A + B @ solved[..., :n], level * (B @ solved[..., n:]), -(Ct @ (C + D @ solved[..., :n])) / level
 
 
-def surely_clear(systems: Systems, gamma: FloatArray) -> BoolArray:
-    r"""Without eigenvalues, for one and two states: levels that are certainly not crossed, given gamma > both ends.
-
-    det(gamma^2 I - G^* G) |det(j w I - A)|^2 is a polynomial of degree n in x = w^2, positive at x = 0 and at infinity for
-    gamma above the gains there. For n = 1 that is all. For n = 2 it is x^2 + x trace(H^2)/2 + det(H), which has no root
-    x > 0 if trace(H^2) >= 0. False decides nothing.
-    """
-    n = systems.A.shape[-1]
-    if n != 2:
-        return np.full(len(systems), n == 1)
-    top, right, left = _blocks(systems, gamma)
-    transposed = np.swapaxes(top, -1, -2)
-    half_trace = (top * transposed).sum(axis=(-2, -1)) + (right * left).sum(axis=(-2, -1))  # left is symmetric
-    size = np.abs(top * transposed).sum(axis=(-2, -1)) + np.abs(right * left).sum(axis=(-2, -1))
-    return np.asarray(half_trace > 1e-6 * size)
-
-
 def near_axis(systems: Systems, gamma: FloatArray) -> FloatArray:
     """Frequencies (g, 2n) >= 0 of eigenvalues of H(gamma) on or near the imaginary axis, ascending; NaN fills up."""
     eigenvalues = np.linalg.eigvals(hamiltonian(systems, gamma))
@@ -73,13 +57,16 @@ def near_axis(systems: Systems, gamma: FloatArray) -> FloatArray:
     return np.sort(np.where(near & (eigenvalues.imag >= 0.0), eigenvalues.imag, np.nan), axis=-1)
 
 
-def between(frequencies: FloatArray) -> FloatArray:
-    """The frequencies themselves and points between neighbours (zero is one), NaN where there is none: (g, 7k).
+def between(frequencies: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """The frequencies (g, k), ascending inside bands from low to high (g,), and points between neighbours, NaN where there
+    is none.
 
     Besides the middle, which makes the convergence quadratic, some points near the ends: a level just above a plateau
     is crossed far away from the resonance that it has to find.
     """
-    before = np.concatenate([np.zeros_like(frequencies[:, :1]), frequencies[:, :-1]], axis=-1)
+    last = np.where(np.isfinite(high), high, np.nan)[:, None]
+    frequencies = np.sort(np.concatenate([frequencies, last], axis=-1), axis=-1)  # NaN stays behind
+    before = np.concatenate([low[:, None], frequencies[:, :-1]], axis=-1)
     inside = [before + share * (frequencies - before) for share in (0.02, 0.15, 0.5, 0.85, 0.98)]
     return np.concatenate([frequencies, *inside, np.sqrt(before * frequencies)], axis=-1)
 
@@ -126,13 +113,15 @@ def crosses_level(
     level = np.broadcast_to(np.asarray(gamma, float), shape).reshape(-1)
     if not (np.isfinite(level) & (level > 0.0)).all():
         raise AnalysisError(f"level gamma = {level.min(initial=np.inf):g} must be finite and positive")
-    poles = systems.poles()
-    stable = (np.abs(poles) < 1.0 if discrete else poles.real < 0.0).all(axis=-1)
+    stable = stability(systems.A, systems.discrete).stable
     if not stable.all():
-        raise AnalysisError(f"system {int(np.argmin(stable))} is unstable; its H-infinity norm is infinite")
+        raise AnalysisError(
+            f"system {int(np.argmin(stable))} is unstable, or not certainly stable at this precision; it has no H-infinity norm"
+        )
     continuous = to_continuous(systems)
     above = sigma_max(continuous.D) < level
     safe = np.where(above, level, 2.0 * sigma_max(continuous.D) + 1.0)
-    seen = gain_at(systems, between(near_axis(continuous, safe))).max(axis=-1)
+    ends = np.zeros(len(level)), np.full(len(level), np.inf)
+    seen = gain_at(systems, between(near_axis(continuous, safe), *ends)).max(axis=-1)
     static = gain_at(systems, np.zeros((len(level), 1)))[:, 0]
     return np.asarray((~above | (np.maximum(seen, static) >= level)).reshape(shape))
