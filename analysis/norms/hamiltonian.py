@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from analysis.errors import AnalysisError
 from analysis.norms.frequency_response import Systems, largest_gain, read_systems, sigma_max
-from analysis.norms.stability import stability
+from analysis.norms.stability import require_stable
 from estimators.arrays import BoolArray, ComplexArray, FloatArray
 
 # How near to the imaginary axis an eigenvalue must be to be looked at: far above rounding. Each one is then decided by
@@ -113,11 +113,7 @@ def crosses_level(
     level = np.broadcast_to(np.asarray(gamma, float), shape).reshape(-1)
     if not (np.isfinite(level) & (level > 0.0)).all():
         raise AnalysisError(f"level gamma = {level.min(initial=np.inf):g} must be finite and positive")
-    stable = stability(systems.A, systems.discrete).stable
-    if not stable.all():
-        raise AnalysisError(
-            f"system {int(np.argmin(stable))} is unstable, or not certainly stable at this precision; it has no H-infinity norm"
-        )
+    require_stable(systems.A, systems.discrete)
     continuous = to_continuous(systems)
     above = sigma_max(continuous.D) < level
     safe = np.where(above, level, 2.0 * sigma_max(continuous.D) + 1.0)

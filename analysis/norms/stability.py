@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.drops.balance import balanced
+from analysis.errors import AnalysisError
 from analysis.norms.modal import EPS, norm
 from analysis.norms.planar import determinant, expanded
 from estimators.arrays import BoolArray, ComplexArray, FloatArray
@@ -46,6 +47,19 @@ def stability(A: FloatArray, discrete: bool) -> Stability:
         except np.linalg.LinAlgError:
             kappa = np.full(poles.shape, np.inf)
     return from_poles(A, poles, EPS * np.sqrt((A * A).sum(axis=(-2, -1)))[:, None] * kappa, discrete)
+
+
+def require_stable(A: FloatArray, discrete: bool) -> None:
+    """Raise AnalysisError that names the first of A (g, n, n) that is not certainly stable."""
+    found = stability(A, discrete)
+    if not found.stable.all():
+        first = int(np.argmin(found.stable))
+        how = (
+            "unstable"
+            if found.unstable[first]
+            else "not stable or unstable at this precision: a pole is on the boundary"
+        )
+        raise AnalysisError(f"system {first} of {len(A)} is {how}; this needs strictly stable systems")
 
 
 def from_poles(A: FloatArray, poles: ComplexArray, sizes: FloatArray, discrete: bool) -> Stability:
