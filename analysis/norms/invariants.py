@@ -52,7 +52,7 @@ class Invariants:
                 for r, i, c in zip(self.real, self.imag, self.constant, strict=True)
             )
             gain = np.sqrt(np.maximum(0.5 * (f + np.sqrt(np.maximum(f * f - 4.0 * k, 0.0))), 0.0))
-        return np.asarray(np.nan_to_num(gain, nan=0.0, posinf=0.0))
+        return np.where(np.isfinite(gain), gain, 0.0)
 
 
 def available(p: int, m: int) -> bool:

@@ -64,12 +64,13 @@ def level_proof(
     """
     level = level_of(parts, gamma)
     far = np.clip(8.0 * np.sqrt((parts.decay**2 + parts.turn**2).max(axis=0)), band[0], band[1])
-    proved = np.isfinite(band[1]) | _tail(level, far)
-    against = np.where(proved, np.nan, far)
+    ended, against = _tail(level, far)
+    ended |= np.isfinite(band[1])
+    proved = np.ones(len(gamma), bool)
     top = np.where(np.isfinite(peak), peak, far)
     marks = np.concatenate([resonances(parts), top[None], top + AROUND[:, None] * distance(parts, top)])
     marks = np.sort(np.concatenate([band[:1], np.clip(marks, band[0], far), far[None]]), axis=0)
-    place, member = np.nonzero((marks[1:] > marks[:-1]) & proved)
+    place, member = np.nonzero(marks[1:] > marks[:-1])
     low, high = marks[place, member], marks[place + 1, member]
     middle = 0.5 * (low + high)
     for end in (low, high):
@@ -78,8 +79,9 @@ def level_proof(
         bound, here = _in_blocks(level, member, low, middle, high)
         open_ = ~(bound > 0.0)
         reached = open_ & ((here <= 0.0) | (depth == DEPTH - 1))  # the level is reached there, or nothing helps
-        proved[member[reached]] = False
-        against[member[reached]] = middle[reached]
+        lowest = np.flatnonzero(reached)[np.argsort(-here[reached])]  # of several points of a member the lowest comes last, and stays
+        proved[member[lowest]] = False
+        against[member[lowest]] = middle[lowest]
         open_ &= proved[member]
         if not open_.any():
             break
@@ -90,7 +92,7 @@ def level_proof(
         centre = 0.5 * (cuts[:-1] + cuts[1:])
         centre[0], centre[-1] = cuts[0], cuts[-1]
         low, middle, high = cuts[:-1].ravel(), centre.ravel(), cuts[1:].ravel()
-    return proved, against
+    return proved & ended, against
 
 
 def _in_blocks(
@@ -140,10 +142,16 @@ def _lower_bound(
     return np.where(np.isfinite(bound), bound, -1.0), h0
 
 
-def _tail(level: Level, far: FloatArray) -> BoolArray:
-    """h > 0 from the frequency `far` on: h >= h_inf + (sum c - sum |c lambda^2| / (x - |lambda|^2)) / x."""
+def _tail(level: Level, far: FloatArray) -> tuple[BoolArray, FloatArray]:
+    """h > 0 from the frequency `far` on: h >= h_inf + (sum c - sum |c lambda^2| / (x - |lambda|^2)) / x; and where h may be lowest."""
     with np.errstate(all="ignore"):
         x, square = far * far, level.parts.decay**2 + level.parts.turn**2
         size = np.sqrt(level.real**2 + level.imag**2)
         lost = (size * (square / (x - square) + 16.0 * EPS) + 2.0 * level.slack).sum(axis=0)
-        return np.asarray(level.constant - level.rounding + np.minimum(level.real.sum(axis=0) - lost, 0.0) / x > 0.0)
+        first = level.real.sum(axis=0)
+        proved = level.constant - level.rounding + np.minimum(first - lost, 0.0) / x > 0.0
+        # h = h_inf + first / x + second / x^2 + ... has its minimum at x = -2 second / first
+        decay, turn = level.parts.decay, level.parts.turn
+        second = (2.0 * decay * turn * -level.imag - (decay * decay - turn * turn) * level.real).sum(axis=0)
+        lowest = -2.0 * second / first
+        return proved, np.where(lowest > x, np.sqrt(lowest), far)

@@ -8,7 +8,8 @@ import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray, IndexArray
 
-STEPS = (0.4, 0.05, 2e-3, 4e-5)  # of the parabolas through three points, in half-widths of the resonance
+AROUND = np.array([[-1.0], [0.0], [1.0]])  # of the parabolas through three points, in steps
+FIRST, LAST, LEAP, STEPS = 0.4, 4e-5, 4.0, 9  # largest and smallest step in half-widths, steps in one move, and moves
 
 
 class Response(Protocol):
@@ -39,13 +40,15 @@ def distance(parts: Response, frequency: FloatArray) -> FloatArray:
 
 
 def first_guess(parts: Response, direct: FloatArray, band: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The largest gain at the ends of the band (2, g) and near the tallest resonance inside, and where: (g,), (g,).
+    """The largest gain at the ends of the band (2, g) and near the tallest resonance (or between two) inside, and where: (g,), (g,).
 
     `direct` (g,) is the gain at infinite frequency.
     """
     endless = ~np.isfinite(band[1])
     ends = np.where(np.isfinite(band), band, 0.0)
-    frequency = np.concatenate([ends, np.clip(resonances(parts), band[0], band[1])])
+    tops = np.sort(resonances(parts), axis=0)
+    between = np.sqrt(np.concatenate([0.1 * tops[:1], tops]) * np.concatenate([tops, 10.0 * tops[-1:]]))
+    frequency = np.concatenate([ends, np.clip(tops, band[0], band[1]), np.clip(between, band[0], band[1])])
     gain = parts.gain(frequency)
     gain[1] = np.where(endless, direct, gain[1])
     frequency[1] = band[1]
@@ -62,14 +65,17 @@ def first_guess(parts: Response, direct: FloatArray, band: FloatArray) -> tuple[
 def climbed(parts: Response, frequency: FloatArray, band: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The largest gain on the way up from frequencies (g,) by parabolas through three points, and where."""
     width = distance(parts, frequency)
-    best, at = np.zeros(len(width)), frequency
-    for step in STEPS:
-        h = step * width
-        low, middle, high = parts.gain(np.clip(np.stack([frequency - h, frequency, frequency + h]), band[0], band[1]))
+    h, best, at = FIRST * width, np.zeros(len(width)), frequency
+    for _ in range(STEPS):
+        low, middle, high = parts.gain(np.clip(frequency + AROUND * h, band[0], band[1]))
         better = middle > best
         best, at = np.where(better, middle, best), np.where(better, frequency, at)
         bend = low - 2.0 * middle + high
-        move = np.where(bend < 0.0, 0.5 * (low - high) / np.where(bend < 0.0, bend, 1.0), np.sign(high - low))
-        frequency = np.clip(frequency + h * np.clip(move, -3.0, 3.0), band[0], band[1])
+        move = np.where(bend < 0.0, 0.5 * (low - high) / np.where(bend < 0.0, bend, 1.0), np.sign(high - low) * LEAP)
+        move = np.clip(move, -LEAP, LEAP)
+        frequency = np.clip(frequency + h * move, band[0], band[1])
+        if (np.abs(h * move) <= LAST * width).all():
+            break
+        h = np.clip(0.5 * np.abs(h * move), LAST * width, h * LEAP)
     last = parts.gain(frequency[None])[0]
     return np.maximum(last, best), np.where(last > best, frequency, at)
