@@ -24,9 +24,10 @@ from analysis.norms.peak_search import distance, resonances
 from estimators.arrays import BoolArray, FloatArray, IndexArray
 
 CUTS = np.array([0.0, 0.05, 0.3, 0.7, 0.95, 1.0])  # of an interval that is not decided: finer at both ends
-AROUND = np.array([-25.0, -5.0, -1.2, -0.4, 0.4, 1.2, 5.0, 25.0])  # half-widths of the peak
+AROUND = np.array([-2.0, -0.45, 0.45, 2.0])  # half-widths of the peak
+NEAR = 0.7**2  # of a distance in units of that to the pole, squared
 DEPTH = 6
-BLOCK = 8_192  # poles times intervals
+BLOCK = 4_096  # poles times intervals
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,9 @@ def level_proof(
         bound, here = _in_blocks(level, member, low, middle, high)
         open_ = ~(bound > 0.0)
         reached = open_ & ((here <= 0.0) | (depth == DEPTH - 1))  # the level is reached there, or nothing helps
-        lowest = np.flatnonzero(reached)[np.argsort(-here[reached])]  # of several points of a member the lowest comes last, and stays
+        lowest = np.flatnonzero(reached)[
+            np.argsort(-here[reached])
+        ]  # of several points of a member the lowest comes last, and stays
         proved[member[lowest]] = False
         against[member[lowest]] = middle[lowest]
         open_ &= proved[member]
@@ -114,36 +117,46 @@ def _lower_bound(
     with np.errstate(all="ignore"):
         decay, turn = level.parts.decay.take(member, axis=1), level.parts.turn.take(member, axis=1)
         cr, ci = level.real.take(member, axis=1), level.imag.take(member, axis=1)
-        # u = 1/(x + lambda^2) = ur + j ui
-        ur = decay * decay - (turn - middle) * (turn + middle)
-        ui = decay * turn * 2.0
-        square = 1.0 / (ur * ur + ui * ui)
-        ur *= square
-        ui *= square
-        size = np.sqrt(square)
-        magnitude = np.sqrt((cr * cr + ci * ci) * square)
-        cr, ci = cr * ur - ci * ui, cr * ui + ci * ur
-        constant = level.constant[member]
-        h0 = constant + cr.sum(axis=0)
-        cr, ci = cr * ur - ci * ui, cr * ui + ci * ur
-        h1 = -cr.sum(axis=0)
-        h2 = (cr * ur - ci * ui).sum(axis=0)
         # the ends are those of neighbours, rounded: a little more than the interval
         ulp = 4.0 * EPS * high * high
         left = (low - middle) * (low + middle) * (1.0 + 1e-9) - ulp
         right = (high - middle) * (high + middle) * (1.0 + 1e-9) + ulp
         reach = np.maximum(-left, right)
-        bent = h2 - reach * (magnitude * square * size / np.maximum(1.0 - size * reach, 0.0)).sum(axis=0)
-        lost = (level.slack.take(member, axis=1) * size + 16.0 * EPS * magnitude).sum(axis=0)
+        # u = 1/(x + lambda^2) = ur + j ui
+        ur = decay * decay - (turn - middle) * (turn + middle)
+        ui = decay * turn * 2.0
+        square = 1.0 / (ur * ur + ui * ui)
+        weight, slack = np.sqrt(cr * cr + ci * ci), level.slack.take(member, axis=1)
+        # a pole too near for a Taylor polynomial stands aside with the most that it can do
+        aside = np.maximum(np.maximum(ur + left, -ur - right), 0.0)
+        near = square * reach * reach > NEAR
+        here = level.constant[member] + ((cr * ur - ci * ui) * square).sum(axis=0)
+        most = (near * (weight + slack) / np.sqrt(aside * aside + ui * ui)).sum(axis=0)
+        far = square * ~near
+        ur *= far
+        ui *= far
+        size = np.sqrt(square)
+        magnitude = weight * size
+        cr, ci = cr * ur - ci * ui, cr * ui + ci * ur
+        h0 = level.constant[member] + cr.sum(axis=0)
+        cr, ci = cr * ur - ci * ui, cr * ui + ci * ur
+        h1 = -cr.sum(axis=0)
+        h2 = (cr * ur - ci * ui).sum(axis=0)
+        bent = h2 - reach * (magnitude * far * size / (1.0 - np.minimum(size * reach, 0.9))).sum(axis=0)
+        lost = (4.0 * slack * size + 16.0 * EPS * magnitude).sum(axis=0)
         ends = np.minimum((h1 + bent * left) * left, (h1 + bent * right) * right)
         vertex = -0.5 * h1 / bent
         inside = (bent > 0.0) & (vertex > left) & (vertex < right)
-        bound = h0 - level.rounding[member] - lost + np.minimum(np.where(inside, 0.5 * h1 * vertex, ends), 0.0)
-    return np.where(np.isfinite(bound), bound, -1.0), h0
+        least = np.minimum(np.where(inside, 0.5 * h1 * vertex, ends), 0.0)
+        bound = h0 - most - level.rounding[member] - lost + least
+    return np.where(np.isfinite(bound), bound, -1.0), here
 
 
 def _tail(level: Level, far: FloatArray) -> tuple[BoolArray, FloatArray]:
-    """h > 0 from the frequency `far` on: h >= h_inf + (sum c - sum |c lambda^2| / (x - |lambda|^2)) / x; and where h may be lowest."""
+    """h > 0 from the frequency `far` on: h >= h_inf + (sum c - sum |c lambda^2| / (x - |lambda|^2)) / x.
+
+    Also the frequency where h may be lowest there.
+    """
     with np.errstate(all="ignore"):
         x, square = far * far, level.parts.decay**2 + level.parts.turn**2
         size = np.sqrt(level.real**2 + level.imag**2)

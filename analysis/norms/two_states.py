@@ -24,17 +24,18 @@ from analysis.norms.modal import EPS
 from analysis.norms.planar import determinant, expanded
 from estimators.arrays import BoolArray, FloatArray, IndexArray
 
-ROUNDS = 12
-Parabola: TypeAlias = tuple[
-    FloatArray, FloatArray, FloatArray
-]  # coefficients of 1, t, t^2; or k, y, z of k a + y s + z
+ROUNDS = 16
+TRIED = (0.3, 3.0)  # of the squared corner frequency, before the search
+TRUSTED = 1e-5  # relative loss by cancellation from which on another road is taken
+Parabola: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]  # of 1, t, t^2; or k, y, z of k a + y s + z
 
 
 @dataclass(frozen=True)
 class Planar:
-    """|a|^2, |N|_F^2 and the minors' squares as parabolas in t = x - centre, and the size of what rounding adds to N: (g,)."""
+    """|a|^2, |N|_F^2 and the minors' squares as parabolas in t = x - centre = delta + rest; what rounding adds to N: (g,)."""
 
     centre: FloatArray
+    rest: FloatArray
     below: Parabola
     trace: Parabola
     area: Parabola
@@ -44,7 +45,7 @@ class Planar:
     def pick(self, index: IndexArray) -> Planar:
         """Some of the systems."""
         below, trace, area = (tuple(c[index] for c in part) for part in (self.below, self.trace, self.area))
-        return Planar(self.centre[index], below, trace, area, self.loss[index], self.rate_loss[index])  # type: ignore[arg-type]
+        return Planar(self.centre[index], self.rest[index], below, trace, area, self.loss[index], self.rate_loss[index])  # type: ignore[arg-type]
 
     def gain(self, t: FloatArray) -> FloatArray:
         """sigma_max at t (g,); a pole gives inf."""
@@ -73,10 +74,13 @@ def planar_peaks(
     f, k = form.trace[2], form.area[2]
     high = np.where(endless, np.sqrt(0.5 * (f + np.sqrt(np.maximum(f * f - 4.0 * k, 0.0)))), high)
     gain, at = np.maximum(low, high), np.where(high > low, ends[1], ends[0])
-    resonance = np.clip(-0.5 * form.below[1], ends[0], ends[1])  # where |a|^2 is least
-    middle = form.gain(np.where(np.isfinite(resonance), resonance, 0.0))
-    better = (middle > gain * (1.0 + 1e-13)) & np.isfinite(resonance)
-    gain, at = np.where(better, middle, gain), np.where(better, resonance, at)
+    corner = np.abs(form.centre + form.rest)  # |d|
+    # where |a|^2 is least, and around the corner frequency
+    for first in (-0.5 * form.below[1], *(corner * factor - form.centre for factor in TRIED)):
+        t = np.clip(first, ends[0], np.where(endless, np.finfo(float).max, ends[1]))
+        found = form.gain(t)
+        better = found > gain * (1.0 + 1e-13)  # a plateau keeps its simplest frequency
+        gain, at = np.where(better, found, gain), np.where(better, t, at)
     proved = np.zeros(len(gain), bool)
     proved[gain == 0.0] = ~np.isfinite(form.loss[gain == 0.0])
     index = np.flatnonzero(gain > 0.0)
@@ -104,7 +108,7 @@ def planar_peaks(
             form.rate_loss / np.sqrt(form.trace[2]),
         )
     upper = gain * (1.0 + tolerance) * (1.0 + loss)
-    return gain, np.where(at == -form.centre, 0.0, frequency), upper, proved & (loss < 0.5)
+    return gain, np.where(at == -form.centre, 0.0, frequency), upper, proved & (loss < TRUSTED)
 
 
 def _inside(form: Planar, vertex: FloatArray, product: FloatArray, ends: FloatArray) -> FloatArray:
@@ -168,6 +172,7 @@ def _planar(systems: Systems) -> Planar:
     direct = _length(D) if not systems.discrete else np.sqrt(trace[2])
     return Planar(
         centre,
+        rest,
         below,
         trace,
         area,
