@@ -27,7 +27,7 @@ CUTS = np.array([0.0, 0.05, 0.3, 0.7, 0.95, 1.0])  # of an interval that is not 
 AROUND = np.array([-2.0, -0.45, 0.45, 2.0])  # half-widths of the peak
 NEAR = 0.7**2  # of a distance in units of that to the pole, squared
 DEPTH = 6
-BLOCK = 4_096  # poles times intervals
+BLOCK = 3_072  # poles times intervals
 
 
 @dataclass(frozen=True)

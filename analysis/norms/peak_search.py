@@ -10,6 +10,7 @@ from estimators.arrays import BoolArray, FloatArray, IndexArray
 
 AROUND = np.array([[-1.0], [0.0], [1.0]])  # of the parabolas through three points, in steps
 FIRST, LAST, LEAP, STEPS = 0.4, 4e-5, 4.0, 9  # first and smallest step in half-widths, steps in one move, and moves
+BESIDE = np.array([-0.7, 0.7])[:, None, None]  # half-widths from a resonance, where feedthrough may move a peak
 SLOW = 0.03  # share of systems that the others do not wait for: the proof finds them
 
 
@@ -49,7 +50,8 @@ def first_guess(parts: Response, direct: FloatArray, band: FloatArray) -> tuple[
     ends = np.where(np.isfinite(band), band, 0.0)
     tops = np.sort(resonances(parts), axis=0)
     between = np.sqrt(np.concatenate([0.1 * tops[:1], tops]) * np.concatenate([tops, 10.0 * tops[-1:]]))
-    frequency = np.concatenate([ends, np.clip(tops, band[0], band[1]), np.clip(between, band[0], band[1])])
+    beside = (parts.turn[None] + BESIDE * parts.decay).reshape(-1, tops.shape[1])
+    frequency = np.concatenate([ends, np.clip(np.concatenate([tops, between, beside]), band[0], band[1])])
     gain = parts.gain(frequency)
     gain[1] = np.where(endless, direct, gain[1])
     frequency[1] = band[1]
