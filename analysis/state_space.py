@@ -81,12 +81,15 @@ def _realised(system: Any) -> Any:
     """Transfer functions of either library as state-space objects, anything else as it is."""
     if _is_system(system) or not hasattr(system, "dt"):
         return system
-    if hasattr(system, "to_ss"):
-        return system.to_ss()
-    if type(system).__module__.startswith("control") and hasattr(system, "num_array"):
-        import control as library
+    try:
+        if hasattr(system, "to_ss"):
+            return system.to_ss()
+        if type(system).__module__.startswith("control"):
+            import control as library
 
-        return library.tf2ss(system)
+            return library.ss(system)
+    except Exception as error:  # improper, no state space, or a realisation that needs slycot
+        raise AnalysisError(f"{type(system).__name__} has no state-space form: {error}") from None
     return system
 
 

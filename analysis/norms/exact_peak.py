@@ -44,7 +44,7 @@ def exact_peak(
             if found > best:
                 best, where = found, point
         if best == 0.0:
-            return 0.0, where, inf
+            return 0.0, where, 0.0 if _vanishes(*matrices) else inf
         level = nextafter(best * (1.0 + tolerance), inf)
         crossings = _crossings(*matrices, level)
         if crossings is None:
@@ -95,6 +95,15 @@ def _crossings(A: Any, B: Any, C: Any, D: Any, level: float) -> list[float] | No
         return []  # Descartes: no positive root
     roots = [root for root, _ in polynomial.complex_roots() if root.imag == 0 and not root.real < 0]
     return sorted({sqrt(max(float(root.real.mid()), 0.0)) for root in roots})
+
+
+def _vanishes(A: Any, B: Any, C: Any, D: Any) -> bool:
+    """Whether D and all Markov parameters are exactly zero."""
+    zero, moved = D == 0 * D, B
+    for _ in range(A.nrows()):
+        zero = zero and C * moved == 0 * D
+        moved = A * moved
+    return bool(zero)
 
 
 def _gain(system: Systems, frequency: float) -> float:

@@ -116,7 +116,10 @@ def _band(band: tuple[float, float] | None, discrete: bool) -> tuple[float, floa
     """Ends as frequencies of continuous systems."""
     if band is None:
         return 0.0, np.inf
-    low, high = (float(w) for w in band)
+    try:
+        low, high = (float(w) for w in band)
+    except (TypeError, ValueError):
+        raise AnalysisError(f"band = {band!r} must be two frequencies (w1, w2)") from None
     most = np.pi if discrete else np.inf
     if not 0.0 <= low < high <= most:
         raise AnalysisError(
@@ -139,20 +142,22 @@ def _flat(
     g = len(systems)
     norm, frequency, upper = np.where(bad, np.inf, np.nan), np.full(g, np.nan), np.full(g, np.inf)
     undecided = ~(good | bad)
-    zero = is_zero(systems)
-    norm[good & zero] = frequency[good & zero] = upper[good & zero] = 0.0
-    index = np.flatnonzero(good & ~zero)
+    zero, exact = is_zero(systems)
+    upper[good & exact] = 0.0
+    index = np.flatnonzero(good & ~exact)
     whole = len(index) == g
     band = np.empty((2, len(index)))
     band[0], band[1] = ends
     some = systems if whole else systems.pick(index)
     if modal is None:
         norm[index], frequency[index], upper[index], proved = planar_peaks(some, band, tolerance)
-        index = index[~proved]
-        if not len(index):
-            return norm, frequency, upper, undecided
-        some, band, modal = systems.pick(index), band[:, ~proved], modal_form(systems.pick(index))
+        index, band = index[~proved], band[:, ~proved]
+        some = systems.pick(index)
+        modal = modal_form(some) if len(index) else None
     elif not whole:
         modal = modal.pick(index)
-    norm[index], frequency[index], upper[index] = modal_peaks(some, modal, band, tolerance)
+    if modal is not None and len(index):
+        norm[index], frequency[index], upper[index] = modal_peaks(some, modal, band, tolerance)
+    faint = good & zero
+    norm[faint] = frequency[faint] = 0.0  # what is left is rounding; `upper` bounds it
     return norm, frequency, upper, undecided

@@ -25,9 +25,9 @@ def modal_peaks(
     """Norm, continuous frequency and upper bound (inf: none) over a band (2, g); no pole may lie on the boundary."""
     g = len(systems)
     norm, at, proved = np.zeros(g), np.zeros(g), np.zeros(g, bool)
-    good = np.isfinite(modal.spread)
-    if available(*modal.direct.shape[-2:]):
-        _prove(modal, band, tolerance, norm, at, proved, np.flatnonzero(good))
+    good = np.flatnonzero(np.isfinite(modal.spread))
+    if len(good) and available(*modal.direct.shape[-2:]):
+        _prove(modal, band, tolerance, norm, at, proved, good)
         norm[proved] = gain_on(systems, at, np.flatnonzero(proved))
     with np.errstate(all="ignore"):
         slack = np.where(norm > 0.0, SPREAD * modal.spread / norm, np.inf)

@@ -82,7 +82,6 @@ def planar_peaks(
         better = found > gain * (1.0 + 1e-13)  # a plateau keeps its simplest frequency
         gain, at = np.where(better, found, gain), np.where(better, t, at)
     proved = np.zeros(len(gain), bool)
-    proved[gain == 0.0] = ~np.isfinite(form.loss[gain == 0.0])
     index = np.flatnonzero(gain > 0.0)
     for _ in range(ROUNDS):
         if not len(index):

@@ -173,6 +173,8 @@ def test_bands_of_discrete_systems_and_wrong_bands() -> None:
     for band in ((2.0, 1.0), (-1.0, 1.0), (1.0, 4.0)):
         with pytest.raises(AnalysisError, match="must rise between 0 and pi rad/sample"):
             hinf_norm(*pole, discrete=True, band=band)
+    with pytest.raises(AnalysisError, match="must be two frequencies"):
+        hinf_norm(*pole, discrete=True, band=(1.0,))  # type: ignore[arg-type]
 
 
 def test_a_level_below_the_peak_is_never_proved() -> None:

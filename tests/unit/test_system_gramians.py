@@ -113,6 +113,9 @@ def test_transfer_functions_static_gains_and_numbers() -> None:
         assert stability_margin(system) == pytest.approx(-0.1)
         assert hankel_singular_values(system).shape == (2,)
     assert hinf_norm(control.tf([1.0], [1.0, -0.5], 0.1)).norm == pytest.approx(2.0)
+    for no_system in (control.tf([1.0, 2.0, 3.0], [1.0, 1.0]), control.frd([1.0, 2.0], [1.0, 2.0])):
+        with pytest.raises(AnalysisError, match="has no state-space form"):
+            hinf_norm(no_system)
     static = control.ss([], [], [], [[3.0, 4.0]])
     assert hinf_norm(static).norm == pytest.approx(5.0) and hinf_norm(static).upper >= 5.0
     assert h2_norm(static, discrete=True) == pytest.approx(5.0) and h2_norm(static) == np.inf
