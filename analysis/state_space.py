@@ -29,8 +29,7 @@ def given_system(
     """An object in the place of A brings all matrices and its time; a transfer function is realised first.
 
     B (n,), C (n,), plain numbers and D = 0 of one system are read as `control.ss` reads them. dt = 0 is continuous, a number
-    or True
-    discrete; None is continuous for scipy.signal, and open for python-control: say which, except for a static gain.
+    or True discrete; None is continuous for scipy.signal, and open for python-control: say which, except for a static gain.
     Raises AnalysisError for `discrete` that is no truth value or contradicts the object, and for matrices beside an object.
     """
     asked = flag("discrete", discrete)

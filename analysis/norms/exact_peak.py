@@ -1,10 +1,8 @@
 r"""The H-infinity norm of one hard system, proved in exact rationals: the two-step method without rounding.
 
 The characteristic polynomial of the Hamiltonian matrix H(gamma) (`analysis.norms.hamiltonian`) is even; as a polynomial in x
-= -s^2 its real
-roots x >= 0 are exactly the squares of the frequencies at which gamma is a singular value. All of it is exact (flint), the
-roots are
-isolated in ball arithmetic, and gains are evaluated there with 212 bits.
+= -s^2 its real roots x >= 0 are exactly the squares of the frequencies at which gamma is a singular value. All of it is exact
+(flint), the roots are isolated in ball arithmetic, and gains are evaluated there with 212 bits.
 """
 
 from __future__ import annotations

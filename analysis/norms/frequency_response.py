@@ -42,8 +42,7 @@ def read_systems(
     """Check four stacks, broadcast their leading axes and flatten them; also returns the leading shape.
 
     D = None means zero; A may be a system object (`analysis.state_space`), or be empty for a static gain D. Raises
-    AnalysisError for matrices that are not finite,
-    not square or do not fit.
+    AnalysisError for matrices that are not finite, not square or do not fit.
     """
     A, B, C, D, discrete = given_system(A, B, C, D, discrete)
     if B is None or C is None:

@@ -1,7 +1,7 @@
 r"""Gramians, Hankel singular values and balanced realisations of stable time-invariant systems.
 
-Gramians are computed as factors, X = L L', so that small Hankel singular values keep their digits. (Of windows of time-varying
-sequences: `analysis.observability.gramians`.)
+Gramians are computed as factors, X = L L', so that small Hankel singular values keep their digits. (Of windows of
+time-varying sequences: `analysis.observability.gramians`.)
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ BALANCED = 1e-6  # of the recomputed gramians of a balanced realisation, relativ
 class BalancedRealization:
     r"""A `control.StateSpace` whose gramians are both diag(`singular_values`), x = `transformation` x_balanced.
 
-    `singular_values` (n,) are those of the given system, descending; of fewer kept states `error_bound` = 2 sum of those left out
-    is at least the H-infinity norm of the error [Glover1984].
+    `singular_values` (n,) are those of the given system, descending; of fewer kept states `error_bound` = 2 sum of those left
+    out is at least the H-infinity norm of the error [Glover1984].
     """
 
     system: control.StateSpace
@@ -52,7 +52,8 @@ def controllability_gramian(A: Any, B: ArrayLike | None = None, discrete: bool |
 
 
 def observability_gramian(A: Any, C: ArrayLike | None = None, discrete: bool | None = None) -> FloatArray:
-    r"""Y with A'Y + Y A + C'C = 0, or Y = A'Y A + C'C: (..., n, n) for stacks A (..., n, n), C (..., p, n) or a system object.
+    r"""Y with A'Y + Y A + C'C = 0, or Y = A'Y A + C'C: (..., n, n) for stacks A (..., n, n), C (..., p, n) or a system
+    object.
 
     Raises AnalysisError for systems that are not certainly stable, and where the equation is not satisfied when recomputed.
     """
@@ -67,7 +68,8 @@ def hankel_singular_values(
     D: ArrayLike | None = None,
     discrete: bool | None = None,
 ) -> FloatArray:
-    r"""sqrt(lambda_i(X Y)), descending, (..., n), from controllability gramian X and observability gramian Y; D does not matter.
+    r"""sqrt(lambda_i(X Y)), descending, (..., n), from controllability gramian X and observability gramian Y; D does not
+    matter.
 
     Stacks or a system object as in `hinf_norm`. Raises AnalysisError for systems that are not certainly stable.
     """
@@ -85,9 +87,8 @@ def balanced_realization(
     r"""The balanced realisation of one system (square-root method), or its truncation to `order` states.
 
     The result keeps the sample time of an object; arrays of a discrete system give dt = True. Raises AnalysisError for
-    stacks, for systems
-    that are not certainly stable, for systems that are not minimal (give `order`), and where the recomputed gramians are not
-    balanced.
+    stacks, for systems that are not certainly stable, for systems that are not minimal (give `order`), and where the
+    recomputed gramians are not balanced.
     """
     shape, systems = read_systems(A, B, C, D, discrete)
     if shape:
@@ -121,8 +122,7 @@ def gramian_factor(A: FloatArray, B: FloatArray, discrete: bool) -> FloatArray:
     r"""L (g, n, k) with L L' = sum_k A^k B B' A'^k, or int e^(A t) B B' e^(A' t) dt, of stable A (g, n, n), B (g, n, m).
 
     Doubling (Smith) of the factor: L <- [L, A L], A <- A A. Continuous systems through s = c (z - 1)/(z + 1) with c the
-    geometric middle
-    of the pole sizes: stiffness costs doublings, not accuracy. Raises AnalysisError if it does not converge.
+    geometric middle of the pole sizes: stiffness costs doublings, not accuracy. Raises AnalysisError if it does not converge.
     """
     n = A.shape[-1]
     if not len(A):

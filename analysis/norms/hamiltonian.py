@@ -5,9 +5,9 @@ With R = gamma^2 I - D'D > 0, gamma is a singular value of G(j omega) if and onl
     H(gamma) = [[A + B R^-1 D'C,            gamma B R^-1 B'       ],
                 [-C'(I + D R^-1 D')C/gamma,  -(A + B R^-1 D'C)'   ]]
 
-(Boyd, Balakrishnan, Kabamba 1989; the factors gamma are a similarity that balances the blocks). A discrete
-system is mapped to a continuous one of the same norm by z = (1 + s)/(1 - s), which needs no inverse of A: a singular A
-(a pole at the origin) is as good as any other.
+(Boyd, Balakrishnan, Kabamba 1989; the factors gamma are a similarity that balances the blocks). A discrete system is mapped
+to a continuous one of the same norm by z = (1 + s)/(1 - s), which needs no inverse of A: a singular A (a pole at the origin)
+is as good as any other.
 """
 
 from __future__ import annotations
@@ -58,11 +58,11 @@ def near_axis(systems: Systems, gamma: FloatArray) -> FloatArray:
 
 
 def between(frequencies: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """The frequencies (g, k), ascending inside bands from low to high (g,), and points between neighbours, NaN where there
-    is none.
+    """The frequencies (g, k), ascending inside bands from low to high (g,), and points between neighbours, NaN where there is
+    none.
 
-    Besides the middle, which makes the convergence quadratic, some points near the ends: a level just above a plateau
-    is crossed far away from the resonance that it has to find.
+    Besides the middle, which makes the convergence quadratic, some points near the ends: a level just above a plateau is
+    crossed far away from the resonance that it has to find.
     """
     last = np.where(np.isfinite(high), high, np.nan)[:, None]
     frequencies = np.sort(np.concatenate([frequencies, last], axis=-1), axis=-1)  # NaN stays behind
@@ -105,9 +105,9 @@ def crosses_level(
 ) -> BoolArray:
     r"""Whether sigma_max(G) reaches the level gamma > 0 at some frequency: boolean array over the leading axes.
 
-    False is the bounded real lemma: the H-infinity norm is below gamma. Both answers rest on the Hamiltonian matrix, not
-    on a sweep: its eigenvalues near the axis are candidates, and the gain is evaluated at and between them.
-    Raises AnalysisError for unstable systems, which have no H-infinity norm to compare.
+    False is the bounded real lemma: the H-infinity norm is below gamma. Both answers rest on the Hamiltonian matrix, not on a
+    sweep: its eigenvalues near the axis are candidates, and the gain is evaluated at and between them. Raises AnalysisError
+    for unstable systems, which have no H-infinity norm to compare.
     """
     shape, systems = read_systems(A, B, C, D, discrete)
     level = np.broadcast_to(np.asarray(gamma, float), shape).reshape(-1)

@@ -2,10 +2,9 @@ r"""H-infinity and L-infinity norms of stacks of systems with their peak frequen
 stability margin.
 
 A level is proved, not sampled: systems with two states by the parabola of `analysis.norms.two_states`, others by Taylor
-bounds of the
-modal form (`analysis.norms.level_proof`), what that leaves open by Hamiltonian matrices (Boyd, Balakrishnan, Kabamba 1989;
-Bruinsma,
-Steinbuch 1990), and matrices on which rounding would decide by exact rationals (`analysis.norms.exact_peak`).
+bounds of the modal form (`analysis.norms.level_proof`), what that leaves open by Hamiltonian matrices (Boyd, Balakrishnan,
+Kabamba 1989; Bruinsma, Steinbuch 1990), and matrices on which rounding would decide by exact rationals
+(`analysis.norms.exact_peak`).
 """
 
 from __future__ import annotations
@@ -35,11 +34,11 @@ SMALL = 4_096  # and systems of two states: what fits a cache
 class HinfNorm:
     r"""sup_w sigma_max(G(j w)) for each system; arrays over the leading axes.
 
-    `norm` is attained at `frequency` (rad/s, or rad/sample for a discrete system; inf: approached as w grows). No gain exceeds
-    `upper`, which is (1 + tolerance + what rounding does to the gain) norm; inf where that is not proved (more than twelve
-    states with nearly dependent eigenvectors). A system that is not stable has the norm inf and the frequency NaN. One that
-    is `undecided`, with a pole on the stability boundary within the precision of its entries, has the norm NaN and the upper
-    bound inf.
+    `norm` is attained at `frequency` (rad/s, or rad/sample for a discrete system; inf: approached as w grows). No gain
+    exceeds `upper`, which is (1 + tolerance + what rounding does to the gain) norm; inf where that is not proved (more than
+    twelve states with nearly dependent eigenvectors). A system that is not stable has the norm inf and the frequency NaN. One
+    that is `undecided`, with a pole on the stability boundary within the precision of its entries, has the norm NaN and the
+    upper bound inf.
     """
 
     norm: FloatArray
@@ -59,11 +58,11 @@ def hinf_norm(
 ) -> HinfNorm:
     r"""||G||_inf = sup_w sigma_max(C (s I - A)^-1 B + D), s = j w or z = e^{j w}, for stacks with any leading axes.
 
-    A (..., n, n), B (..., n, m), C (..., p, n), D (..., p, m) or None for zero; leading axes broadcast; or a
-    system object in the place of A (`analysis.state_space`). A pole that is not
-    strictly stable gives inf, whether inputs and outputs see it or not (internal stability). `tolerance` is relative. `band` =
-    (w1, w2) asks for the largest gain between two frequencies in rad/s (rad/sample up to pi; inf is allowed), of stable systems.
-    Raises AnalysisError for matrices that are not finite, not square or do not fit.
+    A (..., n, n), B (..., n, m), C (..., p, n), D (..., p, m) or None for zero; leading axes broadcast; or a system object in
+    the place of A (`analysis.state_space`). A pole that is not strictly stable gives inf, whether inputs and outputs see it
+    or not (internal stability). `tolerance` is relative. `band` = (w1, w2) asks for the largest gain between two frequencies
+    in rad/s (rad/sample up to pi; inf is allowed), of stable systems. Raises AnalysisError for matrices that are not finite,
+    not square or do not fit.
     """
     return _norm((A, B, C, D, discrete), tolerance, band, stable=True)
 
@@ -79,8 +78,8 @@ def linf_norm(
 ) -> HinfNorm:
     r"""||G||_Linf = sup_w sigma_max(G(j w)) of systems that may be unstable; everything else as in `hinf_norm`.
 
-    Only a pole on the boundary itself gives inf (also one that inputs and outputs do not see), or `undecided` where
-    precision ends.
+    Only a pole on the boundary itself gives inf (also one that inputs and outputs do not see), or `undecided` where precision
+    ends.
     """
     return _norm((A, B, C, D, discrete), tolerance, band, stable=False)
 
@@ -88,8 +87,8 @@ def linf_norm(
 def stability_margin(A: Any, discrete: bool | None = None) -> FloatArray:
     """max_i Re lambda_i(A) in 1/s, or max_i |lambda_i(A)| - 1 per sample: negative is stable (P3 section IV, SM).
 
-    A (..., n, n) gives an array over the leading axes, a system object its margin. Raises AnalysisError for matrices that are not
-    square or finite.
+    A (..., n, n) gives an array over the leading axes, a system object its margin. Raises AnalysisError for matrices that are
+    not square or finite.
     """
     A, *_, discrete = given_system(A, discrete=discrete)
     eigenvalues = np.linalg.eigvals(square("A", A))

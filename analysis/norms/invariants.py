@@ -1,8 +1,8 @@
 r"""|G|_F^2 and the sum of squared 2 x 2 minors of G as partial fractions in x = omega^2.
 
 G(-s)'G(s) is even in s and has simple poles at lambda_k and -lambda_k, so each invariant is a constant + sum_k c_k / (x +
-lambda_k^2).
-With r = min(p, m) <= 2 they give all gains, sigma_max^2 = (f + (f^2 - 4 k)^(1/2)) / 2, at the price of a few real operations.
+lambda_k^2). With r = min(p, m) <= 2 they give all gains, sigma_max^2 = (f + (f^2 - 4 k)^(1/2)) / 2, at the price of a few
+real operations.
 """
 
 from __future__ import annotations

@@ -2,14 +2,13 @@ r"""Proof that no gain of a stack of systems reaches a level, by Taylor bounds o
 
 With r = min(p, m) <= 2, x = omega^2 and the invariants of `analysis.norms.invariants`,
 
-    h(x) = det(I - G^* G / gamma^2) = 1 - |G|_F^2 / gamma^2 + (sum of squared minors) / gamma^4 = h_inf + sum_k c_k / (x +
-    lambda_k^2).
+    h(x) = det(I - G^* G / gamma^2) = 1 - |G|_F^2 / gamma^2 + (sum of squared minors) / gamma^4
+         = h_inf + sum_k c_k / (x + lambda_k^2).
 
-With gamma above the gains at the ends of a band, h > 0 on all of it is the statement that gamma is never reached. On an interval
-around x_0 the sum is its Taylor polynomial of degree two and a remainder below
-sum_k |c_k| |u_k|^4 / (1 - |u_k| d) d^3 with u_k = 1/(x_0 + lambda_k^2) and d the largest distance: a peak of the gain is
-proved in a few
-intervals of the size of its width. What rounding may do to h is subtracted.
+With gamma above the gains at the ends of a band, h > 0 on all of it is the statement that gamma is never reached. On an
+interval around x_0 the sum is its Taylor polynomial of degree two and a remainder below sum_k |c_k| |u_k|^4 / (1 - |u_k| d)
+d^3 with u_k = 1/(x_0 + lambda_k^2) and d the largest distance: a peak of the gain is proved in a few intervals of the size of
+its width. What rounding may do to h is subtracted.
 """
 
 from __future__ import annotations
@@ -58,7 +57,8 @@ def level_of(parts: Invariants, gamma: FloatArray) -> Level:
 def level_proof(
     parts: Invariants, gamma: FloatArray, peak: FloatArray, band: FloatArray
 ) -> tuple[BoolArray, FloatArray]:
-    """Whether gamma (g,) is proved not to be reached inside the band (2, g), and otherwise a frequency that speaks against it.
+    """Whether gamma (g,) is proved not to be reached inside the band (2, g), and otherwise a frequency that speaks against
+    it.
 
     gamma must lie above the gains at the ends of the band; `peak` (g,) is where the largest gain was found. Not proved is no
     proof of the contrary.

@@ -17,10 +17,10 @@ EPS = float(np.finfo(float).eps)
 class Modal:
     r"""Poles (g, n), residues (g, n, p m) and direct gain (g, p, m) of continuous systems of the same gains.
 
-    `spread` (g,) bounds the change of the gain at any frequency by a change |E| <= (rounding) |A| of A, to first order:
-    eps |A| sum_k |c_k| kappa_k / d_k sum_l |b_l| / d_l with d the distances of the poles to the stability boundary and kappa
-    their condition numbers. It is inf where eigenvectors are dependent. `sizes` (g, n) is what rounding may move each eigenvalue
-    `given` (g, n) of A by.
+    `spread` (g,) bounds the change of the gain at any frequency by a change |E| <= (rounding) |A| of A, to first order: eps
+    |A| sum_k |c_k| kappa_k / d_k sum_l |b_l| / d_l with d the distances of the poles to the stability boundary and kappa
+    their condition numbers. It is inf where eigenvectors are dependent. `sizes` (g, n) is what rounding may move each
+    eigenvalue `given` (g, n) of A by.
     """
 
     poles: ComplexArray

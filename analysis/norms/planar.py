@@ -73,7 +73,7 @@ def determinant(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> F
 
 
 def expanded(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, one: int, trace: int) -> FloatArray:
-    """one + trace (a + d) + a d - b c of arrays: products and sums with their rounding errors (Dekker 1971)."""
+    """one + trace (a + d) + a d - b c of arrays: products and sums with their rounding errors [Dekker1971]."""
     first, first_error = _product(a, d)
     second, second_error = _product(-b, c)
     total, error = _sum(first, second)

@@ -1,9 +1,9 @@
-r"""Stability of stacks of matrices with three answers: a pole on the boundary within the precision of the data decides nothing.
+r"""Stability of stacks of matrices with three answers: a pole on the boundary within precision decides nothing.
 
 Eigenvalues of floats are those of A + E with |E| <= a few eps |A|, and so are, as a rule, the matrices that users give. If no
 such E puts an eigenvalue on the boundary, which is the smallest singular value of A - j omega I (A - z I on the unit circle)
-staying above
-that size, then all A + E have the same number of poles on each side, and computed signs are right, defective or not.
+staying above that size [Byers1988], then all A + E have the same number of poles on each side, and computed signs are
+right, defective or not.
 """
 
 from __future__ import annotations
