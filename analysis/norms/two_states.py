@@ -5,9 +5,9 @@ With a(s) = s^2 - tau s + d, every entry of G and every 2 x 2 minor is (k a + y 
     |a|^2 = delta^2 + tau^2 x,    |k a + y s + z|^2 = (z - k delta)^2 + x (y - k tau)^2
 
 and P(x) = |a|^2 det(gamma^2 I - G^* G) is a parabola. Above the gains at the ends of a band, gamma is reached inside if and
-only if the vertex of P lies inside and P there is not positive; the gain at the vertex is the next gamma (an
-iteration of Dinkelbach [Dinkelbach1967], which is superlinear). tau and d are free of cancellation, and the parabola is written around d
-for resonances: damping ratios of 1e-8 cost no digits.
+only if the vertex of P lies inside and P there is not positive; the gain at the vertex is the next gamma (superlinear,
+[Dinkelbach1967]). tau and d are free of cancellation, and the parabola is written around d for resonances: damping ratios of
+1e-8 cost no digits.
 """
 
 from __future__ import annotations

@@ -192,6 +192,23 @@ def test_a_level_below_the_peak_is_never_proved() -> None:
         assert np.isfinite(against[inside & ~done]).all()
 
 
+def test_a_narrow_resonance_far_from_the_found_peak_is_not_overlooked() -> None:
+    """Two resonances on one channel; the taller one is thin, and the search claims the other."""
+    w, k = (2.0, 50.0), np.logspace(-7, -3, 9)
+    A, count = np.zeros((9, 4, 4)), len(k)
+    for i in range(2):
+        A[:, 2 * i, 2 * i + 1], A[:, 2 * i + 1, 2 * i] = w[i], -w[i]
+        A[:, 2 * i + 1, 2 * i + 1] = -2.0 * (k if i else 0.3) * w[i]
+    B, C = np.broadcast_to([[0.0], [1.0], [0.0], [0.05]], (9, 4, 1)), np.broadcast_to([[1.0, 0.0, 1.0, 0.0]], (9, 1, 4))
+    parts = invariants(modal_form(Systems(A, B, C, np.zeros((9, 1, 1)))))
+    band, thin = np.array([np.zeros(count), np.full(count, inf)]), 1e-3 / (2.0 * k)
+    for peak in (0.0, 2.0, 49.0):
+        for share, proved in ((0.5, False), (0.99, False), (1.1, True)):
+            level = np.maximum(share * thin, 1.0)  # the wide one stays below 0.9
+            done, _ = level_proof(parts, level, np.full(count, peak), band)
+            assert (done == (proved | (level > 1.05 * thin))).all()
+
+
 def test_exact_rationals_agree_with_closed_forms() -> None:
     w, z = 3.0, 1e-3
     A, B, C = np.array([[[0.0, 1.0], [-(w**2), -2.0 * z * w]]]), np.array([[[0.0], [w**2]]]), np.array([[[1.0, 0.0]]])
