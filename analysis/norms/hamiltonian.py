@@ -12,6 +12,8 @@ is as good as any other.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -101,9 +103,16 @@ def gain_at(systems: Systems, frequency: FloatArray) -> FloatArray:
 
 
 def crosses_level(
-    A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike | None, gamma: ArrayLike, discrete: bool | None = None
+    A: Any,
+    B: ArrayLike | None = None,
+    C: ArrayLike | None = None,
+    D: ArrayLike | None = None,
+    gamma: ArrayLike = np.nan,
+    discrete: bool | None = None,
 ) -> BoolArray:
     r"""Whether sigma_max(G) reaches the level gamma > 0 at some frequency: boolean array over the leading axes.
+
+    Stacks or a system object as in `hinf_norm`; gamma broadcasts to the leading axes.
 
     False is the bounded real lemma: the H-infinity norm is below gamma. Both answers rest on the Hamiltonian matrix, not on a
     sweep: its eigenvalues near the axis are candidates, and the gain is evaluated at and between them. Raises AnalysisError

@@ -10,20 +10,24 @@ and f'(x) = 0 is a x^2 + 2 b x - (a d^2 - b p) = 0, whose only root x >= 0 is th
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from analysis.checks import as_stack, leading, square
 from analysis.errors import AnalysisError
+from analysis.state_space import given_system
 from estimators.arrays import FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-def planar_margin(A: ArrayLike) -> FloatArray:
-    """max Re lambda(A) of A (..., 2, 2), as `analysis.norms.stability_margin`. Raises AnalysisError for other shapes."""
+def planar_margin(A: Any) -> FloatArray:
+    """max Re lambda(A) of A (..., 2, 2) or a continuous system object, as `stability_margin`. Raises AnalysisError for others."""
+    A, *_, discrete = given_system(A)
+    if discrete:
+        raise AnalysisError("this closed form is for continuous systems; use stability_margin")
     trace, det, delta = _invariants(A)
     root = np.sqrt(np.maximum(delta, 0.0))
     half = 0.5 * trace
@@ -33,11 +37,14 @@ def planar_margin(A: ArrayLike) -> FloatArray:
         return np.where((delta > 0.0) & (half < 0.0), det / low, half + root)
 
 
-def planar_hinf_norm(A: ArrayLike, B: ArrayLike, C: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def planar_hinf_norm(A: Any, B: ArrayLike | None = None, C: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
     r"""sup_w |C (j w I - A)^-1 B| and the frequency in rad/s at which it is attained, as `analysis.norms.hinf_norm`.
 
     A (..., 2, 2), B (..., 2, m), C (..., p, 2) with p = 1 or m = 1. Unstable: inf at NaN. Raises AnalysisError otherwise.
     """
+    A, B, C, D, discrete = given_system(A, B, C)
+    if B is None or C is None or discrete or (D is not None and np.any(D)):
+        raise AnalysisError("this closed form is for continuous systems with B, C and D = 0; use hinf_norm")
     b_, c_ = as_stack("B", B), as_stack("C", C)
     if b_.shape[-2] != 2 or c_.shape[-1] != 2 or min(b_.shape[-1], c_.shape[-2]) != 1:
         raise AnalysisError(f"B {b_.shape} and C {c_.shape} need two states and one input or one output; use hinf_norm")

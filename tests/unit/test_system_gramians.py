@@ -19,6 +19,8 @@ from analysis import (
     stability_margin,
 )
 from analysis.errors import AnalysisError
+from analysis.norms.hamiltonian import crosses_level
+from analysis.norms.planar import planar_hinf_norm, planar_margin
 
 
 def random_system(seed: int, discrete: bool, n: int = 5) -> tuple[np.ndarray, ...]:
@@ -116,6 +118,13 @@ def test_transfer_functions_static_gains_and_numbers() -> None:
     for no_system in (control.tf([1.0, 2.0, 3.0], [1.0, 1.0]), control.frd([1.0, 2.0], [1.0, 2.0])):
         with pytest.raises(AnalysisError, match="has no state-space form"):
             hinf_norm(no_system)
+    system = control.tf([1.0], [1.0, 0.2, 1.0])
+    assert crosses_level(system, gamma=0.999 * peak) and not crosses_level(system, gamma=1.001 * peak)
+    assert planar_hinf_norm(control.ss(system))[0] == pytest.approx(peak, rel=1e-12)
+    assert planar_margin(system) == pytest.approx(-0.1)
+    for closed_form in (planar_hinf_norm, planar_margin):
+        with pytest.raises(AnalysisError, match="continuous systems"):
+            closed_form(control.ss(-0.5 * np.eye(2), [[1.0], [1.0]], [[1.0, 1.0]], 0.0, 0.1))
     static = control.ss([], [], [], [[3.0, 4.0]])
     assert hinf_norm(static).norm == pytest.approx(5.0) and hinf_norm(static).upper >= 5.0
     assert h2_norm(static, discrete=True) == pytest.approx(5.0) and h2_norm(static) == np.inf
