@@ -16,6 +16,8 @@ import numpy as np
 
 from analysis.checks import as_stack, leading, square
 from analysis.errors import AnalysisError
+from analysis.norms.compensated import determinant
+from analysis.norms.stability import stability
 from analysis.state_space import given_system
 from estimators.arrays import FloatArray
 
@@ -40,7 +42,8 @@ def planar_margin(A: Any) -> FloatArray:
 def planar_hinf_norm(A: Any, B: ArrayLike | None = None, C: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
     r"""sup_w |C (j w I - A)^-1 B| and the frequency in rad/s at which it is attained, as `analysis.norms.hinf_norm`.
 
-    A (..., 2, 2), B (..., 2, m), C (..., p, 2) with p = 1 or m = 1. Unstable: inf at NaN. Raises AnalysisError otherwise.
+    A (..., 2, 2), B (..., 2, m), C (..., p, 2) with p = 1 or m = 1. Unstable: inf at NaN, undecided
+    (`HinfNorm`): NaN. Raises AnalysisError otherwise.
     """
     A, B, C, D, discrete = given_system(A, B, C)
     if B is None or C is None or discrete or (D is not None and np.any(D)):
@@ -58,9 +61,10 @@ def planar_hinf_norm(A: Any, B: ArrayLike | None = None, C: ArrayLike | None = N
     rise = np.maximum(a * q - b * p, 0.0)
     scale = b + np.sqrt(b * b + a * rise)
     x = np.where(rise > 0.0, rise / np.where(scale > 0.0, scale, 1.0), 0.0)
-    stable = (trace < 0.0) & (det > 0.0)
+    found = stability(M.reshape(-1, 2, 2), discrete=False)
+    stable, undecided = (answer.reshape(trace.shape) for answer in (found.stable, found.undecided))
     below = np.where(stable, (det - x) ** 2 + trace**2 * x, 1.0)
-    norm = np.where(stable, np.sqrt((a * x + b) / below), np.inf)
+    norm = np.where(stable, np.sqrt((a * x + b) / below), np.where(undecided, np.nan, np.inf))
     return norm, np.where(stable, np.sqrt(x), np.nan)
 
 
@@ -69,44 +73,5 @@ def _invariants(A: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
     M = square("A", A)
     if M.shape[-1] != 2:
         raise AnalysisError(f"A has the shape {M.shape}; these closed forms are for two states")
-    cross = M[..., 0, 1] * M[..., 1, 0]
-    delta = 0.25 * (M[..., 0, 0] - M[..., 1, 1]) ** 2 + cross
-    return M[..., 0, 0] + M[..., 1, 1], M[..., 0, 0] * M[..., 1, 1] - cross, delta
-
-
-def determinant(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
-    """a d - b c of arrays, to the last digits even where the products cancel."""
-    return expanded(a, b, c, d, 0, 0)
-
-
-def expanded(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, one: int, trace: int) -> FloatArray:
-    """one + trace (a + d) + a d - b c of arrays: products and sums with their rounding errors [Dekker1971]."""
-    first, first_error = _product(a, d)
-    second, second_error = _product(-b, c)
-    total, error = _sum(first, second)
-    error = error + (first_error + second_error)
-    if one or trace:
-        for term in (trace * a, trace * d, np.full_like(a, float(one))) if trace else (np.full_like(a, float(one)),):
-            total, more = _sum(total, term)
-            error = error + more
-    return total + error
-
-
-def _sum(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    total = x + y
-    part = total - x
-    return total, (x - (total - part)) + (y - part)
-
-
-def _product(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    product = x * y
-    x_high, y_high = _head(x), _head(y)
-    x_low, y_low = x - x_high, y - y_high
-    error = x_low * y_low - (((product - x_high * y_high) - x_low * y_high) - x_high * y_low)
-    return product, np.where(np.isfinite(error), error, 0.0)
-
-
-def _head(x: FloatArray) -> FloatArray:
-    """The upper half of the digits."""
-    scaled = 134217729.0 * x  # 2^27 + 1
-    return scaled - (scaled - x)
+    a, b, c, d = M[..., 0, 0], M[..., 0, 1], M[..., 1, 0], M[..., 1, 1]
+    return a + d, determinant(a, b, c, d), 0.25 * (a - d) ** 2 + b * c

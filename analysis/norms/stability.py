@@ -14,8 +14,8 @@ import numpy as np
 
 from analysis.drops.balance import balanced
 from analysis.errors import AnalysisError
+from analysis.norms.compensated import determinant, expanded
 from analysis.norms.modal import EPS, norm
-from analysis.norms.planar import determinant, expanded
 from estimators.arrays import BoolArray, ComplexArray, FloatArray
 
 PRECISION = 16.0 * EPS  # of the entries, and of what linear algebra does to them, times the number of states

@@ -17,10 +17,10 @@ from typing import TypeAlias
 
 import numpy as np
 
+from analysis.norms.compensated import determinant, expanded
 from analysis.norms.frequency_response import Systems
 from analysis.norms.invariants import available, minors
 from analysis.norms.modal import EPS
-from analysis.norms.planar import determinant, expanded
 from estimators.arrays import BoolArray, FloatArray, IndexArray
 
 ROUNDS = 16

@@ -5,11 +5,11 @@ from __future__ import annotations
 import mpmath as mp
 import numpy as np
 
+from analysis.norms.compensated import expanded
 from analysis.norms.frequency_response import Systems, largest_gain
 from analysis.norms.invariants import Invariants, invariants
 from analysis.norms.level_proof import Level, _lower_bound, _tail, level_of
 from analysis.norms.modal import modal_form
-from analysis.norms.planar import expanded
 
 COUNT = 400
 

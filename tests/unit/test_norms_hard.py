@@ -16,6 +16,7 @@ from analysis.norms.frequency_response import Systems
 from analysis.norms.invariants import invariants
 from analysis.norms.level_proof import level_proof
 from analysis.norms.modal import modal_form
+from analysis.norms.planar import planar_hinf_norm
 
 
 def gain(A, B, C, D, frequency, discrete):
@@ -109,9 +110,24 @@ def test_rotated_integrators_are_undecided_and_shifted_ones_are_not(n: int, disc
         found = norm(T @ block @ inverse, np.eye(n), np.eye(n), discrete=discrete)
         assert found.undecided.all() and np.isnan(found.norm).all() and (found.upper == inf).all()
         assert np.isfinite(norm(T @ (block - shift) @ inverse, np.eye(n), np.eye(n), discrete=discrete).upper).all()
+    if n == 2 and not discrete:
+        assert np.isnan(planar_hinf_norm(T @ block @ inverse, np.eye(2)[:, :1], np.eye(2))[0]).all()
     assert np.isnan(h2_norm(T @ block @ inverse, np.eye(n), np.eye(n), discrete=discrete)).all()
     assert (hinf_norm(T @ (block + shift) @ inverse, np.eye(n), np.eye(n), discrete=discrete).norm == inf).all()
     assert not hinf_norm(T @ (block + shift) @ inverse, np.eye(n), np.eye(n), discrete=discrete).undecided.any()
+
+
+@pytest.mark.parametrize("n", [2, 4])
+def test_damping_above_rounding_is_decided(n: int) -> None:
+    """Normal matrices with poles 1e-11 from the axis (circle), three hundred times what rounding moves them."""
+    turns = ortho_group.rvs(n, size=20, random_state=n)
+    swing = np.kron(np.diag(np.arange(1.0, n / 2 + 1)), [[0.0, 1.0], [-1.0, 0.0]])
+    angles = np.kron(np.diag(np.ones(n // 2)), [[0.8, 0.6], [-0.6, 0.8]])
+    for sign, norm in ((-1.0, 1e11), (1.0, inf)):
+        for block, discrete in ((swing + sign * 1e-11 * np.eye(n), False), (angles * (1.0 + sign * 1e-11), True)):
+            found = hinf_norm(turns @ block @ np.swapaxes(turns, -1, -2), np.eye(n), np.eye(n), discrete=discrete)
+            assert not found.undecided.any()
+            np.testing.assert_allclose(found.norm, norm, rtol=1e-3)
 
 
 def test_poles_that_are_entries_are_exact() -> None:
