@@ -1,4 +1,4 @@
-r"""H2 norm of stacks of systems: trace(C X C')^(1/2) with the controllability gramian X, from its factor."""
+r"""H2 norm of stacks of systems: trace(C X C')^(1/2) with the controllability gramian X, by doubling."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from analysis.norms.frequency_response import read_systems
-from analysis.norms.gramians import gramian_factor
+from analysis.norms.gramians import gramian_matrix
 from analysis.norms.stability import stability
 from estimators.arrays import FloatArray
 
@@ -32,8 +32,8 @@ def h2_norm(
     index = np.flatnonzero(found.stable & ~feedthrough)
     out = np.where(found.undecided, np.nan, np.inf)
     part = systems.pick(index)
-    energy = ((part.C @ gramian_factor(part.A, part.B, discrete)) ** 2).sum(axis=(-2, -1))
+    energy = np.einsum("gij,gjk,gik->g", part.C, gramian_matrix(part.A, part.B, discrete), part.C)
     if discrete:
         energy = energy + (part.D**2).sum(axis=(-2, -1))
-    out[index] = np.sqrt(energy)
+    out[index] = np.sqrt(np.maximum(energy, 0.0))
     return out.reshape(shape)

@@ -19,6 +19,7 @@ from analysis import (
     stability_margin,
 )
 from analysis.errors import AnalysisError
+from analysis.norms import gramians
 from analysis.norms.hamiltonian import crosses_level
 from analysis.norms.planar import planar_hinf_norm, planar_margin
 
@@ -105,6 +106,21 @@ def test_what_has_no_gramian_is_refused() -> None:
         controllability_gramian(A)
     with pytest.raises(AnalysisError, match="does not fit 5 states"):
         observability_gramian(A, np.ones((1, 4)))
+
+
+@pytest.mark.parametrize("wrong", range(3))
+def test_a_wrong_factor_is_noticed(monkeypatch: pytest.MonkeyPatch, wrong: int) -> None:
+    """The equations are recomputed: a factor that is off by 1e-4 in any of the calls is refused."""
+    A, B, C, D = random_system(6, False)
+    calls, right = iter(range(10)), gramians.gramian_factor
+    monkeypatch.setattr(
+        gramians, "gramian_factor", lambda *given: right(*given) * (1.0 + 1e-4 * (next(calls) == wrong))
+    )
+    with pytest.raises(AnalysisError, match="recomputed gramians differ"):
+        balanced_realization(A, B, C, D)
+    calls = iter([wrong])
+    with pytest.raises(AnalysisError, match="leaves a residual"):
+        controllability_gramian(A, B)
 
 
 def test_transfer_functions_static_gains_and_numbers() -> None:
