@@ -64,6 +64,29 @@ def test_the_tail_beyond_all_poles() -> None:
         assert found[0] == positive
 
 
+def test_discrete_systems_have_the_gains_of_the_circle() -> None:
+    rng = np.random.default_rng(6)
+    radius = 1.0 - 10.0 ** rng.uniform(-6, -1, (COUNT, 2, 1, 1))
+    angle = rng.uniform(0.0, np.pi, (COUNT, 2))
+    A = np.zeros((COUNT, 4, 4))
+    for i in range(2):
+        c, s = np.cos(angle[:, i]), np.sin(angle[:, i])
+        A[:, 2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = radius[:, i] * np.moveaxis(np.array([[c, s], [-s, c]]), -1, 0)
+    systems = Systems(
+        A, rng.normal(size=(COUNT, 4, 2)), rng.normal(size=(COUNT, 2, 4)), rng.normal(size=(COUNT, 2, 2)), True
+    )
+    modal = modal_form(systems)
+    for theta in (
+        angle,
+        rng.uniform(0.0, np.pi, (COUNT, 4)),
+    ):  # on the resonances, whose width is down to 1e-6, and elsewhere
+        wanted = largest_gain(systems, np.exp(1j * theta))
+        np.testing.assert_allclose(modal.gain(np.tan(0.5 * theta).T).T, wanted, rtol=1e-7)
+        # squares of gains far below a peak are sums that cancel: right to rounding of the peak's square
+        error = np.abs(invariants(modal).gain(np.tan(0.5 * theta).T).T ** 2 - wanted**2)
+        assert (error <= 1e-8 * largest_gain(systems, np.exp(1j * angle)).max(axis=1, keepdims=True) ** 2).all()
+
+
 def test_determinants_keep_their_digits_where_products_cancel() -> None:
     rng = np.random.default_rng(4)
     a, d = rng.normal(size=50), rng.normal(size=50)
