@@ -133,7 +133,7 @@ def _flat(
     systems: Systems, tolerance: float, ends: tuple[float, float], stable: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
     small = handles(systems)
-    modal = None if small else modal_form(systems)
+    modal = None if small else modal_form(systems, ends)
     found = stability(systems.A, systems.discrete) if modal is None else from_poles(
         systems.A, modal.given, modal.sizes, systems.discrete
     )  # fmt: skip
@@ -152,7 +152,7 @@ def _flat(
         norm[index], frequency[index], upper[index], proved = planar_peaks(some, band, tolerance)
         index, band = index[~proved], band[:, ~proved]
         some = systems.pick(index)
-        modal = modal_form(some) if len(index) else None
+        modal = modal_form(some, ends) if len(index) else None
     elif not whole:
         modal = modal.pick(index)
     if modal is not None and len(index):

@@ -180,6 +180,25 @@ def test_bands(n: int, outputs: int) -> None:
     assert hinf_norm(A, B, C, band=(0.0, inf)).norm == whole.norm
 
 
+@pytest.mark.parametrize("discrete", [False, True])
+def test_a_band_beside_a_resonance_has_its_bound(discrete: bool) -> None:
+    """Fourteen states, hardly damped at 0.3 rad/s (rad/sample), asked between 0.6 and 2."""
+    n, rng = 14, np.random.default_rng(3)
+    poles = np.linspace(0.3, 2.6, n // 2) * (1j - np.array([1e-9, *np.full(n // 2 - 1, 0.05)]))
+    poles = np.exp(poles) if discrete else poles
+    A = np.zeros((n, n))
+    for i, pole in enumerate(poles):
+        A[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = [[pole.real, pole.imag], [-pole.imag, pole.real]]
+    T = ortho_group.rvs(n, random_state=1)
+    A, B, C = T @ A @ T.T, rng.normal(size=(n, 2)), rng.normal(size=(2, n))
+    w = np.linspace(0.6, 2.0, 5001)[:, None, None]
+    s = np.exp(1j * w) if discrete else 1j * w
+    swept = np.linalg.svd(C @ np.linalg.solve(s * np.eye(n) - A, B + 0j), compute_uv=False).max()
+    found = hinf_norm(A, B, C, discrete=discrete, band=(0.6, 2.0))
+    assert found.norm == pytest.approx(swept, rel=1e-5) and swept <= found.upper <= 1.00001 * swept
+    assert hinf_norm(A, B, C, discrete=discrete).norm > 1e6 * swept
+
+
 def test_bands_of_discrete_systems_and_wrong_bands() -> None:
     pole = (0.5, 1.0, 1.0)  # |1/(e^jt - 1/2)| falls from 2 at 0 to 2/3 at pi
     for low, high in ((1.0, 2.0), (3.0, pi)):
