@@ -45,6 +45,9 @@ def exact_peak(
             return 0.0, where, 0.0 if _vanishes(*matrices) else inf
         level = nextafter(best * (1.0 + tolerance), inf)
         crossings = _crossings(*matrices, level)
+        if crossings is None:  # the level is a singular value of D: one above it is not
+            level = best * (1.0 + 2.0 * tolerance)
+            crossings = _crossings(*matrices, level)
         if crossings is None:
             return best, where, inf
         inside = [w for w in crossings if band[0] < w < band[1]]

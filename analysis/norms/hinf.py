@@ -105,7 +105,10 @@ def _norm(given: tuple[Any, ...], tolerance: float, band: tuple[float, float] | 
     step = SMALL if handles(systems) else max(1, CHUNK // (16 * systems.A.shape[-1] ** 2))
     for start in range(0, len(systems), step):
         part = slice(start, start + step)
-        norm[part], frequency[part], upper[part], undecided[part] = _flat(systems.pick(part), tolerance, ends, stable)
+        with np.errstate(all="ignore"):  # what overflows is not finite, is not proved, and goes on to the next road
+            norm[part], frequency[part], upper[part], undecided[part] = _flat(
+                systems.pick(part), tolerance, ends, stable
+            )
     if systems.discrete:
         frequency = 2.0 * np.arctan(frequency)
     return HinfNorm(norm.reshape(shape), frequency.reshape(shape), upper.reshape(shape), undecided.reshape(shape))

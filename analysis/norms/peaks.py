@@ -91,7 +91,10 @@ def hamiltonian_peaks(
             break
         level = norm[active] * (1.0 + tolerance)
         upper[active] = level
-        candidates = near_axis(continuous.pick(active), level)
+        try:
+            candidates = near_axis(continuous.pick(active), level)
+        except np.linalg.LinAlgError:  # a level that is a singular value of D: left to exact rationals
+            break
         low, high = band[0, active, None], band[1, active, None]
         candidates = np.sort(np.where((candidates > low) & (candidates < high), candidates, np.nan), axis=-1)
         count = np.isfinite(candidates).sum(axis=-1)

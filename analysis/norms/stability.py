@@ -121,7 +121,10 @@ def _small(A: FloatArray, discrete: bool) -> Stability:
     diagonal, products = np.abs(a) + np.abs(d), np.abs(a * d) + np.abs(b * c)
     if discrete:
         needed = [expanded(a, b, c, d, 1, 1), expanded(a, b, c, d, 1, -1), -expanded(a, b, c, d, -1, 0)]
-        sizes = [diagonal + products, diagonal + products, products]
+        # to first order, entry by entry: near z = -1 and z = 1 errors of trace and determinant cancel
+        crossed = 2.0 * np.abs(b * c)
+        sizes = [np.abs(a) * np.abs(d + z) + np.abs(d) * np.abs(a + z) + crossed for z in (1.0, -1.0)]
+        sizes.append(products)
         swinging = [True, True, np.abs(a + d) <= 2.0]
     else:
         needed, sizes = [-(a + d), determinant(a, b, c, d)], [diagonal, products]

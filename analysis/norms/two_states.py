@@ -25,6 +25,7 @@ from estimators.arrays import BoolArray, FloatArray, IndexArray
 
 ROUNDS = 16
 TRIED = (0.3, 3.0)  # of the squared corner frequency, before the search
+APART = 1e3
 TRUSTED = 1e-5  # relative loss by cancellation from which on another road is taken
 Parabola: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]  # of 1, t, t^2; or k, y, z of k a + y s + z
 
@@ -106,6 +107,9 @@ def planar_peaks(
             form.rate_loss / np.sqrt(form.trace[2]),
         )
     upper = gain * (1.0 + tolerance) * (1.0 + loss)
+    # ends of a band far below the centre of the parabola lose their digits in t
+    for end in band:
+        proved &= ~((end > 0.0) & np.isfinite(end) & (form.centre > APART * end * end))
     return gain, np.where(at == -form.centre, 0.0, frequency), upper, proved & (loss < TRUSTED)
 
 
@@ -161,7 +165,8 @@ def _planar(systems: Systems) -> Planar:
         plus, minus, open_ = (expanded(a11, a12, a21, a22, *signs) for signs in ((1, 1), (1, -1), (-1, 0)))
         entries, areas = ([_mapped(item, plus, minus, open_) for item in part] for part in (entries, areas))
         tau, d = 2.0 * open_ / plus, minus / plus
-        loss, rate_loss = 4.0 * (loss + rate_loss) / np.abs(plus), 4.0 * (loss + rate_loss) / np.abs(plus)
+        loss = 4.0 * (loss + rate_loss) / np.abs(plus)  # of the direct gain, which the others hold times d and tau
+        loss, rate_loss = loss * (1.0 + np.abs(d)), loss * (1.0 + np.abs(tau))
     swinging = (d > 0.0) & (tau * tau < 2.0 * d)
     centre = np.where(swinging, d, 0.0)
     rest = np.where(swinging, 0.0, d)  # delta = t - rest

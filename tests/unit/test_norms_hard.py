@@ -180,6 +180,19 @@ def test_bands(n: int, outputs: int) -> None:
     assert hinf_norm(A, B, C, band=(0.0, inf)).norm == whole.norm
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_bands_far_below_poles_near_nyquist(seed: int) -> None:
+    """Two states: the parabola is written around 1e10 and more, the band lies around 0.1."""
+    rng = np.random.default_rng(seed)
+    angle, radius = pi - 10.0 ** rng.uniform(-8, -5), 1.0 - 10.0 ** rng.uniform(-9, -6)
+    T = ortho_group.rvs(2, random_state=rng)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    system = radius * T @ turn @ T.T, rng.normal(size=(2, 2)), rng.normal(size=(2, 2)), np.zeros((2, 2))
+    found = hinf_norm(*system, discrete=True, band=(0.05, 0.3))
+    truth = max(gain(*system, w, True) for w in np.linspace(0.05, 0.3, 21))
+    assert truth <= found.upper <= truth * (1.0 + 1e-5)
+
+
 @pytest.mark.parametrize("discrete", [False, True])
 def test_a_band_beside_a_resonance_has_its_bound(discrete: bool) -> None:
     """Fourteen states, hardly damped at 0.3 rad/s (rad/sample), asked between 0.6 and 2."""
