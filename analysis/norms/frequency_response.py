@@ -41,14 +41,16 @@ def read_systems(
 ) -> tuple[tuple[int, ...], Systems]:
     """Check four stacks, broadcast their leading axes and flatten them; also returns the leading shape.
 
-    D = None means zero; A may be a system object (`analysis.state_space`). Raises AnalysisError for matrices that are not finite,
-    not square or do not fit.
+    D = None means zero; A may be a system object (`analysis.state_space`), or be empty for a static gain D. Raises
+    AnalysisError for matrices that are not finite, not square or do not fit.
     """
     A, B, C, D, discrete = given_system(A, B, C, D, discrete)
     if B is None or C is None:
         raise AnalysisError(
             f"{'B' if B is None else 'C'} is missing; give A, B and C, or a system object with all of them"
         )
+    if D is not None and np.size(A) == 0 and np.ndim(A) <= 2:
+        A, B, C = _static(as_stack("D", D), discrete)
     a, b, c = square("A", A), as_stack("B", B), as_stack("C", C)
     n, m, p = a.shape[-1], b.shape[-1], c.shape[-2]
     d = np.zeros((p, m)) if D is None else as_stack("D", D)
@@ -64,6 +66,12 @@ def read_systems(
         for x in (a, b, c, d)
     ]
     return shape, Systems(flat[0], flat[1], flat[2], flat[3], discrete)
+
+
+def _static(D: FloatArray, discrete: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """A static gain as a system with one stable state that nothing reaches."""
+    p, m = D.shape[-2:]
+    return np.full((1, 1), 0.0 if discrete else -1.0), np.zeros((1, m)), np.zeros((p, 1))
 
 
 def largest_gain(systems: Systems, s: ArrayLike) -> FloatArray:

@@ -5,18 +5,21 @@ With R = gamma^2 I - D'D > 0, gamma is a singular value of G(j omega) if and onl
     H(gamma) = [[A + B R^-1 D'C,            gamma B R^-1 B'       ],
                 [-C'(I + D R^-1 D')C/gamma,  -(A + B R^-1 D'C)'   ]]
 
-(Boyd, Balakrishnan, Kabamba 1989; the factors gamma are a similarity that balances the blocks). A discrete
-system is mapped to a continuous one of the same norm by z = (1 + s)/(1 - s), which needs no inverse of A: a singular A
-(a pole at the origin) is as good as any other.
+(Boyd, Balakrishnan, Kabamba 1989; the factors gamma are a similarity that balances the blocks). A discrete system is mapped
+to a continuous one of the same norm by z = (1 + s)/(1 - s), which needs no inverse of A: a singular A (a pole at the origin)
+is as good as any other.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from analysis.errors import AnalysisError
 from analysis.norms.frequency_response import Systems, largest_gain, read_systems, sigma_max
+from analysis.norms.stability import require_stable
 from estimators.arrays import BoolArray, ComplexArray, FloatArray
 
 # How near to the imaginary axis an eigenvalue must be to be looked at: far above rounding. Each one is then decided by
@@ -48,23 +51,6 @@ def _blocks(systems: Systems, gamma: FloatArray) -> tuple[FloatArray, FloatArray
     return A + B @ solved[..., :n], level * (B @ solved[..., n:]), -(Ct @ (C + D @ solved[..., :n])) / level
 
 
-def surely_clear(systems: Systems, gamma: FloatArray) -> BoolArray:
-    r"""Without eigenvalues, for one and two states: levels that are certainly not crossed, given gamma > both ends.
-
-    det(gamma^2 I - G^* G) |det(j w I - A)|^2 is a polynomial of degree n in x = w^2, positive at x = 0 and at infinity for
-    gamma above the gains there. For n = 1 that is all. For n = 2 it is x^2 + x trace(H^2)/2 + det(H), which has no root
-    x > 0 if trace(H^2) >= 0. False decides nothing.
-    """
-    n = systems.A.shape[-1]
-    if n != 2:
-        return np.full(len(systems), n == 1)
-    top, right, left = _blocks(systems, gamma)
-    transposed = np.swapaxes(top, -1, -2)
-    half_trace = (top * transposed).sum(axis=(-2, -1)) + (right * left).sum(axis=(-2, -1))  # left is symmetric
-    size = np.abs(top * transposed).sum(axis=(-2, -1)) + np.abs(right * left).sum(axis=(-2, -1))
-    return np.asarray(half_trace > 1e-6 * size)
-
-
 def near_axis(systems: Systems, gamma: FloatArray) -> FloatArray:
     """Frequencies (g, 2n) >= 0 of eigenvalues of H(gamma) on or near the imaginary axis, ascending; NaN fills up."""
     eigenvalues = np.linalg.eigvals(hamiltonian(systems, gamma))
@@ -73,13 +59,16 @@ def near_axis(systems: Systems, gamma: FloatArray) -> FloatArray:
     return np.sort(np.where(near & (eigenvalues.imag >= 0.0), eigenvalues.imag, np.nan), axis=-1)
 
 
-def between(frequencies: FloatArray) -> FloatArray:
-    """The frequencies themselves and points between neighbours (zero is one), NaN where there is none: (g, 7k).
+def between(frequencies: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """The frequencies (g, k), ascending inside bands from low to high (g,), and points between neighbours, NaN where there is
+    none.
 
-    Besides the middle, which makes the convergence quadratic, some points near the ends: a level just above a plateau
-    is crossed far away from the resonance that it has to find.
+    Besides the middle, which makes the convergence quadratic, some points near the ends: a level just above a plateau is
+    crossed far away from the resonance that it has to find.
     """
-    before = np.concatenate([np.zeros_like(frequencies[:, :1]), frequencies[:, :-1]], axis=-1)
+    last = np.where(np.isfinite(high), high, np.nan)[:, None]
+    frequencies = np.sort(np.concatenate([frequencies, last], axis=-1), axis=-1)  # NaN stays behind
+    before = np.concatenate([low[:, None], frequencies[:, :-1]], axis=-1)
     inside = [before + share * (frequencies - before) for share in (0.02, 0.15, 0.5, 0.85, 0.98)]
     return np.concatenate([frequencies, *inside, np.sqrt(before * frequencies)], axis=-1)
 
@@ -114,25 +103,30 @@ def gain_at(systems: Systems, frequency: FloatArray) -> FloatArray:
 
 
 def crosses_level(
-    A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike | None, gamma: ArrayLike, discrete: bool | None = None
+    A: Any,
+    B: ArrayLike | None = None,
+    C: ArrayLike | None = None,
+    D: ArrayLike | None = None,
+    gamma: ArrayLike = np.nan,
+    discrete: bool | None = None,
 ) -> BoolArray:
     r"""Whether sigma_max(G) reaches the level gamma > 0 at some frequency: boolean array over the leading axes.
 
-    False is the bounded real lemma: the H-infinity norm is below gamma. Both answers rest on the Hamiltonian matrix, not
-    on a sweep: its eigenvalues near the axis are candidates, and the gain is evaluated at and between them.
-    Raises AnalysisError for unstable systems, which have no H-infinity norm to compare.
+    Stacks or a system object as in `hinf_norm`; gamma broadcasts to the leading axes.
+
+    False is the bounded real lemma: the H-infinity norm is below gamma. Both answers rest on the Hamiltonian matrix, not on a
+    sweep: its eigenvalues near the axis are candidates, and the gain is evaluated at and between them. Raises AnalysisError
+    for unstable systems, which have no H-infinity norm to compare.
     """
     shape, systems = read_systems(A, B, C, D, discrete)
     level = np.broadcast_to(np.asarray(gamma, float), shape).reshape(-1)
     if not (np.isfinite(level) & (level > 0.0)).all():
         raise AnalysisError(f"level gamma = {level.min(initial=np.inf):g} must be finite and positive")
-    poles = systems.poles()
-    stable = (np.abs(poles) < 1.0 if discrete else poles.real < 0.0).all(axis=-1)
-    if not stable.all():
-        raise AnalysisError(f"system {int(np.argmin(stable))} is unstable; its H-infinity norm is infinite")
+    require_stable(systems.A, systems.discrete)
     continuous = to_continuous(systems)
     above = sigma_max(continuous.D) < level
     safe = np.where(above, level, 2.0 * sigma_max(continuous.D) + 1.0)
-    seen = gain_at(systems, between(near_axis(continuous, safe))).max(axis=-1)
+    ends = np.zeros(len(level)), np.full(len(level), np.inf)
+    seen = gain_at(systems, between(near_axis(continuous, safe), *ends)).max(axis=-1)
     static = gain_at(systems, np.zeros((len(level), 1)))[:, 0]
     return np.asarray((~above | (np.maximum(seen, static) >= level)).reshape(shape))

@@ -82,7 +82,7 @@ def sampled_sequence(model: LpvModel, trajectory: ArrayLike, sample_time: float)
     return SampledSequence(transition, driven[..., :inputs], numeric.C, driven[..., inputs:], step)
 
 
-def observability_gramian(A: ArrayLike, C: ArrayLike, state_scale: ArrayLike | None = None) -> Gramians:
+def sequence_observability(A: ArrayLike, C: ArrayLike, state_scale: ArrayLike | None = None) -> Gramians:
     r"""V(k1, k2) = sum_{k=k1}^{k2} phi_{k,k1}' C_k' C_k phi_{k,k1} over the whole sequence (P2 (A1)).
 
     A (..., K, n, n) and C (..., K, m, n), K = k2 - k1 + 1. Raises AnalysisError for shapes that do not fit.
@@ -129,13 +129,13 @@ def growing_observability(A: ArrayLike, C: ArrayLike, state_scale: ArrayLike | N
     return out
 
 
-def controllability_gramian(A: ArrayLike, G: ArrayLike, state_scale: ArrayLike | None = None) -> Gramians:
+def sequence_controllability(A: ArrayLike, G: ArrayLike, state_scale: ArrayLike | None = None) -> Gramians:
     r"""W(k1, k2-1) = sum_{k=k1}^{k2-1} phi_{k2,k+1} G_k G_k' phi_{k2,k+1}' (P2 (A2)); G (..., K, n, m).
 
     For a filter G_k is the factor of the process noise, Q_k = G_k G_k' (P2 prints B_k, which is the input).
     `transition` is phi_{k2,k1}'.
     """
-    return observability_gramian(*_dual(A, G), _inverse(state_scale))
+    return sequence_observability(*_dual(A, G), _inverse(state_scale))
 
 
 def sliding_controllability(A: ArrayLike, G: ArrayLike, window: int, state_scale: ArrayLike | None = None) -> Gramians:

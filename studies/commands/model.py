@@ -6,8 +6,6 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from rich.markup import escape
-
 from studies.commands.model_figure import model_figure
 from studies.commands.model_overview import Overview, overview
 from studies.commands.terminal import print_table
@@ -37,7 +35,7 @@ def run_model(file: str, out: Path | None, as_json: bool) -> int:
         [*(f"{value:.4g}" for value in point), *(_complex(s) for s in poles)]
         for point, poles in zip(found.points, found.poles, strict=True)
     ]
-    print_table("Poles, the parameters standing still", map(escape, headings), rows, left=(), width=160)
+    print_table("Poles, the parameters standing still", headings, rows, left=(), width=160)
     print(found.observability.words("observability", "detectable"))
     if found.model.inputs:
         print(found.controllability.words("controllability", "stabilisable"))

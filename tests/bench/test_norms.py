@@ -6,6 +6,7 @@ slower. Ratios are reported in extra_info, differences are asserted, clocks are 
 
 from __future__ import annotations
 
+import tracemalloc
 from importlib.util import find_spec
 from time import perf_counter
 
@@ -22,7 +23,7 @@ control = pytest.importorskip("control")
 SUBSET = 400 if find_spec("slycot") else 40
 
 
-def reference(systems):
+def reference(systems, dt=0):
     """Norms by the loop that a user would write, its name and its seconds a system."""
     try:
         import slycot  # noqa: F401
@@ -35,7 +36,7 @@ def reference(systems):
             return control.norm(system, p="inf", tol=1e-9, method="scipy")
 
     start = perf_counter()
-    values = [function(control.ss(*matrices)) for matrices in zip(*systems, strict=True)]
+    values = [function(control.ss(*matrices, dt)) for matrices in zip(*systems, strict=True)]
     return np.array(values), name, (perf_counter() - start) / len(values)
 
 
@@ -82,33 +83,47 @@ def test_tire_systems_over_speed_parameter_and_perturbation(benchmark) -> None:
     report(benchmark, found.norm.size, seconds, name)
 
 
-def resonant(count, states, seed=0):
+def resonant(count, states, discrete=False, seed=0):
     """Random oscillators, damping ratios 1e-3..1, in random orthogonal coordinates, half of them with feedthrough."""
     rng = np.random.default_rng(seed)
     A = np.zeros((count, states, states))
     for k in range(0, states, 2):
-        w, z = 10.0 ** rng.uniform(-1, 3, count), 10.0 ** rng.uniform(-3, 0, count)
-        A[:, k, k] = A[:, k + 1, k + 1] = -z * w
-        A[:, k, k + 1] = w * np.sqrt(1.0 - z**2)
-        A[:, k + 1, k] = -A[:, k, k + 1]
+        w, z = (
+            10.0 ** (rng.uniform(-2, 0.5, count) if discrete else rng.uniform(-1, 3, count)),
+            10.0 ** rng.uniform(-3, 0, count),
+        )
+        pole = w * (-z + 1j * np.sqrt(1.0 - z**2))
+        pole = np.exp(pole) if discrete else pole
+        A[:, k, k] = A[:, k + 1, k + 1] = pole.real
+        A[:, k, k + 1], A[:, k + 1, k] = pole.imag, -pole.imag
     Q = np.linalg.qr(rng.normal(size=(count, states, states)))[0]
     A = Q @ A @ np.swapaxes(Q, -1, -2)
     D = rng.normal(size=(count, 2, 2)) * (rng.random((count, 1, 1)) < 0.5)
     return A, rng.normal(size=(count, states, 2)), rng.normal(size=(count, 2, states)), D
 
 
-@pytest.mark.parametrize("states", [2, 4, 8])
-def test_random_resonant_systems(benchmark, states) -> None:
-    systems = resonant(10_000, states)
-    found = benchmark.pedantic(hinf_norm, args=systems, rounds=3, iterations=1)
+@pytest.mark.parametrize("discrete", [False, True], ids=["continuous", "discrete"])
+@pytest.mark.parametrize(
+    ("states", "count"), [(2, 1000), (2, 10_000), (4, 500), (4, 5000), (8, 200), (8, 2000), (30, 20)]
+)
+def test_random_resonant_systems(benchmark, states, count, discrete) -> None:
+    systems = resonant(count, states, discrete)
+    found = benchmark.pedantic(
+        hinf_norm, args=systems, kwargs={"discrete": discrete}, rounds=5, iterations=1, warmup_rounds=1
+    )
     subset = [M[:SUBSET] for M in systems]
-    values, name, seconds = reference(subset)
+    values, name, seconds = reference(subset, True if discrete else 0)
     if name == "control.linfnorm":
         relative = found.norm[:SUBSET] / values - 1.0
         # With feedthrough ab13dd stops below a peak now and then (by up to 12 % here, confirmed in 40 digits); never above
         assert relative.min() > -1e-8
         assert (np.abs(relative) < 1e-8).mean() > 0.95
-    assert crosses_level(*subset, found.norm[:SUBSET] * (1.0 - 1e-8)).all()
-    assert not crosses_level(*subset, found.norm[:SUBSET] * (1.0 + 1e-8)).any()
-    report(benchmark, len(found.norm), seconds, name)
-    assert (found.upper <= found.norm * (1.0 + 1.001e-9)).all()
+    assert crosses_level(*subset, found.norm[:SUBSET] * (1.0 - 1e-7), discrete).all()
+    assert not crosses_level(*subset, found.norm[:SUBSET] * (1.0 + 1e-7), discrete).any()
+    assert (found.norm <= found.upper).all() and (found.upper <= found.norm * (1.0 + 1e-5)).all()
+    report(benchmark, count, seconds, name)
+    if benchmark.stats is not None:
+        tracemalloc.start()
+        hinf_norm(*systems, discrete=discrete)
+        benchmark.extra_info["memory_over_input"] = tracemalloc.get_traced_memory()[1] / sum(M.nbytes for M in systems)
+        tracemalloc.stop()

@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from analysis.observability.gramians import observability_gramian
+from analysis.observability.gramians import sequence_observability
 from studies.papers.longitudinal_speed.inputs import (
     TYPICAL,
     accelerating,
@@ -78,7 +78,7 @@ def test_rank_of_the_gramian_of_fig_1() -> None:
     for A, C in zip(record.sequence.A, record.sequence.C, strict=True):
         total += (C @ phi * scale).T @ (C @ phi * scale)
         phi = A @ phi
-    whole = observability_gramian(record.sequence.A, record.sequence.C, TYPICAL).gramian
+    whole = sequence_observability(record.sequence.A, record.sequence.C, TYPICAL).gramian
     np.testing.assert_allclose(whole, total, rtol=1e-9, atol=1e-12 * np.abs(total).max())
 
 

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from analysis.errors import AnalysisError
 from analysis.observability.gramians import (
-    controllability_gramian,
     growing_observability,
-    observability_gramian,
     sampled_sequence,
+    sequence_controllability,
+    sequence_observability,
     sliding_controllability,
     sliding_observability,
 )
@@ -62,7 +62,7 @@ def test_sliding_growing_and_whole_gramians_follow_the_definition(seed: int, win
         np.testing.assert_allclose(sliding.gramian[k], by_definition(A, C, k, k + window - 1), rtol=1e-9, atol=1e-9)
     growing = growing_observability(A, C)
     np.testing.assert_allclose(growing.gramian[window - 1], by_definition(A, C, 0, window - 1), rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(observability_gramian(A, C).gramian, growing.gramian[-1], rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(sequence_observability(A, C).gramian, growing.gramian[-1], rtol=1e-10, atol=1e-10)
 
 
 @settings(max_examples=25, deadline=None)
@@ -73,7 +73,7 @@ def test_controllability_is_the_sum_over_noise_that_arrives(seed: int, window: i
     sliding = sliding_controllability(A, G, window)
     for k in range(20 - window):
         np.testing.assert_allclose(sliding.gramian[k], reached(A, G, k, k + window - 1), rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(controllability_gramian(A, G).gramian, reached(A, G, 0, 18), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(sequence_controllability(A, G).gramian, reached(A, G, 0, 18), rtol=1e-9, atol=1e-9)
 
 
 def test_leading_axes_are_batches() -> None:
@@ -89,12 +89,12 @@ def test_state_scale_is_a_change_of_units_for_both_gramians() -> None:
     scale = np.array([1e-3, 1.0, 20.0])
     changed_A, changed_C = A * scale / scale[:, None], C * scale
     np.testing.assert_allclose(
-        observability_gramian(A, C, scale).gramian, observability_gramian(changed_A, changed_C).gramian, rtol=1e-10
+        sequence_observability(A, C, scale).gramian, sequence_observability(changed_A, changed_C).gramian, rtol=1e-10
     )
     G = np.swapaxes(C, -1, -2)
     np.testing.assert_allclose(
-        controllability_gramian(A, G, scale).gramian,
-        controllability_gramian(changed_A, G / scale[:, None]).gramian,
+        sequence_controllability(A, G, scale).gramian,
+        sequence_controllability(changed_A, G / scale[:, None]).gramian,
         rtol=1e-10,
     )
 
@@ -102,11 +102,11 @@ def test_state_scale_is_a_change_of_units_for_both_gramians() -> None:
 def test_rank_and_condition_keep_digits_that_the_squared_gramian_loses() -> None:
     """Sensitivities 1 and 1e-10: the gramian has condition 1e20, beyond double precision; its factor has not."""
     C = np.array([[[1.0, 0.0], [0.0, 1e-10]]])
-    found = observability_gramian(np.eye(2)[None], C)
+    found = sequence_observability(np.eye(2)[None], C)
     np.testing.assert_allclose(found.condition, 1e20, rtol=1e-10)
     assert found.rank(1e-12) == 2
     assert found.rank(1e-9) == 1
-    assert observability_gramian(np.eye(2)[None], np.array([[[1.0, 0.0]]])).condition == np.inf
+    assert sequence_observability(np.eye(2)[None], np.array([[[1.0, 0.0]]])).condition == np.inf
 
 
 def test_a_moving_sensor_sees_what_no_frozen_pair_sees() -> None:
@@ -115,7 +115,7 @@ def test_a_moving_sensor_sees_what_no_frozen_pair_sees() -> None:
     C = np.stack([np.ones(10), k], axis=1)[:, None, :]
     A = np.broadcast_to(np.eye(2), (10, 2, 2))
     assert growing_observability(A, C).rank().tolist() == [1] + [2] * 9
-    np.testing.assert_allclose(observability_gramian(A, C).gramian, [[10, k.sum()], [k.sum(), (k**2).sum()]])
+    np.testing.assert_allclose(sequence_observability(A, C).gramian, [[10, k.sum()], [k.sum(), (k**2).sum()]])
 
 
 def test_window_information_is_the_least_over_directions_that_last() -> None:
@@ -205,10 +205,10 @@ def test_bad_settings_are_refused() -> None:
     with pytest.raises(AnalysisError, match="required = -1"):
         uniform_detectability(A, C, 3, required=-1.0)
     with pytest.raises(AnalysisError, match="state_scale"):
-        observability_gramian(A, C, state_scale=[1.0, -1.0, 1.0])
+        sequence_observability(A, C, state_scale=[1.0, -1.0, 1.0])
     with pytest.raises(AnalysisError, match="state_scale"):
-        controllability_gramian(A, np.swapaxes(C, -1, -2), state_scale=[0.0, 1.0, 1.0])
+        sequence_controllability(A, np.swapaxes(C, -1, -2), state_scale=[0.0, 1.0, 1.0])
     with pytest.raises(AnalysisError, match="relative_tolerance"):
-        observability_gramian(A, C).rank(0.0)
+        sequence_observability(A, C).rank(0.0)
     with pytest.raises(AnalysisError, match="sample_time"):
         sampled_sequence(longitudinal_speed_model(load_parameter_set("longitudinal-speed")), [[1.0, 0.0]], 0.0)
