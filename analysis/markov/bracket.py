@@ -17,10 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from analysis.markov.enclosure import DATA, EPS
 from estimators.arrays import BoolArray, FloatArray
-
-EPS = float(np.finfo(float).eps)
-DATA = 0.5 * EPS  # relative error of an entry that was rounded to the nearest float
 
 
 class Bracket(NamedTuple):
@@ -33,7 +31,14 @@ class Bracket(NamedTuple):
     def width(self) -> float:
         """Relative to the larger end; inf where one side is open."""
         size = max(abs(self.lower), abs(self.upper))
-        return (self.upper - self.lower) / size if 0.0 < size < np.inf else 0.0 if size == 0.0 else np.inf
+        if size == 0.0:
+            return 0.0
+        return (self.upper - self.lower) / size if size < np.inf else np.inf
+
+    @property
+    def middle(self) -> float:
+        """The mean of both ends."""
+        return 0.5 * (self.lower + self.upper)
 
     def meet(self, other: Bracket) -> Bracket:
         """What both say."""

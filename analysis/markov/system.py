@@ -20,14 +20,19 @@ import numpy as np
 from analysis.checks import as_stack, leading, positive_semidefinite, square
 from analysis.errors import AnalysisError
 from analysis.markov.chain import distribution, stationary_distribution, stochastic
+from analysis.markov.enclosure import DATA, EPS, enclosed, verdicts
 from analysis.markov.planar import planar_radius
-from analysis.markov.second_moment import lifted, pack, spectral_radius, unpack
-from estimators.arrays import FloatArray
+from analysis.markov.power import radius_estimate
+from analysis.markov.second_moment import lifted, spectral_radius
+from estimators.arrays import AnyArray, BoolArray, FloatArray
+from synthesis.lmi.result import Verdict
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 MANY = 256  # two-state systems from which repeated squaring beats eigenvalue problems
+LARGE = 150  # unknowns m n (n+1)/2 from which steps beat the operator as a matrix
+LIFTED = 3.0 * DATA + 8.0 * EPS  # relative error of an entry p_ij a_kl a_rs of the operator: rounded data, and products of them
 
 
 class MarkovJumpSystem:
@@ -72,8 +77,41 @@ class MarkovJumpSystem:
         """Spectral radius of the second-moment operator, shape of the batch (a 0-d array without one)."""
         return self._radius
 
+    def radius_bounds(self) -> tuple[FloatArray, FloatArray]:
+        """lower <= radius <= upper, shape of the batch each, for all systems whose entries round to these.
+
+        By eigenvectors of the operator in discs (`analysis.markov.enclosure`), or for large systems by Collatz and Wielandt's bounds
+        (`analysis.markov.bracket`). Wide where the eigenvalue is nearly defective: rounding alone then moves it that far.
+        """
+        return self._bounds
+
+    @cached_property
+    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+        if self._large:
+            return self._estimates[1], self._estimates[2]
+        operator = self.second_moment_operator
+        size = second_moment_operator(np.abs(self.modes), self.transition)
+        found = enclosed(operator, LIFTED * size)
+        return _frozen(found.lower), _frozen(found.upper)
+
+    @property
+    def _large(self) -> bool:
+        return self.mode_count * self.size * (self.size + 1) // 2 >= LARGE
+
+    @cached_property
+    def _estimates(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Radius, lower and upper bound of every system of a batch, without operators as matrices."""
+        modes = np.broadcast_to(self.modes, (*self.batch_shape, *self.modes.shape[-3:]))
+        transition = np.broadcast_to(self.transition, (*self.batch_shape, *self.transition.shape[-2:]))
+        out = np.empty((3, *self.batch_shape))
+        for place in np.ndindex(self.batch_shape):
+            out[(slice(None), *place)] = radius_estimate(modes[place], transition[place])
+        return _frozen(out[0]), _frozen(out[1]), _frozen(out[2])
+
     @cached_property
     def _radius(self) -> FloatArray:
+        if self._large:
+            return self._estimates[0]
         operator = self.second_moment_operator
         if self.size != 2 or self.mode_count < 2 or math.prod(self.batch_shape) < MANY:
             return _frozen(spectral_radius(operator))
@@ -84,9 +122,19 @@ class MarkovJumpSystem:
             radius[unmet] = spectral_radius(flat[unmet])
         return _frozen(radius.reshape(self.batch_shape))
 
-    def is_mean_square_stable(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-        """Whether E|x|^2 tends to 0 from every start and every initial mode (P3 Definition 1): radius < 1."""
-        return np.asarray(self._radius < 1.0)
+    def verdict(self) -> Verdict | AnyArray:
+        """CERTIFIED: mean-square stable, REFUTED: not, INCONCLUSIVE: the radius is 1 to within what rounding of the data moves it.
+
+        One verdict, or an object array of the batch's shape.
+        """
+        return verdicts(*self.radius_bounds())
+
+    def is_mean_square_stable(self) -> BoolArray:
+        """Whether E|x|^2 tends to 0 from every start and every initial mode (P3 Definition 1): radius < 1 for certain.
+
+        False where it is not, and where it cannot be decided at this precision: `verdict` tells them apart.
+        """
+        return np.asarray(self.radius_bounds()[1] < 1.0)
 
     @property
     def margin(self) -> FloatArray:
@@ -121,13 +169,14 @@ class MarkovJumpSystem:
         `second_moment` (..., n, n) is E[x x'] at the start, independent of the initial mode.
         """
         X = self.initial_second_moment(second_moment, mode_distribution)
-        vector = pack(X).reshape(*X.shape[:-3], -1)
-        vector = np.broadcast_to(vector, np.broadcast_shapes(vector.shape, (*self.batch_shape, vector.shape[-1])))
-        out = np.empty((_steps(steps) + 1, *vector.shape))
-        out[0] = vector
+        shape = (*self.batch_shape, self.mode_count, self.size, self.size)
+        out = np.empty((_steps(steps) + 1, *np.broadcast_shapes(X.shape, shape)))
+        out[0] = X
+        onward = np.swapaxes(self.transition, -1, -2)
         for k in range(steps):
-            out[k + 1] = (self.second_moment_operator @ out[k][..., None])[..., 0]
-        return unpack(out.reshape(*out.shape[:-1], self.mode_count, -1), self.size)
+            moved = self.modes @ out[k] @ np.swapaxes(self.modes, -1, -2)
+            out[k + 1] = (onward @ moved.reshape(*moved.shape[:-2], -1)).reshape(moved.shape)
+        return out
 
     def initial_second_moment(self, second_moment: ArrayLike, mode_distribution: ArrayLike) -> FloatArray:
         """X_j(0) = pi_j E[x x'], shape (..., m, n, n)."""
