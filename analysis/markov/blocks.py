@@ -1,7 +1,7 @@
 """What drives what: the pairs (mode, state) of a jump system in blocks that no path leaves and enters again.
 
-In order of the blocks the second-moment operator is block triangular, and cross moments grow no faster than the faster of their two
-blocks (Cauchy and Schwarz): its radius, or abscissa, is the largest of the blocks' own.
+In order of the blocks the second-moment operator is block triangular, and cross moments grow no faster than the faster of
+their two blocks (Cauchy and Schwarz): its radius, or abscissa, is the largest of the blocks' own.
 """
 
 from __future__ import annotations

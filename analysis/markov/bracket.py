@@ -5,10 +5,11 @@ The operator (T X)_j = sum_i p_ij A_i X_i A_i' leaves the cone of (X_1, ..., X_m
 
     min_j s_min(W_j)^2 <= radius <= max_j s_max(W_j)^2,    W_j = L_j^-1 [sqrt(p_1j) A_1 L_1, ..., sqrt(p_mj) A_m L_m],
 
-with singular values s: equality holds at the eigenvector. Nobody has to believe how X was found. L is a matrix of floats, so
-X is exact; what rounding does to W_j is bounded by |L_j^-1| |A_i| |L_i|, and the same bound carries a relative error of every entry
-of A_i (Minkowski's inequality moves singular values by no more). The answer therefore holds for every system within that error.
-In continuous time, with (T X)_j = A_j X_j + X_j A_j' + sum_i q_ij X_i, the eigenvalues of L_j^-1 (T X)_j L_j^-T bound the abscissa.
+with singular values s: equality holds at the eigenvector. Nobody has to believe how X was found. L is a matrix of floats,
+so X is exact; what rounding does to W_j is bounded by |L_j^-1| |A_i| |L_i|, and the same bound carries a relative error of
+every entry of A_i (Minkowski's inequality moves singular values by no more). The answer therefore holds for every system
+within that error. In continuous time, with (T X)_j = A_j X_j + X_j A_j' + sum_i q_ij X_i, the eigenvalues of L_j^-1 (T X)_j
+L_j^-T bound the abscissa.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ def discrete_bracket(
     if found is None:
         return Bracket(0.0, np.inf)
     L, K, defect = found
-    m, n = kept.shape
+    n = kept.shape[1]
     root = np.sqrt(transition.T)[:, :, None, None]  # [j, i]: sqrt(p_ij)
     moved = root * (K[:, None] @ (modes @ L)[None])
     error = root * (np.abs(K)[:, None] @ (np.abs(modes) @ np.abs(L))[None])

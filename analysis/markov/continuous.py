@@ -45,7 +45,9 @@ class MarkovJumpProcess:
             raise AnalysisError(
                 f"generator has the shape {self.generator.shape} for {self.modes.shape[-3]} modes; it must be (..., m, m)"
             )
-        self.batch_shape = leading({"modes": self.modes.reshape(*self.modes.shape[:-2], -1), "generator": self.generator})
+        self.batch_shape = leading(
+            {"modes": self.modes.reshape(*self.modes.shape[:-2], -1), "generator": self.generator}
+        )
 
     @cached_property
     def second_moment_operator(self) -> FloatArray:
@@ -74,7 +76,8 @@ class MarkovJumpProcess:
         return out[0], out[1], out[2]
 
     def verdict(self) -> Verdict | AnyArray:
-        """CERTIFIED: mean-square stable, REFUTED: not, INCONCLUSIVE: the abscissa is 0 to within what rounding of the data moves it.
+        """CERTIFIED: mean-square stable, REFUTED: not, INCONCLUSIVE: the abscissa is 0 to within what rounding of the data
+        moves it.
 
         One verdict, or an object array of the batch's shape.
         """

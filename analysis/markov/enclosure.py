@@ -1,9 +1,9 @@
 r"""Enclosures of the leading eigenvalue of matrices, for every matrix within an entrywise error of the given ones.
 
-With computed eigenvectors V and K near V^-1, V^-1 M V = (K V)^-1 K M V is nearly diagonal, and every eigenvalue lies in a disc about
-a diagonal entry whose radius is the sum of the row beside it (Gershgorin 1931). A union of discs that touch no other holds as many
-eigenvalues as discs. Rounding and the error of M enter the radii through |K| |M| |V|; nothing is believed of V. Nearly defective
-matrices have large |K|, and get the wide answer that they deserve.
+With computed eigenvectors V and K near V^-1, V^-1 M V = (K V)^-1 K M V is nearly diagonal, and every eigenvalue lies in a
+disc about a diagonal entry whose radius is the sum of the row beside it (Gershgorin 1931). A union of discs that touch no
+other holds as many eigenvalues as discs. Rounding and the error of M enter the radii through |K| |M| |V|; nothing is
+believed of V. Nearly defective matrices have large |K|, and get the wide answer that they deserve.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def verdicts(lower: FloatArray, upper: FloatArray, border: float = 1.0) -> Verdi
     below, above = np.asarray(upper) < border, np.asarray(lower) >= border
     out = np.full(below.shape, Verdict.INCONCLUSIVE, dtype=object)
     out[below], out[above] = Verdict.CERTIFIED, Verdict.REFUTED
-    return Verdict(out[()]) if out.ndim == 0 else out
+    return Verdict(str(out[()])) if out.ndim == 0 else out
 
 
 def _inverse(V: FloatArray) -> tuple[FloatArray, BoolArray]:

@@ -39,7 +39,9 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True)
 class _Operator:
-    """T as a function, the same with the sizes of all entries, a positive step whose eigenvector is the same, and bounds from X."""
+    """T as a function, the same with the sizes of all entries, a positive step whose eigenvector is the same, and bounds
+    from X.
+    """
 
     apply: Callable[[FloatArray], FloatArray]
     sizes: Callable[[FloatArray], FloatArray]
@@ -91,7 +93,9 @@ def abscissa_estimate(modes: FloatArray, generator: FloatArray, relative: float 
 
 
 def _largest(parts: list[Estimate], least: float) -> Estimate:
-    return Estimate(*(max([least, *column]) for column in zip(*parts, strict=True))) if parts else Estimate(*[least] * 3)
+    return (
+        Estimate(*(max([least, *column]) for column in zip(*parts, strict=True))) if parts else Estimate(*[least] * 3)
+    )
 
 
 def _searched(operator: _Operator, kept: BoolArray) -> Estimate:
@@ -166,9 +170,7 @@ def _written_out(operator: _Operator, both: BoolArray) -> Estimate:
     return Estimate(value, lower, upper)
 
 
-def _arnoldi(
-    apply: Callable[[FloatArray], FloatArray], start: FloatArray, both: BoolArray
-) -> tuple[float, FloatArray]:
+def _arnoldi(apply: Callable[[FloatArray], FloatArray], start: FloatArray, both: BoolArray) -> tuple[float, FloatArray]:
     """The eigenvalue of largest real part and its eigenvector as matrices >= 0; NaN and `start` where it is not found."""
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 

@@ -23,6 +23,7 @@ from analysis.markov.chain import distribution, stationary_distribution, stochas
 from analysis.markov.enclosure import DATA, EPS, enclosed, verdicts
 from analysis.markov.planar import planar_radius
 from analysis.markov.power import radius_estimate
+from analysis.markov.regular import radius_verdicts
 from analysis.markov.second_moment import lifted, spectral_radius
 from estimators.arrays import AnyArray, BoolArray, FloatArray
 from synthesis.lmi.result import Verdict
@@ -32,7 +33,9 @@ if TYPE_CHECKING:
 
 MANY = 256  # two-state systems from which repeated squaring beats eigenvalue problems
 LARGE = 150  # unknowns m n (n+1)/2 from which steps beat the operator as a matrix
-LIFTED = 3.0 * DATA + 8.0 * EPS  # relative error of an entry p_ij a_kl a_rs of the operator: rounded data, and products of them
+LIFTED = (
+    3.0 * DATA + 8.0 * EPS
+)  # relative error of an entry p_ij a_kl a_rs of the operator: rounded data, and products of them
 
 
 class MarkovJumpSystem:
@@ -80,8 +83,9 @@ class MarkovJumpSystem:
     def radius_bounds(self) -> tuple[FloatArray, FloatArray]:
         """lower <= radius <= upper, shape of the batch each, for all systems whose entries round to these.
 
-        By eigenvectors of the operator in discs (`analysis.markov.enclosure`), or for large systems by Collatz and Wielandt's bounds
-        (`analysis.markov.bracket`). Wide where the eigenvalue is nearly defective: rounding alone then moves it that far.
+        By eigenvectors of the operator in discs (`analysis.markov.enclosure`), or for large systems by Collatz and
+        Wielandt's bounds (`analysis.markov.bracket`). Wide where the eigenvalue is nearly defective: rounding alone then
+        moves it that far.
         """
         return self._bounds
 
@@ -123,18 +127,26 @@ class MarkovJumpSystem:
         return _frozen(radius.reshape(self.batch_shape))
 
     def verdict(self) -> Verdict | AnyArray:
-        """CERTIFIED: mean-square stable, REFUTED: not, INCONCLUSIVE: the radius is 1 to within what rounding of the data moves it.
+        """CERTIFIED: mean-square stable, REFUTED: not, INCONCLUSIVE: the radius is 1 to within what rounding of the data
+        moves it.
 
         One verdict, or an object array of the batch's shape.
         """
-        return verdicts(*self.radius_bounds())
+        return self._verdict
+
+    @cached_property
+    def _verdict(self) -> Verdict | AnyArray:
+        if self._large:
+            return verdicts(*self.radius_bounds())
+        size = second_moment_operator(np.abs(self.modes), self.transition)
+        return radius_verdicts(self.second_moment_operator, LIFTED * size)
 
     def is_mean_square_stable(self) -> BoolArray:
         """Whether E|x|^2 tends to 0 from every start and every initial mode (P3 Definition 1): radius < 1 for certain.
 
         False where it is not, and where it cannot be decided at this precision: `verdict` tells them apart.
         """
-        return np.asarray(self.radius_bounds()[1] < 1.0)
+        return np.asarray(np.asarray(self._verdict) == Verdict.CERTIFIED)
 
     @property
     def margin(self) -> FloatArray:

@@ -19,7 +19,9 @@ PIVOT = 1e-10  # smallest pivot, relative to the largest entry of its column
 
 
 def gauge_and_support(vertices: FloatArray, points: FloatArray) -> tuple[FloatArray, IndexArray]:
-    """Gauges (g,) of points (g, n), and n independent vertices (g, n) whose weights carry each; inf if the vertices do not span."""
+    """Gauges (g,) of points (g, n), and n independent vertices (g, n) whose weights carry each; inf if the vertices do not
+    span.
+    """
     if vertices.shape[1] == 2:
         return _planar_gauge(vertices, points)
     size = vertices.shape[1]

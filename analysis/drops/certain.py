@@ -1,0 +1,130 @@
+"""Answers about packet drops that hold for every pair of matrices within rounding of the given one, and say where they end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analysis.checks import probability
+from analysis.drops.balance import balanced
+from analysis.drops.frozen import pair
+from analysis.drops.gilbert_elliott import gilbert_elliott
+from analysis.drops.rational import LARGEST, exact_critical_drop, exact_critical_recovery
+from analysis.drops.regions import Regions, regions
+from analysis.errors import AnalysisError
+from analysis.markov.enclosure import DATA, EPS
+from analysis.markov.regular import radius_verdicts
+from analysis.markov.second_moment import lifted
+from analysis.markov.system import second_moment_operator
+from estimators.arrays import AnyArray, FloatArray
+from synthesis.lmi.result import Verdict
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+MOST_ERROR = 1e-2
+
+
+@dataclass(frozen=True)
+class CriticalInterval:
+    """lower <= critical probability <= upper for every pair within the error; `exact` for the entries as they are stored.
+
+    `exact` is NaN where exact fractions would take too long.
+    """
+
+    lower: float
+    upper: float
+    exact: float
+
+
+def drop_verdict(
+    open_loop: ArrayLike, closed_loop: ArrayLike, probabilities: ArrayLike, relative: float = DATA
+) -> Verdict | AnyArray:
+    """CERTIFIED: mean-square stable at this drop probability, REFUTED: not, INCONCLUSIVE: undecided at this precision.
+
+    For every pair whose entries differ from the given ones by no more than the part `relative` of their size (rounding to the
+    nearest float unless said otherwise). Arguments broadcast as in `drop_radius`; one verdict, or an object array.
+    Raises AnalysisError as `drop_radius`, or for a `relative` outside [0, 0.01].
+    """
+    share = _share(relative)
+    A0, A1 = balanced(*pair(open_loop, closed_loop))
+    p = probability("probabilities", probabilities)[..., None, None]
+    try:
+        operator, size = (
+            p * a + (1.0 - p) * b for a, b in ((lifted(A0), lifted(A1)), (lifted(abs(A0)), lifted(abs(A1))))
+        )
+    except ValueError as error:
+        raise AnalysisError(f"probabilities of shape {p.shape[:-2]} do not broadcast: {error}") from None
+    return radius_verdicts(operator, share * size)
+
+
+def drop_regions(open_loop: ArrayLike, closed_loop: ArrayLike, relative: float = DATA) -> Regions:
+    """All drop probabilities of one pair (n, n), sorted into stable, unstable and undecided for every pair within `relative`.
+
+    Raises AnalysisError for stacks, matrices that do not fit, or a `relative` outside [0, 0.01].
+    """
+    A0, A1 = _one_pair(open_loop, closed_loop)
+    share = _share(relative)
+    return regions(lifted(A1), lifted(A0), share * lifted(np.abs(A1)), share * lifted(np.abs(A0)))
+
+
+def critical_drop_interval(open_loop: ArrayLike, closed_loop: ArrayLike, relative: float = DATA) -> CriticalInterval:
+    """Where `critical_drop_probability` of every pair within `relative` of one pair (n, n) lies. Raises as `drop_regions`.
+
+    An interval that reaches 1 says that some pair within the error may be stable for every p below 1.
+    """
+    A0, A1 = _one_pair(open_loop, closed_loop)
+    found = drop_regions(A0, A1, relative)
+    lower = found.stable[0][1] if found.stable and found.stable[0][0] == 0.0 else 0.0
+    upper = found.unstable[0][0] if found.unstable else 1.0
+    exact = exact_critical_drop(A0, A1) if _unknowns(A0) <= LARGEST else float("nan")
+    return CriticalInterval(lower, upper, exact)
+
+
+def recovery_regions(open_loop: ArrayLike, closed_loop: ArrayLike, failure: float, relative: float = DATA) -> Regions:
+    """All recovery probabilities of one pair (n, n) at one failure probability, sorted as by `drop_regions`; raises as it
+    does.
+    """
+    A0, A1 = _one_pair(open_loop, closed_loop)
+    never, always = (gilbert_elliott(A0, A1, failure, r) for r in (0.0, 1.0))
+    if never.batch_shape:
+        raise AnalysisError(f"regions are for one failure probability, not a batch {never.batch_shape}")
+    share = _share(relative)
+    sizes = [second_moment_operator(np.abs(s.modes), s.transition) for s in (never, always)]
+    return regions(never.second_moment_operator, always.second_moment_operator, share * sizes[0], share * sizes[1])
+
+
+def critical_recovery_interval(
+    open_loop: ArrayLike, closed_loop: ArrayLike, failure: float, relative: float = DATA
+) -> CriticalInterval:
+    """Where `critical_recovery_probability` of every pair within `relative` lies; an upper end of inf if r = 1 may be
+    unstable.
+    """
+    A0, A1 = _one_pair(open_loop, closed_loop)
+    found = recovery_regions(A0, A1, failure, relative)
+    upper = found.stable[-1][0] if found.stable and found.stable[-1][1] == 1.0 else np.inf
+    lower = found.unstable[-1][1] if found.unstable else 0.0
+    if lower == 1.0:
+        lower = np.inf
+    exact = exact_critical_recovery(A0, A1, failure) if 2 * _unknowns(A0) <= LARGEST else float("nan")
+    return CriticalInterval(float(lower), float(upper), exact)
+
+
+def _one_pair(open_loop: ArrayLike, closed_loop: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    A0, A1 = pair(open_loop, closed_loop)
+    if A0.ndim != 2 or A1.ndim != 2:
+        raise AnalysisError(f"this is for one pair of matrices, not stacks {A0.shape}, {A1.shape}")
+    return balanced(A0, A1)
+
+
+def _share(relative: float) -> float:
+    """Relative error of an entry of the operator: two factors within `relative`, a weight, and the rounding of their products."""
+    if not 0.0 <= relative <= MOST_ERROR:
+        raise AnalysisError(f"relative = {relative} must lie between 0 and {MOST_ERROR}")
+    return 2.0 * relative + relative**2 + 8.0 * EPS
+
+
+def _unknowns(A: FloatArray) -> int:
+    return len(A) * (len(A) + 1) // 2
