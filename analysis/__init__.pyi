@@ -18,7 +18,7 @@ from .drops.intermittent import CriticalArrival as CriticalArrival
 from .drops.intermittent import KalmanArrival as KalmanArrival
 from .drops.intermittent import kalman_critical_arrival as kalman_critical_arrival
 from .drops.intermittent import static_critical_arrival as static_critical_arrival
-from .drops.intermittent import static_gain_radius as static_gain_radius
+from .drops.arrival_gains import static_gain_radius as static_gain_radius
 from .drops.mean_square import MeanSquareSchedule as MeanSquareSchedule
 from .drops.mean_square import certified_drop_probability as certified_drop_probability
 from .drops.mean_square import mean_square_schedule as mean_square_schedule

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
+from estimators.whole_files import write_bytes
 
 SCHEMA = "gainsmith.labelled/1"
 Labels: TypeAlias = FloatArray | NDArray[np.str_]
@@ -89,10 +89,16 @@ class LabelledArray:
             "notes": _plain(dict(self.notes)),
             "sha256": hashlib.sha256(data).hexdigest(),
         }
-        text = json.dumps(head, indent=1, allow_nan=False) + "\n"  # before anything is written: notes may not be plain
+        try:
+            text = json.dumps(head, indent=1, allow_nan=False) + "\n"  # before anything is written: notes may not be plain
+        except (TypeError, ValueError) as error:
+            raise AnalysisError(f"'{self.name}': notes hold what JSON has not ({error}); give texts, numbers and lists") from None
         files = _pair(path)
-        _replace(files[0], data)
-        _replace(files[1], text.encode())
+        try:
+            for file, content in zip(files, (data, text.encode()), strict=True):
+                write_bytes(file, content)
+        except OSError as error:
+            raise AnalysisError(f"{files[0].parent}: cannot be written ({error.strerror or error})") from None
         return files
 
 
@@ -147,12 +153,3 @@ def _pair(path: str | Path) -> tuple[Path, Path]:
     if stem.suffix in {".npz", ".json"}:
         stem = stem.with_suffix("")
     return stem.with_name(stem.name + ".npz"), stem.with_name(stem.name + ".json")
-
-
-def _replace(path: Path, data: bytes) -> None:
-    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        beside.write_bytes(data)
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
