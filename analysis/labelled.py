@@ -35,7 +35,8 @@ class Axis:
 class LabelledArray:
     """`values` with one named axis for each dimension, a unit, and notes (plain text and numbers) on where it comes from.
 
-    Raises AnalysisError if an axis is repeated or does not have as many labels as the array has places.
+    Values may be NaN (not known), and are stored as float64. Raises AnalysisError if an axis is repeated or does not have as many
+    labels as the array has places, and for complex or masked values, which would lose a part.
     """
 
     name: str
@@ -45,6 +46,12 @@ class LabelledArray:
     notes: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if np.iscomplexobj(self.values) or np.ma.is_masked(self.values):
+            kind = "complex" if np.iscomplexobj(self.values) else "masked"
+            raise AnalysisError(
+                f"'{self.name}' has {kind} values; store their parts, or NaN where a value is not known"
+            )
+        object.__setattr__(self, "values", np.asarray(self.values, dtype=float))
         lengths = tuple(len(axis.labels) for axis in self.axes)
         names = [axis.name for axis in self.axes]
         if lengths != self.values.shape or len(set(names)) != len(names):
@@ -90,9 +97,13 @@ class LabelledArray:
             "sha256": hashlib.sha256(data).hexdigest(),
         }
         try:
-            text = json.dumps(head, indent=1, allow_nan=False) + "\n"  # before anything is written: notes may not be plain
+            text = (
+                json.dumps(head, indent=1, allow_nan=False) + "\n"
+            )  # before anything is written: notes may not be plain
         except (TypeError, ValueError) as error:
-            raise AnalysisError(f"'{self.name}': notes hold what JSON has not ({error}); give texts, numbers and lists") from None
+            raise AnalysisError(
+                f"'{self.name}': notes hold what JSON has not ({error}); give texts, numbers and lists"
+            ) from None
         files = _pair(path)
         try:
             for file, content in zip(files, (data, text.encode()), strict=True):

@@ -17,6 +17,7 @@ from analysis.markov.enclosure import EPS
 from analysis.markov.regular import radius_verdicts
 from analysis.markov.second_moment import lifted, spectral_radius
 from analysis.markov.system import LIFTED
+from analysis.mode_objects import with_output
 from estimators.arrays import FloatArray
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings
@@ -30,7 +31,7 @@ SWEEPS = 20_000  # of the nonlinear power iteration
 GUARD = 1e-12  # relative, for the rounding of eigenvalues
 
 
-def static_gain_radius(A: ArrayLike, C: ArrayLike, gain: ArrayLike, arrival: ArrayLike) -> FloatArray:
+def static_gain_radius(A: ArrayLike, C: ArrayLike | None, gain: ArrayLike, arrival: ArrayLike) -> FloatArray:
     """Radius of a S(A - K C) + (1 - a) S(A) for A (..., n, n), C (..., k, n), K (..., n, k) and a (...).
 
     Raises AnalysisError for arrays that do not fit or rates outside [0, 1].
@@ -50,7 +51,9 @@ def static_gain_certain(A: FloatArray, C: FloatArray, gain: FloatArray, arrival:
     return radius_verdicts(operator, (LIFTED + 4.0 * len(A) * EPS) * size) is Verdict.CERTIFIED
 
 
-def checked_plant(A: ArrayLike, C: ArrayLike, ndim: int | None = 2) -> tuple[FloatArray, FloatArray]:
+def checked_plant(A: ArrayLike, C: ArrayLike | None, ndim: int | None = 2) -> tuple[FloatArray, FloatArray]:
+    """A and C of arrays, or of a discrete-time object with both in the place of A; `ndim` 2 refuses stacks."""
+    A, C = with_output(A, C, discrete=True)
     plant, output = square("A", A), as_stack("C", C)
     if plant.shape[-1] != output.shape[-1]:
         raise AnalysisError(f"A has the shape {plant.shape} and C {output.shape}; C needs {plant.shape[-1]} columns")

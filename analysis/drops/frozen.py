@@ -31,6 +31,7 @@ from analysis.errors import AnalysisError
 from analysis.markov.enclosure import DATA, enclosed
 from analysis.markov.second_moment import lifted, spectral_radius
 from analysis.markov.system import LIFTED
+from analysis.mode_objects import state_matrices
 from estimators.arrays import BoolArray, FloatArray
 
 if TYPE_CHECKING:
@@ -148,8 +149,9 @@ def crossings(first: FloatArray, last: FloatArray) -> list[float]:
 
 
 def pair(open_loop: ArrayLike, closed_loop: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Both stacks, checked."""
-    A0, A1 = square("open_loop", open_loop), square("closed_loop", closed_loop)
+    """Both stacks, checked; discrete-time objects with A and dt give their A."""
+    first, second = (state_matrices(loop, discrete=True)[0] for loop in (open_loop, closed_loop))
+    A0, A1 = square("open_loop", first), square("closed_loop", second)
     same_size("open_loop", A0, "closed_loop", A1)
     leading({"open_loop": A0, "closed_loop": A1})
     return A0, A1

@@ -88,7 +88,7 @@ class KalmanArrival:
 
 
 def certify_static_gain(
-    A: ArrayLike, C: ArrayLike, arrival: float, method: Method = "riccati", settings: LmiSettings | None = None
+    A: ArrayLike, C: ArrayLike | None, arrival: float, method: Method = "riccati", settings: LmiSettings | None = None
 ) -> StaticGain:
     """Whether some static gain is mean-square stable at this arrival rate.
 
@@ -119,7 +119,7 @@ def certify_static_gain(
 
 def static_critical_arrival(
     A: ArrayLike,
-    C: ArrayLike,
+    C: ArrayLike | None = None,
     tolerance: float = 1e-9,
     method: Method = "riccati",
     settings: LmiSettings | None = None,
@@ -166,7 +166,7 @@ def static_critical_arrival(
 
 def kalman_critical_arrival(
     A: ArrayLike,
-    C: ArrayLike,
+    C: ArrayLike | None = None,
     tolerance: float = 1e-9,
     method: Method = "riccati",
     settings: LmiSettings | None = None,

@@ -20,6 +20,7 @@ from analysis.markov.enclosure import enclosed, verdicts
 from analysis.markov.power import abscissa_estimate
 from analysis.markov.second_moment import triangle
 from analysis.markov.system import LARGE, LIFTED, MarkovJumpSystem
+from analysis.mode_objects import state_matrices
 from estimators.arrays import AnyArray, BoolArray, FloatArray
 from synthesis.lmi.result import Verdict
 
@@ -31,7 +32,7 @@ class MarkovJumpProcess:
     """x' = A_i x with mode i following a Markov process.
 
     Args:
-        modes: A_1..A_m in 1/s, shape (..., m, n, n).
+        modes: A_1..A_m in 1/s, shape (..., m, n, n); or a list of continuous-time objects with A and dt.
         generator: rates in 1/s, shape (..., m, m); generator[i, j] is the rate of jumps from i to j, rows sum to 0.
 
     Raises:
@@ -39,7 +40,7 @@ class MarkovJumpProcess:
     """
 
     def __init__(self, modes: ArrayLike, generator: ArrayLike) -> None:
-        self.modes = square("modes", modes, ndim=3)
+        self.modes = square("modes", state_matrices(modes, discrete=False)[0], ndim=3)
         self.generator = _checked(generator)
         if self.generator.shape[-1] != self.modes.shape[-3]:
             raise AnalysisError(

@@ -62,8 +62,8 @@ def expected_cost(
         return np.asarray(np.einsum("...ikl,...ilk->...", P, X))
     if stable.ndim:
         raise AnalysisError(
-            f"{int((~stable).sum())} of {stable.size} systems are not mean-square stable, or so close to the border that rounding "
-            f"decides (first at {[int(k) for k in np.argwhere(~stable)[0]]}); their cost is infinite or undefined: leave them out"
+            f"{int((~stable).sum())} of {stable.size} systems are not mean-square stable, or too close to the border to "
+            f"tell (first at {[int(k) for k in np.argwhere(~stable)[0]]}); their cost is infinite or undefined: leave them out"
         )
     if verdict == Verdict.INCONCLUSIVE:
         raise AnalysisError(_undecided(system, ()))

@@ -32,7 +32,7 @@ def regular_cells(
     low: FloatArray,
     high: FloatArray,
 ) -> BoolArray:
-    """Cells [low, high] (c,) of x on which no member of (1 - x) first + x last, (d, d) or (c, d, d) each, has the eigenvalue 1."""
+    """Cells [low, high] (c,) of x on which no member of (1 - x) first + x last has the eigenvalue 1; (d, d) or (c, d, d) each."""
     d = first.shape[-1]
     one, change, size = np.eye(d), last - first, np.abs(first) + np.abs(last)
     centre = (0.5 * (low + high))[:, None, None]

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.checks import as_stack, leading, positive_semidefinite, square
+from analysis.checks import as_stack, leading, positive_semidefinite, square, whole
 from analysis.errors import AnalysisError
 from analysis.markov.chain import distribution, stationary_distribution, stochastic
 from analysis.markov.enclosure import DATA, EPS, enclosed, verdicts
@@ -25,6 +25,7 @@ from analysis.markov.planar import planar_radius
 from analysis.markov.power import radius_estimate
 from analysis.markov.regular import radius_verdicts
 from analysis.markov.second_moment import lifted, spectral_radius
+from analysis.mode_objects import state_matrices
 from estimators.arrays import AnyArray, BoolArray, FloatArray
 from synthesis.lmi.result import Verdict
 
@@ -42,7 +43,7 @@ class MarkovJumpSystem:
     """x+ = A_i x with mode i following a Markov chain.
 
     Args:
-        modes: A_1..A_m, shape (..., m, n, n), any leading batch axes.
+        modes: A_1..A_m, shape (..., m, n, n), any leading batch axes; or a list of discrete-time objects with A and dt.
         transition: (..., m, m), transition[i, j] = Pr(next = j | now = i); leading axes broadcast with those of `modes`.
 
     Raises:
@@ -50,7 +51,7 @@ class MarkovJumpSystem:
     """
 
     def __init__(self, modes: ArrayLike, transition: ArrayLike) -> None:
-        self.modes = _frozen(square("modes", modes, ndim=3))
+        self.modes = _frozen(square("modes", state_matrices(modes, discrete=True)[0], ndim=3))
         self.transition = _frozen(stochastic("transition", transition))
         count = self.modes.shape[-3]
         if self.transition.shape[-1] != count:
@@ -170,7 +171,7 @@ class MarkovJumpSystem:
         mean = np.broadcast_to(mean, np.broadcast_shapes(mean.shape, (*self.batch_shape, self.mode_count, self.size)))
         out = np.empty((_steps(steps) + 1, *mean.shape))
         out[0] = mean
-        for k in range(steps):
+        for k in range(len(out) - 1):
             moved = (self.modes @ out[k][..., None])[..., 0]
             out[k + 1] = np.swapaxes(self.transition, -1, -2) @ moved
         return out
@@ -185,7 +186,7 @@ class MarkovJumpSystem:
         out = np.empty((_steps(steps) + 1, *np.broadcast_shapes(X.shape, shape)))
         out[0] = X
         onward = np.swapaxes(self.transition, -1, -2)
-        for k in range(steps):
+        for k in range(len(out) - 1):
             moved = self.modes @ out[k] @ np.swapaxes(self.modes, -1, -2)
             out[k + 1] = (onward @ moved.reshape(*moved.shape[:-2], -1)).reshape(moved.shape)
         return out
@@ -209,7 +210,7 @@ def second_moment_operator(modes: FloatArray, weights: FloatArray) -> FloatArray
 
 def independent(modes: ArrayLike, probabilities: ArrayLike) -> MarkovJumpSystem:
     """Modes drawn independently at every step: every row of the transition matrix is the distribution (P3 (25))."""
-    stack = square("modes", modes, ndim=3)
+    stack = square("modes", state_matrices(modes, discrete=True)[0], ndim=3)
     pi = distribution("probabilities", probabilities, stack.shape[-3])
     return MarkovJumpSystem(stack, np.repeat(pi[..., None, :], stack.shape[-3], axis=-2))
 
@@ -221,6 +222,4 @@ def _frozen(array: FloatArray) -> FloatArray:
 
 
 def _steps(steps: int) -> int:
-    if steps < 0:
-        raise AnalysisError(f"steps = {steps} must not be negative")
-    return int(steps)
+    return whole("steps", steps)
