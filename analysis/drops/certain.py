@@ -9,9 +9,10 @@ import numpy as np
 
 from analysis.checks import probability
 from analysis.drops.balance import balanced
-from analysis.drops.frozen import pair
-from analysis.drops.gilbert_elliott import gilbert_elliott
-from analysis.drops.rational import LARGEST, exact_critical_drop, exact_critical_recovery
+from analysis.drops.frozen import critical_drop_probability, pair
+from analysis.drops.gilbert_elliott import critical_recovery_probability, gilbert_elliott
+from analysis.drops.rational import LARGEST
+from analysis.drops.reach import Family, stable_until, unstable_from
 from analysis.drops.regions import Regions, regions
 from analysis.errors import AnalysisError
 from analysis.markov.enclosure import DATA, EPS
@@ -77,9 +78,13 @@ def critical_drop_interval(open_loop: ArrayLike, closed_loop: ArrayLike, relativ
     """
     A0, A1 = _one_pair(open_loop, closed_loop)
     found = drop_regions(A0, A1, relative)
-    lower = found.stable[0][1] if found.stable and found.stable[0][0] == 0.0 else 0.0
-    upper = found.unstable[0][0] if found.unstable else 1.0
-    exact = exact_critical_drop(A0, A1) if _unknowns(A0) <= LARGEST else float("nan")
+    share, exact = (
+        _share(relative),
+        float(critical_drop_probability(A0, A1)) if _unknowns(A0) <= LARGEST else float("nan"),
+    )
+    received, dropped = (share * lifted(np.abs(A)) for A in (A1, A0))
+    family = Family(lifted(A1), lifted(A0), received, dropped, len(A0), 1)
+    lower, upper = _narrowed(family, found, exact)
     return CriticalInterval(lower, upper, exact)
 
 
@@ -87,13 +92,12 @@ def recovery_regions(open_loop: ArrayLike, closed_loop: ArrayLike, failure: floa
     """All recovery probabilities of one pair (n, n) at one failure probability, sorted as by `drop_regions`; raises as it
     does.
     """
-    A0, A1 = _one_pair(open_loop, closed_loop)
-    never, always = (gilbert_elliott(A0, A1, failure, r) for r in (0.0, 1.0))
-    if never.batch_shape:
-        raise AnalysisError(f"regions are for one failure probability, not a batch {never.batch_shape}")
-    share = _share(relative)
-    sizes = [second_moment_operator(np.abs(s.modes), s.transition) for s in (never, always)]
-    return regions(never.second_moment_operator, always.second_moment_operator, share * sizes[0], share * sizes[1])
+    family = _bursts(open_loop, closed_loop, failure, relative)
+    found = regions(family.first, family.last, family.first_error, family.last_error)
+    stable, unstable, undecided = (
+        tuple((1.0 - b, 1.0 - a) for a, b in reversed(part)) for part in (found.stable, found.unstable, found.undecided)
+    )
+    return Regions(stable, unstable, undecided)
 
 
 def critical_recovery_interval(
@@ -102,14 +106,33 @@ def critical_recovery_interval(
     """Where `critical_recovery_probability` of every pair within `relative` lies; an upper end of inf if r = 1 may be
     unstable.
     """
+    family = _bursts(open_loop, closed_loop, failure, relative)
+    found = regions(family.first, family.last, family.first_error, family.last_error)
+    exact = float("nan")
+    if len(family.first) <= LARGEST:
+        exact = float(critical_recovery_probability(open_loop, closed_loop, failure))
+    lower, upper = _narrowed(family, found, 1.0 - exact)
+    ends = (np.inf if upper == 0.0 else 1.0 - upper, np.inf if lower == 0.0 else 1.0 - lower)
+    return CriticalInterval(float(ends[0]), float(ends[1]), exact)
+
+
+def _narrowed(family: Family, found: Regions, crossing: float) -> tuple[float, float]:
+    """Certain bounds of the first crossing on the way up from 0, from regions and from a value that is near it."""
+    lower = found.stable[0][1] if found.stable and found.stable[0][0] == 0.0 else 0.0
+    upper = found.unstable[0][0] if found.unstable else 1.0
+    if 0.0 < lower < crossing < upper:
+        return stable_until(family, lower, crossing), unstable_from(family, crossing, upper)
+    return lower, upper
+
+
+def _bursts(open_loop: ArrayLike, closed_loop: ArrayLike, failure: float, relative: float) -> Family:
+    """From recovery 1 at x = 0 to recovery 0 at x = 1."""
     A0, A1 = _one_pair(open_loop, closed_loop)
-    found = recovery_regions(A0, A1, failure, relative)
-    upper = found.stable[-1][0] if found.stable and found.stable[-1][1] == 1.0 else np.inf
-    lower = found.unstable[-1][1] if found.unstable else 0.0
-    if lower == 1.0:
-        lower = np.inf
-    exact = exact_critical_recovery(A0, A1, failure) if 2 * _unknowns(A0) <= LARGEST else float("nan")
-    return CriticalInterval(float(lower), float(upper), exact)
+    always, never = (gilbert_elliott(A0, A1, failure, r) for r in (1.0, 0.0))
+    if never.batch_shape:
+        raise AnalysisError(f"regions are for one failure probability, not a batch {never.batch_shape}")
+    first, last = (_share(relative) * second_moment_operator(np.abs(s.modes), s.transition) for s in (always, never))
+    return Family(always.second_moment_operator, never.second_moment_operator, first, last, len(A0), 2)
 
 
 def _one_pair(open_loop: ArrayLike, closed_loop: ArrayLike) -> tuple[FloatArray, FloatArray]:

@@ -123,8 +123,8 @@ def _undecided(system: MarkovJumpSystem, place: tuple[int, ...]) -> str:
     lower, upper = (float(bound[place]) for bound in system.radius_bounds())
     where = f" of system {list(place)}" if place else ""
     return (
-        f"mean-square stability is undecided at this precision: the second-moment radius{where} lies between {lower:.9g} and "
-        f"{upper:.9g} for matrices that round to these; move the data off the border, or give more digits"
+        f"mean-square stability{where} is undecided at this precision: the second-moment radius lies between "
+        f"1 - {1.0 - lower:.1e} and 1 + {upper - 1.0:.1e} for matrices that round to these; give more digits"
     )
 
 
