@@ -46,9 +46,7 @@ class MarkovJumpProcess:
             raise AnalysisError(
                 f"generator has the shape {self.generator.shape} for {self.modes.shape[-3]} modes; it must be (..., m, m)"
             )
-        self.batch_shape = leading(
-            {"modes": self.modes.reshape(*self.modes.shape[:-2], -1), "generator": self.generator}
-        )
+        self.batch_shape = leading({"modes": self.modes[..., 0], "generator": self.generator})
 
     @cached_property
     def second_moment_operator(self) -> FloatArray:

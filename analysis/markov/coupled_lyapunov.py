@@ -132,8 +132,10 @@ def _solve(system: MarkovJumpSystem, source: FloatArray, *, transposed: bool) ->
     operator = system.second_moment_operator
     if transposed:
         operator = np.swapaxes(operator, -1, -2)  # svec is an isometry, so the transpose is the adjoint
-    vector = pack(source).reshape(*source.shape[:-3], -1)
+    vector = pack(source).reshape(*source.shape[:-3], operator.shape[-1])
     found: FloatArray = np.asarray(
         np.linalg.solve(np.eye(operator.shape[-1]) - operator, vector[..., None])[..., 0], float
     )
-    return unpack(found.reshape(*found.shape[:-1], system.mode_count, -1), system.size)
+    return unpack(
+        found.reshape(*found.shape[:-1], system.mode_count, system.size * (system.size + 1) // 2), system.size
+    )

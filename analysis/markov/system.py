@@ -59,8 +59,7 @@ class MarkovJumpSystem:
                 f"transition has the shape {self.transition.shape} for {count} modes of shape {self.modes.shape}; "
                 f"it must be (..., {count}, {count})"
             )
-        flat = self.modes.reshape(*self.modes.shape[:-2], -1)
-        self.batch_shape = leading({"modes": flat, "transition": self.transition})
+        self.batch_shape = leading({"modes": self.modes[..., 0], "transition": self.transition})
 
     @property
     def mode_count(self) -> int:
@@ -188,7 +187,7 @@ class MarkovJumpSystem:
         onward = np.swapaxes(self.transition, -1, -2)
         for k in range(len(out) - 1):
             moved = self.modes @ out[k] @ np.swapaxes(self.modes, -1, -2)
-            out[k + 1] = (onward @ moved.reshape(*moved.shape[:-2], -1)).reshape(moved.shape)
+            out[k + 1] = (onward @ moved.reshape(*moved.shape[:-2], self.size**2)).reshape(moved.shape)
         return out
 
     def initial_second_moment(self, second_moment: ArrayLike, mode_distribution: ArrayLike) -> FloatArray:
