@@ -52,6 +52,9 @@ def test_a_hidden_jordan_block_has_an_exact_answer_and_an_interval(size: int) ->
     found = critical_drop_interval(A0, A1)
     assert found.exact == 0.625 and found.lower < 0.625 < found.upper
     assert 1e-9 < found.upper - found.lower < (1e-3 if size == 2 else 0.05)
+    regions = drop_regions(A0, A1)
+    assert len(regions.stable) == len(regions.unstable) == len(regions.undecided) == 1
+    assert regions.stable[0][1] > 0.3 and regions.unstable[0][0] < 0.95
     for answer, p in ((Verdict.CERTIFIED, 0.3), (Verdict.INCONCLUSIVE, 0.625), (Verdict.REFUTED, 0.95)):
         assert drop_verdict(A0, A1, p) is answer
 

@@ -166,6 +166,13 @@ def test_empty_batches_are_empty_answers_and_the_worst_of_none_is_refused() -> N
             door(none)
 
 
+def test_growth_in_common_coordinates_is_twice_the_largest_eigenvalue() -> None:
+    """V' <= growth V for V = |T e|^2: diagonal modes, and T A T^-1 = [[-1, 2], [0, -1]], whose symmetric part reaches 0."""
+    assert common_growth([np.diag([-1.0, -3.0]), np.diag([-2.0, -0.5])], np.eye(2)) == pytest.approx(-1.0, abs=1e-15)
+    assert common_growth([[[-1.0, 1.0], [0.0, -1.0]]], np.diag([2.0, 1.0])) == pytest.approx(0.0, abs=1e-14)
+    assert common_growth([[[-1.0, 1.0], [0.0, -1.0]]], np.diag([1.0, 1.0])) == pytest.approx(-1.0, abs=1e-14)
+
+
 def test_public_chains_are_checked() -> None:
     np.testing.assert_allclose(stationary_distribution([[0.9, 0.1], [0.4, 0.6]]), [0.8, 0.2])
     with pytest.raises(AnalysisError, match=r"sums to 1\.1"):

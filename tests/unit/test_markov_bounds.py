@@ -217,7 +217,13 @@ def test_three_answers() -> None:
     np.testing.assert_array_equal(batch.is_mean_square_stable(), [True, False, False])
     for shift, answer in ((-1e-9, Verdict.CERTIFIED), (0.0, Verdict.INCONCLUSIVE), (1e-9, Verdict.REFUTED)):
         turning = np.array([[shift, 1.0], [-1.0, shift]])
-        assert MarkovJumpProcess([turning], [[0.0]]).verdict() is answer
+        process = MarkovJumpProcess([turning], [[0.0]])
+        assert process.verdict() is answer and bool(process.is_mean_square_stable()) is (answer is Verdict.CERTIFIED)
+    growing = MarkovJumpProcess([[[0.2]], [[0.3]]], [[-1.0, 1.0], [1.0, -1.0]])
+    assert not growing.is_mean_square_stable()
+    assert growing.second_moment_abscissa() == pytest.approx(
+        np.sqrt(1.01) - 0.5, abs=1e-14
+    )  # of [[-0.6, 1], [1, -0.4]]
 
 
 def test_nearly_defective_is_decided_where_the_family_is_regular() -> None:
