@@ -95,7 +95,8 @@ def limit_gain(A: FloatArray, C: FloatArray, arrival: float) -> tuple[FloatArray
     """The K = K'/a of least radius among Kalman gains K' for process noise from large to next to none, in balanced states."""
     scale = _output_scale(A, C)
     F, G, n = A * (scale[:, None] / scale), C / scale, A.shape[0]
-    best, least = np.zeros((n, C.shape[0])), np.inf
+    best = np.zeros((n, C.shape[0]))
+    least = float(static_gain_radius(A, C, best, arrival))
     for exponent in range(2, -25, -1) if arrival > 0.0 else ():
         try:
             X = solve_discrete_are(F.T, G.T, 10.0**exponent * np.eye(n), np.eye(C.shape[0]))

@@ -37,6 +37,7 @@ from analysis.drops.arrival_gains import (
     static_gain_radius,
 )
 from analysis.errors import AnalysisError
+from analysis.markov.enclosure import EPS
 from analysis.markov.second_moment import lifted, spectral_radius
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
@@ -104,7 +105,7 @@ def certify_static_gain(
         gain, radius = limit_gain(plant, output, a)
         if static_gain_certain(plant, output, gain, a):
             return StaticGain(Verdict.CERTIFIED, a, gain, radius)
-        return StaticGain(Verdict.REFUTED if a <= single else Verdict.INCONCLUSIVE, a, gain, radius)
+        return StaticGain(Verdict.REFUTED if a <= _sure_rate(plant) else Verdict.INCONCLUSIVE, a, gain, radius)
     X, gain = perron(plant, output, a)
     candidate = gain if method == "riccati" else lmi_gain(plant, output, a, settings)
     if candidate is not None:
@@ -204,6 +205,20 @@ def _single_output_rate(A: FloatArray, C: FloatArray) -> float | None:
     """1 - 1/prod |lambda_u|^2 for one output, None for several."""
     size = np.abs(np.linalg.eigvals(A))
     return 1.0 - 1.0 / float(np.prod(size[size > 1.0] ** 2)) if C.shape[0] == 1 else None
+
+
+def _sure_rate(A: FloatArray) -> float:
+    """1 - 1/prod |lambda_u|^2 with every modulus made smaller by what rounding may move it: Wilkinson's condition, or
+    [Elsner1985].
+    """
+    n, norm = len(A), float(np.linalg.norm(A))
+    values, vectors = np.linalg.eig(A)
+    error = 8.0 * n * EPS * norm
+    moved = np.full(n, (2.1 * norm) ** (1.0 - 1.0 / n) * error ** (1.0 / n))
+    if np.linalg.slogdet(vectors)[0] != 0.0:
+        moved = np.minimum(moved, error * np.linalg.norm(np.linalg.inv(vectors), axis=1))
+    size = np.abs(values) - moved
+    return 1.0 - 1.0 / float(np.prod(size[size > 1.0] ** 2))
 
 
 def _nondegenerate(A: FloatArray, C: FloatArray) -> tuple[bool, str]:

@@ -6,7 +6,7 @@ D)), E = I - R N and D the error of the data, so every member is regular if
 
     |(I - H)^-1| (|E| + |R| |D|) < 1 in norm,    |(I - H)^-1| <= prod_j (I + |H^(2^j)|) / (1 - |H^(2^J)|)
 
-(a preconditioned Neumann series, after Rump 1994; with powers, not powers of sizes, so that nearly defective families are not
+(a preconditioned Neumann series, after [Rump1994]; with powers, not powers of sizes, so that nearly defective families are not
 taken for singular ones). The radius of a cone-preserving operator is an eigenvalue of it (Krein and Rutman): in a regular
 family it cannot pass 1, so one member decides for all.
 """
