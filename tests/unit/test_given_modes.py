@@ -36,6 +36,7 @@ from analysis import (
 from analysis.checks import as_stack, positive, whole
 from analysis.errors import AnalysisError
 from analysis.labelled import Axis
+from analysis.markov.chain import distribution
 from analysis.perturbed import PerturbedModel
 from estimators.whole_files import UNFINISHED, whole_file, write_bytes
 from synthesis.models.lpv import LpvModel
@@ -171,6 +172,29 @@ def test_growth_in_common_coordinates_is_twice_the_largest_eigenvalue() -> None:
     assert common_growth([np.diag([-1.0, -3.0]), np.diag([-2.0, -0.5])], np.eye(2)) == pytest.approx(-1.0, abs=1e-15)
     assert common_growth([[[-1.0, 1.0], [0.0, -1.0]]], np.diag([2.0, 1.0])) == pytest.approx(0.0, abs=1e-14)
     assert common_growth([[[-1.0, 1.0], [0.0, -1.0]]], np.diag([1.0, 1.0])) == pytest.approx(-1.0, abs=1e-14)
+
+
+def test_the_constants_of_a_similarity_bound() -> None:
+    """eta1 = 2 (growth + eps/2), eta2 = |T B|^2 rho^2 / (2 eps): A = -I, B = 2 I, |rho| <= 3, eps = 1/2; doubled by T = 2 I."""
+    plain = similarity_bound(-np.eye(2), 2.0 * np.eye(2), np.eye(2), 3.0, 0.5)
+    assert (plain.eta1, plain.eta2, plain.growth) == pytest.approx((-1.5, 36.0, -1.0))
+    assert similarity_bound(-np.eye(2), 2.0 * np.eye(2), 2.0 * np.eye(2), 3.0, 0.5).eta2 == pytest.approx(144.0)
+    assert similarity_bound(-np.eye(2), 2.0 * np.eye(2), np.eye(2), 3.0).eta2 == pytest.approx(18.0)  # eps = |growth|
+    assert plain.energy(100.0, 1.0) == pytest.approx(24.0)  # -eta2 / eta1
+
+
+def test_a_growing_rotation_has_no_common_lyapunov_function() -> None:
+    """|eigenvalue|^2 = det = 1.21 with trace zero: Jury's second condition alone refuses it."""
+    turn = 1.1 * np.array([[0.0, 1.0], [-1.0, 0.0]])
+    assert str(exact_pair_test(turn, 0.5 * np.eye(2), True)) == "refuted"
+    assert str(exact_pair_test(0.8 * turn, 0.5 * np.eye(2), True)) == "certified"
+
+
+def test_printed_probabilities_are_made_to_sum_to_one() -> None:
+    found = distribution("start", [[0.25, 0.75 + 4e-10], [0.5, 0.5]], 2)
+    np.testing.assert_allclose(found.sum(axis=-1), 1.0, atol=1e-15)
+    np.testing.assert_allclose(found[1], 0.5, atol=1e-16)
+    assert found[0, 1] / found[0, 0] == pytest.approx((0.75 + 4e-10) / 0.25, rel=1e-15)
 
 
 def test_public_chains_are_checked() -> None:

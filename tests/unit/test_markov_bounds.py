@@ -192,6 +192,18 @@ def test_discs_hold_the_eigenvalues_of_all_matrices_within_the_error() -> None:
     assert ((part.lower <= real) & (real <= part.upper) & (part.upper - part.lower < 1e-9)).all()
 
 
+def test_discs_have_the_sums_of_rows_as_radii() -> None:
+    """diag(2, 1) is its own eigenbasis: an error in the first row widens the disc about 2, one in the second the disc about 1."""
+    error = np.array([[[0.0, 0.1], [0.0, 0.0]], [[0.0, 0.0], [0.1, 0.0]]])
+    found = enclosed(np.tile(np.diag([2.0, 1.0]), (2, 1, 1)), error)
+    np.testing.assert_allclose(found.upper, [2.1, 2.0], atol=1e-12)
+    np.testing.assert_allclose(found.lower, [1.9, 2.0], atol=1e-12)
+    joined = enclosed(
+        np.diag([2.0, 1.0]), 0.6 * np.ones((2, 2))
+    )  # both discs meet: the lower one may hold the eigenvalue
+    assert joined.lower <= 1e-12 and joined.upper == pytest.approx(3.2)
+
+
 def test_discs_of_a_rotated_jordan_block_are_as_wide_as_its_sensitivity() -> None:
     """An error e moves a double eigenvalue by sqrt(e): the enclosure must hold the worst of them."""
     U = ortho_group.rvs(2, random_state=4)
