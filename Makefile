@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: schedules test lint bench studies sweep clean
+.PHONY: schedules test lint bench mutants studies sweep clean
 
 schedules: $(STAMP)
 	$(BIN)/gainsmith schedules --out estimators/schedules
@@ -31,6 +31,12 @@ bench: $(STAMP)
 	$(BIN)/python -m pip install -qq --editable '.[bench]'
 	$(BIN)/pytest tests/bench --benchmark-only --benchmark-columns=min,median,max,rounds
 
+WHICH ?= analysis.drops.planar*
+mutants: $(STAMP)
+	$(BIN)/python -m pip install -qq --editable '.[mutants]'
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/mutmut run --max-children 2 '$(WHICH)'
+	$(BIN)/mutmut results
+
 $(STAMP): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "gainsmith needs python3 >= 3.11; set PYTHON=...")'
 	$(PYTHON) -m venv $(VENV)
@@ -39,4 +45,4 @@ $(STAMP): pyproject.toml
 	touch $@
 
 clean:
-	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .benchmarks
+	rm -rf $(VENV) mutants build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .benchmarks

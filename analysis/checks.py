@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 def as_stack(name: str, array: ArrayLike, ndim: int = 2) -> FloatArray:
     """The array as finite float64 with at least `ndim` axes, the last two of them a non-empty matrix.
 
-    Complex numbers, text, ragged lists, NaN and infinities raise AnalysisError with the first bad place.
+    Complex numbers, text, ragged lists, masked entries, NaN and infinities raise AnalysisError with the first bad place.
     """
     try:
         given = np.asarray(array)
-        if any(map(np.ma.is_masked, array if isinstance(array, list | tuple) else (array,))):
+        if _masked(array):
             raise AnalysisError(f"{name} has masked entries; fill or remove them before the analysis")
         if np.iscomplexobj(given):
             raise AnalysisError(f"{name} is complex; give real matrices (stack real and imaginary parts)")
@@ -34,6 +34,13 @@ def as_stack(name: str, array: ArrayLike, ndim: int = 2) -> FloatArray:
         raise AnalysisError(f"{name} has the shape {out.shape}; it needs at least {ndim} axes (..., rows, columns)")
     require_finite(name, out)
     return np.asarray(out)
+
+
+def _masked(array: object) -> bool:
+    """Whether a masked entry hides in an array, or in an array of a list: numpy drops masks without a word."""
+    if isinstance(array, list | tuple):
+        return any(_masked(part) for part in array)
+    return bool(np.ma.is_masked(array))
 
 
 def require_finite(name: str, array: FloatArray) -> None:
@@ -117,9 +124,20 @@ def probability(name: str, array: ArrayLike) -> FloatArray:
     return out
 
 
+def whole(name: str, value: float, least: int = 0) -> int:
+    """A whole number that is not below `least`."""
+    number = as_stack(name, value, ndim=0)
+    if number.ndim or number != np.round(number) or number < least:
+        raise AnalysisError(f"{name} = {value} must be a whole number of at least {least}")
+    return int(number)
+
+
 def positive(name: str, value: float) -> float:
     """A finite number above zero."""
-    number = float(as_stack(name, value, ndim=0))
+    given = as_stack(name, value, ndim=0)
+    if given.ndim:
+        raise AnalysisError(f"{name} has the shape {given.shape}; give one number")
+    number = float(given)
     if not number > 0.0:
         raise AnalysisError(f"{name} = {number:g} must be positive")
     return number

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, TypeAlias
 
-from flint import fmpq, fmpq_mat
+from flint import fmpq, fmpq_mat, fmpq_poly
 
 from estimators.arrays import FloatArray
 from synthesis.polynomials.rational import is_positive_definite, rational
@@ -47,3 +47,16 @@ def as_float_up(number: Any) -> float:
 def absolute(number: Any) -> Any:
     """|x| of a rational number."""
     return number if number >= fmpq(0) else -number
+
+
+def eigenvalues(matrix: Rational) -> list[Any]:
+    """Eigenvalues, once each, as certified balls (flint's acb); those that are real have the imaginary part 0."""
+    return [root for root, _ in fmpq_poly(matrix.charpoly().coeffs()).complex_roots()]
+
+
+def radius_below_one(matrix: FloatArray) -> bool | None:
+    """Whether all eigenvalues of a matrix (d, d), as it is stored, lie inside the unit circle; None for one that touches it."""
+    roots = eigenvalues(rationals(matrix))
+    if all(root.abs_upper() < 1 for root in roots):
+        return True
+    return False if any(root.abs_lower() > 1 for root in roots) else None

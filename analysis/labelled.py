@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
+from estimators.whole_files import write_bytes
 
 SCHEMA = "gainsmith.labelled/1"
 Labels: TypeAlias = FloatArray | NDArray[np.str_]
@@ -35,7 +35,8 @@ class Axis:
 class LabelledArray:
     """`values` with one named axis for each dimension, a unit, and notes (plain text and numbers) on where it comes from.
 
-    Raises AnalysisError if an axis is repeated or does not have as many labels as the array has places.
+    Values may be NaN (not known), and are stored as float64. Raises AnalysisError if an axis is repeated or does not have as many
+    labels as the array has places, and for complex or masked values, which would lose a part.
     """
 
     name: str
@@ -45,6 +46,12 @@ class LabelledArray:
     notes: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if np.iscomplexobj(self.values) or np.ma.is_masked(self.values):
+            kind = "complex" if np.iscomplexobj(self.values) else "masked"
+            raise AnalysisError(
+                f"'{self.name}' has {kind} values; store their parts, or NaN where a value is not known"
+            )
+        object.__setattr__(self, "values", np.asarray(self.values, dtype=float))
         lengths = tuple(len(axis.labels) for axis in self.axes)
         names = [axis.name for axis in self.axes]
         if lengths != self.values.shape or len(set(names)) != len(names):
@@ -89,10 +96,20 @@ class LabelledArray:
             "notes": _plain(dict(self.notes)),
             "sha256": hashlib.sha256(data).hexdigest(),
         }
-        text = json.dumps(head, indent=1, allow_nan=False) + "\n"  # before anything is written: notes may not be plain
+        try:
+            text = (
+                json.dumps(head, indent=1, allow_nan=False) + "\n"
+            )  # before anything is written: notes may not be plain
+        except (TypeError, ValueError) as error:
+            raise AnalysisError(
+                f"'{self.name}': notes hold what JSON has not ({error}); give texts, numbers and lists"
+            ) from None
         files = _pair(path)
-        _replace(files[0], data)
-        _replace(files[1], text.encode())
+        try:
+            for file, content in zip(files, (data, text.encode()), strict=True):
+                write_bytes(file, content)
+        except OSError as error:
+            raise AnalysisError(f"{files[0].parent}: cannot be written ({error.strerror or error})") from None
         return files
 
 
@@ -147,12 +164,3 @@ def _pair(path: str | Path) -> tuple[Path, Path]:
     if stem.suffix in {".npz", ".json"}:
         stem = stem.with_suffix("")
     return stem.with_name(stem.name + ".npz"), stem.with_name(stem.name + ".json")
-
-
-def _replace(path: Path, data: bytes) -> None:
-    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        beside.write_bytes(data)
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)

@@ -114,11 +114,11 @@ def error_measure(
     `fixed` values (wheel_speed = 141 numbers, say) become trailing axes of the result; samples are the leading axis.
     """
     L = checked_gain(family.model, gain)
-    held = {name: np.asarray(value, float) for name, value in fixed.items()}
+    held = {name: as_stack(name, value, ndim=0) for name, value in fixed.items()}
     trailing = np.broadcast_shapes(*(value.shape for value in held.values())) if held else ()
 
     def evaluate(samples: Mapping[str, FloatArray]) -> FloatArray:
-        shaped = {name: np.asarray(v, float).reshape(-1, *(1,) * len(trailing)) for name, v in samples.items()}
+        shaped = {name: as_stack(name, v, ndim=0).reshape(-1, *(1,) * len(trailing)) for name, v in samples.items()}
         return np.asarray(measure(*family.at(**held, **shaped).error_dynamics(L)))
 
     return evaluate

@@ -23,19 +23,21 @@ import numpy as np
 
 from analysis.checks import leading, probability, same_size, square
 from analysis.drops.balance import balanced
+from analysis.drops.crossing import REAL, largest_real
 from analysis.drops.planar import critical_planar
+from analysis.drops.rational import exact_critical_drop
+from analysis.drops.regions import Interval, regions
 from analysis.errors import AnalysisError
+from analysis.markov.enclosure import DATA, enclosed
 from analysis.markov.second_moment import lifted, spectral_radius
-from estimators.arrays import FloatArray
+from analysis.markov.system import LIFTED
+from analysis.mode_objects import state_matrices
+from estimators.arrays import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-# A real eigenvalue of a non-symmetric matrix comes out with an imaginary part of up to the square root of the rounding
-# error where it is nearly double.
-REAL = 1e-6
-# How far the radius at the answer may lie from 1 before the answer is refused.
-CHECK = 1e-6
+CHECK = 1e-6  # how far the radius at an answer may lie from 1
 ENDS = 1e-11  # crossings nearer to 0 or 1 than this are the ends themselves
 SINGULAR = 1e14  # condition from which a matrix counts as singular
 
@@ -57,43 +59,34 @@ def critical_drop_probability(open_loop: ArrayLike, closed_loop: ArrayLike) -> F
     """Smallest p in (0, 1] at which the radius of M(p) reaches 1, for stacks of pairs (..., n, n); exact up to rounding.
 
     0 where the received loop is not stable by itself. 1 where every p < 1 is mean-square stable (then p = 1 is too, if the
-    dropped loop is stable).
+    dropped loop is stable). Where rounding would show in the answer (nearly defective or marginal pairs) it is computed in
+    rational arithmetic for the entries as they are stored; `critical_drop_interval` then says how far the rounding of the
+    entries moves it.
 
-    Raises AnalysisError for matrices that are not square, not finite or do not fit, or if an answer fails its check.
+    Raises AnalysisError for matrices that are not square, not finite or do not fit, or for an ill-posed pair of more than 8
+    states.
     """
-    A0, A1 = balanced(*pair(open_loop, closed_loop))
-    if A0.shape[-1] == 2:
-        return critical_planar(A0, A1)
+    A0, A1 = np.broadcast_arrays(*balanced(*pair(open_loop, closed_loop)))
+    p, open_ = critical_planar(A0, A1) if A0.shape[-1] == 2 else _by_eigenvalues(A0, A1)
+    p = np.array(p)
+    for place in np.argwhere(open_):
+        at = tuple(place)
+        p[at] = exact_critical_drop(A0[at], A1[at])
+    return p
+
+
+def _by_eigenvalues(A0: FloatArray, A1: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Critical probabilities (...), and where rounding would show in them."""
     A, B = lifted(A0), lifted(A1)
-    A, B = np.broadcast_arrays(A, B)
-    stable = spectral_radius(A1) < 1.0
-    stable = np.broadcast_to(stable, A.shape[:-2])
+    inner = enclosed(A1, DATA * np.abs(A1))
+    stable = inner.upper < 1.0
+    clear = stable | (inner.lower >= 1.0)
     identity = np.eye(A.shape[-1])
-    left = np.where(stable[..., None, None], identity - B, identity)  # a placeholder where the answer is 0 anyway
-    mu = np.linalg.eigvals(np.linalg.solve(left, A - B))
-    real = np.abs(mu.imag) <= REAL * np.abs(mu)
-    largest = np.where(real, mu.real, 0.0).max(axis=-1)
+    clear &= ~stable | (np.linalg.slogdet(identity - B)[0] != 0.0)
+    left = np.where((stable & clear)[..., None, None], identity - B, identity)  # a placeholder where K is not needed
+    largest, doubtful = largest_real(np.asarray(np.linalg.solve(left, A - B), float), np.linalg.cond(left))
     p = np.where(stable, 1.0 / np.maximum(largest, 1.0), 0.0)
-    _check(A, B, p, crossing=stable & (largest > 1.0))
-    return np.asarray(p)
-
-
-def _check(
-    A: FloatArray, B: FloatArray, p: FloatArray, crossing: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
-) -> None:
-    """Refuse an answer at which the radius is not 1: the eigenvalues of K were too ill-conditioned."""
-    if not crossing.any():
-        return
-    at = p[crossing][:, None, None]
-    radius = spectral_radius(at * A[crossing] + (1.0 - at) * B[crossing])
-    worst = int(np.abs(radius - 1.0).argmax())
-    if not abs(radius[worst] - 1.0) <= CHECK:
-        place = [int(i) for i in np.argwhere(crossing)[worst]]
-        raise AnalysisError(
-            f"critical drop probability of pair {place}: the radius at p = {at[worst, 0, 0]:.6g} is {radius[worst]:.9g}, not 1; "
-            "balanced, the pair is still nearly defective, and "
-            "the rounding of its entries alone moves the answer: bracket it with drop_radius"
-        )
+    return p, ~clear | (stable & doubtful)
 
 
 def mean_square_stable_intervals(open_loop: ArrayLike, closed_loop: ArrayLike) -> tuple[tuple[float, float], ...]:
@@ -106,13 +99,27 @@ def mean_square_stable_intervals(open_loop: ArrayLike, closed_loop: ArrayLike) -
     if A0.ndim != 2 or A1.ndim != 2:
         raise AnalysisError(f"intervals are for one pair of matrices, not stacks {A0.shape}, {A1.shape}")
     A0, A1 = balanced(A0, A1)
-    return stable_intervals(lifted(A1), lifted(A0))
+    sizes = (LIFTED * lifted(np.abs(A)) for A in (A1, A0))
+    return stable_intervals(lifted(A1), lifted(A0), *sizes)
 
 
-def stable_intervals(first: FloatArray, last: FloatArray) -> tuple[tuple[float, float], ...]:
-    """Open intervals of x in [0, 1] on which the radius of (1 - x) first + x last is below 1, for cone-preserving operators."""
+def stable_intervals(
+    first: FloatArray, last: FloatArray, first_error: FloatArray, last_error: FloatArray
+) -> tuple[Interval, ...]:
+    """Open intervals of x in [0, 1] on which the radius of (1 - x) first + x last is below 1, for cone-preserving operators.
+
+    Where computed ends leave the cells in which rounding of the data lets them lie (`analysis.drops.regions`), the
+    intervals are those that are stable for all data within the errors.
+    """
+    found, sure = _float_intervals(first, last), regions(first, last, first_error, last_error)
+    held = all(any(a <= low and high <= b for a, b in found) for low, high in sure.stable)
+    apart = all(b <= low or high <= a for low, high in sure.unstable for a, b in found)
+    return found if held and apart else sure.stable
+
+
+def _float_intervals(first: FloatArray, last: FloatArray) -> tuple[Interval, ...]:
     cuts = [0.0, *crossings(first, last), 1.0]
-    pieces: list[tuple[float, float]] = []
+    pieces: list[Interval] = []
     for low, high in pairwise(cuts):
         middle, touch = (spectral_radius((1.0 - x) * first + x * last) for x in (0.5 * (low + high), low))
         if middle < 1.0:
@@ -142,8 +149,9 @@ def crossings(first: FloatArray, last: FloatArray) -> list[float]:
 
 
 def pair(open_loop: ArrayLike, closed_loop: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Both stacks, checked."""
-    A0, A1 = square("open_loop", open_loop), square("closed_loop", closed_loop)
+    """Both stacks, checked; discrete-time objects with A and dt give their A."""
+    first, second = (state_matrices(loop, discrete=True)[0] for loop in (open_loop, closed_loop))
+    A0, A1 = square("open_loop", first), square("closed_loop", second)
     same_size("open_loop", A0, "closed_loop", A1)
     leading({"open_loop": A0, "closed_loop": A1})
     return A0, A1

@@ -5,7 +5,7 @@ drops with probability p are f = p, r = 1 - p. With A = S(A0), B = S(A1) an eige
 
     x = (1 - f) B x + r A y,    y = f B x + (1 - r) A y,
 
-and, x eliminated (the received loop is stable, so I - (1 - f) B is regular),
+and, x eliminated (where r = 1 is stable, (1 - f) B is, so I - (1 - f) B is regular),
 
     det(I - A + r H A) = 0,    H = (I - B)(I - (1 - f) B)^-1.
 
@@ -21,10 +21,12 @@ import numpy as np
 
 from analysis.checks import probability
 from analysis.drops.balance import balanced
-from analysis.drops.frozen import CHECK, REAL, pair, stable_intervals
+from analysis.drops.crossing import largest_real
+from analysis.drops.frozen import CHECK, pair, stable_intervals
+from analysis.drops.rational import exact_critical_recovery
 from analysis.errors import AnalysisError
-from analysis.markov.second_moment import lifted, spectral_radius
-from analysis.markov.system import MarkovJumpSystem, second_moment_operator
+from analysis.markov.second_moment import lifted
+from analysis.markov.system import LIFTED, MarkovJumpSystem, second_moment_operator
 from estimators.arrays import FloatArray
 
 if TYPE_CHECKING:
@@ -66,11 +68,12 @@ def stability_region(
 def critical_recovery_probability(open_loop: ArrayLike, closed_loop: ArrayLike, failure: ArrayLike) -> FloatArray:
     """The boundary of the region: the recovery probability above which the system is mean-square stable.
 
-    For pairs (..., n, n) and failure probabilities that broadcast with (...). 0 where every r in (0, 1] is stable, inf where
-    r = 1 (one sample lost at a time) is not, or the received loop itself is not; `stable_recovery_intervals` then says whether
-    some smaller r is.
+    For pairs (..., n, n) and failure probabilities that broadcast with (...). 0 where every r in (0, 1] is stable, inf
+    where r = 1 (one sample lost at a time) is not; `stable_recovery_intervals` then says whether some smaller r is. Where
+    rounding would show in the answer it is computed in rational arithmetic for the entries as they are stored;
+    `critical_recovery_interval` then says how far the rounding of the entries moves it.
 
-    Raises AnalysisError for arguments that do not fit, probabilities outside [0, 1], or an answer that fails its check.
+    Raises AnalysisError for arguments that do not fit, probabilities outside [0, 1], or an ill-posed pair of more than 5 states.
     """
     A0, A1 = balanced(*pair(open_loop, closed_loop))
     f = probability("failure", failure)
@@ -78,30 +81,29 @@ def critical_recovery_probability(open_loop: ArrayLike, closed_loop: ArrayLike, 
         shape = np.broadcast_shapes(A0.shape[:-2], A1.shape[:-2], f.shape)
     except ValueError:
         raise AnalysisError(f"failure {f.shape} does not broadcast with the pairs {A0.shape}, {A1.shape}") from None
-    d = A0.shape[-1] * (A0.shape[-1] + 1) // 2
-    A, B = (np.broadcast_to(lifted(X), (*shape, d, d)) for X in (A0, A1))
-    f = np.broadcast_to(f, shape)
-    stable = spectral_radius(B) < 1.0
-    stable &= spectral_radius(_operator(A0, A1, f, np.ones(shape))) < 1.0
+    A0, A1 = (np.broadcast_to(X, (*shape, *X.shape[-2:])) for X in (A0, A1))
+    A, B, f = lifted(A0), lifted(A1), np.broadcast_to(f, shape)
+    always = gilbert_elliott(A0, A1, f, np.ones(shape)).radius_bounds()
+    stable = always[1] < 1.0
+    clear = stable | (always[0] >= 1.0)
     identity = np.eye(A.shape[-1])
-    safe = np.where(stable[..., None, None], 1.0, 0.0)  # zero systems stand in where the answer is inf anyway
+    safe = np.where((stable & clear)[..., None, None], 1.0, 0.0)  # zero systems stand in where K is not needed
     A, B = A * safe, B * safe
     # H = (I - B)(I - (1 - f) B)^-1; the factors commute.
-    H = np.linalg.solve(identity - (1.0 - f)[..., None, None] * B, identity - B)
-    mu = np.linalg.eigvals(np.linalg.solve(identity - A + H @ A, H @ A))
-    real = (np.abs(mu.imag) <= REAL * np.abs(mu)) & (mu.real > 1.0 + SURE)
-    largest = np.where(real, mu.real, 1.0).max(axis=-1)
-    critical = np.where(stable, 1.0 - 1.0 / largest, np.inf)
-    crossing = stable & (largest > 1.0)
+    inner = identity - (1.0 - f)[..., None, None] * B
+    H = np.linalg.solve(inner, identity - B)
+    pencil = identity - A + H @ A
+    K = np.asarray(np.linalg.solve(pencil, H @ A), float)
+    largest, doubtful = largest_real(K, np.linalg.cond(pencil) + np.linalg.cond(inner))
+    crossing = stable & (largest > 1.0 + SURE)
+    critical = np.array(np.where(stable, np.where(crossing, 1.0 - 1.0 / np.maximum(largest, 1.0), 0.0), np.inf))
     if crossing.any():
-        radius = spectral_radius(_operator(A0, A1, f, np.where(crossing, critical, 1.0)))[crossing]
-        if not (np.abs(radius - 1.0) <= CHECK).all():
-            raise AnalysisError(
-                f"critical recovery probability: the radius at an answer is {radius[np.abs(radius - 1.0).argmax()]:.9g}, not 1; "
-                "balanced, the pair is still nearly defective, and "
-                "the rounding of its entries alone moves the answer: bracket it with stability_region"
-            )
-    return np.asarray(critical)
+        radius = gilbert_elliott(A0, A1, f, np.where(crossing, critical, 1.0)).second_moment_radius()
+        doubtful |= crossing & ~(np.abs(radius - 1.0) <= CHECK)
+    for place in np.argwhere(~clear | (stable & doubtful)):
+        at = tuple(place)
+        critical[at] = exact_critical_recovery(A0[at], A1[at], float(f[at]))
+    return critical
 
 
 def stable_recovery_intervals(
@@ -116,9 +118,5 @@ def stable_recovery_intervals(
     never, always = (gilbert_elliott(A0, A1, failure, r) for r in (0.0, 1.0))
     if never.batch_shape:
         raise AnalysisError(f"intervals are for one pair and one failure probability, not a batch {never.batch_shape}")
-    return stable_intervals(never.second_moment_operator, always.second_moment_operator)
-
-
-def _operator(A0: FloatArray, A1: FloatArray, failure: FloatArray, recovery: FloatArray) -> FloatArray:
-    system = gilbert_elliott(A0, A1, failure, recovery)
-    return second_moment_operator(system.modes, system.transition)
+    sizes = [LIFTED * second_moment_operator(np.abs(s.modes), s.transition) for s in (never, always)]
+    return stable_intervals(never.second_moment_operator, always.second_moment_operator, *sizes)

@@ -25,30 +25,35 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
-from analysis.checks import as_stack, probability, square
-from analysis.constant_lmi import constant_problem, matrix_of
+from analysis.checks import probability
+from analysis.drops.arrival_gains import (
+    checked_plant,
+    limit_gain,
+    lmi_gain,
+    perron,
+    refutes,
+    static_gain_certain,
+    static_gain_radius,
+)
 from analysis.errors import AnalysisError
+from analysis.markov.enclosure import EPS
 from analysis.markov.second_moment import lifted, spectral_radius
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings
-from synthesis.lmi.solve import solve
-from synthesis.polynomials.matrix import symmetric_block
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 Method = Literal["riccati", "lmi"]
-SWEEPS = 20_000  # of the nonlinear power iteration
-GUARD = 1e-12  # relative, for the rounding of eigenvalues
 
 
 @dataclass(frozen=True)
 class StaticGain:
-    """Verdict on one arrival rate. CERTIFIED: `gain` K (n, k) has the radius `radius` < 1. REFUTED: no gain is stable."""
+    """Verdict on one arrival rate. CERTIFIED: `gain` K (n, k) has the radius `radius` < 1 for all data
+    that round to these. REFUTED: no gain is stable."""
 
     verdict: Verdict
     arrival: float
@@ -83,51 +88,39 @@ class KalmanArrival:
     static: CriticalArrival
 
 
-def static_gain_radius(A: ArrayLike, C: ArrayLike, gain: ArrayLike, arrival: ArrayLike) -> FloatArray:
-    """Radius of a S(A - K C) + (1 - a) S(A) for A (..., n, n), C (..., k, n), K (..., n, k) and a (...).
-
-    Raises AnalysisError for arrays that do not fit or rates outside [0, 1].
-    """
-    plant, output = _plant(A, C, ndim=None)
-    K, a = as_stack("gain", gain), probability("arrival", arrival)[..., None, None]
-    if K.shape[-2:] != (plant.shape[-1], output.shape[-2]):
-        raise AnalysisError(f"gain has the shape {K.shape}; it must be (..., {plant.shape[-1]}, {output.shape[-2]})")
-    return spectral_radius(a * lifted(plant - K @ output) + (1.0 - a) * lifted(plant))
-
-
 def certify_static_gain(
-    A: ArrayLike, C: ArrayLike, arrival: float, method: Method = "riccati", settings: LmiSettings | None = None
+    A: ArrayLike, C: ArrayLike | None, arrival: float, method: Method = "riccati", settings: LmiSettings | None = None
 ) -> StaticGain:
     """Whether some static gain is mean-square stable at this arrival rate.
 
     The gain comes from the nonlinear Perron problem (method "riccati") or from the LMI (method "lmi"), and is judged by its
     radius alone; a refutation is one matrix inequality by either method. Raises AnalysisError for matrices that do not fit.
     """
-    plant, output = _plant(A, C)
+    plant, output = checked_plant(A, C)
     a = float(probability("arrival", arrival))
     if method not in get_args(Method):
         raise AnalysisError(unknown("method", str(method), get_args(Method)))
     single = _single_output_rate(plant, output)
     if single is not None and method == "riccati":
-        gain, radius = _limit_gain(plant, output, a)
-        if radius < 1.0:
+        gain, radius = limit_gain(plant, output, a)
+        if static_gain_certain(plant, output, gain, a):
             return StaticGain(Verdict.CERTIFIED, a, gain, radius)
-        return StaticGain(Verdict.REFUTED if a <= single else Verdict.INCONCLUSIVE, a, gain, radius)
-    X, gain = _perron(plant, output, a)
+        return StaticGain(Verdict.REFUTED if a <= _sure_rate(plant) else Verdict.INCONCLUSIVE, a, gain, radius)
+    X, gain = perron(plant, output, a)
     candidate = gain if method == "riccati" else lmi_gain(plant, output, a, settings)
     if candidate is not None:
         gain, radius = candidate, float(static_gain_radius(plant, output, candidate, a))
-        if radius < 1.0:
+        if static_gain_certain(plant, output, gain, a):
             return StaticGain(Verdict.CERTIFIED, a, gain, radius)
     else:
         radius = float(static_gain_radius(plant, output, gain, a))
-    refuted = _refutes(plant, output, a, X)
+    refuted = refutes(plant, output, a, X)
     return StaticGain(Verdict.REFUTED if refuted else Verdict.INCONCLUSIVE, a, gain, radius)
 
 
 def static_critical_arrival(
     A: ArrayLike,
-    C: ArrayLike,
+    C: ArrayLike | None = None,
     tolerance: float = 1e-9,
     method: Method = "riccati",
     settings: LmiSettings | None = None,
@@ -137,7 +130,7 @@ def static_critical_arrival(
     0 for a stable A. Raises AnalysisError for matrices that do not fit, or a pair that no gain stabilises even if every
     measurement arrives (undetectable).
     """
-    plant, output = _plant(A, C)
+    plant, output = checked_plant(A, C)
     if not 0.0 < tolerance < 1.0:
         raise AnalysisError(f"tolerance = {tolerance} must lie between 0 and 1")
     none = np.zeros((plant.shape[0], output.shape[0]))
@@ -174,7 +167,7 @@ def static_critical_arrival(
 
 def kalman_critical_arrival(
     A: ArrayLike,
-    C: ArrayLike,
+    C: ArrayLike | None = None,
     tolerance: float = 1e-9,
     method: Method = "riccati",
     settings: LmiSettings | None = None,
@@ -184,7 +177,7 @@ def kalman_critical_arrival(
     Raises AnalysisError as `static_critical_arrival`. Noise covariances do not enter, as long as process noise reaches every
     unstable direction.
     """
-    plant, output = _plant(A, C)
+    plant, output = checked_plant(A, C)
     static = static_critical_arrival(plant, output, tolerance, method, settings)
     low = lower_bound(plant)
     exact, reason = _nondegenerate(plant, output)
@@ -194,44 +187,6 @@ def kalman_critical_arrival(
 def lower_bound(A: FloatArray) -> float:
     """max(0, 1 - 1/max|lambda|^2): below it, the gaps between measurements alone make the second moment diverge."""
     return max(0.0, 1.0 - 1.0 / max(float(spectral_radius(A)) ** 2, 1.0))
-
-
-def lmi_gain(A: FloatArray, C: FloatArray, arrival: float, settings: LmiSettings | None = None) -> FloatArray | None:
-    """K from the LMI at its largest margin, or None if the solver returns no numbers; evidence of nothing by itself."""
-    n, k = A.shape[0], C.shape[0]
-    scale = _output_scale(A, C)
-    F, G = A * (scale[:, None] / scale), C / scale
-    problem = constant_problem()
-    Y, Z = problem.symmetric("Y", n), problem.matrix("Z", n, k)
-    with_, without = Y @ problem.constant(F) + Z @ problem.constant(G), Y @ problem.constant(F)
-    rows = [[Y, with_ * arrival**0.5, without * (1.0 - arrival) ** 0.5], [None, Y, None], [None, None, Y]]
-    problem.require("Psi > 0", symmetric_block(rows))
-    problem.require("Y < 1", problem.constant(np.eye(n)) - Y, strict=False)
-    result = solve(problem, settings or LmiSettings(verify=False))
-    values, products = matrix_of(result.values["Y"]), matrix_of(result.values["Z"])
-    if not (np.isfinite(values).all() and np.isfinite(products).all()) or np.linalg.cond(values) > 1e12:
-        return None
-    return np.asarray(-np.linalg.solve(values, products) / scale[:, None])
-
-
-def _output_scale(A: FloatArray, C: FloatArray) -> FloatArray:
-    """State scaling (n,) by what each state adds to the outputs of n steps: the units of the states drop out."""
-    size = max(float(spectral_radius(A)), np.finfo(float).tiny)
-    rows, seen = C, np.zeros(A.shape[0])
-    for _ in range(A.shape[0]):
-        seen += (rows**2).sum(axis=0)
-        rows = rows @ A / size
-    visible = seen > 0.0
-    return np.sqrt(np.where(visible, seen, seen[visible].mean() if visible.any() else 1.0))
-
-
-def _plant(A: ArrayLike, C: ArrayLike, ndim: int | None = 2) -> tuple[FloatArray, FloatArray]:
-    plant, output = square("A", A), as_stack("C", C)
-    if plant.shape[-1] != output.shape[-1]:
-        raise AnalysisError(f"A has the shape {plant.shape} and C {output.shape}; C needs {plant.shape[-1]} columns")
-    if ndim is not None and (plant.ndim != ndim or output.ndim != ndim):
-        raise AnalysisError(f"A {plant.shape} and C {output.shape} are stacks; this takes one system at a time")
-    return plant, output
 
 
 def _require_detectable(A: FloatArray, C: FloatArray) -> None:
@@ -252,61 +207,18 @@ def _single_output_rate(A: FloatArray, C: FloatArray) -> float | None:
     return 1.0 - 1.0 / float(np.prod(size[size > 1.0] ** 2)) if C.shape[0] == 1 else None
 
 
-def _limit_gain(A: FloatArray, C: FloatArray, arrival: float) -> tuple[FloatArray, float]:
-    """The K = K'/a of least radius among Kalman gains K' for process noise from large to next to none, in balanced states."""
-    scale = _output_scale(A, C)
-    F, G, n = A * (scale[:, None] / scale), C / scale, A.shape[0]
-    best, least = np.zeros((n, C.shape[0])), np.inf
-    for exponent in range(2, -25, -1) if arrival > 0.0 else ():
-        try:
-            X = solve_discrete_are(F.T, G.T, 10.0**exponent * np.eye(n), np.eye(C.shape[0]))
-        except (np.linalg.LinAlgError, ValueError):
-            continue  # noise too small for this precision: the larger ones stand
-        gain = F @ X @ G.T @ np.linalg.inv(G @ X @ G.T + np.eye(C.shape[0])) / scale[:, None] / arrival
-        radius = float(static_gain_radius(A, C, gain, arrival)) if np.isfinite(gain).all() else np.inf
-        if radius < least:
-            best, least = gain, radius
-    return best, least
-
-
-def _optimal_gain(A: FloatArray, C: FloatArray, X: FloatArray) -> FloatArray:
-    innovation = C @ X @ C.T
-    return np.asarray(A @ X @ C.T @ np.linalg.pinv(innovation, rcond=1e-13, hermitian=True))
-
-
-def _step(A: FloatArray, C: FloatArray, arrival: float, X: FloatArray) -> FloatArray:
-    loop = A - _optimal_gain(A, C, X) @ C
-    out = arrival * loop @ X @ loop.T + (1.0 - arrival) * A @ X @ A.T
-    return np.asarray(0.5 * (out + out.T))
-
-
-def _perron(A: FloatArray, C: FloatArray, arrival: float) -> tuple[FloatArray, FloatArray]:
-    """A direction X of Phi_a (trace 1) and the gain that is optimal for it, by power iteration until they decide."""
-    n = A.shape[0]
-    X = np.eye(n) / n
-    for sweep in range(SWEEPS):
-        if (sweep & (sweep + 1)) == 0:  # at powers of two, so that looking costs little
-            gain = _optimal_gain(A, C, X)
-            if float(static_gain_radius(A, C, gain, arrival)) < 1.0 or _refutes(A, C, arrival, X):
-                return X, gain
-        following = _step(A, C, arrival, X)
-        size = float(np.trace(following))
-        if size <= 0.0:
-            break
-        # The average with the last direction damps eigenvalues of the same modulus (complex pairs, opposite signs).
-        following = 0.5 * (following / size + X)
-        change = float(np.abs(following - X).max())
-        X = following
-        if change <= 1e-15:
-            break
-    return X, _optimal_gain(A, C, X)
-
-
-def _refutes(A: FloatArray, C: FloatArray, arrival: float, X: FloatArray) -> bool:
-    """Whether X shows that no gain is stable: Phi_a(X) >= X >= 0 up to rounding, X != 0."""
-    low = float(np.linalg.eigvalsh(X)[0])
-    slack = float(np.linalg.eigvalsh(_step(A, C, arrival, X) - X)[0])
-    return low >= -GUARD * float(np.trace(X)) and slack >= -GUARD * float(np.trace(X))
+def _sure_rate(A: FloatArray) -> float:
+    """1 - 1/prod |lambda_u|^2 with every modulus made smaller by what rounding may move it: Wilkinson's condition, or
+    [Elsner1985].
+    """
+    n, norm = len(A), float(np.linalg.norm(A))
+    values, vectors = np.linalg.eig(A)
+    error = 8.0 * n * EPS * norm
+    moved = np.full(n, (2.1 * norm) ** (1.0 - 1.0 / n) * error ** (1.0 / n))
+    if np.linalg.slogdet(vectors)[0] != 0.0:
+        moved = np.minimum(moved, error * np.linalg.norm(np.linalg.inv(vectors), axis=1))
+    size = np.abs(values) - moved
+    return 1.0 - 1.0 / float(np.prod(size[size > 1.0] ** 2))
 
 
 def _nondegenerate(A: FloatArray, C: FloatArray) -> tuple[bool, str]:

@@ -19,6 +19,7 @@ import numpy as np
 from analysis.checks import probability
 from analysis.constant_lmi import constant_problem, matrix_of
 from analysis.drops.cells import ROUNDING, Cells, cell_updates, curvature, ends
+from analysis.drops.certain import drop_verdict
 from analysis.drops.frozen import drop_radius
 from analysis.drops.modes import schedule_drop_modes
 from analysis.drops.schedule import FrozenDropProbability, frozen_critical_probability
@@ -71,7 +72,7 @@ def mean_square_schedule(
     if p >= frozen.smallest:
         modes = schedule_drop_modes(schedule, frozen.place)
         radius = float(drop_radius(modes.dropped, modes.received, p))
-        if radius >= 1.0:
+        if drop_verdict(modes.dropped, modes.received, p) is Verdict.REFUTED:
             words = f"refuted: second-moment radius {radius:.6g} at {name} = {frozen.place:.6g} {unit}, standing still"
             return MeanSquareSchedule(Verdict.REFUTED, p, words, 1.0 - radius, frozen.place)
     for refinement in REFINEMENTS:

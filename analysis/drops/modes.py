@@ -25,6 +25,7 @@ from scipy.linalg import expm
 
 from analysis.checks import as_stack, leading, positive, square
 from analysis.errors import AnalysisError
+from analysis.mode_objects import with_output
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from estimators.schedule import GainSchedule, Update
@@ -51,13 +52,15 @@ class DropModes:
 
 def runtime_drop_modes(
     A: ArrayLike,
-    C: ArrayLike,
+    C: ArrayLike | None,
     gain: ArrayLike,
     sample_time: float,
     policy: DropPolicy = "coast",
     update: Update = "held",
 ) -> DropModes:
     """Both updates for A (..., n, n) in 1/s, C (..., k, n), gain L or K (..., n, k) and the sample time in s.
+
+    A continuous-time object in the place of A brings C, too: give None for it.
 
     Raises AnalysisError for arrays that do not fit or are not finite, a sample time that is not positive, an unknown policy or
     update.
@@ -66,6 +69,7 @@ def runtime_drop_modes(
         raise AnalysisError(unknown("drop policy", str(policy), get_args(DropPolicy)))
     if update not in get_args(Update):
         raise AnalysisError(unknown("update", str(update), get_args(Update)))
+    A, C = with_output(A, C, discrete=False)
     A, C, L = square("A", A), as_stack("C", C), as_stack("gain", gain)
     T = positive("sample_time", sample_time)
     n, k = A.shape[-1], C.shape[-2]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.checks import probability, square
+from analysis.checks import probability, square, whole
 from analysis.errors import AnalysisError
 from estimators.arrays import BoolArray, FloatArray, IntArray
 
@@ -71,12 +71,13 @@ def recurrent(transition: FloatArray) -> BoolArray:
     return np.asarray((~reach | np.swapaxes(reach, -1, -2)).all(axis=-1))
 
 
-def stationary_distribution(transition: FloatArray) -> FloatArray:
-    """pi = pi P with sum 1, shape (..., m); zero on transient modes.
+def stationary_distribution(transition: ArrayLike) -> FloatArray:
+    """pi = pi P with sum 1, shape (..., m) for transition matrices (..., m, m); zero on transient modes.
 
-    Raises AnalysisError if the chain has several closed classes (several absorbing modes): where it ends depends on where
-    it starts, and no single answer exists.
+    Raises AnalysisError for a matrix that is not stochastic, and if the chain has several closed classes (several absorbing
+    modes): where it ends depends on where it starts, and no single answer exists.
     """
+    transition = stochastic("transition", transition)
     reach, home = reachable(transition), recurrent(transition)
     apart = home[..., :, None] & home[..., None, :] & ~reach
     if apart.any():
@@ -111,9 +112,17 @@ def _eliminated(P: FloatArray) -> FloatArray:
 
 
 def sample_paths(
-    transition: FloatArray, start: FloatArray, steps: int, runs: int, generator: np.random.Generator
+    transition: ArrayLike, start: ArrayLike, steps: int, runs: int, generator: np.random.Generator
 ) -> IntArray:
-    """Modes (steps + 1, runs) of independent runs of one chain; `start` (m,) is the distribution of the first one."""
+    """Modes (steps + 1, runs) of independent runs of one chain (m, m); `start` (m,) is the distribution of the first one.
+
+    Raises AnalysisError for a batch of chains, and for numbers that are no probabilities or no counts.
+    """
+    transition = stochastic("transition", transition)
+    start = distribution("start", start, transition.shape[-1])
+    if transition.ndim != 2 or start.ndim != 1:
+        raise AnalysisError(f"transition {transition.shape} and start {start.shape} are stacks; paths are of one chain")
+    steps, runs = whole("steps", steps), whole("runs", runs)
     cumulative = np.cumsum(transition, axis=-1)
     modes = np.empty((steps + 1, runs), dtype=np.int64)
     last = transition.shape[-1] - 1

@@ -16,9 +16,13 @@ from scipy.linalg import expm
 from analysis.checks import as_stack, leading, positive, square
 from analysis.errors import AnalysisError
 from analysis.markov.chain import ROW_SUM_TOLERANCE, stationary_distribution
+from analysis.markov.enclosure import enclosed, verdicts
+from analysis.markov.power import abscissa_estimate
 from analysis.markov.second_moment import triangle
-from analysis.markov.system import MarkovJumpSystem
-from estimators.arrays import FloatArray
+from analysis.markov.system import LARGE, LIFTED, MarkovJumpSystem
+from analysis.mode_objects import state_matrices
+from estimators.arrays import AnyArray, BoolArray, FloatArray
+from synthesis.lmi.result import Verdict
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -28,7 +32,7 @@ class MarkovJumpProcess:
     """x' = A_i x with mode i following a Markov process.
 
     Args:
-        modes: A_1..A_m in 1/s, shape (..., m, n, n).
+        modes: A_1..A_m in 1/s, shape (..., m, n, n); or a list of continuous-time objects with A and dt.
         generator: rates in 1/s, shape (..., m, m); generator[i, j] is the rate of jumps from i to j, rows sum to 0.
 
     Raises:
@@ -36,30 +40,51 @@ class MarkovJumpProcess:
     """
 
     def __init__(self, modes: ArrayLike, generator: ArrayLike) -> None:
-        self.modes = square("modes", modes, ndim=3)
+        self.modes = square("modes", state_matrices(modes, discrete=False)[0], ndim=3)
         self.generator = _checked(generator)
         if self.generator.shape[-1] != self.modes.shape[-3]:
             raise AnalysisError(
                 f"generator has the shape {self.generator.shape} for {self.modes.shape[-3]} modes; it must be (..., m, m)"
             )
-        leading({"modes": self.modes.reshape(*self.modes.shape[:-2], -1), "generator": self.generator})
+        self.batch_shape = leading({"modes": self.modes[..., 0], "generator": self.generator})
 
     @cached_property
     def second_moment_operator(self) -> FloatArray:
         """Matrix (..., m d, m d), d = n(n+1)/2, with d/dt (svec X_1, ..., svec X_m) = operator (svec X_1, ...)."""
-        L = derivative_operator(self.modes)
-        m, d = L.shape[-3], L.shape[-1]
-        jumps = np.swapaxes(self.generator, -1, -2)[..., :, None, :, None] * np.eye(d)[:, None, :]
-        blocks = np.eye(m)[:, None, :, None] * np.moveaxis(L, -3, -2)[..., None, :, :, :] + jumps
-        return np.asarray(blocks.reshape(*blocks.shape[:-4], m * d, m * d))
+        return second_moment_flow(self.modes, self.generator)
 
     def second_moment_abscissa(self) -> FloatArray:
         """Largest real part of the eigenvalues in 1/s, shape of the batch: the rate at which E|x|^2 grows."""
-        return np.asarray(np.linalg.eigvals(self.second_moment_operator).real.max(axis=-1))
+        return self._estimates[0]
 
-    def is_mean_square_stable(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-        """Whether E|x|^2 tends to 0 from every start."""
-        return np.asarray(self.second_moment_abscissa() < 0.0)
+    def abscissa_bounds(self) -> tuple[FloatArray, FloatArray]:
+        """lower <= abscissa <= upper in 1/s, shape of the batch each, for all processes whose entries round to these."""
+        return self._estimates[1], self._estimates[2]
+
+    @cached_property
+    def _estimates(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        n, m = self.modes.shape[-1], self.modes.shape[-3]
+        if m * n * (n + 1) // 2 < LARGE:
+            size = second_moment_flow(np.abs(self.modes), np.abs(self.generator))
+            return enclosed(self.second_moment_operator, LIFTED * size, modulus=False)
+        modes = np.broadcast_to(self.modes, (*self.batch_shape, *self.modes.shape[-3:]))
+        generator = np.broadcast_to(self.generator, (*self.batch_shape, m, m))
+        out = np.empty((3, *self.batch_shape))
+        for place in np.ndindex(self.batch_shape):
+            out[(slice(None), *place)] = abscissa_estimate(modes[place], generator[place])
+        return out[0], out[1], out[2]
+
+    def verdict(self) -> Verdict | AnyArray:
+        """CERTIFIED: mean-square stable, REFUTED: not, INCONCLUSIVE: the abscissa is 0 to within what rounding of the data
+        moves it.
+
+        One verdict, or an object array of the batch's shape.
+        """
+        return verdicts(*self.abscissa_bounds(), border=0.0)
+
+    def is_mean_square_stable(self) -> BoolArray:
+        """Whether E|x|^2 tends to 0 from every start: abscissa < 0 for certain. False where `verdict` is INCONCLUSIVE."""
+        return np.asarray(self.abscissa_bounds()[1] < 0.0)
 
     @property
     def margin(self) -> FloatArray:
@@ -87,6 +112,15 @@ class MarkovJumpProcess:
         """
         h = positive("step", step)
         return MarkovJumpSystem(expm(self.modes * h), expm(self.generator * h))
+
+
+def second_moment_flow(modes: FloatArray, generator: FloatArray) -> FloatArray:
+    """Matrix of the derivative of (svec X_1, ..., svec X_m) for modes (..., m, n, n) and rates (..., m, m)."""
+    L = derivative_operator(modes)
+    m, d = L.shape[-3], L.shape[-1]
+    jumps = np.swapaxes(generator, -1, -2)[..., :, None, :, None] * np.eye(d)[:, None, :]
+    blocks = np.eye(m)[:, None, :, None] * np.moveaxis(L, -3, -2)[..., None, :, :, :] + jumps
+    return np.asarray(blocks.reshape(*blocks.shape[:-4], m * d, m * d))
 
 
 def derivative_operator(A: FloatArray) -> FloatArray:

@@ -24,7 +24,8 @@ from synthesis.polynomials.matrix import MatrixPolynomial
 class MeanSquareCertificate:
     """Verdict with the Lyapunov matrices (m, n, n) in the states as given, and the margins of the inequalities.
 
-    CERTIFIED: proved by these matrices. REFUTED: the second-moment radius is not below 1. INCONCLUSIVE: neither.
+    CERTIFIED: proved by these matrices. REFUTED: the second-moment radius is not below 1, for any
+    data that round to these. INCONCLUSIVE: neither.
     """
 
     verdict: Verdict
@@ -58,7 +59,7 @@ def mean_square_lmi(system: MarkovJumpSystem, settings: LmiSettings | None = Non
     verdict = result.verdict
     worst = result.tightest
     message = f'{verdict}: tightest "{worst.name}", margin {worst.value:.1e}; second-moment radius {radius:.6g}'
-    if verdict is not Verdict.CERTIFIED and radius >= 1.0:
+    if verdict is not Verdict.CERTIFIED and system.verdict() is Verdict.REFUTED:
         verdict, message = Verdict.REFUTED, f"refuted: second-moment radius {radius:.6g} is not below 1"
     return MeanSquareCertificate(verdict, message, values, result.margins, radius, result)
 

@@ -17,6 +17,7 @@ from analysis.errors import AnalysisError
 from analysis.markov.second_moment import pack, unpack
 from analysis.markov.system import MarkovJumpSystem
 from estimators.arrays import FloatArray
+from synthesis.lmi.result import Verdict
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -54,15 +55,18 @@ def expected_cost(
     """
     W = _per_mode(system, "weights", weights)
     X = system.initial_second_moment(second_moment, mode_distribution)
-    stable = system.is_mean_square_stable()
+    verdict = np.asarray(system.verdict())
+    stable = verdict == Verdict.CERTIFIED
     if stable.all():
         P = _solve(system, W, transposed=True)
         return np.asarray(np.einsum("...ikl,...ilk->...", P, X))
     if stable.ndim:
         raise AnalysisError(
-            f"{int((~stable).sum())} of {stable.size} systems are not mean-square stable (first at "
-            f"{[int(k) for k in np.argwhere(~stable)[0]]}); their cost is infinite or undefined: leave them out"
+            f"{int((~stable).sum())} of {stable.size} systems are not mean-square stable, or too close to the border to "
+            f"tell (first at {[int(k) for k in np.argwhere(~stable)[0]]}); their cost is infinite or undefined: leave them out"
         )
+    if verdict == Verdict.INCONCLUSIVE:
+        raise AnalysisError(_undecided(system, ()))
     # Both sums lie in the interior of the cone only if the start excites, and the weight sees, the growing direction.
     if _fills(system.second_moment_operator, X) and _fills(np.swapaxes(system.second_moment_operator, -1, -2), W):
         return np.asarray(np.inf)
@@ -101,21 +105,37 @@ def _per_mode(system: MarkovJumpSystem, name: str, array: ArrayLike) -> FloatArr
 
 
 def _require_stable(system: MarkovJumpSystem, consequence: str) -> None:
-    radius = system.second_moment_radius()
-    if not (radius < 1.0).all():
-        worst = np.unravel_index(int(radius.argmax()), radius.shape)
-        place = f" (system {[int(k) for k in worst]})" if worst else ""
+    verdict = np.asarray(system.verdict())
+    for bad in (Verdict.REFUTED, Verdict.INCONCLUSIVE):
+        if not (verdict == bad).any():
+            continue
+        worst = tuple(int(k) for k in np.argwhere(verdict == bad)[0])
+        if bad is Verdict.INCONCLUSIVE:
+            raise AnalysisError(_undecided(system, worst))
+        place = f" (system {list(worst)})" if worst else ""
+        radius = float(system.second_moment_radius()[worst])
         raise AnalysisError(
-            f"the system is not mean-square stable: second-moment radius {float(radius[worst]):.6g}{place}, so {consequence}"
+            f"the system is not mean-square stable: second-moment radius {radius:.6g}{place}, so {consequence}"
         )
+
+
+def _undecided(system: MarkovJumpSystem, place: tuple[int, ...]) -> str:
+    lower, upper = (float(bound[place]) for bound in system.radius_bounds())
+    where = f" of system {list(place)}" if place else ""
+    return (
+        f"mean-square stability{where} is undecided at this precision: the second-moment radius lies between "
+        f"1 - {1.0 - lower:.1e} and 1 + {upper - 1.0:.1e} for matrices that round to these; give more digits"
+    )
 
 
 def _solve(system: MarkovJumpSystem, source: FloatArray, *, transposed: bool) -> FloatArray:
     operator = system.second_moment_operator
     if transposed:
         operator = np.swapaxes(operator, -1, -2)  # svec is an isometry, so the transpose is the adjoint
-    vector = pack(source).reshape(*source.shape[:-3], -1)
+    vector = pack(source).reshape(*source.shape[:-3], operator.shape[-1])
     found: FloatArray = np.asarray(
         np.linalg.solve(np.eye(operator.shape[-1]) - operator, vector[..., None])[..., 0], float
     )
-    return unpack(found.reshape(*found.shape[:-1], system.mode_count, -1), system.size)
+    return unpack(
+        found.reshape(*found.shape[:-1], system.mode_count, system.size * (system.size + 1) // 2), system.size
+    )

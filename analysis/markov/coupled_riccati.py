@@ -76,7 +76,7 @@ def jump_regulator(
     residual = float(np.abs(riccati(A, B, Q, R, P, X) - X).max() / max(np.abs(X).max(), np.finfo(float).tiny))
     loop = MarkovJumpSystem(A + B @ F, P)
     radius = float(loop.second_moment_radius())
-    if not (radius < 1.0 and residual <= RESIDUAL):
+    if not (loop.is_mean_square_stable() and residual <= RESIDUAL):
         raise AnalysisError(
             f"coupled Riccati equations: residual {residual:.1e}, closed-loop radius {radius:.6g}; scale states and inputs"
         )

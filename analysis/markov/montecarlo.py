@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import norm
 
-from analysis.checks import as_stack
+from analysis.checks import as_stack, whole
 from analysis.errors import AnalysisError
 from analysis.markov.chain import distribution, sample_paths
 from analysis.markov.coupled_lmi import single
@@ -56,7 +56,8 @@ def check_second_moment(
 
     Raises AnalysisError for a batch of systems, fewer than 100 runs, or a confidence outside (0, 1).
     """
-    if runs < 100 or not 0.0 < confidence < 1.0:
+    steps = whole("steps", steps)
+    if whole("runs", runs) < 100 or not 0.0 < confidence < 1.0:
         raise AnalysisError(f"runs = {runs} must be at least 100 and confidence = {confidence} inside (0, 1)")
     A, P = single(system)
     x = as_stack("state", state, ndim=1)

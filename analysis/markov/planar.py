@@ -30,7 +30,7 @@ def planar_radius(operator: FloatArray) -> FloatArray:
         power = power / np.maximum(size, np.finfo(float).tiny)[:, None, None]
     X = power @ np.tile(IDENTITY, operator.shape[-1] // 3)
     Y = (scaled @ X[..., None])[..., 0]
-    lower, upper = _bounds(X.reshape(len(X), -1, 3), Y.reshape(len(X), -1, 3))
+    lower, upper = _bounds(X.reshape(len(X), operator.shape[-1] // 3, 3), Y.reshape(len(X), operator.shape[-1] // 3, 3))
     met = (upper - lower <= AGREEMENT * upper) & (lower > 0.0)
     return np.asarray(np.where(met, upper * scale, np.nan))
 

@@ -17,24 +17,33 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.checks import as_stack, leading, positive_semidefinite, square
+from analysis.checks import as_stack, leading, positive_semidefinite, square, whole
 from analysis.errors import AnalysisError
 from analysis.markov.chain import distribution, stationary_distribution, stochastic
+from analysis.markov.enclosure import DATA, EPS, enclosed, verdicts
 from analysis.markov.planar import planar_radius
-from analysis.markov.second_moment import lifted, pack, spectral_radius, unpack
-from estimators.arrays import FloatArray
+from analysis.markov.power import radius_estimate
+from analysis.markov.regular import radius_verdicts
+from analysis.markov.second_moment import lifted, spectral_radius
+from analysis.mode_objects import state_matrices
+from estimators.arrays import AnyArray, BoolArray, FloatArray
+from synthesis.lmi.result import Verdict
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 MANY = 256  # two-state systems from which repeated squaring beats eigenvalue problems
+LARGE = 150  # unknowns m n (n+1)/2 from which steps beat the operator as a matrix
+LIFTED = (
+    3.0 * DATA + 8.0 * EPS
+)  # relative error of an entry p_ij a_kl a_rs of the operator: rounded data, and products of them
 
 
 class MarkovJumpSystem:
     """x+ = A_i x with mode i following a Markov chain.
 
     Args:
-        modes: A_1..A_m, shape (..., m, n, n), any leading batch axes.
+        modes: A_1..A_m, shape (..., m, n, n), any leading batch axes; or a list of discrete-time objects with A and dt.
         transition: (..., m, m), transition[i, j] = Pr(next = j | now = i); leading axes broadcast with those of `modes`.
 
     Raises:
@@ -42,7 +51,7 @@ class MarkovJumpSystem:
     """
 
     def __init__(self, modes: ArrayLike, transition: ArrayLike) -> None:
-        self.modes = _frozen(square("modes", modes, ndim=3))
+        self.modes = _frozen(square("modes", state_matrices(modes, discrete=True)[0], ndim=3))
         self.transition = _frozen(stochastic("transition", transition))
         count = self.modes.shape[-3]
         if self.transition.shape[-1] != count:
@@ -50,8 +59,7 @@ class MarkovJumpSystem:
                 f"transition has the shape {self.transition.shape} for {count} modes of shape {self.modes.shape}; "
                 f"it must be (..., {count}, {count})"
             )
-        flat = self.modes.reshape(*self.modes.shape[:-2], -1)
-        self.batch_shape = leading({"modes": flat, "transition": self.transition})
+        self.batch_shape = leading({"modes": self.modes[..., 0], "transition": self.transition})
 
     @property
     def mode_count(self) -> int:
@@ -72,8 +80,42 @@ class MarkovJumpSystem:
         """Spectral radius of the second-moment operator, shape of the batch (a 0-d array without one)."""
         return self._radius
 
+    def radius_bounds(self) -> tuple[FloatArray, FloatArray]:
+        """lower <= radius <= upper, shape of the batch each, for all systems whose entries round to these.
+
+        By eigenvectors of the operator in discs (`analysis.markov.enclosure`), or for large systems by Collatz and
+        Wielandt's bounds (`analysis.markov.bracket`). Wide where the eigenvalue is nearly defective: rounding alone then
+        moves it that far.
+        """
+        return self._bounds
+
+    @cached_property
+    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+        if self._large:
+            return self._estimates[1], self._estimates[2]
+        operator = self.second_moment_operator
+        size = second_moment_operator(np.abs(self.modes), self.transition)
+        found = enclosed(operator, LIFTED * size)
+        return _frozen(found.lower), _frozen(found.upper)
+
+    @property
+    def _large(self) -> bool:
+        return self.mode_count * self.size * (self.size + 1) // 2 >= LARGE
+
+    @cached_property
+    def _estimates(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Radius, lower and upper bound of every system of a batch, without operators as matrices."""
+        modes = np.broadcast_to(self.modes, (*self.batch_shape, *self.modes.shape[-3:]))
+        transition = np.broadcast_to(self.transition, (*self.batch_shape, *self.transition.shape[-2:]))
+        out = np.empty((3, *self.batch_shape))
+        for place in np.ndindex(self.batch_shape):
+            out[(slice(None), *place)] = radius_estimate(modes[place], transition[place])
+        return _frozen(out[0]), _frozen(out[1]), _frozen(out[2])
+
     @cached_property
     def _radius(self) -> FloatArray:
+        if self._large:
+            return self._estimates[0]
         operator = self.second_moment_operator
         if self.size != 2 or self.mode_count < 2 or math.prod(self.batch_shape) < MANY:
             return _frozen(spectral_radius(operator))
@@ -84,9 +126,27 @@ class MarkovJumpSystem:
             radius[unmet] = spectral_radius(flat[unmet])
         return _frozen(radius.reshape(self.batch_shape))
 
-    def is_mean_square_stable(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-        """Whether E|x|^2 tends to 0 from every start and every initial mode (P3 Definition 1): radius < 1."""
-        return np.asarray(self._radius < 1.0)
+    def verdict(self) -> Verdict | AnyArray:
+        """CERTIFIED: mean-square stable, REFUTED: not, INCONCLUSIVE: the radius is 1 to within what rounding of the data
+        moves it.
+
+        One verdict, or an object array of the batch's shape.
+        """
+        return self._verdict
+
+    @cached_property
+    def _verdict(self) -> Verdict | AnyArray:
+        if self._large:
+            return verdicts(*self.radius_bounds())
+        size = second_moment_operator(np.abs(self.modes), self.transition)
+        return radius_verdicts(self.second_moment_operator, LIFTED * size)
+
+    def is_mean_square_stable(self) -> BoolArray:
+        """Whether E|x|^2 tends to 0 from every start and every initial mode (P3 Definition 1): radius < 1 for certain.
+
+        False where it is not, and where it cannot be decided at this precision: `verdict` tells them apart.
+        """
+        return np.asarray(np.asarray(self._verdict) == Verdict.CERTIFIED)
 
     @property
     def margin(self) -> FloatArray:
@@ -110,7 +170,7 @@ class MarkovJumpSystem:
         mean = np.broadcast_to(mean, np.broadcast_shapes(mean.shape, (*self.batch_shape, self.mode_count, self.size)))
         out = np.empty((_steps(steps) + 1, *mean.shape))
         out[0] = mean
-        for k in range(steps):
+        for k in range(len(out) - 1):
             moved = (self.modes @ out[k][..., None])[..., 0]
             out[k + 1] = np.swapaxes(self.transition, -1, -2) @ moved
         return out
@@ -121,13 +181,14 @@ class MarkovJumpSystem:
         `second_moment` (..., n, n) is E[x x'] at the start, independent of the initial mode.
         """
         X = self.initial_second_moment(second_moment, mode_distribution)
-        vector = pack(X).reshape(*X.shape[:-3], -1)
-        vector = np.broadcast_to(vector, np.broadcast_shapes(vector.shape, (*self.batch_shape, vector.shape[-1])))
-        out = np.empty((_steps(steps) + 1, *vector.shape))
-        out[0] = vector
-        for k in range(steps):
-            out[k + 1] = (self.second_moment_operator @ out[k][..., None])[..., 0]
-        return unpack(out.reshape(*out.shape[:-1], self.mode_count, -1), self.size)
+        shape = (*self.batch_shape, self.mode_count, self.size, self.size)
+        out = np.empty((_steps(steps) + 1, *np.broadcast_shapes(X.shape, shape)))
+        out[0] = X
+        onward = np.swapaxes(self.transition, -1, -2)
+        for k in range(len(out) - 1):
+            moved = self.modes @ out[k] @ np.swapaxes(self.modes, -1, -2)
+            out[k + 1] = (onward @ moved.reshape(*moved.shape[:-2], self.size**2)).reshape(moved.shape)
+        return out
 
     def initial_second_moment(self, second_moment: ArrayLike, mode_distribution: ArrayLike) -> FloatArray:
         """X_j(0) = pi_j E[x x'], shape (..., m, n, n)."""
@@ -148,7 +209,7 @@ def second_moment_operator(modes: FloatArray, weights: FloatArray) -> FloatArray
 
 def independent(modes: ArrayLike, probabilities: ArrayLike) -> MarkovJumpSystem:
     """Modes drawn independently at every step: every row of the transition matrix is the distribution (P3 (25))."""
-    stack = square("modes", modes, ndim=3)
+    stack = square("modes", state_matrices(modes, discrete=True)[0], ndim=3)
     pi = distribution("probabilities", probabilities, stack.shape[-3])
     return MarkovJumpSystem(stack, np.repeat(pi[..., None, :], stack.shape[-3], axis=-2))
 
@@ -160,6 +221,4 @@ def _frozen(array: FloatArray) -> FloatArray:
 
 
 def _steps(steps: int) -> int:
-    if steps < 0:
-        raise AnalysisError(f"steps = {steps} must not be negative")
-    return int(steps)
+    return whole("steps", steps)

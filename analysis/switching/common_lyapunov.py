@@ -20,7 +20,7 @@ from analysis.checks import square
 from analysis.constant_lmi import constant_problem, matrix_of
 from analysis.errors import AnalysisError
 from analysis.exact import Rational, congruence, is_positive, rationals, total
-from analysis.state_space import flag
+from analysis.mode_objects import state_matrices
 from estimators.arrays import FloatArray, IndexArray
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import Verdict
@@ -47,16 +47,16 @@ class CommonLyapunov:
     margin: float
 
 
-def common_quadratic_lyapunov(modes: ArrayLike, discrete: bool = False) -> CommonLyapunov:
-    """Decide whether the modes (m, n, n) share a quadratic Lyapunov function.
+def common_quadratic_lyapunov(modes: ArrayLike, discrete: bool | None = None) -> CommonLyapunov:
+    """Decide whether the modes, (m, n, n) or a list of objects with A and dt, share a quadratic Lyapunov function.
 
     Modes that are block triangular in the given states share one if and only if their diagonal blocks do (P is put
     together with growing weights), so decoupled states are taken one block at a time. Raises AnalysisError for modes that
     are not finite square matrices of one size. A common one proves stability under arbitrary switching; none proves
     nothing about it (see `joint_spectral_radius`).
     """
-    flag("discrete", discrete)
-    A = square("modes", modes, ndim=3)
+    matrices, discrete = state_matrices(modes, discrete)
+    A = square("modes", matrices, ndim=3)
     if A.ndim != 3 or not len(A):
         raise AnalysisError(f"modes have the shape {A.shape}; give one stack (m, n, n) of at least one mode")
     blocks = coupled_blocks(A)
@@ -101,8 +101,8 @@ def _decide(A: FloatArray, block: IndexArray, discrete: bool) -> CommonLyapunov:
         message = "refuted: multipliers X exclude every common P, in exact arithmetic"
         return CommonLyapunov(Verdict.REFUTED, message, None, X / scale[:, None] / scale, states, dual)
     message = (
-        f"inconclusive: best margins {primal:.1e} for a common P and {dual:.1e} against one; the modes are at the boundary to "
-        "within rounding"
+        f"inconclusive: best margins {primal:.1e} for a common P and {dual:.1e} against one, and neither is proved in exact "
+        "arithmetic; the modes are near the boundary, or in units too far apart"
     )
     return CommonLyapunov(Verdict.INCONCLUSIVE, message, None, None, states, max(primal, dual))
 

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from analysis.checks import positive, square
 from analysis.errors import AnalysisError
+from analysis.mode_objects import state_matrices
 from analysis.switching.jsr_ellipsoid import Ellipsoid, best_ellipsoid
 from analysis.switching.jsr_polytope import grow_polytope, proved_polytope_bound
 from analysis.switching.jsr_products import multiply_out, proved_rate, search_products, vanishes
@@ -55,10 +56,12 @@ def joint_spectral_radius(
 ) -> JointSpectralRadius:
     """A proved bracket of the joint spectral radius of modes (m, n, n), with relative width `tolerance` where it closes.
 
+    Modes may be a list of discrete-time objects with A and dt.
+
     `depth` bounds the length of products in the search, `most_vertices` the polytope (4000 in the plane, 250 above, where
     each gauge is a linear program). Raises AnalysisError for modes that are not finite square matrices of one size.
     """
-    A = square("modes", modes, ndim=3)
+    A = square("modes", state_matrices(modes, discrete=True)[0], ndim=3)
     if A.ndim != 3 or not len(A):
         raise AnalysisError(f"modes have the shape {A.shape}; give one stack (m, n, n) of at least one mode")
     tolerance = positive("tolerance", tolerance)

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from flint import fmpq, fmpq_mat
-from scipy.linalg import qr
-from scipy.optimize import linprog
 
 from analysis.exact import absolute, as_float_up, rationals
-from estimators.arrays import FloatArray, IndexArray
+from analysis.switching.jsr_gauge import corner_index, gauge_and_support
+from estimators.arrays import FloatArray
 
 LARGE = 1e6  # vertices this far out in units of the start: the modes do not contract
 SMALL = 1e-3  # size of the axis vectors that make the polytope solid
@@ -53,22 +52,6 @@ def grow_polytope(modes: FloatArray, start: FloatArray, most: int) -> Growth:
     return Growth(vertices, False, number)
 
 
-def gauge_and_support(vertices: FloatArray, points: FloatArray) -> tuple[FloatArray, IndexArray]:
-    """min |w|_1 with sum_k w_k v_k = x for each point (g, n), and n independent vertices that carry it: (g,), (g, n)."""
-    if vertices.shape[1] == 2:
-        return _planar_gauge(vertices, points)
-    gauge, support = np.empty(len(points)), np.empty((len(points), vertices.shape[1]), dtype=np.intp)
-    both = np.concatenate([vertices, -vertices]).T
-    for i, point in enumerate(points):
-        scale = np.abs(point).max() or 1.0
-        found = linprog(np.ones(both.shape[1]), A_eq=both, b_eq=point / scale, method="highs-ds")
-        solved = found.status == 0
-        weights = np.asarray(found.x, float) if solved else np.zeros(both.shape[1])
-        gauge[i] = weights.sum() * scale if solved else np.inf
-        support[i] = _basis(vertices, weights[: len(vertices)] + weights[len(vertices) :])
-    return gauge, support
-
-
 def proved_polytope_bound(modes: FloatArray, vertices: FloatArray) -> float:
     """max over modes and vertices of |w|_1 with A_i v_j = sum_k w_k v_k, in exact rational arithmetic, rounded up.
 
@@ -95,45 +78,8 @@ def proved_polytope_bound(modes: FloatArray, vertices: FloatArray) -> float:
     return as_float_up(worst)
 
 
-def _planar_gauge(vertices: FloatArray, points: FloatArray) -> tuple[FloatArray, IndexArray]:
-    """In the plane a point lies in the cone of two neighbouring corners of the polygon."""
-    order = _corner_index(vertices)
-    ring = _upper(vertices[order])
-    angle = np.arctan2(ring[:, 1], ring[:, 0])
-    turn = np.argsort(angle, kind="stable")
-    order, ring, angle = order[turn], ring[turn], angle[turn]
-    seen = _upper(points)
-    place = np.searchsorted(angle, np.arctan2(seen[:, 1], seen[:, 0]), side="right")
-    after = place % len(order)
-    before = (place - 1) % len(order)
-    first = ring[before] * np.where(place == 0, -1.0, 1.0)[:, None]
-    second = ring[after] * np.where(place == len(order), -1.0, 1.0)[:, None]
-    det = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        one = (seen[:, 0] * second[:, 1] - seen[:, 1] * second[:, 0]) / det
-        two = (first[:, 0] * seen[:, 1] - first[:, 1] * seen[:, 0]) / det
-    return np.abs(one) + np.abs(two), np.stack([order[before], order[after]], axis=1)
-
-
-def _upper(points: FloatArray) -> FloatArray:
-    """x or -x in the half-plane of angles [0, pi)."""
-    flip = (points[:, 1] < 0.0) | ((points[:, 1] == 0.0) & (points[:, 0] < 0.0))
-    return np.where(flip[:, None], -points, points)
-
-
-def _corner_index(vertices: FloatArray) -> IndexArray:
-    """Indices of the corners of conv(+-v), by a monotone chain on the doubled set."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        hull = ConvexHull(np.concatenate([vertices, -vertices])).vertices
-    except QhullError:
-        return np.arange(len(vertices))
-    return np.unique(hull % len(vertices))
-
-
 def _corners(vertices: FloatArray) -> FloatArray:
-    return vertices[_corner_index(vertices)]
+    return vertices[corner_index(vertices)]
 
 
 def _outer(points: FloatArray) -> FloatArray:
@@ -142,15 +88,3 @@ def _outer(points: FloatArray) -> FloatArray:
         return points
     sign = np.sign(points[np.arange(len(points)), np.abs(points).argmax(axis=1)])
     return np.asarray(np.unique(np.round(points * sign[:, None], 13), axis=0))
-
-
-def _basis(vertices: FloatArray, weights: FloatArray) -> IndexArray:
-    """n independent vertices, those with weight first."""
-    size = vertices.shape[1]
-    carrying = np.flatnonzero(np.abs(weights) > 1e-12)
-    if len(carrying) == size:
-        return carrying
-    _, _, pivots = qr(
-        (vertices * np.where(np.abs(weights) > 1e-12, 1e6, 1.0)[:, None]).T, mode="economic", pivoting=True
-    )
-    return np.asarray(pivots[:size])

@@ -42,13 +42,38 @@ def search_products(modes: FloatArray, tolerance: float, depth: int) -> Search:
         products = np.einsum("aij,gjk->gaik", modes, products[keep]).reshape(-1, *modes.shape[1:])
         letters = np.tile(np.arange(len(modes)), len(keep))[:, None]
         words = np.concatenate([np.repeat(words[keep], len(modes), axis=0), letters], axis=1)
-        size = np.linalg.norm(products, 2, axis=(-2, -1))
-        bound = np.minimum(np.repeat(bound[keep], len(modes)), size ** (1.0 / length))
-        radii = np.abs(np.linalg.eigvals(products)).max(axis=-1) ** (1.0 / length)
-        best = int(radii.argmax())
-        if radii[best] > rate * (1.0 + 1e-12):  # a power of the same product does not count
-            word, rate = tuple(int(i) for i in words[best]), float(radii[best])
+        found = _fastest(products, length, rate)
+        if found is not None:
+            word, rate = tuple(int(i) for i in words[found[0]]), found[1]
+        bound = np.minimum(np.repeat(bound[keep], len(modes)), _rates(products, length, rate * (1.0 + tolerance)))
     return Search(word, rate, not len(_open(bound, rate, tolerance)), depth)
+
+
+def _fastest(products: FloatArray, length: int, rate: float) -> tuple[int, float] | None:
+    """The product whose eigenvalues beat `rate`, if any, with its own rate; eigenvalues only where |P^4|^(1/4) lets them."""
+    least = rate * (1.0 + 1e-12)  # a power of the same product does not count
+    size = np.maximum(_frobenius(products), np.finfo(float).tiny)
+    fourth = products / size[:, None, None]
+    fourth = fourth @ fourth
+    fourth = fourth @ fourth
+    hopeful = np.flatnonzero((size * _frobenius(fourth) ** 0.25) ** (1.0 / length) > least * (1.0 - 1e-9))
+    if not len(hopeful):
+        return None
+    radii = np.abs(np.linalg.eigvals(products[hopeful])).max(axis=-1) ** (1.0 / length)
+    best = int(radii.argmax())
+    return (int(hopeful[best]), float(radii[best])) if radii[best] > least else None
+
+
+def _rates(products: FloatArray, length: int, enough: float) -> FloatArray:
+    """|P|^(1/length) in the Euclidean norm; where Frobenius' norm is below `enough` already, that."""
+    out = _frobenius(products) ** (1.0 / length)
+    open_ = np.flatnonzero(out > enough)
+    out[open_] = np.linalg.norm(products[open_], 2, axis=(-2, -1)) ** (1.0 / length)
+    return out
+
+
+def _frobenius(products: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.einsum("gij,gij->g", products, products)))
 
 
 def _open(bound: FloatArray, rate: float, tolerance: float) -> IndexArray:

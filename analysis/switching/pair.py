@@ -14,19 +14,18 @@ from numpy.typing import ArrayLike
 from analysis.checks import leading, square
 from analysis.errors import AnalysisError
 from analysis.exact import Rational, rationals
-from analysis.state_space import flag
+from analysis.mode_objects import state_matrices
 from estimators.arrays import FloatArray
 from synthesis.lmi.result import Verdict
 
 
-def pair_margin(first: ArrayLike, second: ArrayLike, discrete: bool = False) -> FloatArray:
+def pair_margin(first: ArrayLike, second: ArrayLike, discrete: bool | None = None) -> FloatArray:
     r"""min over both products of 1 + trace(M)/(2 sqrt(det M)): positive if and only if a common P exists.
 
     Stacks (..., 2, 2) whose leading axes broadcast; an unstable mode gives -inf. In floating point:
     use `exact_pair_test` where the value is at rounding level. Raises AnalysisError for modes that are not 2 x 2.
     """
-    flag("discrete", discrete)
-    A1, A2 = _two_by_two(first, second)
+    A1, A2, discrete = _two_by_two(first, second, discrete)
     shape = leading({"first": A1, "second": A2})
     A1, A2 = (np.broadcast_to(A, (*shape, 2, 2)) for A in (A1, A2))
     stable = np.ones(shape, dtype=bool)
@@ -46,13 +45,12 @@ def pair_margin(first: ArrayLike, second: ArrayLike, discrete: bool = False) -> 
     return np.where(stable, 1.0 + np.minimum(*traces) / (2.0 * root), -np.inf)
 
 
-def exact_pair_test(first: ArrayLike, second: ArrayLike, discrete: bool = False) -> Verdict:
+def exact_pair_test(first: ArrayLike, second: ArrayLike, discrete: bool | None = None) -> Verdict:
     """CERTIFIED: a common quadratic Lyapunov function exists; REFUTED: none does. In exact rational arithmetic.
 
     One pair of 2 x 2 modes, read bit for bit; the boundary itself is REFUTED, as the inequalities are strict.
     """
-    flag("discrete", discrete)
-    A1, A2 = _two_by_two(first, second)
+    A1, A2, discrete = _two_by_two(first, second, discrete)
     if A1.ndim != 2 or A2.ndim != 2:
         raise AnalysisError("the exact test takes one pair of 2 x 2 modes; use pair_margin for stacks")
     exact = [rationals(A) for A in (A1, A2)]
@@ -69,11 +67,15 @@ def exact_pair_test(first: ArrayLike, second: ArrayLike, discrete: bool = False)
     return Verdict.CERTIFIED
 
 
-def _two_by_two(first: ArrayLike, second: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    A1, A2 = square("first mode", first), square("second mode", second)
+def _two_by_two(first: ArrayLike, second: ArrayLike, discrete: bool | None) -> tuple[FloatArray, FloatArray, bool]:
+    """Both modes, of arrays or of objects with A and dt, and whether time is discrete."""
+    (one, time), (two, other) = (state_matrices(mode, discrete) for mode in (first, second))
+    if time != other:
+        raise AnalysisError("one mode is continuous and one discrete; a switched system has one kind of time")
+    A1, A2 = square("first mode", one), square("second mode", two)
     if A1.shape[-1] != 2 or A2.shape[-1] != 2:
         raise AnalysisError(f"the exact test is for 2 states, not {A1.shape[-1]} and {A2.shape[-1]}")
-    return A1, A2
+    return A1, A2, time
 
 
 def _bilinear(A: FloatArray) -> FloatArray:

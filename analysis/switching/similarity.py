@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from analysis.checks import as_stack, positive, square
 from analysis.errors import AnalysisError
+from analysis.mode_objects import state_matrices
 from estimators.arrays import FloatArray
 
 
@@ -36,8 +37,8 @@ class SimilarityBound:
 
     def energy(self, time: ArrayLike, initial: float) -> FloatArray:
         """Bound on V(t) from V(0) (17): e^(eta1 t)(V(0) + eta2/eta1) - eta2/eta1; grows linearly for eta1 = 0."""
-        t = np.asarray(time, float)
-        if (t < 0.0).any() or initial < 0.0:
+        t = as_stack("time", time, ndim=0)
+        if (t < 0.0).any() or not initial >= 0.0:
             raise AnalysisError("time and initial energy must not be negative")
         if self.eta1 == 0.0:
             return np.asarray(initial + self.eta2 * t)
@@ -62,8 +63,11 @@ class DiagonalTransform:
 
 
 def symmetric_growth(A: ArrayLike, T: ArrayLike | None = None) -> FloatArray:
-    """lambda_max of the symmetric part of T A T^-1 for a stack A (..., n, n): the growth rate of |T e| in 1/s."""
-    moved = square("A", A)
+    """lambda_max of the symmetric part of T A T^-1 for a stack A (..., n, n): the growth rate of |T e| in 1/s.
+
+    A may be a continuous-time object with A and dt, or a list of such, here and below.
+    """
+    moved = _matrices("A", A)
     if T is not None:
         moved = _transformed(moved, T)
     return np.asarray(np.linalg.eigvalsh(0.5 * (moved + np.swapaxes(moved, -1, -2)))[..., -1])
@@ -78,7 +82,7 @@ def similarity_bound(
     |lambda_max(A_s)|, which makes the final bound -eta2/eta1 on V least. Raises AnalysisError for a singular T, matrices
     that do not fit, and a negative disturbance.
     """
-    a, b = square("A", A), as_stack("B", B)
+    a, b = _some("A", _matrices("A", A)), _some("B", as_stack("B", B))
     t = _transform(T, a.shape[-1])
     if b.shape[-2] != a.shape[-1]:
         raise AnalysisError(f"B has {b.shape[-2]} rows for {a.shape[-1]} states")
@@ -97,7 +101,7 @@ def best_diagonal_transform(A: ArrayLike) -> DiagonalTransform:
     symmetric, so the growth is the largest eigenvalue of A itself, and no quadratic form does better. For b c < 0
     gamma* = sqrt(-c/b) removes the entry: max(a, d). For b c = 0 that is the infimum, attained only if b = c = 0.
     """
-    array = square("A", A)
+    array = _matrices("A", A)
     if array.shape[-1] != 2:
         raise AnalysisError(f"the closed form is for 2 states, not {array.shape[-1]}; use common_quadratic_lyapunov")
     a, b, c, d = array[..., 0, 0], array[..., 0, 1], array[..., 1, 0], array[..., 1, 1]
@@ -114,7 +118,7 @@ def diagonal_window(A: ArrayLike) -> tuple[FloatArray, FloatArray]:
     |gamma b + c/gamma| < 2 sqrt(a d) with a, d < 0, so with s = sqrt(a d) and q = sqrt(a d - b c) it is
     (|s - q|/|b|, (s + q)/|b|). Matrices share a diagonal T if and only if their windows meet.
     """
-    array = square("A", A)
+    array = _matrices("A", A)
     if array.shape[-1] != 2:
         raise AnalysisError(f"the closed form is for 2 states, not {array.shape[-1]}")
     a, b, c, d = array[..., 0, 0], array[..., 0, 1], array[..., 1, 0], array[..., 1, 1]
@@ -131,7 +135,18 @@ def common_growth(modes: ArrayLike, T: ArrayLike) -> float:
 
     Negative proves stability under arbitrary switching; positive proves nothing except that this T does not.
     """
-    return 2.0 * float(symmetric_growth(modes, T).max())
+    return 2.0 * float(symmetric_growth(_some("modes", _matrices("modes", modes)), T).max())
+
+
+def _matrices(name: str, A: ArrayLike) -> FloatArray:
+    return square(name, state_matrices(A, discrete=False)[0])
+
+
+def _some(name: str, stack: FloatArray) -> FloatArray:
+    """The stack, which must hold a matrix: the worst case of none is no number."""
+    if not stack.size:
+        raise AnalysisError(f"{name} has the shape {stack.shape}; give at least one matrix")
+    return stack
 
 
 def _transform(T: ArrayLike, size: int) -> FloatArray:

@@ -14,6 +14,7 @@ from estimators.errors import ScheduleError
 from estimators.schedule.check import SCHEMA, SEALS, SECTIONS, check_content, check_depth
 from estimators.schedule.checker import printable, quoted, shown
 from estimators.schedule.upgrade import FIRST_FORMAT, upgraded
+from estimators.whole_files import write_bytes
 
 REGENERATE = "regenerate the file instead of editing it"
 LARGEST_FILE = 8_000_000  # bytes
@@ -99,25 +100,10 @@ def read_content(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def write_content(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None:
-    """Checks, seals and writes `content`: beside the target, flushed to the disk, then renamed over it.
-
-    Whoever reads `path` finds the old file or the new one, also when the process is killed; a killed process can
-    leave a hidden `.*.tmp` beside it, which nothing reads.
-    """
-    target = Path(path)
+    """Checks, seals and writes `content`: beside the target, flushed to the disk, then renamed over it (`whole_file`)."""
     check_content(content, place_of(path))
     data = _layout(sealed(content), 0).encode("ascii") + b"\n"
-    beside = target.with_name(f".{target.name}.{os.getpid()}.{os.urandom(4).hex()}.tmp")
-    try:
-        with beside.open("xb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        beside.replace(target)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise
-    _sync_folder(target.parent)
+    write_bytes(Path(path), data, sync=True)
 
 
 def place_of(path: str | os.PathLike[str]) -> str:
@@ -131,17 +117,6 @@ def _digest(value: Any) -> str:
 
 def _place_of(key: str) -> int:
     return SECTIONS.index(key) if key in SECTIONS else len(SECTIONS)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Makes the rename itself survive a power cut, where the platform lets a folder be opened."""
-    if not hasattr(os, "O_DIRECTORY"):
-        return
-    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def _parsed(text: str, where: str) -> Any:

@@ -16,11 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from estimators import whole_files
 from estimators.arrays import AnyArray
+from estimators.whole_files import UNFINISHED
 from studies.claim import JsonValue
 from synthesis.errors import SpecError
 
-UNFINISHED, LOCK = ".unfinished-", ".lock"
+LOCK = ".lock"
 
 
 def check_folder(out: Path) -> None:
@@ -44,20 +46,8 @@ def whole_file(path: Path, sync: bool = False) -> Iterator[Path]:
 
     ``sync``: it is there after a power cut, too. An OSError names ``path``, also where the full disk has no name.
     """
-    with _named(path):
-        handle, name = tempfile.mkstemp(prefix=UNFINISHED, suffix=path.suffix, dir=path.parent)
-        os.close(handle)
-        beside = Path(name)
-        try:
-            yield beside
-            if sync:
-                with beside.open("rb") as file:
-                    os.fsync(file.fileno())
-            beside.chmod(0o644)  # mkstemp makes private files
-            beside.replace(path)
-        except BaseException:
-            beside.unlink(missing_ok=True)
-            raise
+    with _named(path), whole_files.whole_file(path, sync) as beside:
+        yield beside
 
 
 @contextmanager

@@ -203,6 +203,17 @@ def test_one_output_of_integrators_needs_hardly_a_measurement(step: float) -> No
     assert bracket.lower == bracket.upper == 0.0 and bracket.arrival < 1e-3
 
 
+def test_integrators_in_rotated_coordinates_are_not_refuted_by_their_rounding() -> None:
+    """Their computed eigenvalues are 1 +- 1e-8, for which the theorem would ask a rate of 1e-8: undecided, or a gain."""
+    for seed in range(6):
+        U = ortho_group.rvs(2, random_state=seed)
+        A, C = U @ np.array([[1.0, 1.0], [0.0, 1.0]]) @ U.T, np.array([[1.0, 0.0]]) @ U.T
+        assert certify_static_gain(A, C, 1e-10).verdict is not Verdict.REFUTED
+        assert certify_static_gain(1.01 * A, C, 1e-3).verdict is Verdict.REFUTED
+    still = certify_static_gain(0.5 * A, C, 0.0)  # nothing arrives, and nothing has to
+    assert still.verdict is Verdict.CERTIFIED and still.radius < 0.3
+
+
 def test_one_output_at_the_rate_of_the_theorem() -> None:
     """Random unstable plants: a gain just above 1 - 1/prod |lambda_u|^2, a refutation just below, and a bound for any gain."""
     draw = np.random.default_rng(5)
