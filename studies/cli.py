@@ -49,10 +49,14 @@ def parser() -> argparse.ArgumentParser:
         reader.add_argument(
             "logs", nargs="+", type=Path, metavar="LOG", help="CSV log, or several that belong together"
         )
+        needed = reader is identify  # run says itself what is missing: --check and --guess need less
         reader.add_argument(
-            "--drive", required=True, type=Path, metavar="DRIVE.toml", help="columns, units, signs, vehicle"
+            "--drive", required=needed, type=Path, metavar="DRIVE.toml", help="columns, units, signs, vehicle"
         )
-        reader.add_argument("--out", required=True, type=Path, metavar="DIR", help=f"where {text} go")
+        reader.add_argument("--out", required=needed, type=Path, metavar="DIR", help=f"where {text} go")
+    checks = run.add_mutually_exclusive_group()
+    checks.add_argument("--check", action="store_true", help="only compare the signals of the log with one another")
+    checks.add_argument("--no-check", action="store_true", help="run although signs, units or sides seem wrong")
 
     study = command("study", "recompute the papers and the studies beyond them", "study.run_study")
     study.add_argument("studies", nargs="*", metavar="ID", help="studies to run (see gainsmith list)")

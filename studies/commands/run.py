@@ -7,8 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from studies.commands.terminal import print_table, progress_bar
-from studies.drives.run import RunResult, run_drive
+from studies.drives.frames import FrameReport
+from studies.drives.run import RunResult, check_drive, run_drive
+from studies.errors import LogError
+from synthesis.errors import SpecError
 
+CHECK_HEADER = ("comparison", "slope (1 is right)", "quality", "verdict")
 HEADER = ("quantity", "NRMS (%)", "RMS", "maximum", "reference peak", "unit", "samples")
 
 
@@ -45,11 +49,19 @@ def _cells(entry: dict[str, Any]) -> tuple[str, ...]:
     return (*numbers, entry["unit"], str(entry["samples"]))
 
 
-def run_log(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int:
-    """Replay the log and print the metrics beside the baselines; 0 when done."""
+def run_log(logs: list[Path], drive: Path | None, out: Path | None, check: bool, no_check: bool, as_json: bool) -> int:
+    """Replay the log and print the metrics beside the baselines, or check it only; 0 when done."""
+    if drive is None:
+        raise SpecError("run: --drive is missing; give a drive file, or --guess to have a first one written")
+    if check:
+        return _check(logs, drive, as_json)
+    if out is None:
+        raise SpecError("run: --out is missing; give a folder for the results, or --check to look at the log only")
     with progress_bar() as progress:
         task = progress.add_task("replaying", total=1.0)
-        result = run_drive(logs, drive, out, progress=lambda done: progress.update(task, completed=done))
+        result = run_drive(
+            logs, drive, out, check=not no_check, progress=lambda done: progress.update(task, completed=done)
+        )
     if as_json:
         print(json.dumps(result.metrics, indent=1))
         return 0
@@ -57,4 +69,24 @@ def run_log(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int:
     for line in remarks(result):
         print(line)
     print(f"written to {out}")
+    return 0
+
+
+def check_rows(found: FrameReport) -> list[tuple[str, ...]]:
+    """One row a comparison, in the columns of ``CHECK_HEADER``."""
+
+    def number(value: float | None) -> str:
+        return "-" if value is None else f"{value:.3g}"
+
+    return [(row["comparison"], number(row["slope"]), number(row["quality"]), row["verdict"]) for row in found.rows()]
+
+
+def _check(logs: list[Path], drive: Path, as_json: bool) -> int:
+    found = check_drive(logs, drive)
+    if as_json:
+        print(json.dumps({"comparisons": found.rows(), "complaint": found.complaint}, indent=1))
+    else:
+        print_table(f"{drive.stem}: signals beside one another", CHECK_HEADER, check_rows(found), left=(0, 3))
+    if found.complaint is not None:
+        raise LogError(found.complaint)
     return 0
