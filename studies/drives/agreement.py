@@ -65,7 +65,7 @@ class Comparison:
 
     def explained(self, factors: Mapping[str, float]) -> bool:
         """Whether the slope is 1 within the band once the factors are taken out."""
-        return self.misfit(factors) <= np.log(self.band)
+        return bool(self.misfit(factors) <= np.log(self.band))
 
 
 def compare(signals: Mapping[str, FloatArray], drive: DriveFile) -> list[Comparison]:
@@ -180,7 +180,8 @@ class _Log:
         k = np.arange(value.size)
         low, high = np.maximum(k - half, 0), np.minimum(k + half + 1, value.size)
         n = count[high] - count[low]
-        return np.where(2 * n > 2 * half + 1, (total[high] - total[low]) / np.maximum(n, 1), np.nan)
+        mean = (total[high] - total[low]) / np.maximum(n, 1)
+        return np.asarray(np.where(2 * n > 2 * half + 1, mean, np.nan))
 
 
 def _surface_speeds(signals: Mapping[str, FloatArray], car: Vehicle) -> FloatArray:

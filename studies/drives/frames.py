@@ -158,7 +158,7 @@ def _singles(drive: DriveFile, group: str) -> list[Mistake]:
     return found
 
 
-def _any_factor(found: tuple[Comparison, ...], drive: DriveFile) -> list[Mistake]:
+def _any_factor(found: Sequence[Comparison], drive: DriveFile) -> list[Mistake]:
     """One column read too large or too small by a number that is no unit."""
     groups = {group for one in found for group in one.gains if _columns(drive, group)}
     mistakes = []
@@ -224,5 +224,5 @@ def _flip(drive: DriveFile, names: list[str]) -> str:
     return f'sign = "{signs.pop()}" for {_keys(names)}' if len(signs) == 1 else f"the other sign for {_keys(names)}"
 
 
-def _keys(names: list[str]) -> str:
+def _keys(names: Sequence[str]) -> str:
     return "signals.wheel_speed_*" if list(names) == list(WHEEL_SPEEDS) else "signals." + ", ".join(names)

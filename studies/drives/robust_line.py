@@ -43,7 +43,7 @@ def robust_line(x: FloatArray, y: FloatArray, moves: float) -> Line | None:
     good = np.isfinite(x) & np.isfinite(y)
     x, y = x[good], y[good]
     far = _far(x, moves) | _far(y, moves)
-    anchored = np.count_nonzero(far) < FEWEST_POINTS
+    anchored = bool(np.count_nonzero(far) < FEWEST_POINTS)
     if anchored:
         far = np.maximum(np.abs(x), np.abs(y)) > ANCHORED * moves
         if np.count_nonzero(far) < FEWEST_POINTS:

@@ -162,7 +162,8 @@ def test_a_constant_turn_is_compared_with_rest(tmp_path: Path) -> None:
     t = np.arange(0.0, 5.0, 0.01)
     v, r = 12.0, 0.4
     table = {"t": t, "v": v + 0 * t, "ax": 0 * t, "ay": r * v + 0 * t, "az": GRAVITY + 0 * t, "r": r + 0 * t}
-    table |= {"d": 2.6 * r / v * 1.2 + 0 * t, **{f"w_{c}": (v - r * 0.75 * (-1) ** (c[1] == "r")) / 0.33 + 0 * t for c in ("fl", "fr", "rl", "rr")}}  # fmt: skip
+    sides = {"l": v - 0.75 * r, "r": v + 0.75 * r}
+    table |= {"d": 3.1 * r / v + 0 * t, **{name: sides[name[-1]] / 0.33 + 0 * t for name in WHEELS}}
     assert look(tmp_path, TURNING, table).complaint is None
     complaint = look(tmp_path, TURNING, scaled(-1.0, "ay")(table)).complaint
     assert complaint is not None and 'sign = "negative" for signals.ay' in complaint
