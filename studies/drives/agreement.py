@@ -181,7 +181,8 @@ class _Log:
         low, high = np.maximum(k - half, 0), np.minimum(k + half + 1, value.size)
         n = count[high] - count[low]
         mean = (total[high] - total[low]) / np.maximum(n, 1)
-        return np.asarray(np.where(2 * n > 2 * half + 1, mean, np.nan))
+        found: FloatArray = np.where(2 * n > 2 * half + 1, mean, np.nan)
+        return found
 
 
 def _surface_speeds(signals: Mapping[str, FloatArray], car: Vehicle) -> FloatArray:

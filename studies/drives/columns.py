@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import codecs
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from estimators.errors import unknown
 from studies.drives import quantities as si
@@ -16,6 +17,14 @@ from synthesis.toml_file import StrictTable
 def _a_time(unit: str) -> str:
     factor_to(unit, "s")
     return unit
+
+
+def _an_encoding(name: str) -> str:
+    try:
+        codecs.lookup(name)
+    except (LookupError, ValueError):
+        raise ValueError(f"unknown encoding '{name[:40]}'; use one such as utf-8, utf-16, cp1252") from None
+    return name
 
 
 class Column(StrictTable):
@@ -51,19 +60,33 @@ class Align(StrictTable):
 
 
 class LogFile(StrictTable):
-    """One log file: its clock, its rate, and the longest pause that may be bridged by interpolation."""
+    """One log file: its form, its clock, its rate, and the longest pause that may be bridged by interpolation.
+
+    ``time_format = "iso"``: stamps are text, dates of ISO 8601 or times of day. An epoch is a number with its ``time_unit``.
+    ``delimiter``, ``decimal``, ``encoding`` and ``units_row`` (a second line that holds units) are for text files.
+    """
 
     name: str = Field(min_length=1, examples=["car"])
     rate: si.Rate = Field(examples=["200 Hz"])
     file: str | None = None
     time: str = "time"
     time_unit: Annotated[str, AfterValidator(_a_time)] = "s"
+    time_format: Literal["number", "iso"] = "number"
     delimiter: str = Field(default=",", min_length=1, max_length=1)
+    decimal: Literal[".", ","] = "."
+    encoding: Annotated[str, AfterValidator(_an_encoding)] = "utf-8"
+    units_row: bool = False
     max_gap: si.Duration | None = None
     duplicates: Literal["mean", "last", "refuse"] = "mean"
     sort: bool = False
     clock_offset: si.Offset = 0.0
     align: Align | None = None
+
+    @model_validator(mode="after")
+    def _readable(self) -> Self:
+        if self.delimiter == self.decimal:
+            raise ValueError('decimal: the comma also separates columns; set delimiter, such as ";"')
+        return self
 
     @property
     def allowed_gap(self) -> float:

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from estimators.arrays import FloatArray
-from studies.drives.csv_log import line_of
+from studies.drives.table import LogTable
 from studies.errors import LogError
 
 
@@ -24,6 +24,7 @@ class Stamped:
 
 def clean_stamps(
     file: str,
+    table: LogTable,
     time: FloatArray,
     values: dict[str, FloatArray],
     *,
@@ -32,16 +33,18 @@ def clean_stamps(
 ) -> Stamped:
     """Strictly increasing stamps: sorted if ``sort``, equal stamps averaged or reduced to the last one.
 
+    ``time``, s, and ``values`` (n,) are those of ``table``, which knows where rows stand.
+
     Raises LogError with the line of the first stamp that is missing, runs backwards or (``refuse``) repeats.
     """
     missing = np.flatnonzero(~np.isfinite(time))
     if missing.size:
-        raise LogError(f"{file}: line {line_of(int(missing[0]))} has no time stamp; remove the line")
+        raise LogError(f"{file}: {table.place(int(missing[0]))} has no time stamp; remove the line")
     backwards = np.flatnonzero(np.diff(time) < 0)
     if backwards.size and not sort:
         k = int(backwards[0])
         raise LogError(
-            f"{file}: time runs backwards on line {line_of(k + 1)} ({time[k + 1]:g} s after {time[k]:g} s); "
+            f"{file}: time runs backwards on {table.place(k + 1)} ({time[k + 1]:g} s after {time[k]:g} s); "
             "repair the log, or set sort = true for it in the drive file"
         )
     order = np.argsort(time, kind="stable")
@@ -51,7 +54,7 @@ def clean_stamps(
     if repeats.size and duplicates == "refuse":
         k = int(repeats[0]) + 1
         raise LogError(
-            f"{file}: time {time[k]:g} s appears twice, again on line {line_of(int(order[k]))}; "
+            f"{file}: time {time[k]:g} s appears twice, again on {table.place(int(order[k]))}; "
             'set duplicates = "mean" or "last" for this log'
         )
     if repeats.size:
@@ -84,7 +87,9 @@ def resample(time: FloatArray, value: FloatArray, grid: FloatArray, max_gap: flo
     time, value = time[finite], value[finite]
     if time.size < 2:
         return np.full(grid.shape, np.nan)
-    tolerance = 1e-9 * max(1.0, abs(float(time[-1])))  # rounding of the stamps, not a physical time
+    tolerance = max(
+        1e-9 * abs(float(time[-1])), 1e-6
+    )  # rounding of the stamps (0.24 us of an epoch), not a physical time
     out = np.interp(grid, time, value)
     out[(grid < time[0] - tolerance) | (grid > time[-1] + tolerance)] = np.nan
     left = np.clip(np.searchsorted(time, grid + tolerance, side="right") - 1, 0, time.size - 2)
