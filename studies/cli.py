@@ -35,6 +35,8 @@ def parser() -> argparse.ArgumentParser:
     schedules.add_argument(
         "--check", action="store_true", help="write nothing; fail on drift against the schedules in DIR"
     )
+    schedules.add_argument("--radius", metavar="LENGTH", help='another effective radius, such as "0.40 m"')
+    schedules.add_argument("--sample-time", metavar="TIME", help='another sample time, such as "10 ms"')
     schedules.add_argument("--figures", type=Path, metavar="DIR", help="draw gains beside the published ranges")
 
     certify = command("certify", "re-prove schedule files without a solver", "certify.run_certify")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,7 +16,7 @@ from synthesis.errors import SpecError
 from synthesis.lmi.settings import LmiSettings
 from synthesis.models.catalogue import CATALOGUE
 from synthesis.models.lpv import LpvModel
-from synthesis.models.parameter_set import ParameterSet, load_parameter_set
+from synthesis.models.parameter_set import ParameterSet, Quantity, load_parameter_set
 from synthesis.toml_file import StrictTable, find_toml, load_toml, shipped_files
 
 
@@ -108,6 +109,44 @@ class ScheduleSpec(StrictTable):
             **self.model_dump(mode="json", by_alias=True),
             "parameter_set": parameters.model_dump(mode="json", exclude_none=True),
         }
+
+
+FASTEST = 3.0  # of a pole times the sample time, as in the shipped specifications of longitudinal observers
+
+
+@dataclass(frozen=True)
+class Variant:
+    """The same specification for another wheel or another sample time: effective radius, m, and s; None keeps what it has.
+
+    The fastest pole stays where it is, but below 3/sample_time (or what the specification itself allows), where sampling ends it.
+    """
+
+    radius: float | None = None
+    sample_time: float | None = None
+
+    def name(self, spec: str) -> str:
+        """What the schedule is called, such as corner-estimation-longitudinal-400mm-10ms."""
+        parts = [(self.radius, "mm"), (self.sample_time, "ms")]
+        endings = [f"-{value * 1e3:g}{unit}".replace(".", "p") for value, unit in parts if value is not None]
+        return spec + "".join(endings)
+
+    def spec(self, base: ScheduleSpec) -> ScheduleSpec:
+        """The specification at this sample time, with a name of its own."""
+        gains, deploy = base.gains, base.deploy
+        if self.sample_time is not None:
+            deploy = deploy.model_copy(update={"sample_time": self.sample_time})
+            if gains.fastest_pole is not None:
+                times = max(FASTEST, gains.fastest_pole * base.deploy.sample_time)
+                fastest = min(gains.fastest_pole, times / self.sample_time)
+                gains = gains.model_copy(update={"fastest_pole": fastest})
+        return base.model_copy(update={"name": self.name(base.name), "gains": gains, "deploy": deploy})
+
+    def parameters(self, base: ParameterSet) -> ParameterSet:
+        """The parameter set with this radius."""
+        if self.radius is None:
+            return base
+        quantity = Quantity(value=self.radius, unit="m", source="given as --radius")
+        return base.model_copy(update={"vehicle": {**base.vehicle, "effective_radius": quantity}})
 
 
 def shipped_specs() -> dict[str, Path]:

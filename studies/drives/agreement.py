@@ -181,13 +181,12 @@ class _Log:
         low, high = np.maximum(k - half, 0), np.minimum(k + half + 1, value.size)
         n = count[high] - count[low]
         mean = (total[high] - total[low]) / np.maximum(n, 1)
-        found: FloatArray = np.where(2 * n > 2 * half + 1, mean, np.nan)
-        return found
+        return np.where(2 * n > 2 * half + 1, mean, np.nan)
 
 
 def _surface_speeds(signals: Mapping[str, FloatArray], car: Vehicle) -> FloatArray:
     radius = np.repeat([car.effective_radius_front, car.effective_radius_rear], 2)
-    return np.stack([signals[f"wheel_speed_{corner}"] for corner in CORNERS], axis=-1) * radius
+    return np.asarray(np.stack([signals[f"wheel_speed_{corner}"] for corner in CORNERS], axis=-1) * radius)
 
 
 def steering_angle(signals: Mapping[str, FloatArray], car: Vehicle) -> FloatArray | None:

@@ -176,9 +176,18 @@ def _add_signal(name: str) -> str:
     return f'add {name} = {{ column = "...", unit = "{SIGNALS[name]}" }}'
 
 
-def check_estimators(chosen: Estimators, signals: Mapping[str, Column], vehicle: Vehicle, schedules: Schedules) -> None:
+def check_estimators(
+    chosen: Estimators, signals: Mapping[str, Column], vehicle: Vehicle, schedules: Schedules | None
+) -> None:
     """Every estimator that the file asks for by name has the vehicle data, the signals and the schedules that it needs."""
-    if chosen.velocity != "fusion" and schedules.lateral is None:
+    cornered = [name for name in ("corner_velocity", "axle_weights") if name in chosen.model_fields_set]
+    if schedules is None and (cornered or chosen.velocity != "fusion"):
+        name = cornered[0] if cornered else "velocity"
+        raise ValueError(
+            f"schedules: missing, but estimators.{name} = '{getattr(chosen, name)}' runs on gain schedules; add a table "
+            '[schedules] with longitudinal = "corner-estimation-longitudinal"'
+        )
+    if chosen.velocity != "fusion" and (schedules is None or schedules.lateral is None):
         raise ValueError(
             f"schedules.lateral: missing, but estimators.velocity = '{chosen.velocity}' has V_y from nothing else; "
             'add it, such as lateral = "corner-estimation-lateral"'
@@ -216,6 +225,8 @@ _SIGNALS = {
 class DriveFile(StrictTable):
     """A drive file that was read, checked and converted to SI.
 
+    ``schedules`` are for the corner observers: without them the pipeline of the fusion runs alone.
+
     ``check``: compare the signals of the log with one another (:mod:`.frames`) before anything is estimated from them.
     """
 
@@ -224,7 +235,7 @@ class DriveFile(StrictTable):
     source: str = ""
     sample_time: si.Duration = Field(examples=["5 ms"])
     vehicle: Vehicle
-    schedules: Schedules
+    schedules: Schedules | None = None
     check: bool = True
     observer: Observer = Observer()
     estimators: Estimators = Estimators()

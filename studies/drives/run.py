@@ -19,7 +19,7 @@ from studies.drives.plots import figures
 from studies.drives.prepare import corner_inputs_of
 from studies.drives.quantities import CORNERS
 from studies.drives.replay import Progress, replay
-from studies.drives.schedules import check_radii, corner_observer, load_schedule
+from studies.drives.schedules import corner_observer, load_schedules
 from studies.errors import LogError
 from studies.execution.files import check_folder, ready_folder, write_csv, write_json
 from studies.plots.save import write_figures
@@ -73,12 +73,11 @@ def replay_drive(
 ) -> DriveData:
     """As :func:`run_drive`, but the arrays are returned and nothing is written."""
     description = read_drive(drive)
-    names, time = description.schedules, description.sample_time
-    schedule = load_schedule(names.longitudinal, drive.parent, time)
-    lateral = load_schedule(names.lateral, drive.parent, time, "lateral") if names.lateral is not None else None
-    assumed = check_radii(description, drive.parent)
-    observer = corner_observer(description, drive.parent, schedule)
-    pipeline, assumptions = pipeline_of(description, corner_observer(description, drive.parent, schedule), lateral)
+    schedule, lateral, assumed = load_schedules(description, drive.parent)
+    observer, of_pipeline = (
+        None if schedule is None else corner_observer(description, drive.parent, schedule) for _ in range(2)
+    )
+    pipeline, assumptions = pipeline_of(description, of_pipeline, lateral)
     log = read_log(logs, description)
     if check and description.check:
         found = check_frames(log.signals, description, log.files)
@@ -89,21 +88,25 @@ def replay_drive(
         assumed += ("signs, units and sides of the signals are right: not checked (--no-check, or check = false)",)
     progress(0.2)
     inputs = corner_inputs_of(log, description)
-    replayed = replay(inputs, observer, lambda done: progress(0.2 + 0.1 * done))
+    replayed = None if observer is None else replay(inputs, observer, lambda done: progress(0.2 + 0.1 * done))
     chain = run_chain(log, inputs, pipeline, assumptions, lambda done: progress(0.3 + 0.7 * done))
     return DriveData(description, schedule, log, inputs, replayed, chain, assumed)
 
 
 def estimate_columns(data: DriveData) -> Columns:
     """The columns of estimates.csv, SI, the unit in every name."""
-    columns: Columns = {"time_s": data.log.time, "vx_mps": data.replay.velocity}
+    ran = data.replay
+    columns: Columns = {"time_s": data.log.time}
+    columns |= {} if ran is None else {"vx_mps": ran.velocity}
     columns |= {f"vx_{name}_mps": value for name, value in data.baselines.items()}
-    columns |= _by_corner({
-        "vx_{}_mps": data.replay.corner_velocity, "relative_velocity_{}_mps": data.replay.relative_velocity,
+    corners: Columns = {
         "slip_{}": data.slip, "force_x_{}_N": data.inputs.force, "force_z_{}_N": data.inputs.vertical_load,
-        "normalised_force_{}": data.inputs.normalised_force, "innovation_{}": data.replay.innovation,
-        "flags_{}": data.replay.flags,
-    })  # fmt: skip
+        "normalised_force_{}": data.inputs.normalised_force,
+    }  # fmt: skip
+    if ran is not None:
+        estimated = {"vx_{}_mps": ran.corner_velocity, "relative_velocity_{}_mps": ran.relative_velocity}
+        corners = {**estimated, **corners, "innovation_{}": ran.innovation, "flags_{}": ran.flags}
+    columns |= _by_corner(corners)
     if data.chain is not None:
         columns |= chain_columns(data.chain)
     units = {"v": "mps", "a": "mps2", "y": "radps", "f": "N"}
