@@ -58,6 +58,9 @@ def parser() -> argparse.ArgumentParser:
         reader.add_argument("--out", required=needed, type=Path, metavar="DIR", help=f"where {text} go")
     checks = run.add_mutually_exclusive_group()
     checks.add_argument("--check", action="store_true", help="only compare the signals of the log with one another")
+    checks.add_argument(
+        "--guess", action="store_true", help="write a first drive file (to DRIVE.toml) from column names"
+    )
     checks.add_argument("--no-check", action="store_true", help="run although signs, units or sides seem wrong")
 
     study = command("study", "recompute the papers and the studies beyond them", "study.run_study")

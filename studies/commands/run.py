@@ -49,8 +49,18 @@ def _cells(entry: dict[str, Any]) -> tuple[str, ...]:
     return (*numbers, entry["unit"], str(entry["samples"]))
 
 
-def run_log(logs: list[Path], drive: Path | None, out: Path | None, check: bool, no_check: bool, as_json: bool) -> int:
+def run_log(
+    logs: list[Path],
+    drive: Path | None,
+    out: Path | None,
+    check: bool,
+    no_check: bool,
+    as_json: bool,
+    guess: bool = False,
+) -> int:
     """Replay the log and print the metrics beside the baselines, or check it only; 0 when done."""
+    if guess:
+        return _guess(logs, drive, as_json)
     if drive is None:
         raise SpecError("run: --drive is missing; give a drive file, or --guess to have a first one written")
     if check:
@@ -89,4 +99,19 @@ def _check(logs: list[Path], drive: Path, as_json: bool) -> int:
         print_table(f"{drive.stem}: signals beside one another", CHECK_HEADER, check_rows(found), left=(0, 3))
     if found.complaint is not None:
         raise LogError(found.complaint)
+    return 0
+
+
+def _guess(logs: list[Path], drive: Path | None, as_json: bool) -> int:
+    from studies.drives.guess import write_guess
+
+    target, guessed = write_guess(logs, drive)
+    if as_json:
+        print(json.dumps({"drive": str(target), "found": guessed.found, "missing": guessed.missing}, indent=1))
+        return 0
+    print_table("columns", ("signal", "column"), sorted(guessed.found.items()), left=(0, 1))
+    if guessed.missing:
+        print(f"not found: {', '.join(guessed.missing)}; fill them in")
+    names = " ".join(str(path) for path in logs)
+    print(f"written to {target}: edit it, then gainsmith run {names} --drive {target} --check")
     return 0

@@ -109,6 +109,14 @@ def read_header(path: Path, form: CsvForm) -> list[str]:
     return header
 
 
+def read_units(path: Path, form: CsvForm) -> list[str]:
+    """The cells of the line behind the header."""
+    file = _File(path, form)
+    with file.text() as stream:
+        stream.readline()
+        return [cell.strip() for cell in file.split(stream.readline(LONGEST_HEADER))]
+
+
 def _refuse_encoding(file: _File) -> None:
     with file.path.open("rb") as stream:
         start = stream.read(4096)

@@ -6,8 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from studies.drives.columns import LogFile
-from studies.drives.csv_log import CsvForm, read_columns
+from studies.drives.csv_log import CsvForm, read_columns, read_header, read_units
 from studies.drives.table import LogTable
+
+
+def is_text(path: Path) -> bool:
+    """Whether a file is read as CSV: whatever has no ending of another format."""
+    return True
 
 
 def read_table(path: Path, wanted: Mapping[str, str], entry: LogFile) -> LogTable:
@@ -16,6 +21,14 @@ def read_table(path: Path, wanted: Mapping[str, str], entry: LogFile) -> LogTabl
     Raises LogError naming file, place and remedy.
     """
     return read_columns(path, wanted, form_of(entry))
+
+
+def name_columns(path: Path, entry: LogFile) -> dict[str, str]:
+    """Names of all columns with their units, empty where the file has none."""
+    form = form_of(entry)
+    names = read_header(path, form)
+    units = read_units(path, form) if form.units_row else []
+    return {name: units[k] if k < len(units) else "" for k, name in enumerate(names)}
 
 
 def form_of(entry: LogFile) -> CsvForm:
