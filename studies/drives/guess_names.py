@@ -58,7 +58,20 @@ class Guess(NamedTuple):
 
 
 def guess_column(column: str, unit: str = "") -> Guess | None:
-    """What a column of this name is; ``unit`` as a row of units has it. None where no rule knows it."""
+    """What a column of this name is; ``unit`` as a row of units has it. None where no rule knows it.
+
+    A field of a struct or of a message, a.b.c, is what its whole name says, or else its last part.
+    """
+    found = _guess(column, unit)
+    if found is None and "." in column and "[" not in column:
+        return _guess(column.rpartition(".")[2], unit)
+    return found
+
+
+def _guess(column: str, unit: str) -> Guess | None:
+    if column.startswith("/"):  # of a bag: the field says what it is, or the topic where the field is just "data"
+        topic, _, rest = column.partition(".")
+        column = topic.rpartition("/")[2] if rest in ("", "data", "value") else rest
     brackets = _BRACKETS.search(column)
     said = unit or (brackets[1] if brackets else "")
     words = _words(column[: brackets.start()] if brackets else column)

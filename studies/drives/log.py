@@ -14,7 +14,7 @@ from estimators.arrays import FloatArray
 from studies.drives.align import find_offset
 from studies.drives.columns import Column, LogFile
 from studies.drives.drive_file import DriveFile
-from studies.drives.formats import read_table
+from studies.drives.formats import is_bag_folder, read_table
 from studies.drives.plausible import check_plausible
 from studies.drives.quantities import REFERENCES, SIGNALS, factor_to
 from studies.drives.stamps import Stamped, clean_stamps, resample
@@ -95,7 +95,7 @@ def assign_files(paths: Sequence[Path], entries: Sequence[LogFile]) -> dict[str,
     patterns = [entry.file for entry in entries if entry.file is not None]
     found: list[Path] = []
     for path in paths:
-        if path.is_dir():
+        if path.is_dir() and not is_bag_folder(path):
             found += sorted(p for p in path.iterdir() if any(fnmatch(p.name, pattern) for pattern in patterns))
         elif path.exists():
             found.append(path)
