@@ -54,8 +54,16 @@ class _File:
     @contextmanager
     def text(self) -> Iterator[TextIO]:
         encoding = "utf-8-sig" if self.form.encoding.lower() in ("utf-8", "utf8") else self.form.encoding
-        with self.path.open(encoding=encoding, errors="replace", newline="") as stream:
-            yield stream
+        try:
+            with self.path.open(encoding=encoding, errors="replace", newline="") as stream:
+                yield stream
+        except UnicodeError as error:
+            raise self.undecodable(error) from error
+
+    def undecodable(self, error: UnicodeError) -> LogError:
+        why = error.reason if isinstance(error, UnicodeDecodeError) else str(error)
+        words = f"is not in {self.form.encoding} ({why}); correct encoding for this log in the drive file"
+        return LogError(f"{self.name}: {words}")
 
     def split(self, line: str, delimiter: str | None = None) -> list[str]:
         try:
@@ -136,7 +144,7 @@ def _read_text(file: _File) -> pl.DataFrame:
     except OSError as error:
         raise LogError(f"{file.name}: cannot be read ({error.strerror or error}); check the path") from error
     except UnicodeError as error:
-        raise LogError(f"{file.name}: is not in {form.encoding} ({error.reason if isinstance(error, UnicodeDecodeError) else error}); correct encoding in the drive file") from error  # fmt: skip  # noqa: E501
+        raise file.undecodable(error) from error
     except pl.exceptions.NoDataError as error:
         raise LogError(f"{file.name}: is empty; record again or give another file") from error
     except pl.exceptions.PolarsError as error:

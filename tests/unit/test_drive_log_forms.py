@@ -15,6 +15,7 @@ import pytest
 
 from studies.drives.csv_log import CsvForm, read_columns
 from studies.drives.drive_file import read_drive
+from studies.drives.guess import guess
 from studies.drives.log import read_log
 from studies.errors import LogError
 from synthesis.errors import SpecError
@@ -176,6 +177,7 @@ def test_what_is_too_long_is_refused_in_one_short_line(tmp_path: Path) -> None:
         ),
         (lambda: drive(tmp_path, "a = " + "[" * 3000 + "]" * 3000), "nested too deeply"),
         (lambda: drive(tmp_path, DRIVE.replace('time = "t"', 'time = "t"\nencoding = "klingon"')), "unknown encoding"),
+        (lambda: read(tmp_path, GOOD, 'encoding = "utf-16"'), "is not in utf-16"),
     ]
     for call, words in cases:
         with pytest.raises((LogError, SpecError)) as caught:
@@ -215,3 +217,58 @@ def test_a_drive_file_with_every_key_is_read(tmp_path: Path) -> None:
         True,
         "iso",
     )
+
+
+def mutated(rng: np.random.Generator, data: bytes) -> bytes:
+    """One to four cuts, copies, swaps of bytes or words that have hurt before."""
+    words = [
+        b"1e308",
+        b"\xff\xfe",
+        b"\0",
+        b'"',
+        b"\n",
+        b",",
+        b";",
+        b"nan",
+        b"-",
+        b"=",
+        b"[",
+        b"9" * 400,
+        "µ°\u202e".encode(),
+    ]
+    for _ in range(int(rng.integers(1, 5))):
+        at, length = int(rng.integers(0, len(data) + 1)), int(rng.integers(0, 12))
+        match int(rng.integers(0, 4)):
+            case 0:
+                data = data[:at] + data[at + length :]
+            case 1:
+                data = data[:at] + words[int(rng.integers(0, len(words)))] + data[at:]
+            case 2:
+                data = data[:at] + bytes(rng.integers(0, 256, size=length, dtype=np.uint8)) + data[at + length :]
+            case _:
+                data = data[:at] + data[max(0, at - 40) : at] + data[at:]
+    return data
+
+
+@pytest.mark.parametrize("what", ["log", "drive file", "guess"])
+def test_what_is_damaged_is_read_or_refused_in_one_line(tmp_path: Path, what: str) -> None:
+    """A small fuzzer: no traceback, no line that floods a terminal, no infinity in what is read."""
+    rng = np.random.default_rng(7)
+    log, toml = tmp_path / "log.csv", tmp_path / "drive.toml"
+    table = (GOOD if what != "guess" else GOOD.replace("t,", "time,", 1)).encode()
+    good = drive(tmp_path)
+    for _ in range(80):
+        log.write_bytes(table if what == "drive file" else mutated(rng, table))
+        if what == "drive file":
+            toml.write_bytes(mutated(rng, DRIVE.encode()))
+        try:
+            if what == "guess":
+                guess([log])
+                continue
+            found = read_log([log], read_drive(toml) if what == "drive file" else good)
+        except (LogError, SpecError) as error:
+            message = str(error)
+            assert message.isprintable(), message
+            assert len(message) <= 300, message
+        else:
+            assert not any(np.isinf(value).any() for value in (*found.signals.values(), *found.reference.values()))
