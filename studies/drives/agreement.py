@@ -34,6 +34,9 @@ TURNS, SIDEWAYS, ALONG = 0.03, 0.5, 0.6  # rad/s, m/s^2, m/s^2 that count as exc
 BAND, WIDE_BAND = 1.7, 5.0
 """Factors up to which a slope counts as 1. Snow, drift and slip reach 0.63 to 1.27 on the truth vehicles of this project;
 steering on ice reaches 0.42, and a line through the origin holds offsets and grades."""
+MATCH, WIDE_MATCH = 1.6, 3.0
+"""Factors up to which a mistake explains a slope: less than what is no news, since a mistake leaves a slope of 1 behind."""
+SURE = 0.9  # least quality of a line from which a mistake is inferred
 WHEEL_SPREAD = 0.2  # interquartile range of a wheel's ratio to the others, above which it slips rather than misreads
 
 
@@ -41,13 +44,15 @@ WHEEL_SPREAD = 0.2  # interquartile range of a wheel's ratio to the others, abov
 class Comparison:
     """``line``: slope of one quantity over what others predict for it, None where the log does not excite it.
 
-    ``gains``: which groups of columns the slope is proportional to (1) or inversely so (-1). ``band``: factor that is no news.
+    ``gains``: which groups of columns the slope is proportional to (1) or inversely so (-1). ``band``: factor that is no news;
+    ``match``: factor up to which a mistake explains the slope.
     """
 
     title: str
     gains: Mapping[str, int]
     line: Line | None
     band: float
+    match: float = MATCH
 
     @property
     def decides(self) -> bool:
@@ -63,9 +68,23 @@ class Comparison:
             left /= factors.get(group, 1.0) ** power
         return float(abs(np.log(left))) if left > 0.0 else np.inf
 
-    def explained(self, factors: Mapping[str, float]) -> bool:
-        """Whether the slope is 1 within the band once the factors are taken out."""
-        return bool(self.misfit(factors) <= np.log(self.band))
+    @property
+    def agrees(self) -> bool:
+        """Whether nothing has to be explained: the slope is 1 within the band, or the log says nothing."""
+        return bool(self.misfit({}) <= np.log(self.band))
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether a mistake may be inferred from this line."""
+        return not self.agrees and self.line is not None and self.line.quality >= SURE
+
+    def explained(self, factors: Mapping[str, float], wheels: float = 1.0) -> bool:
+        """Whether the slope is 1 once the factors are taken out; one that agrees and has none of them stays as it is.
+
+        ``wheels``: the factor that was taken out of all wheel speeds before the comparison.
+        """
+        touched = self.gains.keys() & factors.keys() or (wheels != 1.0 and "wheels" in self.gains)
+        return (self.agrees and not touched) or bool(self.misfit(factors) <= np.log(self.match))
 
 
 def compare(signals: Mapping[str, FloatArray], drive: DriveFile) -> list[Comparison]:
@@ -124,7 +143,7 @@ class _Log:
         found = []
         if not rear_steers:
             title, gains = "front over rear wheel difference", {"front": 1, "rear": -1}
-            found.append(self._line(title, gains, self.rear, self.front, self.moves, TURNS, WIDE_BAND))
+            found.append(self._line(title, gains, self.rear, self.front, self.moves, TURNS, WIDE_BAND, WIDE_MATCH))
         if "yaw_rate" in self.signals:
             turn = self.mean(self.signals["yaw_rate"])
             for axle, said in (("front", self.front), ("rear", self.rear)):
@@ -155,7 +174,9 @@ class _Log:
         base = self.car.front_axle_distance + self.car.rear_axle_distance
         said = self.speed * self.mean(steer) / (base * (1.0 + (self.speed / CHARACTERISTIC_SPEED) ** 2))
         gains = {**own, "wheels": own.get("wheels", 0) - 1, "steering": -1}
-        return [self._line(f"{name} over steering times speed", gains, said, turn, self.moves, TURNS, WIDE_BAND)]
+        return [
+            self._line(f"{name} over steering times speed", gains, said, turn, self.moves, TURNS, WIDE_BAND, WIDE_MATCH)
+        ]
 
     def _line(
         self,
@@ -166,10 +187,11 @@ class _Log:
         use: BoolArray,
         moves: float,
         band: float = BAND,
+        match: float = MATCH,
     ) -> Comparison:
         line = robust_line(np.where(use, x, np.nan)[:: self.step], y[:: self.step], moves)
         wide = line is not None and line.anchored
-        return Comparison(title, gains, line, WIDE_BAND if wide else band)
+        return Comparison(title, gains, line, WIDE_BAND if wide else band, match)
 
     def mean(self, value: FloatArray, samples: int | None = None) -> FloatArray:
         """Centred mean over the window of the finite samples; NaN where less than half of them are."""

@@ -29,6 +29,10 @@ UNITS = {
 AS_GOOD = 0.1  # by which the misfits of two explanations may differ to be told apart: 10 %
 MOST_NAMED = 3  # explanations in one line
 LONGEST = 130  # characters of all explanations in one line
+MANY, NEAR = (
+    80,
+    0.95,
+)  # points and quality of a line that may show a factor that is no unit: a slide looks like one for a while
 WEIGHTLESS = 0.05  # az over g below which gravity was taken out
 ESCAPE = "correct the drive file (or --no-check)"
 
@@ -51,7 +55,10 @@ Compared = Callable[[float], Sequence[Comparison]]
 
 @dataclass(frozen=True)
 class FrameReport:
-    """The comparisons of a log, and in one line what contradicts and how to mend it; None where nothing does."""
+    """The comparisons of a log, and in one line what contradicts and how to mend it.
+
+    None where nothing does, and where no mistake explains what is off: then it is the drive (slip, drift, bank), no column.
+    """
 
     comparisons: tuple[Comparison, ...]
     complaint: str | None
@@ -63,7 +70,8 @@ class FrameReport:
             line = one.line
             said = "not excited: cannot tell" if line is None else "unclear: cannot tell"
             if one.decides:
-                said = "agrees" if one.explained({}) else "contradicts"
+                wrong = "off: cannot tell" if self.complaint is None else "contradicts"
+                said = "agrees" if one.agrees else wrong
             found.append({
                 "comparison": one.title, "slope": None if line is None else line.slope,
                 "quality": None if line is None else line.quality, "verdict": said,
@@ -85,9 +93,8 @@ def check_frames(signals: Mapping[str, FloatArray], drive: DriveFile, files: Map
         return compare(corrected, drive)
 
     found = tuple(compared(1.0))
-    if all(one.explained({}) for one in found):
-        return FrameReport(found, None)
-    return FrameReport(found, _line_of(drive, files, found, _named(compared, drive)))
+    named = _named(compared, drive)
+    return FrameReport(found, _line_of(drive, files, found, named) if named else None)
 
 
 def _named(compared: Compared, drive: DriveFile) -> list[Mistake]:
@@ -163,9 +170,9 @@ def _any_factor(found: Sequence[Comparison], drive: DriveFile) -> list[Mistake]:
     groups = {group for one in found for group in one.gains if _columns(drive, group)}
     mistakes = []
     for one in found:
-        if one.line is None or one.explained({}):
+        if one.line is None or one.agrees or one.line.points < MANY or one.line.quality < NEAR:
             continue
-        for group in sorted(groups & one.gains.keys()):
+        for group in sorted((groups & one.gains.keys()) - {"steering"}):
             if abs(one.gains[group]) == 1:
                 factor = one.line.slope ** one.gains[group]
                 keys = _keys(_columns(drive, group))
@@ -177,14 +184,15 @@ def _any_factor(found: Sequence[Comparison], drive: DriveFile) -> list[Mistake]:
 def _explain(compared: Compared, mistakes: Sequence[Mistake]) -> list[Mistake]:
     """The mistakes that explain what contradicts, best first, those that are as good included."""
     given = compared(1.0)
-    if all(one.explained({}) for one in given):
+    if not any(one.contradicts for one in given):
         return []
     fits = []
     for mistake in mistakes:
         factors = dict(mistake.factors)
-        found = compared(factors.pop("wheels", 1.0))
+        wheels = factors.pop("wheels", 1.0)
+        found = compared(wheels)
         silenced = any(old.decides and not new.decides for old, new in zip(given, found, strict=True))
-        if not silenced and all(one.explained(factors) for one in found):
+        if not silenced and all(one.explained(factors, wheels) for one in found):
             fits.append((mistake.rare, sum(one.misfit(factors) for one in found), mistake))
     fits.sort(key=lambda fit: fit[:2])
     named: dict[frozenset[str], Mistake] = {}
@@ -196,7 +204,7 @@ def _explain(compared: Compared, mistakes: Sequence[Mistake]) -> list[Mistake]:
 
 def _line_of(drive: DriveFile, files: Mapping[str, str], found: Sequence[Comparison], named: list[Mistake]) -> str:
     worst = max(found, key=lambda one: one.misfit({}) - np.log(one.band))
-    groups = list(named[0].factors) if named else [group for group in worst.gains if _columns(drive, group)]
+    groups = list(named[0].factors)
     names = [name for group in groups for name in _columns(drive, group)] or [WHEEL_SPEEDS[0]]
     column = drive.signals[names[0]]
     place = f"{files[drive.log_of(column)]}: signals.{names[0]}: column '{short(column.column, 30)}' in {short(column.unit)}"
@@ -205,8 +213,7 @@ def _line_of(drive: DriveFile, files: Mapping[str, str], found: Sequence[Compari
     remedies = [one.remedy for one in named]
     while len(remedies) > 1 and sum(map(len, remedies)) > LONGEST:
         remedies.pop()
-    remedy = f"likely {', or '.join(remedies)}" if named else "signs or units of several columns are wrong"
-    return f"{place}: {seen}; {remedy}; {ESCAPE}"
+    return f"{place}: {seen}; likely {', or '.join(remedies)}; {ESCAPE}"
 
 
 def _columns(drive: DriveFile, group: str) -> list[str]:
