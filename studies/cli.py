@@ -49,7 +49,11 @@ def parser() -> argparse.ArgumentParser:
         (identify, "parameter file, fit and residual pictures"),
     ):
         reader.add_argument(
-            "logs", nargs="+", type=Path, metavar="LOG", help="CSV log, or several that belong together"
+            "logs",
+            nargs="+",
+            type=Path,
+            metavar="LOG",
+            help="log (CSV, MDF, ROS bag, MCAP, .mat), or several that belong together",
         )
         needed = reader is identify  # run says itself what is missing: --check and --guess need less
         reader.add_argument(

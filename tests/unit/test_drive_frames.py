@@ -154,6 +154,18 @@ def test_what_is_not_excited_is_not_judged(tmp_path: Path) -> None:
         assert not verdicts & {"agrees", "contradicts"}
 
 
+def test_a_mistake_must_not_silence_what_contradicts_it(tmp_path: Path) -> None:
+    """At constant speed, wheels read as rpm would hardly move and so contradict nothing: that explains nothing."""
+    table = turning()
+    t, v, r = table["t"], 9.0, 0.12 * np.sin(0.9 * table["t"])
+    sides = {"l": v - 0.75 * r, "r": v + 0.75 * r}
+    table |= {name: sides[name[-1]] / 0.33 for name in WHEELS}
+    table |= {"v": v + 0 * t, "ax": 0 * t, "ay": r * v, "r": -r, "d": 2.6 * r / v}
+    complaint = look(tmp_path, TURNING.split("[reference]")[0], table).complaint
+    assert complaint is not None
+    assert 'likely sign = "negative" for signals.yaw_rate;' in complaint
+
+
 def test_wheels_that_spin_or_lock_or_are_dead_are_no_frames(tmp_path: Path) -> None:
     table = turning()
     spin = table | {name: table[name] * (1.0 + 0.8 * (np.sin(3.0 * table["t"]) > 0)) for name in ("w_fl", "w_rl")}

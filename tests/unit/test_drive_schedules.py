@@ -17,6 +17,7 @@ from studies.drives.evaluation import evaluate
 from studies.drives.plots import figures
 from studies.drives.run import estimate_columns, replay_drive, run_drive
 from studies.drives.schedules import Direction, check_radii, load_schedule
+from studies.spec import Variant, load_spec
 from synthesis.errors import SpecError
 from tests.support.schedule_content import EFFECTIVE_RADIUS, schedule_content
 from tests.support.synthetic_drive import DRIVE, columns, write_drive, write_log
@@ -146,6 +147,18 @@ def test_the_command_of_the_refusal_makes_the_schedule(
     if direction == "longitudinal":
         path.write_text(text)
         assert check_radii(read_drive(path), tmp_path) == ()
+
+
+def test_a_variant_keeps_the_fastest_pole_below_what_sampling_allows() -> None:
+    base, _ = load_spec("corner-estimation-longitudinal")  # 600 1/s at 5 ms
+    for step, fastest in ((0.0025, 600.0), (0.005, 600.0), (0.01, 300.0), (0.02, 150.0)):
+        made = Variant(sample_time=step).spec(base)
+        assert made.gains.fastest_pole == pytest.approx(fastest)
+        assert made.deploy.sample_time == step
+    assert Variant(0.4, 0.0025).name("x") == "x-400mm-2p5ms"
+    radius = Variant(radius=0.4).parameters(base.parameter_set()).vehicle["effective_radius"]
+    assert (radius.value, radius.unit) == (0.4, "m")
+    assert Variant().spec(base) == base
 
 
 @pytest.mark.parametrize(("option", "value"), [("--radius", "0.4"), ("--radius", "-1 m"), ("--sample-time", "3 m")])
