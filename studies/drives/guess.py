@@ -22,6 +22,7 @@ NEEDED = (*(f"wheel_speed_{corner}" for corner in ("fl", "fr", "rl", "rr")), "ax
 FASTEST = 100.0  # Hz from which on the shipped sample time of 5 ms is taken
 RADIUS = 0.33  # m where no reference velocity says it: the shipped schedules are for it
 WEIGHTLESS = "left out: az must hold gravity, +9.81 m/s^2 at rest"
+CALM = 0.3  # share of such samples, those of least acceleration, that the radii are taken from
 FAST = 5.0  # m/s of the reference above which wheels roll
 
 
@@ -171,6 +172,9 @@ def _radii(files: list[_Found]) -> tuple[float, float]:
         for pair in (NEEDED[:2], NEEDED[2:4]):
             turned = 0.5 * (si[pair[0]] + si[pair[1]])
             rolls = (si["vx"] > FAST) & (turned > 0.0)
+            if "ax" in column and rolls.any():  # wheels slip least where the car neither drives nor brakes
+                push = np.abs(file.values[column["ax"]])
+                rolls &= push <= np.nanquantile(push[rolls], CALM)
             ratio = si["vx"][rolls] / turned[rolls]
             found.append(float(np.median(ratio)) if ratio.size else np.nan)
         if all(0.2 < one < 0.6 for one in found):
@@ -198,7 +202,7 @@ def _text(files: list[_Found], missing: Sequence[str]) -> str:
         "[vehicle] # CHECK: a usual car, not yours",
         'mass = "1600 kg"', 'front_axle_distance = "1.3 m" # front axle to centre of gravity', 'rear_axle_distance = "1.5 m"',
         'cg_height = "0.55 m"', 'front_track = "1.58 m"', 'rear_track = "1.58 m"',
-        f'effective_radius_front = "{radii[0]:g} m"' + ("" if radii == (RADIUS, RADIUS) else " # from the reference velocity"),
+        f'effective_radius_front = "{radii[0]:g} m"' + ("" if radii == (RADIUS, RADIUS) else " # CHECK: from the reference velocity"),
         f'effective_radius_rear = "{radii[1]:g} m"',
         *(['wheel_inertia = "1.2 kg*m^2"'] if any(name.startswith("torque_") for name in named) else []),
         *(["steering_ratio = 15.0"] if "hand_wheel" in named else []), "",
