@@ -202,7 +202,7 @@ def _text(files: list[_Found], missing: Sequence[str]) -> str:
         "[vehicle] # CHECK: a usual car, not yours",
         'mass = "1600 kg"', 'front_axle_distance = "1.3 m" # front axle to centre of gravity', 'rear_axle_distance = "1.5 m"',
         'cg_height = "0.55 m"', 'front_track = "1.58 m"', 'rear_track = "1.58 m"',
-        f'effective_radius_front = "{radii[0]:g} m"' + ("" if radii == (RADIUS, RADIUS) else " # CHECK: from the reference velocity"),
+        f'effective_radius_front = "{radii[0]:g} m"' + ("" if radii == (RADIUS, RADIUS) else " # CHECK: from the reference"),
         f'effective_radius_rear = "{radii[1]:g} m"',
         *(['wheel_inertia = "1.2 kg*m^2"'] if any(name.startswith("torque_") for name in named) else []),
         *(["steering_ratio = 15.0"] if "hand_wheel" in named else []), "",
