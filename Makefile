@@ -41,7 +41,7 @@ $(STAMP): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "gainsmith needs python3 >= 3.11; set PYTHON=...")'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=24'
-	$(BIN)/python -m pip install -qq --editable '.[test,lint]'
+	$(BIN)/python -m pip install -qq --editable '.[test,lint,logs]'
 	touch $@
 
 clean:

@@ -5,6 +5,9 @@ from .claim import ClaimVerdict as ClaimVerdict
 from .claim import Finding as Finding
 from .drives.drive_file import DriveFile as DriveFile
 from .drives.drive_file import read_drive as read_drive
+from .drives.frames import FrameReport as FrameReport
+from .drives.guess import write_guess as write_guess
+from .drives.run import check_drive as check_drive
 from .drives.run import replay_drive as replay_drive
 from .drives.run import run_drive as run_drive
 from .errors import IdentifyError as IdentifyError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
@@ -14,6 +14,8 @@ from typing import NoReturn
 
 from studies.commands.help import HELP, Paragraphs
 from studies.commands.outcome import REFUSED, refuse, run, speak_safely
+
+Command = Callable[[str, str], argparse.ArgumentParser]
 
 
 class Parser(argparse.ArgumentParser):
@@ -49,6 +51,16 @@ def parser() -> argparse.ArgumentParser:
         new.add_argument("--json", action="store_true", dest="as_json", help="machine-readable output")
         return new
 
+    _models(command)
+    _drives(command)
+    _studies(command)
+    command("list", "listing.run_list")
+    command("doctor", "doctor.run_doctor")
+    return top
+
+
+def _models(command: Command) -> None:
+    """From a model to proved gains."""
     new = command("new", "new.run_new")
     new.add_argument("name", metavar="NAME", help="of the model: letters, digits and hyphens")
     new.add_argument("--out", type=Path, metavar="DIR", help="where they go (default: here)")
@@ -63,6 +75,8 @@ def parser() -> argparse.ArgumentParser:
     schedules.add_argument(
         "--check", action="store_true", help="write nothing; fail on drift against the schedules in DIR"
     )
+    schedules.add_argument("--radius", metavar="LENGTH", help='another effective radius, such as "0.40 m"')
+    schedules.add_argument("--sample-time", metavar="TIME", help='another sample time, such as "10 ms"')
     schedules.add_argument("--figures", type=Path, metavar="DIR", help="draw gains beside the published ranges")
 
     certify = command("certify", "certify.run_certify")
@@ -70,6 +84,9 @@ def parser() -> argparse.ArgumentParser:
         "files", nargs="+", type=Path, metavar="FILE", help="schedule file, or the name of a shipped one"
     )
 
+
+def _drives(command: Command) -> None:
+    """What reads recorded drives."""
     run = command("run", "run.run_log")
     identify = command("identify", "identify.run_identify")
     for reader, text in (
@@ -77,13 +94,27 @@ def parser() -> argparse.ArgumentParser:
         (identify, "parameter file, fit and residual pictures"),
     ):
         reader.add_argument(
-            "logs", nargs="+", type=Path, metavar="LOG", help="CSV log, or several that belong together"
+            "logs",
+            nargs="+",
+            type=Path,
+            metavar="LOG",
+            help="log (CSV, MDF, ROS bag, MCAP, .mat), or several that belong together",
         )
+        needed = reader is identify  # run says itself what is missing: --check and --guess need less
         reader.add_argument(
-            "--drive", required=True, type=Path, metavar="DRIVE.toml", help="columns, units, signs, vehicle"
+            "--drive", required=needed, type=Path, metavar="DRIVE.toml", help="columns, units, signs, vehicle"
         )
-        reader.add_argument("--out", required=True, type=Path, metavar="DIR", help=f"where {text} go")
+        reader.add_argument("--out", required=needed, type=Path, metavar="DIR", help=f"where {text} go")
+    checks = run.add_mutually_exclusive_group()
+    checks.add_argument("--check", action="store_true", help="only compare the signals of the log with one another")
+    checks.add_argument(
+        "--guess", action="store_true", help="write a first drive file (to DRIVE.toml) from column names"
+    )
+    checks.add_argument("--no-check", action="store_true", help="run although signs, units or sides seem wrong")
 
+
+def _studies(command: Command) -> None:
+    """What takes long and goes on where it stopped."""
     study = command("study", "study.run_study")
     study.add_argument("studies", nargs="*", metavar="ID", help="studies to run (see gainsmith list)")
     study.add_argument("--all", action="store_true", dest="every", help="every study")
@@ -110,10 +141,6 @@ def parser() -> argparse.ArgumentParser:
     sweep.add_argument("--update-baseline", action="store_true", help="write the baseline instead of comparing")
     sweep.add_argument("--junit", type=Path, metavar="FILE", help="the gate as JUnit XML")
     sweep.add_argument("--summary", type=Path, metavar="FILE", help="the gate as Markdown")
-
-    command("list", "listing.run_list")
-    command("doctor", "doctor.run_doctor")
-    return top
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -20,7 +20,7 @@ from estimators.errors import GainsmithError
 from estimators.schedule import read_content
 from studies.execution.processes import available_cores, in_order
 from studies.preflight import check_before_design
-from studies.spec import load_spec
+from studies.spec import Variant, load_spec
 from synthesis.certificate.frozen import frozen_gain
 from synthesis.certificate.proof import Proof, prove
 from synthesis.design.deploy import deploy
@@ -29,6 +29,7 @@ from synthesis.design.hinf_observer import channel_matrices
 
 # A stored claim may be worse than a fresh one by this share: levels are searched in steps, and solvers differ.
 WORSE = 0.02
+AS_IT_IS = Variant()
 LARGER_IS_BETTER = ("decay rate", "internal update", "sampled error", "drop probability")
 
 
@@ -56,28 +57,31 @@ class ScheduleRun:
         return self.state in ("written", "kept", "same")
 
 
-def regenerate(names: Iterable[str], out: Path, check: bool = False) -> Iterator[ScheduleRun]:
+def regenerate(
+    names: Iterable[str], out: Path, check: bool = False, variant: Variant = AS_IT_IS
+) -> Iterator[ScheduleRun]:
     """Run the specifications on as many processes as there are cores; order as given.
 
     The work is under way when this returns.
     """
-    return in_order(_run, [(name, out, check) for name in names], available_cores())
+    return in_order(_run, [(name, out, check, variant) for name in names], available_cores())
 
 
-def _run(item: tuple[str, Path, bool]) -> ScheduleRun:
-    name, out, check = item
+def _run(item: tuple[str, Path, bool, Variant]) -> ScheduleRun:
+    name, out, check, variant = item
     start = perf_counter()
     try:
-        return run_spec(name, out, check)
+        return run_spec(name, out, check, variant)
     except GainsmithError as error:
-        return ScheduleRun(Path(name).stem, "failed", perf_counter() - start, str(error))
+        return ScheduleRun(variant.name(Path(name).stem), "failed", perf_counter() - start, str(error))
 
 
-def run_spec(name: str, out: Path, check: bool = False) -> ScheduleRun:
+def run_spec(name: str, out: Path, check: bool = False, variant: Variant = AS_IT_IS) -> ScheduleRun:
     """Design, deploy, prove and write one schedule; with `check` compare only. Raises GainsmithError."""
     start = perf_counter()
-    spec, folder = load_spec(name)
-    plant = spec.plant(folder)
+    base, folder = load_spec(name)
+    spec = variant.spec(base)
+    plant = spec.plant(folder, variant.radius)
     check_before_design(spec, plant.model)
     deployment = deploy(spec.design(plant.model), spec.deploy_settings())
     content = schedule_content(deployment, spec.name, spec.description, spec.resolved(plant))

@@ -18,7 +18,7 @@ from synthesis.exchange.model_text import model_text
 from synthesis.lmi.settings import LmiSettings
 from synthesis.models.catalogue import CATALOGUE
 from synthesis.models.lpv import LpvModel
-from synthesis.models.parameter_set import ParameterSet, load_parameter_set
+from synthesis.models.parameter_set import ParameterSet, Quantity, load_parameter_set
 from synthesis.toml_file import StrictTable, find_toml, read_table, read_toml, shipped_files
 from synthesis.toml_places import Places
 
@@ -102,11 +102,19 @@ class ScheduleSpec(StrictTable):
     gains: DesignSpec = Field(alias="design")
     deploy: DeploySpec
 
-    def plant(self, folder: Path = Path()) -> Plant:
-        """The model: a file beside the specification, or one of the catalogue."""
+    def plant(self, folder: Path = Path(), radius: float | None = None) -> Plant:
+        """The model: a file beside the specification, or one of the catalogue, on request with another effective radius, m."""
         if self.model.file is None:
             parameters = self.parameter_set(folder)
+            if radius is not None:
+                quantity = Quantity(value=radius, unit="m", source="given as --radius")
+                vehicle = {**parameters.vehicle, "effective_radius": quantity}
+                parameters = parameters.model_copy(update={"vehicle": vehicle})
             return Plant(self.build_model(parameters), parameters)
+        if radius is not None:
+            raise SpecError(
+                f"spec '{self.name}': --radius is for models of the catalogue; edit {self.model.file} instead"
+            )
         if Path(self.model.file).suffix != ".toml":
             raise SpecError(f"spec '{self.name}': model.file '{self.model.file}' is not a .toml file; give its path")
         return Plant(load_model(folder / self.model.file), None)
@@ -154,6 +162,37 @@ class ScheduleSpec(StrictTable):
         if plant.parameters is None:
             return {**own, "model_text": model_text(plant.model).splitlines()}
         return {**own, "parameter_set": plant.parameters.model_dump(mode="json", exclude_none=True)}
+
+
+FASTEST = 3.0  # of a pole times the sample time, as in the shipped specifications of longitudinal observers
+
+
+@dataclass(frozen=True)
+class Variant:
+    """The same specification for another wheel or another sample time: effective radius, m, and s; None keeps what it has.
+
+    The fastest pole stays where it is, but below 3/sample_time (or what the specification itself allows), where sampling ends it.
+    """
+
+    radius: float | None = None
+    sample_time: float | None = None
+
+    def name(self, spec: str) -> str:
+        """What the schedule is called, such as corner-estimation-longitudinal-400mm-10ms."""
+        parts = [(self.radius, "mm"), (self.sample_time, "ms")]
+        endings = [f"-{value * 1e3:g}{unit}".replace(".", "p") for value, unit in parts if value is not None]
+        return spec + "".join(endings)
+
+    def spec(self, base: ScheduleSpec) -> ScheduleSpec:
+        """The specification at this sample time, with a name of its own."""
+        gains, deploy = base.gains, base.deploy
+        if self.sample_time is not None:
+            deploy = deploy.model_copy(update={"sample_time": self.sample_time})
+            if gains.fastest_pole is not None:
+                times = max(FASTEST, gains.fastest_pole * base.deploy.sample_time)
+                fastest = min(gains.fastest_pole, times / self.sample_time)
+                gains = gains.model_copy(update={"fastest_pole": fastest})
+        return base.model_copy(update={"name": self.name(base.name), "gains": gains, "deploy": deploy})
 
 
 def shipped_specs() -> dict[str, Path]:

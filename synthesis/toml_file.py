@@ -56,6 +56,8 @@ def read_toml(path: Path, what: str) -> dict[str, typing.Any]:
         raise SpecError(f"{path.name}: cannot be read ({error.strerror}); give the path of a {what} file") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise SpecError(f"{path.name}: not a TOML file: {error}") from error
+    except RecursionError as error:
+        raise SpecError(f"{path.name}: is nested too deeply for a {what} file; write plain tables") from error
 
 
 def load_toml(path: Path, model: type[_Table], what: str) -> _Table:

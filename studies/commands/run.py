@@ -7,8 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from studies.commands.terminal import print_table, progress_bar
-from studies.drives.run import RunResult, run_drive
+from studies.drives.frames import FrameReport
+from studies.drives.run import RunResult, check_drive, run_drive
+from studies.errors import LogError
+from synthesis.errors import SpecError
 
+CHECK_HEADER = ("comparison", "slope (1 is right)", "quality", "verdict")
 HEADER = ("quantity", "NRMS (%)", "RMS", "maximum", "reference peak", "unit", "samples")
 
 
@@ -45,11 +49,29 @@ def _cells(entry: dict[str, Any]) -> tuple[str, ...]:
     return (*numbers, entry["unit"], str(entry["samples"]))
 
 
-def run_log(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int:
-    """Replay the log and print the metrics beside the baselines; 0 when done."""
+def run_log(
+    logs: list[Path],
+    drive: Path | None,
+    out: Path | None,
+    check: bool,
+    no_check: bool,
+    as_json: bool,
+    guess: bool = False,
+) -> int:
+    """Replay the log and print the metrics beside the baselines, or check it only; 0 when done."""
+    if guess:
+        return _guess(logs, drive, as_json)
+    if drive is None:
+        raise SpecError("run: --drive is missing; give a drive file, or --guess to have a first one written")
+    if check:
+        return _check(logs, drive, as_json)
+    if out is None:
+        raise SpecError("run: --out is missing; give a folder for the results, or --check to look at the log only")
     with progress_bar() as progress:
         task = progress.add_task("replaying", total=1.0)
-        result = run_drive(logs, drive, out, progress=lambda done: progress.update(task, completed=done))
+        result = run_drive(
+            logs, drive, out, check=not no_check, progress=lambda done: progress.update(task, completed=done)
+        )
     if as_json:
         print(json.dumps(result.metrics, indent=1))
         return 0
@@ -57,4 +79,39 @@ def run_log(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int:
     for line in remarks(result):
         print(line)
     print(f"written to {out}")
+    return 0
+
+
+def check_rows(found: FrameReport) -> list[tuple[str, ...]]:
+    """One row a comparison, in the columns of ``CHECK_HEADER``."""
+
+    def number(value: float | None) -> str:
+        return "-" if value is None else f"{value:.3g}"
+
+    return [(row["comparison"], number(row["slope"]), number(row["quality"]), row["verdict"]) for row in found.rows()]
+
+
+def _check(logs: list[Path], drive: Path, as_json: bool) -> int:
+    found = check_drive(logs, drive)
+    if as_json:
+        print(json.dumps({"comparisons": found.rows(), "complaint": found.complaint}, indent=1))
+    else:
+        print_table(f"{drive.stem}: signals beside one another", CHECK_HEADER, check_rows(found), left=(0, 3))
+    if found.complaint is not None:
+        raise LogError(found.complaint)
+    return 0
+
+
+def _guess(logs: list[Path], drive: Path | None, as_json: bool) -> int:
+    from studies.drives.guess import write_guess
+
+    target, guessed = write_guess(logs, drive)
+    if as_json:
+        print(json.dumps({"drive": str(target), "found": guessed.found, "missing": guessed.missing}, indent=1))
+        return 0
+    print_table("columns", ("signal", "column"), sorted(guessed.found.items()), left=(0, 1))
+    if guessed.missing:
+        print(f"not found: {', '.join(guessed.missing)}; fill them in")
+    names = " ".join(str(path) for path in logs)
+    print(f"written to {target}: edit it, then gainsmith run {names} --drive {target} --check")
     return 0

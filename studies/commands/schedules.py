@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,12 @@ import numpy as np
 
 from studies.commands.gain_figure import gain_figure
 from studies.commands.terminal import print_table, progress_bar
+from studies.drives.quantities import to_si
 from studies.plots.save import save_figure
 from studies.preflight import check_before_design
 from studies.schedules import ScheduleRun, regenerate
-from studies.spec import load_spec, shipped_specs
+from studies.spec import Variant, load_spec, shipped_specs
+from synthesis.errors import SpecError
 
 HEADINGS = (
     "schedule", "update", "points", "gain of", "deployed", "published", "channel", "gain", "decay", "drops", "state", "s",
@@ -29,14 +32,23 @@ LONGEST_CHANNEL = 44
 MOST_GAINS = 8  # in the table of a terminal
 
 
-def run_schedules(specs: list[str], out: Path | None, check: bool, figures: Path | None, as_json: bool) -> int:
+def run_schedules(
+    specs: list[str],
+    out: Path | None,
+    check: bool,
+    figures: Path | None,
+    as_json: bool,
+    radius: str | None = None,
+    sample_time: str | None = None,
+) -> int:
     """Regenerate (or check) schedules, print a table; 0 good, 1 drift or refused design."""
+    variant = Variant(_quantity("--radius", radius, "m"), _quantity("--sample-time", sample_time, "s"))
     names = specs or list(shipped_specs())
     for name in names:
         spec, place = load_spec(name)  # bad input is refused before anything is designed or written
         check_before_design(spec, spec.plant(place).model)
     folder = out or Path("schedules")
-    pending = regenerate(names, folder, check)
+    pending = regenerate(names, folder, check, variant)
     runs: list[ScheduleRun] = []
     with progress_bar() as progress:
         task = progress.add_task("designing and proving", total=len(names))
@@ -62,6 +74,19 @@ def run_schedules(specs: list[str], out: Path | None, check: bool, figures: Path
             if run.message:
                 print(f"{run.name}: {run.message}", file=sys.stderr)
     return 0 if all(run.good for run in runs) else 1
+
+
+def _quantity(option: str, text: str | None, unit: str) -> float | None:
+    """What an option says in SI. Raises SpecError for what is no positive quantity."""
+    if text is None:
+        return None
+    try:
+        value = to_si(text, unit)
+    except ValueError as error:
+        raise SpecError(f"{option}: {error}") from error
+    if not 0.0 < value < math.inf:
+        raise SpecError(f"{option}: '{text}' is out of range; it must be finite and above 0 {unit}")
+    return value
 
 
 def _cells(run: ScheduleRun) -> tuple[str, ...]:

@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from estimators.arrays import FloatArray
 from studies.errors import LogError
@@ -46,6 +45,8 @@ def find_offset(
 
     Raises LogError when no offset reaches a correlation of 0.9: constant speed, other signals, or another drive.
     """
+    from scipy.optimize import minimize_scalar  # a refused log must not wait for it
+
     velocity_time, velocity = _finite(velocity_time, velocity)
     acceleration_time, acceleration = _finite(acceleration_time, acceleration)
     steps = np.diff(acceleration_time) * (acceleration[1:] + acceleration[:-1]) / 2

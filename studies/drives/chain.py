@@ -50,11 +50,11 @@ class Chain:
 
 @refused_at("estimators")
 def pipeline_of(
-    drive: DriveFile, longitudinal: GainSchedule | CornerKind, lateral: GainSchedule | None = None
+    drive: DriveFile, longitudinal: GainSchedule | CornerKind | None, lateral: GainSchedule | None = None
 ) -> tuple[parts.EstimationPipeline, tuple[str, ...]]:
     """The pipeline that the drive file asks for, for one car, and what had to be assumed.
 
-    ``longitudinal``: the corner observers along the wheels, for this pipeline alone; they run where ``lateral`` is given.
+    ``longitudinal``: the corner observers along the wheels, for this pipeline alone; they run where ``lateral`` is given too.
 
     Raises SpecError, one line, on vehicle data that no car has.
     """
@@ -67,7 +67,9 @@ def pipeline_of(
     }  # fmt: skip
     method: Any = chosen.lateral_force
     weights = SlipWeights() if chosen.axle_weights == "slip" else None
-    corners = parts.CornerObservers(vehicle, longitudinal, lateral, weights=weights) if lateral is not None else None
+    corners: parts.CornerObservers | None = None
+    if longitudinal is not None and lateral is not None:
+        corners = parts.CornerObservers(vehicle, longitudinal, lateral, weights=weights)
     velocity: parts.CornerVelocity | None = None  # the fusion; else a paper's own chain
     if chosen.velocity != "fusion" and corners is not None:
         velocity = parts.CornerVelocity(corners, KinematicKalman(time) if chosen.velocity == "kinematic" else None)

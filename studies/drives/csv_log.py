@@ -1,114 +1,240 @@
-"""Reading columns of numbers from a CSV log, with the line of every complaint."""
+"""Reading columns of numbers from a CSV log, with the line of every complaint and the key that would mend it."""
 
 from __future__ import annotations
 
 import csv
 import itertools
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 import polars as pl
 
 from estimators.arrays import FloatArray
-from estimators.errors import unknown
+from studies.drives.iso_time import iso_seconds, looks_iso
+from studies.drives.quantities import short
+from studies.drives.table import LogTable, no_column, table_of
 from studies.errors import LogError
+
+LONGEST_HEADER = 100_000  # characters
+DELIMITERS = (",", ";", "\t", "|")
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
+_NO_NUMBER = re.compile(r"[^0-9]*")
 
 
 @dataclass(frozen=True)
-class CsvColumns:
-    """The wanted columns as numbers; an empty cell, NaN or infinity is NaN. Row k stands on line k + 2 of the file."""
+class CsvForm:
+    """How the cells are written: keys of a log in the drive file. ``iso``: the column of time stamps in text, if any."""
 
-    values: dict[str, FloatArray]
-    rows: int
-    not_finite: dict[str, int]
+    delimiter: str = ","
+    decimal: str = "."
+    encoding: str = "utf-8"
+    units_row: bool = False
+    iso: str | None = None
+
+    @property
+    def first_line(self) -> int:
+        """The line of row 0, counted from 1: one header line, and one of units if there is one."""
+        return 3 if self.units_row else 2
 
 
-def line_of(row: int) -> int:
-    """The line of the file that holds data row ``row``: one header line, lines counted from 1."""
-    return row + 2
+@dataclass(frozen=True)
+class _File:
+    path: Path
+    form: CsvForm
+
+    @property
+    def name(self) -> str:
+        return self.path.name
+
+    @contextmanager
+    def text(self) -> Iterator[TextIO]:
+        encoding = "utf-8-sig" if self.form.encoding.lower() in ("utf-8", "utf8") else self.form.encoding
+        try:
+            with self.path.open(encoding=encoding, errors="replace", newline="") as stream:
+                yield stream
+        except UnicodeError as error:
+            raise self.undecodable(error) from error
+
+    def undecodable(self, error: UnicodeError) -> LogError:
+        why = error.reason if isinstance(error, UnicodeDecodeError) else str(error)
+        words = f"is not in {self.form.encoding} ({why}); correct encoding for this log in the drive file"
+        return LogError(f"{self.name}: {words}")
+
+    def split(self, line: str, delimiter: str | None = None) -> list[str]:
+        try:
+            return next(csv.reader([line], delimiter=delimiter or self.form.delimiter), [])
+        except csv.Error as error:
+            raise LogError(f"{self.name}: is not a CSV file ({error}); export it again") from error
 
 
-def read_columns(path: Path, wanted: Mapping[str, str], delimiter: str = ",") -> CsvColumns:
+def read_columns(path: Path, wanted: Mapping[str, str], form: CsvForm | None = None) -> LogTable:
     """Read the ``wanted`` columns (name to what they are for) of a CSV file with one header line.
 
-    Raises LogError naming file, line and remedy: no such file, empty, unknown column, a row with too few or too many
-    fields, text where a number belongs.
+    Raises LogError naming file, line and remedy: no such file, empty, another encoding, delimiter or decimal sign, a row of
+    units, unknown column, a row with too few or too many fields, text where a number belongs.
     """
-    table = _read_text(path, delimiter)
-    header = _header(path, delimiter)
+    file = _File(path, form or CsvForm())
+    if not path.is_file():
+        raise LogError(f"{path.name}: cannot be read (no such file); check the path")
+    _refuse_encoding(file)
+    header = read_header(path, file.form)
+    table = _read_text(file)
     if any("\n" in name for name in table.columns):
         raise LogError(f"{path.name}: line 1 opens a quote that it does not close; repair the header")
     for column, role in wanted.items():
         if column not in table.columns:
-            raise LogError(f"{path.name}: {role}: {unknown('column', column, table.columns)}")
+            raise no_column(path.name, role, column, table.columns)
         if header.count(column) > 1:
             raise LogError(f"{path.name}: {role}: column '{column}' appears {header.count(column)} times; rename one")
     if table.height == 0:
         raise LogError(f"{path.name}: has a header but no rows; record again or give another file")
-    _refuse_short_rows(path, table, delimiter)
-    values = {column: _numbers(path, table[column]) for column in wanted}
-    bad = {column: int(np.count_nonzero(~np.isfinite(v))) for column, v in values.items()}
-    for value in values.values():
-        value[~np.isfinite(value)] = np.nan
-    return CsvColumns(values=values, rows=table.height, not_finite={c: n for c, n in bad.items() if n})
+    _refuse_units_row(file, table.select(list(wanted)))
+    _refuse_short_rows(file, table)
+    return table_of({column: _numbers(file, table[column]) for column in wanted}, file.form.first_line)
 
 
-def _read_text(path: Path, delimiter: str) -> pl.DataFrame:
-    if not path.is_file():
-        raise LogError(f"{path.name}: cannot be read (no such file); check the path")
+def read_header(path: Path, form: CsvForm) -> list[str]:
+    """Names of the columns. Raises LogError for a header that is none, or that another delimiter splits."""
+    file = _File(path, form)
+    with file.text() as stream:
+        line = stream.readline(LONGEST_HEADER + 1)
+    if len(line) > LONGEST_HEADER:
+        raise LogError(f"{path.name}: line 1 has more than {LONGEST_HEADER} characters; it must hold the column names")
+    header = file.split(line)
+    if len(header) == 1:
+        for other in DELIMITERS:
+            if other != form.delimiter and len(file.split(line, other)) > 1:
+                shown = other.replace("\t", "\\t")
+                raise LogError(
+                    f'{path.name}: the header has one column, and {len(file.split(line, other))} with "{shown}" between '
+                    f'them; set delimiter = "{shown}" for this log in the drive file'
+                )
+    return header
+
+
+def read_units(path: Path, form: CsvForm) -> list[str]:
+    """The cells of the line behind the header."""
+    file = _File(path, form)
+    with file.text() as stream:
+        stream.readline()
+        return [cell.strip() for cell in file.split(stream.readline(LONGEST_HEADER))]
+
+
+def _refuse_encoding(file: _File) -> None:
+    with file.path.open("rb") as stream:
+        start = stream.read(4096)
+    wide = start[:2] in (b"\xff\xfe", b"\xfe\xff") or start.count(b"\0") > len(start) // 4
+    if wide and not file.form.encoding.lower().startswith("utf-16"):
+        raise LogError(f'{file.name}: is written in UTF-16; set encoding = "utf-16" for this log in the drive file')
+
+
+def _read_text(file: _File) -> pl.DataFrame:
+    form, source = file.form, file.path
     try:
-        return pl.read_csv(path, separator=delimiter, infer_schema=False)
+        data: Path | bytes = source
+        if form.encoding.lower() not in ("utf-8", "utf8"):
+            data = source.read_bytes().decode(form.encoding).lstrip("\ufeff").encode()
+        skip = 1 if form.units_row else 0
+        return pl.read_csv(data, separator=form.delimiter, infer_schema=False, skip_rows_after_header=skip)
     except OSError as error:
-        raise LogError(f"{path.name}: cannot be read ({error.strerror or error}); check the path") from error
+        raise LogError(f"{file.name}: cannot be read ({error.strerror or error}); check the path") from error
+    except UnicodeError as error:
+        raise file.undecodable(error) from error
     except pl.exceptions.NoDataError as error:
-        raise LogError(f"{path.name}: is empty; record again or give another file") from error
+        raise LogError(f"{file.name}: is empty; record again or give another file") from error
     except pl.exceptions.PolarsError as error:
-        raise LogError(f"{path.name}: {_long_row(path, delimiter)}") from error
+        raise LogError(f"{file.name}: {_why_refused(file)}") from error
 
 
-def _header(path: Path, delimiter: str) -> list[str]:
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as stream:
-        return next(csv.reader([stream.readline()], delimiter=delimiter), [])
+def _why_refused(file: _File) -> str:
+    """Why polars refuses a file: nearly always a row with more fields than the header, or another encoding."""
+    with file.text() as stream:
+        fields = len(file.split(stream.readline()))
+        for number, line in enumerate(stream, start=2):
+            found = len(file.split(line))
+            if found > fields:
+                comma = file.form.delimiter == "," and _decimal_commas(line)
+                hint = "; commas seem to be decimal signs: export with another delimiter" if comma else ""
+                return (
+                    f"line {number} has {found} fields where the header has {fields}; repair or remove the line{hint}"
+                )
+            if "\ufffd" in line:
+                return f'line {number} is not UTF-8; set encoding = "cp1252" (or what wrote it) for this log in the drive file'
+    return "is not a CSV file in UTF-8 with one header line; export it again, or set encoding for it in the drive file"
 
 
-def _long_row(path: Path, delimiter: str) -> str:
-    """Why polars refuses a file: nearly always a row with more fields than the header."""
-    fields = len(_header(path, delimiter))
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as stream:
-        for number, line in enumerate(stream, start=1):
-            found = next(csv.reader([line], delimiter=delimiter), [])
-            if len(found) > fields:
-                return f"line {number} has {len(found)} fields where the header has {fields}; repair or remove the line"
-    return "is not a CSV file in UTF-8 with one header line; export it again"
+def _decimal_commas(line: str) -> bool:
+    cells = line.strip().split(",")
+    return len(cells) % 2 == 0 and len(cells) > 2 and all(cell.strip("-+ ").isdigit() for cell in cells)
 
 
-def _refuse_short_rows(path: Path, table: pl.DataFrame, delimiter: str) -> None:
+def _refuse_units_row(file: _File, table: pl.DataFrame) -> None:
+    cells = [str(cell or "").strip() for cell in table.row(0)]
+    words = [cell for cell in cells if cell]
+    if file.form.units_row or not words or any(_NO_NUMBER.fullmatch(cell.replace("^2", "")) is None for cell in words):
+        return
+    if (
+        all(cell.lower() in ("nan", "inf", "-inf", "na", "null", "none") for cell in words)
+        or len(words) < len(cells) // 2
+    ):
+        return
+    if table.height > 1 and _NO_NUMBER.fullmatch(str(table.row(1)[0] or "")):
+        return
+    shown = short(", ".join(words), 40)
+    raise LogError(
+        f"{file.name}: line 2 is a row of units ({shown}), not of numbers; set units_row = true for this log in the drive file"
+    )
+
+
+def _refuse_short_rows(file: _File, table: pl.DataFrame) -> None:
     """A row that ends early reads as empty cells: only the line itself tells it from a row whose last cell is empty."""
     suspects = table[table.columns[-1]].is_null().arg_true().to_list()
     if not suspects:
         return
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as stream:
+    with file.text() as stream:
         lines = dict(zip(itertools.count(1), stream, strict=False))
     for row in suspects:
-        line = lines.get(line_of(row), "")
-        found = len(next(csv.reader([line], delimiter=delimiter), []))
+        number = row + file.form.first_line
+        found = len(file.split(lines.get(number, "")))
         if found < table.width:
             raise LogError(
-                f"{path.name}: line {line_of(row)} has {found} fields where the header has {table.width}; "
+                f"{file.name}: line {number} has {found} fields where the header has {table.width}; "
                 "the row is cut off: repair or remove the line"
             )
 
 
-def _numbers(path: Path, text: pl.Series) -> FloatArray:
+def _numbers(file: _File, text: pl.Series) -> FloatArray:
     stripped = text.str.strip_chars()
-    numbers = stripped.cast(pl.Float64, strict=False)
-    wrong = (numbers.is_null() & stripped.is_not_null() & (stripped != "")).arg_true()
-    if wrong.len():
-        row = int(wrong[0])
+    if text.name == file.form.iso:
+        seconds = iso_seconds(text)
+        wrong = np.flatnonzero(np.isnan(seconds) & (stripped.fill_null("") != "").to_numpy())
+        if wrong.size:
+            place = f"{file.name}: line {int(wrong[0]) + file.form.first_line}: column '{text.name}'"
+            cell = short(str(stripped[int(wrong[0])]), 30)
+            raise LogError(f"{place} holds '{cell}', not a time such as 2024-05-01T12:00:00.005; correct time_format")
+        return seconds
+    decimal = file.form.decimal
+    plain = stripped if decimal == "." else stripped.str.replace(decimal, ".", literal=True)
+    numbers = plain.cast(pl.Float64, strict=False)
+    wrong_rows = (numbers.is_null() & stripped.is_not_null() & (stripped != "")).arg_true()
+    if wrong_rows.len():
+        row = int(wrong_rows[0])
+        cell = str(stripped[row])
         raise LogError(
-            f"{path.name}: line {line_of(row)}: column '{text.name}' holds '{stripped[row]}', not a number; "
-            "leave the cell empty where nothing was measured"
+            f"{file.name}: line {row + file.form.first_line}: column '{text.name}' holds '{short(cell, 30)}', not a number; "
+            f"{_cell_remedy(cell, decimal)}"
         )
     return np.array(numbers.fill_null(np.nan).to_numpy(), dtype=np.float64)
+
+
+def _cell_remedy(cell: str, decimal: str) -> str:
+    if decimal == "." and _DECIMAL_COMMA.fullmatch(cell):
+        return 'set decimal = "," for this log in the drive file'
+    if looks_iso(cell):
+        return 'if it is the time column, set time_format = "iso" for this log in the drive file'
+    return "leave the cell empty where nothing was measured"

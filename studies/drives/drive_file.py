@@ -12,64 +12,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from estimators.errors import unknown
 from estimators.vehicle import VehicleParameters
 from studies.drives import quantities as si
-from studies.drives.quantities import CORNERS, REFERENCES, SIGNALS, factor_to
+from studies.drives.columns import Column, LogFile, check_alignment, check_logs
+from studies.drives.quantities import CORNERS, REFERENCES, SIGNALS
 from synthesis.toml_file import StrictTable, load_toml
 
 WHEEL_INERTIA = 1.0  # kg m^2 where the drive has none: without torques it has nothing to act on
-
-
-def _a_time(unit: str) -> str:
-    factor_to(unit, "s")
-    return unit
-
-
-class Column(StrictTable):
-    """One log column: value in SI = factor * sign * (column in ``unit``)."""
-
-    column: str = Field(min_length=1, examples=["omega_fl"])
-    unit: str = Field(min_length=1, examples=["rad/s"])
-    log: str | None = None
-    sign: Literal["positive", "negative"] = "positive"
-    factor: float = Field(default=1.0, examples=[0.5])
-
-    def scale(self, si_unit: str) -> float:
-        """The number that turns the column into ``si_unit`` with the sign of this project (x forward, y left, z up)."""
-        return factor_to(self.unit, si_unit) * self.factor * (-1.0 if self.sign == "negative" else 1.0)
-
-
-class Align(StrictTable):
-    """Estimate a clock offset: the derivative of ``velocity`` must look like ``acceleration`` (:mod:`.align`)."""
-
-    to: str = Field(examples=["imu"])
-    velocity: str = "vx"
-    acceleration: str = "ax"
-    search: si.Duration | None = None
-
-
-class LogFile(StrictTable):
-    """One log file: its clock, its rate, and the longest pause that may be bridged by interpolation."""
-
-    name: str = Field(min_length=1, examples=["car"])
-    rate: si.Rate = Field(examples=["200 Hz"])
-    file: str | None = None
-    time: str = "time"
-    time_unit: Annotated[str, AfterValidator(_a_time)] = "s"
-    delimiter: str = Field(default=",", min_length=1, max_length=1)
-    max_gap: si.Duration | None = None
-    duplicates: Literal["mean", "last", "refuse"] = "mean"
-    sort: bool = False
-    clock_offset: si.Offset = 0.0
-    align: Align | None = None
-
-    @property
-    def allowed_gap(self) -> float:
-        """The longest spacing of samples that is interpolated over, s (five nominal periods if the file names none)."""
-        return self.max_gap if self.max_gap is not None else 5.0 / self.rate
 
 
 class Vehicle(StrictTable):
@@ -107,6 +59,12 @@ class Vehicle(StrictTable):
     def _possible(self) -> Self:
         _ = self.parameters
         return self
+
+    def radius_for(self, signal: str) -> float | None:
+        """Effective radius, m, of the wheel whose speed a signal is; None for other signals."""
+        if not signal.startswith("wheel_speed_"):
+            return None
+        return self.effective_radius_front if signal.endswith(("_fl", "_fr")) else self.effective_radius_rear
 
 
 class Observer(StrictTable):
@@ -166,15 +124,9 @@ WHEEL_SPEEDS = tuple(f"wheel_speed_{corner}" for corner in CORNERS)
 TORQUES = tuple(f"torque_{corner}" for corner in CORNERS)
 
 
-def check_logs(logs: Sequence[LogFile]) -> None:
-    """Every log has a name of its own."""
-    names = [log.name for log in logs]
-    for name in names:
-        if names.count(name) > 1:
-            raise ValueError(f"log: two entries are called '{name}'; give every log its own name")
-
-
-def check_columns(signals: Mapping[str, Column], reference: Mapping[str, Column], logs: Sequence[LogFile]) -> None:
+def check_columns(
+    signals: Mapping[str, Column], reference: Mapping[str, Column], logs: Sequence[LogFile], vehicle: Vehicle
+) -> None:
     """Every signal is a known one, has a unit that measures it, and says which log holds it."""
     names = [log.name for log in logs]
     given = [("signals", SIGNALS, *each) for each in signals.items()]
@@ -186,32 +138,15 @@ def check_columns(signals: Mapping[str, Column], reference: Mapping[str, Column]
         if column.factor == 0:
             raise ValueError(f"{place}.factor: 0 is not a scale; use a finite number other than zero")
         try:
-            column.scale(known[name])
+            column.scale(known[name], vehicle.radius_for(name))
         except ValueError as error:
             raise ValueError(f"{place}.unit: {error}") from error
+        if column.radius is not None and vehicle.radius_for(name) is None:
+            raise ValueError(f"{place}.radius: belongs to wheel speeds; leave it out")
         if column.log is None and len(names) > 1:
             raise ValueError(f"{place}.log: missing; say which log holds column '{column.column}': {', '.join(names)}")
         if column.log is not None and column.log not in names:
             raise ValueError(f"{place}.log: {unknown('log', column.log, names)}")
-
-
-def check_alignment(columns: Mapping[str, Column], logs: Sequence[LogFile]) -> None:
-    """A log is aligned to one with a clock of its own: velocity in one of the two, acceleration in the other."""
-    for log in logs:
-        if log.align is None:
-            continue
-        place, align = f"log '{log.name}'.align", log.align
-        others = [other.name for other in logs if other.name != log.name and other.align is None]
-        if align.to not in others:
-            raise ValueError(f"{place}.to: {unknown('log', align.to, others)} (a log with a clock of its own)")
-        if log.clock_offset != 0:
-            raise ValueError(f"{place}: clock_offset is given as well; keep one of the two")
-        for role in (align.velocity, align.acceleration):
-            if role not in columns:
-                raise ValueError(f"{place}: {unknown('signal', role, columns)}")
-        if {columns[align.velocity].log, columns[align.acceleration].log} != {log.name, align.to}:
-            roles = f"one of {align.velocity}, {align.acceleration}"
-            raise ValueError(f"{place}: {roles} must be in log '{log.name}', the other in '{align.to}'")
 
 
 def check_signals(signals: Mapping[str, Column], vehicle: Vehicle) -> None:
@@ -241,9 +176,18 @@ def _add_signal(name: str) -> str:
     return f'add {name} = {{ column = "...", unit = "{SIGNALS[name]}" }}'
 
 
-def check_estimators(chosen: Estimators, signals: Mapping[str, Column], vehicle: Vehicle, schedules: Schedules) -> None:
+def check_estimators(
+    chosen: Estimators, signals: Mapping[str, Column], vehicle: Vehicle, schedules: Schedules | None
+) -> None:
     """Every estimator that the file asks for by name has the vehicle data, the signals and the schedules that it needs."""
-    if chosen.velocity != "fusion" and schedules.lateral is None:
+    cornered = [name for name in ("corner_velocity", "axle_weights") if name in chosen.model_fields_set]
+    if schedules is None and (cornered or chosen.velocity != "fusion"):
+        name = cornered[0] if cornered else "velocity"
+        raise ValueError(
+            f"schedules: missing, but estimators.{name} = '{getattr(chosen, name)}' runs on gain schedules; add a table "
+            '[schedules] with longitudinal = "corner-estimation-longitudinal"'
+        )
+    if chosen.velocity != "fusion" and (schedules is None or schedules.lateral is None):
         raise ValueError(
             f"schedules.lateral: missing, but estimators.velocity = '{chosen.velocity}' has V_y from nothing else; "
             'add it, such as lateral = "corner-estimation-lateral"'
@@ -279,14 +223,20 @@ _SIGNALS = {
 
 
 class DriveFile(StrictTable):
-    """A drive file that was read, checked and converted to SI."""
+    """A drive file that was read, checked and converted to SI.
+
+    ``schedules`` are for the corner observers: without them the pipeline of the fusion runs alone.
+
+    ``check``: compare the signals of the log with one another (:mod:`.frames`) before anything is estimated from them.
+    """
 
     schema_: Literal["gainsmith.drive/1"] = Field(alias="schema", examples=["gainsmith.drive/1"])
     name: str = Field(min_length=1, examples=["brake test"])
     source: str = ""
     sample_time: si.Duration = Field(examples=["5 ms"])
     vehicle: Vehicle
-    schedules: Schedules
+    schedules: Schedules | None = None
+    check: bool = True
     observer: Observer = Observer()
     estimators: Estimators = Estimators()
     log: Annotated[list[LogFile], Field(min_length=1)]
@@ -296,7 +246,7 @@ class DriveFile(StrictTable):
     @model_validator(mode="after")
     def _tables_agree(self) -> Self:
         check_logs(self.log)
-        check_columns(self.signals, self.reference, self.log)
+        check_columns(self.signals, self.reference, self.log, self.vehicle)
         check_alignment({**self.reference, **self.signals}, self.log)
         check_signals(self.signals, self.vehicle)
         check_estimators(self.estimators, self.signals, self.vehicle, self.schedules)

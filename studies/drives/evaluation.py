@@ -171,13 +171,16 @@ def _above_least_force(estimates: dict[str, FloatArray], reference: FloatArray) 
 
 @dataclass(frozen=True)
 class DriveData:
-    """One replayed drive: what was described, measured, fed to the observers, and estimated."""
+    """One replayed drive: what was described, measured, fed to the observers, and estimated.
+
+    Without a ``schedule`` no corner observer ran: ``replay`` is None, and slip is formed with the pipeline's V_x.
+    """
 
     drive: DriveFile
-    schedule: GainSchedule
+    schedule: GainSchedule | None
     log: DriveLog
     inputs: CornerInputs
-    replay: Replay
+    replay: Replay | None
     chain: Chain | None = None
     assumptions: tuple[str, ...] = ()
 
@@ -193,7 +196,9 @@ class DriveData:
     @cached_property
     def slip(self) -> FloatArray:
         """Slip ratio (n, 4) from the estimated V_x at the centre of gravity, mapped back to each corner: P1 6.3."""
-        return _slip_at(self.inputs, self.replay.velocity)
+        nothing = np.full(self.log.time.shape, np.nan)
+        alone = nothing if self.chain is None else self.chain.vx
+        return _slip_at(self.inputs, alone if self.replay is None else self.replay.velocity)
 
     @cached_property
     def reference_slip(self) -> FloatArray | None:
@@ -224,11 +229,7 @@ def moving_slip(surface_speed: FloatArray, wheel_velocity: FloatArray) -> FloatA
 
 def evaluate(data: DriveData) -> dict[str, Any]:
     """The content of metrics.json: deviations from the references that the log has, counted flags, assumptions."""
-    chain, used, box = data.chain, data.schedule, data.schedule.parameter
-    schedule = {
-        "name": used.name, "sha256": used.sha256, "sample_time_s": used.sample_time,
-        box.name: {"unit": box.unit, "range": [box.min, box.max], "rate": [box.rate_min, box.rate_max]},
-    }  # fmt: skip
+    chain = data.chain
     pipeline: dict[str, Any] = {}
     if chain is not None:
         given = (chain, data.log, data.inputs, data.drive)
@@ -238,11 +239,24 @@ def evaluate(data: DriveData) -> dict[str, Any]:
             "failed_checks": _counts(chain.checks, Check), "assumptions": list(chain.assumptions),
         }  # fmt: skip
     return {
-        "drive": data.drive.name, "schedule": schedule, "log": data.log.report,
+        "drive": data.drive.name, "schedule": _schedule(data.schedule), "log": data.log.report,
         "velocity": _velocity(data), "force": _force(data), "pipeline": pipeline,
-        "flagged_samples": {name: _counts(data.replay.flags[:, k], Flag) for k, name in enumerate(CORNERS)},
+        "flagged_samples": {
+            name: {} if data.replay is None else _counts(data.replay.flags[:, k], Flag) for k, name in enumerate(CORNERS)
+        },
         "force_sources": dict(zip(CORNERS, data.inputs.force_sources, strict=True)),
         "assumptions": [*data.assumptions, *data.inputs.assumptions],
+    }  # fmt: skip
+
+
+def _schedule(used: GainSchedule | None) -> dict[str, Any] | None:
+    """Which one the corner observers ran with."""
+    if used is None:
+        return None
+    box = used.parameter
+    return {
+        "name": used.name, "sha256": used.sha256, "sample_time_s": used.sample_time,
+        box.name: {"unit": box.unit, "range": [box.min, box.max], "rate": [box.rate_min, box.rate_max]},
     }  # fmt: skip
 
 
@@ -251,8 +265,10 @@ def _velocity(data: DriveData) -> dict[str, Any]:
         return {}
     reference = data.log.reference["vx"]
     estimates = {"pipeline": data.chain.vx} if data.chain is not None else {}
-    estimates |= {"corner_observers": data.replay.velocity, **data.baselines}
-    estimates |= {f"corner_{corner}": data.replay.corner_velocity[:, k] for k, corner in enumerate(CORNERS)}
+    ran = data.replay
+    estimates |= {} if ran is None else {"corner_observers": ran.velocity}
+    estimates |= data.baselines
+    estimates |= {} if ran is None else {f"corner_{c}": ran.corner_velocity[:, k] for k, c in enumerate(CORNERS)}
     return {name: asdict(deviation(value, reference, "m/s")) for name, value in estimates.items()}
 
 

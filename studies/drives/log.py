@@ -3,104 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from estimators.arrays import FloatArray
 from studies.drives.align import find_offset
-from studies.drives.csv_log import line_of, read_columns
-from studies.drives.drive_file import Column, DriveFile, LogFile
+from studies.drives.columns import Column, LogFile
+from studies.drives.drive_file import DriveFile
+from studies.drives.formats import is_bag_folder, read_table
 from studies.drives.plausible import check_plausible
 from studies.drives.quantities import REFERENCES, SIGNALS, factor_to
+from studies.drives.stamps import Stamped, clean_stamps, resample
+from studies.drives.table import LogTable
 from studies.errors import LogError
 
-
-@dataclass(frozen=True)
-class Stamped:
-    """Columns over strictly increasing time, s, and what had to be done to get there."""
-
-    time: FloatArray
-    values: dict[str, FloatArray]
-    duplicates: int
-    out_of_order: int
-
-
-def clean_stamps(
-    file: str,
-    time: FloatArray,
-    values: dict[str, FloatArray],
-    *,
-    sort: bool = False,
-    duplicates: Literal["mean", "last", "refuse"] = "mean",
-) -> Stamped:
-    """Strictly increasing stamps: sorted if ``sort``, equal stamps averaged or reduced to the last one.
-
-    Raises LogError with the line of the first stamp that is missing, runs backwards or (``refuse``) repeats.
-    """
-    missing = np.flatnonzero(~np.isfinite(time))
-    if missing.size:
-        raise LogError(f"{file}: line {line_of(int(missing[0]))} has no time stamp; remove the line")
-    backwards = np.flatnonzero(np.diff(time) < 0)
-    if backwards.size and not sort:
-        k = int(backwards[0])
-        raise LogError(
-            f"{file}: time runs backwards on line {line_of(k + 1)} ({time[k + 1]:g} s after {time[k]:g} s); "
-            "repair the log, or set sort = true for it in the drive file"
-        )
-    order = np.argsort(time, kind="stable")
-    time = time[order]
-    values = {name: value[order] for name, value in values.items()}
-    repeats = np.flatnonzero(np.diff(time) == 0)
-    if repeats.size and duplicates == "refuse":
-        k = int(repeats[0]) + 1
-        raise LogError(
-            f"{file}: time {time[k]:g} s appears twice, again on line {line_of(int(order[k]))}; "
-            'set duplicates = "mean" or "last" for this log'
-        )
-    if repeats.size:
-        values = {name: _merge(time, value, duplicates == "mean") for name, value in values.items()}
-        time = np.unique(time)
-    return Stamped(time=time, values=values, duplicates=int(repeats.size), out_of_order=int(backwards.size))
-
-
-def _merge(time: FloatArray, value: FloatArray, mean: bool) -> FloatArray:
-    """One value per distinct stamp: the mean, or the last, of the finite ones (NaN if there is none)."""
-    finite = np.isfinite(value)
-    unique, group = np.unique(time, return_inverse=True)
-    merged = np.full(unique.size, np.nan)
-    if not mean:
-        merged[group[finite]] = value[finite]  # numpy assigns in order: the last one stays
-        return merged
-    count = np.bincount(group[finite], minlength=unique.size)
-    total = np.bincount(group[finite], weights=value[finite], minlength=unique.size)
-    np.divide(total, count, out=merged, where=count > 0)
-    return merged
-
-
-def resample(time: FloatArray, value: FloatArray, grid: FloatArray, max_gap: float) -> FloatArray:
-    """Linear interpolation of the finite samples on ``grid``; NaN outside the record and inside gaps.
-
-    A gap is a spacing of finite samples above ``max_gap``, s; its two ends are measured and stay. Error of the
-    interpolation between samples at distance h: at most h^2/8 times the largest second derivative.
-    """
-    finite = np.isfinite(value)
-    time, value = time[finite], value[finite]
-    if time.size < 2:
-        return np.full(grid.shape, np.nan)
-    tolerance = 1e-9 * max(1.0, abs(float(time[-1])))  # rounding of the stamps, not a physical time
-    out = np.interp(grid, time, value)
-    out[(grid < time[0] - tolerance) | (grid > time[-1] + tolerance)] = np.nan
-    left = np.clip(np.searchsorted(time, grid + tolerance, side="right") - 1, 0, time.size - 2)
-    gap = np.diff(time)[left] > max_gap + tolerance
-    out[gap & (grid > time[left] + tolerance) & (grid < time[left + 1] - tolerance)] = np.nan
-    return out
-
-
-LONGEST_GAP = 60.0  # s without a row: beyond it the clock has jumped, or it is another drive
+LONGEST_GAP = 10.0  # s without a row: beyond it the clock has jumped, or it is another drive
+ABSURD = 1e9  # in SI: a cell of 1e308 is no measurement, and overflows in the first square
+TIME_UNITS = ("s", "ms", "us", "ns")
+EPOCH = 1e7  # s beyond which a clock counts from long ago, and its origin is moved to the first stamp: digits for the samples
 MOST_SAMPLES = 5_000_000  # of the common grid, seven hours at 5 ms: all signals are held in memory
 
 
@@ -115,6 +39,11 @@ class DriveLog:
     signals: dict[str, FloatArray]
     reference: dict[str, FloatArray]
     report: dict[str, Any]
+
+    @property
+    def files(self) -> dict[str, str]:
+        """Name of the file of each log."""
+        return {name: str(entry["file"]) for name, entry in self.report["logs"].items()}
 
 
 @dataclass(frozen=True)
@@ -135,6 +64,7 @@ def read_log(paths: Sequence[Path], drive: DriveFile) -> DriveLog:
     tracks: dict[str, _Track] = {}
     for entry in drive.log:
         tracks[entry.name], report["logs"][entry.name] = _read_track(files[entry.name], entry, drive)
+    tracks = _from_origin(tracks, report)
     offsets = _clock_offsets(drive, tracks, report)
     grid = _common_grid(drive, tracks, offsets)
     gaps = {entry.name: entry.allowed_gap for entry in drive.log}
@@ -165,7 +95,7 @@ def assign_files(paths: Sequence[Path], entries: Sequence[LogFile]) -> dict[str,
     patterns = [entry.file for entry in entries if entry.file is not None]
     found: list[Path] = []
     for path in paths:
-        if path.is_dir():
+        if path.is_dir() and not is_bag_folder(path):
             found += sorted(p for p in path.iterdir() if any(fnmatch(p.name, pattern) for pattern in patterns))
         elif path.exists():
             found.append(path)
@@ -198,15 +128,17 @@ def _read_track(path: Path, entry: LogFile, drive: DriveFile) -> tuple[_Track, d
     wanted = {entry.time: f"time of log '{entry.name}'"}
     wanted |= {c.column: f"reference.{name}" for name, c in reference.items()}
     wanted |= {c.column: f"signals.{name}" for name, c in signals.items()}
-    table = read_columns(path, wanted, entry.delimiter)
+    table = read_table(path, wanted, entry)
     values = {column: table.values[column] for column in wanted if column != entry.time}
-    seconds = table.values[entry.time] * factor_to(entry.time_unit, "s")
-    stamped = clean_stamps(path.name, seconds, values, sort=entry.sort, duplicates=entry.duplicates)
+    unit = "s" if entry.time_format == "iso" or table.merged else entry.time_unit
+    seconds = table.values[entry.time] * factor_to(unit, "s")
+    stamped = clean_stamps(path.name, table, seconds, values, sort=entry.sort, duplicates=entry.duplicates)
     if stamped.time.size < 2:
         raise LogError(f"{path.name}: holds a single time stamp; a drive needs at least two")
     spacing = np.diff(stamped.time)
-    _check_rate(path, entry, float(np.median(spacing)))
-    _check_gap(path, entry, seconds, stamped.time)
+    if not table.merged:
+        _check_rate(path, entry, float(np.median(spacing)))
+    _check_gap(path, entry, table, seconds, stamped.time)
     report: dict[str, Any] = {
         "file": path.name, "rows": table.rows, "duplicates": stamped.duplicates, "out_of_order": stamped.out_of_order,
         "gaps": int(np.count_nonzero(spacing > entry.allowed_gap * (1 + 1e-9))), "largest_gap_s": float(spacing.max()),
@@ -215,8 +147,11 @@ def _read_track(path: Path, entry: LogFile, drive: DriveFile) -> tuple[_Track, d
     }  # fmt: skip
     track = _Track(
         stamped=stamped,
-        signals={n: stamped.values[c.column] * c.scale(SIGNALS[n]) for n, c in signals.items()},
-        reference={n: stamped.values[c.column] * c.scale(REFERENCES[n]) for n, c in reference.items()},
+        signals={
+            n: _sane(stamped.values[c.column], c.scale(SIGNALS[n], drive.vehicle.radius_for(n)))
+            for n, c in signals.items()
+        },
+        reference={n: _sane(stamped.values[c.column], c.scale(REFERENCES[n])) for n, c in reference.items()},
     )
     return track, report
 
@@ -224,23 +159,50 @@ def _read_track(path: Path, entry: LogFile, drive: DriveFile) -> tuple[_Track, d
 def _check_rate(path: Path, entry: LogFile, spacing: float) -> None:
     """A clock in the wrong unit shows as a rate that is off by a power of ten."""
     if not 1 / 3 < spacing * entry.rate < 3:
+        given = factor_to(entry.time_unit, "s")
+        fitting = [u for u in TIME_UNITS if 1 / 2 < spacing * entry.rate * factor_to(u, "s") / given < 2]
+        likely = f', likely time_unit = "{fitting[0]}"' if fitting else ""
         raise LogError(
             f"{path.name}: rows are {spacing:g} s apart where log '{entry.name}' says {entry.rate:g} Hz; "
-            f"correct its rate or its time_unit (now '{entry.time_unit}')"
+            f"correct its rate or its time_unit (now '{entry.time_unit}'{likely})"
         )
 
 
-def _check_gap(path: Path, entry: LogFile, raw: FloatArray, time: FloatArray) -> None:
+def _sane(value: FloatArray, scale: float) -> FloatArray:
+    """``value`` in SI; what no sensor on a car means is missing."""
+    with np.errstate(over="ignore"):
+        si = value * scale
+    return np.where(np.abs(si) < ABSURD, si, np.nan)
+
+
+def _check_gap(path: Path, entry: LogFile, table: LogTable, raw: FloatArray, time: FloatArray) -> None:
     """``raw``: stamps as they stand in the file, ``time``: those of the track, both in s."""
     k = int(np.argmax(np.diff(time)))
     gap = float(time[k + 1] - time[k])
-    if gap > LONGEST_GAP:
-        line = line_of(int(np.flatnonzero(raw == time[k + 1])[0]))
+    longest = max(LONGEST_GAP, entry.allowed_gap)
+    if gap > longest:
+        place = table.place(int(np.flatnonzero(raw == time[k + 1])[0]))
         raise LogError(
-            f"{path.name}: time column '{entry.time}' jumps by {gap:g} s on line {line} (from {time[k]:.10g} s to "
-            f"{time[k + 1]:.10g} s), at most {LONGEST_GAP:g} s may be missing; correct the clock from there on, or cut "
+            f"{path.name}: time column '{entry.time}' jumps by {gap:g} s on {place} (from {time[k]:.10g} s to "
+            f"{time[k + 1]:.10g} s), at most {longest:g} s may be missing; correct the clock from there on, or cut "
             "the log in two"
         )
+
+
+def _from_origin(tracks: dict[str, _Track], report: dict[str, Any]) -> dict[str, _Track]:
+    """Clocks that count from long ago, as an epoch does, count from the whole second where the first of them starts."""
+    starts = [float(track.stamped.time[0]) for track in tracks.values()]
+    late = [start for start in starts if start > EPOCH]
+    if not late:
+        return tracks
+    origin = float(np.floor(late[0]))
+    report["time_origin_s"] = origin
+    return {
+        name: replace(track, stamped=replace(track.stamped, time=track.stamped.time - origin))
+        if track.stamped.time[0] > EPOCH
+        else track
+        for name, track in tracks.items()
+    }
 
 
 def _clock_offsets(drive: DriveFile, tracks: dict[str, _Track], report: dict[str, Any]) -> dict[str, float]:

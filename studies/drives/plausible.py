@@ -7,12 +7,14 @@ speeds are also compared with a reference velocity: rpm declared for rad/s is R_
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from estimators.arrays import FloatArray
-from studies.drives.drive_file import Column, DriveFile
+from studies.drives.columns import Column
+from studies.drives.drive_file import DriveFile
 from studies.drives.quantities import CORNERS, SIGNALS, factor_to
 from studies.errors import LogError
 
@@ -24,16 +26,18 @@ class Limit(NamedTuple):
     units: tuple[str, ...]
 
 
-_ACCELERATION = Limit(50.0, ("m/s^2", "cm/s^2", "mm/s^2"))
-_RATE = Limit(10.0, ("rad/s", "deg/s"))
-_STEER = Limit(1.3, ("rad", "deg"))
-_WHEEL_UNITS = ("rad/s", "rpm", "deg/s", "turn/s")
+ACCELERATION_UNITS = ("m/s^2", "g", "cm/s^2", "mm/s^2")
+RATE_UNITS, ANGLE_UNITS = ("rad/s", "deg/s"), ("rad", "deg")
+_ACCELERATION = Limit(50.0, ACCELERATION_UNITS)
+_RATE = Limit(10.0, RATE_UNITS)
+_STEER = Limit(1.3, ANGLE_UNITS)
+WHEEL_UNITS = ("rad/s", "rpm", "deg/s", "turn/s", "m/s", "km/h")
 LIMITS: dict[str, Limit] = {
     **dict.fromkeys(("ax", "ay", "az"), _ACCELERATION),
     **dict.fromkeys(("yaw_rate", "roll_rate", "pitch_rate"), _RATE),
     **dict.fromkeys(("steering", *(f"steer_{corner}" for corner in CORNERS)), _STEER),
     "hand_wheel": Limit(20.0, _STEER.units),
-    **dict.fromkeys((f"wheel_speed_{corner}" for corner in CORNERS), Limit(400.0, _WHEEL_UNITS)),
+    **dict.fromkeys((f"wheel_speed_{corner}" for corner in CORNERS), Limit(400.0, WHEEL_UNITS)),
     **dict.fromkeys((f"torque_{corner}" for corner in CORNERS), Limit(50e3, ("N*m",))),
 }
 QUANTILE = 99.0
@@ -65,8 +69,9 @@ def _check_size(drive: DriveFile, files: Mapping[str, str], name: str, value: Fl
     if high <= limit.largest:
         return
     column, si = drive.signals[name], SIGNALS[name]
-    given = factor_to(column.unit, si)
-    fitting = [f'unit = "{unit}"' for unit in limit.units if high * factor_to(unit, si) / given <= limit.largest]
+    factor = partial(column.factor_of, si_unit=si, radius=drive.vehicle.radius_for(name))
+    given = factor(column.unit)
+    fitting = [f'unit = "{unit}"' for unit in limit.units if high * factor(unit) / given <= limit.largest]
     raise LogError(
         f"{_place(drive, files, f'signals.{name}', column)} in {column.unit} reaches {size.max():.4g} {si}, and more than "
         f"{limit.largest:g} {si} too often to be spikes; {_remedy(fitting, column)}"
@@ -101,8 +106,9 @@ def _odd_wheel(
 ) -> str:
     name = f"wheel_speed_{CORNERS[wheel]}"
     column, velocity = drive.signals[name], drive.reference["vx"]
-    given = factor_to(column.unit, "rad/s")
-    fitting = [f'unit = "{unit}"' for unit in _WHEEL_UNITS if _rolls(ratio * factor_to(unit, "rad/s") / given)]
+    factor = partial(column.factor_of, si_unit="rad/s", radius=drive.vehicle.radius_for(name))
+    given = factor(column.unit)
+    fitting = [f'unit = "{unit}"' for unit in WHEEL_UNITS if _rolls(ratio * factor(unit) / given)]
     place = f"{_place(drive, files, f'signals.{name}', column)} in {column.unit}"
     peak = float(np.nanmax(np.abs(speed[:, wheel])))
     if not fitting and whole:

@@ -40,7 +40,8 @@ def velocity(data: DriveData) -> Figure:
     """V_x of reference, observers and baselines, and below it what each is off by."""
     time, reference = data.log.time, data.log.reference.get("vx")
     values = [(style, data.baselines[name]) for name, style in BASELINES.items()]
-    values.append((ESTIMATE, data.replay.velocity))
+    if data.replay is not None:
+        values.append((ESTIMATE, data.replay.velocity))
     if data.chain is not None:
         values.append((PIPELINE, data.chain.vx))
     lines: list[Mark] = [style(time, value) for style, value in values]
@@ -58,7 +59,8 @@ def slip(data: DriveData) -> Figure:
         marks: list[Mark] = []
         if data.reference_slip is not None:
             marks.append(REFERENCE(data.log.time, data.reference_slip[:, k]))
-        marks.append(ESTIMATE(data.log.time, data.slip[:, k]))
+        if data.replay is not None:
+            marks.append(ESTIMATE(data.log.time, data.slip[:, k]))
         if data.chain is not None:
             marks.append(PIPELINE(data.log.time, _while_driving(data.chain, data.chain.slip[:, k])))
         return marks

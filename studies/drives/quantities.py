@@ -39,9 +39,30 @@ _UNIT = re.compile(r"(1/)?[A-Za-zµ°][A-Za-zµ°_]*([*/ ]+[A-Za-zµ°][A-Za-zµ
 _QUANTITY = re.compile(r"\s*([-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]{1,3})?)\s*(.*?)\s*")
 _EXAMPLES = {
     "s": "s, ms, us, min", "Hz": "Hz, kHz", "rad": "rad, deg", "rad/s": "rad/s, deg/s, rpm", "m/s": "m/s, km/h, mph",
-    "m/s^2": "m/s^2, standard_gravity", "N": "N, kN", "N/rad": "N/rad, kN/rad", "N*m": "N*m, kN*m", "kg": "kg, t",
+    "m/s^2": "m/s^2, g", "N": "N, kN", "N/rad": "N/rad, kN/rad", "N*m": "N*m, kN*m", "kg": "kg, t",
     "kg*m^2": "kg*m^2", "m": "m, cm, mm",
 }  # fmt: skip
+
+
+LONGEST_UNIT, LONGEST_QUANTITY = 40, 80  # characters: what is longer is no unit, and takes pint half a minute to refuse
+
+
+def short(text: str, most: int = 60) -> str:
+    """``text`` fit for a message: at most ``most`` characters, control characters escaped."""
+    shown = text if len(text) <= most else f"{text[: most - 3]}..."
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in shown)
+
+
+def wheel_factor(unit: str, radius: float) -> float:
+    """As :func:`factor_to` to rad/s, also from a surface speed such as m/s or km/h over ``radius``, m."""
+    try:
+        return factor_to(unit, "rad/s")
+    except ValueError:
+        try:
+            return factor_to(unit, "m/s") / radius
+        except ValueError:
+            pass
+        raise
 
 
 @functools.cache
@@ -57,8 +78,10 @@ def factor_to(unit: str, target: str) -> float:
     or radians (``Hz`` for a wheel speed): pint takes radians for plain numbers, a drive log must not.
     """
     examples = _EXAMPLES.get(target, target)
-    if len(unit) > 40 or not _UNIT.fullmatch(unit):
-        raise ValueError(f"'{unit}' is not a unit; use one such as {examples}")
+    if len(unit) > LONGEST_UNIT or not _UNIT.fullmatch(unit):
+        raise ValueError(f"'{short(unit)}' is not a unit; use one such as {examples}")
+    if target == "m/s^2" and unit in ("g", "G"):  # pint's g is the gram; nobody logs accelerations in grams
+        unit = "standard_gravity"
     try:
         wanted = _registry().Quantity(1.0, target)
         given = _registry().Quantity(1.0, unit)
@@ -86,9 +109,9 @@ def to_si(text: object, target: str) -> float:
         raise ValueError(f'write a number and a unit in quotes, such as "1.5 {example}"')
     if not isinstance(text, str):
         raise ValueError(f'{text} has no unit; write it in quotes with its unit, such as "{text} {example}"')
-    match = _QUANTITY.fullmatch(text)
+    match = _QUANTITY.fullmatch(text) if len(text) < LONGEST_QUANTITY else None
     if match is None or not match[2]:
-        raise ValueError(f"'{text}' is not a number with a unit; write it like \"1.5 {example}\"")
+        raise ValueError(f"'{short(text)}' is not a number with a unit; write it like \"1.5 {example}\"")
     return float(match[1]) * factor_to(match[2], target)
 
 

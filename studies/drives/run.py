@@ -13,12 +13,14 @@ from estimators.arrays import AnyArray
 from studies.drives.chain import Chain, pipeline_of, run_chain
 from studies.drives.drive_file import read_drive
 from studies.drives.evaluation import DriveData, evaluate
+from studies.drives.frames import FrameReport, check_frames
 from studies.drives.log import read_log
 from studies.drives.plots import figures
 from studies.drives.prepare import corner_inputs_of
 from studies.drives.quantities import CORNERS
 from studies.drives.replay import Progress, replay
-from studies.drives.schedules import check_radii, corner_observer, load_schedule
+from studies.drives.schedules import corner_observer, load_schedules
+from studies.errors import LogError
 from studies.execution.files import check_folder, ready_folder, write_csv, write_json
 from studies.plots.save import write_figures
 
@@ -34,15 +36,18 @@ class RunResult:
     paths: tuple[Path, ...]
 
 
-def run_drive(logs: Sequence[Path], drive: Path, out: Path, *, progress: Progress = lambda _done: None) -> RunResult:
+def run_drive(
+    logs: Sequence[Path], drive: Path, out: Path, *, check: bool = True, progress: Progress = lambda _done: None
+) -> RunResult:
     """Run the pipeline and the four-corner longitudinal observers over the ``logs`` that the ``drive`` file describes.
 
     Writes estimates.csv, metrics.json and the plots (svg and png) to ``out``, each whole or not at all. ``progress``
     is called with the fraction done. Raises SpecError (drive file, schedule) or LogError (logs, ``out``), one line
-    each, before anything is written.
+    each, before anything is written; so it does where signals contradict one another, unless ``check`` is False here or in
+    the drive file.
     """
     check_folder(out)
-    data = replay_drive(logs, drive, progress=lambda done: progress(0.4 * done))
+    data = replay_drive(logs, drive, check=check, progress=lambda done: progress(0.4 * done))
     metrics = evaluate(data)
     ready_folder(out)
     paths = [out / "estimates.csv", out / "metrics.json"]
@@ -53,33 +58,55 @@ def run_drive(logs: Sequence[Path], drive: Path, out: Path, *, progress: Progres
     return RunResult(metrics=metrics, log_report=data.log.report, paths=tuple(paths))
 
 
-def replay_drive(logs: Sequence[Path], drive: Path, *, progress: Progress = lambda _done: None) -> DriveData:
+def check_drive(logs: Sequence[Path], drive: Path) -> FrameReport:
+    """Read the ``logs`` as :func:`run_drive` does and compare their signals with one another; nothing is estimated.
+
+    Raises SpecError (drive file) or LogError (logs), one line; what contradicts is in the report.
+    """
+    description = read_drive(drive)
+    log = read_log(logs, description)
+    return check_frames(log.signals, description, log.files)
+
+
+def replay_drive(
+    logs: Sequence[Path], drive: Path, *, check: bool = True, progress: Progress = lambda _done: None
+) -> DriveData:
     """As :func:`run_drive`, but the arrays are returned and nothing is written."""
     description = read_drive(drive)
-    names, time = description.schedules, description.sample_time
-    schedule = load_schedule(names.longitudinal, drive.parent, time)
-    lateral = load_schedule(names.lateral, drive.parent, time, "lateral") if names.lateral is not None else None
-    assumed = check_radii(description, drive.parent)
-    observer = corner_observer(description, drive.parent, schedule)
-    pipeline, assumptions = pipeline_of(description, corner_observer(description, drive.parent, schedule), lateral)
+    schedule, lateral, assumed = load_schedules(description, drive.parent)
+    observer, of_pipeline = (
+        None if schedule is None else corner_observer(description, drive.parent, schedule) for _ in range(2)
+    )
+    pipeline, assumptions = pipeline_of(description, of_pipeline, lateral)
     log = read_log(logs, description)
+    if check and description.check:
+        found = check_frames(log.signals, description, log.files)
+        if found.complaint is not None:
+            raise LogError(found.complaint)
+        log.report["frames"] = found.rows()
+    else:
+        assumed += ("signs, units and sides of the signals are right: not checked (--no-check, or check = false)",)
     progress(0.2)
     inputs = corner_inputs_of(log, description)
-    replayed = replay(inputs, observer, lambda done: progress(0.2 + 0.1 * done))
+    replayed = None if observer is None else replay(inputs, observer, lambda done: progress(0.2 + 0.1 * done))
     chain = run_chain(log, inputs, pipeline, assumptions, lambda done: progress(0.3 + 0.7 * done))
     return DriveData(description, schedule, log, inputs, replayed, chain, assumed)
 
 
 def estimate_columns(data: DriveData) -> Columns:
     """The columns of estimates.csv, SI, the unit in every name."""
-    columns: Columns = {"time_s": data.log.time, "vx_mps": data.replay.velocity}
+    ran = data.replay
+    columns: Columns = {"time_s": data.log.time}
+    columns |= {} if ran is None else {"vx_mps": ran.velocity}
     columns |= {f"vx_{name}_mps": value for name, value in data.baselines.items()}
-    columns |= _by_corner({
-        "vx_{}_mps": data.replay.corner_velocity, "relative_velocity_{}_mps": data.replay.relative_velocity,
+    corners: Columns = {
         "slip_{}": data.slip, "force_x_{}_N": data.inputs.force, "force_z_{}_N": data.inputs.vertical_load,
-        "normalised_force_{}": data.inputs.normalised_force, "innovation_{}": data.replay.innovation,
-        "flags_{}": data.replay.flags,
-    })  # fmt: skip
+        "normalised_force_{}": data.inputs.normalised_force,
+    }  # fmt: skip
+    if ran is not None:
+        estimated = {"vx_{}_mps": ran.corner_velocity, "relative_velocity_{}_mps": ran.relative_velocity}
+        corners = {**estimated, **corners, "innovation_{}": ran.innovation, "flags_{}": ran.flags}
+    columns |= _by_corner(corners)
     if data.chain is not None:
         columns |= chain_columns(data.chain)
     units = {"v": "mps", "a": "mps2", "y": "radps", "f": "N"}

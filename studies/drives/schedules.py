@@ -23,7 +23,9 @@ OTHER_PAIR = 0.01  # share by which the radii of a longitudinal and a lateral sc
 SAME_WHEEL = 1e-3  # share below which two radii are the same one, rounded
 
 
-def load_schedule(name: str, folder: Path, sample_time: float, direction: Direction = "longitudinal") -> GainSchedule:
+def load_schedule(
+    name: str, folder: Path, sample_time: float, direction: Direction = "longitudinal", drive: DriveFile | None = None
+) -> GainSchedule:
     """The schedule of a direction by shipped name, or by path relative to ``folder`` when the name ends in .json.
 
     Raises SpecError, before anything runs: unreadable or edited, another model or direction, another sample time.
@@ -38,9 +40,37 @@ def load_schedule(name: str, folder: Path, sample_time: float, direction: Direct
     if abs(schedule.sample_time - sample_time) > 1e-9 * sample_time:
         raise SpecError(
             f"schedules.{direction}: '{name}' was proved at sample_time = {schedule.sample_time:g} s, the drive file "
-            f'asks for {sample_time:g} s; set sample_time = "{schedule.sample_time * 1e3:g} ms" or synthesise another'
+            f'asks for {sample_time:g} s; set sample_time = "{schedule.sample_time * 1e3:g} ms" or '
+            f"{'make another' if drive is None else command_for(name, drive)}"
         )
     return schedule
+
+
+def load_schedules(drive: DriveFile, folder: Path) -> tuple[GainSchedule | None, GainSchedule | None, tuple[str, ...]]:
+    """The longitudinal and the lateral schedule that a drive file names (None: it names none), and what is assumed of them.
+
+    Raises SpecError as :func:`load_schedule` and :func:`check_radii`.
+    """
+    named, time = drive.schedules, drive.sample_time
+    if named is None:
+        return None, None, ()
+    longitudinal = load_schedule(named.longitudinal, folder, time, drive=drive)
+    lateral = None if named.lateral is None else load_schedule(named.lateral, folder, time, "lateral", drive)
+    return longitudinal, lateral, check_radii(drive, folder)
+
+
+def command_for(name: str, drive: DriveFile) -> str:
+    """What to type for a schedule like ``name`` of this car at this sample time, as a part of a sentence."""
+    from studies.spec import Variant, shipped_specs  # models and solvers, needed for a refusal alone
+
+    spec = name if name in shipped_specs() else "SPEC"
+    car = drive.vehicle
+    radius = round(0.5 * (car.effective_radius_front + car.effective_radius_rear), 6)
+    made = Variant(radius, drive.sample_time).name(spec)
+    return (
+        f'run gainsmith schedules {spec} --radius "{radius:g} m" --sample-time "{drive.sample_time * 1e3:g} ms" --out . '
+        f'and name "{made}.json"'
+    )
 
 
 def load_tire(name: str, folder: Path) -> BristleTire:
@@ -66,6 +96,8 @@ def check_radii(drive: DriveFile, folder: Path) -> tuple[str, ...]:
     Compared is ``effective_radius`` of each schedule's model, as a share of it. Raises SpecError, one line: more than 10 %
     off the car's radii, or schedules whose radii differ by more than 1 %.
     """
+    if drive.schedules is None:
+        return ()
     named: dict[Direction, str] = {"longitudinal": drive.schedules.longitudinal}
     if drive.schedules.lateral is not None:
         named["lateral"] = drive.schedules.lateral
@@ -94,8 +126,8 @@ def _against_car(drive: DriveFile, direction: Direction, name: str, radius: floa
     if abs(off[axle]) > OTHER_WHEEL:
         raise SpecError(
             f"schedules.{direction}: '{name}' is for effective_radius = {radius:g} m, vehicle.effective_radius_{axle} is "
-            f"{found}, {100 * off[axle]:+.0f} % (at most {100 * OTHER_WHEEL:g} %); correct the radius, or make a "
-            "schedule for this car with gainsmith schedules"
+            f"{found}, {100 * off[axle]:+.0f} % (at most {100 * OTHER_WHEEL:g} %); correct the radius, or "
+            f"{command_for(name, drive)}"
         )
     if abs(off[axle]) <= SAME_WHEEL:
         return []
@@ -148,5 +180,5 @@ def corner_observer(drive: DriveFile, folder: Path, schedule: GainSchedule) -> C
             return SwitchedCorners(schedule)
         if kind == "lpv":
             return ScheduledCorners(schedule)
-        tire = load_tire(drive.schedules.longitudinal, folder)
+        tire = load_tire(drive.schedules.longitudinal if drive.schedules is not None else "", folder)
         return KalmanCorners(tire, schedule.sample_time, states=3 if kind == "kalman-three-state" else 2)

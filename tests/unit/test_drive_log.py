@@ -46,12 +46,13 @@ REFUSALS = {
     ),
     "clock set during the log": (
         rows(["0", "0.005", "0.01", "1700000000.015", "1700000000.02"]),
-        "log.csv: time column 't' jumps by 1.7e+09 s on line 5 (from 0.01 s to 1700000000 s), at most 60 s may be missing; "
+        "log.csv: time column 't' jumps by 1.7e+09 s on line 5 (from 0.01 s to 1700000000 s), at most 10 s may be missing; "
         "correct the clock from there on, or cut the log in two",
     ),
     "wrong time unit": (
         rows(["0", "5", "10", "15"]),
-        "log.csv: rows are 5 s apart where log 'log' says 200 Hz; correct its rate or its time_unit (now 's')",
+        "log.csv: rows are 5 s apart where log 'log' says 200 Hz; correct its rate or its time_unit (now 's', "
+        'likely time_unit = "ms")',
     ),
 }
 

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from estimators.schedule import write_content
+from studies.cli import main
 from studies.commands.run import remarks
+from studies.drives.drive_file import read_drive
 from studies.drives.evaluation import evaluate
-from studies.drives.run import replay_drive, run_drive
+from studies.drives.plots import figures
+from studies.drives.run import estimate_columns, replay_drive, run_drive
+from studies.drives.schedules import Direction, check_radii, load_schedule
+from studies.spec import Variant, load_spec
 from synthesis.errors import SpecError
 from tests.support.schedule_content import EFFECTIVE_RADIUS, schedule_content
 from tests.support.synthetic_drive import DRIVE, columns, write_drive, write_log
@@ -44,7 +51,7 @@ def prepare(folder: Path, text: str, radius: float | None, lateral: float | None
             0.45,
             None,
             r"^schedules\.longitudinal: 'schedule\.json' is for effective_radius = 0\.45 m, "
-            r"vehicle\.effective_radius_front is 0\.33 m, -27 % \(at most 10 %\); correct the radius, or make a schedule",
+            r"vehicle\.effective_radius_front is 0\.33 m, -27 % \(at most 10 %\); correct the radius, or run gainsmith sch",
         ),
         (
             DRIVE.replace('rear = "0.33 m"', 'rear = "37 cm"'),
@@ -111,3 +118,69 @@ def test_a_schedule_file_that_is_not_there(tmp_path: Path) -> None:
         "schedules.longitudinal: no file 'absent.json' beside the drive file; give its path from there, or the name of a "
         "shipped schedule: corner-estimation-lateral, "
     )
+
+
+@pytest.mark.parametrize(
+    ("direction", "radius", "step"), [("longitudinal", "0.4 m", "5 ms"), ("lateral", "0.33 m", "10 ms")]
+)
+def test_the_command_of_the_refusal_makes_the_schedule(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, direction: Direction, radius: str, step: str
+) -> None:
+    """Another wheel, another sample time: what the message says is typed, and what it names is then taken."""
+    name = f"corner-estimation-{direction}"
+    text = DRIVE.replace('"0.33 m"', f'"{radius}"').replace("5 ms", step).replace("schedule.json", name)
+    path = tmp_path / "drive.toml"
+    path.write_text(text.replace('longitudinal = "corner-estimation-lateral"', 'longitudinal = "x.json"'))
+    drive = read_drive(path)
+    with pytest.raises(SpecError) as caught:
+        load_schedule(name, tmp_path, drive.sample_time, direction, drive)
+        check_radii(drive, tmp_path)
+    message = str(caught.value)
+    assert len(message) <= 400
+    command = re.search(r"run gainsmith (.*) and name \"(.*)\"$", message)
+    assert command is not None
+    monkeypatch.chdir(tmp_path)
+    assert main(shlex.split(command[1])) == 0
+    made = load_schedule(command[2], tmp_path, drive.sample_time, direction, drive)
+    assert made.sample_time == drive.sample_time
+    text = text.replace(f'"{name}"', f'"{command[2]}"')
+    if direction == "longitudinal":
+        path.write_text(text)
+        assert check_radii(read_drive(path), tmp_path) == ()
+
+
+def test_a_variant_keeps_the_fastest_pole_below_what_sampling_allows() -> None:
+    base, _ = load_spec("corner-estimation-longitudinal")  # 600 1/s at 5 ms
+    for step, fastest in ((0.0025, 600.0), (0.005, 600.0), (0.01, 300.0), (0.02, 150.0)):
+        made = Variant(sample_time=step).spec(base)
+        assert made.gains.fastest_pole == pytest.approx(fastest)
+        assert made.deploy.sample_time == step
+    assert Variant(0.4, 0.0025).name("x") == "x-400mm-2p5ms"
+    radius = base.plant(radius=0.4).parameters.vehicle["effective_radius"]
+    assert (radius.value, radius.unit) == (0.4, "m")
+    assert Variant().spec(base) == base
+
+
+@pytest.mark.parametrize(("option", "value"), [("--radius", "0.4"), ("--radius", "-1 m"), ("--sample-time", "3 m")])
+def test_options_of_the_command_want_units(
+    option: str, value: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["schedules", f"{option}={value}", "--out", str(tmp_path / "new")]) == 2
+    assert capsys.readouterr().err.startswith(f"gainsmith: {option}: ")
+    assert not (tmp_path / "new").exists()
+
+
+def test_without_schedules_the_pipeline_runs_alone(tmp_path: Path) -> None:
+    """At any sample time and with any wheel: the fusion needs no gains."""
+    text = DRIVE.replace('[schedules]\nlongitudinal = "schedule.json"\n', "").replace('"0.33 m"', '"0.40 m"')
+    log = write_log(tmp_path / "log.csv", columns(0.5))
+    data = replay_drive([log], write_drive(tmp_path, text.replace('"5 ms"', '"10 ms"')))
+    assert data.replay is None
+    metrics = evaluate(data)
+    assert metrics["schedule"] is None
+    assert {"pipeline", "mean_wheel_speed"} <= metrics["velocity"].keys()
+    assert not any("corner" in name for name in metrics["velocity"])
+    found = estimate_columns(data)
+    assert "pipeline_vx_mps" in found and "vx_mps" not in found
+    assert {len(column) for column in found.values()} == {51}
+    assert {figure.name for figure in figures(data)} >= {"velocity", "slip", "forces"}

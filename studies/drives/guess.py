@@ -1,0 +1,264 @@
+"""A first drive file from the names, units and ranges of a log's columns: to be read, corrected and kept by a person."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from estimators.arrays import FloatArray
+from studies.drives.columns import LogFile
+from studies.drives.formats import name_columns, read_table
+from studies.drives.guess_names import Guess, guess_column
+from studies.drives.quantities import SIGNALS, factor_to, short
+from studies.drives.sniff import sniff
+from studies.errors import LogError
+from synthesis.errors import SpecError
+
+NEEDED = (*(f"wheel_speed_{corner}" for corner in ("fl", "fr", "rl", "rr")), "ax")
+FASTEST = 100.0  # Hz from which on the shipped sample time of 5 ms is taken
+RADIUS = 0.33  # m where no reference velocity says it: the shipped schedules are for it
+WEIGHTLESS = "left out: az must hold gravity, +9.81 m/s^2 at rest"
+CALM = 0.3  # share of such samples, those of least acceleration, that the radii are taken from
+FAST = 5.0  # m/s of the reference above which wheels roll
+
+
+@dataclass
+class _Found:
+    """One file: its description, and what its columns were taken for."""
+
+    path: Path
+    entry: LogFile
+    guesses: dict[str, Guess]
+    values: dict[str, FloatArray]
+    rate: float
+    start: float
+    remarks: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Guessed:
+    """The text of a drive file, what was found (signal -> column), and the needed signals that were not."""
+
+    text: str
+    found: dict[str, str]
+    missing: tuple[str, ...]
+
+
+def write_guess(logs: Sequence[Path], drive: Path | None) -> tuple[Path, Guessed]:
+    """Write a drive file for the ``logs``: to ``drive``, else beside the first log; an existing file is never replaced.
+
+    Raises SpecError for a file that is there or cannot be written, LogError for a log that cannot be read or has no clock.
+    """
+    target = drive or logs[0].with_suffix(".toml")
+    if target.exists():
+        raise SpecError(f"{target.name}: is there already, and a guess never replaces it; give another --drive")
+    guessed = guess(logs)
+    try:
+        with target.open("x", encoding="utf-8") as file:
+            file.write(guessed.text)
+    except OSError as error:
+        raise SpecError(f"{target.name}: cannot be written ({error.strerror}); give another --drive") from error
+    return target, guessed
+
+
+def guess(logs: Sequence[Path]) -> Guessed:
+    """The drive file as text. Raises LogError for a log that cannot be read or has no clock."""
+    files = [_look(path) for path in logs]
+    taken: dict[str, str] = {}
+    for file in files:  # of two columns for one signal the first is taken
+        for column, one in list(file.guesses.items()):
+            key = f"{one.table}.{one.name}"
+            if one.table != "time" and taken.setdefault(key, column) != column:
+                file.remarks.append(f"column {json.dumps(column)} also looks like {key}")
+                del file.guesses[column]
+    _one_steering(files)
+    names = {one.name: column for file in files for column, one in file.guesses.items() if one.table != "time"}
+    missing = tuple(name for name in NEEDED if name not in names)
+    return Guessed(_text(files, missing), names, missing)
+
+
+def _look(path: Path) -> _Found:
+    entry = sniff(path)
+    names = name_columns(path, entry)
+    guesses: dict[str, Guess] = {}
+    for column, unit in names.items():
+        one = guess_column(column, unit)
+        if one is not None and one not in guesses.values():
+            guesses[column] = one
+    clocks = [column for column, one in guesses.items() if one.table == "time"]
+    if entry.time in names:
+        clocks = [entry.time]
+    if not clocks:
+        shown = short(", ".join(names), 80)
+        raise LogError(
+            f"{path.name}: no column looks like a clock ({shown}); rename it to time, or write the drive file by hand"
+        )
+    for other in [column for column, one in guesses.items() if one.table == "time" and column != clocks[0]]:
+        del guesses[other]
+    given = guesses.get(clocks[0], Guess("time", "time", None))
+    wanted = dict.fromkeys([clocks[0], *(c for c in guesses if c != clocks[0])], "guess")
+    entry = entry.model_copy(update={"time": clocks[0]})
+    table = read_table(path, wanted, entry)
+    stamps = table.values[clocks[0]]
+    spacing = np.diff(np.unique(stamps[np.isfinite(stamps)]))
+    if not spacing.size:
+        raise LogError(f"{path.name}: time column '{short(clocks[0], 40)}' holds less than two stamps; record again")
+    step = float(np.median(spacing))
+    unit = "s" if entry.time_format == "iso" or table.merged else given.unit or _time_unit(step)
+    step *= factor_to(unit, "s")
+    entry = entry.model_copy(update={"time_unit": unit})
+    values = {column: table.values[column] for column in guesses if column != clocks[0]}
+    return _Found(path, entry, guesses, values, 1.0 / step, float(np.nanmin(stamps)) * factor_to(unit, "s"))
+
+
+def _time_unit(step: float) -> str:
+    """Of a clock that does not say: logs run at 10 Hz to 10 kHz, so that steps of 0.1 ms to 0.1 s fit one unit only."""
+    return next((unit for unit, most in (("s", 0.5), ("ms", 500.0), ("us", 5e5)) if step < most), "ns")
+
+
+def _one_steering(files: list[_Found]) -> None:
+    """A steered axle is described once: both wheels, else one angle, else the hand wheel."""
+    where = {one.name: (file, column) for file in files for column, one in file.guesses.items()}
+    both = "steer_fl" in where and "steer_fr" in where
+    drop = [name for name in ("steer_fl", "steer_fr") if not both]
+    rear = [name for name in ("steer_rl", "steer_rr") if name in where]
+    steers = [np.nanmax(np.abs(where[name][0].values[where[name][1]]), initial=0.0) > 0.0 for name in rear]
+    drop += rear if sum(steers) < 2 else []
+    drop += ["steering", "hand_wheel"] if both else ["hand_wheel"] if "steering" in where else []
+    for name in drop:
+        if name in where:
+            file, column = where[name]
+            del file.guesses[column]
+
+
+def _unit(one: Guess, value: FloatArray) -> tuple[str, str, str]:
+    """Unit, sign and a remark: from the header if it says one, else from the range."""
+    known = np.abs(value[np.isfinite(value)])
+    high = float(np.percentile(known, 99.0)) if known.size else 0.0
+    middle = float(np.nanmedian(value)) if known.size else 0.0
+    sign = ', sign = "negative"' if one.name == "az" and middle < 0.0 else ""
+    if one.name == "az" and abs(middle) < 0.05:
+        return one.unit or "m/s^2", "", WEIGHTLESS
+    if one.unit is not None:
+        return one.unit, sign, ""
+    kind = one.name.rsplit("_", 1)[0] if one.name[-3:] in ("_fl", "_fr", "_rl", "_rr") else one.name
+    unit = {
+        "wheel_speed": "rpm" if high > 400.0 else "rad/s", "torque": "N*m", "steer": "deg" if high > 1.3 else "rad",
+        "steering": "deg" if high > 1.3 else "rad", "hand_wheel": "deg" if high > 15.0 else "rad",
+        "ax": "m/s^2", "ay": "m/s^2", "az": "g" if 0.5 < abs(middle) < 2.0 else "m/s^2", "vx": "km/h" if high > 90.0 else "m/s",
+        "vy": "m/s",
+    }.get(kind, "deg/s" if high > 3.0 else "rad/s")  # fmt: skip
+    return unit, sign, "the unit is a guess"
+
+
+def _radii(files: list[_Found]) -> tuple[float, float]:
+    """Effective radii, m, of both axles from a reference velocity and free-rolling wheels of one file; else the usual ones."""
+    for file in files:
+        column = {one.name: name for name, one in file.guesses.items()}
+        if "vx" not in column or not {f"wheel_speed_{c}" for c in ("fl", "fr", "rl", "rr")} <= column.keys():
+            continue
+        si = {
+            name: file.values[column[name]] * _factor(file, column[name])
+            for name in column
+            if name in ("vx", *NEEDED[:4])
+        }
+        if any(not np.isfinite(_factor(file, column[name])) for name in NEEDED[:4]):
+            continue
+        found = []
+        for pair in (NEEDED[:2], NEEDED[2:4]):
+            turned = 0.5 * (si[pair[0]] + si[pair[1]])
+            rolls = (si["vx"] > FAST) & (turned > 0.0)
+            if "ax" in column and rolls.any():  # wheels slip least where the car neither drives nor brakes
+                push = np.abs(file.values[column["ax"]])
+                rolls &= push <= np.nanquantile(push[rolls], CALM)
+            ratio = si["vx"][rolls] / turned[rolls]
+            found.append(float(np.median(ratio)) if ratio.size else np.nan)
+        if all(0.2 < one < 0.6 for one in found):
+            return round(found[0], 3), round(found[1], 3)
+    return RADIUS, RADIUS
+
+
+def _factor(file: _Found, column: str) -> float:
+    one = file.guesses[column]
+    try:
+        return factor_to(_unit(one, file.values[column])[0], "m/s" if one.name == "vx" else "rad/s")
+    except ValueError:
+        return np.nan
+
+
+def _text(files: list[_Found], missing: Sequence[str]) -> str:
+    radii = _radii(files)
+    rate = max(file.rate for file in files)
+    step = 5.0 if rate >= FASTEST else 1000.0 / rate
+    shipped = step == 5.0 and all(abs(radius / RADIUS - 1.0) < 0.1 for radius in radii)
+    named = {one.name for file in files for one in file.guesses.values()}
+    lines = [
+        "# A guess by gainsmith run --guess: read every line, above all those marked CHECK. Frame: x forward, y left, z up.",
+        'schema = "gainsmith.drive/1"', f"name = {_quoted(files[0].path.stem)}", f'sample_time = "{step:.6g} ms"', "",
+        "[vehicle] # CHECK: a usual car, not yours",
+        'mass = "1600 kg"', 'front_axle_distance = "1.3 m" # front axle to centre of gravity', 'rear_axle_distance = "1.5 m"',
+        'cg_height = "0.55 m"', 'front_track = "1.58 m"', 'rear_track = "1.58 m"',
+        f'effective_radius_front = "{radii[0]:g} m"' + ("" if radii == (RADIUS, RADIUS) else " # CHECK: from the reference"),
+        f'effective_radius_rear = "{radii[1]:g} m"',
+        *(['wheel_inertia = "1.2 kg*m^2"'] if any(name.startswith("torque_") for name in named) else []),
+        *(["steering_ratio = 15.0"] if "hand_wheel" in named else []), "",
+    ]  # fmt: skip
+    hash_ = "" if shipped else "# "
+    if not shipped:
+        mean = 0.5 * (radii[0] + radii[1])
+        lines += [
+            "# Without schedules the corner observers are left out. For this wheel and sample time:",
+            f'#   gainsmith schedules corner-estimation-longitudinal --radius "{mean:g} m" --sample-time "{step:.6g} ms" --out .',
+        ]
+    lines += [f"{hash_}[schedules]", f'{hash_}longitudinal = "corner-estimation-longitudinal"', ""]
+    for file in files:
+        lines += _log_lines(file, files)
+    several = len(files) > 1
+    for table in ("signals", "reference"):
+        rows = [row for file in files for row in _rows(file, table, several)]
+        if table == "signals":
+            rows += [f'# {name} = {{ column = "?", unit = "{SIGNALS[name]}" }} # CHECK: not found' for name in missing]
+        if rows:
+            lines += [f"[{table}]", *rows, ""]
+    lines += [f"# {remark}" for file in files for remark in file.remarks]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _log_lines(file: _Found, files: list[_Found]) -> list[str]:
+    entry = file.entry
+    lines = ["[[log]]", f"name = {_quoted(file.path.stem)}"]
+    if len(files) > 1:
+        lines.append(f"file = {_quoted(file.path.name)}")
+    lines += [f"time = {_quoted(entry.time)}", f'rate = "{float(f"{file.rate:.3g}"):g} Hz"']
+    for key in ("time_unit", "time_format", "delimiter", "decimal", "encoding", "units_row"):
+        value = getattr(entry, key)
+        if value != LogFile.model_fields[key].default:
+            lines.append(f"{key} = {json.dumps(value)}")
+    other = files[0]
+    holds = [{one.name for one in each.guesses.values()} for each in (file, other)]
+    apart = file is not other and abs(file.start - other.start) > 1e-3
+    if apart and any("vx" in one and "ax" in two for one, two in (holds, holds[::-1])):
+        to = _quoted(other.path.stem)
+        lines.append(f'align = {{ to = {to}, velocity = "vx", acceleration = "ax" }} # CHECK: clocks differ')
+    return [*lines, ""]
+
+
+def _rows(file: _Found, table: str, several: bool) -> list[str]:
+    rows = []
+    for column, one in file.guesses.items():
+        if one.table != table:
+            continue
+        unit, sign, remark = _unit(one, file.values[column])
+        log = f"log = {_quoted(file.path.stem)}, " if several else ""
+        comment = f" # CHECK: {remark}" if remark else ""
+        off = "# " if remark == WEIGHTLESS else ""
+        rows.append(f"{off}{one.name} = {{ {log}column = {_quoted(column)}, unit = {_quoted(unit)}{sign} }}{comment}")
+    return rows
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
