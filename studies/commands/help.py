@@ -77,12 +77,17 @@ gainsmith certify longitudinal-speed              a shipped schedule by its name
     "run": Help(
         "replay a recorded drive through the observers",
         """\
-Reads one log or several that belong together, runs the pipeline of forces, velocities and sideslip over them as a car
-would, and compares with the references and the baselines that the drive file names.
+Reads one log or several that belong together (CSV, MDF, ROS bag, MCAP, .mat), compares their signals with one another,
+runs the pipeline of forces, velocities and sideslip over them as a car would, and compares with the references and the
+baselines that the drive file names. Signs, units and sides that contradict one another are refused, with the likely
+mend: --check does only that, --no-check runs in spite of it. --guess writes a first drive file from the columns' names.
 
 Writes into DIR: estimates.csv (one row a sample: time, estimates, standard deviations, flags), metrics.json, and
 plots as SVG and PNG. SI units, ISO axes: x forward, y left, z up.""",
-        "gainsmith run LOG.csv --drive DRIVE.toml --out out/run",
+        """\
+gainsmith run LOG.csv --guess --drive DRIVE.toml  write a first drive file, to be edited
+gainsmith run LOG.csv --drive DRIVE.toml --check  compare the signals only
+gainsmith run LOG.csv --drive DRIVE.toml --out out/run""",
     ),
     "identify": Help(
         "fit tire, radius and wheel inertia to a recorded drive",
@@ -90,7 +95,7 @@ plots as SVG and PNG. SI units, ISO axes: x forward, y left, z up.""",
 Fits slip stiffness, relaxation, damping, effective radii and wheel inertia to a log, with confidence intervals. What
 the log does not excite stays at its prior and is named.
 
-Writes into DIR: identified.toml (a parameter set that a specification takes as it is), fit.json, and pictures of the
+Writes into DIR: identified.toml (a parameter set that a specification takes as it is), identification.json, and pictures of the
 residuals.""",
         "gainsmith identify LOG.csv --drive DRIVE.toml --out out/car",
     ),

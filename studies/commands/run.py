@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from studies.commands.outcome import one_line
 from studies.commands.terminal import print_table, progress_bar
 from studies.drives.frames import FrameReport
 from studies.drives.run import RunResult, check_drive, run_drive
@@ -78,7 +79,8 @@ def run_log(
     print_table(f"{result.metrics.get('drive', drive.stem)}: against the reference", HEADER, summary_rows(result))
     for line in remarks(result):
         print(line)
-    print(f"written to {out}")
+    earlier = f", in the place of the results of '{one_line(result.replaced, 60)}'" if result.replaced else ""
+    print(f"written to {out}{earlier}")
     return 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +22,7 @@ from studies.drives.quantities import CORNERS
 from studies.drives.replay import Progress, replay
 from studies.drives.schedules import corner_observer, load_schedules
 from studies.errors import LogError
-from studies.execution.files import check_folder, ready_folder, write_csv, write_json
+from studies.execution.files import check_folder, only_run, ready_folder, write_csv, write_json
 from studies.plots.save import write_figures
 
 Columns = dict[str, AnyArray]
@@ -29,11 +30,15 @@ Columns = dict[str, AnyArray]
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a run produced: ``metrics`` as written to metrics.json, what reading the log found, and the files."""
+    """What a run produced: ``metrics`` as written to metrics.json, what reading the log found, and the files.
+
+    ``replaced``: the drive whose results were in the folder before; empty if there were none.
+    """
 
     metrics: dict[str, Any]
     log_report: dict[str, Any]
     paths: tuple[Path, ...]
+    replaced: str = ""
 
 
 def run_drive(
@@ -43,7 +48,7 @@ def run_drive(
 
     Writes estimates.csv, metrics.json and the plots (svg and png) to ``out``, each whole or not at all. ``progress``
     is called with the fraction done. Raises SpecError (drive file, schedule) or LogError (logs, ``out``), one line
-    each, before anything is written; so it does where signals contradict one another, unless ``check`` is False here or in
+    each, before anything is written, also where another run writes to ``out``; so it does where signals contradict one another, unless ``check`` is False here or in
     the drive file.
     """
     check_folder(out)
@@ -51,11 +56,24 @@ def run_drive(
     metrics = evaluate(data)
     ready_folder(out)
     paths = [out / "estimates.csv", out / "metrics.json"]
-    write_csv(paths[0], estimate_columns(data))
-    write_json(paths[1], metrics)
-    paths += write_figures(figures(data), out, lambda done: progress(0.4 + 0.6 * done))
+    with only_run(out):
+        replaced = _drive_of(paths[1])
+        write_csv(paths[0], estimate_columns(data))
+        write_json(paths[1], metrics)
+        paths += write_figures(figures(data), out, lambda done: progress(0.4 + 0.6 * done))
     progress(1.0)
-    return RunResult(metrics=metrics, log_report=data.log.report, paths=tuple(paths))
+    return RunResult(metrics, data.log.report, tuple(paths), replaced)
+
+
+def _drive_of(metrics: Path) -> str:
+    """The drive that an earlier run into this folder was about."""
+    if not metrics.exists():
+        return ""
+    try:
+        found = json.loads(metrics.read_bytes())
+    except (OSError, ValueError):
+        return "unknown"
+    return str(found.get("drive", "unknown")) if isinstance(found, dict) else "unknown"
 
 
 def check_drive(logs: Sequence[Path], drive: Path) -> FrameReport:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.execution.files import ready_folder, whole_file, write_json
+from studies.execution.files import only_run, ready_folder, whole_file, write_json
 from studies.identify.identify import Identification
 from studies.identify.parameters import Identified, tire_parameters, vehicle_parameters
 from studies.identify.plots import figures
@@ -200,8 +200,9 @@ def write_identification(found: Identification, out: Path) -> tuple[Path, ...]:
     """
     ready_folder(out)
     paths = [out / "identified.toml", out / "identification.json"]
-    with whole_file(paths[0]) as beside:
-        beside.write_text(parameter_file(found), encoding="utf-8")
-        load_parameter_set(beside)
-    write_json(paths[1], content(found))
-    return (*paths, *write_figures(figures(found), out))
+    with only_run(out):
+        with whole_file(paths[0]) as beside:
+            beside.write_text(parameter_file(found), encoding="utf-8")
+            load_parameter_set(beside)
+        write_json(paths[1], content(found))
+        return (*paths, *write_figures(figures(found), out))

@@ -111,7 +111,9 @@ def test_a_total_force_that_is_judged_against_its_own_input_says_so(tmp_path: Pa
         "its forces are shares of it"
         in evaluate(replayed(tmp_path, shares, pulsed()))["pipeline"]["notes"]["total_force_x"]
     )
+    assert own.replaced == ""
     other = run_drive([log], write_drive(tmp_path, with_total("ax_true")), tmp_path / "out")
+    assert other.replaced == own.metrics["drive"]
     assert not any("(*)" in line for line in (*remarks(other), *(row[0] for row in summary_rows(other))))
 
 
