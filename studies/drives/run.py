@@ -47,9 +47,9 @@ def run_drive(
     """Run the pipeline and the four-corner longitudinal observers over the ``logs`` that the ``drive`` file describes.
 
     Writes estimates.csv, metrics.json and the plots (svg and png) to ``out``, each whole or not at all. ``progress``
-    is called with the fraction done. Raises SpecError (drive file, schedule) or LogError (logs, ``out``), one line
-    each, before anything is written, also where another run writes to ``out``; so it does where signals contradict one another, unless ``check`` is False here or in
-    the drive file.
+    is called with the fraction done. Raises SpecError (drive file, schedule, another run into ``out``) or LogError (logs,
+    ``out``), one line each, before anything is written; so it does where signals contradict one another, unless ``check`` is
+    False here or in the drive file.
     """
     check_folder(out)
     data = replay_drive(logs, drive, check=check, progress=lambda done: progress(0.4 * done))
