@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from flint import fmpq
@@ -10,10 +11,18 @@ from synthesis.errors import ProblemError
 from synthesis.loop.plant import Axis
 
 
-def rates(axes: tuple[Axis, ...], matrix: Any, one: Any, unit_rate: Any, number: Any) -> list[Any]:
+def rates(
+    axes: tuple[Axis, ...],
+    matrix: Any,
+    one: Any,
+    unit_rate: Any,
+    number: Any,
+    jump: Callable[[int], Any] | None = None,
+) -> list[Any]:
     """du_i/dt = (rate middle + rate half r_i) / half as 1 x 1 polynomials, None where the matrix does not depend on u_i.
 
-    Raises ProblemError if the matrix depends on a parameter that may jump.
+    `unit_rate` gives the polynomial r_i. A parameter that may jump is anywhere one sample later: `jump` gives (r_i - u_i)/T, r_i
+    being its next value. Raises ProblemError if the matrix depends on such a parameter and there are no samples.
     """
     found: list[Any] = []
     for i, axis in enumerate(axes):
@@ -21,6 +30,9 @@ def rates(axes: tuple[Axis, ...], matrix: Any, one: Any, unit_rate: Any, number:
             found.append(None)
             continue
         if axis.rate_low is None or axis.rate_high is None:
+            if jump is not None:
+                found.append(jump(i))
+                continue
             raise ProblemError(
                 f"'{axis.name}' may jump, so no Lyapunov function may depend on it; use degree 0 for it or bound its rate"
             )
