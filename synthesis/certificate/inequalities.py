@@ -86,7 +86,10 @@ def _continuous(q: Question, system: System, P: Any, P_dot: Any, arithmetic: Ari
     seen = _over(system, ZC.T @ ZC, shown)
     if q.kind == "H2 norm":
         energy = arithmetic.trace((system.B[q.group] @ W).T @ PBW)
-        return [("observed energy", -(fall + seen)), ("H2 norm", _over(system, _square(q, energy, arithmetic), 2) - energy)]
+        return [
+            ("observed energy", -(fall + seen)),
+            ("H2 norm", _over(system, _square(q, energy, arithmetic), 2) - energy),
+        ]
     side = -_over(system, PBW, moving)
     if q.kind == "energy to peak":
         corner = _over(system, _square(q, W.T @ W, arithmetic), still)

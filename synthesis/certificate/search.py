@@ -82,7 +82,9 @@ class Search:
         if found is None or not np.isfinite(found.decisions).all():
             return None, None
         unit = 1.0 if wish.channel is None else self._output_unit(wish)
-        P = rounded_lyapunov(found.values["P"].coefficients[..., 0] * unit**2, self.scale, len(self.parameters), self.digits)
+        P = rounded_lyapunov(
+            found.values["P"].coefficients[..., 0] * unit**2, self.scale, len(self.parameters), self.digits
+        )
         claim = Claim(wish.kind, float(wish.level or 0.0), P, wish.channel)
         outcome = self.verifier.prove(claim)
         return (claim, outcome) if outcome.proved else (None, outcome)
@@ -111,7 +113,9 @@ class Search:
         elif wish.channel is None:
             problem.require("P < 1", problem.constant(np.eye(size)) - P, strict=False)
         one = problem.constant(np.ones((1, 1)))
-        period = int(self.loop.sample_time.p) / int(self.loop.sample_time.q) if discrete and self.loop.sample_time else 0.0
+        period = (
+            int(self.loop.sample_time.p) / int(self.loop.sample_time.q) if discrete and self.loop.sample_time else 0.0
+        )
         u = [variable(i, 2 * count) for i in range(2 * count)]  # and r
         jump = (lambda i: (u[count + i] - u[i]) * (1.0 / period)) if period else None
         speeds = rates(self.loop.plant.axes, P, one, lambda i: u[count + i], lambda x: int(x.p) / int(x.q), jump)

@@ -123,7 +123,10 @@ class Verifier:
                         continue
                 if depth == DEPTH * count or done > self.most_regions:
                     return Outcome(False, undecided or "matrix exponential", region.offset)
-                waiting += [(half, depth + 1) for half in reversed(region.halves(_axis(depth, P, count if time == "discrete" else 0)))]
+                waiting += [
+                    (half, depth + 1)
+                    for half in reversed(region.halves(_axis(depth, P, count if time == "discrete" else 0)))
+                ]
         return Outcome(True)
 
     def question(self, claim: Claim) -> Question:
