@@ -32,6 +32,11 @@ from .labelled import LabelledArray as LabelledArray
 from .labelled import load_labelled as load_labelled
 from .loads import Loads as Loads
 from .loads import vertical_loads as vertical_loads
+from .lpv.bounds import LpvBounds as LpvBounds
+from .lpv.norms import lpv_decay_rate as lpv_decay_rate
+from .lpv.norms import lpv_h2_norm as lpv_h2_norm
+from .lpv.norms import lpv_l2_gain as lpv_l2_gain
+from .lpv.trajectory import Trajectory as Trajectory
 from .markov.chain import sample_paths as sample_paths
 from .markov.chain import stationary_distribution as stationary_distribution
 from .markov.continuous import MarkovJumpProcess as MarkovJumpProcess

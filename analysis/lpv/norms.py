@@ -26,6 +26,7 @@ from synthesis.certificate.claims import claim_unit
 from synthesis.models.lpv import LpvModel
 
 PARTS = 8  # intervals of every piece of a trajectory whose gain is proved
+CLOSED = 1.003  # bounds so near to each other need no better trajectory
 SHORTER = (1.0 - 1e-9, 1.0 - 1e-6, 1.0 - 1e-3)  # of a growth rate, tried in turn until it is certain
 Degree = int | tuple[int, ...]
 
@@ -51,22 +52,16 @@ def lpv_l2_gain(
     kind = "sampled gain" if discrete else "gain"
     if unstable(question, place):
         return _unstable(question, kind, place)
-    frozen = ProvedPath(question, _standing(question, place), frequency, 1)
-    best, witness = 0.0, None
-    lifted = lift(question, frozen.path, frequency, 1)
-    if lifted is not None:
-        best, witness = frozen.ratio(worst_input(lifted)[1]), frozen.path.trajectory(question.axes, frequency)
-    if _moves(question):
-        carriers = tuple(dict.fromkeys((0.0, frequency)))
-        path, carrier = worst_path(question, gain_of(question), carriers, place)
-        lifted = lift(question, path, carrier, PARTS)
-        if lifted is not None:
-            proved = ProvedPath(question, path, carrier, PARTS).ratio(worst_input(lifted)[1])
-            if proved > best:
-                best, witness = proved, path.trajectory(question.axes, carrier)
-    claim = proved_norm(question, kind, degree, max(best, gain))
-    upper = np.inf if claim is None else claim.level
-    return LpvBounds(kind, best, upper, _unit(question, kind), claim, witness)
+    still = _standing(question, place)
+    best, witness = _proved_ratio(question, still, frequency, 1), still.trajectory(question.axes, frequency)
+    claim = proved_norm(question, kind, degree, gain) if gain > 0.0 or not _moves(question) else None
+    if _moves(question) and (claim is None or claim.level > CLOSED * best):
+        path, carrier = worst_path(question, gain_of(question), tuple(dict.fromkeys((0.0, frequency))), place)
+        proved = _proved_ratio(question, path, carrier, PARTS)
+        if proved > best:
+            best, witness = proved, path.trajectory(question.axes, carrier)
+        claim = claim or proved_norm(question, kind, degree, best)
+    return LpvBounds(kind, best, np.inf if claim is None else claim.level, _unit(question, kind), claim, witness)
 
 
 def lpv_decay_rate(model: LpvModel, degree: Degree = 2, discrete: bool = False) -> LpvBounds:
@@ -152,6 +147,12 @@ def _standing(question: Question, place: FloatArray) -> Path:
     return Path(place[None], np.array([step]), tuple(axis.may_jump for axis in question.axes))
 
 
+def _proved_ratio(question: Question, path: Path, carrier: float, parts: int) -> float:
+    """What is certain of the gain along a path, with the worst input of the floats; 0 where nothing is."""
+    lifted = lift(question, path, carrier, parts)
+    return 0.0 if lifted is None else ProvedPath(question, path, carrier, parts).ratio(worst_input(lifted)[1])
+
+
 def _proved_decay_along(question: Question, path: Path, rate: float) -> float:
     """The least decay rate, near that of the floats, that is certain to be kept to along a path; inf if none is."""
     if not np.isfinite(rate):
@@ -179,4 +180,4 @@ def _unit(question: Question, kind: str) -> str:
     unit = claim_unit("gain", question.channel, {s.name: s.unit for s in signals})
     if kind in ("gain", "sampled gain") or question.discrete:
         return unit
-    return f"{unit} per root of s" if kind == "energy to peak" else f"{unit} per root of s"
+    return f"{unit} per root of s"

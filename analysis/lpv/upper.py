@@ -14,6 +14,7 @@ TIGHTER = (1e-2, 1e-3)  # times the least level, what buys the margin of a proof
 WIDER = (5e-2, 0.2)
 NOTHING, SMALL = 1e-9, (1e-4, 1e-2, 1.0)  # against |C| |B| / |A|
 SHARES = (0.999, 0.99, 0.97, 0.9, 0.7)  # of the largest decay rate that the solver sees
+ENOUGH = 0.98  # of it: then more points are not tried
 BISECTIONS = 12
 MARGIN = 1e-8  # of the solver, below which nothing is read into a sign
 DIGITS, REGIONS, LEVEL_DIGITS = 15, 4000, 6
@@ -59,6 +60,7 @@ def _natural(question: Question) -> float:
 def proved_decay(question: Question, degree: int | tuple[int, ...], most: float) -> Claim | None:
     """The claim with the largest decay rate up to `most`, that of the worst trajectory known, that is proved."""
     kind = "sampled error" if question.discrete else "decay rate"
+    best: Claim | None = None
     for points in GRIDS.get(len(question.axes), (3,)):
         search = _search(question, degree, points, None)
         low, high = 0.0, most
@@ -67,11 +69,17 @@ def proved_decay(question: Question, degree: int | tuple[int, ...], most: float)
             found = search.solve(Wish(kind, middle))
             good = found is not None and found.objective is not None and found.objective > MARGIN * min(1.0, most)
             low, high = (middle, high) if good else (low, middle)
-        for share in SHARES if low > 0.0 else ():
+        floor = 0.0 if best is None else best.level
+        for share in SHARES:
+            if share * low <= floor:
+                break
             claim, _ = search.prove(Wish(kind, round_down(share * low, LEVEL_DIGITS)))
             if claim is not None:
-                return claim
-    return None
+                best = claim
+                break
+        if best is not None and best.level >= ENOUGH * low:
+            break
+    return best
 
 
 def _search(question: Question, degree: int | tuple[int, ...], points: int, size: float | None) -> Search:

@@ -16,12 +16,11 @@ from analysis.lpv.lifted import lift, worst_input
 from analysis.lpv.question import Question
 from analysis.lpv.trajectory import Path, admissible, float_of
 from estimators.arrays import FloatArray
-from synthesis.loop.plant import Axis
 
 KNOTS = 8
 PARTS = 4  # intervals of a piece during the search
 PERIODS = 7
-REFINED, EVALUATIONS = 2, 250
+REFINED, EVALUATIONS = 2, 160
 MOST_SAMPLES = 64  # of a period in discrete time
 
 Score = Callable[[Path, float], float]
@@ -94,23 +93,23 @@ def periods(question: Question) -> list[float]:
     """From a fraction of the fastest time scale to many of the slowest: of poles, and of the way through every range and back."""
     if question.discrete:
         steps = [k for k in (1, 2, 4, 8, 16) if k * KNOTS <= MOST_SAMPLES]
-        ways = [_way(axis) for axis in question.axes]
-        steps += [round(way / KNOTS) for way in ways if way is not None and KNOTS <= way <= 10 * MOST_SAMPLES]
+        steps += [round(way / KNOTS) for way in _ways(question) if KNOTS <= way <= 10 * MOST_SAMPLES]
         return [float(step * KNOTS) for step in dict.fromkeys(steps)]
     centre = question.frozen(np.zeros((1, len(question.axes))))[0][0]
     poles = np.abs(np.linalg.eigvals(centre))
     poles = poles[poles > 0.0]
     scales = [2.0 * np.pi / x for x in poles] or [1.0]
-    ways = [way for way in map(_way, question.axes) if way is not None]
+    ways = _ways(question)
     low, high = 0.2 * min(scales), 4.0 * max(scales)
     return [float(x) for x in (*np.geomspace(low, high, PERIODS), *ways, *(2.0 * way for way in ways))]
 
 
-def _way(axis: Axis) -> float | None:
-    """Time through the range and back; None where it takes none, or for ever."""
-    if axis.rate_low is None or axis.rate_high is None or axis.rate_low == 0 or axis.rate_high == 0:
-        return None
-    return 2.0 * float_of(axis.half / axis.rate_high - axis.half / axis.rate_low)
+def _ways(question: Question) -> list[float]:
+    """Times through the ranges and back, of parameters that take any."""
+    return [
+        2.0 * float_of(axis.half / axis.rate_high - axis.half / axis.rate_low)
+        for axis in question.axes if axis.rate_low is not None and axis.rate_high is not None and axis.rate_low < 0 < axis.rate_high
+    ]  # fmt: skip
 
 
 def _refined(question: Question, score: Score, entry: tuple[float, Path, float]) -> tuple[float, Path, float]:
