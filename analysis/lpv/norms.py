@@ -52,8 +52,8 @@ def lpv_l2_gain(
     kind = "sampled gain" if discrete else "gain"
     if unstable(question, place):
         return _unstable(question, kind, place)
-    still = _standing(question, place)
-    best, witness = _proved_ratio(question, still, frequency, 1), still.trajectory(question.axes, frequency)
+    best = proved_frozen_gain(question, place, frequency)
+    witness = _standing(question, place).trajectory(question.axes, frequency)
     claim = proved_norm(question, kind, degree, gain) if gain > 0.0 or not _moves(question) else None
     if _moves(question) and (claim is None or claim.level > CLOSED * best):
         path, carrier = worst_path(question, gain_of(question), tuple(dict.fromkeys((0.0, frequency))), place)
@@ -118,6 +118,11 @@ def lpv_h2_norm(
     witness = _standing(question, place).trajectory(question.axes, 0.0)
     claim = proved_norm(question, kind, degree, guess)
     return LpvBounds(kind, proved, np.inf if claim is None else claim.level, _unit(question, kind), claim, witness)
+
+
+def proved_frozen_gain(question: Question, place: FloatArray, frequency: float) -> float:
+    """A float that is not above the gain at one place u and one frequency; 0 where nothing is certain."""
+    return _proved_ratio(question, _standing(question, place), frequency, 1)
 
 
 def _question(
