@@ -120,3 +120,7 @@ from .switching.similarity import common_growth as common_growth
 from .switching.similarity import diagonal_window as diagonal_window
 from .switching.similarity import similarity_bound as similarity_bound
 from .switching.similarity import symmetric_growth as symmetric_growth
+from .uncertainty.margin import RobustStabilityMargin as RobustStabilityMargin
+from .uncertainty.margin import robust_stability_margin as robust_stability_margin
+from .uncertainty.worst_gain import WorstCaseGain as WorstCaseGain
+from .uncertainty.worst_gain import worst_case_gain as worst_case_gain

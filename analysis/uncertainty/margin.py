@@ -28,8 +28,8 @@ from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.rational import rational
 
 FARTHEST = 1000.0  # times the ranges: no witness is looked for beyond
-RAYS, SCALES = 256, 160
-ROUNDS, HALVINGS, CLIMBS = 40, 24, 3
+RAYS, SCALES = 96, 80
+ROUNDS, HALVINGS, CLIMBS = 30, 24, 2
 NUDGES = (0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3)  # beyond the border, until the sign is certain
 SHRINKS = (1.0, 0.99, 0.95, 0.9, 0.75, 0.5, 0.2, 0.05)
 EXCHANGES = 20
