@@ -13,8 +13,8 @@ from synthesis.lmi.result import Verdict
 class LpvBounds:
     """lower <= value <= upper, both proved; a side that nothing was found for is 0 or inf.
 
-    For a norm `claim` (its P(u) in scaled parameters) proves `upper`, and along `witness` the norm is at least `lower`. For a decay
-    rate the claim proves `lower`, and along the witness the system decays no faster than `upper`. `unit` of both bounds.
+    For a norm `claim` (its P(u) in scaled parameters) proves `upper`, and along `witness` the norm is at least `lower`. For a
+    decay rate the claim proves `lower`, and along the witness the system decays no faster than `upper`. `unit` of both bounds.
     """
 
     kind: str
@@ -27,7 +27,7 @@ class LpvBounds:
     @property
     def gap(self) -> float:
         """upper/lower - 1; inf where one side is open."""
-        return self.upper / self.lower - 1.0 if 0.0 < self.lower and self.upper < float("inf") else float("inf")
+        return self.upper / self.lower - 1.0 if self.lower > 0.0 and self.upper < float("inf") else float("inf")
 
     def below(self, level: float) -> Verdict:
         """Whether the value is at most `level`: CERTIFIED, REFUTED, or INCONCLUSIVE where the level lies between the bounds."""

@@ -22,10 +22,8 @@ def frozen_energy(question: Question, u: FloatArray, generalised: bool) -> Float
     stable = (np.abs(poles) < 1.0 if question.discrete else poles.real < 0.0).all(axis=-1)
     out = np.full(len(u), np.inf)
     power = B[stable] @ np.swapaxes(B[stable], -1, -2)
-    if question.discrete:
-        X = discrete_gramian(A[stable], power)
-    else:
-        X = continuous_gramian(A[stable], power, np.abs(poles[stable]))
+    sizes = np.abs(poles[stable])
+    X = discrete_gramian(A[stable], power) if question.discrete else continuous_gramian(A[stable], power, sizes)
     seen = C[stable] @ X @ np.swapaxes(C[stable], -1, -2) + D[stable] @ np.swapaxes(D[stable], -1, -2)
     if generalised:
         out[stable] = np.sqrt(np.maximum(np.linalg.eigvalsh(seen)[:, -1], 0.0))
@@ -34,14 +32,14 @@ def frozen_energy(question: Question, u: FloatArray, generalised: bool) -> Float
     return out
 
 
-def h2_squared(question: Question, u: FloatArray) -> float:
+def proved_h2(question: Question, u: FloatArray) -> float:
     """A float that is not above the frozen H2 norm at u: (tr C X C' + D D')^(1/2), X exact."""
     seen = _seen(question, u)
     return 0.0 if seen is None else floor_of(arb(sum((seen[i, i] for i in range(seen.nrows())), fmpq(0))).sqrt())
 
 
-def energy_to_peak_squared(question: Question, u: FloatArray) -> float:
-    """A float that is not above the frozen generalised H2 norm at u: the root of v'(C X C' + D D')v/v'v, v near the eigenvector."""
+def proved_energy_to_peak(question: Question, u: FloatArray) -> float:
+    """A float not above the frozen generalised H2 norm at u: the root of v'(C X C' + D D')v/v'v, v near the eigenvector."""
     seen = _seen(question, u)
     if seen is None:
         return 0.0

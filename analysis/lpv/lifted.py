@@ -3,10 +3,9 @@ r"""The system along a periodic path as a map over one period, in floats: what a
 With x = e^(jwt) xi and w = e^(jwt) v, v constant on every interval, the error of an interval is linear in (xi, v):
 
     xi_(k+1) = F_k xi_k + G_k v_k,    energy_k = [xi_k; v_k]* Q_k [xi_k; v_k]
-
-in continuous time from xi' = (A(p(t)) - jw) xi + B(p(t)) v by Taylor series of short steps, in discrete time as it stands. A periodic
-input of this kind has a periodic answer, and the ratio of their energies over one period bounds the L2 gain of the LPV system from
-below (Cantoni, Sandberg 2009; Peni, Seiler 2016). All intervals are worked on at once.
+ in continuous time from xi' = (A(p(t)) - jw) xi + B(p(t)) v by Taylor series of short steps, in discrete time as it stands. A
+periodic input of this kind has a periodic answer, and the ratio of their energies over one period bounds the L2 gain of the LPV
+system from below (Cantoni, Sandberg 2009; Peni, Seiler 2016). All intervals are worked on at once.
 """
 
 from __future__ import annotations
@@ -26,7 +25,10 @@ LONGEST = 6  # halvings of an interval
 
 @dataclass(frozen=True)
 class Lifted:
-    """`step` (N, n+m, n+m) with rows [F_k G_k] and [0 I], `energy` Q_k (N, n+m, n+m), `length` (N,) of the intervals; n states."""
+    """`step` (N, n+m, n+m) with rows [F_k G_k] and [0 I], `energy` Q_k (N, n+m, n+m), `length` (N,) of the intervals.
+
+    N states.
+    """
 
     step: ComplexArray
     energy: ComplexArray
@@ -59,7 +61,9 @@ def lift(question: Question, path: Path, frequency: float, parts: int) -> Lifted
         return None
     count = 2**halvings
     begin = (start[:, None] + change[:, None] * (np.arange(count) / count)[:, None]).reshape(-1, start.shape[1])
-    step, energy = _taylor(question, begin, np.repeat(change / count, count, axis=0), frequency, np.repeat(length / count, count))
+    step, energy = _taylor(
+        question, begin, np.repeat(change / count, count, axis=0), frequency, np.repeat(length / count, count)
+    )
     for _ in range(halvings):  # two steps after each other
         first, second = step[::2], step[1::2]
         energy = energy[::2] + np.conj(np.swapaxes(first, -1, -2)) @ energy[1::2] @ first

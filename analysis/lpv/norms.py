@@ -1,8 +1,8 @@
 r"""L2 gain, H2 norms and decay rate of a given LPV system: proved from both sides, on the continuum of parameters and rates.
-
-From above (a decay rate: from below) by a Lyapunov function x'P(p)x whose coefficients a solver finds and which is then proved in ball
-arithmetic (`synthesis.certificate.verify`); from below by a periodic parameter trajectory or a frozen place, proved in ball arithmetic
-as well. The gap between the two is what better trajectories and Lyapunov functions of higher degree might still move.
+ From above (a decay rate: from below) by a Lyapunov function x'P(p)x whose coefficients a solver finds and which is then proved
+in ball arithmetic (`synthesis.certificate.verify`); from below by a periodic parameter trajectory or a frozen place, proved in
+ball arithmetic as well. The gap between the two is what better trajectories and Lyapunov functions of higher degree might still
+move.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from analysis.errors import AnalysisError
 from analysis.lpv.bounds import LpvBounds
 from analysis.lpv.frozen import climb, largest_gain, slowest_decay, unstable
-from analysis.lpv.h2 import energy_to_peak_squared, frozen_energy, h2_squared
+from analysis.lpv.h2 import frozen_energy, proved_energy_to_peak, proved_h2
 from analysis.lpv.lifted import lift, worst_input
 from analysis.lpv.proved_path import ProvedPath
 from analysis.lpv.question import Inputs, Question, ask, require_channel
@@ -40,12 +40,12 @@ def lpv_l2_gain(
 ) -> LpvBounds:
     r"""sup |z|_2/|w|_2 over inputs w and admissible parameter trajectories, x(0) = 0: bounds with certificate and witness.
 
-    x' = A(p) x + B(p) w, z = C(p) x + D(p) w, or x+ = .. with `discrete`; then the rate bounds of the model's parameters are per sample.
-    A rate of inf lets a parameter jump, a rate of 0 freezes it. `inputs` are names among inputs and disturbances, or names with the
-    size that counts as one; `outputs` names of outputs; None: all. `degree` is that of P in the parameters, or one degree for each
-    (0 for a parameter that jumps in continuous time). A system that is not stable has the gain inf.
-    Raises AnalysisError for unknown names and degrees that do not fit. Sources: Wu, Yang, Packard, Becker 1996 (upper bound); Peni,
-    Seiler 2016 (lower bound).
+    x' = A(p) x + B(p) w, z = C(p) x + D(p) w, or x+ = .. with `discrete`; then the rate bounds of the model's parameters are
+    per sample. A rate of inf lets a parameter jump, a rate of 0 freezes it. `inputs` are names among inputs and disturbances,
+    or names with the size that counts as one; `outputs` names of outputs; None: all. `degree` is that of P in the parameters,
+    or one degree for each (0 for a parameter that jumps in continuous time). A system that is not stable has the gain inf.
+    Raises AnalysisError for unknown names and degrees that do not fit. Sources: Wu, Yang, Packard, Becker 1996 (upper bound);
+    Peni, Seiler 2016 (lower bound).
     """
     question = _question(model, inputs, outputs, degree, discrete)
     place, gain, frequency = largest_gain(question)
@@ -61,15 +61,19 @@ def lpv_l2_gain(
         if proved > best:
             best, witness = proved, path.trajectory(question.axes, carrier)
         claim = claim or proved_norm(question, kind, degree, best)
+    if _moves(question) and claim is None:  # is there a gain at all?
+        path, _ = worst_path(question, growth_of(question), (0.0,), slowest_decay(question)[0])
+        if ProvedPath(question, path, 0.0, 1).decays_no_faster(0.0):
+            return LpvBounds(kind, np.inf, np.inf, _unit(question, kind), None, path.trajectory(question.axes, 0.0))
     return LpvBounds(kind, best, np.inf if claim is None else claim.level, _unit(question, kind), claim, witness)
 
 
 def lpv_decay_rate(model: LpvModel, degree: Degree = 2, discrete: bool = False) -> LpvBounds:
     r"""The largest a with |x(t)| <= c e^(-a t) |x(0)| along every admissible parameter trajectory, in 1/s or 1/sample.
 
-    `lower` is proved by x'P(p)x with P of the given degree; along `witness` (a frozen place, or a periodic trajectory with its monodromy
-    matrix) the state falls no faster than `upper`, which is 0 for a trajectory that is not stable. Rates and `discrete` as in
-    `lpv_l2_gain`. Raises AnalysisError for degrees that do not fit.
+    `lower` is proved by x'P(p)x with P of the given degree; along `witness` (a frozen place, or a periodic trajectory with its
+    monodromy matrix) the state falls no faster than `upper`, which is 0 for a trajectory that is not stable. Rates and
+    `discrete` as in `lpv_l2_gain`. Raises AnalysisError for degrees that do not fit.
     """
     question = _question(model, (), None, degree, discrete)
     kind = "sampled error" if discrete else "decay rate"
@@ -100,9 +104,9 @@ def lpv_h2_norm(
 ) -> LpvBounds:
     r"""H2 norm: energies of z after an impulse in each input, added up (square root), at most over all parameter trajectories.
 
-    The standard deviation of z under white noise of unit intensity is no larger. `generalised`: the largest |z(t)| (Euclidean) per
-    energy of w, sup |z|_inf/|w|_2 (Rotea 1993). Arguments as in `lpv_l2_gain`; `lower` comes from frozen places, in exact rationals.
-    Raises AnalysisError, too, for D other than zero in continuous time, where the norm is infinite.
+    The standard deviation of z under white noise of unit intensity is no larger. `generalised`: the largest |z(t)| (Euclidean)
+    per energy of w, sup |z|_inf/|w|_2 (Rotea 1993). Arguments as in `lpv_l2_gain`; `lower` comes from frozen places, in exact
+    rationals. Raises AnalysisError, too, for D other than zero in continuous time, where the norm is infinite.
     """
     question = _question(model, inputs, outputs, degree, discrete)
     kind = ("sampled " if discrete else "") + ("energy to peak" if generalised else "H2 norm")
@@ -114,7 +118,7 @@ def lpv_h2_norm(
     if unstable(question, stable_at):
         return _unstable(question, kind, stable_at)
     place, guess = climb(question, lambda u: frozen_energy(question, u, generalised))
-    proved = (energy_to_peak_squared if generalised else h2_squared)(question, place)
+    proved = (proved_energy_to_peak if generalised else proved_h2)(question, place)
     witness = _standing(question, place).trajectory(question.axes, 0.0)
     claim = proved_norm(question, kind, degree, guess)
     return LpvBounds(kind, proved, np.inf if claim is None else claim.level, _unit(question, kind), claim, witness)
@@ -141,7 +145,9 @@ def _question(
 
 def _moves(question: Question) -> bool:
     """Whether a parameter moves at all."""
-    return any(axis.rate_low is None or axis.rate_high is None or axis.rate_low < 0 < axis.rate_high for axis in question.axes)
+    return any(
+        axis.rate_low is None or axis.rate_high is None or axis.rate_low < 0 < axis.rate_high for axis in question.axes
+    )
 
 
 def _standing(question: Question, place: FloatArray) -> Path:

@@ -103,8 +103,8 @@ def ask(
     """The question, with names checked.
 
     `inputs` are names among the model's inputs and disturbances, or names with the size that counts as one; None: all of them.
-    `outputs` are names of its outputs; None: all. Raises AnalysisError for unknown or repeated names, sizes that are not positive and
-    finite, and a model that is no LpvModel.
+    `outputs` are names of its outputs; None: all. Raises AnalysisError for unknown or repeated names, sizes that are not
+    positive and finite, and a model that is no LpvModel.
     """
     if not isinstance(model, LpvModel):
         raise AnalysisError(f"the system is a {type(model).__name__}; give an LpvModel")

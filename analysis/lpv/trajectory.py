@@ -17,8 +17,8 @@ from synthesis.polynomials.rational import rational
 class Trajectory:
     """Parameters that run through `start[k]` -> `end[k]` (K, p), linearly in `durations[k]` (K,), and then again.
 
-    Durations are seconds, or whole samples in discrete time, where a parameter has the values at the beginning of each. A parameter
-    that may jump has start = end. `frequency` (rad/s or rad/sample) is that of the worst input's carrier.
+    Durations are seconds, or whole samples in discrete time, where a parameter has the values at the beginning of each. A
+    parameter that may jump has start = end. `frequency` (rad/s or rad/sample) is that of the worst input's carrier.
     """
 
     parameters: tuple[str, ...]

@@ -21,7 +21,7 @@ DIGITS, REGIONS, LEVEL_DIGITS = 15, 4000, 6
 
 
 def proved_norm(question: Question, kind: str, degree: int | tuple[int, ...], size: float) -> Claim | None:
-    """The claim with the least level that is proved; `size` is a guess of it. None if no Lyapunov function of the degree was found.
+    """The claim with the least level that is proved; `size` is a guess of it. None if no P of the degree was found.
 
     A norm of zero has no least level: then one is proved that is small against what inputs and outputs could do.
     """

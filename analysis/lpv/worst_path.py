@@ -1,7 +1,7 @@
 """A search for bad parameter trajectories: periodic paths along which inputs are amplified most, or the state falls most slowly.
-
-Paths of KNOTS knots at equal distances, first simple ones of many periods (back and forth, each parameter alone and all together, with
-shifts), then the best of them improved by a simplex search over period, ratio of its halves, knots and carrier. Floats: what counts is proved afterwards.
+ Paths of KNOTS knots at equal distances, first simple ones of many periods (back and forth, each parameter alone and all
+together, with shifts), then the best of them improved by a simplex search over period, ratio of its halves, knots and carrier.
+Floats: what counts is proved afterwards.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def _simple(question: Question, place: FloatArray) -> Iterator[Path]:
     wave = np.array(
         [np.sign(np.sin(2 * np.pi * phases + 0.1)) if axis.may_jump else _triangle(phases) for axis in axes]
     )
-    shifts = [(0,) + rest for rest in product((0, KNOTS // 4, KNOTS // 2), repeat=min(count - 1, 2))]
+    shifts = [(0, *rest) for rest in product((0, KNOTS // 4, KNOTS // 2), repeat=min(count - 1, 2))]
     shapes = []
     for shift in shifts:
         full = (*shift, *(0,) * (count - len(shift)))
@@ -106,10 +106,12 @@ def periods(question: Question) -> list[float]:
 
 def _ways(question: Question) -> list[float]:
     """Times through the ranges and back, of parameters that take any."""
-    return [
-        2.0 * float_of(axis.half / axis.rate_high - axis.half / axis.rate_low)
-        for axis in question.axes if axis.rate_low is not None and axis.rate_high is not None and axis.rate_low < 0 < axis.rate_high
-    ]  # fmt: skip
+    found = []
+    for axis in question.axes:
+        low, high = axis.rate_low, axis.rate_high
+        if low is not None and high is not None and low < 0 < high:
+            found.append(2.0 * float_of(axis.half / high - axis.half / low))
+    return found
 
 
 def _refined(question: Question, score: Score, entry: tuple[float, Path, float]) -> tuple[float, Path, float]:

@@ -1,10 +1,9 @@
 r"""Sample-time jitter of a sampled observer: how far the sample time may wander from its nominal value, in any order.
 
     e+ = (e^(T_k A) - K C) e,    T_k anywhere in [(1 - j) T, (1 + j) T]
-
-From below by e'P(T)e with P polynomial in the sample time (a different one in every sample: Daafouz, Bernussou 2001), proved on the
-whole interval with enclosed matrix exponentials; from above by a sequence of sample times whose product certainly has a spectral radius
-of one or more.
+ From below by e'P(T)e with P polynomial in the sample time (a different one in every sample: Daafouz, Bernussou 2001), proved
+on the whole interval with enclosed matrix exponentials; from above by a sequence of sample times whose product certainly has a
+spectral radius of one or more.
 """
 
 from __future__ import annotations
@@ -40,9 +39,10 @@ DIGITS, REGIONS = 15, 600
 
 @dataclass(frozen=True)
 class Jitter:
-    """Stable for every sequence of sample times within +-`lower` of nominal (relative); `witness` (s), repeated, is not stable and within `upper`.
+    """Stable for every sequence of sample times within +-`lower` of nominal (relative).
 
-    `upper` is inf where no such sequence was found. `claim` holds P(T) and the decay per sample that was proved.
+    The sequence `witness` (s), within +-`upper` and repeated for ever, is not stable; `upper` is inf where none was found.
+    `claim` holds P(T) with which stability was proved.
     """
 
     lower: float
@@ -55,8 +55,8 @@ class Jitter:
 def sample_time_jitter(A: ArrayLike, C: ArrayLike, K: ArrayLike, sample_time: float, degree: int = 2) -> Jitter:
     """The relative jitter j that xhat+ = e^(TA) xhat + .. + K (y - C xhat) stands, K fixed, as a bracket.
 
-    A (n, n), C (p, n), K (n, p), `sample_time` in s. `degree` of P in the sample time. Raises AnalysisError for matrices that do not fit
-    or are not finite, and if the observer is not stable at its nominal sample time.
+    A (n, n), C (p, n), K (n, p), `sample_time` in s. `degree` of P in the sample time. Raises AnalysisError for matrices that
+    do not fit or are not finite, and if the observer is not stable at its nominal sample time.
     """
     a, c, k = observer_matrices(A, C, K)
     period = positive("sample_time", sample_time)
@@ -78,21 +78,30 @@ def sample_time_jitter(A: ArrayLike, C: ArrayLike, K: ArrayLike, sample_time: fl
 
 
 def jitter_claim(
-    observer: ObserverLoop, parameters: tuple[SchedulingParameter, ...], shortest: float, longest: float, degree: int = 2
+    observer: ObserverLoop,
+    parameters: tuple[SchedulingParameter, ...],
+    shortest: float,
+    longest: float,
+    degree: int = 2,
 ) -> Claim | None:
     """A proof that the error decays for all sequences of sample times in [shortest, longest] s, or None.
 
-    `observer` has the update `sampled` (a deployed table, or `observer_of` matrices), `parameters` are its scheduling parameters; P is
-    a polynomial in them and in the sample time. Raises AnalysisError for another update, a rational plant, or an interval that is none.
+    `observer` has the update `sampled` (a deployed table, or `observer_of` matrices), `parameters` are its scheduling
+    parameters; P is a polynomial in them and in the sample time. Raises AnalysisError for another update, a rational plant, or
+    an interval that is none.
     """
     if observer.update != "sampled" or not observer.plant.is_polynomial:
         raise AnalysisError("jitter is judged for the update 'sampled' of a polynomial plant")
     if not 0.0 < shortest < longest:
-        raise AnalysisError(f"sample times from {shortest:g} to {longest:g} s are no interval; give 0 < shortest < longest")
+        raise AnalysisError(
+            f"sample times from {shortest:g} to {longest:g} s are no interval; give 0 < shortest < longest"
+        )
     loop, names = _loop_and_names(observer, shortest, longest)
     sample = SchedulingParameter(NAME, "s", shortest, longest, -np.inf, np.inf)
     # Scheduling parameters move with their rates for as long as the longest sample lasts.
-    moving = tuple(replace(p, rate_minimum=p.rate_minimum * longest, rate_maximum=p.rate_maximum * longest) for p in parameters)
+    moving = tuple(
+        replace(p, rate_minimum=p.rate_minimum * longest, rate_maximum=p.rate_maximum * longest) for p in parameters
+    )
     for points in POINTS if not parameters else POINTS[:1]:
         search = Search(loop, names, (*moving, sample), degree, points=points, digits=DIGITS, most_regions=REGIONS)
         claim, _ = search.prove(Wish("sampled error", 0.0))

@@ -1,7 +1,6 @@
 r"""A sampled observer whose sample time varies: e+ = (e^(T A) - K C) e with T anywhere in an interval at every sample.
-
-The sample time is one more parameter, which may jump; the gain is that of the table, whatever T is. Scheduling parameters of the
-observer keep their rates, over the longest sample. One sample is the unit of time.
+ The sample time is one more parameter, which may jump; the gain is that of the table, whatever T is. Scheduling parameters of
+the observer keep their rates, over the longest sample. One sample is the unit of time.
 """
 
 from __future__ import annotations
@@ -78,9 +77,7 @@ class JitterLoop:
 
     def _update(self, region: Region) -> System | None:
         count, inner = region.parameters, region.parameters - 1
-        observers = Region(
-            (*region.offset[:inner], *(fmpq(0),) * inner), (*region.factor[:inner], *(fmpq(0),) * inner)
-        )
+        observers = Region((*region.offset[:inner], *(fmpq(0),) * inner), (*region.factor[:inner], *(fmpq(0),) * inner))
         axis = self.plant.axes[-1]
         length = constant(fmpq_mat([[axis.middle + axis.half * region.offset[inner]]]), 2 * count)
         length = (length + variable(inner, 2 * count) * (axis.half * region.factor[inner])).balls()

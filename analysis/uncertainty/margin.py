@@ -1,10 +1,10 @@
 r"""Robust stability margin under real parametric uncertainty: the largest box of parameters in which the system is stable.
 
     k* = sup { k : A(p) is stable for all |p_i - middle_i| <= k half_i }
-
-and 1/k* is the peak over frequencies of the structured singular value for real repeated blocks, where A is a linear fractional function
-of the parameters. From below by positivity of polynomials on the box (`analysis.uncertainty.polynomials`): for all frequencies at once,
-and without the conservatism of scalings. From above by one member of the family with a pole that is certainly not stable.
+ and 1/k* is the peak over frequencies of the structured singular value for real repeated blocks, where A is a linear fractional
+function of the parameters. From below by positivity of polynomials on the box (`analysis.uncertainty.polynomials`): for all
+frequencies at once, and without the conservatism of scalings. From above by one member of the family with a pole that is
+certainly not stable.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ EXCHANGES = 20
 
 @dataclass(frozen=True)
 class RobustStabilityMargin:
-    """lower <= k* <= upper: stable in the whole box grown `lower` times, not stable at `witness` (name: value), which is in the other."""
+    """lower <= k* <= upper: the whole box grown `lower` times is stable, `witness`, in that grown `upper` times, is not."""
 
     lower: float
     upper: float
@@ -59,11 +59,12 @@ class RobustStabilityMargin:
 def robust_stability_margin(
     model: LpvModel, tolerance: float = 1e-3, discrete: bool = False, farthest: float = 100.0
 ) -> RobustStabilityMargin:
-    """The margin of x' = A(p) x (or x+) over constant p, about the middle of the ranges, to a relative `tolerance` where that is reached.
+    """The margin of x' = A(p) x (or x+) over constant p, about the middle of the ranges.
 
-    Nothing is looked for beyond `farthest` times the ranges: a system that is stable there has this number as lower bound and inf as upper.
-    Raises AnalysisError if the middle is not stable, for no parameters, and for numbers that are not positive. Sources: de Gaston,
-    Safonov 1988 (the margin); Zettler, Garloff 1998 (Bernstein expansion of Hurwitz determinants).
+    `tolerance` is the relative gap that is aimed at. Nothing is looked for beyond `farthest` times the ranges: a system that is
+    stable there has this number as lower bound and inf as upper. Raises AnalysisError if the middle is not stable, for no
+    parameters, and for numbers that are not positive. Sources: de Gaston, Safonov 1988 (the margin); Zettler, Garloff 1998
+    (Bernstein expansion of Hurwitz determinants).
     """
     question = ask(model, (), None, discrete)
     tolerance, farthest = positive("tolerance", tolerance), min(positive("farthest", farthest), FARTHEST)
@@ -95,7 +96,11 @@ def robust_stability_margin(
         if better is None or not np.abs(better).max() < upper:
             break
         witness, upper = better, float(np.abs(better).max())
-    values = None if witness is None else dict(zip((a.name for a in question.axes), question.physical(witness).tolist(), strict=True))
+    values = (
+        None
+        if witness is None
+        else dict(zip((a.name for a in question.axes), question.physical(witness).tolist(), strict=True))
+    )
     return RobustStabilityMargin(lower, upper, values)
 
 
@@ -132,7 +137,10 @@ def _nearest(question: Question, farthest: float) -> FloatArray | None:
 
 
 def _reach(question: Question, rays: FloatArray, farthest: float) -> FloatArray:
-    """The first scale on every ray (g, p) at which a pole is not stable, inf if none is met; poles at infinity end a ray, too."""
+    """The first scale on every ray (g, p) at which a pole is not stable, inf if none is met.
+
+    Poles at infinity end a ray, too.
+    """
     scales = np.concatenate([[0.0], np.geomspace(1e-3, farthest, SCALES)])
     with np.errstate(all="ignore"):
         at = scales[:, None, None] * rays

@@ -1,14 +1,13 @@
 r"""Stability and gain of a whole family of systems as signs of polynomials in its parameters: exact, and nothing is lost.
-
-Stability. chi(s; u) = det(s I - A(u)) = c_n s^n + .. + c_0 with c_n > 0. If one member is stable and, on a connected set of u,
-c_n > 0, c_0 > 0 and the Hurwitz determinant H_(n-1) > 0, then all are: roots move continuously, and one that reaches the imaginary
-axis makes c_0 or H_(n-1) zero (Orlando's formula). In discrete time z = (1 + s)/(1 - s) leads to the same.
+ Stability. chi(s; u) = det(s I - A(u)) = c_n s^n + .. + c_0 with c_n > 0. If one member is stable and, on a connected set of u,
+c_n > 0, c_0 > 0 and the Hurwitz determinant H_(n-1) > 0, then all are: roots move continuously, and one that reaches the
+imaginary axis makes c_0 or H_(n-1) zero (Orlando's formula). In discrete time z = (1 + s)/(1 - s) leads to the same.
 
 Gain. On the imaginary axis det M(jw; u) = +-|chi(jw)|^2 det(g^2 I - G(jw)* G(jw)) with
 
     M(s) = [[A - s I, 0, B], [-C'C, -A' - s I, -C'D], [D'C, B', D'D - g^2 I]].
-
-If all members are stable, one of them has a gain below g, and this polynomial in x = w^2 and u has no zero, then every gain is below g.
+ If all members are stable, one of them has a gain below g, and this polynomial in x = w^2 and u has no zero, then every gain is
+below g.
 """
 
 from __future__ import annotations
@@ -57,7 +56,10 @@ class Family:
         n = len(coefficients) - 1
         zero = self.context.from_dict({})
         hurwitz = [
-            [coefficients[n - (2 * (j + 1) - (i + 1))] if 0 <= 2 * (j + 1) - (i + 1) <= n else zero for j in range(n - 1)]
+            [
+                coefficients[n - (2 * (j + 1) - (i + 1))] if 0 <= 2 * (j + 1) - (i + 1) <= n else zero
+                for j in range(n - 1)
+            ]
             for i in range(n - 1)
         ]
         found = [coefficients[-1], coefficients[0]] + ([determinant(hurwitz, self.context)] if n > 1 else [])
@@ -87,7 +89,9 @@ class Family:
 
         top = [[A[i][j] - unit(i, j, s * d) for j in range(n)] + [zero] * n + B[i] for i in range(n)]
         middle = [
-            [-CC[i][j] for j in range(n)] + [-A[j][i] * d - unit(i, j, s * d * d) for j in range(n)] + [-x for x in CD[i]]
+            [-CC[i][j] for j in range(n)]
+            + [-A[j][i] * d - unit(i, j, s * d * d) for j in range(n)]
+            + [-x for x in CD[i]]
             for i in range(n)
         ]
         bottom = [
@@ -128,7 +132,9 @@ def over_frequencies(coefficients: list[PolynomialMatrix], centre: fmpq) -> Poly
         for power, weight in enumerate(weights):
             if weight:
                 scaled = c * (fmpq(weight) * centre**k)
-                total = total + PolynomialMatrix({(*key, power): m for key, m in scaled.terms.items()}, (1, 1), count + 1)
+                total = total + PolynomialMatrix(
+                    {(*key, power): m for key, m in scaled.terms.items()}, (1, 1), count + 1
+                )
     return total
 
 

@@ -1,7 +1,6 @@
 """Are polynomials positive on a whole box? Bernstein coefficients, and boxes that are halved until it shows.
-
-Many boxes at once in float64 with a guard for all rounding, and what the guard leaves open in balls of 128 bits. A point where a
-polynomial is not positive counts only if its exact value there is not.
+ Many boxes at once in float64 with a guard for all rounding, and what the guard leaves open in balls of 128 bits. A point where
+a polynomial is not positive counts only if its exact value there is not.
 """
 
 from __future__ import annotations
@@ -19,7 +18,9 @@ from synthesis.polynomials.rational import rational
 
 MOST_BOXES = 300  # in balls
 MOST_AT_ONCE, LEVELS = 60_000, 40  # in floats
-GUARD = 1e-12  # times the sum of absolute coefficients: conversion, and LEVELS averages of each degree, lose less by far
+GUARD = (
+    1e-12  # times the sum of absolute coefficients: conversion, and LEVELS averages of each degree, lose less by far
+)
 
 Box = tuple[tuple[fmpq, ...], tuple[fmpq, ...]]  # centre and half widths
 

@@ -1,8 +1,7 @@
 r"""Worst-case gain under real parametric uncertainty: the largest H-infinity norm over a box of constant parameters.
-
-From above the polynomial |chi(jw)|^2 det(g^2 I - G*G) is proved positive on the box and on all frequencies together: frequency is one
-more parameter, w^2 = centre (1 + v)/(1 - v) with v in [-1, 1], so that nothing can hide between the points of a grid. From below one
-member of the family, its gain at one frequency enclosed in balls.
+ From above the polynomial |chi(jw)|^2 det(g^2 I - G*G) is proved positive on the box and on all frequencies together: frequency
+is one more parameter, w^2 = centre (1 + v)/(1 - v) with v in [-1, 1], so that nothing can hide between the points of a grid.
+From below one member of the family, its gain at one frequency enclosed in balls.
 """
 
 from __future__ import annotations
@@ -11,10 +10,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from flint import fmpq
+from flint import fmpq, fmpq_mat
 
 from analysis.checks import positive
 from analysis.errors import AnalysisError
+from analysis.exact import is_positive
 from analysis.lpv.frozen import largest_gain, unstable
 from analysis.lpv.norms import proved_frozen_gain
 from analysis.lpv.question import Inputs, Question, ask, require_channel
@@ -35,7 +35,10 @@ LEVEL_DIGITS = 8
 
 @dataclass(frozen=True)
 class WorstCaseGain:
-    """lower <= max over the box of the H-infinity norm <= upper; at `witness` (name: value) and `frequency` rad/s it is at least `lower`."""
+    """lower <= max over the box of the H-infinity norm <= upper.
+
+    At `witness` (name: value) and `frequency` rad/s it is at least `lower`.
+    """
 
     lower: float
     upper: float
@@ -54,9 +57,9 @@ def worst_case_gain(
 ) -> WorstCaseGain:
     """The worst gain of x' = A(p) x + B(p) w, z = C(p) x + D(p) w over constant p in the ranges of the model's parameters.
 
-    Inputs and outputs as in `lpv_l2_gain`; rate bounds play no part. `tolerance` is the relative gap that is aimed at. A family with a
-    member that is not stable has the gain inf. `upper` is inf where no proof was found. Raises AnalysisError for unknown names and for
-    a tolerance that is not positive.
+    Inputs and outputs as in `lpv_l2_gain`; rate bounds play no part. `tolerance` is the relative gap that is aimed at. A family
+    with a member that is not stable has the gain inf. `upper` is inf where no proof was found. Raises AnalysisError for unknown
+    names and for a tolerance that is not positive.
     """
     question = ask(model, inputs, outputs)
     require_channel(question)
@@ -72,7 +75,9 @@ def worst_case_gain(
     if not stable.positive or unstable(question, np.zeros(count)):
         return WorstCaseGain(lower, np.inf, _values(question, place), frequency)
     if not lower > 0.0:
-        raise AnalysisError(f"model '{model.name}': no input reaches an output anywhere in the ranges; there is no gain to bound")
+        raise AnalysisError(
+            f"model '{model.name}': no input reaches an output anywhere in the ranges; there is no gain to bound"
+        )
     coefficients = family.gain()
     for _ in range(EXCHANGES):
         better = None
@@ -96,15 +101,24 @@ def worst_case_gain(
 def _decide(question: Question, family: Family, coefficients: list[object], level: float, frequency: float) -> Decision:
     """Whether every gain is below the level, for a family that is stable everywhere."""
     count = len(question.axes)
-    at_centre = hinf_norm(*question.frozen(np.zeros((1, count))))
-    if not at_centre.upper[0] < level:  # the middle would not be on the right side
-        return Decision(False, (fmpq(0),) * (count + 1))
     square = rational(level) ** 2
+    if not _static_gain_below(question, square):
+        return Decision(False, (fmpq(0),) * (count + 1))
     in_u = [family.in_parameters(c, square) for c in coefficients]
     A = question.frozen(np.zeros((1, count)))[0][0]
     scale = frequency or float(np.abs(np.linalg.eigvals(A)).max()) or 1.0
     whole = over_frequencies(in_u, rational(float(2.0 ** np.round(np.log2(scale)))) ** 2)
     return all_positive([whole], [fmpq(0)] * (count + 1), [fmpq(1)] * (count + 1))
+
+
+def _static_gain_below(question: Question, square: fmpq) -> bool:
+    """Whether one member, the middle at rest, is on the right side: g^2 I - G(0)'G(0) > 0, exactly."""
+    count = len(question.axes)
+    A, B, C, D, below = (question.exact[key].at((fmpq(0),) * count) for key in ("A", "B", "C", "D", "denominator"))
+    G = (D - C * A.solve(B)) * (1 / below[0, 0])
+    m = G.ncols()
+    level = fmpq_mat(m, m, [square if i == j else fmpq(0) for i in range(m) for j in range(m)])
+    return is_positive(level - G.transpose() * G)
 
 
 def _climbed(question: Question, u: FloatArray) -> tuple[FloatArray, float]:

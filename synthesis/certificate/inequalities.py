@@ -8,16 +8,16 @@ multiplied by so many d that it is polynomial.
     decay rate a      -(S + P' + 2 a P) > 0                                         |e|_P falls at least like exp(-a t)
     fastest pole r    S + 2 r P > 0                                                 every frozen pole has a real part above -r
     gain g            [-(S + P' + C'Z'ZC), -P B W - C'Z'ZDW; *, g^2 I - W'D'Z'ZDW] > 0
-                                                                                    L2 gain from W w to Z(C e + D w) below g
-    H2 norm g         -(S + P' + C'Z'ZC) > 0,  g^2 - tr(W'B'P B W) > 0              energy after an impulse in every input, added up;
-                                                                                    also the variance of z under white noise (D = 0)
-    energy to peak g  [-(S + P'), -P B W; *, g^2 I] > 0,  P - C'Z'ZC > 0            largest |Z C e| is at most g times the energy of w
-                                                                                    to the power 1/2 (D = 0; Rotea 1993: generalised H2)
+                      L2 gain from W w to Z(C e + D w) below g
+    H2 norm g         -(S + P' + C'Z'ZC) > 0,  g^2 - tr(W'B'P B W) > 0
+                      energies of Z C e after an impulse in each input, added up, below g^2 (D = 0)
+    energy to peak g  [-(S + P'), -P B W; *, g^2 I] > 0,  P - C'Z'ZC > 0
+                      the largest |Z C e| is below g |w|_2 (D = 0; generalised H2, Rotea 1993)
 
     discrete (the update e+ = A e + B w of one sample of length T)
     decay over a sample a  exp(-2 a T) P - A'P+A > 0                                |e|_P falls by exp(-a T) in every sample
     gain g            [P - C'Z'ZC - A'P+A, -A'P+B W - C'Z'ZDW; *, g^2 I - W'B'P+B W - W'D'Z'ZDW] > 0
-                                                                                    l2 gain from W w to Z(C e + D w) below g
+                      l2 gain from W w to Z(C e + D w) below g
     drop probability q     P - (1 - q) A'P+A - q A0'P+A0 > 0,  P - A'P+A > 0        mean-square stable when every measurement is
                                                                                     lost independently with a probability up to q
     H2 norm g         P - A'P+A - C'Z'ZC > 0,  g^2 - tr(W'B'P+B W + W'D'Z'ZDW) > 0  as above

@@ -46,8 +46,8 @@ class Wish:
 class Search:
     """Searches claims about one loop; P has the given degree in the parameters, or one degree for each of them.
 
-    `points` of every cell and parameter are where the solver sees the inequalities; `size` is a guess of the levels of gains, which
-    makes them numbers near one (None: taken from frequency responses in the middle of the range). P is rounded to `digits`.
+    `points` of every cell and parameter are where the solver sees the inequalities; `size` is a guess of the levels of gains, by
+    which they are divided (None: from frequency responses in the middle of the range). P is rounded to `digits`.
     """
 
     loop: Loop

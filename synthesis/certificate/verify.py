@@ -158,7 +158,7 @@ def _judge(named: Sequence[tuple[str, PolynomialMatrix]]) -> tuple[Any, str | No
 
 
 def _axis(depth: int, P: PolynomialMatrix, rates: int) -> int:
-    """Which variable to halve: the parameters in turn, and those of the first `rates` rates that the inequality is not affine in."""
+    """Which variable to halve: the parameters in turn, and of the first `rates` rates those that P is not affine in."""
     count = P.variables // 2
     axes = list(range(count)) + [count + i for i in range(rates) if P.degrees[i] > 1]
     return axes[depth % len(axes)]

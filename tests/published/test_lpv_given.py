@@ -34,12 +34,14 @@ def spring(k: float) -> LpvModel:
 
 
 def test_zelentsovsky() -> None:
-    """Quadratic margin 3.82 = 1 + 2 sqrt 2 cut, exact margin 6.985: certified below the one, refuted above the other, open between."""
+    """Quadratic margin 3.82 = 1 + 2 sqrt 2 cut, exact margin 6.985: certified below, refuted above, open between."""
     inside, between, beyond = (lpv_decay_rate(spring(k), degree=0) for k in (3.8, 6.5, 7.2))
     assert inside.lower > 0.0
     assert between.lower == 0.0 < between.upper
     assert beyond.upper == 0.0
     assert beyond.witness is not None and beyond.witness.period > 0.5
+    pushed = small_model([[0, 1], [-2 - p, -1]], [[1, 0]], [parameter("p", 0.0, 7.5, np.inf)], E=[[0], [1]])
+    assert lpv_l2_gain(pushed, degree=0).lower == np.inf
 
 
 def test_quadratic_stability_margin_of_the_lmi_manual() -> None:
@@ -47,7 +49,10 @@ def test_quadratic_stability_margin_of_the_lmi_manual() -> None:
 
     def grown(times: float) -> LpvModel:
         k, f = sp.symbols("k f")
-        ranges = parameter("k", 11 - times, 11 + times, np.inf), parameter("f", 0.6 - times / 10, 0.6 + times / 10, np.inf)
+        ranges = (
+            parameter("k", 11 - times, 11 + times, np.inf),
+            parameter("f", 0.6 - times / 10, 0.6 + times / 10, np.inf),
+        )
         return small_model([[0, 1], [-k, -f]], [[1, 0]], ranges)
 
     assert lpv_decay_rate(grown(1.48), degree=0).lower > 0.0

@@ -1,4 +1,4 @@
-"""Sample-time jitter and constant delay of sampled observers: closed forms, simulation, verified sequences and negative controls."""
+"""Sample-time jitter and constant delay of sampled observers: closed forms, simulation, sequences, negative controls."""
 
 from __future__ import annotations
 
@@ -55,7 +55,10 @@ def test_an_order_of_sample_times_destroys_what_each_keeps_stable() -> None:
 
 
 def test_a_scheduled_observer_with_jitter() -> None:
-    """x' = (p - 0.5) x with K = 0.8, |p| <= 0.4: e^(T (p - 0.5)) - 0.8 stays inside the circle for T in [0.05, 0.4]; K = 1.99 does not."""
+    """x' = (p - 0.5) x with K = 0.8, |p| <= 0.4: e^(T (p - 0.5)) - 0.8 stays inside the circle for T in [0.05, 0.4].
+
+    K = 1.99 does not.
+    """
     p = sp.Symbol("p")
     model = small_model([[p - sp.Rational(1, 2)]], [[1]], [parameter("p", -0.4, 0.4, 1.0)])
     plant, ends = plant_of(model), ((decimal(-0.4), decimal(0.4)),)
@@ -91,7 +94,7 @@ def test_a_delay_between_samples() -> None:
 
 
 def test_delays_against_a_simulation_of_the_observer() -> None:
-    """Plant and observer in continuous time, corrected at the samples, with the estimate's history: they decay below, and grow above."""
+    """Plant and observer in continuous time, corrected at the samples, with the estimate's history."""
     A, T = np.array([[0.0, 1.0], [-25.0, -1.0]]), 0.1
     K = gain(A, T, [-0.3, -0.2])
     jump = expm(-A * T) @ K  # made at t_k it becomes K at t_(k+1)

@@ -55,7 +55,10 @@ def test_de_gaston_and_safonov() -> None:
 
 
 def test_two_carts_and_a_spring() -> None:
-    """Wie and Bernstein's plant with 100 ((s + 1)/(0.001 s + 1))^3 as in the Robust Control Toolbox guide: 2.8826 .. 2.8864, k = 1.5773."""
+    """Wie and Bernstein's plant with 100 ((s + 1)/(0.001 s + 1))^3 as in the Robust Control Toolbox guide: 2.8826 ..
+
+    2.8864, k = 1.5773.
+    """
     m1, m2, k = sp.symbols("m1 m2 k")
     loop = s**2 * (m1 * m2 * s**2 + k * (m1 + m2)) * (s + 1000) ** 3 + 100 * k * (s + 1) ** 3 * 1000**3
     model = companion(loop, ("m1", 0.8, 1.2), ("m2", 0.8, 1.2), ("k", 0.8, 1.2))
@@ -68,8 +71,8 @@ def test_two_carts_and_a_spring() -> None:
 def test_a_small_hole_in_the_stable_set_is_found() -> None:
     """Ackermann's polynomial: stable but for a disc of radius 0.1 about q1 = q2 = 1, which rays and corners miss.
 
-    s^3 + (a + 1) s^2 + (a + 3) s + 1.01 + 6 a + 2 q1 q2 with a = q1 + q2: H_2 = (q1 - 1)^2 + (q2 - 1)^2 - 0.01, so k* = 0.3/1.1.
-    Robust Control Toolbox is reported to give 0.2722 .. 1.2389.
+    s^3 + (a + 1) s^2 + (a + 3) s + 1.01 + 6 a + 2 q1 q2 with a = q1 + q2: H_2 = (q1 - 1)^2 + (q2 - 1)^2 - 0.01, so k* =
+    0.3/1.1. Robust Control Toolbox is reported to give 0.2722 .. 1.2389.
     """
     q1, q2 = sp.symbols("q1 q2")
     a = q1 + q2
@@ -114,7 +117,10 @@ def test_the_stability_polynomials_are_those_of_poles() -> None:
 
 @pytest.mark.parametrize("case", range(3))
 def test_worst_case_gains_are_those_of_dense_grids(case: int) -> None:
-    """One and several inputs and outputs, D, and a denominator; 41^p places are no worse, and 1 % below the claim is refused."""
+    """One and several inputs and outputs, D, and a denominator.
+
+    41^p places are no worse, and 1 % below the claim is refused.
+    """
     model = (
         small_model([[0, 1], [-p, sp.Rational(-1, 5)]], [[1, 0]], [parameter("p", 0.5, 2.0)], E=[[0], [1]]),
         small_model(
