@@ -15,6 +15,7 @@ from analysis.errors import AnalysisError
 from analysis.lpv.bounds import LpvBounds
 from analysis.lpv.frozen import climb, largest_gain, slowest_decay, unstable
 from analysis.lpv.h2 import frozen_energy, proved_energy_to_peak, proved_h2
+from analysis.lpv.h2_path import h2_of, proved_along
 from analysis.lpv.lifted import lift, worst_input
 from analysis.lpv.proved_path import ProvedPath
 from analysis.lpv.question import Inputs, Question, ask, require_channel
@@ -105,7 +106,7 @@ def lpv_h2_norm(
     r"""H2 norm: energies of z after an impulse in each input, added up (square root), at most over all parameter trajectories.
 
     The standard deviation of z under white noise of unit intensity is no larger. `generalised`: the largest |z(t)| (Euclidean)
-    per energy of w, sup |z|_inf/|w|_2 (Rotea 1993). Arguments as in `lpv_l2_gain`; `lower` comes from frozen places, in exact
+    per energy of w, sup |z|_inf/|w|_2 (Rotea 1993). Arguments as in `lpv_l2_gain`; `lower` comes from trajectories, or in exact
     rationals. Raises AnalysisError, too, for D other than zero in continuous time, where the norm is infinite.
     """
     question = _question(model, inputs, outputs, degree, discrete)
@@ -121,6 +122,11 @@ def lpv_h2_norm(
     proved = (proved_energy_to_peak if generalised else proved_h2)(question, place)
     witness = _standing(question, place).trajectory(question.axes, 0.0)
     claim = proved_norm(question, kind, degree, guess)
+    if _moves(question) and (claim is None or claim.level > CLOSED * proved):
+        path, _ = worst_path(question, h2_of(question, generalised), (0.0,), place)
+        along = proved_along(question, path, generalised)
+        if along > proved:
+            proved, witness = along, path.trajectory(question.axes, 0.0)
     return LpvBounds(kind, proved, np.inf if claim is None else claim.level, _unit(question, kind), claim, witness)
 
 

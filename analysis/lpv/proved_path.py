@@ -70,6 +70,11 @@ class ProvedPath:
             return [fmpq(1)] * round(self.path.period)
         return [rational(float(x)) / self.parts for x in self.path.durations for _ in range(self.parts)]
 
+    @cached_property
+    def starts(self) -> list[list[fmpq]]:
+        """u at the beginning of every interval, exact."""
+        return [line.start for line in self._lines(1, fmpq(1))]
+
     def _lines(self, steps: int, unit: fmpq) -> Iterator[Line]:
         """Every step of every interval of every piece, exact; in discrete time every sample."""
         for first, last, duration in zip(self.path.start, self.path.end, self.path.durations, strict=True):

@@ -52,15 +52,19 @@ def time_derivative(matrix: Any, speeds: list[Any]) -> Any:
 
 
 def one_sample_later(matrix: Any, speeds: list[Any], period: Any) -> Any:
-    """M(u + T du/dt), with a rate that is constant over the sample: any admissible motion has such a mean rate."""
+    """M(u + T du/dt), with a rate that is constant over the sample: any admissible motion has such a mean rate.
+
+    Taylor's series by Horner's rule, the derivatives taken first: the step to a parameter that jumps depends on u itself.
+    """
     for i, speed in enumerate(speeds):
         if speed is None:
             continue
-        step, term, total = speed * period, matrix, matrix
+        step, slopes = speed * period, [matrix]
         for k in range(1, matrix.degrees[i] + 1):
-            term = term.derivative(i).scaled_by(step) * _inverse(k, period)
-            total = total + term
-        matrix = total
+            slopes.append(slopes[-1].derivative(i) * _inverse(k, period))  # of order k, over k!
+        matrix = slopes[-1]
+        for slope in reversed(slopes[:-1]):
+            matrix = matrix.scaled_by(step) + slope
     return matrix
 
 

@@ -75,3 +75,11 @@ def test_rolmip_gain() -> None:
     found = lpv_l2_gain(model, degree=0)
     assert found.lower == pytest.approx(1.0108, abs=5e-5)
     assert found.upper == pytest.approx(2.8429, rel=2e-3) and found.upper > 2.8429
+
+
+def test_rolmip_discrete_stability() -> None:
+    """ROLMIP manual, section 7.1: two vertices, constant parameter, feasible with an affine P and not with a constant one."""
+    modes = sp.Matrix([[0.1, 0.9], [0, 0.1]]), sp.Matrix([[0.5, 0], [1, 0.5]])
+    model = small_model(modes[0] * (1 + p) / 2 + modes[1] * (1 - p) / 2, [[1, 0]], [parameter(rate=0.0)])
+    assert lpv_decay_rate(model, degree=1, discrete=True).lower > 0.0
+    assert lpv_decay_rate(model, degree=0, discrete=True).lower == 0.0

@@ -42,7 +42,7 @@ def test_an_order_of_sample_times_destroys_what_each_keeps_stable() -> None:
     """A lightly damped plant: every constant sample time of the interval is stable, one order of two of them is not."""
     K = gain(SWING, 0.1, [0.1, 0.15])
     found = sample_time_jitter(SWING, C, K, 0.1)
-    assert 0.3 < found.lower < found.upper < 1.01 * found.lower
+    assert 0.3 < found.lower < found.upper < 1.06 * found.lower
     assert found.witness is not None and len(set(found.witness)) > 1
     product = np.eye(2)
     for length in found.witness:

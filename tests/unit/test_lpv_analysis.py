@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
+from scipy.linalg import solve_discrete_lyapunov
 
 from analysis.errors import AnalysisError
+from analysis.lpv.h2_path import h2_of, proved_along
 from analysis.lpv.lifted import lift, worst_input
 from analysis.lpv.norms import lpv_decay_rate, lpv_h2_norm, lpv_l2_gain
 from analysis.lpv.proved_path import ProvedPath
@@ -64,12 +66,16 @@ def test_discrete_bounds_are_those_of_closed_forms() -> None:
 
 
 def test_jumps_between_samples_may_use_a_lyapunov_function_of_the_parameter() -> None:
-    """A1, A2 of the ROLMIP manual, section 7.1: no common quadratic proof comes near what P(p) proves for jumps of p."""
+    """0.8 times A1, A2 of the ROLMIP manual, section 7.1: a constant P proves less than P(p), none more than a product."""
     modes = sp.Matrix([[0.1, 0.9], [0, 0.1]]), sp.Matrix([[0.5, 0], [1, 0.5]])
-    model = small_model(modes[0] * (1 + p) / 2 + modes[1] * (1 - p) / 2, [[1, 0]], [parameter(rate=np.inf)])
-    loose, tight = (lpv_decay_rate(model, degree=k, discrete=True) for k in (0, 2))
-    assert loose.lower < 0.5 * tight.lower
-    assert 0.0 < tight.lower <= tight.upper and tight.gap < 0.02
+    A = sp.Rational(4, 5) * (modes[0] * (1 + p) / 2 + modes[1] * (1 - p) / 2)
+    model = small_model(A, [[1, 0]], [parameter(rate=np.inf)])
+    loose, *tight = (lpv_decay_rate(model, degree=k, discrete=True) for k in (0, 1, 3))
+    for found in tight:
+        assert 1.4 * loose.lower < found.lower <= found.upper
+        assert found.gap < 0.1
+    standing = lpv_decay_rate(replace(model, parameters=(parameter(rate=0.0),)), degree=3, discrete=True)
+    assert standing.lower > 1.5 * loose.upper  # what P(p) must not prove for jumps
 
 
 def test_h2_norms_without_parameters_are_those_of_matrices() -> None:
@@ -94,6 +100,36 @@ def test_h2_norms_of_moving_parameters() -> None:
     direct = small_model([[-2 - p]], [[1]], [parameter(rate=1.0)], E=[[1]], F=[[1]])
     with pytest.raises(AnalysisError, match="infinite"):
         lpv_h2_norm(direct)
+
+
+@pytest.mark.parametrize("generalised", [False, True])
+def test_h2_norms_along_a_path(generalised: bool) -> None:
+    """A discrete path of two places against Lyapunov equations; the bounds of a family that has room for both."""
+    A = [[[0.1, 0.9], [0.0, 0.1]], [[0.5, 0.0], [1.0, 0.5]]]
+    model = small_model(
+        sp.Matrix(A[1]) * (1 + p) / 2 + sp.Matrix(A[0]) * (1 - p) / 2,
+        [[1, 0]],
+        [parameter(rate=np.inf)],
+        E=[[0], [1]],
+        F=[[p]],
+    )
+    question = ask(model, discrete=True)
+    path = Path(np.array([[-1.0], [1.0]]), np.ones(2), (True,))
+    modes, B, C = np.array(A), np.array([[0.0], [1.0]]), np.array([[1.0, 0.0]])
+    values = []
+    for here, there in ((modes[0], modes[1]), (modes[1], modes[0])):
+        if generalised:  # all inputs of the past that end where `here` begins
+            X = solve_discrete_lyapunov(there @ here, there @ B @ B.T @ there.T + B @ B.T)
+            values.append((C @ X @ C.T)[0, 0] + 1.0)
+        else:  # an impulse where `here` begins
+            W = solve_discrete_lyapunov((here @ there).T, C.T @ C + there.T @ C.T @ C @ there)
+            values.append((B.T @ W @ B)[0, 0] + 1.0)
+    proved = proved_along(question, path, generalised)
+    assert proved == pytest.approx(np.sqrt(max(values)), rel=1e-9)
+    assert h2_of(question, generalised)(path, 0.0) == pytest.approx(max(values), rel=1e-9)
+    slower = small_model(sp.Matrix(model.A) * sp.Rational(4, 5), model.C, model.parameters, E=model.E, F=model.F)
+    found = lpv_h2_norm(slower, degree=2, discrete=True, generalised=generalised)
+    assert found.lower <= found.upper < 1.6 * found.lower
 
 
 def test_the_ratio_of_a_path_is_what_a_simulation_gives() -> None:
