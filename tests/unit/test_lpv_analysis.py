@@ -7,14 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sympy as sp
+from flint import fmpq
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_discrete_lyapunov
 
 from analysis.errors import AnalysisError
+from analysis.lpv import proved_step
 from analysis.lpv.h2_path import h2_of, proved_along
 from analysis.lpv.lifted import lift, worst_input
 from analysis.lpv.norms import lpv_decay_rate, lpv_h2_norm, lpv_l2_gain
 from analysis.lpv.proved_path import ProvedPath
+from analysis.lpv.proved_step import Line
 from analysis.lpv.question import ask
 from analysis.lpv.trajectory import Path, admissible, check_admissible
 from analysis.norms.h2 import h2_norm
@@ -174,6 +177,24 @@ def test_rational_models_are_enclosed_along_a_path() -> None:
     assert ProvedPath(question, path, 0.3, 4).ratio(v) == pytest.approx(value, rel=1e-6)
     gain = lpv_l2_gain(replace(rational, parameters=(parameter(rate=0.0),)), degree=2)
     assert 1.0 < gain.upper / gain.lower < 1.05
+
+
+@pytest.mark.parametrize("denominator", [1, 3 + p])
+def test_short_series_are_enclosed(monkeypatch: pytest.MonkeyPatch, denominator: sp.Expr) -> None:
+    """With 4 terms of the series, 3 of that of 1/d, the balls are wide and hold what 24 and 16 terms give."""
+    A = [[sp.Rational(-1, 2), 1 / denominator], [-3 / denominator, -1]]
+    question = ask(small_model(A, [[1 / denominator, p]], [parameter()], E=[[0], [1 / denominator]]))
+    line = Line(question, [fmpq(-1, 5)], [fmpq(2, 5)], fmpq(1, 4), 0.7, fmpq(1))
+    exact = line.step()
+    monkeypatch.setattr(proved_step, "TERMS", 4)
+    monkeypatch.setattr(proved_step, "BELOW", 3)
+    short = line.step()
+    assert exact is not None and short is not None
+    for wide, narrow in ((short.step, exact.step), (short.energy, exact.energy)):
+        for ball, inner in zip(wide.entries(), narrow.entries(), strict=True):
+            assert ball.contains(inner)
+    radii = [float(x.real.rad()) for x in short.step.entries()[:2]]
+    assert 1e-9 < max(radii) < 5e-2
 
 
 def test_growth_along_a_path_is_refused_a_little_above() -> None:
