@@ -79,7 +79,8 @@ class Line:
         for k in range(TERMS):
             terms.append(_sum([flow[i] * terms[k - i] for i in range(min(order, k + 1))]) * fmpq(1, k + 1))
         left_over = sum(
-            size(_sum([flow[i] * terms[k - i] for i in range(k - TERMS, order)])) for k in range(TERMS, TERMS + order)
+            size(_sum([flow[i] * terms[k - i] for i in range(k - TERMS, min(order, k + 1))]))
+            for k in range(TERMS, TERMS + order)
         ) + loose * sum(size(term) for term in terms)
         error = (arb(sum(size(term) for term in flow) + loose).exp() * arb(left_over)).abs_upper()
         terms[0] = terms[0] + acb_mat([[_ball(error)] * (n + m)] * n + [[acb(0)] * (n + m)] * m)

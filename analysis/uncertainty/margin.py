@@ -32,7 +32,7 @@ RAYS, SCALES = 96, 80
 ROUNDS, HALVINGS, CLIMBS = 30, 24, 2
 NUDGES = (0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3)  # beyond the border, until the sign is certain
 SHRINKS = (1.0, 0.99, 0.95, 0.9, 0.75, 0.5, 0.2, 0.05)
-EXCHANGES = 20
+EXCHANGES, PULLS = 20, 80
 
 
 @dataclass(frozen=True)
@@ -168,12 +168,18 @@ def _safe_margin(question: Question, u: FloatArray) -> FloatArray:
 
 
 def _pulled(question: Question, place: FloatArray) -> FloatArray:
-    """The border on the ray through a place that is not stable."""
-    size = float(np.abs(place).max())
-    if size == 0.0:
-        return place
-    reach = _reach(question, place[None] / size, max(2.0 * size, 1.0))
-    return place if not np.isfinite(reach[0]) else place / size * float(reach[0])
+    """From a place that is not stable to one nearer to the middle, by steps that are halved: holes may be too small for rays."""
+    count, step = len(place), 0.25
+    ways = np.array(list(product((-1.0, 0.0, 1.0), repeat=count))) if count <= 4 else np.eye(count)
+    for _ in range(PULLS):
+        tried = np.concatenate([place + step * ways, place - step * ways, place[None] * (1.0 - step)])
+        size = np.abs(tried).max(axis=1)
+        nearer = (size < np.abs(place).max()) & (_safe_margin(question, tried) >= 0.0)
+        if nearer.any():
+            place = tried[int(np.where(nearer, size, np.inf).argmin())]
+        else:
+            step *= 0.5
+    return place
 
 
 def _certain(question: Question, place: FloatArray) -> FloatArray | None:

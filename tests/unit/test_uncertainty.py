@@ -15,7 +15,7 @@ from analysis.norms.hinf import hinf_norm
 from analysis.uncertainty.margin import robust_stability_margin
 from analysis.uncertainty.polynomials import Family
 from analysis.uncertainty.signs import all_positive
-from analysis.uncertainty.worst_gain import worst_case_gain
+from analysis.uncertainty.worst_gain import _decide, worst_case_gain
 from synthesis.lmi.result import Verdict
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.enclosure import PolynomialMatrix
@@ -68,19 +68,25 @@ def test_two_carts_and_a_spring() -> None:
     assert found.witness is not None and found.witness["k"] == pytest.approx(1.5773, abs=5e-5)
 
 
-def test_a_small_hole_in_the_stable_set_is_found() -> None:
-    """Ackermann's polynomial: stable but for a disc of radius 0.1 about q1 = q2 = 1, which rays and corners miss.
+@pytest.mark.parametrize("radius", ["0.1", "0.01"])
+def test_a_small_hole_in_the_stable_set_is_found(radius: str) -> None:
+    """Ackermann's polynomial: stable but for a disc about q1 = q2 = 1, which rays and corners miss; then the proof must not.
 
-    s^3 + (a + 1) s^2 + (a + 3) s + 1.01 + 6 a + 2 q1 q2 with a = q1 + q2: H_2 = (q1 - 1)^2 + (q2 - 1)^2 - 0.01, so k* =
-    0.3/1.1. Robust Control Toolbox is reported to give 0.2722 .. 1.2389.
+    s^3 + (a + 1) s^2 + (a + 3) s + 1 + r^2 + 6 a + 2 q1 q2 with a = q1 + q2: H_2 = (q1 - 1)^2 + (q2 - 1)^2 - r^2, so
+    k* = (0.4 - r)/1.1. At r = 0.1 the Robust Control Toolbox is reported to give 0.2722 .. 1.2389.
     """
     q1, q2 = sp.symbols("q1 q2")
-    a = q1 + q2
-    loop = s**3 + (a + 1) * s**2 + (a + 3) * s + sp.Rational(101, 100) + 6 * a + 2 * q1 * q2
-    found = robust_stability_margin(companion(loop, ("q1", 0.3, 2.5), ("q2", 0.0, 1.7)))
-    assert found.lower <= 0.3 / 1.1 <= found.upper * (1 + 1e-12)
+    a, r = q1 + q2, sp.Rational(radius)
+    loop = s**3 + (a + 1) * s**2 + (a + 3) * s + 1 + r**2 + 6 * a + 2 * q1 * q2
+    model = companion(loop, ("q1", 0.3, 2.5), ("q2", 0.0, 1.7))
+    found, exact = robust_stability_margin(model), (0.4 - float(r)) / 1.1
+    assert found.lower <= exact <= found.upper * (1 + 1e-9)
     assert found.upper / found.lower < 1.002
     assert found.verdict is Verdict.REFUTED
+    polynomials = Family(ask(model)).stability()
+    for scale, positive in ((0.999 * exact, True), (1.001 * exact, False), (1.0, False)):
+        box = [fmpq(0)] * 2, [fmpq(*scale.as_integer_ratio())] * 2
+        assert all_positive(polynomials, *box).positive is positive
 
 
 @pytest.mark.parametrize(("discrete", "expected"), [(False, 1.5), (True, np.sqrt(0.4))])
@@ -136,6 +142,39 @@ def test_worst_case_gains_are_those_of_dense_grids(case: int) -> None:
     worst = float(hinf_norm(*question.frozen(grid)).norm.max())
     assert worst * (1 - 1e-6) <= found.lower <= found.upper < found.lower * 1.0015
     assert found.below(1.01 * worst) is Verdict.CERTIFIED and found.below(0.99 * worst) is Verdict.REFUTED
+
+
+@pytest.mark.parametrize("denominator", [sp.Integer(1), 3 + p])
+def test_the_gain_polynomial_is_that_of_frequency_responses(denominator: sp.Expr) -> None:
+    """|chi(jw)|^2 det(g^2 I - G*G) d^k with two inputs and D, at random places, frequencies and levels."""
+    A, B = sp.Matrix([[0, 1], [-2 - p, -1 + q / 2]]), sp.Matrix([[0, 1], [1, p]])
+    model = small_model(
+        A / denominator, [[1, 0], [0, q]], [parameter("p"), parameter("q")], E=B / denominator, F=[[0, 0.1], [0.3, p]]
+    )
+    question = ask(model)
+    family = Family(question)
+    coefficients, rng = family.gain(), np.random.default_rng(7)
+    for _ in range(8):
+        u, w, g = rng.uniform(-1.0, 1.0, 2), float(rng.uniform(0.1, 3.0)), float(rng.uniform(0.2, 3.0))
+        a, b, c, d = (m[0] for m in question.frozen(u[None]))
+        G = c @ np.linalg.solve(1j * w * np.eye(2) - a, b) + d
+        below = float(denominator.subs(p, u[0]) / denominator.subs(p, 0))
+        wanted = (
+            abs(np.linalg.det(1j * w * np.eye(2) - a)) ** 2 * np.linalg.det(g**2 * np.eye(2) - np.conj(G.T) @ G).real
+        )
+        point, square = [fmpq(*float(x).as_integer_ratio()) for x in u], fmpq(*g.as_integer_ratio()) ** 2
+        values = [family.in_parameters(x, square).at(point)[0, 0] for x in coefficients]
+        found = sum(int(x.p) / int(x.q) * w ** (2 * k) for k, x in enumerate(values))
+        assert found == pytest.approx(wanted * below ** (2 + 2 * 2 + 2 * 2), rel=1e-9)
+
+
+def test_two_singular_values_above_a_level_are_not_below_it() -> None:
+    """G near 2 I: det(1 - G*G) is positive everywhere, though every gain is above 1."""
+    model = small_model([[-1 + p / 2, 0], [0, -1]], sp.eye(2) / 10, [parameter()], E=sp.eye(2), F=2 * sp.eye(2))
+    question = ask(model)
+    family = Family(question)
+    assert not _decide(question, family, family.gain(), 1.0, 0.0).positive
+    assert _decide(question, family, family.gain(), 2.3, 0.0).positive
 
 
 def test_rolmip_worst_case_gain() -> None:
