@@ -199,6 +199,18 @@ def test_short_series_are_enclosed(
     assert 1e-9 < max(float(x.real.rad()) for x in short.step.entries()[:2]) < 0.5
 
 
+def test_outputs_over_a_denominator_are_enclosed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A state that stands still, seen through 1/(3 + p): all that is uncertain is 1/d."""
+    line = Line(
+        ask(small_model([[0]], [[1 / (3 + p)]], [parameter()], E=[[0]])), [fmpq(-1)], [fmpq(1)], fmpq(1), 0.0, fmpq(1)
+    )
+    monkeypatch.setattr(proved_step, "BELOW", 4)
+    short = line.step()
+    assert short is not None
+    ball = short.energy[0, 0].real  # the integral of 1/(2 + s)^2 over s in [0, 1]
+    assert ball.contains(fmpq(1, 6)) and 1e-6 < float(ball.rad()) < 10.0
+
+
 def test_growth_along_a_path_is_refused_a_little_above() -> None:
     """A frozen pole pair at -0.2 +- 2i: no faster than 0.2001 is certain, no faster than 0.1999 is not claimed."""
     question = ask(small_model([[0, 1], [-4.04, -0.4 + 0 * p]], [[p, 0]], [parameter(rate=0.0)], E=[[0], [1]]))
