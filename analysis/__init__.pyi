@@ -39,6 +39,11 @@ from .labelled import LabelledArray as LabelledArray
 from .labelled import load_labelled as load_labelled
 from .loads import Loads as Loads
 from .loads import vertical_loads as vertical_loads
+from .lpv.bounds import LpvBounds as LpvBounds
+from .lpv.norms import lpv_decay_rate as lpv_decay_rate
+from .lpv.norms import lpv_h2_norm as lpv_h2_norm
+from .lpv.norms import lpv_l2_gain as lpv_l2_gain
+from .lpv.trajectory import Trajectory as Trajectory
 from .markov.chain import sample_paths as sample_paths
 from .markov.chain import stationary_distribution as stationary_distribution
 from .markov.continuous import MarkovJumpProcess as MarkovJumpProcess
@@ -146,3 +151,12 @@ from .switching.similarity import common_growth as common_growth
 from .switching.similarity import diagonal_window as diagonal_window
 from .switching.similarity import similarity_bound as similarity_bound
 from .switching.similarity import symmetric_growth as symmetric_growth
+from .uncertainty.delay import DelayMargin as DelayMargin
+from .uncertainty.delay import delay_margin as delay_margin
+from .uncertainty.jitter import Jitter as Jitter
+from .uncertainty.jitter import judge_sample_times as judge_sample_times
+from .uncertainty.jitter import sample_time_jitter as sample_time_jitter
+from .uncertainty.margin import RobustStabilityMargin as RobustStabilityMargin
+from .uncertainty.margin import robust_stability_margin as robust_stability_margin
+from .uncertainty.worst_gain import WorstCaseGain as WorstCaseGain
+from .uncertainty.worst_gain import worst_case_gain as worst_case_gain

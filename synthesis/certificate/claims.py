@@ -7,10 +7,21 @@ from dataclasses import dataclass
 
 from synthesis.polynomials.enclosure import PolynomialMatrix
 
-ERROR_EQUATION = ("decay rate", "fastest pole", "gain")
-UPDATE = ("internal update", "sampled error", "sampled gain", "motion gain", "drop probability")
+ERROR_EQUATION = ("decay rate", "fastest pole", "gain", "H2 norm", "energy to peak")
+UPDATE = (
+    "internal update",
+    "sampled error",
+    "sampled gain",
+    "motion gain",
+    "drop probability",
+    "sampled H2 norm",
+    "sampled energy to peak",
+)
 KINDS = (*ERROR_EQUATION, *UPDATE)
-WITH_CHANNEL = {"gain": "disturbances", "sampled gain": "disturbances", "motion gain": "motion"}
+GAINS = {"gain": "disturbances", "sampled gain": "disturbances", "motion gain": "motion"}  # of energy
+WITH_CHANNEL = GAINS | dict.fromkeys(
+    ("H2 norm", "energy to peak", "sampled H2 norm", "sampled energy to peak"), "disturbances"
+)
 KINDS_OF = {  # which kinds say something true about which update (synthesis.loop.observer)
     "held": (
         "decay rate",
@@ -34,6 +45,10 @@ WORDS = {
     "sampled gain": "update: gain",
     "motion gain": "update: gain of motion",
     "drop probability": "update: drop probability",
+    "H2 norm": "H2 norm",
+    "energy to peak": "generalised H2 norm",
+    "sampled H2 norm": "update: H2 norm",
+    "sampled energy to peak": "update: generalised H2 norm",
 }
 
 

@@ -7,14 +7,14 @@ from flint import fmpq
 
 from estimators.arrays import FloatArray
 from synthesis.certificate.refute import grid
-from synthesis.loop.observer import ObserverLoop
+from synthesis.loop.loop import Loop
 from synthesis.loop.system import Region, System
 from synthesis.polynomials.enclosure import PolynomialMatrix
 
 BISECTIONS = 40
 
 
-def frozen_gain(loop: ObserverLoop, d: FloatArray, z: FloatArray) -> float:
+def frozen_gain(loop: Loop, d: FloatArray, z: FloatArray) -> float:
     """Largest gain from d w to z e over constant parameters and a grid of frequencies: a bound from below for the update.
 
     d (disturbances, w) and z (errors, states) are those of a channel (`channel_matrices`).
@@ -33,7 +33,7 @@ def frozen_gain(loop: ObserverLoop, d: FloatArray, z: FloatArray) -> float:
     return float(np.linalg.norm(response, 2, axis=(-2, -1)).max())
 
 
-def frozen_update(loop: ObserverLoop) -> tuple[FloatArray, FloatArray]:
+def frozen_update(loop: Loop) -> tuple[FloatArray, FloatArray]:
     """A of the update (g, n, n) with and without a measurement, on a grid."""
     received, lost = [], []
     for system in _systems(loop, "discrete"):
@@ -42,7 +42,7 @@ def frozen_update(loop: ObserverLoop) -> tuple[FloatArray, FloatArray]:
     return np.array(received), np.array(lost)
 
 
-def slowest_decay(loop: ObserverLoop) -> float:
+def slowest_decay(loop: Loop) -> float:
     """The least decay rate of the update over constant parameters, 1/s; not positive where one is unstable."""
     received, _ = frozen_update(loop)
     if not len(received) or loop.sample_time is None:
@@ -51,7 +51,7 @@ def slowest_decay(loop: ObserverLoop) -> float:
     return float(-np.log(max(radius, 1e-12)) / _float(loop.sample_time))
 
 
-def critical_probability(loop: ObserverLoop) -> float:
+def critical_probability(loop: Loop) -> float:
     """The largest drop probability with a frozen second-moment radius below one everywhere on the grid."""
     received, lost = frozen_update(loop)
     if not len(received):
@@ -70,7 +70,7 @@ def critical_probability(loop: ObserverLoop) -> float:
     return low
 
 
-def _systems(loop: ObserverLoop, time: str) -> list[System]:
+def _systems(loop: Loop, time: str) -> list[System]:
     found = []
     for point in dict.fromkeys(grid(loop)):
         system = loop.system(Region((*point, *(fmpq(0),) * len(point)), (fmpq(0),) * (2 * len(point))), time)  # type: ignore[arg-type]

@@ -39,7 +39,7 @@ def _with_update(
     search: Search, channels: Sequence[ClaimChannel], found: list[Claim | None], settle: float
 ) -> tuple[Claim, ...] | None:
     """What the runtime's update gets beside: only the claims about drops and motion may be missing."""
-    update = search.loop.update
+    update = "held" if search.loop.time == "continuous" else "sampled"
     found += [largest(search, UPDATE_OF[update], slowest_decay(search.loop))]
     found += [best_gain(search, Wish("sampled gain", None, channel), settle) for channel in channels]
     if any(claim is None for claim in found):

@@ -12,9 +12,9 @@ from itertools import chain, product
 import numpy as np
 from flint import arb, arb_mat, fmpq, fmpq_mat, fmpq_poly
 
-from synthesis.certificate.claims import ERROR_EQUATION, Claim
+from synthesis.certificate.claims import ERROR_EQUATION, GAINS, Claim
 from synthesis.certificate.verify import Verifier
-from synthesis.loop.observer import ObserverLoop
+from synthesis.loop.loop import Loop
 from synthesis.loop.plant import Plant
 from synthesis.loop.system import Region, System, Time
 from synthesis.polynomials.definite import is_positive_definite
@@ -42,7 +42,7 @@ def refuting_place(verifier: Verifier, claim: Claim, first: Iterable[Point] = ()
     return None
 
 
-def unstable_place(loop: ObserverLoop, decay_rate: fmpq, first: Iterable[Point] = ()) -> Point | None:
+def unstable_place(loop: Loop, decay_rate: fmpq, first: Iterable[Point] = ()) -> Point | None:
     """Where the frozen error equation has a pole that is not left of -decay_rate, exactly; None if nowhere looked at."""
     ranked = sorted(dict.fromkeys(grid(loop)), key=lambda point: -_slowest(loop, point))
     climbed = (_climbed(loop, point) for point in ranked[:CLIMBS])
@@ -53,7 +53,7 @@ def unstable_place(loop: ObserverLoop, decay_rate: fmpq, first: Iterable[Point] 
     return None
 
 
-def _climbed(loop: ObserverLoop, point: Point) -> Point:
+def _climbed(loop: Loop, point: Point) -> Point:
     """A place near by with a pole further right, by steps that are halved: what is unstable may lie between grid points."""
     height, step = _slowest(loop, point), fmpq(1, PARTS)
     for _ in range(HALVINGS):
@@ -115,7 +115,7 @@ def _determinant(matrix: Matrix) -> fmpq_poly:
     return sum(terms, fmpq_poly([0]))
 
 
-def grid(loop: ObserverLoop) -> Iterator[Point]:
+def grid(loop: Loop) -> Iterator[Point]:
     """Points of every cell, its corners among them."""
     for cell in loop.cells():
         count = cell.parameters
@@ -143,7 +143,7 @@ def _shifted(matrix: Entries, rate: fmpq | arb) -> Entries:
     return matrix + arb_mat(n, n, [rate if i == j else 0 for i in range(n) for j in range(n)])
 
 
-def _slowest(loop: ObserverLoop, point: Point) -> float:
+def _slowest(loop: Loop, point: Point) -> float:
     system = loop.system(_standing(point), "continuous")
     if system is None:
         return -np.inf
@@ -160,11 +160,11 @@ def _breaks(verifier: Verifier, claim: Claim, system: System) -> bool:
     if claim.kind == "fastest pole":
         return is_hurwitz(_shifted(A * -1, -level)) is False
     if system.time == "continuous":
-        return is_hurwitz(A) is False or _static_gain_exceeds(verifier, claim, system, A * -1)
+        return is_hurwitz(A) is False or (claim.kind in GAINS and _static_gain_exceeds(verifier, claim, system, A * -1))
     if claim.channel is not None:
         n = A.nrows()
         rest = arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)]) - A
-        return is_schur(A) is False or _static_gain_exceeds(verifier, claim, system, rest)
+        return is_schur(A) is False or (claim.kind in GAINS and _static_gain_exceeds(verifier, claim, system, rest))
     period = verifier.loop.sample_time
     if claim.kind != "drop probability":
         return is_schur(A * arb(level * period).exp()) is False
@@ -175,14 +175,17 @@ def _breaks(verifier: Verifier, claim: Claim, system: System) -> bool:
 
 
 def _static_gain_exceeds(verifier: Verifier, claim: Claim, system: System, rest: Entries) -> bool:
-    """The gain at frequency zero, Z rest^-1 B W, certainly has a singular value above the level."""
+    """The gain at frequency zero, Z (C rest^-1 B + D) W, certainly has a singular value above the level."""
     question = verifier.question(claim)
+    Z, W = arb_mat(question.Z), arb_mat(question.W)
     try:
-        response = arb_mat(question.Z) * rest.solve(_constant(system.B[question.group]) * arb_mat(question.W))
+        states = rest.solve(_constant(system.B[question.group]) * W)
     except ZeroDivisionError:
         return False
-    if system.denominator is not None:
-        response = response * (1 / _constant(system.denominator)[0, 0])
+    below = arb(1) if system.denominator is None else _constant(system.denominator)[0, 0]
+    response = Z * (_constant(system.C) * states * (1 / below) + _constant(system.D[question.group]) * W)
+    if system.shared:
+        response = response * (1 / below)
     size = response.nrows()
     level = arb_mat(size, size, [question.level**2 if i == j else 0 for i in range(size) for j in range(size)])
     return is_positive_definite(level - response * response.transpose()) is False

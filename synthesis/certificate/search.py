@@ -15,16 +15,16 @@ import numpy as np
 from estimators.arrays import FloatArray
 from synthesis.certificate.claims import ERROR_EQUATION, WITH_CHANNEL, Claim, ClaimChannel, rows_of
 from synthesis.certificate.inequalities import Question, inequalities
-from synthesis.certificate.rounding import rounded_lyapunov
+from synthesis.certificate.rounding import LYAPUNOV_DIGITS, rounded_lyapunov
 from synthesis.certificate.unknowns import Unknowns, in_scaled_states
-from synthesis.certificate.verify import Names, Outcome, Verifier
+from synthesis.certificate.verify import MOST_REGIONS, Names, Outcome, Verifier
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult
 from synthesis.lmi.scaling import error_scale
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
+from synthesis.loop.loop import Loop
 from synthesis.loop.motion import one_sample_later, rates, time_derivative
-from synthesis.loop.observer import ObserverLoop
 from synthesis.loop.system import Region, System
 from synthesis.models.param import SchedulingParameter
 from synthesis.polynomials.matrix import variable
@@ -44,24 +44,32 @@ class Wish:
 
 @dataclass(frozen=True)
 class Search:
-    """Searches claims about one loop; P has the given degree in the parameters."""
+    """Searches claims about one loop; P has the given degree in the parameters, or one degree for each of them.
 
-    loop: ObserverLoop
+    `points` of every cell and parameter are where the solver sees the inequalities; `size` is a guess of the levels of gains, by
+    which they are divided (None: from frequency responses in the middle of the range). P is rounded to `digits`.
+    """
+
+    loop: Loop
     names: Names
     parameters: tuple[SchedulingParameter, ...]
-    degree: int = 1
+    degree: int | tuple[int, ...] = 1
     settings: LmiSettings = field(default_factory=LmiSettings)
+    points: int = POINTS_PER_CELL
+    size: float | None = None
+    digits: int = LYAPUNOV_DIGITS
+    most_regions: int = MOST_REGIONS
 
     @cached_property
     def verifier(self) -> Verifier:
         """Of the same loop: cells are worked out once for both."""
-        return Verifier(self.loop, self.names)
+        return Verifier(self.loop, self.names, self.most_regions)
 
     @cached_property
     def scale(self) -> FloatArray:
         """Diagonal balancing of the error matrix in the middle of the range."""
         cells = list(self.loop.cells())
-        middle = self.loop.system(cells[len(cells) // 2], "continuous" if self.loop.update == "held" else "discrete")
+        middle = self.loop.system(cells[len(cells) // 2], self.loop.time)
         if middle is None:
             return np.ones(self.loop.plant.states)
         A = _value(in_scaled_states(middle, np.ones(self.loop.plant.states)).A)
@@ -74,7 +82,9 @@ class Search:
         if found is None or not np.isfinite(found.decisions).all():
             return None, None
         unit = 1.0 if wish.channel is None else self._output_unit(wish)
-        P = rounded_lyapunov(found.values["P"].coefficients[..., 0] * unit**2, self.scale, len(self.parameters))
+        P = rounded_lyapunov(
+            found.values["P"].coefficients[..., 0] * unit**2, self.scale, len(self.parameters), self.digits
+        )
         claim = Claim(wish.kind, float(wish.level or 0.0), P, wish.channel)
         outcome = self.verifier.prove(claim)
         return (claim, outcome) if outcome.proved else (None, outcome)
@@ -95,18 +105,20 @@ class Search:
         """Solve for P; None where a cell cannot be enclosed. With a level a common margin is maximised."""
         problem = LmiProblem(self.parameters, maximise_margin=wish.level is not None)
         size, count = self.loop.plant.states, len(self.parameters)
-        P = problem.symmetric("P", size, tuple(0 if p.may_jump else self.degree for p in self.parameters) or 0)
+        discrete = wish.kind not in ERROR_EQUATION
+        P = problem.symmetric("P", size, self._degrees(discrete) or 0)
         square = problem.scalar("gamma^2") if wish.level is None else None
         if square is not None:
             problem.minimise("gamma^2")
         elif wish.channel is None:
             problem.require("P < 1", problem.constant(np.eye(size)) - P, strict=False)
         one = problem.constant(np.ones((1, 1)))
-        speeds = rates(
-            self.loop.plant.axes, P, one, lambda i: variable(count + i, 2 * count), lambda x: int(x.p) / int(x.q)
+        period = (
+            int(self.loop.sample_time.p) / int(self.loop.sample_time.q) if discrete and self.loop.sample_time else 0.0
         )
-        discrete = wish.kind not in ERROR_EQUATION
-        period = 0.0 if self.loop.sample_time is None else int(self.loop.sample_time.p) / int(self.loop.sample_time.q)
+        u = [variable(i, 2 * count) for i in range(2 * count)]  # and r
+        jump = (lambda i: (u[count + i] - u[i]) * (1.0 / period)) if period else None
+        speeds = rates(self.loop.plant.axes, P, one, lambda i: u[count + i], lambda x: int(x.p) / int(x.q), jump)
         later = one_sample_later(P, speeds, period) if discrete else time_derivative(P, speeds)
         question = self._question(wish, period, square)
         cells = list(self.loop.cells())
@@ -120,8 +132,13 @@ class Search:
             for name, matrix in named:
                 problem.require_on(f"{name}, cell {number}", matrix, offset, factor)
         longest = max((len(points) - 1 for points in self.loop.breakpoints), default=1)
-        settings = replace(self.settings, relaxation="grid", points=POINTS_PER_CELL * longest, verify=False)
+        settings = replace(self.settings, relaxation="grid", points=self.points * longest, verify=False)
         return solve(problem, settings)
+
+    def _degrees(self, discrete: bool) -> tuple[int, ...]:
+        """Of P in every parameter: none in one that may jump, unless it does so between samples only."""
+        given = (self.degree,) * len(self.parameters) if isinstance(self.degree, int) else self.degree
+        return tuple(0 if p.may_jump and not discrete else k for p, k in zip(self.parameters, given, strict=True))
 
     def _question(self, wish: Wish, period: float, square: object) -> Question:
         """Errors in the unit of `_output_unit`, inputs in one that makes the least gain a number near one."""
@@ -134,12 +151,17 @@ class Search:
 
     def _errors(self, wish: Wish) -> FloatArray:
         assert wish.channel is not None
-        states = list(self.names.states)
-        return np.eye(len(states))[[states.index(name) for name in wish.channel.errors]]
+        errors = list(self.names.errors)
+        return np.eye(len(errors))[[errors.index(name) for name in wish.channel.errors]]
 
     def _output_unit(self, wish: Wish) -> float:
         """The errors of the channel are numbers near one in it when the scaled states are."""
-        return float(np.abs(self._errors(wish) / self.scale).max())
+        region = next(iter(self.loop.cells()))
+        found = self.loop.system(region, "discrete" if wish.kind not in ERROR_EQUATION else "continuous")
+        if found is None:
+            return 1.0
+        C = in_scaled_states(found, self.scale).C.coefficients
+        return float(np.abs(self._errors(wish) @ np.abs(C).sum(axis=tuple(range(C.ndim - 3)))[..., 0]).max()) or 1.0
 
     def _sizes(self, channel: ClaimChannel, kind: str) -> FloatArray:
         inputs: Sequence[str] = self.names.disturbances if WITH_CHANNEL[kind] == "disturbances" else self.names.states
@@ -152,6 +174,8 @@ class Search:
         Not the static gain alone: noise of a position, say, leaves the velocity error of an integrator alone at rest.
         """
         assert wish.channel is not None
+        if self.size is not None:
+            return self.size
         cells = list(self.loop.cells())
         region: Region = cells[len(cells) // 2]
         found = self.loop.system(region, "discrete" if wish.kind not in ERROR_EQUATION else "continuous")
@@ -159,6 +183,7 @@ class Search:
             return 1.0
         system: System = in_scaled_states(found, self.scale)
         A, B = _value(system.A), _value(system.B[WITH_CHANNEL[wish.kind]]) @ self._sizes(wish.channel, wish.kind)
+        ZC = self._errors(wish) @ _value(system.C)
         if system.denominator is not None:
             below = float(_value(system.denominator)[0, 0])
             A, B = A / below, B / below
@@ -168,11 +193,11 @@ class Search:
             points = 1j * np.concatenate([[0.0], np.linalg.norm(A, 2) * np.geomspace(1e-3, 10.0, len(ANGLES) - 1)])
         resolvent = points[:, None, None] * np.eye(len(A)) - A
         try:
-            answer = (self._errors(wish) / self.scale) @ np.linalg.solve(resolvent, B[None].astype(complex))
+            answer = ZC @ np.linalg.solve(resolvent, B[None].astype(complex))
             size = float(np.linalg.norm(answer, 2, axis=(-2, -1)).max())
         except np.linalg.LinAlgError:
             size = 0.0
-        step = float(np.linalg.norm((self._errors(wish) / self.scale) @ B))
+        step = float(np.linalg.norm(ZC @ B))
         return next((x for x in (size, step) if 0.0 < x < np.inf), 1.0)
 
 

@@ -28,6 +28,10 @@ class Unknowns:
         """A symmetric block matrix."""
         return symmetric_block(rows)
 
+    def trace(self, matrix: MatrixPolynomial) -> MatrixPolynomial:
+        """The sum of the diagonal, 1 x 1."""
+        return MatrixPolynomial(np.einsum("...iim->...m", matrix.coefficients)[..., None, None, :])
+
     def exp(self, exponent: Any) -> float:
         """e^x."""
         return math.exp(exponent)
@@ -68,4 +72,5 @@ def in_scaled_states(system: System, scale: FloatArray) -> System:
         {name: floats(matrix) for name, matrix in system.D.items()},
         turned(system.coasting),
         None if system.denominator is None else floats(system.denominator),
+        system.shared,
     )

@@ -15,12 +15,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from flint import arb, fmpq, fmpq_mat
+from flint import arb, arb_mat, fmpq, fmpq_mat
 
 from synthesis.certificate.claims import ERROR_EQUATION, WITH_CHANNEL, Claim, rows_of
 from synthesis.certificate.inequalities import Question, inequalities
+from synthesis.loop.loop import Loop
 from synthesis.loop.motion import one_sample_later, rates, time_derivative
-from synthesis.loop.observer import ObserverLoop
 from synthesis.loop.system import Time
 from synthesis.polynomials.definite import sign_on_box
 from synthesis.polynomials.enclosure import PolynomialMatrix, block, constant, identity, variable
@@ -33,10 +33,16 @@ ORDER = 8  # total degree of the inequalities that is kept; products of exponent
 
 @dataclass(frozen=True)
 class Names:
-    """The signals of a loop in order."""
+    """The signals of a loop in order; the outputs of an observer's error are its states, and are not named again."""
 
     states: tuple[str, ...]
     disturbances: tuple[str, ...]
+    outputs: tuple[str, ...] = ()
+
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """The rows of C."""
+        return self.outputs or self.states
 
 
 @dataclass(frozen=True)
@@ -63,6 +69,11 @@ class Balls:
         """A symmetric block matrix."""
         return block(rows)
 
+    def trace(self, matrix: PolynomialMatrix) -> PolynomialMatrix:
+        """The sum of the diagonal, 1 x 1."""
+        terms = {k: arb_mat([[sum((m[i, i] for i in range(m.nrows())), arb(0))]]) for k, m in matrix.terms.items()}
+        return PolynomialMatrix(terms, (1, 1), matrix.variables)
+
     def exp(self, exponent: Any) -> arb:
         """e^x."""
         return arb(exponent).exp()
@@ -72,8 +83,9 @@ class Balls:
 class Verifier:
     """Proves claims about one loop; what the loop is on a cell is worked out once and shared by all claims."""
 
-    loop: ObserverLoop
+    loop: Loop
     names: Names
+    most_regions: int = MOST_REGIONS
     balls: Balls = field(default_factory=Balls)
 
     def prove(self, claim: Claim, dual: bool = False) -> Outcome:
@@ -85,8 +97,10 @@ class Verifier:
         axes, count = self.loop.plant.axes, len(self.loop.plant.axes)
         P = claim.P.in_variables(2 * count)
         one = constant(fmpq_mat([[1]]), 2 * count)
-        speeds = rates(axes, P, one, lambda i: variable(count + i, 2 * count), lambda x: x)
-        period = self.loop.sample_time
+        period = self.loop.sample_time if time == "discrete" else None
+        u = [variable(i, 2 * count) for i in range(2 * count)]  # and r
+        jump = None if period is None else lambda i: (u[count + i] - u[i]) * (1 / period)
+        speeds = rates(axes, P, one, lambda i: u[count + i], lambda x: x, jump)
         later = time_derivative(P, speeds) if time == "continuous" else one_sample_later(P, speeds, period)
         if dual:
             later = -later
@@ -107,9 +121,12 @@ class Verifier:
                         return Outcome(False, failed[0], region.point(failed[1]))
                     if undecided is None:
                         continue
-                if depth == DEPTH * count or done > MOST_REGIONS:
+                if depth == DEPTH * count or done > self.most_regions:
                     return Outcome(False, undecided or "matrix exponential", region.offset)
-                waiting += [(half, depth + 1) for half in reversed(region.halves(_axis(depth, P, count)))]
+                waiting += [
+                    (half, depth + 1)
+                    for half in reversed(region.halves(_axis(depth, P, count if time == "discrete" else 0)))
+                ]
         return Outcome(True)
 
     def question(self, claim: Claim) -> Question:
@@ -124,7 +141,7 @@ class Verifier:
             decimal(size) if i == place else fmpq(0)
             for i in range(len(inputs)) for place, size in zip(places, sizes, strict=True)
         ])  # fmt: skip
-        Z = fmpq_mat([[fmpq(int(name == error)) for name in self.names.states] for error in claim.channel.errors])
+        Z = fmpq_mat([[fmpq(int(name == error)) for name in self.names.errors] for error in claim.channel.errors])
         return Question(claim.kind, level, group, W, Z, period)
 
 
@@ -140,7 +157,8 @@ def _judge(named: Sequence[tuple[str, PolynomialMatrix]]) -> tuple[Any, str | No
     return None, undecided
 
 
-def _axis(depth: int, P: PolynomialMatrix, count: int) -> int:
-    """Which variable to halve: the parameters in turn, and rates that P is not affine in."""
-    axes = list(range(count)) + [count + i for i in range(count) if P.degrees[i] > 1]
+def _axis(depth: int, P: PolynomialMatrix, rates: int) -> int:
+    """Which variable to halve: the parameters in turn, and of the first `rates` rates those that P is not affine in."""
+    count = P.variables // 2
+    axes = list(range(count)) + [count + i for i in range(rates) if P.degrees[i] > 1]
     return axes[depth % len(axes)]

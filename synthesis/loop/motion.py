@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from flint import fmpq
@@ -10,10 +11,18 @@ from synthesis.errors import ProblemError
 from synthesis.loop.plant import Axis
 
 
-def rates(axes: tuple[Axis, ...], matrix: Any, one: Any, unit_rate: Any, number: Any) -> list[Any]:
+def rates(
+    axes: tuple[Axis, ...],
+    matrix: Any,
+    one: Any,
+    unit_rate: Any,
+    number: Any,
+    jump: Callable[[int], Any] | None = None,
+) -> list[Any]:
     """du_i/dt = (rate middle + rate half r_i) / half as 1 x 1 polynomials, None where the matrix does not depend on u_i.
 
-    Raises ProblemError if the matrix depends on a parameter that may jump.
+    `unit_rate` gives the polynomial r_i. A parameter that may jump is anywhere one sample later: `jump` gives (r_i - u_i)/T, r_i
+    being its next value. Raises ProblemError if the matrix depends on such a parameter and there are no samples.
     """
     found: list[Any] = []
     for i, axis in enumerate(axes):
@@ -21,6 +30,9 @@ def rates(axes: tuple[Axis, ...], matrix: Any, one: Any, unit_rate: Any, number:
             found.append(None)
             continue
         if axis.rate_low is None or axis.rate_high is None:
+            if jump is not None:
+                found.append(jump(i))
+                continue
             raise ProblemError(
                 f"'{axis.name}' may jump, so no Lyapunov function may depend on it; use degree 0 for it or bound its rate"
             )
@@ -40,15 +52,19 @@ def time_derivative(matrix: Any, speeds: list[Any]) -> Any:
 
 
 def one_sample_later(matrix: Any, speeds: list[Any], period: Any) -> Any:
-    """M(u + T du/dt), with a rate that is constant over the sample: any admissible motion has such a mean rate."""
+    """M(u + T du/dt), with a rate that is constant over the sample: any admissible motion has such a mean rate.
+
+    Taylor's series by Horner's rule, the derivatives taken first: the step to a parameter that jumps depends on u itself.
+    """
     for i, speed in enumerate(speeds):
         if speed is None:
             continue
-        step, term, total = speed * period, matrix, matrix
+        step, slopes = speed * period, [matrix]
         for k in range(1, matrix.degrees[i] + 1):
-            term = term.derivative(i).scaled_by(step) * _inverse(k, period)
-            total = total + term
-        matrix = total
+            slopes.append(slopes[-1].derivative(i) * _inverse(k, period))  # of order k, over k!
+        matrix = slopes[-1]
+        for slope in reversed(slopes[:-1]):
+            matrix = matrix.scaled_by(step) + slope
     return matrix
 
 

@@ -29,7 +29,7 @@ from flint import arb, fmpq, fmpq_mat
 
 from synthesis.errors import ProblemError
 from synthesis.loop.plant import Plant
-from synthesis.loop.system import Region, System
+from synthesis.loop.system import Region, System, Time
 from synthesis.polynomials.enclosure import PolynomialMatrix, Powers, constant, identity, zero
 from synthesis.polynomials.exponential import exponential, phi
 
@@ -62,6 +62,11 @@ class ObserverLoop:
             plant, tuple((axis.low, axis.high) for axis in plant.axes), dict.fromkeys(corners, gain), rounded=False
         )
 
+    @property
+    def time(self) -> Time:
+        """Continuous for an observer that is integrated, discrete for one that corrects once a sample."""
+        return "continuous" if self.update == "held" else "discrete"
+
     def cells(self) -> Iterator[Region]:
         """The boxes between neighbouring breakpoints."""
         edges = [
@@ -84,9 +89,7 @@ class ObserverLoop:
 
     def local(self, matrix: PolynomialMatrix, region: Region) -> PolynomialMatrix:
         """A polynomial in u in the local variables (t, r) of a region."""
-        count = region.parameters
-        moved = matrix.affine(region.offset[:count], region.factor[:count])
-        return moved.balls().in_variables(2 * count)
+        return region.local(matrix)
 
     def gain(self, region: Region) -> PolynomialMatrix:
         """The multilinear gain on a region that lies in one cell."""

@@ -8,6 +8,8 @@ from typing import Any, Literal, Protocol
 
 from flint import fmpq
 
+from synthesis.polynomials.enclosure import PolynomialMatrix
+
 Time = Literal["continuous", "discrete"]
 
 
@@ -35,7 +37,7 @@ class System:
     """x' (continuous) or x+ (discrete) = (A x + sum of B_k w_k) / denominator,  z = C x + sum of D_k w_k.
 
     `B` and `D` hold one matrix for every group k of inputs ("disturbances", "motion"); `coasting` is A while no measurement
-    comes in, None for a law that does not know of it. `denominator` is None where it is one.
+    comes in, None for a law that does not know of it. `denominator` is None where it is one; with `shared` z is over it, too.
     """
 
     time: Time
@@ -45,6 +47,7 @@ class System:
     D: Mapping[str, Any]
     coasting: Any = None
     denominator: Any = None
+    shared: bool = False
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,11 @@ class Region:
     def parameters(self) -> int:
         """Number of scheduling parameters."""
         return len(self.offset) // 2
+
+    def local(self, matrix: PolynomialMatrix) -> PolynomialMatrix:
+        """A polynomial in u in the local variables (t, r), with balls."""
+        count = self.parameters
+        return matrix.affine(self.offset[:count], self.factor[:count]).balls().in_variables(2 * count)
 
     def halves(self, axis: int) -> tuple[Region, Region]:
         """Cut in the middle of one variable."""

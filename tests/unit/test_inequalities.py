@@ -178,3 +178,30 @@ def test_drop_probabilities_are_what_second_moments_say(seed: int) -> None:
     if np.linalg.eigvalsh(received).min() > 0.0:
         assert case.holds("drop probability", 0.97 * low, P, P)
     assert not case.holds("drop probability", 1.02 * low, P, P)
+
+
+@pytest.mark.parametrize("time", ["continuous", "discrete"])
+@pytest.mark.parametrize("seed", range(4))
+def test_h2_norms_are_what_gramians_say(time: Time, seed: int) -> None:
+    """A P a little above the gramian proves a little more than the norm, and none near it less; also over a denominator."""
+    case = Case(time, seed, 1.6 if time == "continuous" and seed % 2 else None)
+    small = 1e-6 * np.eye(3)
+    if time == "continuous":
+        case.D = np.zeros((2, 2))
+        P = solve_continuous_lyapunov(case.A.T, -case.C.T @ case.C - small)
+        X = solve_continuous_lyapunov(case.A, -case.B @ case.B.T - small)
+        kinds, later = ("H2 norm", "energy to peak"), np.zeros((3, 3))
+    else:
+        P = solve_discrete_lyapunov(case.A.T, case.C.T @ case.C + small)
+        X = solve_discrete_lyapunov(case.A, case.B @ case.B.T + small)
+        kinds, later = ("sampled H2 norm", "sampled energy to peak"), P
+    norm = float(np.sqrt(np.trace(case.B.T @ P @ case.B + case.D.T @ case.D)))
+    assert case.holds(kinds[0], 1.01 * norm, P, later)
+    assert not case.holds(kinds[0], 0.99 * norm, P, later)
+    assert not case.holds(kinds[0], 1.01 * norm, 0.98 * P, 0.98 * later)
+    peak = float(np.sqrt(np.linalg.eigvalsh(case.C @ X @ case.C.T + case.D @ case.D.T)[-1]))
+    stored = np.linalg.inv(X) * (1.01 * peak) ** 2
+    after = later if time == "continuous" else stored
+    assert case.holds(kinds[1], 1.02 * peak, stored, after)
+    smaller = stored * (0.98 / 1.01) ** 2
+    assert not case.holds(kinds[1], 0.99 * peak, smaller, after if time == "continuous" else smaller)

@@ -10,10 +10,11 @@ from flint import fmpq, fmpq_mat
 from synthesis.certificate.claims import Claim, ClaimChannel
 from synthesis.certificate.refute import refuting_place
 from synthesis.certificate.verify import Names, Outcome, Verifier
+from synthesis.errors import ProblemError
 from synthesis.loop.motion import one_sample_later, rates, time_derivative
 from synthesis.loop.observer import ObserverLoop, Update
 from synthesis.loop.plant import Axis, Plant
-from synthesis.polynomials.enclosure import PolynomialMatrix, identity, variable
+from synthesis.polynomials.enclosure import PolynomialMatrix, constant, identity, variable
 
 NAMES = Names(("x",), ("d",))
 PERIOD = fmpq(1, 10)
@@ -137,6 +138,27 @@ def test_one_sample_later_counts(slope: float) -> None:
     border = (2.718281828459045**0.2 - 1.0) / 0.1
     assert prove(loop_of(scalar(-1.0), rate=0.98 * border), "internal update", 0.001, P).proved
     assert not prove(loop_of(scalar(-1.0), rate=1.02 * border), "internal update", 0.001, P).proved
+
+
+def test_a_parameter_that_jumps_is_anywhere_one_sample_later() -> None:
+    """P of degree 3 in u and 2 in v: what is put in for u is its next value r, and v moves with its rate."""
+    axes = (
+        Axis("u", "1", fmpq(-1), fmpq(1), None, None),
+        Axis("v", "1", fmpq(-1), fmpq(1), fmpq(-1), fmpq(1)),
+    )
+    values = {(3, 1, 0, 0): 2, (1, 2, 0, 0): -3, (0, 0, 0, 0): 5}
+    P = PolynomialMatrix({k: fmpq_mat([[fmpq(x)]]) for k, x in values.items()}, (1, 1), 4)
+    one, place = constant(fmpq_mat([[1]]), 4), [variable(i, 4) for i in range(4)]
+
+    def jump(i: int) -> PolynomialMatrix:
+        return (place[2 + i] - place[i]) * (1 / PERIOD)
+
+    speeds = rates(axes, P, one, lambda i: place[2 + i], lambda x: x, jump)
+    later = one_sample_later(P, speeds, PERIOD)
+    for u, v, r, s in ((fmpq(1, 3), fmpq(-1, 2), fmpq(1), fmpq(-1)), (fmpq(-1), fmpq(1), fmpq(1, 7), fmpq(1, 2))):
+        assert later.at((u, v, r, s)) == P.at((r, v + PERIOD * s, fmpq(0), fmpq(0)))
+    with pytest.raises(ProblemError, match="may jump"):
+        rates(axes, P, one, lambda i: place[2 + i], lambda x: x)
 
 
 def test_one_sample_later_is_the_polynomial_elsewhere() -> None:
