@@ -9,7 +9,7 @@ from flint import arb, fmpq, fmpq_mat
 
 from analysis.lpv.proved_path import floor_of
 from analysis.lpv.question import Question
-from analysis.norms.h2 import continuous_gramian, discrete_gramian
+from analysis.norms.gramians import gramian_matrix
 from estimators.arrays import FloatArray
 from synthesis.polynomials.rational import rational
 from synthesis.polynomials.stable import is_hurwitz, is_schur
@@ -21,9 +21,7 @@ def frozen_energy(question: Question, u: FloatArray, generalised: bool) -> Float
     poles = np.linalg.eigvals(A)
     stable = (np.abs(poles) < 1.0 if question.discrete else poles.real < 0.0).all(axis=-1)
     out = np.full(len(u), np.inf)
-    power = B[stable] @ np.swapaxes(B[stable], -1, -2)
-    sizes = np.abs(poles[stable])
-    X = discrete_gramian(A[stable], power) if question.discrete else continuous_gramian(A[stable], power, sizes)
+    X = gramian_matrix(A[stable], B[stable], question.discrete)
     seen = C[stable] @ X @ np.swapaxes(C[stable], -1, -2) + D[stable] @ np.swapaxes(D[stable], -1, -2)
     if generalised:
         out[stable] = np.sqrt(np.maximum(np.linalg.eigvalsh(seen)[:, -1], 0.0))

@@ -89,13 +89,16 @@ def formula(entry: sp.Expr, model: LpvModel) -> str:
     symbols = [sp.Symbol(name) for name in (*(p.name for p in model.parameters), *model.constants)]
     plain = entry.subs({s: sp.Symbol(s.name) for s in entry.free_symbols})
     plain = plain.replace(lambda e: e.is_Float, lambda e: sp.Rational(str(e)))
-    rational = all(number.is_Rational for number in plain.atoms(sp.Number)) and not plain.atoms(sp.NumberSymbol)
+    rational = all(number.is_Rational for number in plain.atoms(sp.Number)) and not plain.atoms(
+        sp.NumberSymbol, sp.Function
+    )
+    rational &= all(power.exp.is_Integer for power in plain.atoms(sp.Pow))
     if rational and plain.is_rational_function(*symbols):
         return str(plain)
     values = {sp.Symbol(name): sp.Rational(str(c.value)) for name, c in model.constants.items()}
     parameters = symbols[: len(model.parameters)]
     polynomial = sp.Poly(sp.cancel(sp.together(plain.subs(values))), *parameters)
-    terms = {powers: sp.Rational(str(sp.Float(c, 17))) for powers, c in polynomial.terms()}
+    terms = {powers: sp.Rational(str(sp.N(c, 17))) for powers, c in polynomial.terms()}
     return str(sp.Poly(terms, *parameters).as_expr())
 
 

@@ -140,7 +140,7 @@ def decimal_pair(parameter: SchedulingParameter) -> tuple[int, int]:
 
 def _rational(number: sp.Expr) -> sp.Rational:
     """A number as the decimals that it shows."""
-    return number if number.is_Rational else sp.Rational(str(sp.Float(number, 17)))
+    return number if number.is_Rational else sp.Rational(str(sp.N(number, 17)))
 
 
 def _fraction(entry: sp.Expr, generators: list[sp.Symbol], where: str) -> tuple[sp.Expr, sp.Expr]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,9 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from estimators.errors import GainsmithError
+from synthesis.design.export import formula
 from synthesis.errors import ModelError
+from synthesis.models.formula import parse, read
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Constant, SchedulingParameter, Signal
 from tests.support.lmi_cases import corner, parameter, small_model
@@ -279,3 +282,24 @@ def test_model_without_parameters_is_a_constant_one() -> None:
     numeric = model.on(np.zeros((1, 0)))
     assert numeric.A.tolist() == [[[-2.0]]]
     assert numeric.C.tolist() == [[[1.0]]]
+
+
+@pytest.mark.parametrize(
+    ("entry", "at"),
+    [
+        (sp.sqrt(2), 1.5 * 2**0.5),
+        (sp.pi, 1.5 * np.pi),
+        (sp.sin(1), 1.5 * np.sin(1.0)),
+        (sp.root(2, 3), 1.5 * 2 ** (1 / 3)),
+    ],
+)
+def test_irrational_numbers_are_taken_at_17_digits_and_written_so(entry: sp.Expr, at: float) -> None:
+    p = sp.Symbol("p")
+    model = LpvModel(
+        "irrational", "test", states=(Signal("x", "1"),), outputs=(Signal("y", "1"),),
+        parameters=(SchedulingParameter("p", "1", 1.0, 2.0, -1.0, 1.0),), A=sp.Matrix([[-entry * p]]), C=sp.Matrix([[1]]),
+    )  # fmt: skip
+    assert float(model.on([1.5]).A[0, 0, 0]) == pytest.approx(-at, rel=1e-15)
+    written = formula(model.A[0, 0], model)
+    value = read(parse(written, "A"), written, {"p": Fraction(3, 2)}, Fraction, "A")
+    assert float(value) == pytest.approx(-at, rel=1e-15)
