@@ -10,13 +10,14 @@ import numpy as np
 from estimators.arguments import LIMIT
 from estimators.arithmetic import Arithmetic, Number
 from estimators.arrays import AnyArray, BoolArray, FlagArray
+from estimators.display import Display
 from estimators.errors import EstimatorError
 from estimators.faults import Flag, raise_flag
 
 Saved = dict[str, AnyArray]
 
 
-class Memory:
+class Memory(Display):
     """What an object remembers from step to step: values named in `memory`, and parts that remember themselves.
 
     A value is an array, a number, or a list of these; steps replace it or write to it, but keep its shape and type. A part
@@ -26,6 +27,16 @@ class Memory:
     memory: tuple[str, ...] = ()
     parts: tuple[str, ...] = ()
     unknowns: tuple[str, ...] = ()  # values of `memory` in which NaN means "never seen"
+
+    def summary(self) -> tuple[str, ...]:
+        """Its kind, and what it has of a schedule, a batch, a sample time and a count of samples."""
+        facts = (
+            ("schedule", getattr(getattr(self, "schedule", None), "name", None)),
+            ("batch shape", getattr(self, "batch_shape", None)),
+            ("sample time [s]", getattr(self, "sample_time", None)),
+            ("samples so far", getattr(self, "samples", None)),
+        )
+        return (type(self).__name__, *(f"{what}: {value}" for what, value in facts if value is not None))
 
     def save(self) -> Saved:
         """Everything needed to continue later, as plain arrays; what belongs to a part carries its name and a dot."""

@@ -16,6 +16,7 @@ from analysis.observability.pairs import driven_pair, observed_pair, unit_pair, 
 from analysis.observability.staircase import rounding_tolerance, separate
 from analysis.observability.witness_gain import witness_gain
 from estimators.arrays import ComplexArray, FloatArray
+from estimators.display import Display
 from synthesis.lmi.result import Verdict
 
 if TYPE_CHECKING:
@@ -26,8 +27,8 @@ SPREAD = 2.0**10  # beyond it states differ in their units, and their errors wit
 EVALUATIONS = 20_000  # of a smallest singular value, where no gain gives a proof
 
 
-@dataclass(frozen=True)
-class Detectability:
+@dataclass(frozen=True, repr=False)
+class Detectability(Display):
     r"""The verdict on a pair whose entries are known to the relative `precision`, and what shows it.
 
     CERTIFIED: `gain` L (n, m; K (m, n) for stabilizability) makes A - L C (A - B K) stable, and keeps doing so under every change
@@ -49,6 +50,15 @@ class Detectability:
     precision: float
     gain: FloatArray | None
     exact: bool
+
+    def summary(self) -> tuple[str, ...]:
+        """Verdict, distance and the mode that is seen least."""
+        return (
+            f"Detectability: {self.verdict} ({self.reason})",
+            f"relative distance: {self.lower:.3g} to {self.upper:.3g} at the mode {_name(self.mode)}",
+            f"hidden modes at this precision: {', '.join(map(_name, self.hidden_modes)) or 'none'}",
+            f"relative precision of the data: {self.precision:.2g}",
+        )
 
 
 def detectable(

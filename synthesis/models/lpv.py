@@ -11,6 +11,7 @@ import numpy as np
 import sympy as sp
 
 from estimators.arrays import FloatArray
+from estimators.display import Display, counted
 from estimators.errors import unknown
 from synthesis.errors import ModelError
 from synthesis.models.extract import MATRICES, ExactModel, PolynomialModel, extract, in_floats
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-@dataclass(frozen=True, eq=False)
-class LpvModel:
+@dataclass(frozen=True, eq=False, repr=False)
+class LpvModel(Display):
     r"""x' = A(p) x + B(p) u + E(p) d,  y = C(p) x + D(p) u + F(p) d, with p(t) in a box and dp/dt in another.
 
     Matrices are sympy matrices whose symbols are the names of `parameters` and `constants`, polynomial or rational in
@@ -69,6 +70,21 @@ class LpvModel:
             object.__setattr__(self, key, matrix)
         self._check_symbols()
         self.polynomial  # noqa: B018  a model that is not rational, or divides by zero, must not exist
+
+    def summary(self) -> tuple[str, ...]:
+        """Signals and parameters with their units; `gainsmith model` shows the rest."""
+
+        def listed(signals: tuple[Signal, ...]) -> str:
+            return ", ".join(f"{s.name} [{s.unit}]" for s in signals) or "none"
+
+        moving = [f"{p.name} {p.minimum:g} to {p.maximum:g} {p.unit}" for p in self.parameters]
+        return (
+            f"LpvModel '{self.name}' ({self.source})",
+            f"{counted(len(self.states), 'state')}: {listed(self.states)}",
+            f"inputs; outputs: {listed(self.inputs)}; {listed(self.outputs)}",
+            f"disturbances: {listed(self.disturbances)}",
+            f"{counted(len(moving), 'parameter')}: {', '.join(moving) or 'none'}",
+        )
 
     def _check_names(self) -> None:
         if not self.states or not self.outputs:
