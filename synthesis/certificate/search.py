@@ -1,7 +1,8 @@
 """For one claim about a loop: the P that proves it with the largest margin, or the best level that some P proves.
 
-The inequalities are those that `synthesis.certificate.verify` proves; here they are solved for, on a few points of every cell.
-Nothing that comes out is believed: P is rounded, and the claim is proved for the rounded P, or it is none.
+The inequalities are those that `synthesis.certificate.verify` proves; here they are solved for by exchange: on a few places of the
+table, then looked at on all, and where the proof itself fails that place joins them. Nothing that comes out is believed: P is
+rounded, and the claim is proved for the rounded P, or it is none.
 """
 
 from __future__ import annotations
@@ -16,21 +17,24 @@ from estimators.arrays import FloatArray
 from synthesis.certificate.claims import ERROR_EQUATION, WITH_CHANNEL, Claim, ClaimChannel, rows_of
 from synthesis.certificate.inequalities import Question, inequalities
 from synthesis.certificate.rounding import rounded_lyapunov
-from synthesis.certificate.unknowns import Unknowns, in_scaled_states
+from synthesis.certificate.sampled_loop import SampledLoop
+from synthesis.certificate.unknowns import in_scaled_states
 from synthesis.certificate.verify import Names, Outcome, Verifier
+from synthesis.lmi.clarabel_backend import RawAnswer
+from synthesis.lmi.exchange import Family, Memory, corners, exchange, recall, remember
 from synthesis.lmi.problem import LmiProblem
-from synthesis.lmi.result import LmiResult
+from synthesis.lmi.relaxation import rate_samples
+from synthesis.lmi.samples import Samples, Sampling
 from synthesis.lmi.scaling import error_scale
 from synthesis.lmi.settings import LmiSettings
-from synthesis.lmi.solve import solve
 from synthesis.loop.motion import one_sample_later, rates, time_derivative
 from synthesis.loop.observer import ObserverLoop
-from synthesis.loop.system import Region, System
+from synthesis.loop.system import Region, System, Time
 from synthesis.models.param import SchedulingParameter
-from synthesis.polynomials.matrix import variable
+from synthesis.polynomials.matrix import MatrixPolynomial, variable
 
-POINTS_PER_CELL = 5
 ANGLES = np.concatenate([[0.0], np.geomspace(1e-3, np.pi, 15)])  # per sample, where the size of a gain is looked for
+PROOFS = 3  # of one wish: a place where one fails is solved for, too
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,19 @@ class Wish:
     channel: ClaimChannel | None = None
 
 
+@dataclass
+class Asked:
+    """A wish as an LMI problem: its unknown P and the inequalities at the places where they are looked at."""
+
+    problem: LmiProblem
+    P: MatrixPolynomial
+    families: list[Family]
+
+    def add(self, inequality: str, place: FloatArray) -> bool:
+        """Solve for this place, too; False if that changes nothing."""
+        return any([family.add(place) for family in self.families if family.name == inequality])
+
+
 @dataclass(frozen=True)
 class Search:
     """Searches claims about one loop; P has the given degree in the parameters."""
@@ -51,6 +68,9 @@ class Search:
     parameters: tuple[SchedulingParameter, ...]
     degree: int = 1
     settings: LmiSettings = field(default_factory=LmiSettings)
+    _least: dict[tuple[str, str], float] = field(default_factory=dict, repr=False, compare=False)
+    _loops: dict[str, SampledLoop] = field(default_factory=dict, repr=False, compare=False)
+    _memory: dict[str, Memory] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
     def verifier(self) -> Verifier:
@@ -70,58 +90,100 @@ class Search:
 
     def prove(self, wish: Wish) -> tuple[Claim | None, Outcome | None]:
         """A proved claim, or the outcome of the proof that failed (None if the solver found nothing to prove)."""
-        found = self.solve(wish)
-        if found is None or not np.isfinite(found.decisions).all():
+        asked = self._asked(wish)
+        if asked is None:
             return None, None
         unit = 1.0 if wish.channel is None else self._output_unit(wish)
-        P = rounded_lyapunov(found.values["P"].coefficients[..., 0] * unit**2, self.scale, len(self.parameters))
-        claim = Claim(wish.kind, float(wish.level or 0.0), P, wish.channel)
-        outcome = self.verifier.prove(claim)
-        return (claim, outcome) if outcome.proved else (None, outcome)
+        outcome: Outcome | None = None
+        for _ in range(PROOFS):
+            found = self._solved(asked, wish)
+            if found.infeasible or not np.isfinite(found.decisions).all():
+                return None, outcome
+            coefficients = asked.P.substitute(found.decisions).coefficients[..., 0]
+            P = rounded_lyapunov(coefficients * unit**2, self.scale, len(self.parameters))
+            claim = Claim(wish.kind, float(wish.level or 0.0), P, wish.channel)
+            outcome = self.verifier.prove(claim)
+            if outcome.proved:
+                return claim, outcome
+            place = np.array([int(x.p) / int(x.q) for x in outcome.place])
+            if not len(place) or not asked.add(outcome.inequality, place):
+                break
+        return None, outcome
 
     def least_gain(self, wish: Wish) -> float:
         """The least level of a gain, as the solver sees it on the points; inf if it found none. Not proved."""
-        found = self.solve(replace(wish, level=None))
-        if (
-            found is None
-            or found.objective is None
-            or found.objective <= 0.0
-            or not found.report.status.endswith("Solved")
-        ):
-            return np.inf
-        return float(np.sqrt(found.objective)) * self._unit(wish)
+        key = wish.kind, repr(wish.channel)
+        if key not in self._least:
+            asked = self._asked(replace(wish, level=None))
+            found = None if asked is None else self._solved(asked, wish)
+            square = np.nan if found is None or asked is None else float(asked.problem.cost @ found.decisions)
+            solved = found is not None and found.status.endswith("Solved") and square > 0.0
+            self._least[key] = float(np.sqrt(square)) * self._unit(wish) if solved else np.inf
+        return self._least[key]
 
-    def solve(self, wish: Wish) -> LmiResult | None:
-        """Solve for P; None where a cell cannot be enclosed. With a level a common margin is maximised."""
+    def _solved(self, asked: Asked, wish: Wish) -> RawAnswer:
+        found = exchange(asked.problem, asked.families, replace(self.settings, verify=False))
+        if not found.infeasible and np.isfinite(found.decisions).all():
+            remember(asked.families, found.decisions, self._memory.setdefault(wish.kind, {}))
+        return found
+
+    def _asked(self, wish: Wish) -> Asked | None:
+        """The problem for P; None where a cell cannot be enclosed. With a level a common margin is maximised."""
+        time: Time = "continuous" if wish.kind in ERROR_EQUATION else "discrete"
+        sampled = self._sampled(time)
+        if sampled.grid is None:
+            return None
         problem = LmiProblem(self.parameters, maximise_margin=wish.level is not None)
         size, count = self.loop.plant.states, len(self.parameters)
         P = problem.symmetric("P", size, tuple(0 if p.may_jump else self.degree for p in self.parameters) or 0)
         square = problem.scalar("gamma^2") if wish.level is None else None
         if square is not None:
             problem.minimise("gamma^2")
-        elif wish.channel is None:
-            problem.require("P < 1", problem.constant(np.eye(size)) - P, strict=False)
         one = problem.constant(np.ones((1, 1)))
         speeds = rates(
             self.loop.plant.axes, P, one, lambda i: variable(count + i, 2 * count), lambda x: int(x.p) / int(x.q)
         )
-        discrete = wish.kind not in ERROR_EQUATION
         period = 0.0 if self.loop.sample_time is None else int(self.loop.sample_time.p) / int(self.loop.sample_time.q)
-        later = one_sample_later(P, speeds, period) if discrete else time_derivative(P, speeds)
-        question = self._question(wish, period, square)
-        cells = list(self.loop.cells())
-        for number, region in enumerate(cells):
-            system = self.loop.system(region, "discrete" if discrete else "continuous")
-            if system is None:
-                return None
-            offset, factor = (np.array([int(x.p) / int(x.q) for x in side]) for side in (region.offset, region.factor))
-            here = [matrix.affine(offset, factor) for matrix in (P, later)]
-            named = inequalities(question, in_scaled_states(system, self.scale), here[0], here[1], Unknowns())
-            for name, matrix in named:
-                problem.require_on(f"{name}, cell {number}", matrix, offset, factor)
-        longest = max((len(points) - 1 for points in self.loop.breakpoints), default=1)
-        settings = replace(self.settings, relaxation="grid", points=POINTS_PER_CELL * longest, verify=False)
-        return solve(problem, settings)
+        later = one_sample_later(P, speeds, period) if time == "discrete" else time_derivative(P, speeds)
+        places = rate_places(sampled.grid, later, count)
+        unknown = None if square is None else Samples(square.coefficients.reshape(1, 1, 1, -1))
+        question = self._question(wish, period, unknown)
+
+        def named(P: MatrixPolynomial, later: MatrixPolynomial, chosen: FloatArray) -> dict[str, FloatArray]:
+            found = inequalities(
+                question, sampled.at(chosen[:, :count]), Samples(P.at(chosen)), Samples(later.at(chosen)), Sampling()
+            )
+            return {name: np.broadcast_to(m.values, (len(chosen), *m.values.shape[1:])) for name, m in found}
+
+        margin = problem.margin_index
+
+        def family(name: str) -> Family:
+            def rows(chosen: FloatArray) -> FloatArray:
+                values = named(P, later, chosen)[name]
+                values = np.pad(values, [*[(0, 0)] * 3, (0, problem.decisions + 1 - values.shape[-1])])
+                values = 0.5 * (values + np.swapaxes(values, 1, 2))
+                if margin is not None:
+                    values[..., 1 + margin] -= np.eye(values.shape[1])
+                return values
+
+            def known(decisions: FloatArray, chosen: FloatArray) -> FloatArray:
+                values = named(P.substitute(decisions), later.substitute(decisions), chosen)[name]
+                values = values[..., 0] + values[..., 1:] @ decisions[: values.shape[-1] - 1]
+                values = 0.5 * (values + np.swapaxes(values, 1, 2))
+                return values if margin is None else values - decisions[margin] * np.eye(values.shape[1])
+
+            return Family(name, places, rows, known, corners(places, count))
+
+        families = [family(name) for name in named(P, later, places[:1])]
+        if wish.level is not None and wish.channel is None:
+            families.append(_below_one(P, places, count))
+        recall(families, self._memory.get(wish.kind, {}))
+        return Asked(problem, P, families)
+
+    def _sampled(self, time: Time) -> SampledLoop:
+        if time not in self._loops:
+            self._loops[time] = SampledLoop(self.loop, self.scale, time)
+        return self._loops[time]
 
     def _question(self, wish: Wish, period: float, square: object) -> Question:
         """Errors in the unit of `_output_unit`, inputs in one that makes the least gain a number near one."""
@@ -174,6 +236,29 @@ class Search:
             size = 0.0
         step = float(np.linalg.norm((self._errors(wish) / self.scale) @ B))
         return next((x for x in (size, step) if 0.0 < x < np.inf), 1.0)
+
+
+def rate_places(grid: FloatArray, later: MatrixPolynomial, count: int) -> FloatArray:
+    """Every place of the grid with every vertex of the rates (and more, where P one sample later is not affine in them)."""
+    found = rate_samples(later, count)
+    moving = np.array(found).reshape(len(found), count)
+    return np.hstack([np.repeat(grid, len(moving), axis=0), np.tile(moving, (len(grid), 1))])
+
+
+def _below_one(P: MatrixPolynomial, places: FloatArray, count: int) -> Family:
+    """P < 1, which normalises the unknowns and takes no part in the verdict."""
+    still = np.unique(np.hstack([places[:, :count], np.zeros_like(places[:, count:])]), axis=0)
+    unit = np.eye(P.shape[0])
+
+    def rows(chosen: FloatArray) -> FloatArray:
+        values = -P.at(chosen)
+        values[..., 0] += unit
+        return values
+
+    def known(decisions: FloatArray, chosen: FloatArray) -> FloatArray:
+        return np.asarray(unit - P.substitute(decisions).at(chosen)[..., 0])
+
+    return Family("P < 1", still, rows, known, corners(still, count), strict=False)
 
 
 def _value(matrix: object) -> FloatArray:
