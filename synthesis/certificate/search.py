@@ -34,6 +34,7 @@ from synthesis.models.param import SchedulingParameter
 from synthesis.polynomials.matrix import MatrixPolynomial, variable
 
 ANGLES = np.concatenate([[0.0], np.geomspace(1e-3, np.pi, 15)])  # per sample, where the size of a gain is looked for
+ACCURACY = 1e-4  # relative, of a least gain or a largest margin: what holds is proved afterwards
 PROOFS = 3  # of one wish: a place where one fails is solved for, too
 
 
@@ -97,7 +98,10 @@ class Search:
         outcome: Outcome | None = None
         for _ in range(PROOFS):
             found = self._solved(asked, wish)
+            index = asked.problem.margin_index
             if found.infeasible or not np.isfinite(found.decisions).all():
+                return None, outcome
+            if index is not None and not found.decisions[index] > 0.0:
                 return None, outcome
             coefficients = asked.P.substitute(found.decisions).coefficients[..., 0]
             P = rounded_lyapunov(coefficients * unit**2, self.scale, len(self.parameters))
@@ -122,7 +126,7 @@ class Search:
         return self._least[key]
 
     def _solved(self, asked: Asked, wish: Wish) -> RawAnswer:
-        found = exchange(asked.problem, asked.families, replace(self.settings, verify=False))
+        found = exchange(asked.problem, asked.families, replace(self.settings, verify=False), ACCURACY)
         if not found.infeasible and np.isfinite(found.decisions).all():
             remember(asked.families, found.decisions, self._memory.setdefault(wish.kind, {}))
         return found
@@ -149,17 +153,25 @@ class Search:
         unknown = None if square is None else Samples(square.coefficients.reshape(1, 1, 1, -1))
         question = self._question(wish, period, unknown)
 
-        def named(P: MatrixPolynomial, later: MatrixPolynomial, chosen: FloatArray) -> dict[str, FloatArray]:
-            found = inequalities(
-                question, sampled.at(chosen[:, :count]), Samples(P.at(chosen)), Samples(later.at(chosen)), Sampling()
-            )
-            return {name: np.broadcast_to(m.values, (len(chosen), *m.values.shape[1:])) for name, m in found}
+        last: dict[bool, tuple[tuple[bytes, bytes], dict[str, FloatArray]]] = {}
+
+        def named(chosen: FloatArray, decisions: FloatArray | None = None) -> dict[str, FloatArray]:
+            """All inequalities there: the families ask for them one by one."""
+            key = chosen.tobytes(), b"" if decisions is None else decisions.tobytes()
+            if (decisions is not None) in last and last[decisions is not None][0] == key:
+                return last[decisions is not None][1]
+            here = [m if decisions is None else m.substitute(decisions) for m in (P, later)]
+            values = [Samples(m.at(chosen)) for m in here]
+            found = inequalities(question, sampled.at(chosen[:, :count]), *values, Sampling())
+            out = {name: np.broadcast_to(m.values, (len(chosen), *m.values.shape[1:])) for name, m in found}
+            last[decisions is not None] = key, out
+            return out
 
         margin = problem.margin_index
 
         def family(name: str) -> Family:
             def rows(chosen: FloatArray) -> FloatArray:
-                values = named(P, later, chosen)[name]
+                values = named(chosen)[name]
                 values = np.pad(values, [*[(0, 0)] * 3, (0, problem.decisions + 1 - values.shape[-1])])
                 values = 0.5 * (values + np.swapaxes(values, 1, 2))
                 if margin is not None:
@@ -167,14 +179,14 @@ class Search:
                 return values
 
             def known(decisions: FloatArray, chosen: FloatArray) -> FloatArray:
-                values = named(P.substitute(decisions), later.substitute(decisions), chosen)[name]
+                values = named(chosen, decisions)[name]
                 values = values[..., 0] + values[..., 1:] @ decisions[: values.shape[-1] - 1]
                 values = 0.5 * (values + np.swapaxes(values, 1, 2))
                 return values if margin is None else values - decisions[margin] * np.eye(values.shape[1])
 
             return Family(name, places, rows, known, corners(places, count))
 
-        families = [family(name) for name in named(P, later, places[:1])]
+        families = [family(name) for name in named(places[:1])]
         if wish.level is not None and wish.channel is None:
             families.append(_below_one(P, places, count))
         recall(families, self._memory.get(wish.kind, {}))

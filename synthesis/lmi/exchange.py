@@ -86,7 +86,7 @@ class Family:
 Memory = dict[str, FloatArray]  # places of every inequality that decided when a problem of the same kind was solved
 
 
-def solve_sampled(relaxed: RelaxedProblem, settings: LmiSettings, rough: bool = False) -> RawAnswer:
+def solve_sampled(relaxed: RelaxedProblem, settings: LmiSettings, tolerance: float = FINE) -> RawAnswer:
     """Solve a sampled problem with the method for few places and many unknowns."""
     if settings.solver.startswith("cvxpy:"):
         from synthesis.lmi.cvxpy_backend import solve_with_cvxpy  # cvxpy takes 1 s to import
@@ -99,19 +99,20 @@ def solve_sampled(relaxed: RelaxedProblem, settings: LmiSettings, rough: bool = 
         values = part.values.copy()
         values[..., 0] -= part.margin * np.eye(values.shape[1])
         blocks.append(values)
-    tolerance = max(settings.tolerance, ROUGH if rough else FINE)
+    tolerance = max(settings.tolerance, tolerance)
     return solve_with_interior(blocks, relaxed.cost, relaxed.weights, tolerance, settings.max_iterations)
 
 
 def exchange(
-    problem: LmiProblem, families: Sequence[Family], settings: LmiSettings, rough: bool | None = None
+    problem: LmiProblem, families: Sequence[Family], settings: LmiSettings, tolerance: float | None = None
 ) -> RawAnswer:
     """Solve until no place that is looked at falls short; the families remember what is solved for.
 
     Without `verify` an objective that does not move any more ends it, too: then it bounds, and nothing else is asked of it.
     """
     index = problem.margin_index
-    rough = index is not None or problem.least_norm if rough is None else rough
+    if tolerance is None:
+        tolerance = ROUGH if index is not None or problem.least_norm else FINE
     iterations, seconds, before, answer = 0, 0.0, np.inf, None
     for _ in range(ROUNDS):
         sampled = tuple(
@@ -121,13 +122,15 @@ def exchange(
             )
             for family in families if len(places := family.places[family.active])
         )  # fmt: skip
-        answer = solve_sampled(RelaxedProblem("exchange", sampled, (), problem.cost, problem.weights), settings, rough)
+        answer = solve_sampled(RelaxedProblem("exchange", sampled, (), problem.cost, problem.weights), settings, tolerance)
         iterations, seconds = iterations + answer.iterations, seconds + answer.seconds
         if answer.infeasible or not np.isfinite(answer.decisions).all():
             break
         value = float(problem.cost @ answer.decisions)
         if not settings.verify and index is None and abs(value - before) <= STEADY * abs(value):
             break
+        if index is not None and not answer.decisions[index] > 0.0 and not settings.verify:
+            break  # even these places leave no margin
         before = value
         slack = 0.0 if index is None else SLACK * abs(float(answer.decisions[index]))
         slack = max(slack, SLACK * problem.floor, EDGE / 2)

@@ -18,9 +18,8 @@ from time import perf_counter
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from estimators.arrays import FloatArray
+from estimators.arrays import FloatArray, IndexArray
 from synthesis.lmi.clarabel_backend import RawAnswer
-from synthesis.lmi.conic import triangle
 
 REGULAR = (1e-14, 1e-12, 1e-10, 1e-8)  # shares of the diagonal that keep the system definite where a direction is free
 STEP = 0.98  # of the way to the boundary
@@ -36,7 +35,7 @@ class Blocks:
         stacked = [np.concatenate([block for block in given if block.shape[1] == size]) for size in sizes]
         self.fixed = [np.ascontiguousarray(block[..., 0]) for block in stacked]
         self.free = [np.ascontiguousarray(block[..., 1:]) for block in stacked]
-        self.triangles = [triangle(size) for size in sizes]
+        self.triangles = [triangle_by_rows(size) for size in sizes]
         self.order = sum(part.shape[0] * part.shape[1] for part in self.fixed)
 
     def linear(self, x: FloatArray) -> list[FloatArray]:
@@ -65,12 +64,23 @@ class Blocks:
     def turned(self, left: Sequence[FloatArray]) -> FloatArray:
         """Scaled triangles of R^-1 F_i R^-T, one column for every unknown; `left` holds R^-1."""
         parts = []
-        for inverse, free, (rows, columns, weights) in zip(left, self.free, self.triangles, strict=True):
+        for inverse, free, (_, _, weights) in zip(left, self.free, self.triangles, strict=True):
             size, count = inverse.shape[-1], free.shape[-1]
             once = (inverse @ free.reshape(len(free), size, size * count)).reshape(free.shape)
-            twice = inverse[:, None] @ once  # the F_i are symmetric
-            parts.append((twice[:, rows, columns] * weights[:, None]).reshape(-1, count))
-        return np.concatenate(parts)
+            flat = np.empty((len(free), len(weights), count))
+            start = 0
+            for row in range(size):  # the F_i are symmetric, and only the upper triangle of what comes out is wanted
+                np.matmul(inverse[:, row:], once[:, row], out=flat[:, start : start + size - row])
+                start += size - row
+            flat *= weights[:, None]
+            parts.append(flat.reshape(-1, count))
+        return np.concatenate(parts) if len(parts) > 1 else parts[0]
+
+
+def triangle_by_rows(size: int) -> tuple[IndexArray, IndexArray, FloatArray]:
+    """Rows and columns of the upper triangle, and the weights sqrt(2) that keep inner products."""
+    rows, columns = np.triu_indices(size)
+    return rows, columns, np.where(rows == columns, 1.0, np.sqrt(2.0))
 
 
 @dataclass
