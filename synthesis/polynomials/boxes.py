@@ -1,0 +1,280 @@
+r"""Matrix polynomials on many boxes at once, enclosed in float64: the quick road of a proof, taken before ball arithmetic.
+
+    M_g(t) lies in  sum over |k| <= D of t^k middle[g, k]  +-  radius[g],    t in [-1, 1]^v
+
+Rounding is bounded a priori (Higham, Accuracy and Stability, section 3): a product of A and B is off by at most gamma S(A) S(B), entry
+by entry, S(A) the sum of the absolute coefficients, whatever the order of summation and whether or not products are fused; terms
+above the order D widen the radius by their size. Radii are themselves computed in float64 and inflated after every operation. What is
+shown here is shown; what is not is left to `synthesis.polynomials.enclosure`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from math import ceil, factorial, log2
+from typing import Any
+
+import numpy as np
+
+from estimators.arrays import FloatArray, IndexArray
+from synthesis.polynomials.exponential import LARGEST, balance_of
+from synthesis.polynomials.positivity import to_bernstein
+
+EPS = 2.0**-52
+INFLATE = 1.0 + 1e-9  # after every operation on radii, each of which is off by fewer than 10^5 roundings
+TINY = 1e-290  # what underflow may take away
+TERMS = 14  # of the series of phi at |X| <= 1/2: remainder 5e-17
+
+
+@dataclass(frozen=True)
+class Orders:
+    """The monomials t^k of total degree up to `highest` in v variables, by degree; `place[k + l]` adds exponents."""
+
+    powers: tuple[tuple[int, ...], ...]
+    upto: tuple[int, ...]  # number of monomials that may multiply number k without leaving the table
+    sums: tuple[IndexArray, ...]
+
+
+@cache
+def orders(variables: int, highest: int) -> Orders:
+    """The table of monomials."""
+    powers = sorted((k for k in product(range(highest + 1), repeat=variables) if sum(k) <= highest), key=lambda k: (sum(k), k))
+    place = {k: i for i, k in enumerate(powers)}
+    upto = tuple(sum(sum(k) + sum(m) <= highest for m in powers) for k in powers)
+    sums = tuple(
+        np.array([place[tuple(a + b for a, b in zip(k, m, strict=True))] for m in powers[:count]], dtype=np.intp)
+        for k, count in zip(powers, upto, strict=True)
+    )
+    return Orders(tuple(powers), upto, sums)
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """`middle` (g, K, rows, columns) and `radius` (g, rows, columns); g = 1 stands for all boxes."""
+
+    middle: FloatArray
+    radius: FloatArray
+    variables: int
+    highest: int
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.middle.shape[2], self.middle.shape[3]
+
+    @property
+    def size(self) -> FloatArray:
+        """Bounds of |M_g(t)|, entry by entry, radius included."""
+        return np.asarray(INFLATE * (np.abs(self.middle).sum(axis=1) + self.radius))
+
+    @property
+    def T(self) -> Boxes:
+        """The transpose."""
+        return self._like(np.swapaxes(self.middle, 2, 3), np.swapaxes(self.radius, 1, 2))
+
+    def _like(self, middle: FloatArray, radius: FloatArray) -> Boxes:
+        return Boxes(middle, radius, self.variables, self.highest)
+
+    def __neg__(self) -> Boxes:
+        return self._like(-self.middle, self.radius)
+
+    def __add__(self, other: Boxes) -> Boxes:
+        middle = self.middle + other.middle
+        rounding = EPS * np.abs(middle).sum(axis=1)
+        return self._like(middle, INFLATE * (self.radius + other.radius + rounding))
+
+    def __sub__(self, other: Boxes) -> Boxes:
+        return self + (-other)
+
+    def __mul__(self, factor: Any) -> Boxes:
+        """Times a number: exact if it is a float, else enclosed."""
+        number, off = _number(factor)
+        middle = self.middle * number
+        spread = self.radius * abs(number) + off * self.size + EPS * np.abs(middle).sum(axis=1) + TINY
+        return self._like(middle, INFLATE * spread)
+
+    __rmul__ = __mul__
+
+    def __matmul__(self, other: Boxes) -> Boxes:
+        table = orders(self.variables, self.highest)
+        count = max(len(self.middle), len(other.middle))
+        out = np.zeros((count, len(table.powers), self.shape[0], other.shape[1]))
+        magnitudes = np.abs(other.middle)
+        total = magnitudes.sum(axis=1)
+        lost: Any = 0.0
+        for k, (upto, sums) in enumerate(zip(table.upto, table.sums, strict=True)):
+            left = self.middle[:, k]
+            if not left.any():
+                continue
+            out[:, sums] += left[:, None] @ other.middle[:, :upto]
+            if upto < len(table.powers):
+                lost = lost + np.abs(left) @ magnitudes[:, upto:].sum(axis=1)
+        gamma = EPS * (self.shape[1] + 2 * len(table.powers) + 8)
+        size = np.abs(self.middle).sum(axis=1)
+        spread = lost + size @ (gamma * total + other.radius) + self.radius @ (total + other.radius) + TINY
+        return self._like(out, INFLATE * spread)
+
+    def scaled_by(self, scalar: Boxes) -> Boxes:
+        """Times a 1 x 1 polynomial."""
+        diagonal = np.einsum("gkij,ab->gkab", scalar.middle, np.eye(self.shape[0]))
+        spread = np.einsum("gij,ab->gab", scalar.radius, np.eye(self.shape[0]))
+        return self._like(diagonal, spread) @ self
+
+    def truncated(self, order: int) -> Boxes:
+        """Itself: nothing above `highest` is kept anyway."""
+        return self
+
+    def widened(self, radius: FloatArray) -> Boxes:
+        """Uncertain by so much more."""
+        return self._like(self.middle, INFLATE * (self.radius + radius))
+
+    def tiled(self, times: int) -> Boxes:
+        """All boxes once more, and once more."""
+        return self._like(np.tile(self.middle, (times, 1, 1, 1)), np.tile(self.radius, (times, 1, 1)))
+
+
+def constants(matrix: FloatArray, variables: int, highest: int) -> Boxes:
+    """A matrix of floats (rows, columns), the same on all boxes."""
+    array = np.asarray(matrix, float)
+    middle = np.zeros((1, len(orders(variables, highest).powers), *array.shape))
+    middle[0, 0] = array
+    return Boxes(middle, np.zeros((1, *array.shape)), variables, highest)
+
+
+def _number(factor: Any) -> tuple[float, float]:
+    """A float, and by how much the number may be another, relative to it."""
+    if isinstance(factor, float):
+        return factor, 0.0
+    if isinstance(factor, int):
+        return float(factor), 0.0
+    if hasattr(factor, "mid"):
+        value = float(factor.mid())
+        return value, 4 * EPS + (float(factor.rad()) * (1 + 1e-9) / abs(value) if value else float(factor.rad()))
+    return int(factor.p) / int(factor.q), EPS
+
+
+class BoxArithmetic:
+    """Arithmetic of boxes for the inequalities (`synthesis.certificate.inequalities.Arithmetic`)."""
+
+    def eye(self, size: int, like: Boxes) -> Boxes:
+        """The unit matrix."""
+        return constants(np.eye(size), like.variables, like.highest)
+
+    def known(self, rows: Any, like: Boxes) -> Boxes:
+        """A matrix of rationals."""
+        array = np.array([[int(x.p) / int(x.q) for x in row] for row in rows.tolist()]).reshape(rows.nrows(), rows.ncols())
+        return constants(array, like.variables, like.highest).widened(EPS * np.abs(array)[None])
+
+    def block(self, rows: Any) -> Boxes:
+        """A symmetric block matrix from its upper triangle."""
+        diagonal = [row[i] for i, row in enumerate(rows)]
+        ends = np.concatenate([[0], np.cumsum([part.shape[0] for part in diagonal])])
+        count = max(len(part.middle) for row in rows for part in row if part is not None)
+        like = diagonal[0]
+        middle = np.zeros((count, like.middle.shape[1], ends[-1], ends[-1]))
+        radius = np.zeros((count, ends[-1], ends[-1]))
+        for i, row in enumerate(rows):
+            for j in range(i, len(rows)):
+                if row[j] is None:
+                    continue
+                across, down = slice(ends[i], ends[i + 1]), slice(ends[j], ends[j + 1])
+                middle[:, :, across, down], radius[:, across, down] = row[j].middle, row[j].radius
+                middle[:, :, down, across] = np.swapaxes(row[j].middle, 2, 3)
+                radius[:, down, across] = np.swapaxes(row[j].radius, 1, 2)
+        return Boxes(middle, radius, like.variables, like.highest)
+
+    def exp(self, exponent: Any) -> Any:
+        """e^x as a ball."""
+        from flint import arb
+
+        return arb(exponent).exp()
+
+
+def phi(matrix: Boxes) -> Boxes | None:
+    """An enclosure of int_0^1 e^(M s) ds on every box (`synthesis.polynomials.exponential`); None if M is too large."""
+    n = matrix.shape[0]
+    size = matrix.size.max(axis=0)
+    if not np.isfinite(size).all():
+        return None
+    weights = np.array([float(w.p) / float(w.q) for w in balance_of(size)])  # powers of two: exact
+    turned = _turned(matrix, weights)
+    norm = float(turned.size.sum(axis=2).max()) * INFLATE
+    if not norm < LARGEST:
+        return None
+    halvings = max(0, ceil(log2(norm)) + 1) if norm > 0.0 else 0
+    X = turned * 2.0**-halvings
+    unit = constants(np.eye(n), matrix.variables, matrix.highest)
+    found = unit * (1.0 / factorial(TERMS))
+    for k in range(TERMS - 1, 0, -1):
+        found = X @ found + (unit * (1.0 / factorial(k))).widened(np.full((1, n, n), EPS / factorial(k)))
+    small = norm * 2.0**-halvings
+    found = found.widened(np.full((1, n, n), 1.01 * small**TERMS / factorial(TERMS + 1) + EPS / factorial(TERMS)))
+    for _ in range(halvings):
+        found = (unit + (X @ found) * 0.5) @ found
+        X = X * 2.0
+    return _turned(found, 1.0 / weights)
+
+
+def _turned(matrix: Boxes, weights: FloatArray) -> Boxes:
+    """diag(w) M diag(w)^-1 for powers of two."""
+    factor = weights[:, None] / weights
+    return Boxes(matrix.middle * factor, matrix.radius * factor, matrix.variables, matrix.highest)
+
+
+def exponential(matrix: Boxes, integral: Boxes) -> Boxes:
+    """e^M = I + M phi(M), from phi(M)."""
+    return constants(np.eye(matrix.shape[0]), matrix.variables, matrix.highest) + matrix @ integral
+
+
+def positive(matrix: Boxes) -> FloatArray:
+    """Which boxes (g,) certainly have M(t) > 0 everywhere, from their Bernstein coefficients; only a True says something.
+
+    Every coefficient B, scaled by powers of two to a diagonal near one, is positive definite if B - c I = R'R + D with row sums of
+    |D| and of the radius below c: R'R >= 0 whatever R is, so that how R was found does not matter.
+    """
+    table = orders(matrix.variables, matrix.highest)
+    used = [p for p, k in zip(table.powers, np.abs(matrix.middle).max(axis=(0, 2, 3)), strict=True) if k > 0.0]
+    degrees = [max((k[i] for k in used), default=0) for i in range(matrix.variables)]
+    n = matrix.shape[0]
+    tensor = np.zeros((len(matrix.middle), *(d + 1 for d in degrees), n, n))
+    for number, k in enumerate(table.powers):
+        if all(a <= d for a, d in zip(k, degrees, strict=True)):
+            tensor[(slice(None), *k)] = matrix.middle[:, number]
+    for axis, degree in enumerate(degrees):
+        tensor = np.moveaxis(np.tensordot(to_bernstein(degree), tensor, axes=(1, axis + 1)), 0, axis + 1)
+    radius = matrix.radius + EPS * (2 * sum(degrees) + 8) * np.abs(matrix.middle).sum(axis=1)
+    values = tensor.reshape(len(tensor), -1, n, n)
+    return _definite(values, INFLATE * radius[:, None]).all(axis=1)
+
+
+def _definite(values: FloatArray, radius: FloatArray) -> FloatArray:
+    diagonal = np.diagonal(values, axis1=-2, axis2=-1)
+    good = (diagonal > 0.0).all(axis=-1) & np.isfinite(values).all(axis=(-2, -1))
+    scale = np.exp2(-np.round(0.5 * np.log2(np.where(good[..., None], diagonal, 1.0))))
+    scaled = values * scale[..., :, None] * scale[..., None, :]
+    spread = INFLATE * radius * scale[..., :, None] * scale[..., None, :]
+    need = spread.sum(axis=-1).max(axis=-1)
+    shift = 2.0 * need + 64 * values.shape[-1] ** 2 * EPS
+    shifted = scaled - shift[..., None, None] * np.eye(values.shape[-1])
+    R, found = _factor(shifted)
+    back = np.swapaxes(R, -1, -2) @ R
+    size = np.swapaxes(np.abs(R), -1, -2) @ np.abs(R) + np.abs(scaled) + shift[..., None, None]
+    rest = np.abs(shifted - back) + EPS * (values.shape[-1] + 8) * size
+    return np.asarray(good & found & (INFLATE * (rest.sum(axis=-1).max(axis=-1) + need) < shift))
+
+
+def _factor(matrices: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Upper triangular R with R'R near the matrix, for a stack; and where every pivot was positive."""
+    work, n = matrices.copy(), matrices.shape[-1]
+    R = np.zeros_like(work)
+    good = np.ones(work.shape[:-2], dtype=np.bool_)
+    for k in range(n):
+        pivot = work[..., k, k]
+        good &= pivot > 0.0
+        root = np.sqrt(np.where(good, pivot, 1.0))
+        R[..., k, k:] = work[..., k, k:] / root[..., None]
+        R[..., k, k] = root
+        work[..., k + 1 :, k + 1 :] -= R[..., k, k + 1 :, None] * R[..., k, None, k + 1 :]
+    return R, good
