@@ -48,7 +48,8 @@ def _with_update(
     extra: list[Claim | None] = []
     if update == "held":
         extra += [
-            best_gain(search, Wish("motion gain", None, channel), settle) for channel in motion_channels(search, channels)
+            best_gain(search, Wish("motion gain", None, channel), settle)
+            for channel in motion_channels(search, channels)
         ]
     extra += [largest(search, "drop probability", critical_probability(search.loop))]
     return tuple(claim for claim in (*found, *extra) if claim is not None)

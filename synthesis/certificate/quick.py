@@ -1,7 +1,7 @@
 """The cells of a table on which a claim is proved at once, in float64 with bounds of all rounding; the others are left to balls.
 
-The inequalities are affine in dP/dt and in P one sample later, and those in the rates (where P is affine in the parameters that move):
-so they hold for all rates if they hold at the vertices of the rates, which are proved side by side.
+The inequalities are affine in dP/dt and in P one sample later, and those in the rates (where P is affine in what moves): so
+they hold for all rates if they hold at the vertices of the rates, which are proved side by side.
 """
 
 from __future__ import annotations
@@ -46,7 +46,9 @@ def quickly_proved(
     system = known[time]
     if system is None:
         return nothing
-    slopes = [None if speed is None else (own.derivative(i), *_ends(speed, count + i)) for i, speed in enumerate(speeds)]
+    slopes = [
+        None if speed is None else (own.derivative(i), *_ends(speed, count + i)) for i, speed in enumerate(speeds)
+    ]
     vertices = list(product(*[(0, 1) if s is not None and s[1] != s[2] else (0,) for s in slopes]))
     if len(vertices) > MOST_VERTICES:
         return nothing

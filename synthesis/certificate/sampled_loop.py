@@ -16,8 +16,9 @@ from synthesis.certificate.unknowns import in_scaled_states
 from synthesis.lmi.samples import Samples
 from synthesis.loop.observer import ObserverLoop
 from synthesis.loop.system import Region, System, Time
+from synthesis.polynomials.boxes import Boxes, orders
 
-PARTS = {1: 4}  # of every cell, along every parameter; 2 for more parameters
+MOST_PLACES = 4000  # of the parameters; larger tables are looked at in the corners of their cells only
 MATRICES = ("A", "C", "coasting", "denominator")
 GROUPS = ("B", "D")
 
@@ -29,17 +30,20 @@ class SampledLoop:
     loop: ObserverLoop
     scale: FloatArray
     time: Time
+    on_boxes: dict[str, System | None] = field(default_factory=dict, repr=False, compare=False)
     _rows: dict[tuple[float, ...], dict[Any, FloatArray]] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
     def grid(self) -> FloatArray | None:
         """Corners of the cells and places between them; None where a cell cannot be enclosed."""
-        count = len(self.loop.plant.axes)
-        line = np.linspace(-1.0, 1.0, PARTS.get(count, 2) + 1)
+        count, cells = len(self.loop.plant.axes), list(self.loop.cells())
+        parts = 4 if count == 1 else 2
+        line = np.linspace(-1.0, 1.0, (parts if len(cells) * (parts + 1) ** count <= MOST_PLACES else 1) + 1)
         local = np.array(list(product(line, repeat=count))).reshape(len(line) ** count, count)
-        for region in self.loop.cells():
-            if not self._fill(region, local):
-                return None
+        if not self._fill_at_once(cells, local):
+            for region in cells:
+                if not self._fill(region, local):
+                    return None
         return np.array(list(self._rows)).reshape(len(self._rows), count)
 
     def at(self, places: FloatArray) -> System:
@@ -68,6 +72,44 @@ class SampledLoop:
     def _standing(self, key: tuple[float, ...]) -> Region:
         zeros = (fmpq(0),) * len(key)
         return Region((*(fmpq(*value.as_integer_ratio()) for value in key), *zeros), (*zeros, *zeros))
+
+    def _fill_at_once(self, cells: list[Region], local: FloatArray) -> bool:
+        """All cells from the middles of their enclosures, where the loop has them."""
+        if self.time not in self.on_boxes:
+            self.on_boxes[self.time] = self.loop.on_boxes(self.time) if hasattr(self.loop, "on_boxes") else None
+        system, count = self.on_boxes[self.time], local.shape[1]
+        if system is None:
+            return False
+        powers = np.array(orders(count, system.A.highest).powers)
+        monomials = (local[:, None] ** powers).prod(axis=-1)
+        left, right = self.scale[:, None], 1.0 / self.scale
+        found: dict[Any, FloatArray] = {}
+
+        def keep(name: Any, boxes: Boxes, factor: FloatArray) -> None:
+            flat = monomials @ boxes.middle.reshape(len(boxes.middle), len(powers), boxes.shape[0] * boxes.shape[1])
+            values = flat.reshape(len(boxes.middle), len(local), *boxes.shape) * factor
+            found[name] = np.broadcast_to(values, (len(cells), *values.shape[1:])).reshape(
+                len(cells) * len(local), *boxes.shape
+            )
+
+        keep("A", system.A, left * right)
+        keep("C", system.C, right)
+        if system.coasting is not None:
+            keep("coasting", system.coasting, left * right)
+        if system.denominator is not None:
+            keep("denominator", system.denominator, np.ones(1))
+        for group in system.B:
+            keep(("B", group), system.B[group], left)
+            keep(("D", group), system.D[group], np.ones(1))
+        offset, factor = (
+            np.array([[int(x.p) / int(x.q) for x in side[:count]] for side in sides])[:, None]
+            for sides in ([cell.offset for cell in cells], [cell.factor for cell in cells])
+        )
+        places = np.round((offset + factor * local).reshape(-1, count), 12)
+        _, first = np.unique(places, axis=0, return_index=True)
+        for index in np.sort(first):
+            self._rows[_key(places[index])] = {name: values[index] for name, values in found.items()}
+        return all(np.isfinite(values).all() for values in found.values())
 
     def _fill(self, region: Region, local: FloatArray) -> bool:
         """Remember the system at local coordinates (g, p) of a region."""

@@ -1,8 +1,8 @@
 """For one claim about a loop: the P that proves it with the largest margin, or the best level that some P proves.
 
-The inequalities are those that `synthesis.certificate.verify` proves; here they are solved for by exchange: on a few places of the
-table, then looked at on all, and where the proof itself fails that place joins them. Nothing that comes out is believed: P is
-rounded, and the claim is proved for the rounded P, or it is none.
+The inequalities are those that `synthesis.certificate.verify` proves; here they are solved for by exchange: on a few places of
+the table, then looked at on all, and where the proof itself fails that place joins them. Nothing that comes out is believed: P
+is rounded, and the claim is proved for the rounded P, or it is none.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Asked:
 
     def add(self, inequality: str, place: FloatArray) -> bool:
         """Solve for this place, too; False if that changes nothing."""
-        return any([family.add(place) for family in self.families if family.name == inequality])
+        return sum(family.add(place) for family in self.families if family.name == inequality) > 0
 
 
 @dataclass(frozen=True)
@@ -161,8 +161,8 @@ class Search:
             if (decisions is not None) in last and last[decisions is not None][0] == key:
                 return last[decisions is not None][1]
             here = [m if decisions is None else m.substitute(decisions) for m in (P, later)]
-            values = [Samples(m.at(chosen)) for m in here]
-            found = inequalities(question, sampled.at(chosen[:, :count]), *values, Sampling())
+            now, then = (Samples(m.at(chosen)) for m in here)
+            found = inequalities(question, sampled.at(chosen[:, :count]), now, then, Sampling())
             out = {name: np.broadcast_to(m.values, (len(chosen), *m.values.shape[1:])) for name, m in found}
             last[decisions is not None] = key, out
             return out
@@ -194,7 +194,7 @@ class Search:
 
     def _sampled(self, time: Time) -> SampledLoop:
         if time not in self._loops:
-            self._loops[time] = SampledLoop(self.loop, self.scale, time)
+            self._loops[time] = SampledLoop(self.loop, self.scale, time, self.verifier.boxes)
         return self._loops[time]
 
     def _question(self, wish: Wish, period: float, square: object) -> Question:

@@ -4,8 +4,8 @@ Read this together with `synthesis.polynomials.enclosure` and `.definite`; the t
 the table the closed loop is a polynomial (with an enclosed remainder where it holds a matrix exponential), so every inequality is
 a symmetric matrix polynomial M(t, r), t the place in the cell, r the place of the rates between their bounds. All its Bernstein
 coefficients positive definite proves M > 0 on the cell. A cell that decides nothing is halved. Every number is a ball of 128
-bits around the exact one: a sign counts only if it is certain, whatever processor computed it. Cells with room to spare are proved
-all at once before (`synthesis.certificate.quick`), in float64 with bounds of what it rounds.
+bits around the exact one: a sign counts only if it is certain, whatever processor computed it. Cells with room to spare are
+proved all at once before (`synthesis.certificate.quick`), in float64 with bounds of what it rounds.
 
 A failed proof says only that this P does not do. What the loop itself does is asked separately (`synthesis.certificate.refute`).
 """
@@ -77,7 +77,7 @@ class Verifier:
     loop: ObserverLoop
     names: Names
     balls: Balls = field(default_factory=Balls)
-    _boxes: dict[str, System | None] = field(default_factory=dict, repr=False, compare=False)
+    boxes: dict[str, System | None] = field(default_factory=dict, repr=False, compare=False)
 
     def prove(self, claim: Claim, dual: bool = False) -> Outcome:
         """Every inequality of the claim on every cell.
@@ -94,7 +94,7 @@ class Verifier:
         if dual:
             later = -later
         question = self.question(claim)
-        done_at_once = quickly_proved(self.loop, question, time, P, speeds, dual, self._boxes)
+        done_at_once = quickly_proved(self.loop, question, time, P, speeds, dual, self.boxes)
         for number, cell in enumerate(self.loop.cells()):
             if done_at_once[number]:
                 continue

@@ -128,14 +128,14 @@ def _candidates(gains: ObserverGains, settings: DeploySettings) -> Iterator[tupl
     if count == 1:
         yield from ((number,) for number in SEGMENTS)
         return
-    segments = tuple(_along(gains, axis, settings.interpolation_cost) for axis in range(count))
+    segments: tuple[int, ...] = tuple(_along(gains, axis, settings.interpolation_cost) for axis in range(count))
     while np.prod([number + 1 for number in segments]) <= MOST_ENTRIES:
         yield segments
         segments = tuple(2 * number for number in segments)
 
 
 def _along(gains: ObserverGains, axis: int, share: float) -> int:
-    """The least number of segments, 1, 2, 4, .., that interpolates well along one parameter, the others at both ends."""
+    """The least number of segments, a power of two, that interpolates well along one parameter, the others at both ends."""
     parameters = gains.model.parameters
     others = [np.array([p.minimum, p.maximum]) for p in parameters]
     others[axis] = np.linspace(parameters[axis].minimum, parameters[axis].maximum, FINEST + 1)
@@ -143,7 +143,7 @@ def _along(gains: ObserverGains, axis: int, share: float) -> int:
     found = gains.gain(grid.reshape(-1, len(parameters)))
     values = np.moveaxis(found.reshape(*grid.shape[:-1], -1), axis, 0).reshape(FINEST + 1, -1, found[0].size)
     size = np.abs(values).max(axis=(0, 1)) + np.finfo(float).tiny
-    for segments in (2**k for k in range(FINEST.bit_length())):
+    for segments in (1, 2, 4, 8, 16, 32):
         weights = np.linspace(0.0, segments, FINEST + 1)
         low = np.minimum(weights.astype(int), segments - 1)
         knots, rest = values[:: FINEST // segments], (weights - low)[:, None, None]

@@ -164,8 +164,8 @@ def minimised(
     # The optimum itself is not handed on then: it need not hold on the continuum, only the level a back-off above it.
     optimum = solve(first, replace(design.settings, verify=not bounding), memory)
     lower = None if optimum.lower_bound is None else to_gamma(model, design, scale, max(optimum.lower_bound, 0.0))
-    named = optimum.objective is not None and optimum.objective > 0.0 and optimum.report.status == "Solved"
-    if bounding and named:
+    named = optimum.objective is not None and optimum.objective > 0.0
+    if bounding and named and optimum.report.status == "Solved":
         gamma = round_up(to_gamma(model, design, scale, optimum.objective or 0.0) * (1.0 + design.backoff))
         result = solve(problem(gamma), design.settings, memory)
         bounding = result.verdict is Verdict.CERTIFIED

@@ -1,10 +1,10 @@
 r"""Exchange: solve on a few places, look where the answer fails, add those places, solve again.
 
-Of the many places of a grid (20 x 20 parameter values with 4 rate vertices are 1600) only a handful ever decide. Places that are not
-solved for are only looked at: for known decisions that is one evaluation and the least eigenvalue. What holds on the places that
-were looked at is then proved on the continuum, and a place where that proof fails joins them (cutting planes of semi-infinite
-programming; Hettich and Kortanek 1993). Every problem that is solved on the way is a part of the whole one, so its lower bound
-and its certificate of infeasibility are those of the whole.
+Of the many places of a grid (20 x 20 parameter values with 4 rate vertices are 1600) only a handful ever decide. Places that
+are not solved for are only looked at: for known decisions that is one evaluation and the least eigenvalue. What holds on the
+places that were looked at is then proved on the continuum, and a place where that proof fails joins them (cutting planes of
+semi-infinite programming; Hettich and Kortanek 1993). Every problem that is solved on the way is a part of the whole one, so
+its lower bound and its certificate of infeasibility are those of the whole.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from itertools import product
 
 import numpy as np
 
-from estimators.arrays import FloatArray, IndexArray
+from estimators.arrays import FloatArray
 from synthesis.lmi.clarabel_backend import RawAnswer, solve_with_clarabel
 from synthesis.lmi.conic import assemble, structural_zeros
 from synthesis.lmi.interior import solve_with_interior
@@ -27,7 +27,10 @@ ROUNDS = 20
 MORE = 6  # places that one inequality gains in a round
 SHARE = 0.1  # of the worst violation; what is broken by less waits
 EDGE = 1e-7  # every inequality is solved for with this margin, and half of it may be missing where it is only looked at
-KEPT, NEARLY = 12, 1e-4  # places of an inequality that the next problem starts with: the tightest ones, relative to its size
+KEPT, NEARLY = (
+    12,
+    1e-4,
+)  # places of an inequality that the next problem starts with: the tightest ones, relative to its size
 LOOKED_AT = {0: 1, 1: 9}  # points for each parameter, by their number; 5 for more
 SLACK = 0.02  # share of the common margin by which a place that is only looked at may fall short
 STEADY = 1e-5  # relative change of an objective that nothing will be proved at
@@ -122,7 +125,9 @@ def exchange(
             )
             for family in families if len(places := family.places[family.active])
         )  # fmt: skip
-        answer = solve_sampled(RelaxedProblem("exchange", sampled, (), problem.cost, problem.weights), settings, tolerance)
+        answer = solve_sampled(
+            RelaxedProblem("exchange", sampled, (), problem.cost, problem.weights), settings, tolerance
+        )
         iterations, seconds = iterations + answer.iterations, seconds + answer.seconds
         if answer.infeasible or not np.isfinite(answer.decisions).all():
             break
@@ -193,4 +198,3 @@ def corners(places: FloatArray, count: int) -> list[int]:
         if key not in found or agree[index] > agree[found[key]]:
             found[key] = int(index)
     return list(found.values())
-

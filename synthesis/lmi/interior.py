@@ -3,10 +3,11 @@ r"""A primal-dual interior-point method for few matrix inequalities with many un
     minimise  c'x + x'diag(d)x / 2   subject to   S_j = F_j0 + sum_i x_i F_ji >= 0
     dual      Y_j >= 0,  <F_ji, Y_j> summed over j = c_i + d_i x_i
 
-with the scaling of Nesterov and Todd and Mehrotra's predictor (as in Vandenberghe, The CVXOPT linear and quadratic cone program
-solvers, 2010): R_j with R^-1 S R^-T = R'Y R = diag(lambda), and all directions from one matrix, the Gram matrix of the R^-1 F_ji R^-T.
-That is one product of dense matrices for each step, where a solver for sparse cones factors the triangles of all blocks: five to ten
-times as long with sixteen states. What it says of itself is no more believed than any other solver's word.
+with the scaling of Nesterov and Todd and Mehrotra's predictor (as in Vandenberghe, The CVXOPT linear and quadratic cone
+program solvers, 2010): R_j with R^-1 S R^-T = R'Y R = diag(lambda), and all directions from one matrix, the Gram matrix of
+the R^-1 F_ji R^-T. That is one product of dense matrices for each step, where a solver for sparse cones factors the triangles
+of all blocks: five to ten times as long with sixteen states. What it says of itself is no more believed than any other
+solver's word.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
@@ -209,7 +211,7 @@ class _Normal:
         diagonal = np.diag(matrix)
         self.scale = 1.0 / np.sqrt(np.maximum(diagonal, np.finfo(float).eps * max(float(diagonal.max()), 1e-300)))
         self.scaled = matrix * np.outer(self.scale, self.scale)
-        self.factor = None
+        self.factor: Any = None
         for share in REGULAR:
             try:
                 self.factor = cho_factor(self.scaled + share * np.eye(len(matrix)), lower=True, check_finite=False)
@@ -245,7 +247,11 @@ def _step(
         asked = [q + part for q, part in zip(right, rest, strict=True)]
         x = normal.solve(flat.T @ blocks.flat(asked) - dual_rest)
         change = [a @ part @ np.swapaxes(a, -1, -2) for a, part in zip(left, blocks.linear(x), strict=True)]
-        return x, [c - r for c, r in zip(change, rest, strict=True)], [q - c for q, c in zip(asked, change, strict=True)]
+        return (
+            x,
+            [c - r for c, r in zip(change, rest, strict=True)],
+            [q - c for q, c in zip(asked, change, strict=True)],
+        )
 
     eye = [np.eye(v.shape[-1]) for v in values]
     _, dS, dY = direction([-v[..., None] * e for v, e in zip(values, eye, strict=True)])

@@ -14,7 +14,6 @@ from synthesis.lmi.settings import LmiSettings
 from synthesis.polynomials.matrix import MatrixPolynomial, padded
 from synthesis.polynomials.positivity import to_bernstein
 
-
 MOST_WORK = 100_000  # of `cheaper`: beyond it a few places that are exchanged cost less (six states, degree 1)
 
 

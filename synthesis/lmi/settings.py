@@ -15,11 +15,15 @@ Relaxation = Literal["auto", "grid", "vertex", "exact", "bernstein", "exchange"]
 class LmiSettings:
     """How an LMI problem is relaxed, solved and re-checked."""
 
-    relaxation: Relaxation = "auto"  # auto: exact or grid where one parameter and few states make them cheap, else exchange
+    relaxation: Relaxation = (
+        "auto"  # auto: exact or grid where one parameter and few states make them cheap, else exchange
+    )
     points: int = 140  # grid points for each parameter
     cells: int = 1  # pieces of the range of each parameter, each with its own Bernstein coefficients
     margin: float = 1e-8  # every inequality holds by this much, in balanced coordinates
-    solver: str = "CLARABEL"  # assembled directly (bernstein and exchange: by `interior`); "cvxpy:NAME": the second back end
+    solver: str = (
+        "CLARABEL"  # assembled directly (bernstein and exchange: by `interior`); "cvxpy:NAME": the second back end
+    )
     tolerance: float = 1e-8  # gap and feasibility tolerance of the solver
     max_iterations: int = 200  # of the interior-point method
     verify: bool = True  # re-evaluate every inequality outside the solver

@@ -42,7 +42,7 @@ def solve(problem: LmiProblem, settings: LmiSettings | None = None, memory: Memo
     if kind == "exchange":
         answer, decisions, margins, assembly, verification = _exchanged(problem, settings, memory)
     else:
-        answer, assembly = _relaxed(problem, replace(settings, relaxation=kind))
+        answer, assembly = _relaxed(problem, settings)
         start, decisions = perf_counter(), answer.decisions
         margins = ()
         if settings.verify and not answer.infeasible and np.isfinite(decisions).all():
@@ -88,14 +88,15 @@ def _exchanged(problem: LmiProblem, settings: LmiSettings, memory: Memory | None
     while True:
         answer = exchange(problem, families, settings)
         iterations, solving = iterations + answer.iterations, solving + answer.seconds
-        decisions, margins = answer.decisions, ()
+        decisions = answer.decisions
+        margins: tuple[Margin, ...] = ()
         if not settings.verify or answer.infeasible or not np.isfinite(decisions).all():
             break
         began = perf_counter()
         decisions, margins, places = _verified(problem, answer.decisions, settings)
         verification += perf_counter() - began
-        failed = [(family, place) for family, place, m in zip(strict, places, margins, strict=True) if not m.proved]
-        if not any([family.add(place) for family, place in failed]) or iterations > MOST_ITERATIONS:
+        failed = [(strict[i], places[i]) for i, margin in enumerate(margins) if not margin.proved]
+        if not sum(family.add(place) for family, place in failed) or iterations > MOST_ITERATIONS:
             break
     if memory is not None and not answer.infeasible and np.isfinite(decisions).all():
         remember(families, answer.decisions, memory)

@@ -2,10 +2,10 @@ r"""Matrix polynomials on many boxes at once, enclosed in float64: the quick roa
 
     M_g(t) lies in  sum over |k| <= D of t^k middle[g, k]  +-  radius[g],    t in [-1, 1]^v
 
-Rounding is bounded a priori (Higham, Accuracy and Stability, section 3): a product of A and B is off by at most gamma S(A) S(B), entry
-by entry, S(A) the sum of the absolute coefficients, whatever the order of summation and whether or not products are fused; terms
-above the order D widen the radius by their size. Radii are themselves computed in float64 and inflated after every operation. What is
-shown here is shown; what is not is left to `synthesis.polynomials.enclosure`.
+Rounding is bounded a priori (Higham, Accuracy and Stability, section 3): a product of A and B is off by at most gamma S(A)
+S(B), entry by entry, S(A) the sum of the absolute coefficients, whatever the order of summation and whether or not products
+are fused; terms above the order D widen the radius by their size. Radii are themselves computed in float64 and inflated after
+every operation. What is shown here is shown; what is not is left to `synthesis.polynomials.enclosure`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from estimators.arrays import FloatArray, IndexArray
+from estimators.arrays import BoolArray, FloatArray, IndexArray
 from synthesis.polynomials.exponential import LARGEST, balance_of
 from synthesis.polynomials.positivity import to_bernstein
 
@@ -40,7 +40,9 @@ class Orders:
 @cache
 def orders(variables: int, highest: int) -> Orders:
     """The table of monomials."""
-    powers = sorted((k for k in product(range(highest + 1), repeat=variables) if sum(k) <= highest), key=lambda k: (sum(k), k))
+    powers = sorted(
+        (k for k in product(range(highest + 1), repeat=variables) if sum(k) <= highest), key=lambda k: (sum(k), k)
+    )
     place = {k: i for i, k in enumerate(powers)}
     upto = tuple(sum(sum(k) + sum(m) <= highest for m in powers) for k in powers)
     sums = tuple(
@@ -164,7 +166,9 @@ class BoxArithmetic:
 
     def known(self, rows: Any, like: Boxes) -> Boxes:
         """A matrix of rationals."""
-        array = np.array([[int(x.p) / int(x.q) for x in row] for row in rows.tolist()]).reshape(rows.nrows(), rows.ncols())
+        array = np.array([[int(x.p) / int(x.q) for x in row] for row in rows.tolist()]).reshape(
+            rows.nrows(), rows.ncols()
+        )
         return constants(array, like.variables, like.highest).widened(EPS * np.abs(array)[None])
 
     def block(self, rows: Any) -> Boxes:
@@ -228,30 +232,33 @@ def exponential(matrix: Boxes, integral: Boxes) -> Boxes:
     return constants(np.eye(matrix.shape[0]), matrix.variables, matrix.highest) + matrix @ integral
 
 
-def positive(matrix: Boxes) -> FloatArray:
+def positive(matrix: Boxes) -> BoolArray:
     """Which boxes (g,) certainly have M(t) > 0 everywhere, from their Bernstein coefficients; only a True says something.
 
-    Every coefficient B, scaled by powers of two to a diagonal near one, is positive definite if B - c I = R'R + D with row sums of
-    |D| and of the radius below c: R'R >= 0 whatever R is, so that how R was found does not matter.
+    Every coefficient B, scaled by powers of two to a diagonal near one, is positive definite if B - c I = R'R + D with row sums
+    of |D| and of the radius below c: R'R >= 0 whatever R is, so that how R was found does not matter.
     """
     table = orders(matrix.variables, matrix.highest)
-    used = [p for p, k in zip(table.powers, np.abs(matrix.middle).max(axis=(0, 2, 3)), strict=True) if k > 0.0]
+    used: list[tuple[int, ...]] = [
+        p for p, k in zip(table.powers, np.abs(matrix.middle).max(axis=(0, 2, 3)), strict=True) if k > 0.0
+    ]
     degrees = [max((k[i] for k in used), default=0) for i in range(matrix.variables)]
     n = matrix.shape[0]
     tensor = np.zeros((len(matrix.middle), *(d + 1 for d in degrees), n, n))
     for number, k in enumerate(table.powers):
         if all(a <= d for a, d in zip(k, degrees, strict=True)):
-            tensor[(slice(None), *k)] = matrix.middle[:, number]
+            place: Any = (slice(None), *k)
+            tensor[place] = matrix.middle[:, number]
     for axis, degree in enumerate(degrees):
         tensor = np.moveaxis(np.tensordot(to_bernstein(degree), tensor, axes=(1, axis + 1)), 0, axis + 1)
     radius = matrix.radius + EPS * (2 * sum(degrees) + 8) * np.abs(matrix.middle).sum(axis=1)
     values = tensor.reshape(len(tensor), -1, n, n)
-    return _definite(values, INFLATE * radius[:, None]).all(axis=1)
+    return np.asarray(_definite(values, INFLATE * radius[:, None]).all(axis=1))
 
 
-def _definite(values: FloatArray, radius: FloatArray) -> FloatArray:
+def _definite(values: FloatArray, radius: FloatArray) -> BoolArray:
     diagonal = np.diagonal(values, axis1=-2, axis2=-1)
-    good = (diagonal > 0.0).all(axis=-1) & np.isfinite(values).all(axis=(-2, -1))
+    good = np.asarray((diagonal > 0.0).all(axis=-1) & np.isfinite(values).all(axis=(-2, -1)))
     scale = np.exp2(-np.round(0.5 * np.log2(np.where(good[..., None], diagonal, 1.0))))
     scaled = values * scale[..., :, None] * scale[..., None, :]
     spread = INFLATE * radius * scale[..., :, None] * scale[..., None, :]
@@ -265,11 +272,11 @@ def _definite(values: FloatArray, radius: FloatArray) -> FloatArray:
     return np.asarray(good & found & (INFLATE * (rest.sum(axis=-1).max(axis=-1) + need) < shift))
 
 
-def _factor(matrices: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _factor(matrices: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Upper triangular R with R'R near the matrix, for a stack; and where every pivot was positive."""
     work, n = matrices.copy(), matrices.shape[-1]
     R = np.zeros_like(work)
-    good = np.ones(work.shape[:-2], dtype=np.bool_)
+    good: BoolArray = np.ones(work.shape[:-2], dtype=np.bool_)
     for k in range(n):
         pivot = work[..., k, k]
         good &= pivot > 0.0
