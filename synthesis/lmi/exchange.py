@@ -103,7 +103,11 @@ def solve_sampled(relaxed: RelaxedProblem, settings: LmiSettings, tolerance: flo
         values[..., 0] -= part.margin * np.eye(values.shape[1])
         blocks.append(values)
     tolerance = max(settings.tolerance, tolerance)
-    return solve_with_interior(blocks, relaxed.cost, relaxed.weights, tolerance, settings.max_iterations)
+    found = solve_with_interior(blocks, relaxed.cost, relaxed.weights, tolerance, settings.max_iterations)
+    if not found.infeasible:
+        return found
+    other = solve_with_clarabel(assemble(relaxed), len(relaxed.cost), settings)  # which polishes its evidence
+    return other if other.excluded > found.excluded else found
 
 
 def exchange(
