@@ -3,11 +3,11 @@ r"""The update of an observer of any size over one sample with u, y and p held, 
     held     xhat+ = xhat + phi(M) T (A xhat + B u + L innovation),   M = T (A - L C)
     sampled  xhat+ = xhat + phi(M) T (A xhat + B u) + K innovation,   M = T A
 
-with phi(M) = int_0^1 e^(Ms) ds and innovation = y - C xhat - D u at the start of the sample. phi(M) v is all that is needed: with
-v_k = M v_(k-1)/(k+1) it is the sum of the v_k, in `pieces` equal parts of the sample where M is large. |M| <= nu on the whole range, in
-the largest row sum of diag(w) |M| diag(w)^-1 (bounds of |A| and |C| are the sums of their Chebyshev coefficients, that of |L| is the
-largest entry of the table). With z = nu/pieces the terms from k = K on sum to less than z^K / (K+1)! / (1 - z/(K+2)), whatever
-the parameters are; K is the least with a sum below 2^-53 of the first term.
+with phi(M) = int_0^1 e^(Ms) ds and innovation = y - C xhat - D u at the start of the sample. phi(M) v is all that is needed:
+with v_k = M v_(k-1)/(k+1) it is the sum of the v_k, in `pieces` equal parts of the sample where M is large. |M| <= nu on the
+whole range, in the largest row sum of diag(w) |M| diag(w)^-1 (bounds of |A| and |C| are the sums of their Chebyshev
+coefficients, that of |L| is the largest entry of the table). With z = nu/pieces the terms from k = K on sum to less than z^K
+/ (K+1)! / (1 - z/(K+2)), whatever the parameters are; K is the least with a sum below 2^-53 of the first term.
 """
 
 from __future__ import annotations
@@ -24,7 +24,9 @@ from estimators.schedule import GainSchedule, PlantPolynomials
 from estimators.schedule.plant import chebyshev
 
 _ENOUGH = 2.0**-53
-_LARGEST = 50.0  # of nu: from e^50 of growth in one sample on a sign or the sample time is wrong
+_STIFFEST = 2000.0  # of nu: more would take 500 pieces of a sample
+_MOST_GROWTH = 50.0  # exponent of growth in one sample; from e^700 on float64 overflows
+_LOOKS = 500  # places at most where growth is looked for
 _LARGEST_STEP = 1e50  # of the numbers in T A, T L C: their products meet states of up to 1e100 (arguments.LIMIT)
 _ROUNDS = 8  # of balancing
 
@@ -72,31 +74,53 @@ class ExactStep:
         for key, shape in (("A", (nx, nx)), ("B", (nx, nu)), ("C", (ny, nx)), ("D", (ny, nu))):
             full = np.zeros((*self.orders, *shape))
             full[tuple(slice(n) for n in stored[key].shape[:count])] = stored[key]
-            flat.append(full.reshape(math.prod(self.orders), -1))
+            flat.append(full.reshape(math.prod(self.orders), shape[0] * shape[1]))
         self.coefficients: FloatArray = np.hstack(flat)
         self.ends = np.cumsum([part.shape[1] for part in flat])[:-1]
         first = schedule.plant["A"]
         self.middle, self.half = (
-            (first.middle, first.half) if isinstance(first, PlantPolynomials) else np.array([[first.middle], [first.half]])
+            (first.middle, first.half)
+            if isinstance(first, PlantPolynomials)
+            else np.array([[first.middle], [first.half]])
         )
         self.sampled = schedule.update == "sampled"
         table = schedule.table if self.sampled else period * schedule.table
         self.gains = Multilinear(schedule.grid, table)
         sizes = {key: np.abs(part).sum(axis=tuple(range(count))) for key, part in stored.items()}
         gain = np.abs(table).max(axis=tuple(range(count)))
-        if not max(float(sizes["A"].sum() + sizes["B"].sum()), float((gain @ (sizes["C"].sum(1) + sizes["D"].sum(1))).sum())) <= _LARGEST_STEP:  # noqa: E501
+        products = float((gain @ np.hstack([sizes["C"], sizes["D"]])).sum())
+        if not max(float(sizes["A"].sum() + sizes["B"].sum()), products) <= _LARGEST_STEP:
             raise ScheduleError(
                 f"schedule '{schedule.name}': plant, gains and sample time multiply to more than {_LARGEST_STEP:g} in one "
                 "sample, where float64 overflows; check their units"
             )
-        nu_bound = norm_bound(sizes["A"] + (0.0 if self.sampled else gain @ sizes["C"]))
-        if not nu_bound <= _LARGEST:
+        largest = norm_bound(sizes["A"] + (0.0 if self.sampled else gain @ sizes["C"]))
+        self._refuse_growth(schedule)
+        if not largest <= _STIFFEST:
             raise ScheduleError(
-                f"schedule '{schedule.name}': the error may grow by e^{nu_bound:.0f} in one sample; check the signs and units of "
-                "the gains and the sample time"
+                f"schedule '{schedule.name}': the fastest error moves {largest:.0f} times faster than a sample; shorten the "
+                "sample time or bound the fastest pole"
             )
-        self.pieces, self.terms = series(nu_bound)
+        self.pieces, self.terms = series(largest)
         self.factors = [1.0 / (k + 1) for k in range(1, self.terms)]
+
+    def _refuse_growth(self, schedule: GainSchedule) -> None:
+        """A proved schedule never comes here; a wrong sign or sample time must not end in an overflow."""
+        count = len(schedule.grid)
+        lines = [np.union1d(line, 0.5 * (line[1:] + line[:-1])) for line in schedule.grid]
+        while math.prod(map(len, lines)) > _LOOKS and max(map(len, lines)) > 2:
+            lines = [np.union1d(line[::2], line[-1:]) if len(line) > 3 else line[[0, -1]] for line in lines]
+        places = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, count)
+        A, _, C, _ = self.plant(places)
+        for matrices in (A,) if self.sampled else (A, A - self.gains(places) @ C):
+            growth = np.linalg.eigvals(matrices).real.max(axis=-1)
+            if not growth.max() <= _MOST_GROWTH:
+                place = places[int(growth.argmax())]
+                at = ", ".join(f"{q.name} = {x:g} {q.unit}" for q, x in zip(schedule.parameters, place, strict=True))
+                raise ScheduleError(
+                    f"schedule '{schedule.name}': the error grows by e^{growth.max():.0f} in one sample at {at}; check the signs "
+                    "of the gains and the sample time"
+                )
 
     def plant(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """T A, T B, C and D at parameters (n, p)."""
@@ -121,10 +145,7 @@ class ExactStep:
         if not self.sampled:
             rate = rate + correction
             M = A - gain @ C
-        if len(state) == 1:
-            moved = self._moved_one(M[0], rate[0], state[0])[None]
-        else:
-            moved = self._moved(M, rate, state)
+        moved = self._moved_one(M[0], rate[0], state[0])[None] if len(state) == 1 else self._moved(M, rate, state)
         return (moved + correction if self.sampled else moved), innovation
 
     def _moved_one(self, M: FloatArray, rate: FloatArray, state: FloatArray) -> FloatArray:

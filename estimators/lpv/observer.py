@@ -80,9 +80,7 @@ class LpvObserver(Renewable):
         """A copy of the estimate, shape (*batch_shape, states)."""
         return self._state.copy().reshape(*self.batch_shape, self.sizes[0])
 
-    def step(
-        self, held_input: npt.ArrayLike, measurement: npt.ArrayLike, parameter: npt.ArrayLike
-    ) -> LpvObserverStep:
+    def step(self, held_input: npt.ArrayLike, measurement: npt.ArrayLike, parameter: npt.ArrayLike) -> LpvObserverStep:
         """Moves every entry by one sample; arguments have the shapes (*batch_shape, nu), (.., ny) and (.., parameters).
 
         The last axis may be left out where it is one long.
@@ -117,14 +115,18 @@ class LpvObserver(Renewable):
             innovation[seen.missing] = np.nan
         everywhere: BoolArray = np.ones(shape, dtype=np.bool_) if used is None else used.reshape(shape)
         return LpvObserverStep(
-            self.state, innovation.reshape(*shape, -1), everywhere, flags, seen.parameter.reshape(*shape, -1)
+            self.state,
+            innovation.reshape(*shape, self.sizes[2]),
+            everywhere,
+            flags,
+            seen.parameter.reshape(*shape, len(self.schedule.parameters)),
         )
 
     def _signals(self, value: npt.ArrayLike, size: int, what: str) -> FloatArray:
         array, wanted = numbers(value, what), (*self.batch_shape, size)
         if array.shape != wanted and not (size == 1 and array.shape == self.batch_shape):
             raise EstimatorError(f"{what} has shape {array.shape}, expected {wanted}")
-        return array.reshape(-1, size)
+        return array.reshape(math.prod(self.batch_shape), size)
 
     def reset(self, where: npt.ArrayLike | None = None, state: npt.ArrayLike = 0.0) -> None:
         """Sets the entries `where` (mask of the batch shape; None: all) to `state` and forgets what they have seen.

@@ -57,10 +57,11 @@ class PlantMatrices(NamedTuple):
 class GainSchedule:
     """Gains over scheduling parameters, with the plant, the units and the update that they are proved for.
 
-    `table` has the shape (breakpoints of each parameter, states, outputs), `grid` the breakpoints (b_i,) of each parameter; arrays
-    are read-only. One parameter is given as an array of any shape; several as arrays whose last axis holds them in order. The plant is xdot = A x + B u + E d,
-    y = C x + D u + F d. `sample_time` in s. `update` "held": the gains L belong to the continuous-time observer, integrated
-    exactly with y held over a sample; "sampled": the gains K correct once a sample (see `LpvVelocityObserver`).
+    `table` has the shape (breakpoints of each parameter, states, outputs), `grid` the breakpoints (b_i,) of each parameter;
+    arrays are read-only. One parameter is given as an array of any shape; several as arrays whose last axis holds them in
+    order. The plant is xdot = A x + B u + E d, y = C x + D u + F d. `sample_time` in s. `update` "held": the gains L belong
+    to the continuous-time observer, integrated exactly with y held over a sample; "sampled": the gains K correct once a
+    sample (see `LpvVelocityObserver`).
     """
 
     name: str

@@ -40,7 +40,8 @@ class PlantPolynomials(NamedTuple):
         u = (np.asarray(parameter) - self.middle) / self.half
         lead, shape = u.shape[:-1], self.coefficients.shape[-2:]
         basis = chebyshev(u.reshape(-1, u.shape[-1]), self.coefficients.shape[:-2])
-        return np.asarray((basis @ self.coefficients.reshape(basis.shape[1], -1)).reshape(*lead, *shape))
+        flat = self.coefficients.reshape(basis.shape[1], shape[0] * shape[1])
+        return np.asarray((basis @ flat).reshape(*lead, *shape))
 
 
 def chebyshev(u: FloatArray, sizes: Sequence[int]) -> FloatArray:

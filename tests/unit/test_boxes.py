@@ -96,7 +96,10 @@ def test_phi_and_exponential_are_those_of_scipy_at_random_places() -> None:
     for _ in range(4):
         t = RNG.uniform(-1.0, 1.0, 2)
         for g, region in enumerate(regions):
-            u = [float(o.p) / float(o.q) + float(f.p) / float(f.q) * x for o, f, x in zip(region.offset, region.factor, t)]  # noqa: B905
+            u = [
+                float(o.p) / float(o.q) + float(f.p) / float(f.q) * x
+                for o, f, x in zip(region.offset, region.factor, t)
+            ]
             exact = M.at([rational(x) for x in u])
             matrix = np.array([float(x.p) / float(x.q) for x in exact.entries()]).reshape(3, 3)
             value = np.einsum("k,kij->ij", (t**monomials).prod(axis=1), whole.middle[g])

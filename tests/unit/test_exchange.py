@@ -23,7 +23,9 @@ from synthesis.models.lpv import LpvModel
 from tests.support.lmi_cases import corner, lyapunov_problem, parameter, small_model
 
 p, q = sp.symbols("p q")
-DESIGN = ObserverDesign((Channel(("d1", "d2"), ("x1", "x2")),), degree=1, decay_rate=0.05, fastest_pole=60.0, backoff=0.0)
+DESIGN = ObserverDesign(
+    (Channel(("d1", "d2"), ("x1", "x2")),), degree=1, decay_rate=0.05, fastest_pole=60.0, backoff=0.0
+)
 
 
 def two_parameters(rate: float = 2.0) -> LpvModel:
@@ -63,9 +65,7 @@ def test_least_norms_agree_too() -> None:
     problem = observer_problem(model, DESIGN, scale, 0.6, False, 1e-4, clock)
     ours = solve_with_interior(blocks_of(problem, settings), problem.cost, problem.weights, 1e-8)
     theirs = solve_with_clarabel(assemble(relax(problem, settings)), problem.decisions, settings)
-    np.testing.assert_allclose(
-        problem.weights @ ours.decisions**2, problem.weights @ theirs.decisions**2, rtol=1e-5
-    )
+    np.testing.assert_allclose(problem.weights @ ours.decisions**2, problem.weights @ theirs.decisions**2, rtol=1e-5)
 
 
 def test_an_infeasible_problem_comes_with_evidence_and_a_feasible_one_without() -> None:
@@ -77,7 +77,9 @@ def test_an_infeasible_problem_comes_with_evidence_and_a_feasible_one_without() 
         A = feasible.constant(np.diag([a, -1.0]))
         feasible.require("P > 1", P - feasible.constant(np.eye(2)))
         feasible.require("decay", -(P @ A + A.T @ P))
-        found = solve_with_interior(blocks_of(feasible, LmiSettings(relaxation="grid")), feasible.cost, feasible.weights, 1e-6)
+        found = solve_with_interior(
+            blocks_of(feasible, LmiSettings(relaxation="grid")), feasible.cost, feasible.weights, 1e-6
+        )
         assert found.infeasible is not possible
         assert (found.excluded > 1e6) is not possible
         verdict = solve(feasible, LmiSettings(relaxation="exchange")).verdict
@@ -90,7 +92,9 @@ def test_exchange_finds_the_optimum_of_the_exact_relaxation(degree: int) -> None
     """The reference problem of the papers, 1.0441868 for degrees 1 to 3, from a handful of places."""
     model, _ = corner("corner-estimation", "longitudinal", 140.0)
     channel = Channel(
-        ("friction", "acceleration_error", "force_noise"), ("bristle_deflection", "relative_velocity"), weights=(1.0, 1.0, 0.5)
+        ("friction", "acceleration_error", "force_noise"),
+        ("bristle_deflection", "relative_velocity"),
+        weights=(1.0, 1.0, 0.5),
     )
     design = ObserverDesign((channel,), degree=degree, backoff=0.0)
     exact = design_observer(model, design)
@@ -151,9 +155,7 @@ def test_what_no_lyapunov_function_proves_is_certified_by_no_relaxation() -> Non
 
 
 def test_rates_decide_with_two_parameters_as_with_one() -> None:
-    slow, fast = (
-        design_observer(two_parameters(rate), DESIGN).gamma for rate in (0.0, 50.0)
-    )
+    slow, fast = (design_observer(two_parameters(rate), DESIGN).gamma for rate in (0.0, 50.0))
     jumping = design_observer(two_parameters(np.inf), replace(DESIGN, degree=0)).gamma
     assert slow < fast <= jumping * (1.0 + 1e-4)
     with pytest.raises(ProblemError, match="unbounded rate"):
