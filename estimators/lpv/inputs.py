@@ -85,10 +85,10 @@ class SignalMonitor(Memory):
         for one in raised:
             flags |= one
         missing = ~(np.absolute(y) <= LIMIT)
-        absent = missing.any(axis=1)
+        absent: BoolArray = np.asarray(missing.any(axis=1))
         raise_flag(flags, absent, Flag.MISSING_MEASUREMENT)
         no_input = ~(np.absolute(u) <= LIMIT)
-        raise_flag(flags, no_input.any(axis=1), Flag.MISSING_INPUT)
+        raise_flag(flags, np.asarray(no_input.any(axis=1)), Flag.MISSING_INPUT)
         held = np.where(no_input, self.input, u)
         self.input[:] = held
         coast = absent | self._stale(y, absent, flags)

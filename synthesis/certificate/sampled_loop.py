@@ -76,7 +76,7 @@ class SampledLoop:
     def _fill_at_once(self, cells: list[Region], local: FloatArray) -> bool:
         """All cells from the middles of their enclosures, where the loop has them."""
         if self.time not in self.on_boxes:
-            self.on_boxes[self.time] = self.loop.on_boxes(self.time) if hasattr(self.loop, "on_boxes") else None
+            self.on_boxes[self.time] = self.loop.on_boxes(self.time, cells) if hasattr(self.loop, "on_boxes") else None
         system, count = self.on_boxes[self.time], local.shape[1]
         if system is None:
             return False

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 from flint import arb, fmpq, fmpq_mat
@@ -23,7 +24,7 @@ from synthesis.certificate.inequalities import Question, inequalities
 from synthesis.certificate.quick import quickly_proved
 from synthesis.loop.motion import one_sample_later, rates, time_derivative
 from synthesis.loop.observer import ObserverLoop
-from synthesis.loop.system import System, Time
+from synthesis.loop.system import Region, System, Time
 from synthesis.polynomials.definite import sign_on_box
 from synthesis.polynomials.enclosure import PolynomialMatrix, block, constant, identity, variable
 from synthesis.polynomials.rational import decimal
@@ -98,6 +99,9 @@ class Verifier:
         for number, cell in enumerate(self.loop.cells()):
             if done_at_once[number]:
                 continue
+            broken = self._fails_in_a_corner(cell, question, time, P, later, dual) if count > 1 else None
+            if broken is not None:
+                return broken
             waiting, done = [(cell, 0)], 0
             while waiting:
                 region, depth = waiting.pop()
@@ -117,6 +121,27 @@ class Verifier:
                     return Outcome(False, undecided or "matrix exponential", region.offset)
                 waiting += [(half, depth + 1) for half in reversed(region.halves(_axis(depth, P, count)))]
         return Outcome(True)
+
+    def _fails_in_a_corner(
+        self, cell: Region, question: Question, time: Time, P: PolynomialMatrix, later: PolynomialMatrix, dual: bool
+    ) -> Outcome | None:
+        """The corner of the cell, and of the rates, where the claim certainly fails: numbers are quicker than polynomials."""
+        count = cell.parameters
+        moving = [i for i in range(count) if later.degrees[count + i]]
+        for signs in product((-1, 1), repeat=count + len(moving)):
+            local = [*signs[:count], *(0,) * count]
+            for i, sign in zip(moving, signs[count:], strict=True):
+                local[count + i] = sign
+            point = Region(cell.point(tuple(local)), (fmpq(0),) * (2 * count))
+            system = self.loop.system(Region((*point.offset[:count], *(fmpq(0),) * count), point.factor), time)
+            if system is None:
+                return None
+            here = [m.affine(point.offset, point.factor).balls() for m in (P, later)]
+            acting = replace(system, A=system.A.T) if dual else system
+            failed, _ = _judge(inequalities(question, acting, here[0], here[1], self.balls))
+            if failed is not None and failed[1] is not None:
+                return Outcome(False, failed[0], point.offset)
+        return None
 
     def question(self, claim: Claim) -> Question:
         """The numbers of a claim, exact."""

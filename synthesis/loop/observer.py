@@ -141,15 +141,15 @@ class ObserverLoop:
             out[key] = matrices[key].blurred(_evaluation_error(matrix, argument))
         return out
 
-    def on_boxes(self, time: Time) -> System | None:
-        """`system` on all cells at once, every matrix `Boxes`; None where they are too many or too large for that."""
-        axes, cells = self.plant.axes, list(self.cells())
+    def on_boxes(self, time: Time, cells: Sequence[Region]) -> System | None:
+        """`system` on many regions at once, every matrix `Boxes`; None where they are too many or too large for that."""
+        axes = self.plant.axes
         if not 1 <= len(axes) <= max(HIGHEST) or len(cells) > MOST_BOXES:
             return None
         plant = {key: local(self._plant[key], cells) for key in "ACEF"}
         shape = self.plant.states, self.plant.matrices["C"].shape[0]
         rounding = rounding_of(self._gain_rounding, shape) if self.rounded else np.zeros(shape)
-        gain = gains(self.table, [len(points) for points in self.breakpoints], rounding)
+        gain = gains(self.table, self.breakpoints, axes, cells, rounding)
         if time == "discrete":
             return self._updated(plant, gain, unit(self.plant.states, axes), boxes)
         below = None if self.plant.is_polynomial else local(self.plant.denominator, cells)

@@ -7,7 +7,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from flint import arb, fmpq_mat
+from flint import arb, fmpq, fmpq_mat
 
 from estimators.arrays import FloatArray
 from synthesis.loop.plant import Axis
@@ -15,7 +15,7 @@ from synthesis.loop.system import Region
 from synthesis.polynomials.boxes import EPS, Boxes, constants, orders
 from synthesis.polynomials.enclosure import PolynomialMatrix
 
-HIGHEST = {1: 8, 2: 6, 3: 4}  # total degree that is kept, by the number of parameters
+HIGHEST = {1: 8, 2: 7, 3: 6}  # total degree that is kept, by the number of parameters
 MOST_BOXES = 20_000
 
 
@@ -50,23 +50,40 @@ def local(matrix: PolynomialMatrix, cells: Sequence[Region]) -> Boxes:
     return _boxes(moved, radius, count)
 
 
-def gains(table: Mapping[tuple[int, ...], fmpq_mat], counts: Sequence[int], rounding: FloatArray) -> Boxes:
-    """The multilinear gain on every cell: sum over its corners of the gain there times prod (1 +- t_i)/2."""
-    shape = next(iter(table.values())).nrows(), next(iter(table.values())).ncols()
-    values = np.empty((*counts, *shape))
-    for index in np.ndindex(*counts):
-        values[index] = np.array([_float(x) for x in table[index].entries()]).reshape(shape)
-    count = len(counts)
-    corners = [
-        values[tuple(slice(c, n - 1 + c) for c, n in zip(corner, counts, strict=True))].reshape(-1, *shape)
-        for corner in product((0, 1), repeat=count)
-    ]
-    moved = np.stack(corners, axis=1).reshape(-1, *(2,) * count, *shape)
+def gains(
+    table: Mapping[tuple[int, ...], fmpq_mat],
+    breakpoints: Sequence[Sequence[fmpq]],
+    axes: Sequence[Axis],
+    cells: Sequence[Region],
+    rounding: FloatArray,
+) -> Boxes:
+    """The multilinear gain on every region (each in one cell of the table), from the exact corners of its cell.
+
+    On a cell it is the sum over its corners of the gain there times prod (1 +- t_i)/2; a part of it is t = offset + factor s.
+    """
+    count, first = len(breakpoints), next(iter(table.values()))
+    shape = first.nrows(), first.ncols()
+    numbers = {index: np.array([_float(x) for x in m.entries()]).reshape(shape) for index, m in table.items()}
+    scaled = [[axis.scaled(x) for x in line] for axis, line in zip(axes, breakpoints, strict=True)]
+    moved = np.empty((len(cells), *(2,) * count, *shape))
+    offset, factor = np.empty((len(cells), count)), np.empty((len(cells), count))
+    for g, cell in enumerate(cells):
+        low = []
+        for i, line in enumerate(scaled):
+            k = next(j for j in range(len(line) - 1) if cell.offset[i] <= line[j + 1])
+            low.append(k)
+            middle, half = (line[k] + line[k + 1]) / 2, (line[k + 1] - line[k]) / 2
+            offset[g, i], factor[g, i] = _float((cell.offset[i] - middle) / half), _float(cell.factor[i] / half)
+        for corner in product((0, 1), repeat=count):
+            moved[(g, *corner)] = numbers[tuple(k + c for k, c in zip(low, corner, strict=True))]
     size = np.abs(moved).sum(axis=tuple(range(1, count + 1)))
-    for axis in range(1, count + 1):
-        low, high = np.take(moved, 0, axis=axis), np.take(moved, 1, axis=axis)
-        moved = np.stack([0.5 * (low + high), 0.5 * (high - low)], axis=axis)
-    return _boxes(moved, EPS * (count + 4) * size + rounding, count)
+    for axis in range(count):
+        left, right = np.take(moved, 0, axis=axis + 1), np.take(moved, 1, axis=axis + 1)
+        spread = (len(cells), *(1,) * (left.ndim - 1))
+        slope = 0.5 * (right - left)
+        start = 0.5 * (left + right) + offset[:, axis].reshape(spread) * slope
+        moved = np.stack([start, factor[:, axis].reshape(spread) * slope], axis=axis + 1)
+    return _boxes(moved, EPS * (8 * count + 8) * size + rounding, count)
 
 
 def rounding_of(radii: Mapping[tuple[int, int], Any], shape: tuple[int, int]) -> FloatArray:

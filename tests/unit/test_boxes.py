@@ -8,6 +8,7 @@ from flint import arb_mat, fmpq, fmpq_mat
 from scipy.linalg import expm
 
 from synthesis.loop.on_boxes import gains, local
+from synthesis.loop.plant import Axis
 from synthesis.loop.system import Region
 from synthesis.polynomials import boxes
 from synthesis.polynomials.boxes import Boxes, constants, orders, positive
@@ -73,7 +74,9 @@ def test_sums_and_products_hold_the_exact_values(count: int) -> None:
 
 def test_an_interpolated_table_holds_the_exact_multilinear_gain() -> None:
     table = {k: fmpq_mat(1, 1, [fmpq(int(RNG.integers(1, 1000)), 7)]) for k in np.ndindex(4, 4)}
-    found = gains(table, [4, 4], np.zeros((1, 1)))
+    axes = [Axis(name, "1", fmpq(-1), fmpq(1), None, None) for name in "pq"]
+    line = [fmpq(-1), fmpq(-1, 3), fmpq(2, 7), fmpq(1)]
+    found = gains(table, [line, line], axes, cells(2), np.zeros((1, 1)))
     point = (fmpq(3, 11), fmpq(-5, 13))
     exact = []
     for i in range(3):
@@ -83,6 +86,11 @@ def test_an_interpolated_table_holds_the_exact_multilinear_gain() -> None:
             value += a * ((1 - b) * table[i + 1, j][0, 0] + b * table[i + 1, j + 1][0, 0])
             exact.append(fmpq_mat(1, 1, [value]))
     assert holds(found, exact, point)
+    halves = [
+        half for cell in cells(2) for half in cell.halves(1)
+    ]  # parts of cells: s from the middle of the lower half
+    parts = gains(table, [line, line], axes, halves[::2], np.zeros((1, 1)))
+    assert holds(parts, exact, (point[0], 2 * point[1] + 1)) is (abs(2 * point[1] + 1) <= 1)
 
 
 def test_phi_and_exponential_are_those_of_scipy_at_random_places() -> None:
@@ -98,7 +106,7 @@ def test_phi_and_exponential_are_those_of_scipy_at_random_places() -> None:
         for g, region in enumerate(regions):
             u = [
                 float(o.p) / float(o.q) + float(f.p) / float(f.q) * x
-                for o, f, x in zip(region.offset, region.factor, t)
+                for o, f, x in zip(region.offset, region.factor, t, strict=False)
             ]
             exact = M.at([rational(x) for x in u])
             matrix = np.array([float(x.p) / float(x.q) for x in exact.entries()]).reshape(3, 3)

@@ -5,15 +5,18 @@ from __future__ import annotations
 import copy
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import sympy as sp
+from flint import fmpq, fmpq_mat
 
 from estimators import GainSchedule, LpvObserver
 from estimators.schedule import read_content
+from synthesis.certificate.inequalities import Question
 from synthesis.certificate.proof import certificate, prove
-from synthesis.certificate.quick import quickly_proved
+from synthesis.certificate.quick import _Form, quickly_proved
 from synthesis.certificate.verify import Verifier
 from synthesis.design import deploy as deploying
 from synthesis.design.deploy import Deployment, DeploySettings, deploy, names_of
@@ -21,6 +24,7 @@ from synthesis.design.export import export, schedule_content
 from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.errors import ProblemError
 from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.enclosure import PolynomialMatrix
 from tests.support.lmi_cases import parameter, small_model
 
 p, q, r = sp.symbols("p q r")
@@ -89,8 +93,9 @@ def test_the_quick_road_proves_nothing_that_balls_refuse(deployment: Deployment)
     """Both roads on the claims as they are, and on the same claims at levels that do not hold."""
     loop, names = deployment.loop, names_of(deployment.gains.model)
     for claim in deployment.claims:
-        harder = replace(claim, level=claim.level * (0.9 if "gain" in claim.kind or "pole" in claim.kind else 1.0))
-        harder = replace(harder, level=min(2.0 * claim.level, 0.999)) if harder.level == claim.level else harder
+        easier_up = "gain" in claim.kind or "pole" in claim.kind
+        level = claim.level / 20.0 if easier_up else 0.9999 if claim.kind == "drop probability" else 300.0 * claim.level
+        harder = replace(claim, level=level)
         for asked in (claim, harder):
             both = Verifier(loop, names)
             plain = Verifier(loop, names)
@@ -149,3 +154,12 @@ def test_what_cannot_work_is_refused_before_anything_is_solved(monkeypatch: pyte
     monkeypatch.setattr(deploying, "Search", None)
     with pytest.raises(ProblemError, match="has 4 scheduling parameters; a table that is deployed has 1 to 3"):
         deploy(gains)
+
+
+def test_products_of_two_motions_are_part_of_one_sample_later() -> None:
+    """P = 1 + u1 u2 at the vertices of the rates: (u1 + d1)(u2 + d2) and not only its terms of first order."""
+    own = PolynomialMatrix({(0, 0): fmpq_mat([[1]]), (1, 1): fmpq_mat([[1]])}, (1, 1), 2)
+    loop = SimpleNamespace(sample_time=fmpq(1, 2))
+    later = _Form(loop, Question("internal update", fmpq(1)), "discrete", own, (), False)._later([fmpq(3), fmpq(-2)])
+    for u in ((fmpq(0), fmpq(0)), (fmpq(1, 3), fmpq(-1, 5))):
+        assert later.at(u)[0, 0] == 1 + (u[0] + fmpq(3, 2)) * (u[1] - 1)
