@@ -20,7 +20,7 @@ import numpy as np
 from estimators.arrays import BoolArray, FloatArray
 from estimators.errors import ScheduleError
 from estimators.interpolate import Multilinear
-from estimators.schedule import GainSchedule, PlantPolynomials
+from estimators.schedule import GainSchedule
 from estimators.schedule.plant import chebyshev
 
 _ENOUGH = 2.0**-53
@@ -78,11 +78,8 @@ class ExactStep:
         self.coefficients: FloatArray = np.hstack(flat)
         self.ends = np.cumsum([part.shape[1] for part in flat])[:-1]
         first = schedule.plant["A"]
-        self.middle, self.half = (
-            (first.middle, first.half)
-            if isinstance(first, PlantPolynomials)
-            else np.array([[first.middle], [first.half]])
-        )
+        self.middle: FloatArray = np.atleast_1d(first.middle)
+        self.half: FloatArray = np.atleast_1d(first.half)
         self.sampled = schedule.update == "sampled"
         table = schedule.table if self.sampled else period * schedule.table
         self.gains = Multilinear(schedule.grid, table)

@@ -39,7 +39,7 @@ class SchedulingParameter:
     unit: str
     min: float
     max: float
-    rate_min: float  # unit per second
+    rate_min: float  # unit per second; -inf and inf: it may jump
     rate_max: float
     absolute: bool  # gains and plant depend on the magnitude
 
@@ -230,8 +230,8 @@ def _build(content: Mapping[str, Any]) -> GainSchedule:
     for stored in content["scheduling"]:
         entry = dict(stored)
         breakpoints = entry.pop("breakpoints")
-        for key in ("min", "max", "rate_min", "rate_max"):
-            entry[key] = float(entry[key])
+        for key, free in (("min", 0.0), ("max", 0.0), ("rate_min", -np.inf), ("rate_max", np.inf)):
+            entry[key] = free if entry[key] is None else float(entry[key])
         parameters.append(SchedulingParameter(**entry))
         grid.append(_frozen(breakpoints, (len(breakpoints),)))
     signals = {kind: tuple(Signal(signal["name"], signal["unit"]) for signal in model[kind]) for kind in SIGNALS}

@@ -303,7 +303,11 @@ def observer_problem(
     scaled = model.polynomial.with_states_scaled(scale)
     known = {key: problem.scaled(getattr(scaled, key)) for key in ("A", "C", "E", "F", "denominator")}
     below, nx, ny = known["denominator"], len(model.states), len(model.outputs)
-    P = problem.symmetric("P", nx, design.degree)
+    # A parameter that jumps may move the gains, but not the Lyapunov function.
+    jumps = any(p.may_jump for p in model.parameters)
+    P = problem.symmetric(
+        "P", nx, tuple(0 if p.may_jump else design.degree for p in model.parameters) if jumps else design.degree
+    )
     X = problem.matrix("X", nx, ny, design.degree)
     closed = (P @ known["A"] - X @ known["C"]) * (1.0 / clock)
     frozen = closed + closed.T

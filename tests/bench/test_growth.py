@@ -1,6 +1,6 @@
 """How the cost of an observer with proof grows with states and parameters, and against one cvxpy block for each grid point.
 
-Run with  pytest tests/bench/test_growth.py --benchmark-only -s ; without benchmarks only the small cases run, once, for their answers.
+Run with  pytest tests/bench/test_growth.py --benchmark-only -s ; without benchmarks only the small cases run, for their answers.
 Times of one run are comparable with each other only: `cpu` is the processor's time, which a loaded machine lengthens less.
 """
 
@@ -30,7 +30,7 @@ CASES = [(2, 1), (4, 1), (8, 1), (16, 1), (19, 1), (2, 2), (4, 2), (8, 2), (2, 3
 
 @pytest.mark.parametrize(("states", "parameters"), CASES)
 def test_from_model_to_proved_schedule(benchmark: Any, states: int, parameters: int) -> None:
-    if benchmark.disabled and (states, parameters) not in CASES[:2] + [(2, 2)]:
+    if benchmark.disabled and (states, parameters) not in [*CASES[:2], (2, 2)]:
         pytest.skip("long; runs when benchmarks are enabled")
     seconds: dict[str, float] = {}
 
@@ -92,7 +92,8 @@ def test_two_parameters_against_one_cvxpy_block_for_each_point(benchmark: Any, c
     benchmark.extra_info |= {"script / ours": round(ratio, 1), "script, s": round(script, 1), "gamma": ours.gamma}
     with capsys.disabled():
         print(
-            f"\nper-block script {script:.1f} s, ours {np.median(times):.2f} s: {ratio:.0f} times; gamma {ours.gamma:.6f}, {gamma:.6f}"
+            f"\nper-block script {script:.1f} s, ours {np.median(times):.2f} s: {ratio:.0f} times; "
+            f"gamma {gamma:.6f} and {ours.gamma:.6f}"
         )
 
 

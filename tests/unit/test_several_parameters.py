@@ -13,6 +13,7 @@ import sympy as sp
 from flint import fmpq, fmpq_mat
 
 from estimators import GainSchedule, LpvObserver
+from estimators.errors import ScheduleError
 from estimators.schedule import read_content
 from synthesis.certificate.inequalities import Question
 from synthesis.certificate.proof import certificate, prove
@@ -136,13 +137,31 @@ def test_the_runtime_follows_the_plant_within_the_proved_gain(content: dict) -> 
     np.testing.assert_allclose(step.estimate, x, atol=0.05)
 
 
-def test_three_parameters_and_parameters_that_jump(tmp_path: Path) -> None:
+def test_three_parameters_end_to_end(tmp_path: Path) -> None:
     found = deploy(design_observer(spring(3), DESIGN), DeploySettings(interpolation_cost=0.03))
     assert found.table.ndim == 5
     assert all(proof.proved for proof in export(tmp_path / "three.json", schedule_content(found, "three")))
-    steady = replace(DESIGN, degree=0, decay_rate=0.02)
-    jumping = design_observer(spring(2, np.inf), steady)
-    assert jumping.gamma >= design_observer(spring(2, 0.5), steady).gamma * (1.0 - 1e-6)
+
+
+def test_parameters_that_jump_from_design_to_runtime(tmp_path: Path) -> None:
+    """Rates are null in the file; claims hold whatever the parameters do; a P that depends on them is refused."""
+    found = deploy(design_observer(spring(2, np.inf), replace(DESIGN, decay_rate=0.02)))
+    content = schedule_content(found, "jumping")
+    assert [entry["rate_max"] for entry in content["scheduling"]] == [None, None]
+    assert all(proof.proved for proof in export(tmp_path / "jumping.json", content))
+    schedule = GainSchedule.load(tmp_path / "jumping.json")
+    observer = LpvObserver(schedule)
+    flags = [int(observer.step([0.0], [0.0], place).flags) for place in ([-1.0, 1.0], [1.0, -1.0], [0.3, 0.9])]
+    assert flags == [0, 0, 0]
+    moving = copy.deepcopy(content)
+    moving["claims"][0]["P"]["orders"].append([1, 0])
+    moving["claims"][0]["P"]["coefficients"].append([[1e-6, 0.0], [0.0, 1e-6]])
+    with pytest.raises(ScheduleError, match="depends on p, which may jump; it proves nothing"):
+        prove(moving)
+    half = copy.deepcopy(content)
+    half["scheduling"][0]["rate_min"] = -1.0
+    with pytest.raises(ScheduleError, match=r"rate_max: expected a number, got None"):
+        prove(half)
 
 
 def test_what_cannot_work_is_refused_before_anything_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
