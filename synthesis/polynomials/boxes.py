@@ -24,6 +24,7 @@ from synthesis.polynomials.positivity import to_bernstein
 
 EPS = 2.0**-52
 INFLATE = 1.0 + 1e-9  # after every operation on radii, each of which is off by fewer than 10^5 roundings
+SHORT = 2.0**-28  # share of the diagonal that is given away for lower degrees, at first
 TINY = 1e-290  # what underflow may take away
 TERMS = 14  # of the series of phi at |X| <= 1/2: remainder 5e-17
 
@@ -103,20 +104,43 @@ class Boxes:
         table = orders(self.variables, self.highest)
         count = max(len(self.middle), len(other.middle))
         out = np.zeros((count, len(table.powers), self.shape[0], other.shape[1]))
-        magnitudes = np.abs(other.middle)
-        total = magnitudes.sum(axis=1)
+        beyond = np.cumsum(np.abs(other.middle)[:, ::-1], axis=1)[
+            :, ::-1
+        ]  # sums of the absolute coefficients from number k on
+        total = beyond[:, 0]
+        last = int(np.flatnonzero(total_by_order(other.middle))[-1]) + 1 if other.middle.any() else 0
         lost: Any = 0.0
         for k, (upto, sums) in enumerate(zip(table.upto, table.sums, strict=True)):
             left = self.middle[:, k]
             if not left.any():
                 continue
-            out[:, sums] += left[:, None] @ other.middle[:, :upto]
-            if upto < len(table.powers):
-                lost = lost + np.abs(left) @ magnitudes[:, upto:].sum(axis=1)
+            kept = min(upto, last)
+            out[:, sums[:kept]] += left[:, None] @ other.middle[:, :kept]
+            if upto < last:
+                lost = lost + np.abs(left) @ beyond[:, upto]
         gamma = EPS * (self.shape[1] + 2 * len(table.powers) + 8)
         size = np.abs(self.middle).sum(axis=1)
         spread = lost + size @ (gamma * total + other.radius) + self.radius @ (total + other.radius) + TINY
-        return self._like(out, INFLATE * spread)
+        return self._like(out, INFLATE * spread).trimmed()
+
+    def trimmed(self) -> Boxes:
+        """Without the monomials that are below a rounding in every entry of every box; they go into the radius."""
+        sizes = np.abs(self.middle)
+        return self._without(sizes, np.asarray((sizes <= EPS * sizes.sum(axis=1, keepdims=True)).all(axis=(0, 2, 3))))
+
+    def shortened(self) -> Boxes:
+        """Without the monomials that hardly matter for the sign: far below the diagonal's mean of their row and column."""
+        sizes, diagonal = np.abs(self.middle), np.abs(np.diagonal(self.middle[:, 0], axis1=1, axis2=2))
+        scale = SHORT * np.sqrt(diagonal[:, :, None] * diagonal[:, None, :])
+        return self._without(sizes, np.asarray((sizes <= scale[:, None]).all(axis=(0, 2, 3))))
+
+    def _without(self, sizes: FloatArray, idle: BoolArray) -> Boxes:
+        idle[0] = False
+        if not idle.any():
+            return self
+        middle = self.middle.copy()
+        middle[:, idle] = 0.0
+        return self._like(middle, INFLATE * (self.radius + sizes[:, idle].sum(axis=1)))
 
     def scaled_by(self, scalar: Boxes) -> Boxes:
         """Times a 1 x 1 polynomial."""
@@ -135,6 +159,11 @@ class Boxes:
     def tiled(self, times: int) -> Boxes:
         """All boxes once more, and once more."""
         return self._like(np.tile(self.middle, (times, 1, 1, 1)), np.tile(self.radius, (times, 1, 1)))
+
+
+def total_by_order(middle: FloatArray) -> FloatArray:
+    """Sums (K,) of all absolute coefficients of each monomial."""
+    return np.asarray(np.abs(middle).sum(axis=(0, 2, 3)))
 
 
 def constants(matrix: FloatArray, variables: int, highest: int) -> Boxes:
@@ -238,6 +267,15 @@ def positive(matrix: Boxes) -> BoolArray:
     Every coefficient B, scaled by powers of two to a diagonal near one, is positive definite if B - c I = R'R + D with row sums
     of |D| and of the radius below c: R'R >= 0 whatever R is, so that how R was found does not matter.
     """
+    good = _positive(matrix.shortened())
+    left = np.flatnonzero(~good)
+    if len(left):
+        part = matrix if len(matrix.middle) == 1 else matrix._like(matrix.middle[left], matrix.radius[left])
+        good[left] = _positive(part)
+    return good
+
+
+def _positive(matrix: Boxes) -> BoolArray:
     table = orders(matrix.variables, matrix.highest)
     used: list[tuple[int, ...]] = [
         p for p, k in zip(table.powers, np.abs(matrix.middle).max(axis=(0, 2, 3)), strict=True) if k > 0.0

@@ -7,6 +7,7 @@ Times of one run are comparable with each other only: `cpu` is the processor's t
 from __future__ import annotations
 
 import resource
+import warnings
 from itertools import product
 from time import perf_counter, process_time
 from typing import Any
@@ -25,7 +26,7 @@ from synthesis.lmi.result import Verdict
 from tests.support.any_size import any_schedule, signals
 from tests.support.chain import chain, chain_design
 
-CASES = [(2, 1), (4, 1), (8, 1), (16, 1), (19, 1), (2, 2), (4, 2), (8, 2), (2, 3), (4, 3)]
+CASES = [(2, 1), (4, 1), (8, 1), (16, 1), (19, 1), (2, 2), (4, 2), (8, 2), (4, 3)]
 
 
 @pytest.mark.parametrize(("states", "parameters"), CASES)
@@ -57,7 +58,7 @@ def test_two_parameters_against_one_cvxpy_block_for_each_point(benchmark: Any, c
     import cvxpy as cp
 
     model = chain(4, 2)
-    channel = Channel(("w", "v0", "v1"), ("x0", "x1"))
+    channel = Channel(("w", "v0", "v1"), ("x2", "x3"))
     found = design_observer(model, ObserverDesign((channel,), degree=1, backoff=0.0))
     ours = benchmark.pedantic(design_observer, (model, ObserverDesign((channel,), degree=1, backoff=0.0)), rounds=3)
     assert ours.verdict is Verdict.CERTIFIED
@@ -72,7 +73,8 @@ def test_two_parameters_against_one_cvxpy_block_for_each_point(benchmark: Any, c
     X = [cp.Variable((4, 2)) for _ in range(3)]
     square, constraints = cp.Variable(), []
     half = [q.half_width for q in model.parameters]
-    Z = np.eye(2, 4) @ Ti * found.scale[:2].max()
+    unit = float((1.0 / found.scale[2:]).max())  # of the velocities
+    Z = np.eye(4)[2:] @ Ti / unit
     for u in product(np.linspace(-1.0, 1.0, 20), repeat=2):
         at = model.on(np.array([[q.middle + q.half_width * x for q, x in zip(model.parameters, u, strict=True)]]))
         A, C, E, F = T @ at.A[0] @ Ti, at.C[0] @ Ti, T @ at.E[0], at.F[0]
@@ -84,9 +86,11 @@ def test_two_parameters_against_one_cvxpy_block_for_each_point(benchmark: Any, c
             phi = A.T @ here + here @ A - gain @ C - C.T @ gain.T + moving + Z.T @ Z
             constraints.append(cp.bmat([[phi, side], [side.T, -square * np.eye(3)]]) << -1e-8 * np.eye(7))
     problem = cp.Problem(cp.Minimize(square), constraints)
-    problem.solve(solver="CLARABEL")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of inaccuracy; the answer is compared
+        problem.solve(solver="CLARABEL")
     script = perf_counter() - start
-    gamma = float(np.sqrt(problem.value)) / found.scale[:2].max()
+    gamma = float(np.sqrt(problem.value)) * unit
     assert ours.gamma == pytest.approx(gamma, rel=1e-4)
     ratio = script / float(np.median(times))
     benchmark.extra_info |= {"script / ours": round(ratio, 1), "script, s": round(script, 1), "gamma": ours.gamma}
