@@ -133,6 +133,16 @@ class GainSchedule:
         self._only_one()
         return self.grid[0]
 
+    @property
+    def polynomials(self) -> dict[str, PlantPolynomial]:
+        """The plant as polynomials of the only parameter.
+
+        Raises:
+            ScheduleError: there are several.
+        """
+        self._only_one()
+        return {key: matrix for key, matrix in self.plant.items() if isinstance(matrix, PlantPolynomial)}
+
     def _only_one(self) -> None:
         if len(self.parameters) != 1:
             names = shown(", ".join(parameter.name for parameter in self.parameters), 120)
