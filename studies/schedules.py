@@ -22,7 +22,7 @@ from studies.execution.processes import available_cores, in_order
 from studies.spec import load_spec
 from synthesis.certificate.frozen import frozen_gain
 from synthesis.certificate.proof import Proof, prove
-from synthesis.design.deploy import deploy
+from synthesis.design.deploy import deploy, refuse_undeployable
 from synthesis.design.export import export, schedule_content
 from synthesis.design.hinf_observer import channel_matrices
 from synthesis.models.parameter_set import ParameterSet
@@ -78,9 +78,11 @@ def run_spec(name: str, out: Path, check: bool = False) -> ScheduleRun:
     start = perf_counter()
     spec, folder = load_spec(name)
     parameters = spec.parameter_set(folder)
-    deployment = deploy(spec.design(spec.build_model(parameters)), spec.deploy_settings())
+    model = spec.build_model(parameters)
+    refuse_undeployable(model)  # before the design, which may take minutes
+    deployment = deploy(spec.design(model), spec.deploy_settings())
     content = schedule_content(deployment, spec.name, spec.description, spec.resolved(parameters))
-    loop, model = deployment.loop, deployment.gains.model
+    loop = deployment.loop
     least = tuple(frozen_gain(loop, *channel_matrices(model, channel)) for channel in deployment.gains.design.channels)
     path = out / f"{spec.name}.json"
     fresh = tuple(prove(content, str(path)))

@@ -18,7 +18,8 @@ from estimators.arrays import BoolArray
 from synthesis.certificate.inequalities import Question, inequalities
 from synthesis.loop.on_boxes import HIGHEST, local
 from synthesis.loop.system import Region, System, Time
-from synthesis.polynomials.boxes import BoxArithmetic, Boxes, positive
+from synthesis.polynomials.box_sign import positive
+from synthesis.polynomials.boxes import BoxArithmetic, Boxes
 from synthesis.polynomials.enclosure import PolynomialMatrix
 
 MOST_VERTICES = 8

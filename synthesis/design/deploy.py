@@ -77,9 +77,7 @@ def deploy(
     model, design = gains.model, gains.design
     if gains.verdict is not Verdict.CERTIFIED:
         raise ProblemError(f"gains are not certified and are not deployed: {gains.result.message}")
-    refuse_undeployable(model, "deployed")
-    if not model.polynomial.is_polynomial:
-        raise ProblemError(f"model '{model.name}' is rational; schedule files store polynomial plants")
+    refuse_undeployable(model)
     if gains.update == "sampled" and gains.sample_time != settings.sample_time:
         raise ProblemError(
             f"gains designed for a sample time of {gains.sample_time} s are not run at {settings.sample_time} s"
@@ -109,13 +107,15 @@ def deploy(
     )
 
 
-def refuse_undeployable(model: LpvModel, what: str) -> None:
-    """Raise ProblemError for a model whose tables cannot be proved: known before anything is solved."""
+def refuse_undeployable(model: LpvModel) -> None:
+    """Raise ProblemError for a model whose tables cannot be proved or stored: known before anything is solved."""
     count = len(model.parameters)
     if not 1 <= count <= MOST_PARAMETERS:
         raise ProblemError(
-            f"model '{model.name}' has {count} scheduling parameters; a table that is {what} has 1 to {MOST_PARAMETERS}"
+            f"model '{model.name}' has {count} scheduling parameters; a table that is deployed has 1 to {MOST_PARAMETERS}"
         )
+    if not model.polynomial.is_polynomial:
+        raise ProblemError(f"model '{model.name}' is rational; schedule files store polynomial plants")
 
 
 def _candidates(gains: ObserverGains, settings: DeploySettings) -> Iterator[tuple[int, ...]]:

@@ -32,7 +32,7 @@ from synthesis.errors import ProblemError
 from synthesis.loop.on_boxes import HIGHEST, MOST_BOXES, gains, local, rounding_of, unit
 from synthesis.loop.plant import Plant
 from synthesis.loop.system import Region, System, Time
-from synthesis.polynomials import boxes
+from synthesis.polynomials import box_exponential
 from synthesis.polynomials import exponential as exponentials
 from synthesis.polynomials.enclosure import PolynomialMatrix, Powers, identity
 
@@ -151,7 +151,7 @@ class ObserverLoop:
         rounding = rounding_of(self._gain_rounding, shape) if self.rounded else np.zeros(shape)
         gain = gains(self.table, self.breakpoints, axes, cells, rounding)
         if time == "discrete":
-            return self._updated(plant, gain, unit(self.plant.states, axes), boxes)
+            return self._updated(plant, gain, unit(self.plant.states, axes), box_exponential)
         below = None if self.plant.is_polynomial else local(self.plant.denominator, cells)
         return self._equation(plant, gain, unit(self.plant.states, axes), below)
 
