@@ -1,4 +1,4 @@
-"""Is a symmetric matrix polynomial positive definite on each of many boxes? Bernstein coefficients, and a factor that is checked."""
+"""Is a symmetric matrix polynomial positive definite on each of many boxes? Bernstein coefficients and a checked factor."""
 
 from __future__ import annotations
 

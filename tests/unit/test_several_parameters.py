@@ -182,3 +182,21 @@ def test_products_of_two_motions_are_part_of_one_sample_later() -> None:
     later = _Form(loop, Question("internal update", fmpq(1)), "discrete", own, (), False)._later([fmpq(3), fmpq(-2)])
     for u in ((fmpq(0), fmpq(0)), (fmpq(1, 3), fmpq(-1, 5))):
         assert later.at(u)[0, 0] == 1 + (u[0] + fmpq(3, 2)) * (u[1] - 1)
+
+
+@pytest.mark.parametrize("kind", ["decay rate", "internal update"])
+@pytest.mark.parametrize("rates", [(0, 10**6), (-(10**6), 0)])
+def test_every_vertex_of_the_rates_counts_on_both_roads(
+    deployment: Deployment, kind: str, rates: tuple[int, int]
+) -> None:
+    """A P that moves with the parameters proves nothing about ones that move as good as at once, up or down."""
+    claim = next(claim for claim in deployment.claims if claim.kind == kind)
+    assert any(claim.P.degrees)
+    plant = deployment.loop.plant
+    axes = tuple(replace(axis, rate_low=fmpq(rates[0]), rate_high=fmpq(rates[1])) for axis in plant.axes)
+    loop = replace(deployment.loop, plant=replace(plant, axes=axes), _systems={})
+    for balls_alone in (False, True):
+        verifier = Verifier(loop, names_of(deployment.gains.model))
+        if balls_alone:
+            verifier.boxes.update(continuous=None, discrete=None)
+        assert not verifier.prove(claim).proved
