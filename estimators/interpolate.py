@@ -1,8 +1,9 @@
-"""Piecewise linear interpolation over one parameter, with slopes and segment lookup prepared once."""
+"""Piecewise linear interpolation over one parameter, and multilinear over several, with their lookup prepared once."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -62,3 +63,38 @@ class PiecewiseLinear:
         start, pairs = self.columns[bisect_right(self.inner, parameter)]
         offset = parameter - start
         return [value + slope * offset for value, slope in pairs]
+
+
+class Multilinear:
+    """v(p) on a rectilinear grid: in every cell the sum over its corners of the value there times products of (1 - w) or w.
+
+    A stored value is returned as it is stored (w is 0 or 1 there, exactly).
+
+    Args:
+        grid: breakpoints (b_i,) of each parameter, strictly increasing, two at least.
+        table: (b_1, .., b_p, ...).
+    """
+
+    def __init__(self, grid: Sequence[FloatArray], table: FloatArray) -> None:
+        self.grid = [np.ascontiguousarray(line) for line in grid]
+        self.inner = [line[1:-1] for line in self.grid]
+        counts = [len(line) for line in grid]
+        self.strides = [int(np.prod(counts[axis + 1 :])) for axis in range(len(counts))]
+        self.shape = table.shape[len(grid) :]
+        self.rows: FloatArray = np.ascontiguousarray(table.reshape(int(np.prod(counts)), -1))
+
+    def __call__(self, parameters: FloatArray) -> FloatArray:
+        """Values at `parameters` (m, p), each in its range; shape (m, ...)."""
+        places: IndexArray = np.zeros((1, len(parameters)), dtype=np.intp)
+        weights: FloatArray = np.ones((1, len(parameters)))
+        for axis, (line, inner, stride) in enumerate(zip(self.grid, self.inner, self.strides, strict=True)):
+            value = parameters[:, axis]
+            low = inner.searchsorted(value, "right")
+            start = line.take(low)
+            share = (value - start) / (line.take(low + 1) - start)
+            places = np.concatenate([places + low * stride, places + (low + 1) * stride])
+            weights = np.concatenate([weights * (1.0 - share), weights * share])
+        found = weights[0][:, None] * self.rows.take(places[0], 0)
+        for place, weight in zip(places[1:], weights[1:], strict=True):
+            found += weight[:, None] * self.rows.take(place, 0)
+        return np.asarray(found.reshape(len(parameters), *self.shape))

@@ -23,7 +23,7 @@ from studies.preflight import check_before_design
 from studies.spec import Variant, load_spec
 from synthesis.certificate.frozen import frozen_gain
 from synthesis.certificate.proof import Proof, prove
-from synthesis.design.deploy import deploy
+from synthesis.design.deploy import deploy, refuse_undeployable
 from synthesis.design.export import export, schedule_content
 from synthesis.design.hinf_observer import channel_matrices
 
@@ -82,10 +82,12 @@ def run_spec(name: str, out: Path, check: bool = False, variant: Variant = AS_IT
     base, folder = load_spec(name)
     spec = variant.spec(base)
     plant = spec.plant(folder, variant.radius)
-    check_before_design(spec, plant.model)
-    deployment = deploy(spec.design(plant.model), spec.deploy_settings())
+    model = plant.model
+    refuse_undeployable(model)  # before the design, which may take minutes
+    check_before_design(spec, model)
+    deployment = deploy(spec.design(model), spec.deploy_settings())
     content = schedule_content(deployment, spec.name, spec.description, spec.resolved(plant))
-    loop, model = deployment.loop, deployment.gains.model
+    loop = deployment.loop
     least = tuple(frozen_gain(loop, *channel_matrices(model, channel)) for channel in deployment.gains.design.channels)
     path = out / f"{spec.name}.json"
     fresh = tuple(prove(content, str(path)))

@@ -52,7 +52,7 @@ class CellUpdates:
 
 def cell_updates(schedule: GainSchedule, cells: Cells, scale: FloatArray) -> CellUpdates:
     """Both updates of the runtime on every cell, states scaled: S M S^-1, S G S^-1."""
-    A, C = (_local(schedule.plant[key], cells) for key in ("A", "C"))
+    A, C = (_local(schedule.polynomials[key], cells) for key in ("A", "C"))
     ends = schedule.gain(np.stack([cells.low, cells.high], axis=1))
     gain = np.stack([ends[:, 0], ends[:, 1] - ends[:, 0]], axis=1)
     corrected = np.zeros((len(cells.low), C.shape[1] + 1, *A.shape[-2:]))  # -L C or -K C

@@ -66,8 +66,7 @@ def proved_decay(question: Question, degree: int | tuple[int, ...], most: float)
         low, high = 0.0, most
         for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)
-            found = search.solve(Wish(kind, middle))
-            good = found is not None and found.objective is not None and found.objective > MARGIN * min(1.0, most)
+            good = search.largest_margin(Wish(kind, middle)) > MARGIN * min(1.0, most)
             low, high = (middle, high) if good else (low, middle)
         floor = 0.0 if best is None else best.level
         for share in SHARES:

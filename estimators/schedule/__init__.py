@@ -11,7 +11,7 @@ from estimators.schedule.gain_schedule import (
     Update,
     outside_range,
 )
-from estimators.schedule.plant import PlantPolynomial
+from estimators.schedule.plant import PlantPolynomial, PlantPolynomials
 from estimators.schedule.upgrade import FIRST_FORMAT, upgraded
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "GainSchedule",
     "PlantMatrices",
     "PlantPolynomial",
+    "PlantPolynomials",
     "SchedulingParameter",
     "Signal",
     "Update",

@@ -38,8 +38,9 @@ def check_content(content: Mapping[str, Any], where: str) -> None:
     """Checks the form of everything; digests are checked when a file is read.
 
     The plant is xdot = A x + B u + E d, y = C x + D u + F d, its matrices polynomials in u = (p - middle)/half of each parameter;
-    `gain.table` has the shape (breakpoints of each parameter, states, outputs). `provenance` says where a file came from and is
-    free (no control characters, no numbers that other readers would read otherwise); nothing in it is believed.
+    `gain.table` has the shape (breakpoints of each parameter, states, outputs). Rates are numbers, or both null: the parameter
+    may jump, and no P depends on it. `provenance` says where a file came from and is free (no control characters, no numbers that
+    other readers would read otherwise); nothing in it is believed.
 
     Raises:
         ScheduleError: names `where`, the JSON place such as `gain.table[3]`, and what was expected there.
@@ -138,10 +139,11 @@ def _parameter(check: Checker, entry: Any, place: str) -> None:
         check.fail(
             f"{place}.max", f"range [{low}, {high}] {unit} of {name} is too narrow for float64 to tell values apart"
         )
-    falling = check.number(entry["rate_min"], f"{place}.rate_min")
-    rising = check.number(entry["rate_max"], f"{place}.rate_max")
-    if not falling <= 0.0 <= rising:
-        check.fail(f"{place}.rate_min", f"rates [{falling}, {rising}] {unit}/s of {name} must contain 0")
+    if not (entry["rate_min"] is None and entry["rate_max"] is None):  # both null: the parameter may jump
+        falling = check.number(entry["rate_min"], f"{place}.rate_min")
+        rising = check.number(entry["rate_max"], f"{place}.rate_max")
+        if not falling <= 0.0 <= rising:
+            check.fail(f"{place}.rate_min", f"rates [{falling}, {rising}] {unit}/s of {name} must contain 0")
     if not isinstance(entry["absolute"], bool):
         check.fail(f"{place}.absolute", f"expected true or false, got {quoted(entry['absolute'])}")
     if entry["absolute"] and low < 0.0:

@@ -13,11 +13,11 @@ import numpy.typing as npt
 
 from estimators.arrays import FloatArray
 from estimators.errors import EstimatorError, RangeError, ScheduleError
-from estimators.interpolate import PiecewiseLinear
+from estimators.interpolate import Multilinear, PiecewiseLinear
 from estimators.schedule.check import SHAPES, SIGNALS, check_content, check_depth
 from estimators.schedule.checker import shown
 from estimators.schedule.files import check_seal, read_content, sealed
-from estimators.schedule.plant import PlantPolynomial, plant_polynomial
+from estimators.schedule.plant import PlantPolynomial, PlantPolynomials, plant_of
 from estimators.schedule.upgrade import FIRST_FORMAT, upgraded
 
 SHIPPED = Path(__file__).parents[1] / "schedules"
@@ -39,7 +39,7 @@ class SchedulingParameter:
     unit: str
     min: float
     max: float
-    rate_min: float  # unit per second
+    rate_min: float  # unit per second; -inf and inf: it may jump
     rate_max: float
     absolute: bool  # gains and plant depend on the magnitude
 
@@ -55,20 +55,22 @@ class PlantMatrices(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class GainSchedule:
-    """Gains over one scheduling parameter, with the plant, the units and the update that they are proved for.
+    """Gains over scheduling parameters, with the plant, the units and the update that they are proved for.
 
-    `table` has the shape (breakpoints, states, outputs); arrays are read-only. The plant is xdot = A x + B u + E d,
-    y = C x + D u + F d. `sample_time` in s. `update` "held": the gains L belong to the continuous-time observer, integrated
-    exactly with y held over a sample; "sampled": the gains K correct once a sample (see `LpvVelocityObserver`).
+    `table` has the shape (breakpoints of each parameter, states, outputs), `grid` the breakpoints (b_i,) of each parameter;
+    arrays are read-only. One parameter is given as an array of any shape; several as arrays whose last axis holds them in
+    order. The plant is xdot = A x + B u + E d, y = C x + D u + F d. `sample_time` in s. `update` "held": the gains L belong
+    to the continuous-time observer, integrated exactly with y held over a sample; "sampled": the gains K correct once a
+    sample (see `LpvVelocityObserver`).
     """
 
     name: str
-    parameter: SchedulingParameter
-    breakpoints: FloatArray
+    parameters: tuple[SchedulingParameter, ...]
+    grid: tuple[FloatArray, ...]
     table: FloatArray
     sample_time: float
     update: Update
-    plant: Mapping[str, PlantPolynomial]
+    plant: Mapping[str, PlantPolynomial | PlantPolynomials]
     states: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
@@ -109,7 +111,45 @@ class GainSchedule:
         if isinstance(content, Mapping) and content.get("schema") == FIRST_FORMAT:
             content = upgraded(content, where)
         check_content(content, where)
-        return _build(content if "sha256" in content else sealed(content), where)
+        return _build(content if "sha256" in content else sealed(content))
+
+    @property
+    def parameter(self) -> SchedulingParameter:
+        """The only parameter.
+
+        Raises:
+            ScheduleError: there are several.
+        """
+        self._only_one()
+        return self.parameters[0]
+
+    @property
+    def breakpoints(self) -> FloatArray:
+        """Those of the only parameter.
+
+        Raises:
+            ScheduleError: there are several.
+        """
+        self._only_one()
+        return self.grid[0]
+
+    @property
+    def polynomials(self) -> dict[str, PlantPolynomial]:
+        """The plant as polynomials of the only parameter.
+
+        Raises:
+            ScheduleError: there are several.
+        """
+        self._only_one()
+        return {key: matrix for key, matrix in self.plant.items() if isinstance(matrix, PlantPolynomial)}
+
+    def _only_one(self) -> None:
+        if len(self.parameters) != 1:
+            names = shown(", ".join(parameter.name for parameter in self.parameters), 120)
+            raise ScheduleError(
+                f"schedule '{self.name}' follows {len(self.parameters)} parameters ({names}), what uses it here follows one; "
+                "take LpvObserver"
+            )
 
     @property
     def gain_units(self) -> tuple[tuple[str, ...], ...]:
@@ -120,12 +160,17 @@ class GainSchedule:
         )
 
     def gain(self, parameter: npt.ArrayLike) -> FloatArray:
-        """L(p), linear between the stored breakpoints: shape (*parameter.shape, states, outputs).
+        """L(p), multilinear between the stored breakpoints: shape (*parameter.shape, states, outputs).
+
+        With several parameters the last axis of `parameter` goes.
 
         Raises:
             RangeError: a value outside the certified range or not finite; names the first such sample.
         """
         values = self.certified(parameter)
+        if len(self.parameters) > 1:
+            found = Multilinear(self.grid, self.table)(values.reshape(-1, len(self.parameters)))
+            return found.reshape(*values.shape[:-1], *self.table.shape[-2:])
         table = self.table.reshape(len(self.breakpoints), -1)
         found = PiecewiseLinear(self.breakpoints, table)(values.reshape(-1))
         return np.ascontiguousarray(found.T).reshape(*values.shape, *self.table.shape[1:])
@@ -141,17 +186,26 @@ class GainSchedule:
 
     def certified(self, parameter: npt.ArrayLike) -> FloatArray:
         """The parameter as gains and plant depend on it (its magnitude if so declared), refused outside the range."""
+        names = ", ".join(entry.name for entry in self.parameters)
         try:
             raw = np.asarray(parameter, dtype=np.float64)
         except (TypeError, ValueError) as error:
-            raise EstimatorError(f"{self.parameter.name} is not an array of numbers: {error}") from error
-        values: FloatArray = np.abs(raw) if self.parameter.absolute else raw
-        good = (values >= self.parameter.min) & (values <= self.parameter.max)
-        if not good.all():
-            first = tuple(int(axis[0]) for axis in np.nonzero(~np.atleast_1d(good)))
-            place = "" if raw.ndim == 0 else f" (sample {first[0] if raw.ndim == 1 else first})"
-            raise RangeError(outside_range(self.parameter, float(np.atleast_1d(raw)[first]), place))
-        return values
+            raise EstimatorError(f"{names} is not an array of numbers: {error}") from error
+        if len(self.parameters) == 1:
+            return _certified(self.parameter, raw)
+        if raw.ndim == 0 or raw.shape[-1] != len(self.parameters):
+            raise EstimatorError(f"parameters of shape {raw.shape}; the last axis must hold {names}")
+        return np.stack([_certified(entry, raw[..., i]) for i, entry in enumerate(self.parameters)], axis=-1)
+
+
+def _certified(parameter: SchedulingParameter, raw: FloatArray) -> FloatArray:
+    values: FloatArray = np.abs(raw) if parameter.absolute else raw
+    good = (values >= parameter.min) & (values <= parameter.max)
+    if not good.all():
+        first = tuple(int(axis[0]) for axis in np.nonzero(~np.atleast_1d(good)))
+        place = "" if raw.ndim == 0 else f" (sample {first[0] if raw.ndim == 1 else first})"
+        raise RangeError(outside_range(parameter, float(np.atleast_1d(raw)[first]), place))
+    return values
 
 
 def outside_range(parameter: SchedulingParameter, value: float, place: str) -> str:
@@ -179,28 +233,29 @@ def _frozen(value: Any, shape: tuple[int, ...]) -> FloatArray:
     return array
 
 
-def _build(content: Mapping[str, Any], where: str) -> GainSchedule:
+def _build(content: Mapping[str, Any]) -> GainSchedule:
     """From checked and sealed content."""
-    if len(content["scheduling"]) != 1:
-        names = shown(", ".join(entry["name"] for entry in content["scheduling"]), 120)
-        raise ScheduleError(
-            f"{where}: scheduling: {len(content['scheduling'])} parameters ({names}); the runtime interpolates over one"
-        )
-    model, entry = content["model"], dict(content["scheduling"][0])
-    breakpoints = entry.pop("breakpoints")
-    for key in ("min", "max", "rate_min", "rate_max"):
-        entry[key] = float(entry[key])
+    model = content["model"]
+    parameters, grid = [], []
+    for stored in content["scheduling"]:
+        entry = dict(stored)
+        breakpoints = entry.pop("breakpoints")
+        for key, free in (("min", 0.0), ("max", 0.0), ("rate_min", -np.inf), ("rate_max", np.inf)):
+            entry[key] = free if entry[key] is None else float(entry[key])
+        parameters.append(SchedulingParameter(**entry))
+        grid.append(_frozen(breakpoints, (len(breakpoints),)))
     signals = {kind: tuple(Signal(signal["name"], signal["unit"]) for signal in model[kind]) for kind in SIGNALS}
     sizes = {kind: len(found) for kind, found in signals.items()}
+    ranges = [(parameter.min, parameter.max) for parameter in parameters]
     plant = {
-        key: plant_polynomial(content["plant"][key], entry["min"], entry["max"], (sizes[rows], sizes[columns]))
+        key: plant_of(content["plant"][key], ranges, (sizes[rows], sizes[columns]))
         for key, (rows, columns) in SHAPES.items()
     }
     return GainSchedule(
         name=content["name"],
-        parameter=SchedulingParameter(**entry),
-        breakpoints=_frozen(breakpoints, (len(breakpoints),)),
-        table=_frozen(content["gain"]["table"], (len(breakpoints), sizes["states"], sizes["outputs"])),
+        parameters=tuple(parameters),
+        grid=tuple(grid),
+        table=_frozen(content["gain"]["table"], (*map(len, grid), sizes["states"], sizes["outputs"])),
         sample_time=float(content["update"]["sample_time"]),
         update=content["update"]["kind"],
         plant=plant,

@@ -1,4 +1,4 @@
-"""The plant of a schedule in float64: Chebyshev polynomials of the scaled parameter, evaluated as they were proved."""
+"""The plant of a schedule in float64: Chebyshev polynomials of the scaled parameters, evaluated as they were proved."""
 
 from __future__ import annotations
 
@@ -28,6 +28,36 @@ class PlantPolynomial(NamedTuple):
         return np.asarray(first + u * here - later)
 
 
+class PlantPolynomials(NamedTuple):
+    """M(p) = sum over (i, j, ..) of coefficients[i, j, ..] T_i(u_1) T_j(u_2) .., u = (p - middle) / half of every parameter."""
+
+    middle: FloatArray  # (parameters,)
+    half: FloatArray
+    coefficients: FloatArray  # (orders of each parameter, rows, columns)
+
+    def at(self, parameter: FloatArray) -> FloatArray:
+        """M(p) of parameters (..., parameters), shape (..., rows, columns)."""
+        u = (np.asarray(parameter) - self.middle) / self.half
+        lead, shape = u.shape[:-1], self.coefficients.shape[-2:]
+        basis = chebyshev(u.reshape(-1, u.shape[-1]), self.coefficients.shape[:-2])
+        flat = self.coefficients.reshape(basis.shape[1], shape[0] * shape[1])
+        return np.asarray((basis @ flat).reshape(*lead, *shape))
+
+
+def chebyshev(u: FloatArray, sizes: Sequence[int]) -> FloatArray:
+    """T_i(u_1) T_j(u_2) .. at (g, parameters): array (g, number of products), the last parameter's order running fastest."""
+    found: FloatArray = np.ones((len(u), 1))
+    for axis, size in enumerate(sizes):
+        single = np.empty((len(u), size))
+        single[:, 0] = 1.0
+        if size > 1:
+            single[:, 1] = u[:, axis]
+        for k in range(2, size):
+            single[:, k] = 2.0 * u[:, axis] * single[:, k - 1] - single[:, k - 2]
+        found = (found[:, :, None] * single[:, None]).reshape(len(u), -1)
+    return found
+
+
 def scaling(low: float, high: float) -> tuple[float, float]:
     """Middle and half width of a range, correctly rounded from the decimals that are written."""
     first, last = Fraction(repr(float(low))), Fraction(repr(float(high)))
@@ -42,3 +72,18 @@ def plant_polynomial(stored: Mapping[str, Any], low: float, high: float, shape: 
         coefficients[order] = np.array(matrix, dtype=np.float64).reshape(shape)
     coefficients.flags.writeable = False
     return PlantPolynomial(*scaling(low, high), coefficients)
+
+
+def plant_of(
+    stored: Mapping[str, Any], ranges: Sequence[tuple[float, float]], shape: Sequence[int]
+) -> PlantPolynomial | PlantPolynomials:
+    """From the stored form; with one parameter the form that two-state observers unroll."""
+    if len(ranges) == 1:
+        return plant_polynomial(stored, *ranges[0], shape)
+    orders = [max((order[i] for order in stored["orders"]), default=0) for i in range(len(ranges))]
+    coefficients = np.zeros((*(order + 1 for order in orders), *shape))
+    for order, matrix in zip(stored["orders"], stored["coefficients"], strict=True):
+        coefficients[tuple(order)] = np.array(matrix, dtype=np.float64).reshape(shape)
+    coefficients.flags.writeable = False
+    middle, half = np.array([scaling(low, high) for low, high in ranges]).T
+    return PlantPolynomials(middle, half, coefficients)

@@ -105,4 +105,4 @@ def polynomial_plant(schedule: GainSchedule) -> Plant:
         for found in (schedule.states, schedule.outputs, schedule.disturbances)
     )
     box = (SchedulingParameter(p.name, p.unit, p.min, p.max, p.rate_min, p.rate_max),)
-    return Plant(entries, box, states, outputs, disturbances, polynomials=schedule.plant)
+    return Plant(entries, box, states, outputs, disturbances, polynomials=schedule.polynomials)

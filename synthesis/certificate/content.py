@@ -54,7 +54,13 @@ def subject_of(content: Mapping[str, Any], where: str) -> Subject:
     """
     model = content["model"]
     axes = tuple(
-        Axis(p["name"], p["unit"], *(decimal(p[key]) for key in ("min", "max", "rate_min", "rate_max")))
+        Axis(
+            p["name"],
+            p["unit"],
+            decimal(p["min"]),
+            decimal(p["max"]),
+            *(None if p[key] is None else decimal(p[key]) for key in ("rate_min", "rate_max")),
+        )
         for p in content["scheduling"]
     )
     if len(axes) > MOST_PARAMETERS:
@@ -112,11 +118,7 @@ def claims_of(content: Mapping[str, Any], subject: Subject, where: str) -> list[
                 for name in names:
                     if name not in known_names:
                         raise ScheduleError(f"{place}.channel: '{name}' is none of {', '.join(known_names)}")
-        P = stored_polynomial(claim["P"], len(content["scheduling"]), (len(subject.names.states),) * 2)
-        if prod((degree + 1) ** 2 for degree in P.degrees) > MOST_DENSE:
-            raise ScheduleError(f"{place}.P: orders {list(P.degrees)} are too high for {P.variables} parameters")
-        if any(m != m.transpose() for m in P.terms.values()):
-            raise ScheduleError(f"{place}.P: not symmetric; it proves nothing")
+        P = _lyapunov(claim["P"], subject, f"{place}.P")
         found.append(Claim(kind, claim["level"], from_chebyshev(P), channel))
     said = [(c.kind, repr(c.channel)) for c in found]
     if len(set(said)) < len(said):
@@ -124,6 +126,20 @@ def claims_of(content: Mapping[str, Any], subject: Subject, where: str) -> list[
     if not any(claim.kind == UPDATE_OF[update] for claim in found):
         raise ScheduleError(f"{where}: claims: none about the update that the runtime performs ('{UPDATE_OF[update]}')")
     return found
+
+
+def _lyapunov(stored: Mapping[str, Any], subject: Subject, place: str) -> PolynomialMatrix:
+    """P as it is written; raises ScheduleError for one that proves nothing."""
+    axes = subject.loop.plant.axes
+    P = stored_polynomial(stored, len(axes), (len(subject.names.states),) * 2)
+    if prod((degree + 1) ** 2 for degree in P.degrees) > MOST_DENSE:
+        raise ScheduleError(f"{place}: orders {list(P.degrees)} are too high for {P.variables} parameters")
+    jumping = [axis.name for axis, degree in zip(axes, P.degrees, strict=True) if axis.may_jump and degree]
+    if jumping:
+        raise ScheduleError(f"{place}: depends on {jumping[0]}, which may jump; it proves nothing")
+    if any(m != m.transpose() for m in P.terms.values()):
+        raise ScheduleError(f"{place}: not symmetric; it proves nothing")
+    return P
 
 
 def stored_polynomial(stored: Mapping[str, Any], parameters: int, shape: tuple[int, int]) -> PolynomialMatrix:

@@ -12,6 +12,7 @@ from synthesis.loop.system import Region, System
 from synthesis.polynomials.enclosure import PolynomialMatrix
 
 BISECTIONS = 40
+POWERS = 60  # of the second moment's map
 
 
 def frozen_gain(loop: Loop, d: FloatArray, z: FloatArray) -> float:
@@ -56,10 +57,9 @@ def critical_probability(loop: Loop) -> float:
     received, lost = frozen_update(loop)
     if not len(received):
         return 0.0
-    squares = [np.einsum("gij,gkl->gikjl", m, m).reshape(len(m), -1, m.shape[-1] ** 2) for m in (received, lost)]
 
     def stable(p: float) -> bool:
-        return bool(np.abs(np.linalg.eigvals((1.0 - p) * squares[0] + p * squares[1])).max() < 1.0)
+        return bool(second_moment_radius(received, lost, p).max() < 1.0)
 
     if not stable(0.0):
         return 0.0
@@ -68,6 +68,25 @@ def critical_probability(loop: Loop) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if stable(middle) else (low, middle)
     return low
+
+
+def second_moment_radius(received: FloatArray, lost: FloatArray, p: float) -> FloatArray:
+    """Spectral radii (g,) of X -> (1-p) A X A' + p A0 X A0', from matrices (g, n, n).
+
+    Up to three states by eigenvalues. With more the matrix of the map has n^4 entries: powers of the map, which keeps positive
+    semidefinite X so, grow like the radius.
+    """
+    n = received.shape[-1]
+    if n <= 3:
+        squares = [np.einsum("gij,gkl->gikjl", m, m).reshape(len(m), n * n, n * n) for m in (received, lost)]
+        return np.asarray(np.abs(np.linalg.eigvals((1.0 - p) * squares[0] + p * squares[1])).max(axis=-1))
+    X = np.broadcast_to(np.eye(n), received.shape)
+    growth = np.ones(len(received))
+    for _ in range(POWERS):
+        X = (1.0 - p) * received @ X @ np.swapaxes(received, 1, 2) + p * lost @ X @ np.swapaxes(lost, 1, 2)
+        growth = np.trace(X, axis1=1, axis2=2)
+        X = X / np.maximum(growth, np.finfo(float).tiny)[:, None, None]
+    return growth
 
 
 def _systems(loop: Loop, time: str) -> list[System]:

@@ -12,10 +12,11 @@ import numpy as np
 
 from synthesis.certificate.claims import UPDATE_OF, Claim, ClaimChannel
 from synthesis.certificate.frozen import critical_probability, slowest_decay
-from synthesis.certificate.rounding import round_down, round_up
+from synthesis.certificate.rounding import round_down, round_up, significant
 from synthesis.certificate.search import Search, Wish
 
 SHARES = (0.99, 0.97, 0.94, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1)  # of what frozen parameters allow
+MOST_PAIRS = 4  # of a state that moves and an error, each with a claim of its own
 SETTLE = (1.0, 2.0, 5.0, 20.0)  # times the wanted distance from the least gain
 
 
@@ -46,13 +47,21 @@ def _with_update(
         return None
     extra: list[Claim | None] = []
     if update == "held":
-        errors = dict.fromkeys(name for channel in channels for name in channel.errors)
         extra += [
-            best_gain(search, Wish("motion gain", None, ClaimChannel({state: 1.0}, (error,))), settle)
-            for error in errors for state in search.names.states
-        ]  # fmt: skip
+            best_gain(search, Wish("motion gain", None, channel), settle)
+            for channel in motion_channels(search, channels)
+        ]
     extra += [largest(search, "drop probability", critical_probability(search.loop))]
     return tuple(claim for claim in (*found, *extra) if claim is not None)
+
+
+def motion_channels(search: Search, channels: Sequence[ClaimChannel]) -> list[ClaimChannel]:
+    """From every state's motion to every error of the channels; with many of them from all states together, each in its size."""
+    states, errors = search.names.states, tuple(dict.fromkeys(name for channel in channels for name in channel.errors))
+    if len(states) * len(errors) <= MOST_PAIRS:
+        return [ClaimChannel({state: 1.0}, (error,)) for error in errors for state in states]
+    sizes = {state: significant(1.0 / scale, 1.0 / scale, 1) for state, scale in zip(states, search.scale, strict=True)}
+    return [ClaimChannel(sizes, errors)]
 
 
 def best_gain(search: Search, wish: Wish, settle: float) -> Claim | None:

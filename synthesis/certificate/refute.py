@@ -23,7 +23,7 @@ from synthesis.polynomials.rational import Matrix, decimal, multiply, transpose
 from synthesis.polynomials.stable import is_hurwitz, is_schur
 
 Point = tuple[fmpq, ...]
-PARTS = 8  # of every cell, along every parameter
+PARTS = 8  # of every cell, along every parameter, but 1 to 2 where a table has many cells
 MOST_POINTS = 500
 CLIMBS, HALVINGS = 2, 12  # places from which an unstable pole is sought between grid points, and halvings of the step
 MOST_STATES = 4  # for the second moment, whose matrix has the square of the size
@@ -117,9 +117,11 @@ def _determinant(matrix: Matrix) -> fmpq_poly:
 
 def grid(loop: Loop) -> Iterator[Point]:
     """Points of every cell, its corners among them."""
-    for cell in loop.cells():
-        count = cell.parameters
-        steps = [[fmpq(2 * k - PARTS, PARTS) for k in range(PARTS + 1)]] * count
+    cells = list(loop.cells())
+    count = len(loop.plant.axes)
+    parts = next((n for n in (PARTS, 4, 2) if len(cells) * n**count <= 2 * MOST_POINTS), 1) if count > 1 else PARTS
+    for cell in cells:
+        steps = [[fmpq(2 * k - parts, parts) for k in range(parts + 1)]] * count
         for local in product(*steps):
             yield cell.point((*local, *(0,) * count))[:count]
 

@@ -1,7 +1,8 @@
 """For one claim about a loop: the P that proves it with the largest margin, or the best level that some P proves.
 
-The inequalities are those that `synthesis.certificate.verify` proves; here they are solved for, on a few points of every cell.
-Nothing that comes out is believed: P is rounded, and the claim is proved for the rounded P, or it is none.
+The inequalities are those that `synthesis.certificate.verify` proves; here they are solved for by exchange: on a few places of
+the table, then looked at on all, and where the proof itself fails that place joins them. Nothing that comes out is believed: P
+is rounded, and the claim is proved for the rounded P, or it is none.
 """
 
 from __future__ import annotations
@@ -16,21 +17,25 @@ from estimators.arrays import FloatArray
 from synthesis.certificate.claims import ERROR_EQUATION, WITH_CHANNEL, Claim, ClaimChannel, rows_of
 from synthesis.certificate.inequalities import Question, inequalities
 from synthesis.certificate.rounding import LYAPUNOV_DIGITS, rounded_lyapunov
-from synthesis.certificate.unknowns import Unknowns, in_scaled_states
+from synthesis.certificate.sampled_loop import SampledLoop
+from synthesis.certificate.unknowns import in_scaled_states
 from synthesis.certificate.verify import MOST_REGIONS, Names, Outcome, Verifier
+from synthesis.lmi.clarabel_backend import RawAnswer
+from synthesis.lmi.exchange import Family, Memory, corners, exchange, recall, remember
 from synthesis.lmi.problem import LmiProblem
-from synthesis.lmi.result import LmiResult
+from synthesis.lmi.relaxation import rate_samples
+from synthesis.lmi.samples import Samples, Sampling
 from synthesis.lmi.scaling import error_scale
 from synthesis.lmi.settings import LmiSettings
-from synthesis.lmi.solve import solve
 from synthesis.loop.loop import Loop
 from synthesis.loop.motion import one_sample_later, rates, time_derivative
-from synthesis.loop.system import Region, System
+from synthesis.loop.system import Region, System, Time
 from synthesis.models.param import SchedulingParameter
-from synthesis.polynomials.matrix import variable
+from synthesis.polynomials.matrix import MatrixPolynomial, variable
 
-POINTS_PER_CELL = 5
 ANGLES = np.concatenate([[0.0], np.geomspace(1e-3, np.pi, 15)])  # per sample, where the size of a gain is looked for
+ACCURACY = 1e-4  # relative, of a least gain or a largest margin: what holds is proved afterwards
+PROOFS = 3  # of one wish: a place where one fails is solved for, too
 
 
 @dataclass(frozen=True)
@@ -42,12 +47,25 @@ class Wish:
     channel: ClaimChannel | None = None
 
 
+@dataclass
+class Asked:
+    """A wish as an LMI problem: its unknown P and the inequalities at the places where they are looked at."""
+
+    problem: LmiProblem
+    P: MatrixPolynomial
+    families: list[Family]
+
+    def add(self, inequality: str, place: FloatArray) -> bool:
+        """Solve for this place, too; False if that changes nothing."""
+        return sum(family.add(place) for family in self.families if family.name == inequality) > 0
+
+
 @dataclass(frozen=True)
 class Search:
     """Searches claims about one loop; P has the given degree in the parameters, or one degree for each of them.
 
-    `points` of every cell and parameter are where the solver sees the inequalities; `size` is a guess of the levels of gains, by
-    which they are divided (None: from frequency responses in the middle of the range). P is rounded to `digits`.
+    `points` of every cell and parameter are where the inequalities are looked at (None: few); `size` is a guess of the levels of
+    gains, by which they are divided (None: from frequency responses in the middle of the range). P is rounded to `digits`.
     """
 
     loop: Loop
@@ -55,10 +73,13 @@ class Search:
     parameters: tuple[SchedulingParameter, ...]
     degree: int | tuple[int, ...] = 1
     settings: LmiSettings = field(default_factory=LmiSettings)
-    points: int = POINTS_PER_CELL
+    points: int | None = None
     size: float | None = None
     digits: int = LYAPUNOV_DIGITS
     most_regions: int = MOST_REGIONS
+    _least: dict[tuple[str, str], float] = field(default_factory=dict, repr=False, compare=False)
+    _loops: dict[str, SampledLoop] = field(default_factory=dict, repr=False, compare=False)
+    _memory: dict[str, Memory] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
     def verifier(self) -> Verifier:
@@ -78,62 +99,120 @@ class Search:
 
     def prove(self, wish: Wish) -> tuple[Claim | None, Outcome | None]:
         """A proved claim, or the outcome of the proof that failed (None if the solver found nothing to prove)."""
-        found = self.solve(wish)
-        if found is None or not np.isfinite(found.decisions).all():
+        asked = self._asked(wish)
+        if asked is None:
             return None, None
         unit = 1.0 if wish.channel is None else self._output_unit(wish)
-        P = rounded_lyapunov(
-            found.values["P"].coefficients[..., 0] * unit**2, self.scale, len(self.parameters), self.digits
-        )
-        claim = Claim(wish.kind, float(wish.level or 0.0), P, wish.channel)
-        outcome = self.verifier.prove(claim)
-        return (claim, outcome) if outcome.proved else (None, outcome)
+        outcome: Outcome | None = None
+        for _ in range(PROOFS):
+            found = self._solved(asked, wish)
+            index = asked.problem.margin_index
+            if found.infeasible or not np.isfinite(found.decisions).all():
+                return None, outcome
+            if index is not None and not found.decisions[index] > 0.0:
+                return None, outcome
+            coefficients = asked.P.substitute(found.decisions).coefficients[..., 0]
+            P = rounded_lyapunov(coefficients * unit**2, self.scale, len(self.parameters), self.digits)
+            claim = Claim(wish.kind, float(wish.level or 0.0), P, wish.channel)
+            outcome = self.verifier.prove(claim)
+            if outcome.proved:
+                return claim, outcome
+            place = np.array([int(x.p) / int(x.q) for x in outcome.place])
+            if not len(place) or not asked.add(outcome.inequality, place):
+                break
+        return None, outcome
+
+    def largest_margin(self, wish: Wish) -> float:
+        """The common margin of the inequalities as the solver sees it; -inf if it found none. Not proved."""
+        asked = self._asked(wish)
+        if asked is None or asked.problem.margin_index is None:
+            return -np.inf
+        margin = float(self._solved(asked, wish).decisions[asked.problem.margin_index])
+        return margin if np.isfinite(margin) else -np.inf
 
     def least_gain(self, wish: Wish) -> float:
         """The least level of a gain, as the solver sees it on the points; inf if it found none. Not proved."""
-        found = self.solve(replace(wish, level=None))
-        if (
-            found is None
-            or found.objective is None
-            or found.objective <= 0.0
-            or not found.report.status.endswith("Solved")
-        ):
-            return np.inf
-        return float(np.sqrt(found.objective)) * self._unit(wish)
+        key = wish.kind, repr(wish.channel)
+        if key not in self._least:
+            asked = self._asked(replace(wish, level=None))
+            found = None if asked is None else self._solved(asked, wish)
+            square = np.nan if found is None or asked is None else float(asked.problem.cost @ found.decisions)
+            solved = found is not None and found.status.endswith("Solved") and square > 0.0
+            self._least[key] = float(np.sqrt(square)) * self._unit(wish) if solved else np.inf
+        return self._least[key]
 
-    def solve(self, wish: Wish) -> LmiResult | None:
-        """Solve for P; None where a cell cannot be enclosed. With a level a common margin is maximised."""
+    def _solved(self, asked: Asked, wish: Wish) -> RawAnswer:
+        found = exchange(asked.problem, asked.families, replace(self.settings, verify=False), ACCURACY)
+        if not found.infeasible and np.isfinite(found.decisions).all():
+            remember(asked.families, found.decisions, self._memory.setdefault(wish.kind, {}))
+        return found
+
+    def _asked(self, wish: Wish) -> Asked | None:
+        """The problem for P; None where a cell cannot be enclosed. With a level a common margin is maximised."""
+        time: Time = "continuous" if wish.kind in ERROR_EQUATION else "discrete"
+        sampled = self._sampled(time)
+        if sampled.grid is None:
+            return None
         problem = LmiProblem(self.parameters, maximise_margin=wish.level is not None)
         size, count = self.loop.plant.states, len(self.parameters)
-        discrete = wish.kind not in ERROR_EQUATION
+        discrete = time == "discrete"
         P = problem.symmetric("P", size, self._degrees(discrete) or 0)
         square = problem.scalar("gamma^2") if wish.level is None else None
         if square is not None:
             problem.minimise("gamma^2")
-        elif wish.channel is None:
-            problem.require("P < 1", problem.constant(np.eye(size)) - P, strict=False)
         one = problem.constant(np.ones((1, 1)))
-        period = (
-            int(self.loop.sample_time.p) / int(self.loop.sample_time.q) if discrete and self.loop.sample_time else 0.0
-        )
+        period = 0.0 if self.loop.sample_time is None else int(self.loop.sample_time.p) / int(self.loop.sample_time.q)
         u = [variable(i, 2 * count) for i in range(2 * count)]  # and r
-        jump = (lambda i: (u[count + i] - u[i]) * (1.0 / period)) if period else None
+        jump = (lambda i: (u[count + i] - u[i]) * (1.0 / period)) if discrete and period else None
         speeds = rates(self.loop.plant.axes, P, one, lambda i: u[count + i], lambda x: int(x.p) / int(x.q), jump)
         later = one_sample_later(P, speeds, period) if discrete else time_derivative(P, speeds)
-        question = self._question(wish, period, square)
-        cells = list(self.loop.cells())
-        for number, region in enumerate(cells):
-            system = self.loop.system(region, "discrete" if discrete else "continuous")
-            if system is None:
-                return None
-            offset, factor = (np.array([int(x.p) / int(x.q) for x in side]) for side in (region.offset, region.factor))
-            here = [matrix.affine(offset, factor) for matrix in (P, later)]
-            named = inequalities(question, in_scaled_states(system, self.scale), here[0], here[1], Unknowns())
-            for name, matrix in named:
-                problem.require_on(f"{name}, cell {number}", matrix, offset, factor)
-        longest = max((len(points) - 1 for points in self.loop.breakpoints), default=1)
-        settings = replace(self.settings, relaxation="grid", points=self.points * longest, verify=False)
-        return solve(problem, settings)
+        places = rate_places(sampled.grid, later, count)
+        unknown = None if square is None else Samples(square.coefficients.reshape(1, 1, 1, -1))
+        question = self._question(wish, period, unknown)
+
+        last: dict[bool, tuple[tuple[bytes, bytes], dict[str, FloatArray]]] = {}
+
+        def named(chosen: FloatArray, decisions: FloatArray | None = None) -> dict[str, FloatArray]:
+            """All inequalities there: the families ask for them one by one."""
+            key = chosen.tobytes(), b"" if decisions is None else decisions.tobytes()
+            if (decisions is not None) in last and last[decisions is not None][0] == key:
+                return last[decisions is not None][1]
+            here = [m if decisions is None else m.substitute(decisions) for m in (P, later)]
+            now, then = (Samples(m.at(chosen)) for m in here)
+            found = inequalities(question, sampled.at(chosen[:, :count]), now, then, Sampling())
+            out = {name: np.broadcast_to(m.values, (len(chosen), *m.values.shape[1:])) for name, m in found}
+            last[decisions is not None] = key, out
+            return out
+
+        margin = problem.margin_index
+
+        def family(name: str) -> Family:
+            def rows(chosen: FloatArray) -> FloatArray:
+                values = named(chosen)[name]
+                values = np.pad(values, [*[(0, 0)] * 3, (0, problem.decisions + 1 - values.shape[-1])])
+                values = 0.5 * (values + np.swapaxes(values, 1, 2))
+                if margin is not None:
+                    values[..., 1 + margin] -= np.eye(values.shape[1])
+                return values
+
+            def known(decisions: FloatArray, chosen: FloatArray) -> FloatArray:
+                values = named(chosen, decisions)[name]
+                values = values[..., 0] + values[..., 1:] @ decisions[: values.shape[-1] - 1]
+                values = 0.5 * (values + np.swapaxes(values, 1, 2))
+                return values if margin is None else values - decisions[margin] * np.eye(values.shape[1])
+
+            return Family(name, places, rows, known, corners(places, count))
+
+        families = [family(name) for name in named(places[:1])]
+        if wish.level is not None and wish.channel is None:
+            families.append(_below_one(P, places, count))
+        recall(families, self._memory.get(wish.kind, {}))
+        return Asked(problem, P, families)
+
+    def _sampled(self, time: Time) -> SampledLoop:
+        if time not in self._loops:
+            self._loops[time] = SampledLoop(self.loop, self.scale, time, self.points, self.verifier.boxes)
+        return self._loops[time]
 
     def _degrees(self, discrete: bool) -> tuple[int, ...]:
         """Of P in every parameter: none in one that may jump, unless it does so between samples only."""
@@ -199,6 +278,29 @@ class Search:
             size = 0.0
         step = float(np.linalg.norm(ZC @ B))
         return next((x for x in (size, step) if 0.0 < x < np.inf), 1.0)
+
+
+def rate_places(grid: FloatArray, later: MatrixPolynomial, count: int) -> FloatArray:
+    """Every place of the grid with every vertex of the rates (and more, where P one sample later is not affine in them)."""
+    found = rate_samples(later, count)
+    moving = np.array(found).reshape(len(found), count)
+    return np.hstack([np.repeat(grid, len(moving), axis=0), np.tile(moving, (len(grid), 1))])
+
+
+def _below_one(P: MatrixPolynomial, places: FloatArray, count: int) -> Family:
+    """P < 1, which normalises the unknowns and takes no part in the verdict."""
+    still = np.unique(np.hstack([places[:, :count], np.zeros_like(places[:, count:])]), axis=0)
+    unit = np.eye(P.shape[0])
+
+    def rows(chosen: FloatArray) -> FloatArray:
+        values = -P.at(chosen)
+        values[..., 0] += unit
+        return values
+
+    def known(decisions: FloatArray, chosen: FloatArray) -> FloatArray:
+        return np.asarray(unit - P.substitute(decisions).at(chosen)[..., 0])
+
+    return Family("P < 1", still, rows, known, corners(still, count), strict=False)
 
 
 def _value(matrix: object) -> FloatArray:

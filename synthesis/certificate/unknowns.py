@@ -1,8 +1,7 @@
-"""The inequalities of a claim with float64 numbers and unknowns: what the solver is given."""
+"""Exact systems in float64 and in scaled states: what a search works with."""
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -10,31 +9,7 @@ import numpy as np
 from estimators.arrays import FloatArray
 from synthesis.loop.system import System
 from synthesis.polynomials.enclosure import PolynomialMatrix
-from synthesis.polynomials.matrix import MatrixPolynomial, constant, symmetric_block
-
-
-class Unknowns:
-    """Float arithmetic for the inequalities (`synthesis.certificate.inequalities.Arithmetic`)."""
-
-    def eye(self, size: int, like: Any) -> MatrixPolynomial:
-        """The unit matrix."""
-        return constant(np.eye(size), like.variables)
-
-    def known(self, rows: Any, like: Any) -> MatrixPolynomial:
-        """A matrix of numbers."""
-        return constant(np.asarray(rows, float), like.variables)
-
-    def block(self, rows: Any) -> MatrixPolynomial:
-        """A symmetric block matrix."""
-        return symmetric_block(rows)
-
-    def trace(self, matrix: MatrixPolynomial) -> MatrixPolynomial:
-        """The sum of the diagonal, 1 x 1."""
-        return MatrixPolynomial(np.einsum("...iim->...m", matrix.coefficients)[..., None, None, :])
-
-    def exp(self, exponent: Any) -> float:
-        """e^x."""
-        return math.exp(exponent)
+from synthesis.polynomials.matrix import MatrixPolynomial, constant
 
 
 def floats(matrix: PolynomialMatrix) -> MatrixPolynomial:

@@ -4,7 +4,8 @@ Read this together with `synthesis.polynomials.enclosure` and `.definite`; the t
 the table the closed loop is a polynomial (with an enclosed remainder where it holds a matrix exponential), so every inequality is
 a symmetric matrix polynomial M(t, r), t the place in the cell, r the place of the rates between their bounds. All its Bernstein
 coefficients positive definite proves M > 0 on the cell. A cell that decides nothing is halved. Every number is a ball of 128
-bits around the exact one: a sign counts only if it is certain, whatever processor computed it.
+bits around the exact one: a sign counts only if it is certain, whatever processor computed it. Cells with room to spare are
+proved all at once before (`synthesis.certificate.quick`), in float64 with bounds of what it rounds.
 
 A failed proof says only that this P does not do. What the loop itself does is asked separately (`synthesis.certificate.refute`).
 """
@@ -13,15 +14,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 from flint import arb, arb_mat, fmpq, fmpq_mat
 
 from synthesis.certificate.claims import ERROR_EQUATION, WITH_CHANNEL, Claim, rows_of
 from synthesis.certificate.inequalities import Question, inequalities
+from synthesis.certificate.quick import quickly_proved
 from synthesis.loop.loop import Loop
 from synthesis.loop.motion import one_sample_later, rates, time_derivative
-from synthesis.loop.system import Time
+from synthesis.loop.system import Region, System, Time
 from synthesis.polynomials.definite import sign_on_box
 from synthesis.polynomials.enclosure import PolynomialMatrix, block, constant, identity, variable
 from synthesis.polynomials.rational import decimal
@@ -87,6 +90,7 @@ class Verifier:
     names: Names
     most_regions: int = MOST_REGIONS
     balls: Balls = field(default_factory=Balls)
+    boxes: dict[str, System | None] = field(default_factory=dict, repr=False, compare=False)
 
     def prove(self, claim: Claim, dual: bool = False) -> Outcome:
         """Every inequality of the claim on every cell.
@@ -105,7 +109,13 @@ class Verifier:
         if dual:
             later = -later
         question = self.question(claim)
-        for cell in self.loop.cells():
+        done_at_once = quickly_proved(self.loop, question, time, P, speeds, dual, self.boxes)
+        for number, cell in enumerate(self.loop.cells()):
+            if done_at_once[number]:
+                continue
+            broken = self._fails_in_a_corner(cell, question, time, P, later, dual) if count > 1 else None
+            if broken is not None:
+                return broken
             waiting, done = [(cell, 0)], 0
             while waiting:
                 region, depth = waiting.pop()
@@ -128,6 +138,27 @@ class Verifier:
                     for half in reversed(region.halves(_axis(depth, P, count if time == "discrete" else 0)))
                 ]
         return Outcome(True)
+
+    def _fails_in_a_corner(
+        self, cell: Region, question: Question, time: Time, P: PolynomialMatrix, later: PolynomialMatrix, dual: bool
+    ) -> Outcome | None:
+        """The corner of the cell, and of the rates, where the claim certainly fails: numbers are quicker than polynomials."""
+        count = cell.parameters
+        moving = [i for i in range(count) if later.degrees[count + i]]
+        for signs in product((-1, 1), repeat=count + len(moving)):
+            local = [*signs[:count], *(0,) * count]
+            for i, sign in zip(moving, signs[count:], strict=True):
+                local[count + i] = sign
+            point = Region(cell.point(tuple(local)), (fmpq(0),) * (2 * count))
+            system = self.loop.system(Region((*point.offset[:count], *(fmpq(0),) * count), point.factor), time)
+            if system is None:
+                return None
+            here = [m.affine(point.offset, point.factor).balls() for m in (P, later)]
+            acting = replace(system, A=system.A.T) if dual else system
+            failed, _ = _judge(inequalities(question, acting, here[0], here[1], self.balls))
+            if failed is not None and failed[1] is not None:
+                return Outcome(False, failed[0], point.offset)
+        return None
 
     def question(self, claim: Claim) -> Question:
         """The numbers of a claim, exact."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -25,6 +25,8 @@ from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.rational import decimal
 
 SEGMENTS = (7, 14, 28, 56, 112)
+MOST_PARAMETERS = 3  # of a proof: polynomials of order 8 in more of them have too many terms
+MOST_ENTRIES, FINEST = 4000, 64  # breakpoints of a table with several parameters, and segments along one of them
 REFINEMENT = 4  # a table is compared with one of so many times its segments
 TABLE_DIGITS = 4  # of the largest gain of each entry; more would be digits of the solver and not of the guarantee
 
@@ -75,12 +77,7 @@ def deploy(
     model, design = gains.model, gains.design
     if gains.verdict is not Verdict.CERTIFIED:
         raise ProblemError(f"gains are not certified and are not deployed: {gains.result.message}")
-    if len(model.parameters) != 1:
-        raise ProblemError(
-            f"model '{model.name}' has {len(model.parameters)} scheduling parameters; a deployed table has one"
-        )
-    if not model.polynomial.is_polynomial:
-        raise ProblemError(f"model '{model.name}' is rational; schedule files store polynomial plants")
+    refuse_undeployable(model)
     if gains.update == "sampled" and gains.sample_time != settings.sample_time:
         raise ProblemError(
             f"gains designed for a sample time of {gains.sample_time} s are not run at {settings.sample_time} s"
@@ -91,10 +88,10 @@ def deploy(
             raise ProblemError(f"model '{model.name}' is not deployed: {posed.message}")
     kind = "gain" if gains.update == "held" else "sampled gain"
     channels = [claim_channel(channel) for channel in design.channels]
-    for segments in SEGMENTS:
-        progress(f"{segments} segments")
+    for segments in _candidates(gains, settings):
+        progress(f"{' x '.join(map(str, segments))} segments")
         search, points, table = _tabulated(gains, segments, settings, settings.dtype)
-        finer, _, _ = _tabulated(gains, REFINEMENT * segments, settings, "float64")
+        finer, _, _ = _tabulated(gains, tuple(REFINEMENT * number for number in segments), settings, "float64")
         cost = max(table_cost(search, finer, Wish(kind, None, channel)) for channel in channels)
         if not cost < settings.interpolation_cost:
             continue
@@ -105,9 +102,54 @@ def deploy(
         if claims is not None:
             return Deployment(gains, settings, points, table, claims, cost)
     raise ProblemError(
-        f"model '{model.name}': no table with up to {SEGMENTS[-1]} segments keeps the guarantee within "
+        f"model '{model.name}': no table with up to {' x '.join(map(str, segments))} segments keeps the guarantee within "
         f"{100 * settings.interpolation_cost:g} %; give the design more back-off or a lower degree"
     )
+
+
+def refuse_undeployable(model: LpvModel) -> None:
+    """Raise ProblemError for a model whose tables cannot be proved or stored: known before anything is solved."""
+    count = len(model.parameters)
+    if not 1 <= count <= MOST_PARAMETERS:
+        raise ProblemError(
+            f"model '{model.name}' has {count} scheduling parameters; a table that is deployed has 1 to {MOST_PARAMETERS}"
+        )
+    if not model.polynomial.is_polynomial:
+        raise ProblemError(f"model '{model.name}' is rational; schedule files store polynomial plants")
+
+
+def _candidates(gains: ObserverGains, settings: DeploySettings) -> Iterator[tuple[int, ...]]:
+    """Segments along every parameter, coarsest first.
+
+    With several parameters an axis is cut until interpolating along it alone costs no more than the allowed share of the
+    largest gain; then all of them are doubled together. An axis along which the gains are straight keeps one segment.
+    """
+    count = len(gains.model.parameters)
+    if count == 1:
+        yield from ((number,) for number in SEGMENTS)
+        return
+    segments: tuple[int, ...] = tuple(_along(gains, axis, settings.interpolation_cost) for axis in range(count))
+    while np.prod([number + 1 for number in segments]) <= MOST_ENTRIES:
+        yield segments
+        segments = tuple(2 * number for number in segments)
+
+
+def _along(gains: ObserverGains, axis: int, share: float) -> int:
+    """The least number of segments, a power of two, that interpolates well along one parameter, the others at both ends."""
+    parameters = gains.model.parameters
+    others = [np.array([p.minimum, p.maximum]) for p in parameters]
+    others[axis] = np.linspace(parameters[axis].minimum, parameters[axis].maximum, FINEST + 1)
+    grid = np.stack(np.meshgrid(*others, indexing="ij"), axis=-1)
+    found = gains.gain(grid.reshape(-1, len(parameters)))
+    values = np.moveaxis(found.reshape(*grid.shape[:-1], -1), axis, 0).reshape(FINEST + 1, -1, found[0].size)
+    size = np.abs(values).max(axis=(0, 1)) + np.finfo(float).tiny
+    for segments in (1, 2, 4, 8, 16, 32):
+        weights = np.linspace(0.0, segments, FINEST + 1)
+        low = np.minimum(weights.astype(int), segments - 1)
+        knots, rest = values[:: FINEST // segments], (weights - low)[:, None, None]
+        if (np.abs(knots[low] * (1 - rest) + knots[low + 1] * rest - values).max(axis=(0, 1)) <= share * size).all():
+            return segments
+    return FINEST
 
 
 def table_cost(coarse: Search, fine: Search, wish: Wish) -> float:
@@ -134,9 +176,13 @@ def deployed_loop(
     return ObserverLoop(plant_of(gains.model), points, entries, gains.update, decimal(sample_time))
 
 
-def tabulate(gains: ObserverGains, segments: int, dtype: str) -> tuple[tuple[FloatArray, ...], FloatArray]:
+def tabulate(
+    gains: ObserverGains, segments: int | tuple[int, ...], dtype: str
+) -> tuple[tuple[FloatArray, ...], FloatArray]:
     """Equidistant breakpoints of every parameter and gains there, rounded to a few digits and to the type that stores them."""
-    lines = tuple(np.linspace(p.minimum, p.maximum, segments + 1) for p in gains.model.parameters)
+    parameters = gains.model.parameters
+    numbers = (segments,) * len(parameters) if isinstance(segments, int) else segments
+    lines = tuple(np.linspace(p.minimum, p.maximum, n + 1) for p, n in zip(parameters, numbers, strict=True))
     points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(lines))
     table = gains.gain(points)
     largest = np.abs(table).max(axis=0)
@@ -152,14 +198,18 @@ def names_of(model: LpvModel) -> Names:
 
 
 def _tabulated(
-    gains: ObserverGains, segments: int, settings: DeploySettings, dtype: str
+    gains: ObserverGains, segments: tuple[int, ...], settings: DeploySettings, dtype: str
 ) -> tuple[Search, tuple[FloatArray, ...], FloatArray]:
     model, design = gains.model, gains.design
     points, table = tabulate(gains, segments, dtype)
     loop = deployed_loop(gains, points, table, settings.sample_time)
-    return Search(loop, names_of(model), model.parameters, lyapunov_degree(design), design.settings), points, table
+    return (
+        Search(loop, names_of(model), model.parameters, lyapunov_degree(model, design), design.settings),
+        points,
+        table,
+    )
 
 
-def lyapunov_degree(design: ObserverDesign) -> int:
-    """Degree of P in the claims: that of the gains, at least one."""
-    return max(design.degree, 1)
+def lyapunov_degree(model: LpvModel, design: ObserverDesign) -> tuple[int, ...]:
+    """Degree of P in the claims for each parameter: that of the gains, at least one; none in a parameter that may jump."""
+    return tuple(0 if p.may_jump else max(design.degree, 1) for p in model.parameters)

@@ -36,8 +36,9 @@ def schedule_content(
         "description": description,
         "model": _model(model),
         "scheduling": [
-            {"name": p.name, "unit": p.unit, "min": p.minimum, "max": p.maximum, "rate_min": p.rate_minimum,
-             "rate_max": p.rate_maximum, "absolute": p.absolute, "breakpoints": line.tolist()}
+            {"name": p.name, "unit": p.unit, "min": p.minimum, "max": p.maximum,
+             "rate_min": None if p.may_jump else p.rate_minimum, "rate_max": None if p.may_jump else p.rate_maximum,
+             "absolute": p.absolute, "breakpoints": line.tolist()}
             for p, line in zip(model.parameters, deployment.breakpoints, strict=True)
         ],
         "update": {"kind": deployment.gains.update, "sample_time": deployment.settings.sample_time},

@@ -25,7 +25,9 @@ from estimators.arrays import FloatArray
 from synthesis.certificate.refute import undetectable_place
 from synthesis.certificate.rounding import round_down, round_up
 from synthesis.errors import ProblemError
+from synthesis.lmi.exchange import Memory
 from synthesis.lmi.problem import LmiProblem
+from synthesis.lmi.relaxation import relaxation_of
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.scaling import observer_scale
 from synthesis.lmi.settings import LmiSettings
@@ -156,20 +158,33 @@ def minimised(
 ) -> ObserverGains:
     """The three solves of a design; `problem(gamma, maximise_margin, floor)` builds its inequalities."""
     refuse_undetectable(model)
-    optimum = solve(problem(None), design.settings)
+    memory: Memory = {}
+    first = problem(None)
+    bounding = design.backoff > 0.0 and relaxation_of(first, design.settings) == "exchange"
+    # The optimum itself is not handed on then: it need not hold on the continuum, only the level a back-off above it.
+    optimum = solve(first, replace(design.settings, verify=not bounding), memory)
     lower = None if optimum.lower_bound is None else to_gamma(model, design, scale, max(optimum.lower_bound, 0.0))
-    if optimum.verdict is Verdict.CERTIFIED and optimum.objective is not None and optimum.objective > 0.0:
-        gamma, result = to_gamma(model, design, scale, optimum.objective), optimum
+    named = optimum.objective is not None and optimum.objective > 0.0
+    if bounding and named and optimum.report.status == "Solved":
+        gamma = round_up(to_gamma(model, design, scale, optimum.objective or 0.0) * (1.0 + design.backoff))
+        result = solve(problem(gamma), design.settings, memory)
+        bounding = result.verdict is Verdict.CERTIFIED
     else:
-        gamma, result = _least_certified(model, design, scale, problem, optimum)
+        bounding = False
+    if not bounding:
+        if optimum.verdict is Verdict.CERTIFIED and named:
+            gamma, result = to_gamma(model, design, scale, optimum.objective or 0.0), optimum
+        else:
+            gamma, result = _least_certified(model, design, scale, problem, optimum)
     if design.backoff > 0.0:
-        gamma = round_up(gamma * (1.0 + design.backoff))
-        result = solve(problem(gamma), design.settings)
+        if not bounding:
+            gamma = round_up(gamma * (1.0 + design.backoff))
+            result = solve(problem(gamma), design.settings, memory)
         if result.verdict is not Verdict.CERTIFIED:
             raise ProblemError(f"model '{model.name}': {result.message}")
         floor = round_down(KEPT * float(result.objective or 0.0), 2)
         if floor > 0.0:
-            settled = solve(problem(gamma, False, floor), design.settings)
+            settled = solve(problem(gamma, False, floor), design.settings, memory)
             result = settled if settled.verdict is Verdict.CERTIFIED else result
     return ObserverGains(design, model, lower, gamma, result, optimum, scale, update, sample_time)
 
@@ -288,7 +303,11 @@ def observer_problem(
     scaled = model.polynomial.with_states_scaled(scale)
     known = {key: problem.scaled(getattr(scaled, key)) for key in ("A", "C", "E", "F", "denominator")}
     below, nx, ny = known["denominator"], len(model.states), len(model.outputs)
-    P = problem.symmetric("P", nx, design.degree)
+    # A parameter that jumps may move the gains, but not the Lyapunov function.
+    jumps = any(p.may_jump for p in model.parameters)
+    P = problem.symmetric(
+        "P", nx, tuple(0 if p.may_jump else design.degree for p in model.parameters) if jumps else design.degree
+    )
     X = problem.matrix("X", nx, ny, design.degree)
     closed = (P @ known["A"] - X @ known["C"]) * (1.0 / clock)
     frozen = closed + closed.T

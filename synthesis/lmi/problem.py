@@ -204,6 +204,11 @@ class LmiProblem:
             raise ProblemError(f"'{name}' is not an unknown number of this problem and cannot be minimised")
         return int(np.flatnonzero(entry.coefficients.reshape(-1))[0]) - 1
 
+    @property
+    def margin_index(self) -> int | None:
+        """Which decision is the common margin."""
+        return self._objective_index(MARGIN) if self.maximise_margin else None
+
     def without_margin(self, decisions: FloatArray) -> FloatArray:
         """The same decisions with the common margin taken out of the inequalities."""
         if not self.maximise_margin:

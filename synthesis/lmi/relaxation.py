@@ -1,4 +1,4 @@
-"""From inequalities on a box to finitely many: sampled points, vertices, or sums of squares."""
+"""From inequalities on a box to finitely many: sampled points, vertices, Bernstein coefficients, or sums of squares."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ from synthesis.errors import ProblemError
 from synthesis.lmi.problem import Inequality, LmiProblem
 from synthesis.lmi.settings import LmiSettings
 from synthesis.polynomials.matrix import MatrixPolynomial, padded
+from synthesis.polynomials.positivity import to_bernstein
+
+MOST_WORK = 100_000  # of `cheaper`: beyond it a few places that are exchanged cost less (six states, degree 1)
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class RelaxedProblem:
 
 def relax(problem: LmiProblem, settings: LmiSettings) -> RelaxedProblem:
     """Apply the relaxation that the settings name ('auto' picks the cheaper sound one for one parameter)."""
-    kind = cheaper(problem, settings) if settings.relaxation == "auto" else settings.relaxation
+    kind = relaxation_of(problem, settings)
     if kind == "exact":
         if len(problem.parameters) != 1:
             raise ProblemError(
@@ -62,7 +65,9 @@ def relax(problem: LmiProblem, settings: LmiSettings) -> RelaxedProblem:
             part for entry in problem.inequalities for part in _sums_of_squares(problem, entry, settings.margin)
         )
         return RelaxedProblem(kind, (), sos, problem.cost, problem.weights)
-    if kind == "vertex":
+    if kind == "bernstein":
+        sampled = tuple(_coefficients(problem, entry, settings) for entry in problem.inequalities)
+    elif kind == "vertex":
         sampled = tuple(part for entry in problem.inequalities for part in _vertices(problem, entry, settings.margin))
     else:
         sampled = tuple(
@@ -72,16 +77,23 @@ def relax(problem: LmiProblem, settings: LmiSettings) -> RelaxedProblem:
     return RelaxedProblem(kind, sampled, (), problem.cost, problem.weights)
 
 
+def relaxation_of(problem: LmiProblem, settings: LmiSettings) -> str:
+    """The relaxation that the settings name, or the one that 'auto' takes."""
+    return cheaper(problem, settings) if settings.relaxation == "auto" else settings.relaxation
+
+
 def cheaper(problem: LmiProblem, settings: LmiSettings) -> str:
-    """Grid or exact, by the sum of squared cone dimensions, which tracks the measured solve time of both."""
+    """Grid or exact, by the sum of squared cone dimensions, which tracks the measured solve time of both; else exchange."""
     if len(problem.parameters) != 1:
-        return "grid"
+        return "exchange" if problem.parameters else "grid"
     grid = exact = 0
     for entry in problem.inequalities:
         k, degree = entry.matrix.shape[0], entry.matrix.degrees[0]
         rates = 2 if entry.matrix.degrees[1] else 1
         grid += rates * len(_axes(problem, entry, settings.points)[0]) * (k * (k + 1) // 2) ** 2
         exact += rates * sum((k * (h + 1) * (k * (h + 1) + 1) // 2) ** 2 for h in _orders(degree))
+    if min(exact, grid) > MOST_WORK:
+        return "exchange"
     return "exact" if exact <= grid else "grid"
 
 
@@ -125,6 +137,27 @@ def _sample(problem: LmiProblem, entry: Inequality, axes: list[FloatArray], marg
     places = np.hstack([np.tile(grid, (len(rates), 1)), np.repeat(rates, len(grid), axis=0)])
     values = widened(entry.matrix.at(places), problem.decisions)
     return SampledInequality(entry.name, values, places, margin if entry.strict else 0.0)
+
+
+def _coefficients(problem: LmiProblem, entry: Inequality, settings: LmiSettings) -> SampledInequality:
+    """The coefficients of M in the tensor Bernstein basis of every cell: all of them positive definite proves M > 0 there.
+
+    Sufficient by construction, and the less conservative the more cells. `places` are where the basis functions peak.
+    """
+    count, matrix = len(problem.parameters), entry.matrix
+    edges = [np.linspace(-1.0, 1.0, settings.cells + 1) if d else np.array([-1.0, 1.0]) for d in matrix.degrees[:count]]
+    values, places = [], []
+    for low in product(*(range(len(line) - 1) for line in edges)):
+        ends = [(line[k], line[k + 1]) for line, k in zip(edges, low, strict=True)] + [(-1.0, 1.0)] * count
+        offset, factor = (np.array([(b + sign * a) / 2 for a, b in ends]) for sign in (1.0, -1.0))
+        local = matrix.affine(offset, factor).coefficients
+        for axis, degree in enumerate(matrix.degrees):
+            local = np.moveaxis(np.tensordot(to_bernstein(degree), local, axes=(1, axis)), 0, axis)
+        values.append(local.reshape(-1, *local.shape[2 * count :]))
+        peaks = [np.linspace(-1.0, 1.0, degree + 1) if degree else np.zeros(1) for degree in matrix.degrees]
+        places.append(offset + factor * np.array(list(product(*peaks))).reshape(-1, 2 * count))
+    margin = settings.margin if entry.strict else 0.0
+    return SampledInequality(entry.name, widened(np.concatenate(values), problem.decisions), np.vstack(places), margin)
 
 
 def _vertices(problem: LmiProblem, entry: Inequality, margin: float) -> list[SampledInequality]:

@@ -8,17 +8,22 @@ from typing import Literal, get_args
 from estimators.errors import unknown
 from synthesis.errors import ProblemError
 
-Relaxation = Literal["auto", "grid", "vertex", "exact"]
+Relaxation = Literal["auto", "grid", "vertex", "exact", "bernstein", "exchange"]
 
 
 @dataclass(frozen=True)
 class LmiSettings:
     """How an LMI problem is relaxed, solved and re-checked."""
 
-    relaxation: Relaxation = "auto"  # auto: exact or grid for one parameter, whichever is cheaper; grid for more
+    relaxation: Relaxation = (
+        "auto"  # auto: exact or grid where one parameter and few states make them cheap, else exchange
+    )
     points: int = 140  # grid points for each parameter
+    cells: int = 1  # pieces of the range of each parameter, each with its own Bernstein coefficients
     margin: float = 1e-8  # every inequality holds by this much, in balanced coordinates
-    solver: str = "CLARABEL"  # CLARABEL is assembled directly; "cvxpy:NAME" takes the second back end
+    solver: str = (
+        "CLARABEL"  # assembled directly (bernstein and exchange: by `interior`); "cvxpy:NAME": the second back end
+    )
     tolerance: float = 1e-8  # gap and feasibility tolerance of the solver
     max_iterations: int = 200  # of the interior-point method
     verify: bool = True  # re-evaluate every inequality outside the solver
@@ -28,7 +33,7 @@ class LmiSettings:
     def __post_init__(self) -> None:
         if self.relaxation not in get_args(Relaxation):
             raise ProblemError(unknown("relaxation", self.relaxation, get_args(Relaxation)))
-        for name, low in (("points", 2), ("max_iterations", 1), ("proof_depth", 1), ("threads", 1)):
+        for name, low in (("points", 2), ("cells", 1), ("max_iterations", 1), ("proof_depth", 1), ("threads", 1)):
             if getattr(self, name) < low:
                 raise ProblemError(f"setting {name} = {getattr(self, name)} must be at least {low}")
         for name in ("margin", "tolerance"):

@@ -25,13 +25,16 @@ from functools import cached_property
 from itertools import pairwise, product
 from typing import Any, Literal
 
+import numpy as np
 from flint import arb, fmpq, fmpq_mat
 
 from synthesis.errors import ProblemError
+from synthesis.loop.on_boxes import HIGHEST, MOST_BOXES, gains, local, rounding_of, unit
 from synthesis.loop.plant import Plant
 from synthesis.loop.system import Region, System, Time
-from synthesis.polynomials.enclosure import PolynomialMatrix, Powers, constant, identity, zero
-from synthesis.polynomials.exponential import exponential, phi
+from synthesis.polynomials import box_exponential
+from synthesis.polynomials import exponential as exponentials
+from synthesis.polynomials.enclosure import PolynomialMatrix, Powers, identity
 
 Update = Literal["held", "sampled"]
 ROUNDING = fmpq(1, 2**50)  # of float64, with room: every rounding below costs at most 2^-53 of what is rounded
@@ -141,51 +144,67 @@ class ObserverLoop:
             out[key] = matrices[key].blurred(_evaluation_error(matrix, argument))
         return out
 
+    def on_boxes(self, time: Time, cells: Sequence[Region]) -> System | None:
+        """`system` on many regions at once, every matrix `Boxes`; None where they are too many or too large for that."""
+        axes = self.plant.axes
+        if not 1 <= len(axes) <= max(HIGHEST) or len(cells) > MOST_BOXES:
+            return None
+        plant = {key: local(self._plant[key], cells) for key in "ACEF"}
+        shape = self.plant.states, self.plant.matrices["C"].shape[0]
+        rounding = rounding_of(self._gain_rounding, shape) if self.rounded else np.zeros(shape)
+        gain = gains(self.table, self.breakpoints, axes, cells, rounding)
+        if time == "discrete":
+            return self._updated(plant, gain, unit(self.plant.states, axes), box_exponential)
+        below = None if self.plant.is_polynomial else local(self.plant.denominator, cells)
+        return self._equation(plant, gain, unit(self.plant.states, axes), below)
+
     def _error_equation(self, region: Region) -> System:
         plant = {key: self.local(self._plant[key], region) for key in "ACEF"}
-        gain = self.gain(region)
-        n, inputs = self.plant.states, plant["E"].shape[1]
-        unit = identity(n, 2 * region.parameters)
-        none = constant(zero((n, inputs)), 2 * region.parameters).balls()
         below = None if self.plant.is_polynomial else self.local(self.plant.denominator, region)
+        return self._equation(plant, self.gain(region), identity(self.plant.states, 2 * region.parameters), below)
+
+    def _error_update(self, region: Region) -> System | None:
+        plant = {key: self.local(self._plant[key], region) for key in "ACEF"}
+        return self._updated(plant, self.gain(region), identity(self.plant.states, 2 * region.parameters), exponentials)
+
+    def _equation(self, plant: dict[str, Any], gain: Any, eye: Any, below: Any) -> System:
         return System(
             "continuous",
             A=plant["A"] - gain @ plant["C"],
             B={"disturbances": plant["E"] - gain @ plant["F"]},
-            C=unit,
-            D={"disturbances": none},
+            C=eye,
+            D={"disturbances": plant["E"] * 0},
             coasting=plant["A"],
             denominator=below,
         )
 
-    def _error_update(self, region: Region) -> System | None:
+    def _updated(self, plant: dict[str, Any], gain: Any, eye: Any, ring: Any) -> System | None:
+        """The update over a sample; `ring` knows phi and the exponential of its matrices."""
         if self.sample_time is None or not self.plant.is_polynomial:
             raise ProblemError("an update over a sample needs a sample time and a polynomial plant")
         period = self.sample_time
-        plant = {key: self.local(self._plant[key], region) for key in "ACEF"}
-        gain, unit = self.gain(region), identity(self.plant.states, 2 * region.parameters)
         TA = plant["A"] * period
-        coast = phi(TA)
+        coast = ring.phi(TA)
         if coast is None:
             return None
-        coasting = exponential(TA, coast)
+        coasting = ring.exponential(TA, coast)
         forced = (coast @ plant["E"]).truncated(ORDER) * period
         if self.update == "sampled":
             A = (coasting - gain @ plant["C"]).truncated(ORDER)
             B = {"disturbances": forced - gain @ plant["F"]}
         else:
             M = TA - gain @ plant["C"] * period
-            closed = phi(M)
+            closed = ring.phi(M)
             if closed is None:
                 return None
-            A = exponential(M, closed)
+            A = ring.exponential(M, closed)
             driven = plant["E"] - gain @ plant["F"]
             B = {
                 "disturbances": (closed @ driven).truncated(ORDER) * period,
                 "motion": (coast - closed) * period,
             }
         none = {name: matrix * 0 for name, matrix in B.items()}
-        return System("discrete", A, B, unit, none, coasting)
+        return System("discrete", A, B, eye, none, coasting)
 
 
 def _evaluation_error(matrix: PolynomialMatrix, argument: Sequence[fmpq]) -> Any:

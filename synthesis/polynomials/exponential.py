@@ -14,6 +14,7 @@ from math import ceil, factorial, log2
 import numpy as np
 from flint import arb, arb_mat, fmpq
 
+from estimators.arrays import FloatArray
 from synthesis.polynomials.enclosure import PolynomialMatrix, constant, identity, row_sum
 
 TERMS = 16  # of the series at |X| <= 1/2: remainder 2e-20
@@ -66,6 +67,12 @@ def balance(matrix: PolynomialMatrix) -> list[fmpq]:
     size = np.zeros((n, n))
     for entries in matrix.terms.values():
         size += np.array([[float(abs(arb(x)).abs_upper()) for x in row] for row in entries.tolist()]).reshape(n, n)
+    return balance_of(size)
+
+
+def balance_of(size: FloatArray) -> list[fmpq]:
+    """The same from bounds of the absolute values (n, n)."""
+    n, size = len(size), np.array(size)
     # Opposite a zero any size can be had (A = [[a, 1e6], [0, b]]): as if there stood what makes it that of the diagonal.
     diagonal, largest = max(float(np.diag(size).max(initial=0.0)), SMALL), float(size.max(initial=0.0))
     if diagonal < largest < np.inf:

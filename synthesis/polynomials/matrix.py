@@ -92,11 +92,12 @@ class MatrixPolynomial:
 
     def at(self, points: FloatArray) -> FloatArray:
         """Values at (g, v) points: array (g, rows, columns, 1+N)."""
-        values = np.broadcast_to(self.coefficients, (len(points), *self.coefficients.shape))
+        monomials = np.ones((len(points), 1))
         for variable in range(self.variables):
-            vander = np.vander(points[:, variable], values.shape[1], increasing=True)
-            values = np.einsum("gk,gk...->g...", vander, values)
-        return np.asarray(values)
+            powers = np.vander(points[:, variable], self.degrees[variable] + 1, increasing=True)
+            monomials = (monomials[:, :, None] * powers[:, None]).reshape(len(points), -1)
+        rest = self.coefficients.shape[self.variables :]
+        return np.asarray((monomials @ self.coefficients.reshape(monomials.shape[1], -1)).reshape(len(points), *rest))
 
     def substitute(self, decisions: FloatArray) -> MatrixPolynomial:
         """The known polynomial that results when the decision variables take these values."""

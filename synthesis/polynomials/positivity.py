@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from math import comb
 
 import numpy as np
@@ -39,7 +40,7 @@ def prove_positive(matrix: MatrixPolynomial, depth: int = 16, magnitude: float =
         raise ProblemError("a matrix polynomial with coefficients that are not finite has no sign")
     size = max(float(np.abs(local).sum(axis=tuple(range(v))).sum(axis=-1).max()), magnitude)
     for axis in range(v):
-        local = np.moveaxis(np.tensordot(_to_bernstein(local.shape[axis] - 1), local, axes=(1, axis)), 0, axis)
+        local = np.moveaxis(np.tensordot(to_bernstein(local.shape[axis] - 1), local, axes=(1, axis)), 0, axis)
     boxes, lower, width = local[None], np.zeros((1, v)), np.ones((1, v))
     scale = float(np.abs(np.linalg.eigvalsh(local)).max()) or 1.0
     guard = 4 * np.finfo(float).eps * size * (local.shape[-1] + sum(local.shape[:v]))
@@ -65,7 +66,8 @@ def prove_positive(matrix: MatrixPolynomial, depth: int = 16, magnitude: float =
     return Positivity(False, smallest < -guard, smallest, place, scale)
 
 
-def _to_bernstein(degree: int) -> FloatArray:
+@cache
+def to_bernstein(degree: int) -> FloatArray:
     """Matrix from monomial to Bernstein coefficients on [-1, 1]; exact, and no entry is larger than one.
 
     Entry (i, k) is the blossom of u^k with i arguments +1 and degree - i arguments -1.

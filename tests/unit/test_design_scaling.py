@@ -68,8 +68,8 @@ def test_a_first_solve_that_stalls_costs_time_and_no_truth(
     """Whatever objective the stalled solve leaves behind, gamma is one that is certified, and near the least there is."""
     calls = []
 
-    def stalling(problem: Any, settings: Any) -> LmiResult:
-        found = solve(problem, settings)
+    def stalling(problem: Any, settings: Any, memory: Any = None) -> LmiResult:
+        found = solve(problem, settings, memory)
         calls.append(found)
         if len(calls) > 1:
             return found

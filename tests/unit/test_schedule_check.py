@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from estimators import GainSchedule, ScheduleError
+from estimators import GainSchedule, LpvVelocityObserver, ScheduleError
 from estimators.schedule import check_content
 from tests.support.schedule_content import schedule_content
 
@@ -117,7 +117,7 @@ def test_single_precision_tables_hold_single_precision_numbers() -> None:
         check_content(schedule_content(gains=(1e39, 183.125), dtype="float32"), "here")
 
 
-def test_two_parameters_are_a_valid_file_that_the_runtime_refuses_clearly() -> None:
+def test_two_parameters_are_a_valid_file_that_what_follows_one_refuses_clearly() -> None:
     content = schedule_content()
     content["scheduling"].append(
         {
@@ -129,5 +129,9 @@ def test_two_parameters_are_a_valid_file_that_the_runtime_refuses_clearly() -> N
         matrix["orders"] = [[*orders, 0] for orders in matrix["orders"]]
     content["gain"]["table"] = [[entry, entry] for entry in content["gain"]["table"]]
     check_content(content, "here")
-    with pytest.raises(ScheduleError, match=r"2 parameters \(wheel_speed, load\); the runtime interpolates over one"):
-        GainSchedule.from_content(content)
+    schedule = GainSchedule.from_content(content)
+    assert schedule.table.shape == (4, 2, 2, 1)
+    with pytest.raises(
+        ScheduleError, match=r"follows 2 parameters \(wheel_speed, load\), what uses it here follows one; take"
+    ):
+        LpvVelocityObserver(schedule)

@@ -67,5 +67,5 @@ def _model(name: str) -> LpvModel:
 def _constant(title: str, name: str, gains: tuple[float, ...]) -> Design:
     """Printed gains in the shape of a schedule, on the plant of the shipped one `name` with the same tires."""
     column, shipped = np.array(gains)[:, None], GainSchedule.shipped(name)
-    schedule = replace(shipped, name=title, breakpoints=np.array(WHEEL_SPEED), table=np.stack([column, column]))
+    schedule = replace(shipped, name=title, grid=(np.array(WHEEL_SPEED),), table=np.stack([column, column]))
     return Design(title, "printed", _model(name), schedule)

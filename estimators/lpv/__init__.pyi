@@ -1,0 +1,2 @@
+from .observer import LpvObserver as LpvObserver
+from .observer import LpvObserverStep as LpvObserverStep

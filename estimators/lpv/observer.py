@@ -1,0 +1,152 @@
+"""An observer of any size that follows a schedule over any number of parameters, for a batch of entries at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.arguments import LIMIT, batch, finite, mask, numbers, quiet
+from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.errors import EstimatorError
+from estimators.lpv.exact_step import ExactStep
+from estimators.lpv.inputs import SignalMonitor
+from estimators.memory import Renewable, Saved
+from estimators.schedule import GainSchedule
+
+_CHUNK = 4096  # entries worked on at once: what lies between the operations stays in the cache
+
+
+class LpvObserverStep(NamedTuple):
+    """What one step returns, ready for a log; leading axes are those of the batch."""
+
+    estimate: FloatArray  # (..., nx) states at the end of the sample
+    innovation: FloatArray  # (..., ny) y - C xhat - D u at its start; NaN where that measurement is missing
+    used: BoolArray  # (...) whether the measurements corrected the estimate
+    flags: FlagArray  # (...) sums of `Flag`; 0 where nothing is wrong
+    parameter: FloatArray  # (..., parameters) that were used
+
+
+class LpvObserver(Renewable):
+    """xhat' = A(p) xhat + B(p) u + L(p) (y - C(p) xhat - D(p) u), updated exactly with u, y and p held over a sample.
+
+    A schedule whose update is "sampled" instead predicts exactly with u and p held and adds K(p) (y - C(p) xhat - D(p) u) once a
+    sample. Plant and gains are the polynomial and the table that were proved (`gainsmith certify`).
+
+    Measurements that are missing (one of them not finite) or stale are not used: the entry coasts with L = 0. A missing input
+    or parameter is held at its last finite value; a parameter outside its certified range is clipped to it. All of this is
+    flagged, and estimates are finite always. `LpvVelocityObserver` is the faster form for two states, one input and one output.
+
+    Args:
+        schedule: of any size.
+        batch_shape: shape of every entry's signals given to `step`; () for one plant, (10000,) for many runs.
+        outside: a parameter or a rate outside the certified box is clipped and flagged ("flag") or raises ("refuse").
+        stale_after: measurements that all repeat exactly for more than so many samples are stale; None: never.
+
+    Raises:
+        EstimatorError: an option that means nothing.
+        ScheduleError: gains or a model whose error grows beyond all bounds within one sample.
+    """
+
+    memory = ("_state", "samples", "renewed")
+    parts: tuple[str, ...] = ("monitor",)
+
+    def __init__(
+        self,
+        schedule: GainSchedule,
+        batch_shape: tuple[int, ...] = (),
+        outside: Literal["flag", "refuse"] = "flag",
+        stale_after: int | None = None,
+    ) -> None:
+        if outside not in ("flag", "refuse"):
+            raise EstimatorError(f"outside = {outside!r} is not known; use 'flag' or 'refuse'")
+        if stale_after is not None and stale_after < 1:
+            raise EstimatorError(f"stale_after = {stale_after} samples must be at least 1, or None")
+        super().__init__(batch(batch_shape))
+        self.schedule, count = schedule, math.prod(self.batch_shape)
+        self.exact = ExactStep(schedule)
+        self.sizes = self.exact.sizes
+        self.monitor = SignalMonitor(
+            schedule.parameters, self.sizes[1:], schedule.sample_time, count, outside == "refuse", stale_after
+        )
+        self._state: FloatArray = np.zeros((count, self.sizes[0]))
+        self.samples = 0
+
+    @property
+    def state(self) -> FloatArray:
+        """A copy of the estimate, shape (*batch_shape, states)."""
+        return self._state.copy().reshape(*self.batch_shape, self.sizes[0])
+
+    def step(self, held_input: npt.ArrayLike, measurement: npt.ArrayLike, parameter: npt.ArrayLike) -> LpvObserverStep:
+        """Moves every entry by one sample; arguments have the shapes (*batch_shape, nu), (.., ny) and (.., parameters).
+
+        The last axis may be left out where it is one long.
+
+        Raises:
+            EstimatorError: another shape, or not numbers.
+            RangeError: outside the certified box, if the observer refuses that; the state is then unchanged.
+        """
+        shape = self.batch_shape
+        u = self._signals(held_input, self.sizes[1], "input")
+        y = self._signals(measurement, self.sizes[2], "measurement")
+        p = self._signals(parameter, len(self.schedule.parameters), "parameter")
+        seen = self.monitor(u, y, p, self.samples, shape)
+        used = None if seen.coast is None else ~seen.coast
+        innovation = np.empty_like(y)
+        moved = np.empty_like(self._state)
+        for start in range(0, len(p), _CHUNK):
+            part = slice(start, start + _CHUNK)
+            moved[part], innovation[part] = self.exact.advance(
+                self._state[part], seen.held_input[part], seen.measurement[part], seen.parameter[part],
+                None if used is None else used[part],
+            )  # fmt: skip
+        self._state = moved
+        self.samples += 1
+        flags: FlagArray = np.zeros(shape, dtype=np.int32) if seen.flags is None else seen.flags.reshape(shape)
+        if not quiet(moved.reshape(-1)):
+            gone = ~(np.absolute(moved) <= LIMIT).all(axis=1)  # an unstable model coasting for long
+            moved[gone] = 0.0
+            self._renew(gone.reshape(shape))
+        self._flag_renewed(flags)
+        if seen.missing is not None:
+            innovation[seen.missing] = np.nan
+        everywhere: BoolArray = np.ones(shape, dtype=np.bool_) if used is None else used.reshape(shape)
+        return LpvObserverStep(
+            self.state,
+            innovation.reshape(*shape, self.sizes[2]),
+            everywhere,
+            flags,
+            seen.parameter.reshape(*shape, len(self.schedule.parameters)),
+        )
+
+    def _signals(self, value: npt.ArrayLike, size: int, what: str) -> FloatArray:
+        array, wanted = numbers(value, what), (*self.batch_shape, size)
+        if array.shape != wanted and not (size == 1 and array.shape == self.batch_shape):
+            raise EstimatorError(f"{what} has shape {array.shape}, expected {wanted}")
+        return array.reshape(math.prod(self.batch_shape), size)
+
+    def reset(self, where: npt.ArrayLike | None = None, state: npt.ArrayLike = 0.0) -> None:
+        """Sets the entries `where` (mask of the batch shape; None: all) to `state` and forgets what they have seen.
+
+        `state` broadcasts to (*batch_shape, states). The next step carries the flag RESET for these entries.
+
+        Raises:
+            EstimatorError: another shape, or a state that is not finite.
+        """
+        chosen = mask(where, self.batch_shape, "where")
+        full, flat = finite(state, (*self.batch_shape, self.sizes[0]), "state"), chosen.reshape(-1)
+        self._state[flat] = full.reshape(-1, self.sizes[0])[flat]
+        self.monitor.forget(flat)
+        self._renew(chosen)
+
+    def save(self) -> Saved:
+        """Everything needed to continue later, and the digest of the schedule, as plain arrays."""
+        return super().save() | {"schedule_sha256": np.array(self.schedule.sha256)}
+
+    def _check(self, saved: Mapping[str, AnyArray]) -> None:
+        if "schedule_sha256" in saved and str(saved["schedule_sha256"]) != self.schedule.sha256:
+            raise EstimatorError(f"saved with another schedule than '{self.schedule.name}' {self.schedule.sha256[:12]}")
+        super()._check(saved)

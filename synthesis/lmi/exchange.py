@@ -1,0 +1,204 @@
+r"""Exchange: solve on a few places, look where the answer fails, add those places, solve again.
+
+Of the many places of a grid (20 x 20 parameter values with 4 rate vertices are 1600) only a handful ever decide. Places that
+are not solved for are only looked at: for known decisions that is one evaluation and the least eigenvalue. What holds on the
+places that were looked at is then proved on the continuum, and a place where that proof fails joins them (cutting planes of
+semi-infinite programming; Hettich and Kortanek 1993). Every problem that is solved on the way is a part of the whole one, so
+its lower bound and its certificate of infeasibility are those of the whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from estimators.arrays import FloatArray
+from synthesis.lmi.clarabel_backend import RawAnswer, solve_with_clarabel
+from synthesis.lmi.conic import assemble, structural_zeros
+from synthesis.lmi.interior import solve_with_interior
+from synthesis.lmi.problem import Inequality, LmiProblem
+from synthesis.lmi.relaxation import RelaxedProblem, SampledInequality, rate_samples, widened
+from synthesis.lmi.settings import LmiSettings
+
+ROUNDS = 20
+MORE = 6  # places that one inequality gains in a round
+SHARE = 0.1  # of the worst violation; what is broken by less waits
+EDGE = 1e-7  # every inequality is solved for with this margin, and half of it may be missing where it is only looked at
+KEPT, NEARLY = (
+    12,
+    1e-4,
+)  # places of an inequality that the next problem starts with: the tightest ones, relative to its size
+LOOKED_AT = {0: 1, 1: 9}  # points for each parameter, by their number; 5 for more
+SLACK = 0.02  # share of the common margin by which a place that is only looked at may fall short
+STEADY = 1e-5  # relative change of an objective that nothing will be proved at
+FINE, ROUGH = 1e-6, 1e-3  # relative accuracy of an objective; of a largest margin, and of a least norm
+
+
+@dataclass
+class Family:
+    """One inequality at the places where it is looked at.
+
+    `rows(places)` gives its values with unknowns (g, k, k, 1+N), `known(decisions, places)` those of known decisions (g, k, k).
+    `active` are the indices of the places that are solved for.
+    """
+
+    name: str
+    places: FloatArray
+    rows: Callable[[FloatArray], FloatArray]
+    known: Callable[[FloatArray, FloatArray], FloatArray]
+    active: list[int]
+    strict: bool = True
+
+    def add(self, place: FloatArray) -> bool:
+        """Look there, and solve for it; False if it is solved for already."""
+        near = np.abs(self.places[self.active] - place).max(axis=1, initial=0.0) < 1e-9
+        if near.any():
+            return False
+        self.places = np.vstack([self.places, place])
+        self.active.append(len(self.places) - 1)
+        return True
+
+    def worst(self, decisions: FloatArray, slack: float) -> list[int]:
+        """Indices of places that fall short by more than `slack`, worst first, no two of them neighbours."""
+        values = self.known(decisions, self.places)
+        least = np.linalg.eigvalsh(values)[:, 0]
+        least[self.active] = np.inf
+        short = np.flatnonzero(least < -slack)
+        chosen: list[int] = []
+        for index in short[np.argsort(least[short])]:
+            if least[index] > SHARE * least[short].min():
+                break
+            apart = np.abs(self.places[chosen] - self.places[index]).max(axis=1) if chosen else np.array([np.inf])
+            if apart.min() > 0.3:
+                chosen.append(int(index))
+            if len(chosen) == MORE:
+                break
+        return chosen
+
+    def tightest(self, decisions: FloatArray) -> FloatArray:
+        """Places (g, v) that decide at these decisions: what a problem of the same kind does well to start with."""
+        places = self.places[self.active]
+        values = np.linalg.eigvalsh(self.known(decisions, places))
+        order = np.argsort(values[:, 0])[:KEPT]
+        return np.asarray(places[order[values[order, 0] < NEARLY * max(1.0, float(values[:, -1].max()))]])
+
+
+Memory = dict[str, FloatArray]  # places of every inequality that decided when a problem of the same kind was solved
+
+
+def solve_sampled(relaxed: RelaxedProblem, settings: LmiSettings, tolerance: float = FINE) -> RawAnswer:
+    """Solve a sampled problem with the method for few places and many unknowns."""
+    if settings.solver.startswith("cvxpy:"):
+        from synthesis.lmi.cvxpy_backend import solve_with_cvxpy  # cvxpy takes 1 s to import
+
+        return solve_with_cvxpy(relaxed, settings.solver.removeprefix("cvxpy:"), settings)
+    if any(len(structural_zeros(part.values)) for part in relaxed.sampled):
+        return solve_with_clarabel(assemble(relaxed), len(relaxed.cost), settings)  # knows of equalities
+    blocks = []
+    for part in relaxed.sampled:
+        values = part.values.copy()
+        values[..., 0] -= part.margin * np.eye(values.shape[1])
+        blocks.append(values)
+    tolerance = max(settings.tolerance, tolerance)
+    found = solve_with_interior(blocks, relaxed.cost, relaxed.weights, tolerance, settings.max_iterations)
+    if not found.infeasible:
+        return found
+    other = solve_with_clarabel(assemble(relaxed), len(relaxed.cost), settings)  # which polishes its evidence
+    return other if other.excluded > found.excluded else found
+
+
+def exchange(
+    problem: LmiProblem, families: Sequence[Family], settings: LmiSettings, tolerance: float | None = None
+) -> RawAnswer:
+    """Solve until no place that is looked at falls short; the families remember what is solved for.
+
+    Without `verify` an objective that does not move any more ends it, too: then it bounds, and nothing else is asked of it.
+    """
+    index = problem.margin_index
+    if tolerance is None:
+        tolerance = ROUGH if index is not None or problem.least_norm else FINE
+    iterations, seconds, before, answer = 0, 0.0, np.inf, None
+    for _ in range(ROUNDS):
+        sampled = tuple(
+            SampledInequality(
+                family.name, widened(family.rows(places), problem.decisions), places,
+                max(settings.margin, EDGE) if family.strict else 0.0,
+            )
+            for family in families if len(places := family.places[family.active])
+        )  # fmt: skip
+        answer = solve_sampled(
+            RelaxedProblem("exchange", sampled, (), problem.cost, problem.weights), settings, tolerance
+        )
+        iterations, seconds = iterations + answer.iterations, seconds + answer.seconds
+        if answer.infeasible or not np.isfinite(answer.decisions).all():
+            break
+        value = float(problem.cost @ answer.decisions)
+        if not settings.verify and index is None and abs(value - before) <= STEADY * abs(value):
+            break
+        if index is not None and not answer.decisions[index] > 0.0 and not settings.verify:
+            break  # even these places leave no margin
+        before = value
+        slack = 0.0 if index is None else SLACK * abs(float(answer.decisions[index]))
+        slack = max(slack, SLACK * problem.floor, EDGE / 2)
+        more = [family.worst(answer.decisions, slack) for family in families]
+        if not any(more):
+            break
+        for family, indices in zip(families, more, strict=True):
+            family.active += indices
+    assert answer is not None
+    return replace(answer, iterations=iterations, seconds=seconds)
+
+
+def families_of(problem: LmiProblem, memory: Memory | None = None) -> list[Family]:
+    """The inequalities of a problem on a grid of the parameters and at the vertices of the rates that they depend on."""
+    families = [_family(problem, entry) for entry in problem.inequalities]
+    recall(families, memory or {})
+    return families
+
+
+def recall(families: Sequence[Family], memory: Memory) -> None:
+    """Start with the places that decided before."""
+    for family in families:
+        for place in memory.get(family.name, ()):
+            family.add(place)
+
+
+def remember(families: Sequence[Family], decisions: FloatArray, memory: Memory) -> None:
+    """What decides at these decisions."""
+    for family in families:
+        memory[family.name] = family.tightest(decisions)
+
+
+def _family(problem: LmiProblem, entry: Inequality) -> Family:
+    count = len(problem.parameters)
+    degrees = entry.matrix.degrees[:count]
+    fine = LOOKED_AT.get(count, 5)
+    lines = [np.linspace(-1.0, 1.0, 2 if d == 1 and count > 1 else fine) if d else np.zeros(1) for d in degrees]
+    found, points = rate_samples(entry.matrix, count), list(product(*lines))  # one empty point without parameters
+    grid, rates = (np.array(line, float).reshape(len(line), count) for line in (points, found))
+    places = np.hstack([np.repeat(grid, len(rates), axis=0), np.tile(rates, (len(grid), 1))])
+
+    def rows(chosen: FloatArray) -> FloatArray:
+        return entry.matrix.at(chosen)
+
+    def known(decisions: FloatArray, chosen: FloatArray) -> FloatArray:
+        return np.asarray(entry.matrix.substitute(decisions).at(chosen)[..., 0])
+
+    return Family(entry.name, places, rows, known, corners(places, count), entry.strict)
+
+
+def corners(places: FloatArray, count: int) -> list[int]:
+    """Indices to start with: every corner of the parameters with one of its rates, opposite ones with opposite rates."""
+    spread = np.abs(places[:, :count]).max(axis=0, initial=0.0)
+    at_corner = (np.abs(places[:, :count]) >= spread - 1e-12).all(axis=1)
+    sign = np.where(places[:, :count] >= 0.0, 1.0, -1.0)
+    agree = (places[:, count:] * sign).sum(axis=1)
+    found: dict[tuple[float, ...], int] = {}
+    for index in np.flatnonzero(at_corner):
+        key = tuple(places[index, :count])
+        if key not in found or agree[index] > agree[found[key]]:
+            found[key] = int(index)
+    return list(found.values())
