@@ -76,8 +76,8 @@ class EstimationPipeline(Memory):
         EstimatorError: a setting that is not positive, a part for another batch or sample time.
     """
 
-    memory = ("bias", "front", "angle", "speed", "drive")
-    unknowns = ("drive",)
+    memory = ("bias", "front", "angle", "speed", "drive", "read", "free", "used", "inertial")
+    unknowns = ("drive", "read", "free")
 
     def __init__(
         self,
@@ -126,6 +126,10 @@ class EstimationPipeline(Memory):
         self.front: Number = kit.full(0.0)  # F_yf of the last sample, N
         self.angle: Number = kit.full(0.0)  # the last known steering of the front wheels, rad
         self.speed: list[Number] = [kit.full(0.0)] * 3  # V_x, V_y, r of the last sample
+        self.used: list[Number] = [kit.full(True)] * 3  # whether the velocity part believed a_x, a_y, r of the last sample
+        self.inertial: list[Number] = [kit.full(0.0)] * 3  # and what it took them for
+        self.read: list[Number] = [kit.full(math.nan)] * 2  # a_x, a_y as they came
+        self.free: list[Number] = [kit.full(math.nan)] * 2  # and without gravity
         self.drive: Number = kit.full(math.nan)  # sum of the wheels' own F_x over m, m/s^2, where all are known
 
     def step(self, signals: VehicleSignals) -> PipelineStep:
@@ -142,6 +146,10 @@ class EstimationPipeline(Memory):
         late = self._late(signals.elapsed)
         fresh = self.readings.step(w)
         tilt, own_x, own_y, free_x, free_y = self._tilted(signals, read_x, read_y, turned)
+        own_x, own_y, turned = (
+            choose(used | kit.no(abs(value) < math.inf), value, instead)
+            for used, value, instead in zip(self.used, (own_x, own_y, turned), self.inertial, strict=True)
+        )
         own_x, own_y = own_x - self.bias[0], own_y - self.bias[1]
         lean, rise = (None, None) if tilt is None else (tilt.roll, tilt.pitch)
         loads = self.loads.step(read_x - self.bias[0], read_y - self.bias[1], signals.az, rise, lean)
@@ -178,6 +186,8 @@ class EstimationPipeline(Memory):
         self.front = kit.own(lateral.axle_force[..., 0])
         vx, vy = self.speed[:2] = kit.own(moved.vx), kit.own(moved.vy)
         self.speed[2] = kit.own(moved.yaw_rate)
+        if (used := getattr(moved, "inertial_used", None)) is not None:
+            self.used, self.inertial = kit.rows(used, 3), kit.rows(moved.inertial, 3)
         flags: FlagArray = moved.flags | loads.flags | lateral.flags
         if tilt is not None:
             self.drive = choose(lost, math.nan, kit.own(wheels.force.sum(axis=-1)) / car.mass)
@@ -237,6 +247,9 @@ class EstimationPipeline(Memory):
         self.speed = [choose(here, 0.0, value) for value in self.speed]
         self.front, self.angle = choose(here, 0.0, self.front), choose(here, 0.0, self.angle)
         self.drive = choose(here, math.nan, self.drive)
+        self.used = [choose(here, True, value) for value in self.used]
+        self.read = [choose(here, math.nan, value) for value in self.read]
+        self.free = [choose(here, math.nan, value) for value in self.free]
 
     def _late(self, elapsed: npt.ArrayLike | None) -> Number:
         """Where the sample came so early or late that a difference quotient over it is no derivative."""
@@ -270,19 +283,23 @@ class EstimationPipeline(Memory):
         tilt = self.attitude.step(
             read(signals.roll_rate, "roll_rate", limits.YAW_RATE),
             read(signals.pitch_rate, "pitch_rate", limits.YAW_RATE),
-            ax - self.bias[0],
-            ay - self.bias[1],
+            kit.where(self.used[0], ax - self.bias[0], math.nan),
+            kit.where(self.used[1], ay - self.bias[1], math.nan),
             motion_x=self.drive,
             motion_y=self.speed[2] * self.speed[0],
-            yaw_rate=turn,
+            yaw_rate=kit.where(self.used[2], turn, self.inertial[2]),
             grade=read(signals.grade, "grade", limits.ANGLE),
             bank=read(signals.bank, "bank", limits.ANGLE),
         )
         up = read(signals.az, "az", limits.ACCELERATION)
         up = kit.where(abs(up) < math.inf, up, GRAVITY)
         own_x, own_y, _ = levelled(ax, ay, up, tilt.pitch, tilt.roll)
-        free = without_gravity(ax, ay, tilt.total_roll, tilt.total_pitch)
-        return tilt, *(kit.own(value) for value in (own_x, own_y, *free))
+        moved = (kit.own(value) for value in without_gravity(ax, ay, tilt.total_roll, tilt.total_pitch))
+        # a reading that repeats itself is the old one, and so is what is left of it: else a frozen sensor would seem alive
+        pairs = zip((ax, ay), self.read, moved, self.free, strict=True)
+        self.free = [kit.where(new == old, last, value) for new, old, value, last in pairs]
+        self.read = [ax, ay]
+        return tilt, kit.own(own_x), kit.own(own_y), *self.free
 
 
 def _possible(kit: Arithmetic, value: Number, limit: float) -> Number:

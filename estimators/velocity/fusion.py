@@ -20,6 +20,7 @@ from estimators.velocity.consistency_reset import LateralReset, LongitudinalRese
 from estimators.velocity.fusion_inputs import ConditionedInputs, FusionInputs
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.fusion_step import FusionStep, Outcome, fusion_step
+from estimators.velocity.signal_monitor import SignalMonitor
 from estimators.velocity.zero_velocity import ZeroVelocityDetector
 
 _MISSING_INPUT, _RESET, _GATED = int(Flag.MISSING_INPUT), int(Flag.RESET), int(Flag.GATED)
@@ -51,7 +52,7 @@ class VelocityFusion(Memory):
 
     memory = ("new", "renewed", "start")
     parts = (
-        "inputs", "longitudinal_filter", "lateral_filter", "acceleration_source", "slip_direction", "longitudinal_reset",
+        "inputs", "longitudinal_filter", "lateral_filter", "signal_monitor", "acceleration_source", "slip_direction", "longitudinal_reset",
         "lateral_reset", "zero_velocity",
     )  # fmt: skip
     unknowns = ("start",)
@@ -77,6 +78,7 @@ class VelocityFusion(Memory):
         self._across = lateral.LateralFusion(vehicle, self.settings, every, count)
         self.longitudinal_filter, self.lateral_filter = self._along.filter, self._across.filter
         self.inputs = FusionInputs(self._radius, self.settings, count)
+        self.signal_monitor = SignalMonitor(vehicle, self._along, self._across, count)
         self.acceleration_source = AccelerationSource(vehicle, self._along, count)
         self.slip_direction = SlipDirectionTest(self._along, count)
         self.longitudinal_reset = LongitudinalReset(self.settings, count)
@@ -122,19 +124,18 @@ class VelocityFusion(Memory):
         dt, odd = self._elapsed(elapsed)
         seen = self.inputs(inertial, wheels, turned, dt)
         self._begin(seen)
-        a, b, r = seen.inertial
+        judged = self.signal_monitor(dt, seen)
+        b, r, noise_b, noise_r, used_b, used_r, unknown = judged
         given = None if normalised_force is None else kit.wheels(normalised_force, shape, "normalised_force")
         disproved = self.slip_direction.remaining > 0.0
         pull = self.acceleration_source(dt, seen, given, self.inputs.slope, disproved)
         a, noise, doubt, blind, unbelieved, mu = pull
+        self.signal_monitor.mu = mu
         turn, before = across.yaw_rate(r), along.speed
         along.predict(dt, a, noise, turn, across.speed, doubt > 0.0)
-        across.predict(dt, b, seen.noise[1], r, seen.noise[2], before)
-        yaw_acceleration, left, own = (
-            self.inputs.yaw_acceleration,
-            across.speed,
-            along.acceleration(a) + turn * across.speed,
-        )
+        across.predict(dt, b, noise_b, r, noise_r, before, used_b & used_r)
+        yaw_acceleration, left = self.signal_monitor.yaw_acceleration, across.speed
+        own = along.acceleration(a) + turn * left
 
         def moves(angle: Number, x: Number, y: Number) -> tuple[Number, ...]:
             sine, cosine = kit.sin(angle), kit.cos(angle)
@@ -149,20 +150,22 @@ class VelocityFusion(Memory):
         along.zero_velocity_update(standing)
         front = slipping[0] | slipping[1] | wheel.gated[0] | wheel.gated[1]
         rear = slipping[2] | slipping[3] | wheel.gated[2] | wheel.gated[3]
-        usable = kit.stacked((seen.present & seen.steered & kit.no(front), seen.present & kit.no(rear)))
+        told = kit.no(unknown)
+        usable = kit.stacked((told & seen.steered & kit.no(front), told & kit.no(rear)))
         fl, fr, rl, rr = seen.steer
         angles = kit.stacked((0.5 * (fl + fr), 0.5 * (rl + rr)))
         axle = across.correct(dt, b, r, yaw_acceleration, angles, along.speed, a, usable)
         restarted = self.lateral_reset(dt, along.speed, axle, usable)
-        across.blind(dt, seen.blind)
+        across.blind(dt, unknown)
         across.zero_velocity_update(standing, r)
-        flags = seen.flags | kit.where(odd, _MISSING_INPUT, 0) | kit.where(unbelieved, _GATED, 0)
+        flags = seen.flags | kit.where(odd, _MISSING_INPUT, 0) | kit.where(unbelieved | kit.no(used_b & used_r), _GATED, 0)
         flags = flags | kit.where(self.renewed | restarted, _RESET, 0)
         self.renewed = self._never
         self._guard(seen, lost)
         outcome = Outcome(slipping, wheel, axle, standing, self.zero_velocity.stopped(seen.silent))
         geometry = (sine, course[0], *self._places)
-        return fusion_step(kit, shape, along, across, seen, geometry, outcome, flags)
+        inertial, used = (a, b, r), (kit.no(unbelieved) & seen.good[0], used_b, used_r)
+        return fusion_step(kit, shape, along, across, seen, geometry, outcome, flags, inertial, used)
 
     def reset(self, where: npt.ArrayLike | None = None, vx: npt.ArrayLike = np.nan, vy: npt.ArrayLike = 0.0) -> None:
         """Forgets the entries `where` (mask of the batch shape; None: all) and starts them at `vx`, `vy`, m/s.

@@ -81,14 +81,36 @@ class LateralFusion:
         x = self.filter.mean
         return measured * (1.0 - self._sensor * x[TURN_SCALE]) - x[YAW_BIAS]
 
+    def reading(self, yaw_rate: Number) -> Number:
+        """What the sensor would say of the yaw rate r, rad/s."""
+        x = self.filter.mean
+        return (yaw_rate + x[YAW_BIAS]) / (1.0 - self._sensor * x[TURN_SCALE])
+
     def predict(
-        self, elapsed: Number, measured: Number, noise: Number, yaw_rate: Number, yaw_noise: Number, speed: Number
+        self,
+        elapsed: Number,
+        measured: Number,
+        noise: Number,
+        yaw_rate: Number,
+        yaw_noise: Number,
+        speed: Number,
+        believed: Number,
     ) -> None:
-        """`measured` a_y and `yaw_rate` as the unit gives them, with their standard deviations; `speed` V_x."""
+        """`measured` a_y and `yaw_rate` as the unit gives them, with their standard deviations; `speed` V_x.
+
+        Readings that are not `believed` teach nothing about the sensors, nor about the road.
+        """
         travel = elapsed * speed
         coupling = (-elapsed, -elapsed, travel, -elapsed * measured, travel * yaw_rate)
+        if self.kit.some(self.kit.no(believed)):
+            x, choose = self.filter.mean, self.kit.where
+            known = sum(gain * x[place] for gain, place in zip(coupling, _MOVING, strict=True))
+            coupling = tuple(choose(believed, gain, 0.0) for gain in coupling)
+            held = choose(believed, 0.0, known)
+        else:
+            held = 0.0
         own, turned = elapsed * noise, travel * yaw_noise
-        shift = elapsed * measured - travel * yaw_rate
+        shift = elapsed * measured - travel * yaw_rate + held
         self.filter.move(elapsed, abs(speed), _MOVING, coupling, shift, own * own + turned * turned)
 
     def correct(
