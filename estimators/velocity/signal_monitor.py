@@ -48,7 +48,7 @@ from estimators.velocity.longitudinal_fusion import RADIUS, LongitudinalFusion
 
 _STEERING = (1.0, 0.5, 0.02)  # m/s^2, share of itself, 1/m: understeer of 2 deg/g at 25 m/s, and the lag of the car; 3.5 deg
 _ALIVE = (0.5, 0.1)  # m/s^2, and share of the larger: what a slide adds before a live reading is doubted
-_SWAY = 0.5  # share of V_y' by which its model may be off
+_SWAY = 1.0  # share of V_y' by which its model may be off: it is made of a yaw rate that may be at fault itself
 _UNDULATION = 0.5  # m/s^2 of side wind, ruts and body roll in a_y
 _UNLIKE = 0.001  # slip of a free-rolling wheel that the other one of its axle does not share
 _SHARE = 0.03  # relative: scale errors of both sensors and of V_x
@@ -183,12 +183,13 @@ class SignalMonitor(CarsMemory):
 
         stuck = [(count - 1.0) * elapsed > s.slowest_unit for count in seen.run]
         wrong_r = outvoted(0, beyond, (1, 2, 3), (2, 3, 4), (1, 2, 4), (1, 3, 4))
-        wrong_r = wrong_r & no(agree[0, 1] | agree[0, 2] | agree[0, 3])
+        backed = agree[0, 1] & (against[1, 2] | against[1, 3] | against[1, 4])
+        wrong_r = wrong_r & no(backed | agree[0, 2] | agree[0, 3])
         wrong_r = wrong_r | (stuck[2] & outvoted(0, against, (1, 2), (1, 3), (2, 3), (2, 4), (3, 4)))
-        grip = [agree[0, 4] & agree[2, 4], agree[0, 4] & agree[3, 4], agree[2, 4] & agree[3, 4]]
         wrong_y = never
-        for pair, follows in zip(((0, 2), (0, 3), (2, 3)), grip, strict=True):
-            wrong_y = wrong_y | (outvoted(1, beyond, pair) & follows)
+        for j, k in ((0, 2), (0, 3), (2, 3)):
+            follows = agree[j, k] & agree[j, 4] & agree[k, 4]
+            wrong_y = wrong_y | (beyond[1, j] & against[1, k] & follows)
         wrong_y = wrong_y & no(agree[1, 2] | agree[1, 3])
         wrong_y = wrong_y & ((level[1] * level[4] < 0.0) | (abs(level[1]) > abs(level[4])))
         wrong_y = wrong_y | (stuck[1] & (against[1, 2] | against[1, 3] | (against[0, 1] & no(wrong_r))))
@@ -203,6 +204,10 @@ class SignalMonitor(CarsMemory):
         ):
             fades = choose(contradicted | no(supported), before, largest(before - elapsed, 0.0))
             left.append(choose(wrong, s.error_memory, fades))
+        begun = [wrong & (before == 0.0) for wrong, before in zip((wrong_y, wrong_r), self.remaining, strict=True)]
+        if kit.some(begun[0] | begun[1]):  # V_y has followed it for a while
+            gap = kit.where(begun[1], abs(level[0] - level[3]), abs(level[0] - level[1]))
+            self.across.filter.widen(begun[0] | begun[1], (gap * s.error_memory) ** 2)
         self.remaining = kit.stacked(left)
         used_y, used_r = known[1] & (left[0] == 0.0), known[0] & (left[1] == 0.0)
         return self._replaced(elapsed, seen, allowed, known, used_y, used_r, sway)

@@ -186,3 +186,7 @@ class SpeedFilter(Memory):
         self.spread[1 : self.size, where] = 0.0
         self.mean[0] = np.where(where, first, self.mean[0])
         self.spread[0] = np.where(where, variance, self.spread[0])
+
+    def widen(self, where: Number, variance: Number) -> None:
+        """Adds to the variance of the speed where the condition `where` holds."""
+        self.spread[0] = self.spread[0] + np.where(where, variance, 0.0)
