@@ -125,7 +125,7 @@ class VelocityFusion(Memory):
         seen = self.inputs(inertial, wheels, turned, dt)
         self._begin(seen)
         judged = self.signal_monitor(dt, seen)
-        b, r, noise_b, noise_r, used_b, used_r, unknown = judged
+        b, r, noise_b, noise_r, used_b, used_r, unknown, off = judged
         given = None if normalised_force is None else kit.wheels(normalised_force, shape, "normalised_force")
         disproved = self.slip_direction.remaining > 0.0
         pull = self.acceleration_source(dt, seen, given, self.inputs.slope, disproved)
@@ -154,7 +154,7 @@ class VelocityFusion(Memory):
         usable = kit.stacked((told & seen.steered & kit.no(front), told & kit.no(rear)))
         fl, fr, rl, rr = seen.steer
         angles = kit.stacked((0.5 * (fl + fr), 0.5 * (rl + rr)))
-        axle = across.correct(dt, b, r, yaw_acceleration, angles, along.speed, a, usable)
+        axle = across.correct(dt, b, r, yaw_acceleration, angles, along.speed, a, usable, off)
         restarted = self.lateral_reset(dt, along.speed, axle, usable)
         across.blind(dt, unknown)
         across.zero_velocity_update(standing, r)

@@ -123,8 +123,12 @@ class LateralFusion:
         speed: Number,
         acceleration: Number,
         usable: Signals,
+        doubt: Number,
     ) -> AxleUpdate:
-        """`steer` of the axles, rad; `acceleration` a_x, for the loads; `usable`: the tires of the axle do not slip."""
+        """`steer` of the axles, rad; `acceleration` a_x, for the loads; `usable`: the tires of the axle do not slip.
+
+        `doubt`: m/s^2 by which an a_y that is not the sensor's may be off.
+        """
         s, x, kit = self.settings, self.filter.mean, self.kit
         largest, smallest = kit.maximum, kit.minimum
         magnitude, turn, left = abs(speed), self.yaw_rate(yaw_rate), x[SPEED]
@@ -153,7 +157,8 @@ class LateralFusion:
             sigma = magnitude * (s.side_floor + s.side_linear * abs(side)) + s.slip_speed
             white = turn_noise + speed * speed * steering_noise
             values = (one, steep, -arm * one, steep * measured, -arm * sensed, linear, linear * square)
-            return innovation, mu, sigma * sigma, white, *values
+            unknown = steep * doubt
+            return innovation, mu, sigma * sigma + unknown * unknown, white, *values
 
         innovation, mu, model, white, *values = kit.each(predicted, steer, x[TIRES::2], x[TIRES + 1 :: 2], *self._axles)
 

@@ -64,6 +64,7 @@ class Judged(NamedTuple):
     used_ay: Number
     used_yaw_rate: Number
     unknown: Number  # whether nothing tells the yaw rate
+    doubt: Number  # m/s^2 by which a replaced a_y may be off for long; 0 where it is the reading
 
 
 class SignalMonitor(CarsMemory):
@@ -124,7 +125,7 @@ class SignalMonitor(CarsMemory):
         if not kit.some(kit.no(quiet)):
             self._differentiate(r, self.since[1] > 0.0, elapsed)
             self.since = kit.stacked([self._zero] * 2)
-            return Judged(b, r, seen.noise[1], seen.noise[2], known[1], known[0], self._never)
+            return Judged(b, r, seen.noise[1], seen.noise[2], known[1], known[0], self._never, self._zero)
         return self._voted(elapsed, seen, allowed, known, sway)
 
     def _allowances(
@@ -248,10 +249,10 @@ class SignalMonitor(CarsMemory):
         central = choose(used_r, speed * turn, other)
         own = central + sway + y[BIAS] + y[BANK]
         ay = choose(used_y, b, own / (1.0 - y[SCALE]))
-        spread = (_UNDULATION + _SWAY * abs(sway) + choose(used_r, allowed[0], 0.0)) / s.gate
-        noise_y = choose(used_y, seen.noise[1], spread * grown[0])
+        doubt_y = (_UNDULATION + _SWAY * abs(sway) + choose(used_r, allowed[0], doubt)) / s.gate
+        noise_y = choose(used_y, seen.noise[1], doubt_y * grown[0])
         self._differentiate(yaw_rate, switched, elapsed)
-        return Judged(ay, yaw_rate, noise_y, noise_r, used_y, used_r, unknown)
+        return Judged(ay, yaw_rate, noise_y, noise_r, used_y, used_r, unknown, choose(used_y, 0.0, doubt_y))
 
     def _differentiate(self, yaw_rate: Number, switched: Number, elapsed: Number) -> None:
         """First-order filter of the slope; where the yaw rate comes from another source than before, that is no slope."""
