@@ -145,7 +145,7 @@ class VelocityFusion(Memory):
         slipping = self.inputs.slipping(course[2], seen.fresh, dt, doubt)
         wheel = along.correct(dt, seen, slipping, mu, b / GRAVITY, longitudinal.WheelMotion(*course), blind)
         self.slip_direction(dt, seen, wheel.innovation, mu)
-        standing, lost = self.zero_velocity(seen, a, turn, dt)
+        standing, lost = self.zero_velocity(seen, a, b, turn, dt)
         lost = lost | self.longitudinal_reset(dt, standing, seen, wheel, slipping, mu, self._radius)
         along.zero_velocity_update(standing)
         front = slipping[0] | slipping[1] | wheel.gated[0] | wheel.gated[1]
@@ -162,7 +162,9 @@ class VelocityFusion(Memory):
         flags = flags | kit.where(self.renewed | restarted, _RESET, 0)
         self.renewed = self._never
         self._guard(seen, lost)
-        outcome = Outcome(slipping, wheel, axle, standing, self.zero_velocity.stopped(seen.silent))
+        # what none of the measurements tells: a speed below the dead band of the wheels, and which of two pairs is right
+        hidden = kit.maximum(kit.where(standing, self.settings.dead_band, 0.0), self.longitudinal_reset.split) / 3.0
+        outcome = Outcome(slipping, wheel, axle, standing, self.zero_velocity.stopped(seen.silent), hidden)
         geometry = (sine, course[0], *self._places)
         inertial, used = (a, b, r), (kit.no(unbelieved) & seen.good[0], used_b, used_r)
         return fusion_step(kit, shape, along, across, seen, geometry, outcome, flags, inertial, used)
@@ -207,10 +209,17 @@ class VelocityFusion(Memory):
         self.new = blind
 
     def _middle(self, seen: ConditionedInputs) -> Number:
-        """Median surface speed of the fresh wheels, m/s: one that stands or spins alone does not count; 0 without any."""
-        surfaces = [R * w for R, w in zip(self._radius, seen.wheel_speed, strict=True)]
-        known = np.where(np.array(seen.fresh), np.array(surfaces), math.nan).reshape(4, -1)
-        middle = np.nanmedian(np.where(np.isfinite(known).any(axis=0), known, 0.0), axis=0)
+        """Median surface speed of the fresh wheels, m/s: one that stands or spins alone does not count; 0 without any.
+
+        Two that spin and two that stand have no middle: a car that stands on ice is more usual than one with two dead wheels.
+        """
+        surfaces = np.array([R * w for R, w in zip(self._radius, seen.wheel_speed, strict=True)])
+        known = np.where(np.array(seen.fresh), surfaces, math.nan).reshape(4, -1)
+        known = np.where(np.isfinite(known).any(axis=0), known, 0.0)
+        low, high = (np.nanquantile(known, 0.5, axis=0, method=side) for side in ("lower", "higher"))
+        size = np.maximum(np.abs(low), np.abs(high))
+        apart = high - low > self.settings.agreement * size + self.settings.dead_speed
+        middle = np.where(apart, np.where(np.abs(low) < np.abs(high), low, high), 0.5 * (low + high))
         return middle.item() if self._count == 1 else middle
 
     def _forget(self, where: Number) -> None:

@@ -55,6 +55,7 @@ class Outcome(NamedTuple):
     axle: lateral.AxleUpdate
     standing: Number
     stopped: Signals  # wheels that do not turn though the car moves
+    hidden: Number  # m/s, deviation of V_x that no measurement can take away
 
 
 def fusion_step(
@@ -71,7 +72,7 @@ def fusion_step(
 ) -> FusionStep:
     """The step in the batch shape; `course` sine and cosine of the steering and x, y of the wheels."""
     choose, x, y = kit.where, along.filter.mean, across.filter.mean
-    slipping, wheel, axle, standing, stopped = outcome
+    slipping, wheel, axle, standing, stopped, hidden = outcome
     turn, ahead_speed, left_speed = across.yaw_rate(inertial[2]), x[0], y[0]
 
     def mapped(
@@ -98,7 +99,8 @@ def fusion_step(
         if kit.some(found[0] | found[1] | found[2] | found[3]):
             (wheel_flags,) = kit.each(lambda sums, bad, bit=flag: (sums | choose(bad, bit, 0),), wheel_flags, found)
     flags = flags | choose(standing, _STANDING, 0) | choose(axle.excited, 0, _NOT_EXCITED)
-    speeds = (x[0], y[0], kit.sqrt(along.filter.variance(0)), kit.sqrt(across.filter.variance(0)), turn)
+    forward = kit.sqrt(along.filter.variance(0) + hidden * hidden)
+    speeds = (x[0], y[0], forward, kit.sqrt(across.filter.variance(0)), turn)
     errors = (x[BIAS], y[lateral.BIAS], y[lateral.YAW_BIAS], x[GRADE], y[lateral.BANK])
     real = kit.table((speeds, errors, radius, slip, angle, innovation, axle.innovation, inertial), shape)
     true = kit.table((wheel.used, wheel.gated, slipping, axle.used, (standing,), used), shape)

@@ -173,6 +173,13 @@ class LateralFusion:
         self.filter.weigh(innovation, variance, used)
         return AxleUpdate(innovation, used, mu, excited[0] | excited[1])
 
+    def calm(self, measured: Number) -> Number:
+        """Whether the body accelerates sideways no more than a standing one may, given what is known of bias and bank."""
+        f, s, x = self.filter, self.settings, self.filter.mean
+        unknown = f.variance(BIAS) + f.variance(BANK) + 2.0 * f.variance(BIAS, BANK)
+        own = measured * (1.0 - x[SCALE]) - x[BIAS] - x[BANK]
+        return abs(own) < 3.0 * self.kit.sqrt(unknown + s.still_acceleration**2)
+
     def blind(self, elapsed: Number, where: Number) -> None:
         """V_y near zero for the cars `where` that have no lateral motion sensor: nothing else is known."""
         if self.kit.some(where):
