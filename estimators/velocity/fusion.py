@@ -151,7 +151,9 @@ class VelocityFusion(Memory):
         front = slipping[0] | slipping[1] | wheel.gated[0] | wheel.gated[1]
         rear = slipping[2] | slipping[3] | wheel.gated[2] | wheel.gated[3]
         told = kit.no(unknown)
-        usable = kit.stacked((told & seen.steered & kit.no(front), told & kit.no(rear)))
+        calm, silent = across.calm(b), seen.silent  # wheels that slide sideways do not turn, and have no slip angle
+        front_rolls, rear_rolls = (calm | kit.no(silent[i] & silent[i + 1]) for i in (0, 2))
+        usable = kit.stacked((told & seen.steered & front_rolls & kit.no(front), told & rear_rolls & kit.no(rear)))
         fl, fr, rl, rr = seen.steer
         angles = kit.stacked((0.5 * (fl + fr), 0.5 * (rl + rr)))
         axle = across.correct(dt, b, r, yaw_acceleration, angles, along.speed, a, usable, off)
@@ -206,6 +208,7 @@ class VelocityFusion(Memory):
         beside = choose(abs(self.start[1]) < math.inf, self.start[1], 0.0)
         unsure = 0.05 + 0.02 * abs(first)
         self.lateral_filter.renew(self.new, beside, unsure * unsure)
+        self.zero_velocity.begin(self.new, asked & (abs(first) + abs(beside) > self.settings.dead_speed))
         self.new = blind
 
     def _middle(self, seen: ConditionedInputs) -> Number:

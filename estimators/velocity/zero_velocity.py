@@ -32,7 +32,7 @@ class ZeroVelocityDetector(CarsMemory):
         self._along, self._across = along, across
         self._zero, self._never = self.kit.full(0.0), self.kit.full(False)
         self.calm: Number = self._zero  # s of silent wheels and calm body
-        self.turned: Number = self._zero  # 1 once a wheel has turned, or the estimate has moved
+        self.turned: Number = self._zero  # 1 once a wheel has turned, or the car was said to move
         self.level_x: Number = self._zero  # a_x and a_y, low-passed while the wheels are silent
         self.level_y: Number = self._zero
 
@@ -55,10 +55,13 @@ class ZeroVelocityDetector(CarsMemory):
         level = self._along.calm(ax) & self._across.calm(ay)
         steady = self._steady(ax, ay, elapsed) & ((self.turned == 0.0) | (self.calm > _PATIENCE))
         self.calm = kit.where(calm & (level | steady), self.calm + elapsed, 0.0)
-        moves = self._moves()
-        self.turned = kit.where(moves, 1.0, self.turned)
+        moves = self._moves() & kit.no(steady & (self.turned == 0.0))
         enough = kit.where(level, s.still_time, _PATIENCE)
         return (self.calm > enough) & kit.no(moves), (self.calm > s.lost_time) & level & moves & seen.alive
+
+    def begin(self, where: Number, moving: Number) -> None:
+        """Cars that start, and whether they were said to move."""
+        self.turned = self.kit.where(where, self.kit.where(moving, 1.0, 0.0), self.turned)
 
     def stopped(self, silent: Signals) -> Signals:
         """Wheels that do not turn though the car moves."""
