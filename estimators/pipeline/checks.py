@@ -32,12 +32,13 @@ class CrossChecks(Memory):
         sample_time: s.
         batch_shape: () for one car.
         memory_time: s, of the low-pass: longer than a stroke of a brake controller.
+        repeat_time: s, the longest interval of the wheel speed sensors: between their samples no wheel says anything new.
 
     Raises:
         EstimatorError: a time that is not positive.
     """
 
-    memory = ("gaps",)
+    memory = ("gaps", "alone")
 
     def __init__(
         self,
@@ -45,13 +46,16 @@ class CrossChecks(Memory):
         sample_time: float,
         batch_shape: tuple[int, ...] = (),
         memory_time: float = 0.5,
+        repeat_time: float = 0.025,
     ) -> None:
         self.vehicle, self.batch_shape = vehicle, batch(batch_shape)
+        self._patience = setting(repeat_time, "repeat_time", "s") / setting(sample_time, "sample_time", "s")
         self._gain = 1.0 - math.exp(
             -setting(sample_time, "sample_time", "s") / setting(memory_time, "memory_time", "s")
         )
         self._kit = arithmetic(self.batch_shape)
         self.gaps: list[Number] = [self._kit.full(0.0)] * 3
+        self.alone: Number = self._kit.full(0.0)  # samples since a wheel last supported V_x
 
     def __call__(
         self,
@@ -81,12 +85,13 @@ class CrossChecks(Memory):
         load_gap = choose(known, (load[0] + load[1] + load[2] + load[3]) / weight - 1.0, 0.0)
         wheels = kit.rows(moved.used, 4)
         supported = wheels[0] | wheels[1] | wheels[2] | wheels[3] | own(moved.standing)
+        self.alone = choose(supported, 0.0, kit.minimum(self.alone + 1.0, self._patience + 1.0))
         found = (
             abs(gaps[0]) > BALANCE,
             abs(gaps[1]) > BALANCE,
             abs(load_gap) > LOAD,
             abs(gaps[2]) > VELOCITY[0] + VELOCITY[1] * abs(speed),
-            kit.no(supported),
+            self.alone > self._patience,
             unknown,
             late,
         )
@@ -101,3 +106,4 @@ class CrossChecks(Memory):
         """Forgets the gaps of the entries `where` (bool mask; None: all)."""
         chosen = self._kit.own(mask(where, self.batch_shape, "where"))
         self.gaps = [self._kit.where(chosen, 0.0, gap) for gap in self.gaps]
+        self.alone = self._kit.where(chosen, 0.0, self.alone)

@@ -108,7 +108,7 @@ class EstimationPipeline(Memory):
         self.velocity: VelocityPart = velocity or VelocityFusion(vehicle, time, shape)
         self.attitude, self.corner_observers, self.sideslip = attitude, corner_observers, sideslip
         self.yaw_slope = FilteredDerivative(time, 0.02, shape)
-        self.checks = CrossChecks(vehicle, time, shape)
+        self.checks = CrossChecks(vehicle, time, shape, repeat_time=repeat_time)
         self.readings = WheelReadings(four, max(1, round(setting(repeat_time, "repeat_time", "s") / time)))
         names = ("longitudinal_force", "loads", "attitude", "lateral_force", "velocity", "corner_observers", "sideslip")
         own = ("yaw_slope", "checks", "readings")
@@ -184,13 +184,18 @@ class EstimationPipeline(Memory):
         consistency = self.checks(agreed, lateral, loads, moved, corners, signals.az, lost, late)
         self.bias = kit.rows(moved.sensor_bias, 3)[:2]
         self.front = kit.own(lateral.axle_force[..., 0])
-        vx, vy = self.speed[:2] = kit.own(moved.vx), kit.own(moved.vy)
+        before, (vx, vy) = self.speed[0], (kit.own(moved.vx), kit.own(moved.vy))
+        self.speed[:2] = vx, vy
         self.speed[2] = kit.own(moved.yaw_rate)
         if (used := getattr(moved, "inertial_used", None)) is not None:
             self.used, self.inertial = kit.rows(used, 3), kit.rows(moved.inertial, 3)
         flags: FlagArray = moved.flags | loads.flags | lateral.flags
+        started = (kit.own(moved.flags) & int(Flag.RESET)) != 0
         if tilt is not None:
-            self.drive = choose(lost, math.nan, kit.own(wheels.force.sum(axis=-1)) / car.mass)
+            # without torques what the wheels hold V_x to: slower, but no more in a loop with gravity than they are
+            gained = (vx - before) / self.sample_time - self.speed[2] * vy
+            gained = choose(started, math.nan, gained)
+            self.drive = choose(lost, gained, kit.own(wheels.force.sum(axis=-1)) / car.mass)
             flags = flags | tilt.flags
         if delayed:
             flags = flags | np.asarray(choose(late, int(Flag.STALE_MEASUREMENT), 0), dtype=np.int32)
