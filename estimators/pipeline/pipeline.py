@@ -22,6 +22,7 @@ from estimators.forces import (
 )
 from estimators.memory import Memory
 from estimators.pipeline.checks import CrossChecks
+from estimators.pipeline.direction import DirectionOfTravel
 from estimators.pipeline.parts import (
     CORNER_PARTS,
     AttitudePart,
@@ -71,12 +72,13 @@ class EstimationPipeline(Memory):
         attitude, corner_observers, sideslip: parts; None: without. The car is then level, and tilt counts as bias.
         acceleration_deviation: m/s^2, how wrong a_x may be where it corrects the sum of the wheels' forces.
         repeat_time: s, the longest interval of the wheel speed sensors.
+        unsigned_wheels: the sensors do not tell backward from forward (most cars): `direction` does, or the accelerometer.
 
     Raises:
         EstimatorError: a setting that is not positive, a part for another batch or sample time.
     """
 
-    memory = ("bias", "front", "angle", "speed", "drive", "read", "free", "used", "inertial")
+    memory = ("bias", "front", "angle", "speed", "drive", "read", "free", "used", "inertial", "gravity")
     unknowns = ("drive", "read", "free")
 
     def __init__(
@@ -93,6 +95,7 @@ class EstimationPipeline(Memory):
         sideslip: SideslipPart | None = None,
         acceleration_deviation: float = 0.15,
         repeat_time: float = 0.025,
+        unsigned_wheels: bool = False,
     ) -> None:
         self.vehicle, self.batch_shape = vehicle, batch(batch_shape)
         shape = self.batch_shape
@@ -111,10 +114,12 @@ class EstimationPipeline(Memory):
         self.checks = CrossChecks(vehicle, time, shape, repeat_time=repeat_time)
         self.readings = WheelReadings(four, max(1, round(setting(repeat_time, "repeat_time", "s") / time)))
         names = ("longitudinal_force", "loads", "attitude", "lateral_force", "velocity", "corner_observers", "sideslip")
+        self.direction = DirectionOfTravel(vehicle, time, shape) if unsigned_wheels else None
         own = ("yaw_slope", "checks", "readings")
         self._named = (*(name for name in names if getattr(self, name) is not None), *own)
         check_parts({name: getattr(self, name) for name in self._named}, shape, time, CORNER_PARTS)
         self.parts = tuple(name for name in self._named if hasattr(getattr(self, name), "save"))
+        self.parts += ("direction",) if unsigned_wheels else ()
         self._lateral_first = bool(getattr(self.velocity, "uses_lateral_force", False))
         self._use_across = self._lateral_first or self.corner_observers is not None
         self._total_deviation = vehicle.mass * setting(acceleration_deviation, "acceleration_deviation", "m/s^2")
@@ -128,6 +133,7 @@ class EstimationPipeline(Memory):
         self.speed: list[Number] = [kit.full(0.0)] * 3  # V_x, V_y, r of the last sample
         self.used: list[Number] = [kit.full(True)] * 3  # whether the velocity part believed a_x, a_y, r of the last sample
         self.inertial: list[Number] = [kit.full(0.0)] * 3  # and what it took them for
+        self.gravity: Number = kit.full(0.0)  # in a_x, m/s^2, as far as the velocity part knows it
         self.read: list[Number] = [kit.full(math.nan)] * 2  # a_x, a_y as they came
         self.free: list[Number] = [kit.full(math.nan)] * 2  # and without gravity
         self.drive: Number = kit.full(math.nan)  # sum of the wheels' own F_x over m, m/s^2, where all are known
@@ -144,6 +150,13 @@ class EstimationPipeline(Memory):
         read_x, read_y = (_possible(kit, value, limits.ACCELERATION) for value in (ax, ay))
         turned = _possible(kit, turn, limits.YAW_RATE)
         late = self._late(signals.elapsed)
+        signed = None
+        if self.direction is not None:
+            pull = (self.free[0] if self.attitude else ax) - self.bias[0] - self.gravity
+            signed = self.direction.step(w, np.asarray(pull), signals.direction)
+            w = signed.wheel_speed
+            if signed.turned.any():
+                self.velocity.reset(signed.turned, signed.speed)
         fresh = self.readings.step(w)
         tilt, own_x, own_y, free_x, free_y = self._tilted(signals, read_x, read_y, turned)
         own_x, own_y, turned = (
@@ -189,12 +202,13 @@ class EstimationPipeline(Memory):
         self.speed[2] = kit.own(moved.yaw_rate)
         if (used := getattr(moved, "inertial_used", None)) is not None:
             self.used, self.inertial = kit.rows(used, 3), kit.rows(moved.inertial, 3)
+            self.gravity = kit.own(moved.gravity[..., 0])
         flags: FlagArray = moved.flags | loads.flags | lateral.flags
         started = (kit.own(moved.flags) & int(Flag.RESET)) != 0
         if tilt is not None:
             # without torques what the wheels hold V_x to: slower, but no more in a loop with gravity than they are
             gained = (vx - before) / self.sample_time - self.speed[2] * vy
-            gained = choose(started, math.nan, gained)
+            gained = choose(started | kit.own(moved.standing), math.nan, gained)
             self.drive = choose(lost, gained, kit.own(wheels.force.sum(axis=-1)) / car.mass)
             flags = flags | tilt.flags
         if delayed:
@@ -203,7 +217,7 @@ class EstimationPipeline(Memory):
         return PipelineStep(
             vx=moved.vx,
             vy=moved.vy,
-            vx_deviation=moved.vx_deviation,
+            vx_deviation=moved.vx_deviation if signed is None else np.hypot(moved.vx_deviation, signed.open_deviation),
             vy_deviation=moved.vy_deviation,
             sideslip=np.asarray(sideslip).reshape(shape),
             yaw_rate=moved.yaw_rate,
@@ -252,6 +266,9 @@ class EstimationPipeline(Memory):
         self.speed = [choose(here, 0.0, value) for value in self.speed]
         self.front, self.angle = choose(here, 0.0, self.front), choose(here, 0.0, self.angle)
         self.drive = choose(here, math.nan, self.drive)
+        self.gravity = choose(here, 0.0, self.gravity)
+        if self.direction is not None:
+            self.direction.forget(np.ravel(here) if not self._single else here)
         self.used = [choose(here, True, value) for value in self.used]
         self.read = [choose(here, math.nan, value) for value in self.read]
         self.free = [choose(here, math.nan, value) for value in self.free]

@@ -151,7 +151,8 @@ class VelocityFusion(Memory):
         front = slipping[0] | slipping[1] | wheel.gated[0] | wheel.gated[1]
         rear = slipping[2] | slipping[3] | wheel.gated[2] | wheel.gated[3]
         told = kit.no(unknown)
-        calm, silent = across.calm(b), seen.silent  # wheels that slide sideways do not turn, and have no slip angle
+        # wheels that slide sideways do not turn, and have no slip angle; no road is so slippery that the car feels nothing
+        calm, silent = across.friction(b) < self.settings.unloaded, seen.silent
         front_rolls, rear_rolls = (calm | kit.no(silent[i] & silent[i + 1]) for i in (0, 2))
         usable = kit.stacked((told & seen.steered & front_rolls & kit.no(front), told & rear_rolls & kit.no(rear)))
         fl, fr, rl, rr = seen.steer

@@ -173,6 +173,11 @@ class LateralFusion:
         self.filter.weigh(innovation, variance, used)
         return AxleUpdate(innovation, used, mu, excited[0] | excited[1])
 
+    def friction(self, measured: Number) -> Number:
+        """|F_y|/F_z of the whole car, from its a_y as measured."""
+        x = self.filter.mean
+        return abs(measured * (1.0 - x[SCALE]) - x[BIAS] - x[BANK]) / GRAVITY
+
     def calm(self, measured: Number) -> Number:
         """Whether the body accelerates sideways no more than a standing one may, given what is known of bias and bank."""
         f, s, x = self.filter, self.settings, self.filter.mean

@@ -48,6 +48,8 @@ from estimators.velocity.longitudinal_fusion import RADIUS, LongitudinalFusion
 
 _STEERING = (1.0, 0.5, 0.02)  # m/s^2, share of itself, 1/m: understeer of 2 deg/g at 25 m/s, and the lag of the car; 3.5 deg
 _ALIVE = (0.5, 0.1)  # m/s^2, and share of the larger: what a slide adds before a live reading is doubted
+_PATIENCE = 0.5  # s for which a car that follows its steering contradicts its a_y before the road is taken for banked
+_BANK = 0.3  # rad: banked curves of test tracks are up to 0.5
 _SWAY = 1.0  # share of V_y' by which its model may be off: it is made of a yaw rate that may be at fault itself
 _UNDULATION = 0.5  # m/s^2 of side wind, ruts and body roll in a_y
 _UNLIKE = 0.001  # slip of a free-rolling wheel that the other one of its axle does not share
@@ -70,7 +72,7 @@ class Judged(NamedTuple):
 class SignalMonitor(CarsMemory):
     """Remembers of `count` cars the low-passed witnesses and for how long who is not believed."""
 
-    memory = ("level", "remaining", "since", "yaw_rate", "yaw_acceleration", "mu")
+    memory = ("level", "remaining", "since", "sloped", "yaw_rate", "yaw_acceleration", "mu")
     unknowns = ("yaw_rate",)
 
     def __init__(
@@ -86,6 +88,7 @@ class SignalMonitor(CarsMemory):
         self.level: Signals = kit.stacked([zero] * 5)  # low-passed witnesses, m/s^2
         self.remaining: Signals = kit.stacked([zero] * 2)  # s for which a_y, yaw rate are not believed
         self.since: Signals = kit.stacked([zero] * 2)  # s for which a_y, yaw rate have been replaced
+        self.sloped: Number = zero  # s for which a_y has been off as on a bank
         self.mu: Signals = kit.stacked([zero] * 4)  # F_x/F_z of the wheels at the last sample
         self.yaw_rate: Number = kit.full(math.nan)  # the last one that was used, rad/s
         self.yaw_acceleration: Number = zero  # filtered, rad/s^2
@@ -125,6 +128,7 @@ class SignalMonitor(CarsMemory):
         if not kit.some(kit.no(quiet)):
             self._differentiate(r, self.since[1] > 0.0, elapsed)
             self.since = kit.stacked([self._zero] * 2)
+            self.sloped = kit.maximum(self.sloped - elapsed, 0.0)
             return Judged(b, r, seen.noise[1], seen.noise[2], known[1], known[0], self._never, self._zero)
         return self._voted(elapsed, seen, allowed, known, sway)
 
@@ -194,6 +198,19 @@ class SignalMonitor(CarsMemory):
         wrong_y = wrong_y & no(agree[1, 2] | agree[1, 3])
         wrong_y = wrong_y & ((level[1] * level[4] < 0.0) | (abs(level[1]) > abs(level[4])))
         wrong_y = wrong_y | (stuck[1] & (against[1, 2] | against[1, 3] | (against[0, 1] & no(wrong_r))))
+        straight = largest(abs(level[0]), abs(level[4])) < _STEERING[0]
+        follows = agree[0, 4] & (agree[0, 2] & agree[2, 4] | agree[0, 3] & agree[3, 4])
+        gap = level[0] - level[1]
+        steady = abs(sway) < 0.5 * abs(gap)
+        apart = steady & (abs(gap) > allowed[0] + allowed[1] - _SWAY * abs(sway))
+        slope = apart & follows & (no(wrong_y) | straight) & no(stuck[1])
+        self.sloped = largest(self.sloped + choose(slope, elapsed, -elapsed), 0.0)
+        found = self.sloped > _PATIENCE
+        if kit.some(found):
+            self.across.filter.widen(found, (GRAVITY * _BANK) ** 2, BANK)
+            self.across.filter.widen(found, (gap * _PATIENCE) ** 2)
+            self.sloped = choose(found, 0.0, self.sloped)
+            wrong_y = wrong_y & no(found)
         contradicted_r = against[0, 1] & no(wrong_y) | against[0, 2] | against[0, 3]
         contradicted_y = against[0, 1] & no(wrong_r) | against[1, 2] | against[1, 3]
         supported_r = agree[0, 1] | agree[0, 2] | agree[0, 3]

@@ -126,10 +126,10 @@ class SpeedFilterFew(SpeedFilter):
             self.spread[0] = self.spread[:, 0] = 0.0
             self.spread[0, 0] = variance
 
-    def widen(self, where: bool, variance: float) -> None:
-        """Adds to the variance of the speed, if `where`."""
+    def widen(self, where: bool, variance: float, place: int = 0) -> None:
+        """Adds to the variance of a state, if `where`."""
         if where:
-            self.spread[0, 0] += variance
+            self.spread[place, place] += variance
 
 
 def _inverse_factor(S: list[_Row], noise: Sequence[float]) -> list[_Row]:
