@@ -65,7 +65,9 @@ class DirectionOfTravel(CarsMemory):
         found = self._found(kit.rows(wheel_speed, 4), kit.car(pull, shape, "pull"), gear)
         way, turned, surface, known = (np.reshape(value, shape) for value in found)
         # the other way is off by twice the speed, and a little more while the car brakes: three deviations cover it
-        return SignedWheels(np.abs(wheel_speed) * way[..., None], turned, way * surface, np.where(known, 0.0, 0.8 * surface))
+        return SignedWheels(
+            np.abs(wheel_speed) * way[..., None], turned, way * surface, np.where(known, 0.0, 0.8 * surface)
+        )
 
     def _found(self, wheel_speed: Signals, pull: Number, given: Number) -> tuple[Number, Number, Number, Number]:
         """Way, whether it has just changed while the car rolls, s, and whether it is known."""

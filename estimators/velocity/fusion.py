@@ -52,8 +52,8 @@ class VelocityFusion(Memory):
 
     memory = ("new", "renewed", "start")
     parts = (
-        "inputs", "longitudinal_filter", "lateral_filter", "signal_monitor", "acceleration_source", "slip_direction", "longitudinal_reset",
-        "lateral_reset", "zero_velocity",
+        "inputs", "longitudinal_filter", "lateral_filter", "signal_monitor", "acceleration_source", "slip_direction",
+        "longitudinal_reset", "lateral_reset", "zero_velocity",
     )  # fmt: skip
     unknowns = ("start",)
 
@@ -161,13 +161,13 @@ class VelocityFusion(Memory):
         restarted = self.lateral_reset(dt, along.speed, axle, usable)
         across.blind(dt, unknown)
         across.zero_velocity_update(standing, r)
-        flags = seen.flags | kit.where(odd, _MISSING_INPUT, 0) | kit.where(unbelieved | kit.no(used_b & used_r), _GATED, 0)
+        flags = (
+            seen.flags | kit.where(odd, _MISSING_INPUT, 0) | kit.where(unbelieved | kit.no(used_b & used_r), _GATED, 0)
+        )
         flags = flags | kit.where(self.renewed | restarted, _RESET, 0)
         self.renewed = self._never
         self._guard(seen, lost)
-        # what none of the measurements tells: a speed below the dead band of the wheels, and which of two pairs is right
-        hidden = kit.maximum(kit.where(standing, self.settings.dead_band, 0.0), self.longitudinal_reset.split) / 3.0
-        outcome = Outcome(slipping, wheel, axle, standing, self.zero_velocity.stopped(seen.silent), hidden)
+        outcome = Outcome(slipping, wheel, axle, standing, self.zero_velocity.stopped(seen.silent), self._hidden())
         geometry = (sine, course[0], *self._places)
         inertial, used = (a, b, r), (kit.no(unbelieved) & seen.good[0], used_b, used_r)
         return fusion_step(kit, shape, along, across, seen, geometry, outcome, flags, inertial, used)
@@ -186,6 +186,11 @@ class VelocityFusion(Memory):
         start = [self._kit.where(chosen, new, old) for new, old in zip(asked, self.start, strict=True)]
         self.start = self._kit.stacked(start)
         self._forget(chosen)
+
+    def _hidden(self) -> tuple[Number, Number]:
+        """What none of the measurements tells: speeds below the dead band of the wheels, and which of two pairs is right."""
+        slow = self.zero_velocity.hidden()
+        return self._kit.maximum(slow, self.longitudinal_reset.split / 3.0), slow
 
     def _elapsed(self, elapsed: npt.ArrayLike | None) -> tuple[Number, Number]:
         """Seconds, and where they were unusable and replaced by the sample time."""

@@ -55,7 +55,7 @@ class Outcome(NamedTuple):
     axle: lateral.AxleUpdate
     standing: Number
     stopped: Signals  # wheels that do not turn though the car moves
-    hidden: Number  # m/s, deviation of V_x that no measurement can take away
+    hidden: tuple[Number, Number]  # m/s, deviations of V_x and V_y that no measurement can take away
 
 
 def fusion_step(
@@ -99,8 +99,10 @@ def fusion_step(
         if kit.some(found[0] | found[1] | found[2] | found[3]):
             (wheel_flags,) = kit.each(lambda sums, bad, bit=flag: (sums | choose(bad, bit, 0),), wheel_flags, found)
     flags = flags | choose(standing, _STANDING, 0) | choose(axle.excited, 0, _NOT_EXCITED)
-    forward = kit.sqrt(along.filter.variance(0) + hidden * hidden)
-    speeds = (x[0], y[0], forward, kit.sqrt(across.filter.variance(0)), turn)
+    forward, sideways = (
+        kit.sqrt(half.filter.variance(0) + more * more) for half, more in zip((along, across), hidden, strict=True)
+    )
+    speeds = (x[0], y[0], forward, sideways, turn)
     errors = (x[BIAS], y[lateral.BIAS], y[lateral.YAW_BIAS], x[GRADE], y[lateral.BANK])
     real = kit.table((speeds, errors, radius, slip, angle, innovation, axle.innovation, inertial), shape)
     true = kit.table((wheel.used, wheel.gated, slipping, axle.used, (standing,), used), shape)

@@ -4,8 +4,8 @@ All wheels with a reading hardly turn, and accelerations and yaw rate are those 
 along or across. What gravity adds on a slope is not known at first; a car whose wheels have never turned, and one that stands
 already, needs only accelerations that stay the same: nothing but a car that was parked begins with wheels at rest.
 
-Wheel sensors say nothing below their dead band: a car that creeps looks like one that stands, and what is reported of a
-standing one is no more certain than that.
+Wheel sensors say nothing below their dead band: a car that creeps looks like one that stands, and what is reported of one with
+slow wheels is no more certain than that (`hidden`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from estimators.velocity.longitudinal_fusion import SPEED, LongitudinalFusion
 
 _STEEPEST = 4.0  # m/s^2 of gravity along or across a slope on which cars are parked: 40 %
 
-_PATIENCE = 0.5  # s of accelerations that stay the same, where these are not level: sensors that start up may be silent first
+_PATIENCE = (
+    0.5  # s of accelerations that stay the same, where these are not level: sensors that start up may be silent first
+)
 
 
 class ZeroVelocityDetector(CarsMemory):
@@ -33,6 +35,7 @@ class ZeroVelocityDetector(CarsMemory):
         self._zero, self._never = self.kit.full(0.0), self.kit.full(False)
         self.calm: Number = self._zero  # s of silent wheels and calm body
         self.turned: Number = self._zero  # 1 once a wheel has turned, or the car was said to move
+        self.slow: Number = self._never  # no wheel turns faster than a sensor without pulses may, at this sample
         self.level_x: Number = self._zero  # a_x and a_y, low-passed while the wheels are silent
         self.level_y: Number = self._zero
 
@@ -42,13 +45,17 @@ class ZeroVelocityDetector(CarsMemory):
         """Whether the car stands; and whether it does for so long that an estimate which moves must be lost."""
         s, kit, silent = self.settings, self.kit, seen.silent
         if not kit.some(silent[0] | silent[1] | silent[2] | silent[3]):
-            self.calm, self.turned = self._zero, kit.full(1.0)
+            self.calm, self.turned, self.slow = self._zero, kit.full(1.0), self._never
             return self._never, self._never
         count, moving = 0, self._never
         for fresh, still in zip(seen.fresh, silent, strict=True):
             count = count + kit.where(fresh, 1, 0)
             moving = moving | (fresh & kit.no(still))
-        self.turned = kit.where(moving, 1.0, self.turned)
+        fastest = kit.full(0.0)
+        for w, R in zip(seen.wheel_speed, self._along.radius, strict=True):
+            fastest = kit.maximum(fastest, abs(R * w))
+        self.slow = (fastest <= s.dead_speed) & (count >= 2)
+        self.turned = kit.where(fastest > s.dead_speed, 1.0, self.turned)
         unsure = kit.sqrt(self._across.filter.variance(YAW_BIAS))
         calm = (seen.good[0] | seen.good[1] | seen.good[2]) & kit.no(moving) & (count >= 2)
         calm = calm & (abs(turn) < s.still_yaw_rate + 3.0 * unsure)
@@ -58,6 +65,11 @@ class ZeroVelocityDetector(CarsMemory):
         moves = self._moves() & kit.no(steady & (self.turned == 0.0))
         enough = kit.where(level, s.still_time, _PATIENCE)
         return (self.calm > enough) & kit.no(moves), (self.calm > s.lost_time) & level & moves & seen.alive
+
+    def hidden(self) -> Number:
+        """Deviation of the speeds that no measurement can take away, m/s: three of it are the dead band of the wheels."""
+        s, speed = self.settings, abs(self._along.speed)
+        return self.kit.where(self.slow & (speed < s.dead_band), s.dead_band / 3.0, 0.0)
 
     def begin(self, where: Number, moving: Number) -> None:
         """Cars that start, and whether they were said to move."""

@@ -23,7 +23,9 @@ class Turn(NamedTuple):
     vy: FloatArray
 
 
-def turn(seconds: float, yaw_rate: FloatArray, speed: float = 20.0, gravity: FloatArray | float = 0.0, seed: int = 0) -> Turn:
+def turn(
+    seconds: float, yaw_rate: FloatArray, speed: float = 20.0, gravity: FloatArray | float = 0.0, seed: int = 0
+) -> Turn:
     """Quasi-steady: V_y follows the side forces, slips are those of the fusion's own model; `gravity` along y is in a_y too.
 
     `yaw_rate` (n,); V_y' is part of a_y.
@@ -45,7 +47,9 @@ def turn(seconds: float, yaw_rate: FloatArray, speed: float = 20.0, gravity: Flo
     return Turn(signals, np.full(n, speed), vy)
 
 
-def there_and_back(seconds: float, yaw_rate: float, begin: float = 1.5, end: float = 4.5, ramp: float = 0.6) -> FloatArray:
+def there_and_back(
+    seconds: float, yaw_rate: float, begin: float = 1.5, end: float = 4.5, ramp: float = 0.6
+) -> FloatArray:
     """Straight, a turn from `begin` to `end`, straight again."""
     t = STEP * np.arange(round(seconds / STEP))
     rise = np.clip((t - begin) / ramp, 0.0, 1.0) * np.clip((end - t) / ramp, 0.0, 1.0)

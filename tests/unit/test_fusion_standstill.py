@@ -51,7 +51,7 @@ def test_sliding_sideways_is_not_standing() -> None:
     fusion = VelocityFusion(CAR, STEP)
     fusion.reset(vx=0.0, vy=12.0)
     steps, _ = driven(signals, fusion)
-    error, deviation = (np.array(v) for v in zip(*((s.vy - v, s.vy_deviation) for s, v in zip(steps, true, strict=True)), strict=True))
+    error, deviation = np.array([step.vy for step in steps]) - true, np.array([step.vy_deviation for step in steps])
     moving = true > 1.0
     assert not any(step.standing for step, moves in zip(steps, moving, strict=True) if moves)
     assert np.abs(error)[moving].max() < 0.2

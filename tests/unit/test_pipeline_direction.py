@@ -9,7 +9,9 @@ from estimators.pipeline import EstimationPipeline, VehicleSignals
 from tests.support.pipeline_truth import CAR, TIME, Truth, noisy, straight
 
 
-def driven(truth: Truth, direction: float | None = None, torque: bool = False, unsigned: bool = True) -> tuple[np.ndarray, ...]:
+def driven(
+    truth: Truth, direction: float | None = None, torque: bool = False, unsigned: bool = True
+) -> tuple[np.ndarray, ...]:
     """V_x error and deviation of a car whose sensors count teeth."""
     pipeline = EstimationPipeline(CAR, TIME, unsigned_wheels=unsigned)
     steps = [

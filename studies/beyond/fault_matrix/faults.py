@@ -37,5 +37,8 @@ SIGNALS: dict[str, int | None] = {
     "wheel_speed fl": 0, "wheel_speed rr": 3, "steer": None, "torque fl": 0,
 }  # fmt: skip
 """Signals at fault, and the wheel where one of four fails alone; two wheels stand for all, front and rear, left and right."""
-SEVERE = {"ax": 1.0, "ay": 1.0, "yaw_rate": 0.05, "az": 2.0, "roll_rate": 0.1, "pitch_rate": 0.1, "wheel_speed": 3.0, "steer": 0.01, "torque": 300.0}
+SEVERE = {
+    "ax": 1.0, "ay": 1.0, "yaw_rate": 0.05, "az": 2.0, "roll_rate": 0.1, "pitch_rate": 0.1, "wheel_speed": 3.0, "steer": 0.01,
+    "torque": 300.0,
+}  # fmt: skip
 """How far a reading is from the true one before it matters: m/s^2, rad/s, rad, N m; a wheel by 1 m/s."""
