@@ -18,6 +18,8 @@ BALANCE = 0.6
 """m/s^2 that sum of F/m and acceleration may stay apart: 0.15 of bias, 2 % of torque at 0.5 g, drag at 30 m/s (0.3)."""
 LOAD = 0.05
 """Relative."""
+HEAVE = (0.25, 0.2)
+"""Share of g that a_z may be off, low-passed over so many seconds: crests and dips are shorter or weaker, a fault is not."""
 VELOCITY = (0.5, 0.05)
 """m/s, and share of the speed."""
 _BITS = [int(check) for check in (Check.FORCE_BALANCE, Check.LATERAL_BALANCE, Check.LOAD_SUM, Check.CORNERS_DISAGREE)]
@@ -38,7 +40,7 @@ class CrossChecks(Memory):
         EstimatorError: a time that is not positive.
     """
 
-    memory = ("gaps", "alone")
+    memory = ("gaps", "alone", "heave")
 
     def __init__(
         self,
@@ -55,6 +57,8 @@ class CrossChecks(Memory):
         )
         self._kit = arithmetic(self.batch_shape)
         self.gaps: list[Number] = [self._kit.full(0.0)] * 3
+        self._quick = 1.0 - math.exp(-sample_time / HEAVE[1])
+        self.heave: Number = self._kit.full(0.0)  # a_z/g - 1, low-passed
         self.alone: Number = self._kit.full(0.0)  # samples since a wheel last supported V_x
 
     def __call__(
@@ -79,6 +83,10 @@ class CrossChecks(Memory):
             gaps.append(gap + choose(abs(change) < math.inf, change, 0.0))
         self.gaps = gaps
         up = GRAVITY if az is None else own(entries(az, shape, "az"))
+        there = abs(up) < 1e6  # False for NaN
+        self.heave = self.heave + choose(
+            there, self._quick * (choose(there, up, 0.0) / GRAVITY - 1.0 - self.heave), 0.0
+        )
         known = (abs(up) > 0.1 * GRAVITY) & (abs(up) < math.inf)
         load = kit.rows(loads.load, 4)
         weight = mass * choose(known, up, GRAVITY)
@@ -89,7 +97,7 @@ class CrossChecks(Memory):
         found = (
             abs(gaps[0]) > BALANCE,
             abs(gaps[1]) > BALANCE,
-            abs(load_gap) > LOAD,
+            (abs(load_gap) > LOAD) | (abs(self.heave) > HEAVE[0]),
             abs(gaps[2]) > VELOCITY[0] + VELOCITY[1] * abs(speed),
             self.alone > self._patience,
             unknown,
@@ -107,3 +115,4 @@ class CrossChecks(Memory):
         chosen = self._kit.own(mask(where, self.batch_shape, "where"))
         self.gaps = [self._kit.where(chosen, 0.0, gap) for gap in self.gaps]
         self.alone = self._kit.where(chosen, 0.0, self.alone)
+        self.heave = self._kit.where(chosen, 0.0, self.heave)

@@ -39,9 +39,6 @@ _UNDULATION = 0.5  # m/s^2 of side wind, ruts and body roll in a_y
 _UNLIKE = 0.001  # slip of a free-rolling wheel that the other one of its axle does not share
 _SHARE = 0.03  # relative: scale errors of both sensors and of V_x
 _PATIENCE = 0.5  # s for which a car that follows its steering contradicts its a_y before the road is taken for banked
-_LASTING = (
-    0.6  # of the allowances: a contradiction that lasts is one below them, for biases have given way to it by then
-)
 _BANK = 0.3  # rad: banked curves of test tracks are up to 0.5
 
 
@@ -111,7 +108,7 @@ class SignalMonitor(CarsMemory):
         allowed, known = self._allowances(seen, level, sway, (s_fl, s_fr, s_rl, s_rr))
         v_g, v_p, v_f, v_q, _ = level
         t_g, t_p, t_f, t_q, _ = allowed
-        quiet = known[0] & known[1] & (abs(v_p - v_g) < _LASTING * (t_p + t_g))
+        quiet = known[0] & known[1] & (abs(v_p - v_g) < t_p + t_g)
         quiet = (
             quiet
             & (kit.no(known[2]) | (abs(v_f - v_g) < t_f + t_g))
@@ -167,7 +164,7 @@ class SignalMonitor(CarsMemory):
         found = vote(kit, level, allowed, known, (stuck_y, stuck_r))
         gap, (wrong_y, wrong_r) = level[YAW_RATE] - level[SIDE], found.wrong
         steady = abs(sway) < 0.5 * abs(gap)
-        apart = known[SIDE] & steady & (abs(gap) > _LASTING * (allowed[YAW_RATE] + allowed[SIDE] - _SWAY * abs(sway)))
+        apart = known[SIDE] & steady & (abs(gap) > allowed[YAW_RATE] + allowed[SIDE] - _SWAY * abs(sway))
         straight = largest(abs(level[YAW_RATE]), abs(level[STEERING])) < _STEERING[0]
         banked = self._banked(elapsed, apart & found.grip & (no(wrong_y) | straight) & no(stuck_y), gap)
         left = []
