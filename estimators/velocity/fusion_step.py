@@ -99,9 +99,8 @@ def fusion_step(
         if kit.some(found[0] | found[1] | found[2] | found[3]):
             (wheel_flags,) = kit.each(lambda sums, bad, bit=flag: (sums | choose(bad, bit, 0),), wheel_flags, found)
     flags = flags | choose(standing, _STANDING, 0) | choose(axle.excited, 0, _NOT_EXCITED)
-    forward, sideways = (
-        kit.sqrt(half.filter.variance(0) + more * more) for half, more in zip((along, across), hidden, strict=True)
-    )
+    forward = kit.sqrt(along.filter.variance(0) + hidden[0] * hidden[0])
+    sideways = kit.sqrt(across.filter.variance(0) + hidden[1] * hidden[1])
     speeds = (x[0], y[0], forward, sideways, turn)
     errors = (x[BIAS], y[lateral.BIAS], y[lateral.YAW_BIAS], x[GRADE], y[lateral.BANK])
     real = kit.table((speeds, errors, radius, slip, angle, innovation, axle.innovation, inertial), shape)

@@ -29,11 +29,9 @@ from estimators.velocity.lateral_fusion import BANK, BIAS, SCALE, TIRES, YAW_BIA
 from estimators.velocity.longitudinal_fusion import RADIUS, LongitudinalFusion
 from estimators.velocity.signal_vote import FRONT, REAR, SIDE, STEERING, YAW_RATE, vote
 
-_STEERING = (
-    1.0,
-    0.5,
-    0.02,
-)  # m/s^2, share of itself, 1/m: understeer of 2 deg/g at 25 m/s, and the lag of the car; 3.5 deg
+_UNDERSTEER = 1.0  # m/s^2 by which steering may be off where tires slip: 2 deg/g at 25 m/s
+_FOLLOW = 0.5  # share of itself: the same, and the lag of the car behind its steering
+_TOE = 0.02  # 1/m: 3.5 deg of steering over a wheelbase, all that is left of it at walking pace
 _SWAY = 1.0  # share of V_y' by which its model may be off: it is made of a yaw rate that may be at fault itself
 _UNDULATION = 0.5  # m/s^2 of side wind, ruts and body roll in a_y
 _UNLIKE = 0.001  # slip of a free-rolling wheel that the other one of its axle does not share
@@ -129,8 +127,8 @@ class SignalMonitor(CarsMemory):
         s, kit, speed = self.settings, self.kit, self.along.speed
         P, Q, gate = self.across.filter.variance, self.along.filter.variance, s.gate
         magnitude, largest = abs(speed), kit.maximum
-        t_g = magnitude * gate * kit.sqrt(P(YAW_BIAS) + s.yaw_rate_noise**2) + _SHARE * abs(level[0])
-        t_p = gate * kit.sqrt(P(BIAS) + P(BANK)) + _UNDULATION + _SHARE * abs(level[1]) + _SWAY * abs(sway)
+        t_g = magnitude * gate * kit.sqrt(P(YAW_BIAS) + s.yaw_rate_noise**2) + _SHARE * abs(level[YAW_RATE])
+        t_p = gate * kit.sqrt(P(BIAS) + P(BANK)) + _UNDULATION + _SHARE * abs(level[SIDE]) + _SWAY * abs(sway)
         allowed, known = [t_g, t_p], [seen.good[2], seen.good[1]]
         for axle, track in enumerate(self._tracks):
             i, k = 2 * axle, 2 * axle + 1
@@ -146,8 +144,8 @@ class SignalMonitor(CarsMemory):
                 & kit.no(seen.silent[i] | seen.silent[k])
             )
             known.append(live & rolls)
-        slow = _STEERING[2] * speed * speed
-        allowed.append(kit.minimum(_STEERING[0], slow) + _STEERING[1] * abs(level[4]))
+        slow = _TOE * speed * speed
+        allowed.append(kit.minimum(_UNDERSTEER, slow) + _FOLLOW * abs(level[STEERING]))
         known.append(seen.steered)
         return tuple(allowed), tuple(known)
 
@@ -165,7 +163,7 @@ class SignalMonitor(CarsMemory):
         gap, (wrong_y, wrong_r) = level[YAW_RATE] - level[SIDE], found.wrong
         steady = abs(sway) < 0.5 * abs(gap)
         apart = known[SIDE] & steady & (abs(gap) > allowed[YAW_RATE] + allowed[SIDE] - _SWAY * abs(sway))
-        straight = largest(abs(level[YAW_RATE]), abs(level[STEERING])) < _STEERING[0]
+        straight = largest(abs(level[YAW_RATE]), abs(level[STEERING])) < _UNDERSTEER
         banked = self._banked(elapsed, apart & found.grip & (no(wrong_y) | straight) & no(stuck_y), gap)
         left = []
         for wrong, contradicted, supported, before in zip(
