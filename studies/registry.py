@@ -17,6 +17,7 @@ MODULES = {
     "ekf-ukf-lateral": "studies.papers.ekf_ukf_lateral.study",
     "smo-ekf-sideslip": "studies.papers.smo_ekf_sideslip.study",
     "drop-tolerance": "studies.beyond.drop_tolerance.study",
+    "fault-matrix": "studies.beyond.fault_matrix.study",
     "friction-floor": "studies.beyond.friction_floor.study",
     "implementability": "studies.beyond.implementability.study",
     "well-posed-design": "studies.beyond.well_posed_design.study",

@@ -18,6 +18,8 @@ BALANCE = 0.6
 """m/s^2 that sum of F/m and acceleration may stay apart: 0.15 of bias, 2 % of torque at 0.5 g, drag at 30 m/s (0.3)."""
 LOAD = 0.05
 """Relative."""
+HEAVE = (0.25, 0.2)
+"""Share of g that a_z may be off, low-passed over so many seconds: crests and dips are shorter or weaker, a fault is not."""
 VELOCITY = (0.5, 0.05)
 """m/s, and share of the speed."""
 _BITS = [int(check) for check in (Check.FORCE_BALANCE, Check.LATERAL_BALANCE, Check.LOAD_SUM, Check.CORNERS_DISAGREE)]
@@ -32,12 +34,13 @@ class CrossChecks(Memory):
         sample_time: s.
         batch_shape: () for one car.
         memory_time: s, of the low-pass: longer than a stroke of a brake controller.
+        repeat_time: s, the longest interval of the wheel speed sensors: between their samples no wheel says anything new.
 
     Raises:
         EstimatorError: a time that is not positive.
     """
 
-    memory = ("gaps",)
+    memory = ("gaps", "alone", "heave")
 
     def __init__(
         self,
@@ -45,13 +48,18 @@ class CrossChecks(Memory):
         sample_time: float,
         batch_shape: tuple[int, ...] = (),
         memory_time: float = 0.5,
+        repeat_time: float = 0.025,
     ) -> None:
         self.vehicle, self.batch_shape = vehicle, batch(batch_shape)
+        self._patience = setting(repeat_time, "repeat_time", "s") / setting(sample_time, "sample_time", "s")
         self._gain = 1.0 - math.exp(
             -setting(sample_time, "sample_time", "s") / setting(memory_time, "memory_time", "s")
         )
         self._kit = arithmetic(self.batch_shape)
         self.gaps: list[Number] = [self._kit.full(0.0)] * 3
+        self._quick = 1.0 - math.exp(-sample_time / HEAVE[1])
+        self.heave: Number = self._kit.full(0.0)  # a_z/g - 1, low-passed
+        self.alone: Number = self._kit.full(0.0)  # samples since a wheel last supported V_x
 
     def __call__(
         self,
@@ -75,18 +83,23 @@ class CrossChecks(Memory):
             gaps.append(gap + choose(abs(change) < math.inf, change, 0.0))
         self.gaps = gaps
         up = GRAVITY if az is None else own(entries(az, shape, "az"))
+        there = abs(up) < 1e6  # False for NaN
+        self.heave = self.heave + choose(
+            there, self._quick * (choose(there, up, 0.0) / GRAVITY - 1.0 - self.heave), 0.0
+        )
         known = (abs(up) > 0.1 * GRAVITY) & (abs(up) < math.inf)
         load = kit.rows(loads.load, 4)
         weight = mass * choose(known, up, GRAVITY)
         load_gap = choose(known, (load[0] + load[1] + load[2] + load[3]) / weight - 1.0, 0.0)
         wheels = kit.rows(moved.used, 4)
         supported = wheels[0] | wheels[1] | wheels[2] | wheels[3] | own(moved.standing)
+        self.alone = choose(supported, 0.0, kit.minimum(self.alone + 1.0, self._patience + 1.0))
         found = (
             abs(gaps[0]) > BALANCE,
             abs(gaps[1]) > BALANCE,
-            abs(load_gap) > LOAD,
+            (abs(load_gap) > LOAD) | (abs(self.heave) > HEAVE[0]),
             abs(gaps[2]) > VELOCITY[0] + VELOCITY[1] * abs(speed),
-            kit.no(supported),
+            self.alone > self._patience,
             unknown,
             late,
         )
@@ -101,3 +114,5 @@ class CrossChecks(Memory):
         """Forgets the gaps of the entries `where` (bool mask; None: all)."""
         chosen = self._kit.own(mask(where, self.batch_shape, "where"))
         self.gaps = [self._kit.where(chosen, 0.0, gap) for gap in self.gaps]
+        self.alone = self._kit.where(chosen, 0.0, self.alone)
+        self.heave = self._kit.where(chosen, 0.0, self.heave)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from estimators.arguments import batch, entries, mask, setting
-from estimators.arithmetic import Arithmetic, Number, arithmetic
+from estimators.arithmetic import Number, arithmetic
 from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.faults import Flag
 from estimators.forces import (
@@ -16,12 +16,12 @@ from estimators.forces import (
     LateralForceEstimator,
     UnknownInputForceObserver,
     VerticalLoads,
-    levelled,
     reconcile,
-    without_gravity,
 )
 from estimators.memory import Memory
 from estimators.pipeline.checks import CrossChecks
+from estimators.pipeline.direction import DirectionOfTravel
+from estimators.pipeline.last_sample import LastSample, possible
 from estimators.pipeline.parts import (
     CORNER_PARTS,
     AttitudePart,
@@ -37,7 +37,7 @@ from estimators.pipeline.readings import WheelReadings
 from estimators.pipeline.result import PipelineStep
 from estimators.pipeline.signals import VehicleSignals
 from estimators.signals import FilteredDerivative, limits
-from estimators.vehicle import GRAVITY, VehicleParameters
+from estimators.vehicle import VehicleParameters
 from estimators.velocity import VelocityFusion
 from estimators.velocity.slip import LEAST_SPEED
 
@@ -71,13 +71,13 @@ class EstimationPipeline(Memory):
         attitude, corner_observers, sideslip: parts; None: without. The car is then level, and tilt counts as bias.
         acceleration_deviation: m/s^2, how wrong a_x may be where it corrects the sum of the wheels' forces.
         repeat_time: s, the longest interval of the wheel speed sensors.
+        unsigned_wheels: the sensors do not tell backward from forward (most cars): `direction` does, or the accelerometer.
 
     Raises:
         EstimatorError: a setting that is not positive, a part for another batch or sample time.
     """
 
-    memory = ("bias", "front", "angle", "speed", "drive")
-    unknowns = ("drive",)
+    memory = ("front", "angle")
 
     def __init__(
         self,
@@ -93,6 +93,7 @@ class EstimationPipeline(Memory):
         sideslip: SideslipPart | None = None,
         acceleration_deviation: float = 0.15,
         repeat_time: float = 0.025,
+        unsigned_wheels: bool = False,
     ) -> None:
         self.vehicle, self.batch_shape = vehicle, batch(batch_shape)
         shape = self.batch_shape
@@ -108,13 +109,15 @@ class EstimationPipeline(Memory):
         self.velocity: VelocityPart = velocity or VelocityFusion(vehicle, time, shape)
         self.attitude, self.corner_observers, self.sideslip = attitude, corner_observers, sideslip
         self.yaw_slope = FilteredDerivative(time, 0.02, shape)
-        self.checks = CrossChecks(vehicle, time, shape)
+        self.checks = CrossChecks(vehicle, time, shape, repeat_time=repeat_time)
         self.readings = WheelReadings(four, max(1, round(setting(repeat_time, "repeat_time", "s") / time)))
         names = ("longitudinal_force", "loads", "attitude", "lateral_force", "velocity", "corner_observers", "sideslip")
+        self.direction = DirectionOfTravel(vehicle, time, shape) if unsigned_wheels else None
         own = ("yaw_slope", "checks", "readings")
         self._named = (*(name for name in names if getattr(self, name) is not None), *own)
         check_parts({name: getattr(self, name) for name in self._named}, shape, time, CORNER_PARTS)
         self.parts = tuple(name for name in self._named if hasattr(getattr(self, name), "save"))
+        self.parts += ("last", "direction") if unsigned_wheels else ("last",)
         self._lateral_first = bool(getattr(self.velocity, "uses_lateral_force", False))
         self._use_across = self._lateral_first or self.corner_observers is not None
         self._total_deviation = vehicle.mass * setting(acceleration_deviation, "acceleration_deviation", "m/s^2")
@@ -122,11 +125,9 @@ class EstimationPipeline(Memory):
         self._kit = kit = arithmetic(shape)
         self._single = math.prod(shape) == 1
         self._level, self._never = np.zeros(shape), kit.full(False)
-        self.bias: list[Number] = [kit.full(0.0)] * 2  # of a_x, a_y, m/s^2, up to the last sample
+        self.last = LastSample(time, shape)
         self.front: Number = kit.full(0.0)  # F_yf of the last sample, N
         self.angle: Number = kit.full(0.0)  # the last known steering of the front wheels, rad
-        self.speed: list[Number] = [kit.full(0.0)] * 3  # V_x, V_y, r of the last sample
-        self.drive: Number = kit.full(math.nan)  # sum of the wheels' own F_x over m, m/s^2, where all are known
 
     def step(self, signals: VehicleSignals) -> PipelineStep:
         """One sample on.
@@ -134,22 +135,26 @@ class EstimationPipeline(Memory):
         Raises:
             EstimatorError: a signal of another shape, or not numbers.
         """
-        kit, shape, car, choose = self._kit, self.batch_shape, self.vehicle, self._kit.where
+        kit, shape, car, choose, last = self._kit, self.batch_shape, self.vehicle, self._kit.where, self.last
         w, steer, torque, *body = signals.arrays(shape)
         ax, ay, turn = (kit.own(value) for value in body)
-        read_x, read_y = (_possible(kit, value, limits.ACCELERATION) for value in (ax, ay))
-        turned = _possible(kit, turn, limits.YAW_RATE)
+        read_x, read_y = (possible(kit, value, limits.ACCELERATION) for value in (ax, ay))
+        turned = possible(kit, turn, limits.YAW_RATE)
         late = self._late(signals.elapsed)
+        w, open_way = self._signed(w, signals, read_x)
         fresh = self.readings.step(w)
-        tilt, own_x, own_y, free_x, free_y = self._tilted(signals, read_x, read_y, turned)
-        own_x, own_y = own_x - self.bias[0], own_y - self.bias[1]
+        tilt, own_x, own_y, free_x, free_y = last.tilted(self.attitude, signals, read_x, read_y, turned)
+        own_x, own_y, turned = last.believed(own_x, own_y, turned)
+        read_x, read_y = last.believed(read_x, read_y)
+        bias_x, bias_y = last.bias
+        own_x, own_y = own_x - bias_x, own_y - bias_y
         lean, rise = (None, None) if tilt is None else (tilt.roll, tilt.pitch)
-        loads = self.loads.step(read_x - self.bias[0], read_y - self.bias[1], signals.az, rise, lean)
+        loads = self.loads.step(read_x - bias_x, read_y - bias_y, signals.az, rise, lean)
         wheels = self.longitudinal_force.step(w, torque, loads.load, fresh=fresh)
         delayed = kit.some(late)
         unknown = wheels.unknown | np.asarray(late)[..., None] if delayed else wheels.unknown
         front = kit.rows(steer, 4)
-        angle = _possible(kit, 0.5 * (front[0] + front[1]), limits.ANGLE)
+        angle = possible(kit, 0.5 * (front[0] + front[1]), limits.ANGLE)
         self.angle = choose(abs(angle) < math.inf, angle, self.angle)
         total = car.mass * own_x + self.front * kit.sin(self.angle)
         agreed = reconcile(wheels.force, wheels.deviation, total, self._total_deviation, loads.load, unknown)
@@ -174,21 +179,14 @@ class EstimationPipeline(Memory):
         open_ = kit.rows(unknown, 4)
         lost = open_[0] | open_[1] | open_[2] | open_[3]
         consistency = self.checks(agreed, lateral, loads, moved, corners, signals.az, lost, late)
-        self.bias = kit.rows(moved.sensor_bias, 3)[:2]
         self.front = kit.own(lateral.axle_force[..., 0])
-        vx, vy = self.speed[:2] = kit.own(moved.vx), kit.own(moved.vy)
-        self.speed[2] = kit.own(moved.yaw_rate)
-        flags: FlagArray = moved.flags | loads.flags | lateral.flags
-        if tilt is not None:
-            self.drive = choose(lost, math.nan, kit.own(wheels.force.sum(axis=-1)) / car.mass)
-            flags = flags | tilt.flags
-        if delayed:
-            flags = flags | np.asarray(choose(late, int(Flag.STALE_MEASUREMENT), 0), dtype=np.int32)
+        last.learn(moved, kit.own(wheels.force.sum(axis=-1)) / car.mass, lost)
+        vx, vy, _ = last.speed
         sideslip = kit.atan(vy / kit.maximum(abs(vx), LEAST_SPEED))
         return PipelineStep(
             vx=moved.vx,
             vy=moved.vy,
-            vx_deviation=moved.vx_deviation,
+            vx_deviation=moved.vx_deviation if open_way is None else np.hypot(moved.vx_deviation, open_way),
             vy_deviation=moved.vy_deviation,
             sideslip=np.asarray(sideslip).reshape(shape),
             yaw_rate=moved.yaw_rate,
@@ -202,7 +200,7 @@ class EstimationPipeline(Memory):
             roll=self._level if tilt is None else tilt.roll,
             pitch=self._level if tilt is None else tilt.pitch,
             consistency=consistency,
-            flags=flags,
+            flags=self._flags(moved.flags | loads.flags | lateral.flags, tilt, late),
             wheel_flags=moved.wheel_flags | wheels.flags,
             wheels=wheels,
             reconciled=agreed,
@@ -233,10 +231,27 @@ class EstimationPipeline(Memory):
             else:
                 part.reset(corners if name in CORNER_PARTS else chosen)
         here, choose = self._kit.own(chosen), self._kit.where
-        self.bias = [choose(here, 0.0, value) for value in self.bias]
-        self.speed = [choose(here, 0.0, value) for value in self.speed]
         self.front, self.angle = choose(here, 0.0, self.front), choose(here, 0.0, self.angle)
-        self.drive = choose(here, math.nan, self.drive)
+        self.last.forget(here)
+        if self.direction is not None:
+            self.direction.forget(here if self._single else np.ravel(here))
+
+    def _signed(self, w: FloatArray, signals: VehicleSignals, ax: Number) -> tuple[FloatArray, FloatArray | None]:
+        """Wheel speeds with a sign, and the deviation of V_x, m/s, where it is open; as they are, and None, if they have one."""
+        if self.direction is None:
+            return w, None
+        signed = self.direction.step(w, np.asarray(self.last.pull(ax)), signals.direction)
+        if signed.turned.any() and (reset := getattr(self.velocity, "reset", None)) is not None:
+            reset(signed.turned, signed.speed)
+        return signed.wheel_speed, signed.open_deviation
+
+    def _flags(self, flags: FlagArray, tilt: AttitudeStep | None, late: Number) -> FlagArray:
+        """Of the whole car: `flags` of the parts, those of the attitude, and samples that came late."""
+        if tilt is not None:
+            flags = flags | tilt.flags
+        if not self._kit.some(late):
+            return flags
+        return flags | np.asarray(self._kit.where(late, int(Flag.STALE_MEASUREMENT), 0), dtype=np.int32)
 
     def _late(self, elapsed: npt.ArrayLike | None) -> Number:
         """Where the sample came so early or late that a difference quotient over it is no derivative."""
@@ -254,37 +269,3 @@ class EstimationPipeline(Memory):
             ratio: FloatArray = force / load
             return ratio
         return np.where(lifted, np.nan, force / np.where(lifted, 1.0, load))
-
-    def _tilted(
-        self, signals: VehicleSignals, ax: Number, ay: Number, turn: Number
-    ) -> tuple[AttitudeStep | None, Number, Number, Number, Number]:
-        """The attitude step, a_x and a_y level with the road (forces), and without gravity (velocities), m/s^2."""
-        if self.attitude is None:
-            return None, ax, ay, ax, ay
-        shape, kit = self.batch_shape, self._kit
-
-        def read(given: npt.ArrayLike | None, name: str, limit: float) -> Number:
-            """NaN for what is absent, and for what no sensor reads."""
-            return math.nan if given is None else _possible(kit, kit.own(entries(given, shape, name)), limit)
-
-        tilt = self.attitude.step(
-            read(signals.roll_rate, "roll_rate", limits.YAW_RATE),
-            read(signals.pitch_rate, "pitch_rate", limits.YAW_RATE),
-            ax - self.bias[0],
-            ay - self.bias[1],
-            motion_x=self.drive,
-            motion_y=self.speed[2] * self.speed[0],
-            yaw_rate=turn,
-            grade=read(signals.grade, "grade", limits.ANGLE),
-            bank=read(signals.bank, "bank", limits.ANGLE),
-        )
-        up = read(signals.az, "az", limits.ACCELERATION)
-        up = kit.where(abs(up) < math.inf, up, GRAVITY)
-        own_x, own_y, _ = levelled(ax, ay, up, tilt.pitch, tilt.roll)
-        free = without_gravity(ax, ay, tilt.total_roll, tilt.total_pitch)
-        return tilt, *(kit.own(value) for value in (own_x, own_y, *free))
-
-
-def _possible(kit: Arithmetic, value: Number, limit: float) -> Number:
-    """NaN for what no sensor of a car reads."""
-    return kit.where(abs(value) <= limit, value, math.nan)

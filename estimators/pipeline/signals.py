@@ -29,6 +29,7 @@ class VehicleSignals(NamedTuple):
     grade: npt.ArrayLike = 0.0  # (...) rad, of the road, uphill positive
     bank: npt.ArrayLike = 0.0  # (...) rad, left side up positive
     elapsed: npt.ArrayLike | None = None  # (...) s since the last sample, where it is not the sample time
+    direction: npt.ArrayLike | None = None  # (...) gear: 1 forward, -1 backward; 0 or NaN where it does not say
 
     def arrays(
         self, shape: tuple[int, ...]

@@ -25,6 +25,8 @@ from .mapping import to_centre as to_centre
 from .mapping import to_corners as to_corners
 from .slip import side_slip_angle as side_slip_angle
 from .slip import slip_ratio as slip_ratio
+from .soft_tire import SoftTires as SoftTires
+from .soft_tire import soft_tires as soft_tires
 from .suspension import SuspensionCompliance as SuspensionCompliance
 from .suspension import SuspensionParameters as SuspensionParameters
 from .suspension import SuspensionStep as SuspensionStep

@@ -9,7 +9,9 @@ and their distance from the prediction, which integrates the accelerometer, chan
 standstill or wheels that turn have supported the estimate for as long, the clock runs at a tenth while the force could
 explain the side to which they are off (beyond `unloaded`): four wheels may well slip together, but they had grip before.
 
-A wheel that does not turn has no vote: four locked wheels agree as well, and are no evidence of anything. A car that
+A wheel that does not turn has no vote for another speed: four locked wheels agree as well, and are no evidence of anything.
+But it may support the estimate, of a car that stands on ice while the others spin: more wheels must contradict than support.
+As many against as for it is a `split`: it stays open which pair is right, and how far they are apart is reported. A car that
 stands beyond doubt for `lost_time` while its estimate moves is lost too; a sliding car decelerates.
 
 **V_y.** Is V_y lost? After a slide the axle conditions may stay gated for good: they are far from a V_y that is wrong.
@@ -62,9 +64,9 @@ class LongitudinalReset(CarsMemory):
             self.supported = self.supported + choose(standing | used[0] | used[1] | used[2] | used[3], elapsed, 0.0)
         news = seen.fresh[0] | seen.fresh[1] | seen.fresh[2] | seen.fresh[3]
         if not kit.some(wheel.gated[0] | wheel.gated[1] | wheel.gated[2] | wheel.gated[3]):
-            self.contradicted = choose(news, 0.0, self.contradicted)
+            self.contradicted, self.split = choose(news, 0.0, self.contradicted), kit.full(0.0)
             return kit.full(False)
-        turning, dissent = 0, kit.full(False)
+        turning, support, dissent = 0, 0, kit.full(False)
         low, high, force, surface, gap = _FAR, -_FAR, 0.0, 0.0, 0.0
         outputs = (
             seen.fresh,
@@ -80,6 +82,7 @@ class LongitudinalReset(CarsMemory):
         for fresh, silent, off, far, slips, own, w, age, R in zip(*outputs, strict=True):
             turns = fresh & no(silent)
             turning = turning + choose(turns, 1, 0)
+            support = support + choose(silent & no(far), 1, 0)
             dissent = dissent | (turns & (slips | no(far)))
             low, high = choose(turns, kit.minimum(low, off), low), choose(turns, kit.maximum(high, off), high)
             force = force + choose(turns, own, 0.0)
@@ -91,7 +94,9 @@ class LongitudinalReset(CarsMemory):
         rolls = rolls & (abs(off - apart) <= s.dead_speed + s.rolling * since)
         explained = (force * kit.sign(off) > s.unloaded * turning) & (self.supported >= s.lost_time)
         time = self.contradicted + gap * choose(explained, _PATIENCE, 1.0)
-        contradicted = choose((turning >= 2) & no(dissent) & rolls, time, 0.0)
+        against = (turning >= 2) & no(dissent)
+        self.split = choose(against & (turning == support), abs(off), 0.0)
+        contradicted = choose(against & rolls & (turning > support), time, 0.0)
         self.contradicted = choose(news, contradicted, self.contradicted)
         self.since, self.apart = choose(news, since, self.since), choose(news, apart, self.apart)
         return self.contradicted > s.lost_time

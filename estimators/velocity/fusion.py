@@ -20,6 +20,7 @@ from estimators.velocity.consistency_reset import LateralReset, LongitudinalRese
 from estimators.velocity.fusion_inputs import ConditionedInputs, FusionInputs
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.fusion_step import FusionStep, Outcome, fusion_step
+from estimators.velocity.signal_monitor import SignalMonitor
 from estimators.velocity.zero_velocity import ZeroVelocityDetector
 
 _MISSING_INPUT, _RESET, _GATED = int(Flag.MISSING_INPUT), int(Flag.RESET), int(Flag.GATED)
@@ -51,8 +52,8 @@ class VelocityFusion(Memory):
 
     memory = ("new", "renewed", "start")
     parts = (
-        "inputs", "longitudinal_filter", "lateral_filter", "acceleration_source", "slip_direction", "longitudinal_reset",
-        "lateral_reset", "zero_velocity",
+        "inputs", "longitudinal_filter", "lateral_filter", "signal_monitor", "acceleration_source", "slip_direction",
+        "longitudinal_reset", "lateral_reset", "zero_velocity",
     )  # fmt: skip
     unknowns = ("start",)
 
@@ -77,6 +78,7 @@ class VelocityFusion(Memory):
         self._across = lateral.LateralFusion(vehicle, self.settings, every, count)
         self.longitudinal_filter, self.lateral_filter = self._along.filter, self._across.filter
         self.inputs = FusionInputs(self._radius, self.settings, count)
+        self.signal_monitor = SignalMonitor(vehicle, self._along, self._across, count)
         self.acceleration_source = AccelerationSource(vehicle, self._along, count)
         self.slip_direction = SlipDirectionTest(self._along, count)
         self.longitudinal_reset = LongitudinalReset(self.settings, count)
@@ -122,19 +124,18 @@ class VelocityFusion(Memory):
         dt, odd = self._elapsed(elapsed)
         seen = self.inputs(inertial, wheels, turned, dt)
         self._begin(seen)
-        a, b, r = seen.inertial
+        judged = self.signal_monitor(dt, seen)
+        b, r, noise_b, noise_r, used_b, used_r, unknown, off = judged
         given = None if normalised_force is None else kit.wheels(normalised_force, shape, "normalised_force")
         disproved = self.slip_direction.remaining > 0.0
         pull = self.acceleration_source(dt, seen, given, self.inputs.slope, disproved)
         a, noise, doubt, blind, unbelieved, mu = pull
+        self.signal_monitor.mu = mu
         turn, before = across.yaw_rate(r), along.speed
         along.predict(dt, a, noise, turn, across.speed, doubt > 0.0)
-        across.predict(dt, b, seen.noise[1], r, seen.noise[2], before)
-        yaw_acceleration, left, own = (
-            self.inputs.yaw_acceleration,
-            across.speed,
-            along.acceleration(a) + turn * across.speed,
-        )
+        across.predict(dt, b, noise_b, r, noise_r, before, used_b & used_r)
+        yaw_acceleration, left = self.signal_monitor.yaw_acceleration, across.speed
+        own = along.acceleration(a) + turn * left
 
         def moves(angle: Number, x: Number, y: Number) -> tuple[Number, ...]:
             sine, cosine = kit.sin(angle), kit.cos(angle)
@@ -144,25 +145,32 @@ class VelocityFusion(Memory):
         slipping = self.inputs.slipping(course[2], seen.fresh, dt, doubt)
         wheel = along.correct(dt, seen, slipping, mu, b / GRAVITY, longitudinal.WheelMotion(*course), blind)
         self.slip_direction(dt, seen, wheel.innovation, mu)
-        standing, lost = self.zero_velocity(seen, a, turn, dt)
+        standing, lost = self.zero_velocity(seen, a, b, turn, dt)
         lost = lost | self.longitudinal_reset(dt, standing, seen, wheel, slipping, mu, self._radius)
         along.zero_velocity_update(standing)
         front = slipping[0] | slipping[1] | wheel.gated[0] | wheel.gated[1]
         rear = slipping[2] | slipping[3] | wheel.gated[2] | wheel.gated[3]
-        usable = kit.stacked((seen.present & seen.steered & kit.no(front), seen.present & kit.no(rear)))
+        told = kit.no(unknown)
+        # wheels that slide sideways do not turn, and have no slip angle; no road is so slippery that the car feels nothing
+        calm, silent = across.friction(b) < self.settings.unloaded, seen.silent
+        front_rolls, rear_rolls = (calm | kit.no(silent[i] & silent[i + 1]) for i in (0, 2))
+        usable = kit.stacked((told & seen.steered & front_rolls & kit.no(front), told & rear_rolls & kit.no(rear)))
         fl, fr, rl, rr = seen.steer
         angles = kit.stacked((0.5 * (fl + fr), 0.5 * (rl + rr)))
-        axle = across.correct(dt, b, r, yaw_acceleration, angles, along.speed, a, usable)
+        axle = across.correct(dt, b, r, yaw_acceleration, angles, along.speed, a, usable, off)
         restarted = self.lateral_reset(dt, along.speed, axle, usable)
-        across.blind(dt, seen.blind)
+        across.blind(dt, unknown)
         across.zero_velocity_update(standing, r)
-        flags = seen.flags | kit.where(odd, _MISSING_INPUT, 0) | kit.where(unbelieved, _GATED, 0)
+        flags = (
+            seen.flags | kit.where(odd, _MISSING_INPUT, 0) | kit.where(unbelieved | kit.no(used_b & used_r), _GATED, 0)
+        )
         flags = flags | kit.where(self.renewed | restarted, _RESET, 0)
         self.renewed = self._never
         self._guard(seen, lost)
-        outcome = Outcome(slipping, wheel, axle, standing, self.zero_velocity.stopped(seen.silent))
+        outcome = Outcome(slipping, wheel, axle, standing, self.zero_velocity.stopped(seen.silent), self._hidden())
         geometry = (sine, course[0], *self._places)
-        return fusion_step(kit, shape, along, across, seen, geometry, outcome, flags)
+        inertial, used = (a, b, r), (kit.no(unbelieved) & seen.good[0], used_b, used_r)
+        return fusion_step(kit, shape, along, across, seen, geometry, outcome, flags, inertial, used)
 
     def reset(self, where: npt.ArrayLike | None = None, vx: npt.ArrayLike = np.nan, vy: npt.ArrayLike = 0.0) -> None:
         """Forgets the entries `where` (mask of the batch shape; None: all) and starts them at `vx`, `vy`, m/s.
@@ -178,6 +186,11 @@ class VelocityFusion(Memory):
         start = [self._kit.where(chosen, new, old) for new, old in zip(asked, self.start, strict=True)]
         self.start = self._kit.stacked(start)
         self._forget(chosen)
+
+    def _hidden(self) -> tuple[Number, Number]:
+        """What none of the measurements tells: speeds below the dead band of the wheels, and which of two pairs is right."""
+        slow = self.zero_velocity.hidden()
+        return self._kit.maximum(slow, self.longitudinal_reset.split / 3.0), slow
 
     def _elapsed(self, elapsed: npt.ArrayLike | None) -> tuple[Number, Number]:
         """Seconds, and where they were unusable and replaced by the sample time."""
@@ -201,13 +214,21 @@ class VelocityFusion(Memory):
         beside = choose(abs(self.start[1]) < math.inf, self.start[1], 0.0)
         unsure = 0.05 + 0.02 * abs(first)
         self.lateral_filter.renew(self.new, beside, unsure * unsure)
+        self.zero_velocity.begin(self.new, asked & (abs(first) + abs(beside) > self.settings.dead_speed))
         self.new = blind
 
     def _middle(self, seen: ConditionedInputs) -> Number:
-        """Median surface speed of the fresh wheels, m/s: one that stands or spins alone does not count; 0 without any."""
-        surfaces = [R * w for R, w in zip(self._radius, seen.wheel_speed, strict=True)]
-        known = np.where(np.array(seen.fresh), np.array(surfaces), math.nan).reshape(4, -1)
-        middle = np.nanmedian(np.where(np.isfinite(known).any(axis=0), known, 0.0), axis=0)
+        """Median surface speed of the fresh wheels, m/s: one that stands or spins alone does not count; 0 without any.
+
+        Two that spin and two that stand have no middle: a car that stands on ice is more usual than one with two dead wheels.
+        """
+        surfaces = np.array([R * w for R, w in zip(self._radius, seen.wheel_speed, strict=True)])
+        known = np.where(np.array(seen.fresh), surfaces, math.nan).reshape(4, -1)
+        known = np.where(np.isfinite(known).any(axis=0), known, 0.0)
+        low, high = (np.nanquantile(known, 0.5, axis=0, method=side) for side in ("lower", "higher"))
+        size = np.maximum(np.abs(low), np.abs(high))
+        apart = high - low > self.settings.agreement * size + self.settings.dead_speed
+        middle = np.where(apart, np.where(np.abs(low) < np.abs(high), low, high), 0.5 * (low + high))
         return middle.item() if self._count == 1 else middle
 
     def _forget(self, where: Number) -> None:

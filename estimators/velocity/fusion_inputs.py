@@ -3,8 +3,8 @@
 A value that repeats bit for bit is taken for the old sample: a slow sensor behind a fast clock. An inertial signal that
 has been the same for j samples has integrated one and the same error j times: the variance of the integral grows by
 j^2 - (j - 1)^2 = 2 j - 1 times that of a single one. A wheel speed that repeats is not used again before its model error
-has changed, so that a 50 Hz signal does not count four times; a wheel that reads zero has no other way to say so. An
-inertial signal that is missing is held for a while, and then counts as zero: held in a turn, it would run away.
+has changed, so that a 50 Hz signal does not count four times; a wheel that reads zero has no other way to say so. An a_x
+that is missing is held for a while, and then counts as zero; what replaces a_y and the yaw rate is in `signal_monitor`.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ class ConditionedInputs(NamedTuple):
 
     inertial: Signals
     noise: Signals  # standard deviations of the means over this sample
+    run: Signals  # samples for which each has been the same, or missing
+    good: Signals  # whether each was there
     wheel_speed: Signals
     fresh: Signals  # a wheel speed that says something new
     gap: Signals  # s since the wheel last said something new
@@ -36,7 +38,6 @@ class ConditionedInputs(NamedTuple):
     steered: Number  # whether all steering angles were there
     present: Number  # whether all inertial signals were there
     alive: Number  # whether a_x was there, and has not been the same for longer than a slow sensor is
-    blind: Number  # a_y or r has been missing for long: both are given as 0
     flags: Number
     wheel_flags: Signals
 
@@ -44,7 +45,7 @@ class ConditionedInputs(NamedTuple):
 class FusionInputs(CarsMemory):
     """Remembers the last good values of `count` cars."""
 
-    memory = ("inertial", "run", "wheel_speed", "age", "steer", "slope", "yaw_acceleration", "slip_left")
+    memory = ("inertial", "run", "wheel_speed", "age", "steer", "slope", "slip_left")
     unknowns = ("wheel_speed",)
 
     def __init__(self, radius: Signals, settings: FusionSettings, count: int) -> None:
@@ -60,13 +61,11 @@ class FusionInputs(CarsMemory):
         # of the wheels: s since each last said something new, filtered derivative rad/s^2, s of high slip still believed
         wheels = kit.each(lambda v: (v + zero, v + zero, v + zero, v + zero, v + zero + math.nan), four)
         self.steer, self.age, self.slope, self.slip_left, self.wheel_speed = wheels
-        self.yaw_acceleration: Number = zero  # filtered yaw acceleration, rad/s^2
 
     def __call__(self, inertial: Signals, wheel_speed: Signals, steer: Signals, elapsed: Number) -> ConditionedInputs:
         """Raw signals, which may be anything; `elapsed` s, above zero."""
         kit, choose, no, some = self.kit, self.kit.where, self.kit.no, self.kit.some
-        flags, blind, last = kit.full(0), kit.full(False), self.inertial[2]
-        knew = self.run[2] > 0.0
+        flags = kit.full(0)
         value, run, noise, good, stale = kit.each(
             self._inertial, inertial, self.inertial, self.run, self._limits, self._quiet, self._loud
         )
@@ -75,18 +74,14 @@ class FusionInputs(CarsMemory):
             flags = flags | choose(tired, _STALE, 0)
         if some(no(present)):
             flags = flags | self._missing(inertial, good)
-            gone = [no(fine) & (count >= _LONGEST_RUN) for fine, count in zip(good, run, strict=True)]
-            blind = gone[1] | gone[2]  # a_y without r, or r without a_y, misleads V_y
-            lost = zip((gone[0], blind, blind), value, strict=True)
-            value = kit.stacked([choose(nothing, 0.0, v) for nothing, v in lost])
+            gone = no(good[0]) & (run[0] >= _LONGEST_RUN)
+            value = kit.stacked((choose(gone, 0.0, value[0]), value[1], value[2]))
         (turned,) = kit.each(lambda angle: (abs(angle) <= limits.ANGLE,), steer)
         steered = turned[0] & turned[1] & turned[2] & turned[3]
         if some(no(steered)):
             flags = flags | choose(steered, 0, _MISSING_INPUT)
             (steer,) = kit.each(lambda good, angle, old: (choose(good, angle, old),), turned, steer, self.steer)
         self.steer = steer
-        yaw_step = choose(knew & good[2], value[2] - last, 0.0) / elapsed
-        self.yaw_acceleration = self._smooth(self.yaw_acceleration, yaw_step, elapsed)
         self.inertial, self.run = value, run
 
         def wheel(new: Number, before: Number, age: Number, slope: Number, radius: Number) -> tuple[Number, ...]:
@@ -112,7 +107,7 @@ class FusionInputs(CarsMemory):
         )
         wheels = (speed, fresh, gap, silent, self.steer)
         alive = good[0] & (run[0] < _LONGEST_RUN) & ((run[0] - 1.0) * elapsed < self.settings.slowest_unit)
-        return ConditionedInputs(value, noise, *wheels, steered, present, alive, blind, flags, wheel_flags)
+        return ConditionedInputs(value, noise, run, good, *wheels, steered, present, alive, flags, wheel_flags)
 
     def slipping(self, acceleration: Signals, fresh: Signals, elapsed: Number, doubt: Number) -> Signals:
         """Fresh wheels whose surface leaves the car, |R w' - a| too large, now or within the hold time.

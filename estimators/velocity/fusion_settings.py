@@ -46,6 +46,7 @@ class FusionSettings:
     steering_noise: float = 0.004  # rad: sensor 0.002, and the play of the linkage
     tooth_pitch: float = 0.05  # m of road between two pulses of the wheel-speed ring: 48 teeth on 0.35 m
     dead_speed: float = 0.3  # m/s below which a ring gives no pulses: a wheel that reads zero may roll as fast
+    dead_band: float = 0.6  # m/s at which a passive wheel sensor may still read zero: creeping looks like standing
     radius_common: float = 0.015  # relative error of the effective radius, all wheels alike: pressure, wear, catalogue
     radius_single: float = 0.005  # relative, of each wheel for itself
     radius_memory: float = 3600.0  # s: tires warm up

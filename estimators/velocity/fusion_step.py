@@ -25,6 +25,8 @@ class FusionStep(NamedTuple):
     vx_deviation: FloatArray  # (...) m/s, standard deviation
     vy_deviation: FloatArray  # (...) m/s
     yaw_rate: FloatArray  # (...) rad/s, without its estimated bias and scale error
+    inertial: FloatArray  # (..., 3) a_x, a_y in m/s^2 and r in rad/s as used: the reading, or what it should have been
+    inertial_used: BoolArray  # (..., 3) whether it is the reading
     sensor_bias: FloatArray  # (..., 3) of a_x, a_y in m/s^2 and of r in rad/s
     gravity: FloatArray  # (..., 2) m/s^2 in a_x and a_y, from grade and bank
     radius: FloatArray  # (..., 4) effective radii, m, as learned
@@ -53,6 +55,7 @@ class Outcome(NamedTuple):
     axle: lateral.AxleUpdate
     standing: Number
     stopped: Signals  # wheels that do not turn though the car moves
+    hidden: tuple[Number, Number]  # m/s, deviations of V_x and V_y that no measurement can take away
 
 
 def fusion_step(
@@ -64,11 +67,13 @@ def fusion_step(
     course: tuple[Signals, Signals, Signals, Signals],
     outcome: Outcome,
     flags: Number,
+    inertial: tuple[Number, Number, Number],
+    used: tuple[Number, Number, Number],
 ) -> FusionStep:
     """The step in the batch shape; `course` sine and cosine of the steering and x, y of the wheels."""
     choose, x, y = kit.where, along.filter.mean, across.filter.mean
-    slipping, wheel, axle, standing, stopped = outcome
-    turn, ahead_speed, left_speed = across.yaw_rate(seen.inertial[2]), x[0], y[0]
+    slipping, wheel, axle, standing, stopped, hidden = outcome
+    turn, ahead_speed, left_speed = across.yaw_rate(inertial[2]), x[0], y[0]
 
     def mapped(
         w: Number,
@@ -94,10 +99,12 @@ def fusion_step(
         if kit.some(found[0] | found[1] | found[2] | found[3]):
             (wheel_flags,) = kit.each(lambda sums, bad, bit=flag: (sums | choose(bad, bit, 0),), wheel_flags, found)
     flags = flags | choose(standing, _STANDING, 0) | choose(axle.excited, 0, _NOT_EXCITED)
-    speeds = (x[0], y[0], kit.sqrt(along.filter.variance(0)), kit.sqrt(across.filter.variance(0)), turn)
+    forward = kit.sqrt(along.filter.variance(0) + hidden[0] * hidden[0])
+    sideways = kit.sqrt(across.filter.variance(0) + hidden[1] * hidden[1])
+    speeds = (x[0], y[0], forward, sideways, turn)
     errors = (x[BIAS], y[lateral.BIAS], y[lateral.YAW_BIAS], x[GRADE], y[lateral.BANK])
-    real = kit.table((speeds, errors, radius, slip, angle, innovation, axle.innovation), shape)
-    true = kit.table((wheel.used, wheel.gated, slipping, axle.used, (standing,)), shape)
+    real = kit.table((speeds, errors, radius, slip, angle, innovation, axle.innovation, inertial), shape)
+    true = kit.table((wheel.used, wheel.gated, slipping, axle.used, (standing,), used), shape)
     sums = kit.table((wheel_flags, (flags,)), shape).astype(np.int32)
     return FusionStep(
         vx=real[..., 0],
@@ -105,6 +112,8 @@ def fusion_step(
         vx_deviation=real[..., 2],
         vy_deviation=real[..., 3],
         yaw_rate=real[..., 4],
+        inertial=real[..., 28:],
+        inertial_used=true[..., 15:],
         sensor_bias=real[..., 5:8],
         gravity=real[..., 8:10],
         radius=real[..., 10:14],
@@ -114,7 +123,7 @@ def fusion_step(
         used=true[..., :4],
         gated=true[..., 4:8],
         high_slip=true[..., 8:12],
-        axle_innovation=real[..., 26:],
+        axle_innovation=real[..., 26:28],
         axle_used=true[..., 12:14],
         standing=true[..., 14],
         flags=sums[..., 4],

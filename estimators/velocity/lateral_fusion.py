@@ -81,14 +81,36 @@ class LateralFusion:
         x = self.filter.mean
         return measured * (1.0 - self._sensor * x[TURN_SCALE]) - x[YAW_BIAS]
 
+    def reading(self, yaw_rate: Number) -> Number:
+        """What the sensor would say of the yaw rate r, rad/s."""
+        x = self.filter.mean
+        return (yaw_rate + x[YAW_BIAS]) / (1.0 - self._sensor * x[TURN_SCALE])
+
     def predict(
-        self, elapsed: Number, measured: Number, noise: Number, yaw_rate: Number, yaw_noise: Number, speed: Number
+        self,
+        elapsed: Number,
+        measured: Number,
+        noise: Number,
+        yaw_rate: Number,
+        yaw_noise: Number,
+        speed: Number,
+        believed: Number,
     ) -> None:
-        """`measured` a_y and `yaw_rate` as the unit gives them, with their standard deviations; `speed` V_x."""
+        """`measured` a_y and `yaw_rate` as the unit gives them, with their standard deviations; `speed` V_x.
+
+        Readings that are not `believed` teach nothing about the sensors, nor about the road.
+        """
         travel = elapsed * speed
         coupling = (-elapsed, -elapsed, travel, -elapsed * measured, travel * yaw_rate)
+        if self.kit.some(self.kit.no(believed)):
+            x, choose = self.filter.mean, self.kit.where
+            known = sum(gain * x[place] for gain, place in zip(coupling, _MOVING, strict=True))
+            coupling = tuple(choose(believed, gain, 0.0) for gain in coupling)
+            held = choose(believed, 0.0, known)
+        else:
+            held = 0.0
         own, turned = elapsed * noise, travel * yaw_noise
-        shift = elapsed * measured - travel * yaw_rate
+        shift = elapsed * measured - travel * yaw_rate + held
         self.filter.move(elapsed, abs(speed), _MOVING, coupling, shift, own * own + turned * turned)
 
     def correct(
@@ -101,8 +123,12 @@ class LateralFusion:
         speed: Number,
         acceleration: Number,
         usable: Signals,
+        doubt: Number,
     ) -> AxleUpdate:
-        """`steer` of the axles, rad; `acceleration` a_x, for the loads; `usable`: the tires of the axle do not slip."""
+        """`steer` of the axles, rad; `acceleration` a_x, for the loads; `usable`: the tires of the axle do not slip.
+
+        `doubt`: m/s^2 by which an a_y that is not the sensor's may be off.
+        """
         s, x, kit = self.settings, self.filter.mean, self.kit
         largest, smallest = kit.maximum, kit.minimum
         magnitude, turn, left = abs(speed), self.yaw_rate(yaw_rate), x[SPEED]
@@ -131,7 +157,8 @@ class LateralFusion:
             sigma = magnitude * (s.side_floor + s.side_linear * abs(side)) + s.slip_speed
             white = turn_noise + speed * speed * steering_noise
             values = (one, steep, -arm * one, steep * measured, -arm * sensed, linear, linear * square)
-            return innovation, mu, sigma * sigma, white, *values
+            unknown = steep * doubt
+            return innovation, mu, sigma * sigma + unknown * unknown, white, *values
 
         innovation, mu, model, white, *values = kit.each(predicted, steer, x[TIRES::2], x[TIRES + 1 :: 2], *self._axles)
 
@@ -145,6 +172,18 @@ class LateralFusion:
         used, variance, excited = kit.each(judged, explained, innovation, model, white, values[5], usable)
         self.filter.weigh(innovation, variance, used)
         return AxleUpdate(innovation, used, mu, excited[0] | excited[1])
+
+    def friction(self, measured: Number) -> Number:
+        """|F_y|/F_z of the whole car, from its a_y as measured."""
+        x = self.filter.mean
+        return abs(measured * (1.0 - x[SCALE]) - x[BIAS] - x[BANK]) / GRAVITY
+
+    def calm(self, measured: Number) -> Number:
+        """Whether the body accelerates sideways no more than a standing one may, given what is known of bias and bank."""
+        f, s, x = self.filter, self.settings, self.filter.mean
+        unknown = f.variance(BIAS) + f.variance(BANK) + 2.0 * f.variance(BIAS, BANK)
+        own = measured * (1.0 - x[SCALE]) - x[BIAS] - x[BANK]
+        return abs(own) < 3.0 * self.kit.sqrt(unknown + s.still_acceleration**2)
 
     def blind(self, elapsed: Number, where: Number) -> None:
         """V_y near zero for the cars `where` that have no lateral motion sensor: nothing else is known."""

@@ -118,13 +118,15 @@ class LongitudinalFusion:
             error: Number,
         ) -> tuple[Number, ...]:
             surface, slip, late = radius * w, compliance * force, per_speed * pull
-            innovation = surface * (1.0 + error) - gain * speed - shift - magnitude * slip
+            expected = gain * speed + shift + magnitude * slip
+            innovation = surface * (1.0 + error) - expected
             friction = largest(abs(force), hidden)
             share = s.slip_floor + (s.slip_linear + s.slip_cubic * friction * friction) * friction
             sigma = magnitude * share + s.slip_speed
             model = sigma * sigma + late * late  # what slip compliance and pulse ring leave unexplained
             model = choose(silent, largest(model, s.dead_speed**2), model)
-            return innovation, model, gain + way * slip, magnitude * force, -surface
+            # the measured surface speed here would correlate sensitivity and innovation: noise would shrink the radii
+            return innovation, model, gain + way * slip, magnitude * force, -expected / (1.0 + error)
 
         innovation, model, *values = kit.each(
             predicted, seen.wheel_speed, seen.silent, mu, *course, self.radius, x[RADIUS:]

@@ -186,3 +186,8 @@ class SpeedFilter(Memory):
         self.spread[1 : self.size, where] = 0.0
         self.mean[0] = np.where(where, first, self.mean[0])
         self.spread[0] = np.where(where, variance, self.spread[0])
+
+    def widen(self, where: Number, variance: Number, place: int = 0) -> None:
+        """Adds to the variance of a state where the condition `where` holds."""
+        at = self._at[place, place]
+        self.spread[at] = self.spread[at] + np.where(where, variance, 0.0)

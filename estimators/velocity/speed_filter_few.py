@@ -126,6 +126,11 @@ class SpeedFilterFew(SpeedFilter):
             self.spread[0] = self.spread[:, 0] = 0.0
             self.spread[0, 0] = variance
 
+    def widen(self, where: bool, variance: float, place: int = 0) -> None:
+        """Adds to the variance of a state, if `where`."""
+        if where:
+            self.spread[place, place] += variance
+
 
 def _inverse_factor(S: list[_Row], noise: Sequence[float]) -> list[_Row]:
     """L^-1 with L L' = S + diag(noise), for up to four channels: each row from those above."""

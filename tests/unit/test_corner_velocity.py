@@ -99,7 +99,9 @@ def test_faults_are_flagged_and_survived() -> None:
     steps = run(pipeline_of(), truth)
     assert all(step.flags & Flag.MISSING_INPUT for step in (*steps[50:60], *steps[100:110]))
     assert all((step.wheel_flags & Flag.MISSING_MEASUREMENT).all() for step in steps[81:90])
-    assert all(Check.NO_WHEEL & int(step.consistency.failed) for step in steps[82:90])
+    assert all(
+        Check.NO_WHEEL & int(step.consistency.failed) for step in steps[86:90]
+    )  # longer than a sensor repeats itself
     for step in steps:
         assert finite(step._replace(vx_deviation=np.zeros(()), vy_deviation=np.zeros(())))
     assert abs(steps[-1].vx - truth.vx[-1]) < 0.2

@@ -103,8 +103,8 @@ def test_one_lateral_signal_is_lost_in_a_turn(lost: str) -> None:
         if k > 400:
             signals[lost] = np.nan
         step = fusion.step(CORNERING[0] + noise, CORNERING[1], **signals)
-    assert abs(step.vy) < 1.0
-    assert not step.axle_used.any()
+    assert abs(step.vy) < 0.6  # the other signals say what it should read: the axles still hold V_y
+    assert step.inertial_used.tolist() == [True, lost != "ay", lost != "yaw_rate"]
 
 
 def test_everything_is_lost_for_long() -> None:

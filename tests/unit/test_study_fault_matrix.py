@@ -1,0 +1,48 @@
+"""The fault matrix: a few of its cells, and that it sees what a pipeline without a monitor would do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from studies.beyond.fault_matrix.faults import FAULTS, SIGNALS
+from studies.beyond.fault_matrix.matrix import Cell, cases, matrix
+from studies.beyond.fault_matrix.study import STUDY
+
+CHOSEN = [("none", "none"), ("ay", "zero"), ("yaw_rate", "negated"), ("wheel_speed rr", "zero"), ("ax", "missing")]
+
+
+@pytest.fixture(scope="module")
+def found() -> list[Cell]:
+    return matrix(1, CHOSEN)
+
+
+def test_every_cell_is_there_once(found: list[Cell]) -> None:
+    assert len(cases()) == 1 + len(SIGNALS) * len(FAULTS)
+    assert len({(c.signal, c.fault, c.drive) for c in found}) == len(found) == 5 * len(CHOSEN)
+    assert [part.name for part in STUDY.parts] == ["matrix"]
+
+
+def test_the_chosen_cells_hold_their_bounds(found: list[Cell]) -> None:
+    for cell in found:
+        assert not set(cell.missed()) & set("xyrf"), cell
+    (turn,) = (c for c in found if c.signal == "ay" and c.drive == "turn")
+    assert turn.flagged
+    assert not any(c.flagged is not None for c in found if c.signal == "none")
+
+
+def test_a_fusion_without_its_monitor_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The negative control: the same matrix, and nobody votes."""
+    from estimators.velocity import signal_monitor
+    from estimators.velocity.signal_vote import Vote
+
+    def nobody(kit: object, level: np.ndarray, *_: object) -> Vote:
+        never = np.zeros(np.shape(level)[1:], dtype=np.bool_)
+        return Vote((never, never), (never, never), (~never, ~never), never)
+
+    monkeypatch.setattr(signal_monitor, "vote", nobody)
+    cells = matrix(1, [("ay", "zero"), ("yaw_rate", "negated")])
+    for cell in cells:
+        if cell.drive == "turn":
+            assert {"y", "f"} & set(cell.missed())
+            assert cell.vy > 2.0
