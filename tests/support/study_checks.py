@@ -59,7 +59,7 @@ def check_claim(claim: Claim) -> None:
 def check_sentence(text: str) -> None:
     """One sentence for readers: no keys, no brackets of dictionaries, no long digits, no truth values of a machine."""
     assert text.endswith(".") and 20 < len(text) < 200, text
-    assert not re.search(r"[{}]|\w: [^;]*; \w+:|\bTrue\b|\bFalse\b|\bNone\b|\bnan\b|\d{8}|\d\.\d{7}|e[-+]\d\d", text), (
+    assert not re.search(r"[{}]|\w: [^;]*; \w+:|\bTrue\b|\bFalse\b|\bNone\b|\bnan\b|\d{8}|\d\.\d{8}|e[-+]\d\d", text), (
         text
     )
 
