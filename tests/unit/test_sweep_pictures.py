@@ -12,8 +12,7 @@ from studies.plots import Bars, Figure, Panel, Words
 from studies.plots.draw import draw
 from studies.sweeps.change import Change, change_panel
 from studies.sweeps.measures import Measure
-from studies.sweeps.tornado import Bar
-from studies.sweeps.tornado import _panel as tornado_panel
+from studies.sweeps.tornado import Bar, round_ticks, tornado_panel
 
 MEASURE = cast(Measure, SimpleNamespace(name="noise_norm", unit="1/s", better="smaller", sign=1.0))
 LEVELS = np.array([-0.2, -0.1, 0.1, 0.2])
