@@ -56,6 +56,9 @@ def parser() -> argparse.ArgumentParser:
         "--check", action="store_true", help="write nothing; fail on drift against the schedules in DIR"
     )
     schedules.add_argument("--figures", type=Path, metavar="DIR", help="draw gains beside the published ranges")
+    schedules.add_argument(
+        "--report", type=Path, metavar="FILE", help="one page: gains, proved levels, tightest places"
+    )
 
     certify = command("certify", "certify.run_certify")
     certify.add_argument(

@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from estimators.schedule import GainSchedule
 from studies.commands.terminal import print_table, progress_bar
-from studies.plots import Axis, Figure, Line, Mark, Panel, Shade
-from studies.plots.colours import DEPLOYED, PRINTED_BAND
+from studies.execution.files import write_bytes
 from studies.plots.save import save_figure
+from studies.report.schedule_figures import gain_figure
 from studies.schedules import ScheduleRun, regenerate
 from studies.spec import load_spec, shipped_specs
 
@@ -27,33 +26,9 @@ CAPTION = (
 )
 
 
-def gain_figure(run: ScheduleRun) -> Figure:
-    """Every gain as it is deployed (points and straight lines), the published range shaded behind it."""
-    parameter = run.content["scheduling"][0]
-    breakpoints = np.array(parameter["breakpoints"])
-    table = np.array(run.content["gain"]["table"])[..., 0]
-    units = GainSchedule.from_content(run.content).gain_units
-    symbol = "$L$" if run.content["update"]["kind"] == "held" else "$K$"
-    panels = []
-    for i, gains in enumerate(table.T):
-        marks: list[Mark] = [Line(breakpoints, gains, "deployed, proved", DEPLOYED, marker="o")]
-        if run.published is not None:
-            low, high = run.published[i]
-            marks.insert(0, Shade(low, high, "y", f"published range {low:g} to {high:g}", PRINTED_BAND))
-        x = Axis(f"{parameter['name'].replace('_', ' ')} [{parameter['unit']}]", breakpoints[0], breakpoints[-1])
-        panels.append(Panel(marks, x, Axis(f"{symbol}$_{i + 1}$ [{units[i][0]}]", low=0.0), legend="best"))
-    decay = next(p.level for p in run.proofs if p.kind in ("internal update", "sampled error"))
-    title = f"{run.name}: update decays at {decay:g} 1/s, proved over the whole range and rate box"
-    return Figure(
-        run.name,
-        title,
-        "Each gain as straight lines between its breakpoints, over the published range.",
-        panels,
-        size=(4.4 * len(panels), 3.4), title=title,
-    )  # fmt: skip
-
-
-def run_schedules(specs: list[str], out: Path | None, check: bool, figures: Path | None, as_json: bool) -> int:
+def run_schedules(
+    specs: list[str], out: Path | None, check: bool, figures: Path | None, report: Path | None, as_json: bool
+) -> int:
     """Regenerate (or check) schedules, print a table; 0 good, 1 drift or refused design."""
     names = specs or list(shipped_specs())
     for name in names:
@@ -70,7 +45,12 @@ def run_schedules(specs: list[str], out: Path | None, check: bool, figures: Path
         figures.mkdir(parents=True, exist_ok=True)
         for run in runs:
             if run.content:
-                save_figure(gain_figure(run), figures)
+                save_figure(gain_figure(run.content, run.published, _title(run)), figures)
+    if report is not None:
+        from studies.report.schedules import schedules_page
+
+        report.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(report, schedules_page(runs).encode())
     if as_json:
         print(json.dumps([_row(run) for run in runs], indent=1))
     else:
@@ -81,6 +61,11 @@ def run_schedules(specs: list[str], out: Path | None, check: bool, figures: Path
             if run.message:
                 print(f"{run.name}: {run.message}", file=sys.stderr)
     return 0 if all(run.good for run in runs) else 1
+
+
+def _title(run: ScheduleRun) -> str:
+    decay = next(p.level for p in run.proofs if p.kind in ("internal update", "sampled error"))
+    return f"{run.name}: update decays at {decay:g} 1/s, proved over the whole range and rate box"
 
 
 def _cells(run: ScheduleRun) -> tuple[str, ...]:

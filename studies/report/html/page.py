@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import cache
 from hashlib import sha256
 from importlib import resources
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -52,7 +52,12 @@ def report_page(records: Sequence[StudyRecord], claims: Sequence[dict[str, JsonV
     drawings = pictures(
         [(part.folder, f["name"]) for record in records for part in record.stored for f in part.figures]
     )
+    return filled(
+        "report.html.jinja", records=records, claims=claims, board=board, first=overview(claims), pictures=drawings
+    )
+
+
+def filled(template: str, **values: Any) -> str:
+    """A page in the dress of the report."""
     text, digest = script()
-    return environment().get_template("report.html.jinja").render(
-        records=records, claims=claims, board=board, first=overview(claims), pictures=drawings, script=text, digest=digest,
-    )  # fmt: skip
+    return environment().get_template(template).render(values, script=text, digest=digest)
