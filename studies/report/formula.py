@@ -89,9 +89,11 @@ def formulas(text: str) -> Iterator[tuple[int, int, Node]]:
 
 
 def _is_word(text: str, tokens: list[Token], at: int) -> bool:
-    """A unit after its number, or the sigma of sigma points."""
-    unit = tokens[at].text in UNITS and at > 0 and tokens[at - 1].kind == "number"
-    return unit or re.match("[sS]igma points?", text[tokens[at].start :]) is not None
+    """A unit after its number, the number of a Proposition, or the sigma of sigma points."""
+    before = tokens[at - 1] if at else None
+    unit = tokens[at].text in UNITS and before is not None and before.kind == "number"
+    counted = tokens[at].kind == "number" and before is not None and re.fullmatch("[A-Z][a-z]{3,}", before.text)
+    return unit or bool(counted) or re.match("[sS]igma points?", text[tokens[at].start :]) is not None
 
 
 def whole_formula(text: str) -> Node | None:

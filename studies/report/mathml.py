@@ -21,9 +21,18 @@ def typeset(text: str) -> str:
     pieces, end = [], 0
     for start, stop, node in formulas(text):
         source = text[start:stop]
-        pieces += [escape(text[end:start]), f'<math alttext="{escape(source)}">{mathml(node)}</math>']
+        pieces += [_plain(text[end:start]), f'<math alttext="{escape(source)}">{mathml(node)}</math>']
         end = stop
-    return "".join([*pieces, escape(text[end:])])
+    return "".join([*pieces, _plain(text[end:])])
+
+
+def _plain(text: str) -> str:
+    return escape(squared(text))
+
+
+def squared(text: str) -> str:
+    """``text`` with m/s^2 as m/s²."""
+    return re.sub(r"(?<=/)s\^2", "s²", text)
 
 
 def mathml(node: Node) -> str:

@@ -8,11 +8,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 BUDGET = 2_900_000  # bytes of all drawings, before base64 makes four of three: the page stays below 5 MB
 LARGEST_SVG = 160_000  # drawings of tens of thousands of points are vectors of megabytes
 SCALES = (1.0, 0.8, 0.65, 0.5)  # of the pixels that a drawing was stored with
 COLOURS = 32  # of a page's copy: those of the curves and their soft edges
+FREQUENT = 10  # of these colours are the most frequent ones
+APART = 12  # of 255: nearer colours are one
 POINT = 96.0 / 72.0  # CSS pixels
 
 
@@ -52,27 +55,49 @@ def _form(folder: Path, name: str, share: int) -> tuple[bytes, str]:
         return pixels, "png"
     content = b""
     for scale in SCALES if len(pixels) < 4 * share else SCALES[1:]:
-        content = _smaller(pixels, scale)
+        content = _smaller(pixels, scale, share)
         if len(content) <= share:
             break
     return content, "webp"
 
 
-def _smaller(pixels: bytes, scale: float) -> bytes:
-    """As WebP: curves in few colours without loss, or where that is larger (maps, noise) with loss."""
+def _smaller(pixels: bytes, scale: float, share: int) -> bytes:
+    """As WebP: curves in few colours without loss, or where that is too large (maps, noise) with loss."""
     from PIL import Image
+
+    def saved(image: Image.Image, quality: int, lossless: bool) -> bytes:
+        file = BytesIO()
+        image.save(file, "WEBP", method=3, quality=quality, lossless=lossless)
+        return file.getvalue()
 
     image = Image.open(BytesIO(pixels)).convert("RGB")
     if scale != 1.0:
         size = (round(image.width * scale), round(image.height * scale))
         image = image.resize(size, Image.Resampling.LANCZOS)
-    few = image.quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).convert("RGB")
-    forms = []
-    for shown, how in ((few, {"lossless": True, "quality": 50}), (image, {"quality": 40})):
-        file = BytesIO()
-        shown.save(file, "WEBP", method=3, **how)
-        forms.append(file.getvalue())
-    return min(forms, key=len)
+    exact = saved(_few(image), 50, lossless=True)
+    return exact if len(exact) <= share else min(exact, saved(image, 40, lossless=False), key=len)
+
+
+def _few(image: Any) -> Any:
+    """The drawing in few colours: the most frequent ones (paper, grid, words), and those that cover all that occur (curves)."""
+    from PIL import Image
+
+    frequent = [
+        colour for _, colour in sorted(image.getcolors(image.width * image.height), reverse=True)[: 4 * FREQUENT]
+    ]
+    covering = image.quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).getpalette()
+    chosen: list[tuple[int, ...]] = []
+    for most, colours in ((FREQUENT, frequent), (COLOURS, zip(*[iter(covering)] * 3, strict=True))):
+        for colour in colours:
+            if len(chosen) < most and all(_distance(colour, other) >= APART for other in chosen):
+                chosen.append(colour)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([value for colour in chosen + chosen[:1] * (256 - len(chosen)) for value in colour])
+    return image.quantize(palette=palette, dither=Image.Dither.NONE).convert("RGB")
+
+
+def _distance(a: tuple[int, ...], b: tuple[int, ...]) -> int:
+    return max(abs(x - y) for x, y in zip(a, b, strict=True))
 
 
 def _picture(folder: Path, name: str, content: bytes, kind: str) -> Picture:

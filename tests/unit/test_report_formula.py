@@ -28,6 +28,7 @@ def found(text: str) -> list[str]:
         ("A penalty of 100 N/s over 0.3 m at 40 rad/s, a well-posed H-infinity design of 2 kN m", []),
         ("Sigma point weights W_i = 1/(2 (N + eta))", ["W_i = 1/(2 (N + eta))"]),
         ("L = 7/48 m = 0.1458 m", ["L = 7/48"]),
+        ("With the T of Proposition 1 lambda_bar is", ["lambda_bar"]),
         ("the 3 x 3 square, which no diagonal T can do better", []),
         ("already set: σ₀/(σ₀ + σ₂κRₑ|ω|) and μF_z", []),
         ("off by (force_rl - front_force_x)*sin(steering_angle)/mass.", ["(force_rl - front_force_x)*sin(steering_angle)/mass"]),
@@ -72,6 +73,10 @@ def test_what_is_half_a_formula_is_no_whole_one() -> None:
 )
 def test_symbols_are_well_formed(name: str) -> None:
     ElementTree.fromstring(symbol(name))
+
+
+def test_accelerations_have_a_raised_two() -> None:
+    assert typeset("0.5 m/s^2 and radius^2") == "0.5 m/s² and radius^2"
 
 
 def test_deep_nesting_ends() -> None:

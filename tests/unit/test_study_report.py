@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import json
 import re
-from base64 import b64encode
+from base64 import b64decode, b64encode
 from collections import Counter
 from hashlib import sha256
 from html.parser import HTMLParser
+from io import BytesIO
 from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from studies.claim import ClaimVerdict
+from studies.plots import Figure, Line, Panel
+from studies.plots.save import save_figure
 from studies.report.html.text import alignments, brief, cell, label, number, prose
 from studies.report.pictures import LARGEST_SVG, picture, pictures
 from studies.report.scoreboard import MARKS, MEANINGS, scoreboard
@@ -132,6 +137,21 @@ def test_the_page_weighs_no_more_than_its_budget(out: Path) -> None:
     }
 
 
+def test_few_colours_keep_paper_grid_and_the_thinnest_curve(tmp_path: Path) -> None:
+    x = np.linspace(0.0, 1.0, 400)
+    noise = np.random.default_rng(3).standard_normal((8, 400))
+    curves = [Line(x, y, color=c) for y, c in zip(noise, ("#0b62a4", "#c1272d", "#1b7f5c", "#7b3294") * 2, strict=True)]
+    rare = Line([0.0, 1.0], [6.0, 6.0], color="#e08214", width=1.5)
+    save_figure(Figure("curves", "c", "a", Panel([*curves, rare], "x [m]", "y [m]")), tmp_path)
+    (made,) = pictures([(tmp_path, "curves")], 90_000).values()
+    shown = (
+        np.asarray(Image.open(BytesIO(b64decode(made.uri.partition(",")[2]))).convert("RGB")).reshape(-1, 3).astype(int)
+    )
+    for wanted in ((255, 255, 255), (0x0B, 0x62, 0xA4), (0xC1, 0x27, 0x2D), (0xE0, 0x82, 0x14), (0xE0, 0xE0, 0xE0)):
+        assert (np.abs(shown - wanted).max(axis=1) <= 16).sum() > 100, wanted
+    assert (shown == 255).all(axis=1).mean() > 0.3  # the paper is white, not nearly
+
+
 def test_links_lead_somewhere_and_names_are_unique(page: Elements) -> None:
     ids = [name for _, attributes in page.tags if (name := attributes.get("id"))]
     assert max(Counter(ids).values()) == 1
@@ -212,7 +232,8 @@ def overlap(a: tuple[float, float], b: tuple[float, float], side: float) -> bool
 
 @pytest.mark.parametrize(
     ("value", "shown"),
-    [(None, "–"), (True, "yes"), (3, "3"), (1234567, "1234567"), (1 / 3, "0.33333"), (1.5e9, "1.5e9"), (2e-9, "2e-9"),
+    [(None, "–"), (True, "yes"), (-0.0, "0"), (3, "3"),
+     (1234567, "1234567"), (1 / 3, "0.33333"), (1.5e9, "1.5e9"), (2e-9, "2e-9"),
      ("0.9960", "0.9960")],
 )  # fmt: skip
 def test_cells_read_well(value: Any, shown: str) -> None:

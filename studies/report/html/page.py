@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 from studies.claim import ClaimVerdict, JsonValue
 from studies.report.html.text import alignments, anchor, brief, cell, counted, fits, label, number, prose
+from studies.report.mathml import squared
 from studies.report.overview import overview, sentence
 from studies.report.pictures import pictures
 from studies.report.scoreboard import MARKS, MEANINGS, Scoreboard
@@ -30,7 +31,7 @@ def environment() -> Environment:
         lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     made.filters |= {"number": number, "cell": cell, "brief": brief, "prose": prose, "anchor": anchor, "label": label}
-    made.filters["slug"] = slug
+    made.filters |= {"slug": slug, "squared": squared}
     made.globals |= {"verdicts": list(ClaimVerdict), "marks": MARKS, "meanings": MEANINGS}
     made.globals |= {"alignments": alignments, "fits": fits, "counted": counted, "sentence": sentence}
     return made

@@ -8,7 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from studies.report.mathml import typeset
+from studies.report.mathml import squared, typeset
 
 MISSING = "–"
 UNITS = {
@@ -20,7 +20,7 @@ NUMERIC_TEXT = re.compile(r"[\s±+\-−<>≤≥≈~]*\d")
 
 def number(value: float, digits: int = 7) -> str:
     """``value`` with ``digits`` significant ones, exponents short: 1.5e9, not 1.5e+09."""
-    text = str(value) if isinstance(value, int) else f"{value:.{digits}g}"
+    text = str(value) if isinstance(value, int) else f"{value + 0.0:.{digits}g}"  # -0.0 becomes 0
     return re.sub(r"e\+?(-?)0*(\d)", r"e\1\2", text)
 
 
@@ -30,7 +30,7 @@ def cell(value: Any, digits: int = 5) -> str:
         return MISSING
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return number(value, digits) if isinstance(value, int | float) else str(value)
+    return number(value, digits) if isinstance(value, int | float) else squared(str(value))
 
 
 def brief(value: Any, length: int = 110, digits: int = 7) -> str:
