@@ -44,7 +44,11 @@ def run_schedules(
     if figures is not None:
         figures.mkdir(parents=True, exist_ok=True)
         for run in runs:
-            if run.content:
+            if run.content and len(run.content["scheduling"]) != 1:
+                print(
+                    f"{run.name}: gains of {len(run.content['scheduling'])} parameters are not drawn", file=sys.stderr
+                )
+            elif run.content:
                 save_figure(gain_figure(run.content, run.published, _title(run)), figures)
     if report is not None:
         from studies.report.schedules import schedules_page

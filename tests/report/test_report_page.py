@@ -8,8 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from estimators.schedule import SHIPPED, read_content
+from studies.report.frozen_levels import frozen_levels
+from studies.report.schedules import schedules_page
 from studies.run import run_studies
+from studies.schedules import ScheduleRun
 from studies.study import QUICK
+from synthesis.certificate.proof import Proof
 from tests.support.browser import Page, find_chromium
 from tests.support.study_fakes.registry import REGISTRY
 
@@ -107,6 +112,18 @@ def test_no_other_script_runs(page: Page, report: Path, tmp_path: Path) -> None:
     assert page.evaluate("window.ran === undefined") and any(
         "Content Security Policy" in text for text in page.complaints()
     )
+
+
+@pytest.mark.parametrize(("width", "dark"), [(390, True), (1280, False)])
+def test_the_page_of_a_schedule_wears_the_same_dress(page: Page, tmp_path: Path, width: int, dark: bool) -> None:
+    content = read_content(SHIPPED / "resilient-velocity-lateral.json")
+    proofs = tuple(Proof(level.claim, level.kind, level.level, level.unit, True) for level in frozen_levels(content))
+    path = tmp_path / "schedules.html"
+    path.write_text(schedules_page([ScheduleRun("resilient-velocity-lateral", "same", 1.0, "", content, proofs)]))
+    page.show(path, width, dark=dark)
+    page.evaluate(UNFOLD)
+    assert page.complaints() == [] and page.evaluate(CONTRAST) == [] and page.evaluate(BREADTH) <= width
+    assert page.evaluate(SEEN) and all(page.evaluate(PICTURES))
 
 
 def test_light_and_dark_differ_and_paper_is_light(page: Page, report: Path, tmp_path: Path) -> None:
