@@ -14,8 +14,10 @@ Text and formulas stand side by side, so reading stops before the first thing th
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+
+from studies.report.tokens import Token, tokens_of
 
 GREEK = {
     "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "epsilon": "ε", "zeta": "ζ", "eta": "η", "theta": "θ",
@@ -25,27 +27,12 @@ GREEK = {
 FUNCTIONS = ("exp", "diag", "rank", "sin", "cos", "tan", "sqrt", "det", "sup", "log", "atan")
 RELATIONS = ("<=", ">=", "=", "<", ">")
 UNITS = frozenset("smNghx")  # letters that are units, or "times", where a number stands before them
-TOKEN = re.compile(
-    r"(?P<number>(?<![\w.])(?:\d{1,3}(?:,\d{3})+|\d+)(?:\.\d+)?(?:e[-+]?\d+)?(?![A-Za-z_]))"
-    r"|(?P<name>(?<!\w)[A-Za-z][A-Za-z0-9]*(?:_(?:[A-Za-z0-9]+|\([^()]*\)))*)"
-    r"|(?P<mark><=|>=|\*\*|\+-|[-+*/^=<>|'()\[\],;−])"
-)
 _LETTER, _INDEX = f"(?:{'|'.join(GREEK)})", r"(?:\d[a-z\d]*|(?:_(?:\w+|\([^()]*\)))+)"
 INDEXED = re.compile(rf"d?{_LETTER}{_INDEX}?|d?[A-Za-z]{_INDEX}|[A-Za-z]|d(?!o)[A-Za-z]")
 DEEPEST = 8  # brackets inside brackets
+COUNTED = re.compile("(?:Prop|The|Rem|Ex|Tab|Fig|Test|Sec)[a-z]*")  # Proposition 1 and their like
 PAPER = re.compile(r"P[1-5]")
 LABEL = re.compile(r"\(\s*[A-Z]\d+\s*\)")  # of an equation in an appendix: (A4)
-
-
-@dataclass(frozen=True)
-class Token:
-    """A number, name or mark; ``spaced`` when a space stands before it."""
-
-    kind: str
-    text: str
-    start: int
-    end: int
-    spaced: bool
 
 
 @dataclass(frozen=True)
@@ -69,7 +56,7 @@ class Unreadable(Exception):  # noqa: N818  # how reading stops, no error
 
 def formulas(text: str) -> Iterator[tuple[int, int, Node]]:
     """Where formulas stand in ``text``, and what they are."""
-    tokens = _tokens(text)
+    tokens = tokens_of(text)
     at = 0
     while at < len(tokens):
         if (label := LABEL.match(text, tokens[at].start)) is not None:
@@ -92,7 +79,7 @@ def _is_word(text: str, tokens: list[Token], at: int) -> bool:
     """A unit after its number, the number of a Proposition, or the sigma of sigma points."""
     before = tokens[at - 1] if at else None
     unit = tokens[at].text in UNITS and before is not None and before.kind == "number"
-    counted = tokens[at].kind == "number" and before is not None and re.fullmatch("[A-Z][a-z]{3,}", before.text)
+    counted = tokens[at].kind == "number" and before is not None and COUNTED.fullmatch(before.text)
     return unit or bool(counted) or re.match("[sS]igma points?", text[tokens[at].start :]) is not None
 
 
@@ -120,17 +107,6 @@ def _strong(name: str) -> bool:
 
 def _unit(node: Node) -> bool:
     return node.kind in ("product", "fraction") and all(len(n.text) < 2 and not n.text.isdigit() for n in node.walk())
-
-
-def _tokens(text: str) -> list[Token]:
-    found: list[Token] = []
-    for match in TOKEN.finditer(text):
-        kind, start = str(match.lastgroup), match.start()
-        spaced = start > 0 and text[start - 1].isspace()
-        joined = start > 0 and text[start - 1] == "'" and re.fullmatch("[A-Z][a-z]", match[0])  # e'Pe
-        pieces = [(k, k + 1) for k in (start, start + 1)] if joined else [(start, match.end())]
-        found += [Token(kind, text[a:b], a, b, spaced and a == start) for a, b in pieces]
-    return found
 
 
 class Reader:
@@ -161,7 +137,7 @@ class Reader:
             return self._chain("sum", self.product, ("+", "-", "+-", "−"), Node("signed", sign.text, (self.product(),)))
         return self._chain("sum", self.product, ("+", "-", "+-", "−"))
 
-    def _chain(self, kind: str, rule, marks: tuple[str, ...], first: Node | None = None) -> Node:  # type: ignore[no-untyped-def]
+    def _chain(self, kind: str, rule: Callable[[], Node], marks: tuple[str, ...], first: Node | None = None) -> Node:
         parts = [first or rule()]
         between = []
         while self.next.text in marks:

@@ -29,6 +29,7 @@ def found(text: str) -> list[str]:
         ("Sigma point weights W_i = 1/(2 (N + eta))", ["W_i = 1/(2 (N + eta))"]),
         ("L = 7/48 m = 0.1458 m", ["L = 7/48"]),
         ("With the T of Proposition 1 lambda_bar is", ["lambda_bar"]),
+        ("Margin 1 - rho of stability", ["1 - rho"]),
         ("the 3 x 3 square, which no diagonal T can do better", []),
         ("already set: σ₀/(σ₀ + σ₂κRₑ|ω|) and μF_z", []),
         ("off by (force_rl - front_force_x)*sin(steering_angle)/mass.", ["(force_rl - front_force_x)*sin(steering_angle)/mass"]),
