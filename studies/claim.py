@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
+
+from studies.sentence import fill
 
 JsonValue = Any
 """Numbers, texts, lists and dictionaries of them: what a JSON file can hold."""
@@ -33,7 +35,12 @@ class ClaimVerdict(StrEnum):
 
 @dataclass(frozen=True)
 class Published:
-    """A claim as the paper prints it: the fixed half, kept as data in the ``claims.toml`` of its study."""
+    """A claim as the paper prints it: the fixed half, kept as data in the ``claims.toml`` of its study.
+
+    ``found`` has a sentence for the verdict under which it was written, with fields that are filled from what is computed
+    (`studies.sentence`); so has ``advice``, what a reader should do differently. ``claimed`` is False for what no paper
+    claims and is computed because other claims rest on it.
+    """
 
     id: str
     paper: str
@@ -41,6 +48,9 @@ class Published:
     statement: str
     published: JsonValue
     tolerance: str
+    found: Mapping[str, str] = field(default_factory=dict)
+    advice: str = ""
+    claimed: bool = True
 
 
 @dataclass(frozen=True)
@@ -65,7 +75,15 @@ class Claim:
         return {
             "id": p.id, "paper": p.paper, "where": p.where, "statement": p.statement, "published": p.published,
             "computed": f.computed, "tolerance": p.tolerance, "verdict": str(f.verdict), "reading": f.reading,
+            "claimed": p.claimed, "found": self._filled(p.found.get(f.verdict, "")), "advice": self._filled(p.advice),
         }  # fmt: skip
+
+    def _filled(self, template: str) -> str:
+        """The sentence, empty where a field has no value: hours of computing are not lost to a misspelt one (tests refuse it)."""
+        try:
+            return fill(template, self.finding.computed)
+        except ValueError:
+            return ""
 
 
 ClaimFunction = Callable[[], Finding]

@@ -78,6 +78,9 @@ def _models(command: Command) -> None:
     schedules.add_argument("--radius", metavar="LENGTH", help='another effective radius, such as "0.40 m"')
     schedules.add_argument("--sample-time", metavar="TIME", help='another sample time, such as "10 ms"')
     schedules.add_argument("--figures", type=Path, metavar="DIR", help="draw gains beside the published ranges")
+    schedules.add_argument(
+        "--report", type=Path, metavar="FILE", help="one page: gains, proved levels, tightest places"
+    )
 
     certify = command("certify", "certify.run_certify")
     certify.add_argument(

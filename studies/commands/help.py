@@ -60,6 +60,7 @@ unproved is written.""",
         """\
 gainsmith schedules                               all shipped ones into ./schedules
 gainsmith schedules my-observer.toml --out out    from a specification of your own
+gainsmith schedules --out out --report out/schedules.html   and one page: gains, proved levels, tightest places
 gainsmith schedules --out schedules --check       in CI: exit 1 if a claim fails, or can be had better""",
     ),
     "certify": Help(

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from studies.commands.gain_figure import gain_figure
 from studies.commands.terminal import print_table, progress_bar
 from studies.drives.quantities import to_si
+from studies.execution.files import write_bytes
 from studies.plots.save import save_figure
 from studies.preflight import check_before_design
+from studies.report.schedule_figures import gain_figure
 from studies.schedules import ScheduleRun, regenerate
 from studies.spec import Variant, load_spec, shipped_specs
 from synthesis.errors import SpecError
@@ -37,6 +38,7 @@ def run_schedules(
     out: Path | None,
     check: bool,
     figures: Path | None,
+    report: Path | None,
     as_json: bool,
     radius: str | None = None,
     sample_time: str | None = None,
@@ -59,7 +61,12 @@ def run_schedules(
         figures.mkdir(parents=True, exist_ok=True)
         for run in runs:
             if run.content:
-                save_figure(gain_figure(run), figures)
+                save_figure(gain_figure(run.content, run.published, _title(run)), figures)
+    if report is not None:
+        from studies.report.schedules import schedules_page
+
+        report.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(report, schedules_page(runs).encode())
     if as_json:
         print(json.dumps([_row(run) for run in runs], indent=1))
     else:
@@ -87,6 +94,11 @@ def _quantity(option: str, text: str | None, unit: str) -> float | None:
     if not 0.0 < value < math.inf:
         raise SpecError(f"{option}: '{text}' is out of range; it must be finite and above 0 {unit}")
     return value
+
+
+def _title(run: ScheduleRun) -> str:
+    decay = next(p.level for p in run.proofs if p.kind in ("internal update", "sampled error"))
+    return f"{run.name}: update decays at {decay:g} 1/s, proved over the whole range and rate box"
 
 
 def _cells(run: ScheduleRun) -> tuple[str, ...]:

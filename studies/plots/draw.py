@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import singledispatch
 from itertools import product
+from textwrap import fill
 from typing import Any
 
 import matplotlib as mpl
@@ -21,6 +22,7 @@ PATTERN: Mapping[str, Any] = {
     "solid": "-", "dashed": (0, (5, 2)), "dotted": (0, (1, 1.5)), "dash-dot": (0, (6, 1.5, 1, 1.5)),
     "long dash": (0, (8, 2, 2, 2, 2, 2)), "none": "",
 }  # fmt: skip
+LETTERS = 12.5  # of a title fit into an inch
 STYLE: Any = {
     "font.size": 9,
     "axes.titlesize": 9.5,
@@ -62,7 +64,7 @@ def draw(figure: Figure) -> Sheet:
             meshes = [mesh for axes in sheet.axes for mesh in axes.collections if isinstance(mesh, QuadMesh)]
             sheet.colorbar(meshes[0], ax=sheet.axes, label=figure.bar, shrink=0.6, aspect=40)
         if figure.title:
-            sheet.suptitle(figure.title, x=0.01, ha="left", fontsize=10)
+            sheet.suptitle(fill(figure.title, int(LETTERS * figure.size[0])), x=0.01, ha="left", fontsize=10)
         if figure.legend:
             shown = {
                 text: handle
@@ -98,7 +100,9 @@ def _run(axes: Any, name: str, given: Axis) -> None:
     getattr(axes, f"set_{name}label")(given.label)
     if given.ticks is not None:
         words = (
-            list(given.ticks.values()) if isinstance(given.ticks, Mapping) else [f"{tick:g}" for tick in given.ticks]
+            list(given.ticks.values())
+            if isinstance(given.ticks, Mapping)
+            else [f"{tick:g}".replace("-", "−") for tick in given.ticks]
         )
         getattr(axes, f"set_{name}ticks")(list(given.ticks), words)
         getattr(axes, f"{name}axis").minorticks_off()

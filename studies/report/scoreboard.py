@@ -24,6 +24,11 @@ MEANINGS = {
 }
 
 
+def is_published(claim: Mapping[str, JsonValue]) -> bool:
+    """Whether a paper claims it; results derived because claims rest on them are no published claims."""
+    return bool(claim.get("claimed", claim["verdict"] != ClaimVerdict.DERIVED))
+
+
 @dataclass(frozen=True)
 class PaperScore:
     """One row: the claims of ``paper`` (P1..P5, or "other") in order, ``name`` the study that computes them."""
@@ -31,6 +36,16 @@ class PaperScore:
     paper: str
     name: str
     claims: tuple[dict[str, JsonValue], ...]
+
+    @property
+    def published(self) -> int:
+        """Claims that the paper makes."""
+        return sum(is_published(claim) for claim in self.claims)
+
+    @property
+    def derived(self) -> int:
+        """Results that the paper does not claim."""
+        return len(self.claims) - self.published
 
     def count(self, verdict: ClaimVerdict) -> int:
         """Claims with ``verdict``."""
@@ -49,11 +64,21 @@ class Scoreboard:
         return sum(len(paper.claims) for paper in self.papers)
 
     @property
+    def published(self) -> int:
+        """Claims that a paper makes."""
+        return sum(paper.published for paper in self.papers)
+
+    @property
+    def derived(self) -> int:
+        """Results that no paper claims, computed because claims rest on them."""
+        return self.total - self.published
+
+    @property
     def heading(self) -> str:
         """What the board shows, as a title."""
         if self.total == 0:
             return "Studies beyond the papers"
-        return f"{self.total} published claim{'' if self.total == 1 else 's'}, recomputed"
+        return f"{self.published} published claim{'' if self.published == 1 else 's'}, recomputed"
 
     def count(self, verdict: ClaimVerdict) -> int:
         """Claims of all papers with ``verdict``."""

@@ -1,4 +1,4 @@
-"""Figures of a sweep: tornado, worst case over the grid, the two parameters that matter most, before and after."""
+"""Figures of a sweep: worst case over the grid, the two parameters that matter most, and the files of all of them."""
 
 from __future__ import annotations
 
@@ -9,36 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from analysis.sensitivity.designs import OneAtATimeDesign
 from estimators.arrays import FloatArray
-from studies.plots import Axis, Band, Bars, ColouredDots, Figure, Level, Line, Map, Mark, Panel, Shade, Words, dots
-from studies.plots.colours import ABOVE, BELOW, BEST, DIVERGING, LOWER_END, MIDDLE, NOMINAL, UPPER_END, WORST
+from studies.plots import Axis, Band, ColouredDots, Figure, Line, Map, Mark, Panel, dots
+from studies.plots.colours import BEST, DIVERGING, LOWER_END, MIDDLE, NOMINAL, UPPER_END, WORST
 from studies.plots.save import save_figure
 from studies.sweeps.baseline import Baseline
+from studies.sweeps.change import change_figure
 from studies.sweeps.engine import SweepResult
 from studies.sweeps.evaluate import TIE
+from studies.sweeps.labels import better, paneled, titled, words
 from studies.sweeps.measures import Measure
 from studies.sweeps.store import Rows, SweepFolder
 from studies.sweeps.tables import columns_of
+from studies.sweeps.tornado import Bar, tornado, tornado_figure
 
 MOST_POINTS = 3000
-VALUES = {"nominal": "o", "median": "s", "quantile 95 %": "^", "quantile 99 %": "D", "worst": "X"}
-"""Statistics of the comparison, with their markers."""
-
-
-@dataclass(frozen=True)
-class Bar:
-    """One parameter alone: its relative `levels` and the measure (worst over the grid) there; `nominal` in the middle."""
-
-    parameter: str
-    levels: FloatArray
-    values: FloatArray
-    nominal: float
-
-    @property
-    def reach(self) -> float:
-        """The largest deviation; infinite ones count most."""
-        return float(np.abs(self.values - self.nominal).max())
 
 
 @dataclass(frozen=True)
@@ -53,30 +38,6 @@ class WorstMap:
     worst: FloatArray
     best: FloatArray
     position: FloatArray
-
-
-def tornado(rows: Rows, measure: Measure) -> list[Bar]:
-    """One bar a parameter, the longest first; empty without a one-at-a-time stage."""
-    nominal: float | None = None
-    values, at = [], []
-    alone = next((stage for stage in rows.stages if isinstance(stage, OneAtATimeDesign)), None)
-    for stage, _, columns in rows.columns([*rows.ranges, measure.name]):
-        if nominal is None:
-            nominal = float(columns[measure.name][0])
-            centre = np.array([float(columns[name][0]) for name in rows.ranges])
-        if stage is alone:
-            values.append(columns[measure.name])
-            at.append(np.stack([columns[name] for name in rows.ranges], axis=1))
-    if nominal is None or not values:
-        return []
-    found, where = np.concatenate(values).reshape(len(rows.ranges), -1), np.concatenate(at)
-    where = where.reshape(len(rows.ranges), -1, len(rows.ranges))
-    bars = [
-        Bar(name, where[i, :, i] / centre[i] - 1.0 if centre[i] else where[i, :, i], found[i], nominal)
-        for i, name in enumerate(rows.ranges)
-        if not np.isnan(found[i]).any()
-    ]
-    return sorted(bars, key=lambda bar: -bar.reach)
 
 
 def worst_map(folder: SweepFolder, rows: Rows, observer: int, measure: Measure) -> WorstMap | None:
@@ -168,39 +129,7 @@ def figures(result: SweepResult, before: Baseline | None, observers: Collection[
         if scatter is not None:
             yield scatter
     if before is not None:
-        yield before_after_figure(result, before)
-
-
-def tornado_figure(rows: Rows, bars: Mapping[str, list[Bar]]) -> Figure:
-    """One panel a measure: how far it moves when one parameter alone goes through its range."""
-    shown = [(m, bars[m.name][::-1]) for m in rows.measures if bars[m.name]]
-    title = f"{rows.observer.name}: one parameter at a time, worst over the grid"
-    panels, height = [_tornado(*each) for each in shown], 1.4 + 0.42 * len(rows.ranges)
-    return _figure(f"{rows.observer.name}-tornado", title, panels, 4.6, height)
-
-
-def _tornado(measure: Measure, bars: Sequence[Bar]) -> Panel:
-    marks: list[Mark] = [Level(x=bars[0].nominal, label="nominal", color=NOMINAL, width=0.9)]
-    ends = [bars[0].nominal]
-    for label, colour, side in (
-        ("parameter below its nominal value", BELOW, -1.0), ("above", ABOVE, 1.0),
-    ):  # fmt: skip
-        spans = []
-        for place, bar in enumerate(bars):
-            reach = bar.values[(side * bar.levels > 0.0) & np.isfinite(bar.values)]
-            if len(reach):
-                spans.append((place, min(reach.min(), bar.nominal), max(reach.max(), bar.nominal)))
-        if spans:
-            places, left, right = np.array(spans).T
-            marks.append(Bars(places, right - left, label, colour, 0.6, flat=True, start=left, alpha=0.8))
-            ends += [*left, *right]
-    for place, bar in enumerate(bars):
-        if not np.isfinite(bar.values).all():
-            marks.append(Words(bar.nominal, place, "unstable", size=7.0, vertical="center"))
-    room = 0.06 * (max(ends) - min(ends)) or None  # bars may not end at the frame
-    x = Axis(_titled(measure), room and min(ends) - room, room and max(ends) + room)
-    y = Axis(ticks={place: _words(bar.parameter) for place, bar in enumerate(bars)})
-    return Panel(marks, x, y, _better(measure))
+        yield change_figure(result, before)
 
 
 def map_figure(result: SweepResult, rows: Rows, maps: Sequence[tuple[Measure, WorstMap]]) -> Figure:
@@ -211,9 +140,9 @@ def map_figure(result: SweepResult, rows: Rows, maps: Sequence[tuple[Measure, Wo
     for k in range(0, len(maps), across):
         pair = maps[k : k + across]
         grid.append([_envelope(measure, found) for measure, found in pair])
-        grid.append([_position(rows, found, f"{_words(box.name)} ({box.unit})") for _, found in pair])
+        grid.append([_position(rows, found, f"{words(box.name)} [{box.unit}]") for _, found in pair])
     heights = 2.5 + 0.22 * d
-    title = f"{rows.observer.name}: worst of {result.sweep.designs(rows.observer)} designs at every {_words(box.name)}"
+    title = f"{rows.observer.name}: worst of {result.sweep.designs(rows.observer)} designs at every {words(box.name)}"
     return Figure(
         f"{rows.observer.name}-map",
         title,
@@ -234,14 +163,14 @@ def _envelope(measure: Measure, found: WorstMap) -> Panel:
 
     marks: list[Mark] = [
         Band(found.points, finite(found.worst, top), finite(found.best, top), color="0.9", alpha=1.0),
-        Line(found.points, finite(found.worst), "worst design", WORST, width=1.4),
-        Line(found.points, finite(found.best), "best design", BEST, width=1.2),
-        Line(found.points, finite(found.nominal), "nominal", NOMINAL, width=1.2),
+        Line(found.points, finite(found.worst), "worst design", WORST, width=1.6),
+        Line(found.points, finite(found.best), "best design", BEST, "dashed", 1.4),
+        Line(found.points, finite(found.nominal), "nominal", NOMINAL, "dotted", 1.6),
     ]
     unstable = found.points[~np.isfinite(found.worst)]
     if len(unstable):
         marks.append(dots(unstable, np.full(len(unstable), top), "unstable", WORST, "x", 4.0))
-    return Panel(marks, Axis("", found.points[0], found.points[-1]), _titled(measure), _better(measure))
+    return Panel(marks, Axis("", found.points[0], found.points[-1]), titled(measure), better(measure))
 
 
 def _position(rows: Rows, found: WorstMap, label: str) -> Panel:
@@ -253,7 +182,7 @@ def _position(rows: Rows, found: WorstMap, label: str) -> Panel:
     ):  # fmt: skip
         marks.append(dots([], [], name, colour, "s", 7.0, edge="0.6"))
     x = Axis(label, found.points[0], found.points[-1])
-    return Panel(marks, x, Axis("", d - 0.5, -0.5, ticks=dict(enumerate(map(_words, rows.ranges)))), grid=False)
+    return Panel(marks, x, Axis("", d - 0.5, -0.5, ticks=dict(enumerate(map(words, rows.ranges)))), grid=False)
 
 
 def scatter_figure(result: SweepResult, rows: Rows, bars: Mapping[str, list[Bar]]) -> Figure | None:
@@ -270,13 +199,13 @@ def scatter_figure(result: SweepResult, rows: Rows, bars: Mapping[str, list[Bar]
         low, high = (float(end) for end in np.quantile(values, [0.005, 0.995]))
         colours = "viridis_r" if measure.better == "smaller" else "viridis"
         x, y = at[order].T
-        marks = [ColouredDots(x, y, values[order], _titled(measure), colours, low, high)]
-        across, up = (f"{_words(name)} ({units[name]})" for name in names)
-        panels.append(Panel(marks, across, up, _better(measure)))
+        marks = [ColouredDots(x, y, values[order], titled(measure), colours, low, high)]
+        across, up = (f"{words(name)} [{units[name]}]" for name in names)
+        panels.append(Panel(marks, across, up, better(measure)))
     if not panels:
         return None
     title = f"{rows.observer.name}: the two parameters that matter most (dark is worse)"
-    return _figure(f"{rows.observer.name}-scatter", title, panels, 4.4, 3.3)
+    return paneled(f"{rows.observer.name}-scatter", title, panels, 4.4, 3.3)
 
 
 def _two(result: SweepResult, rows: Rows, measure: Measure, bars: list[Bar]) -> tuple[str, str]:
@@ -288,61 +217,3 @@ def _two(result: SweepResult, rows: Rows, measure: Measure, bars: list[Bar]) -> 
     }
     ranked = sorted(totals, key=lambda name: -totals[name]) or [bar.parameter for bar in bars] or list(rows.ranges)
     return ranked[0], ranked[1]
-
-
-def before_after_figure(result: SweepResult, before: Baseline) -> Figure:
-    """One panel a measure, one row an observer: how much of its distance to worthlessness each statistic won or lost."""
-    panels = [_changes(result, before, measure) for measure in result.sweep.measures]
-    title = f"Sweep {result.sweep.name}: after, against the baseline"
-    return _figure("before-after", title, panels, 4.8, 1.0 + 0.42 * len(result.sweep.observers))
-
-
-def _changes(result: SweepResult, before: Baseline, measure: Measure) -> Panel:
-    tolerance = 100.0 * result.sweep.tolerances.get(measure.name, result.sweep.tolerance)
-    changes = []
-    for place, observer in enumerate(result.sweep.observers):
-        for name in VALUES:
-            old, new = (s.of(observer.name, measure.name, name) for s in (before.summary, result.summary))
-            if old is not None and new is not None:
-                changes.append((place, name, -100.0 * measure.loss(old.value, new.value)))
-    reach = max([2.0 * tolerance, *(abs(change) for *_, change in changes if np.isfinite(change))])
-    marks: list[Mark] = [
-        Shade(-tolerance, 0.0, "x", "tolerance", "0.92", 1.0),
-        Level(x=0.0, color=NOMINAL, width=0.9),
-        *(dots([], [], name, "0.4", marker) for name, marker in VALUES.items()),
-        dots([], [], "shrunk", ABOVE),
-    ]
-    for place, name, change in changes:
-        shown = float(np.clip(change, -1.15 * reach, 1.15 * reach))
-        marks += [
-            Line([0.0, shown], [place, place], color="0.75", width=1.2),
-            dots(shown, place, color=ABOVE if change < -tolerance else BELOW, marker=VALUES[name]),
-        ]
-    wide = reach > 10.0 * tolerance > 0.0
-    label, names = "change against the baseline (%): left is worse", [s.name for s in result.sweep.observers]
-    x = Axis(label, -1.3 * reach, 1.3 * reach, "symlog" if wide else "linear", linear=2.0 * tolerance)
-    y = Axis("", len(names) - 0.5, -0.5, ticks=dict(enumerate(names)))
-    return Panel(marks, x, y, _words(measure.name))
-
-
-def _figure(name: str, title: str, panels: Sequence[Panel], width: float, height: float) -> Figure:
-    """Panels of so many inches in two columns, with one legend below all."""
-    across = min(2, len(panels))
-    rows = [panels[k : k + across] for k in range(0, len(panels), across)]
-    shown = f"{title}: {', '.join(panel.title for panel in panels)}"
-    size = (width * across, height * len(rows) + 0.7)
-    return Figure(name, title, shown, rows, size=size, legend="below", title=title)
-
-
-def _better(measure: Measure) -> str:
-    """The name, and which way is better."""
-    return f"{_words(measure.name)}: {measure.better} is better"
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
-
-
-def _titled(measure: Measure) -> str:
-    """Name and unit, for an axis."""
-    return _words(measure.name) + ("" if measure.unit == "1" else f" ({measure.unit})")

@@ -24,7 +24,7 @@ from studies.papers.resilient_velocity.study import STUDY
 from studies.plots import Figure
 from studies.plots.draw import draw
 from studies.study import QUICK
-from tests.support.study_checks import desk_parts
+from tests.support.study_checks import check_claim, desk_parts
 
 REFERENCE = Path(__file__).parents[3] / "shared" / "reference" / "claims.json"
 PRINT: dict[str, dict[str, str]] = {
@@ -54,8 +54,7 @@ def test_every_claim_is_computed_once_and_can_be_stored() -> None:
     computed = [c.published.id for result in results().values() for c in result.claims]
     assert sorted(computed) == sorted(listed) and len(set(computed)) == len(computed) == 26
     for claim in claims().values():
-        assert json.loads(json.dumps(claim.row(), allow_nan=False))["reading"].endswith(".")
-        assert isinstance(claim.finding.verdict, ClaimVerdict)
+        check_claim(claim)
 
 
 def test_every_figure_and_table_stands_alone() -> None:

@@ -6,9 +6,10 @@ import json
 import re
 from typing import Any
 
-from studies.claim import ClaimVerdict
+from studies.claim import Claim, ClaimVerdict
 from studies.plots import Figure, colours
 from studies.plots.draw import draw
+from studies.sentence import fill
 from studies.study import Part, PartResult, Study
 
 
@@ -42,8 +43,25 @@ def check_result(result: PartResult) -> None:
         assert all(len(row) == len(table.columns) for row in table.rows), table.name
         json.dumps([list(row) for row in table.rows])
     for claim in result.claims:
-        row = json.loads(json.dumps(claim.row()))
-        assert row["reading"] and row["computed"] and row["verdict"] in set(ClaimVerdict)
+        check_claim(claim)
+
+
+def check_claim(claim: Claim) -> None:
+    """It can be stored, and one sentence says what was found: filled in full, below 200 characters, no dump of values."""
+    row = json.loads(json.dumps(claim.row(), allow_nan=False))
+    assert row["reading"].endswith(".") and row["computed"] and row["verdict"] in set(ClaimVerdict)
+    for template in (claim.published.found[row["verdict"]], claim.published.advice):
+        fill(template, claim.finding.computed)  # raises for a field without a value
+    check_sentence(row["found"])
+    assert not row["advice"] or (row["advice"].endswith(".") and len(row["advice"]) < 200)
+
+
+def check_sentence(text: str) -> None:
+    """One sentence for readers: no keys, no brackets of dictionaries, no long digits, no truth values of a machine."""
+    assert text.endswith(".") and 20 < len(text) < 200, text
+    assert not re.search(r"[{}]|\w: [^;]*; \w+:|\bTrue\b|\bFalse\b|\bNone\b|\bnan\b|\d{8}|\d\.\d{8}|e[-+]\d\d", text), (
+        text
+    )
 
 
 def nameless(figure: Figure) -> set[str]:

@@ -55,7 +55,9 @@ def test_schedules_write_check_and_drift(tmp_path: Path, capsys: pytest.CaptureF
     out = ["--out", str(tmp_path)]
     assert main(["schedules", name, *out, "--check"]) == 1
     assert "does not exist" in capsys.readouterr().err
-    assert main(["schedules", name, *out, "--json", "--figures", str(tmp_path / "figures")]) == 0
+    report = ["--report", str(tmp_path / "pages" / "report.html")]
+    assert main(["schedules", name, *out, "--json", "--figures", str(tmp_path / "figures"), *report]) == 0
+    assert "All 10 claims are proved" in (tmp_path / "pages" / "report.html").read_text()
     row = json.loads(capsys.readouterr().out)[0]
     assert row["state"] == "written" and all(proof["proved"] for proof in row["proofs"])
     assert (tmp_path / "figures" / f"{name}.svg").stat().st_size > 1000

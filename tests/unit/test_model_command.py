@@ -13,7 +13,7 @@ from analysis.observability.hidden_modes import undetectable_mode, unstabilisabl
 from analysis.observability.matrix import controllability_matrix
 from analysis.observability.range_rank import controllability_over_range, observability_over_range
 from studies.cli import main
-from studies.commands.gain_figure import curves_of
+from studies.report.schedule_figures import curves_of
 from studies.spec import any_model, shipped_examples
 from synthesis.exchange.model_file import load_model
 from synthesis.models.lpv import LpvModel

@@ -74,9 +74,10 @@ def test_results_are_stored_as_the_study_gave_them(run: Run, tmp_path: Path) -> 
     claims = {claim["id"]: claim for claim in json.loads((out / "claims.json").read_text())}
     assert list(claims) == ["P1-root", "P1-pair", "P1-wrong", "P1-sign", "P1-open", "P1-extra"]
     assert list(claims["P1-root"]) == [
-        "id", "paper", "where", "statement", "published", "computed", "tolerance", "verdict", "reading"
+        "id", "paper", "where", "statement", "published", "computed", "tolerance", "verdict", "reading",
+        "claimed", "found", "advice",
     ]  # fmt: skip
-    assert claims["P1-root"]["computed"] == 2.0**0.5
+    assert claims["P1-root"]["computed"] == 2.0**0.5 and claims["P1-root"]["found"].startswith("The root is 1.414 m")
     assert claims["P1-pair"]["computed"] == {"omega=0": 0.5, "omega=40": [1, 2.5]}
     assert claims["P1-wrong"]["computed"] is None and claims["P1-open"]["computed"] == "inf"
     assert claims["P1-extra"]["computed"] is True and claims["P1-extra"]["verdict"] == "derived (not claimed)"

@@ -6,7 +6,9 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from markupsafe import Markup, escape
+from markupsafe import Markup
+
+from studies.report.mathml import squared, typeset
 
 MISSING = "–"
 UNITS = {
@@ -18,7 +20,7 @@ NUMERIC_TEXT = re.compile(r"[\s±+\-−<>≤≥≈~]*\d")
 
 def number(value: float, digits: int = 7) -> str:
     """``value`` with ``digits`` significant ones, exponents short: 1.5e9, not 1.5e+09."""
-    text = str(value) if isinstance(value, int) else f"{value:.{digits}g}"
+    text = str(value) if isinstance(value, int) else f"{value + 0.0:.{digits}g}"  # -0.0 becomes 0
     return re.sub(r"e\+?(-?)0*(\d)", r"e\1\2", text)
 
 
@@ -28,7 +30,7 @@ def cell(value: Any, digits: int = 5) -> str:
         return MISSING
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return number(value, digits) if isinstance(value, int | float) else str(value)
+    return number(value, digits) if isinstance(value, int | float) else squared(str(value))
 
 
 def brief(value: Any, length: int = 110, digits: int = 7) -> str:
@@ -58,17 +60,24 @@ def _line(value: Any, digits: int) -> str:
     if isinstance(value, dict):
         return "; ".join(f"{label(key)}: {_line(entry, digits)}" for key, entry in value.items())
     if isinstance(value, list):
-        return "[" + ", ".join(_line(entry, digits) for entry in value) + "]"
+        inside = ", ".join(_line(entry, digits) for entry in value)
+        return f"[{inside}]" if any(isinstance(entry, list) for entry in value) else inside
     return cell(value, digits)
 
 
 def prose(text: str) -> Markup:
-    """Escaped text; what stands between backticks is set as code."""
+    """Escaped text with its formulas set; what stands between backticks is set as code."""
     pieces = text.split("`")
     if len(pieces) % 2 == 0:  # an odd backtick is just a character
-        return escape(text)
-    marked = [Markup("<code>{}</code>").format(piece) if i % 2 else escape(piece) for i, piece in enumerate(pieces)]
+        pieces = [text]
+    marked = [Markup("<code>{}</code>").format(p) if i % 2 else Markup(typeset(p)) for i, p in enumerate(pieces)]
     return Markup("").join(marked)
+
+
+def counted(**things: int) -> str:
+    """``3 figures, 1 table``; nothing for none."""
+    names = {name: name.replace("_", " ") for name in things}
+    return ", ".join(f"{n} {names[k].removesuffix('s') if n == 1 else names[k]}" for k, n in things.items() if n)
 
 
 def alignments(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> list[str]:

@@ -1,0 +1,120 @@
+"""How near a schedule comes to what is proved about it, at every constant parameter value: a second road, in floats.
+
+A constant parameter is one of the admissible motions, so no proved level can be better than what is found here; how far it
+stays behind is the price of motion and of the proof. Norms and drop probabilities come from `analysis`, which shares nothing
+with the verifier but the loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from flint import fmpq
+
+from analysis import critical_drop_probability, hinf_norm
+from estimators.arrays import FloatArray
+from synthesis.certificate.claims import ERROR_EQUATION, WITH_CHANNEL, Claim, claim_name, claim_unit, rows_of
+from synthesis.certificate.content import claims_of, subject_of
+from synthesis.certificate.refute import grid
+from synthesis.loop.observer import ObserverLoop
+from synthesis.loop.system import Region, System
+from synthesis.polynomials.enclosure import PolynomialMatrix
+
+LARGER_IS_BETTER = ("decay rate", "internal update", "sampled error", "drop probability")
+
+
+@dataclass(frozen=True)
+class FrozenLevel:
+    """A claim with its proved ``level`` and what constant parameters ``points`` (g, p) allow, ``values`` (g,)."""
+
+    claim: str
+    kind: str
+    unit: str
+    level: float
+    points: FloatArray
+    values: FloatArray
+
+    @property
+    def larger_is_better(self) -> bool:
+        """Whether the proof is a bound from below."""
+        return self.kind in LARGER_IS_BETTER
+
+    @property
+    def tightest(self) -> int:
+        """The point where the value is nearest to the proved level."""
+        return int(np.argmin(self.values) if self.larger_is_better else np.argmax(self.values))
+
+    @property
+    def slack(self) -> float:
+        """What is left there, as a share of the level; negative would contradict the proof."""
+        best = self.values[self.tightest]
+        return float(best / self.level - 1.0 if self.larger_is_better else 1.0 - best / self.level)
+
+
+def frozen_levels(content: Mapping[str, Any], where: str = "schedule") -> list[FrozenLevel]:
+    """One for each claim of a checked schedule content. Raises ScheduleError as `synthesis.certificate.content.subject_of`."""
+    subject = subject_of(content, where)
+    loop, axes = subject.loop, subject.loop.plant.axes
+    points = list(dict.fromkeys(grid(loop)))
+    scale = np.array([[_number(axis.middle), _number(axis.half)] for axis in axes]).reshape(-1, 2)
+    places = (
+        np.array([[_number(u) for u in point] for point in points]).reshape(len(points), -1) * scale[:, 1] + scale[:, 0]
+    )
+    found = []
+    for claim in claims_of(content, subject, where):
+        systems = _standing(loop, points, "continuous" if claim.kind in ERROR_EQUATION else "discrete")
+        kept = np.array([system is not None for system in systems])
+        values = _values(claim, [s for s in systems if s is not None], subject.names, loop)
+        name, unit = (make(claim.kind, claim.channel, subject.units) for make in (claim_name, claim_unit))
+        found.append(FrozenLevel(name, claim.kind, unit, claim.level, places[kept], values))
+    return found
+
+
+def _standing(loop: ObserverLoop, points: list[Any], time: Literal["continuous", "discrete"]) -> list[System | None]:
+    count = len(loop.plant.axes)
+    still = (fmpq(0),) * count
+    return [loop.system(Region((*point, *still), still * 2), time) for point in points]
+
+
+def _values(claim: Claim, systems: list[System], names: Any, loop: ObserverLoop) -> FloatArray:
+    A = np.array([_matrix(system.A, system) for system in systems])
+    poles = np.linalg.eigvals(A)
+    match claim.kind:
+        case "decay rate":
+            return np.asarray(-poles.real.max(axis=-1), float)
+        case "fastest pole":
+            return np.asarray(-poles.real.min(axis=-1), float)
+        case "internal update" | "sampled error":
+            period = _number(loop.sample_time) if loop.sample_time is not None else 1.0
+            return np.asarray(-np.log(np.abs(poles).max(axis=-1)) / period, float)
+        case "drop probability":
+            return critical_drop_probability(np.array([_matrix(s.coasting, s) for s in systems]), A)
+    assert claim.channel is not None
+    group = WITH_CHANNEL[claim.kind]
+    inputs = names.disturbances if group == "disturbances" else names.states
+    where, sizes = rows_of(inputs, claim.channel)
+    B = np.array([_matrix(system.B[group], system)[:, where] * np.array(sizes) for system in systems])
+    C = np.array([[float(name == error) for name in names.states] for error in claim.channel.errors])
+    return hinf_norm(A, B, C, discrete=claim.kind != "gain").norm
+
+
+def _matrix(matrix: PolynomialMatrix, system: System) -> FloatArray:
+    """At the constant parameter, in floats."""
+    below = 1.0 if system.denominator is None else _entries(system.denominator).item()
+    return _entries(matrix) / below
+
+
+def _entries(matrix: PolynomialMatrix) -> FloatArray:
+    entries = matrix.terms.get((0,) * matrix.variables)
+    if entries is None:
+        return np.zeros(matrix.shape)
+    return np.array([float(x.mid()) if hasattr(x, "mid") else _number(x) for x in entries.entries()]).reshape(
+        matrix.shape
+    )
+
+
+def _number(value: fmpq) -> float:
+    return int(value.p) / int(value.q)

@@ -1,0 +1,84 @@
+"""Pictures of a sweep as data: neither side of a bar hides the other, every bar has its number, nothing changed is said."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from studies.plots import Bars, Figure, Panel, Words
+from studies.plots.draw import draw
+from studies.sweeps.change import Change, change_panel
+from studies.sweeps.measures import Measure
+from studies.sweeps.tornado import Bar, round_ticks, tornado_panel
+
+MEASURE = cast(Measure, SimpleNamespace(name="noise_norm", unit="1/s", better="smaller", sign=1.0))
+LEVELS = np.array([-0.2, -0.1, 0.1, 0.2])
+
+
+def bars(*values: list[float]) -> list[Bar]:
+    return [Bar(f"p{i}", LEVELS, np.array(v), 1.0) for i, v in enumerate(values)]
+
+
+def words(panel: Panel) -> list[str]:
+    return [mark.text for mark in panel.marks if isinstance(mark, Words)]
+
+
+def test_bars_to_one_side_stand_side_by_side_with_their_numbers() -> None:
+    panel = tornado_panel(MEASURE, bars([1.3, 1.2, 1.1, 1.4], [1.0, 1.0, 1.0, 1.0], [0.999, 1.0, 1.0, 1.001]))
+    below, above = (mark for mark in panel.marks if isinstance(mark, Bars))
+    width = below.width
+    assert isinstance(below.color, str) and below.color != above.color
+    assert np.all(np.abs(np.asarray(below.places) - np.asarray(above.places)) >= width)
+    assert words(panel) == ["1.3", "no change", "0.999", "1.4", "no change", "1.001"]
+    assert panel.x.label == "noise norm [1/s]" if not isinstance(panel.x, str) else False
+
+
+def test_unstable_designs_are_named() -> None:
+    panel = tornado_panel(MEASURE, bars([np.inf, 1.2, 1.1, 1.0]))
+    assert "unstable" in words(panel) and "inf" not in words(panel)
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(-12.9, -5.1), (0.7389, 0.7561), (0.0, 1.0), (1e-9, 3e-9), (99_990.0, 100_010.0)]
+)
+def test_ticks_are_few_round_and_inside(low: float, high: float) -> None:
+    ticks = np.array(round_ticks(low, high))
+    assert 2 <= len(ticks) <= 6 and np.all((low <= ticks) & (ticks <= high))
+    steps = np.diff(ticks)
+    assert np.ptp(steps) < 1e-6 * steps[0]
+
+
+def result(names: tuple[str, ...]) -> Any:
+    return SimpleNamespace(
+        sweep=SimpleNamespace(tolerances={}, tolerance=0.01, observers=[SimpleNamespace(name=n) for n in names])
+    )
+
+
+def test_where_nothing_changed_the_picture_says_so_with_the_values() -> None:
+    changes = [Change(0, "nominal", 1e-5, -85.4, "1/s"), Change(0, "worst", 0.0, -61.59, "1/s")]
+    panel = change_panel(result(("one",)), MEASURE, changes)
+    assert panel.title == "noise norm: unchanged" and words(panel) == ["nominal -85.4 1/s, worst -61.59 1/s"]
+
+
+def test_changes_are_counted_and_written_and_statistics_do_not_cover_each_other() -> None:
+    names = ("nominal", "median", "quantile 95 %", "quantile 99 %", "worst")
+    changes = [
+        Change(0, name, percent, 1.0, "1") for name, percent in zip(names, (0.0, -4.8, 3.1, -0.5, 0.0), strict=True)
+    ]
+    panel = change_panel(result(("one",)), MEASURE, changes)
+    assert panel.title == "noise norm: 1 shrank, 3 moved" and words(panel) == ["−4.8", "+3.1", "−0.5"]
+    assert len({change.y for change in changes}) == 5
+
+
+@pytest.mark.parametrize("columns", [1, 2])
+def test_long_titles_stay_inside_the_sheet(columns: int) -> None:
+    panel = tornado_panel(MEASURE, bars([1.3, 1.2, 1.1, 1.4]))
+    title = "resilient-velocity-longitudinal: one parameter at a time, worst over the grid of wheel speeds and rates"
+    sheet = draw(Figure("long", "c", "a", [panel] * columns, size=(4.8 * columns, 2.0), title=title, legend="below"))
+    sheet.draw_without_rendering()
+    assert sheet.get_suptitle().replace("\n", " ") == title
+    (shown,) = [text for text in sheet.texts if text.get_text() == sheet.get_suptitle()]
+    assert shown.get_window_extent().x1 <= sheet.bbox.x1
