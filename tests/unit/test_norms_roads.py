@@ -7,7 +7,7 @@ from math import inf, sqrt
 import numpy as np
 import pytest
 
-from analysis import hinf_norm, linf_norm
+from analysis import h2_norm, hinf_norm, linf_norm
 from analysis.norms import peaks, two_states
 from analysis.norms.exact_peak import exact_peak
 from analysis.norms.frequency_response import Systems
@@ -91,3 +91,14 @@ def test_only_eigenvalues_near_the_axis_are_crossings() -> None:
     found = near_axis(systems, np.array([0.8]))[0]
     np.testing.assert_allclose(found[np.isfinite(found)], 0.75, rtol=1e-12)
     assert np.isfinite(found).sum() == 1 and np.isnan(near_axis(systems, np.array([2.0]))).all()
+
+
+def test_doubling_goes_on_to_the_last_digits() -> None:
+    """1/(1 - a^2) and 1/(2 a) where the step that would be left out is still 1e-5 or 1e-9 of the sum."""
+    one = np.ones((1, 1, 1))
+    for exponent in (9.5, 9.9, 18.5, 20.0):
+        a = np.exp(-exponent / 64.0)
+        factor = gramian_factor(a * one, one, True)[0]
+        assert (factor @ factor.T).item() == pytest.approx(1.0 / (1.0 - a * a), rel=1e-13)
+        assert gramian_matrix(a * one, one, True).item() == pytest.approx(1.0 / (1.0 - a * a), rel=1e-13)
+        assert h2_norm(-a * one, one, one).item() ** 2 == pytest.approx(0.5 / a, rel=1e-13)
