@@ -95,9 +95,8 @@ def test_window_constants_in_closed_form() -> None:
         assert uniform_detectability(A, C, window, contraction=c, required=required).verdict is verdict
     one_bad = np.concatenate([held(np.diag([a, b]), 9), held(np.diag([a, 0.99]), 9)])
     judged = uniform_detectability(one_bad, held([[1.0, 0.0]], 18), window, contraction=c)
-    assert (
-        judged.verdict is Verdict.REFUTED and judged.information[0] > 0.1 and judged.worst == (6,)
-    )  # 0.8^3 0.99 = 0.507 lasts
+    assert judged.verdict is Verdict.REFUTED and judged.information[0] > 0.1
+    assert judged.worst == (6,)  # the first window in which e_2 lasts: 0.8^3 0.99 = 0.507
     # everything lasts: tau = 0 is best, and c_2 is the smallest eigenvalue of V
     both = uniform_detectability(held(np.eye(2), 5), held(np.diag([1.0, 0.3]), 5), 4, contraction=0.9)
     np.testing.assert_allclose(both.information, 4 * 0.09, rtol=1e-12)
@@ -108,7 +107,7 @@ def test_window_constants_in_closed_form() -> None:
 
 
 def test_ranks_and_scales_of_sequences() -> None:
-    """The rank is relative to the largest singular value of the factor, 1e-12 by default, in the units that `state_scale` says."""
+    """The rank is relative to the largest singular value of the factor, 1e-12 by default, in the units of `state_scale`."""
     for size in (1e-20, 1.0, 1e20):
         for least, rank in ((1e-10, 2), (1e-14, 1)):
             found = sequence_observability(np.eye(2)[None], size * np.diag([1.0, least])[None])
