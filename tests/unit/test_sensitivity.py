@@ -234,3 +234,18 @@ def test_perturbed_models_check_names_ranges_and_denominators() -> None:
         PerturbedModel(model).at(p=1.0, c=[1.0, 0.0])
     measure = error_measure(PerturbedModel(model), [0.5], lambda A, B: A[..., 0, 0], p=[1.0, 2.0])
     np.testing.assert_allclose(measure({"c": np.array([1.0, 2.0, 4.0])}), [[-1.5, -2.5], [-1.0, -1.5], [-0.75, -1.0]])
+
+
+def test_evaluations_are_all_counted_and_results_named() -> None:
+    seen: list[int] = []
+
+    def hill(s):
+        seen.append(len(s["x"]))
+        return -((s["x"] - 0.3) ** 2) - (s["y"] - 0.6) ** 4
+
+    found = worst_case(hill, {"x": (0.0, 1.0), "y": (0.0, 1.0)}, seed=1)
+    assert found.evaluations == sum(seen) > len(seen) > 1
+    indices = variance_indices(hill, {"x": (0.0, 1.0), "y": (0.0, 1.0)}, samples=64)
+    assert indices.first_order.name.startswith("first-order index of") and indices.total.name.startswith(
+        "total index of"
+    )

@@ -1,0 +1,73 @@
+"""Where a frozen loop breaks a claim: found between the grid points, exact at the level, and never where nothing is broken."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+from flint import fmpq, fmpq_mat
+
+from synthesis.certificate.refute import undetectable_place, unstable_place
+from synthesis.loop.observer import ObserverLoop
+from synthesis.loop.plant import Axis, Plant
+from synthesis.polynomials.enclosure import PolynomialMatrix, constant
+
+
+def rational(x: Fraction) -> fmpq:
+    return fmpq(x.numerator, x.denominator)
+
+
+def plant(A: PolynomialMatrix, C: PolynomialMatrix) -> Plant:
+    """x' = A(u) x + d, y = C x, with u = p in [-1, 1] per parameter."""
+    n, v = A.shape[0], A.variables
+    none = {key: constant(fmpq_mat(*shape, [0] * (shape[0] * shape[1])), v) for key, shape in (
+        ("B", (n, 1)), ("D", (1, 1)), ("F", (1, 1)),
+    )}  # fmt: skip
+    axes = tuple(Axis(f"p{i}", "1", fmpq(-1), fmpq(1), fmpq(-1), fmpq(1)) for i in range(v))
+    drive = constant(fmpq_mat(n, 1, [1] * n), v)
+    return Plant(axes, {"A": A, "C": C, "E": drive, **none}, constant(fmpq_mat([[1]]), v))
+
+
+def hill(places: tuple[Fraction, ...], height: Fraction) -> PolynomialMatrix:
+    """height - sum of (u_i - place_i)^2, one state."""
+    v = len(places)
+    terms = {(0,) * v: fmpq_mat([[rational(height - sum(place**2 for place in places))]])}
+    for i, place in enumerate(places):
+        terms[tuple(int(k == i) for k in range(v))] = fmpq_mat([[rational(2 * place)]])
+        terms[tuple(2 * int(k == i) for k in range(v))] = fmpq_mat([[fmpq(-1)]])
+    return PolynomialMatrix(terms, (1, 1), v)
+
+
+def open_loop(A: PolynomialMatrix) -> ObserverLoop:
+    """Without a correction."""
+    v = A.variables
+    table = {index: fmpq_mat([[0]]) for index in ([(0,), (1,)] if v == 1 else [(0, 0), (0, 1), (1, 0), (1, 1)])}
+    one = constant(fmpq_mat([[1]]), v)
+    return ObserverLoop(plant(A, one), ((fmpq(-1), fmpq(1)),) * v, table, "held", fmpq(1, 10), False)
+
+
+@pytest.mark.parametrize("places", [(Fraction(1, 3),), (Fraction(-7, 11),), (Fraction(1, 3), Fraction(-7, 11))])
+def test_an_unstable_hill_between_grid_points_is_climbed(places: tuple[Fraction, ...]) -> None:
+    height = Fraction(1, 10**5)  # unstable within 0.003 of the top, a fortieth of the step of the grid
+    found = unstable_place(open_loop(hill(places, height)), fmpq(0))
+    assert found is not None
+    assert sum((Fraction(int(u.p), int(u.q)) - place) ** 2 for u, place in zip(found, places, strict=True)) <= height
+    assert unstable_place(open_loop(hill(places, -height)), fmpq(0)) is None
+    # the same hill against a decay rate just above and just below what its top has
+    assert unstable_place(open_loop(hill(places, -height)), rational(2 * height)) is not None
+    assert unstable_place(open_loop(hill(places, -height)), rational(height / 2)) is None
+
+
+def test_a_place_that_is_given_is_tried_first() -> None:
+    top = Fraction(123456789, 10**9)
+    needle = open_loop(hill((top,), Fraction(1, 10**20)))  # too narrow for any climb
+    assert unstable_place(needle, fmpq(0)) is None
+    assert unstable_place(needle, fmpq(0), [(rational(top),)]) == (rational(top),)
+
+
+def test_hidden_modes_count_only_if_they_do_not_decay() -> None:
+    """x2 shows by u - place alone: hidden at u = place, where its rate is the sign."""
+    for place in (fmpq(1, 3), fmpq(2, 7)):
+        C = PolynomialMatrix({(0,): fmpq_mat([[1, -place]]), (1,): fmpq_mat([[0, 1]])}, (1, 2), 1)
+        for rate, found in ((fmpq(1), (place,)), (fmpq(0), (place,)), (fmpq(-1), None)):
+            assert undetectable_place(plant(constant(fmpq_mat([[-1, 0], [0, rate]]), 1), C)) == found
