@@ -1,14 +1,18 @@
-"""Where a frozen loop breaks a claim: found between the grid points, exact at the level, and never where nothing is broken."""
+"""Frozen loops: where one breaks a claim, exact and between grid points; rates, drops and gains in closed form."""
 
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import product
+from math import exp, log
 
+import numpy as np
 import pytest
 from flint import fmpq, fmpq_mat
 
+from synthesis.certificate.frozen import critical_probability, frozen_gain, slowest_decay
 from synthesis.certificate.refute import undetectable_place, unstable_place
-from synthesis.loop.observer import ObserverLoop
+from synthesis.loop.observer import ObserverLoop, Update
 from synthesis.loop.plant import Axis, Plant
 from synthesis.polynomials.enclosure import PolynomialMatrix, constant
 
@@ -38,29 +42,29 @@ def hill(places: tuple[Fraction, ...], height: Fraction) -> PolynomialMatrix:
     return PolynomialMatrix(terms, (1, 1), v)
 
 
-def open_loop(A: PolynomialMatrix) -> ObserverLoop:
-    """Without a correction."""
+def loop_of(A: PolynomialMatrix, gain: float = 0.0, update: Update = "held") -> ObserverLoop:
+    """The same gain at every breakpoint."""
     v = A.variables
-    table = {index: fmpq_mat([[0]]) for index in ([(0,), (1,)] if v == 1 else [(0, 0), (0, 1), (1, 0), (1, 1)])}
+    table = {index: fmpq_mat([[rational(Fraction(gain))]]) for index in product((0, 1), repeat=v)}
     one = constant(fmpq_mat([[1]]), v)
-    return ObserverLoop(plant(A, one), ((fmpq(-1), fmpq(1)),) * v, table, "held", fmpq(1, 10), False)
+    return ObserverLoop(plant(A, one), ((fmpq(-1), fmpq(1)),) * v, table, update, fmpq(1, 10), False)
 
 
 @pytest.mark.parametrize("places", [(Fraction(1, 3),), (Fraction(-7, 11),), (Fraction(1, 3), Fraction(-7, 11))])
 def test_an_unstable_hill_between_grid_points_is_climbed(places: tuple[Fraction, ...]) -> None:
     height = Fraction(1, 10**5)  # unstable within 0.003 of the top, a fortieth of the step of the grid
-    found = unstable_place(open_loop(hill(places, height)), fmpq(0))
+    found = unstable_place(loop_of(hill(places, height)), fmpq(0))
     assert found is not None
     assert sum((Fraction(int(u.p), int(u.q)) - place) ** 2 for u, place in zip(found, places, strict=True)) <= height
-    assert unstable_place(open_loop(hill(places, -height)), fmpq(0)) is None
+    assert unstable_place(loop_of(hill(places, -height)), fmpq(0)) is None
     # the same hill against a decay rate just above and just below what its top has
-    assert unstable_place(open_loop(hill(places, -height)), rational(2 * height)) is not None
-    assert unstable_place(open_loop(hill(places, -height)), rational(height / 2)) is None
+    assert unstable_place(loop_of(hill(places, -height)), rational(2 * height)) is not None
+    assert unstable_place(loop_of(hill(places, -height)), rational(height / 2)) is None
 
 
 def test_a_place_that_is_given_is_tried_first() -> None:
     top = Fraction(123456789, 10**9)
-    needle = open_loop(hill((top,), Fraction(1, 10**20)))  # too narrow for any climb
+    needle = loop_of(hill((top,), Fraction(1, 10**20)))  # too narrow for any climb
     assert unstable_place(needle, fmpq(0)) is None
     assert unstable_place(needle, fmpq(0), [(rational(top),)]) == (rational(top),)
 
@@ -71,3 +75,28 @@ def test_hidden_modes_count_only_if_they_do_not_decay() -> None:
         C = PolynomialMatrix({(0,): fmpq_mat([[1, -place]]), (1,): fmpq_mat([[0, 1]])}, (1, 2), 1)
         for rate, found in ((fmpq(1), (place,)), (fmpq(0), (place,)), (fmpq(-1), None)):
             assert undetectable_place(plant(constant(fmpq_mat([[-1, 0], [0, rate]]), 1), C)) == found
+
+
+@pytest.mark.parametrize("gain", [0.9, 1.4])  # a positive pole and a negative one
+def test_rates_drops_and_gains_of_a_scalar_update(gain: float) -> None:
+    """x' = a x + d over T = 0.1: e+ = (e^(a T) - K) e + (e^(a T) - 1)/a d; without a measurement e+ = e^(a T) e + .."""
+    a, T, one = 2.0, 0.1, np.ones((1, 1))
+    loop = loop_of(constant(fmpq_mat([[2]]), 1), gain, "sampled")
+    pole, lost = exp(a * T) - gain, exp(a * T)
+    assert slowest_decay(loop) == pytest.approx(-log(abs(pole)) / T, rel=1e-9)
+    assert critical_probability(loop) == pytest.approx((1.0 - pole**2) / (lost**2 - pole**2), rel=1e-9)
+    largest = (lost - 1.0) / a / (1.0 - abs(pole))  # at the frequency 0, or pi
+    assert frozen_gain(loop, 3.0 * one, 5.0 * one) == pytest.approx(15.0 * largest, rel=1e-9)
+
+
+def test_the_worst_of_the_frozen_loops_counts() -> None:
+    """x' = (2 + u) x: both ends of the range lie on the grid, and the upper one is worse."""
+    A = PolynomialMatrix({(0,): fmpq_mat([[2]]), (1,): fmpq_mat([[1]])}, (1, 1), 1)
+    loop, lost = loop_of(A, 0.9, "sampled"), exp(0.3)
+    pole = lost - 0.9
+    assert slowest_decay(loop) == pytest.approx(-log(pole) / 0.1, rel=1e-9)
+    assert critical_probability(loop) == pytest.approx((1.0 - pole**2) / (lost**2 - pole**2), rel=1e-9)
+    unstable = loop_of(A, 0.2, "sampled")
+    assert critical_probability(unstable) == 0.0 and slowest_decay(unstable) < 0.0
+    steady = loop_of(constant(fmpq_mat([[-1]]), 1), 0.5, "sampled")  # needs no measurement
+    assert critical_probability(steady) == pytest.approx(1.0, abs=1e-9)
