@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import re
+from fractions import Fraction
 
 import numpy as np
 import pytest
 import sympy as sp
+from flint import fmpq, fmpq_mat
 from scipy.linalg import expm
 
+from synthesis.certificate.unknowns import in_scaled_states
 from synthesis.design.hinf_observer import Channel, ObserverDesign
 from synthesis.design.sampled_observer import _fitted
 from synthesis.design.stability import affine_quadratic_stability
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import Verdict
+from synthesis.loop.system import System
+from synthesis.polynomials.enclosure import PolynomialMatrix
 from tests.support.lmi_cases import parameter, small_model
 
 p, q = sp.symbols("p q")
@@ -63,3 +68,35 @@ def test_limits_of_a_design() -> None:
     ):  # fmt: skip
         with pytest.raises(ProblemError):
             ObserverDesign(channels, **wrong)  # type: ignore[arg-type]
+
+
+def test_scaled_states_leave_inputs_and_outputs_alone() -> None:
+    """x' = (A x + B w)/(1 + u^2/2), z = C x + D w: the same gains from w to z in the states diag(s) x, at every u."""
+    draw, scale = np.random.default_rng(1), np.array([1e-3, 1.0, 20.0])
+
+    def polynomial(rows: int, columns: int) -> PolynomialMatrix:
+        entries = [[fmpq(int(k), 8) for k in draw.integers(-20, 20, rows * columns)] for _ in range(2)]
+        return PolynomialMatrix({(k,): fmpq_mat(rows, columns, e) for k, e in enumerate(entries)}, (rows, columns), 1)
+
+    below = PolynomialMatrix({(0,): fmpq_mat([[1]]), (2,): fmpq_mat([[fmpq(1, 2)]])}, (1, 1), 1)
+    given = System(
+        "continuous", polynomial(3, 3), {"w": polynomial(3, 2)}, polynomial(2, 3), {"w": polynomial(2, 2)},
+        polynomial(3, 3), below,
+    )  # fmt: skip
+    scaled, s = in_scaled_states(given, scale), 0.3 + 2.0j
+
+    def gain(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, d: float) -> np.ndarray:
+        return np.asarray(C @ np.linalg.solve(s * np.eye(3) - A / d, B / d) + D)
+
+    for u in (-1.0, 0.25, 0.5):
+        before = [np.array([[float(Fraction(int(x.p), int(x.q))) for x in row] for row in m.at([fmpq(int(4 * u), 4)]).tolist()])
+                  for m in (given.A, given.B["w"], given.C, given.D["w"], given.coasting)]  # fmt: skip
+        after = [
+            m.at(np.array([[u]]))[0, ..., 0]
+            for m in (scaled.A, scaled.B["w"], scaled.C, scaled.D["w"], scaled.coasting)
+        ]
+        d = float(scaled.denominator.at(np.array([[u]]))[0, 0, 0, 0])
+        assert d == 1.0 + u * u / 2.0
+        np.testing.assert_allclose(gain(*after[:4], d), gain(*before[:4], d), rtol=1e-10)
+        np.testing.assert_allclose(after[4], before[4] * scale[:, None] / scale, rtol=1e-12)
+        np.testing.assert_allclose(after[0], before[0] * scale[:, None] / scale, rtol=1e-12)
