@@ -256,3 +256,17 @@ def test_the_linear_zones_see_what_the_vehicle_measures() -> None:
     np.testing.assert_allclose(without, [[0.0, *lever, 0.0], *np.zeros((3, 4))], rtol=1e-15)
     seen = [[1.0, 0.0, 0.0, 0.0], [0.0, 0.5 / m, 0.5 / m, 0.0], [0.0, 0.0, 0.0, 0.25 / m], [0.0, 0.0, 0.0, 0.0]]
     np.testing.assert_allclose(without - with_zones, seen, rtol=1e-12, atol=1e-18)
+
+
+@pytest.mark.parametrize(("share", "tied"), [(1e-12, True), (1e-6, False), (-1e-6, False)])
+def test_the_equality_of_two_gains_is_read_to_nine_digits(share: float, tied: bool) -> None:
+    matrix = EXACT.matrix.copy()
+    place = np.argwhere(matrix == EXACT[5])[0]
+    matrix[tuple(place)] *= 1.0 + share
+    gains = SlidingModeGains(matrix)
+    named = {v.condition: v for v in sliding_mode_convergence(gains, CAR).violations}
+    assert (named == {}) is tied and (reaching_time(gains, CAR, 0.1, 0.0) < np.inf) is tied
+    assert sliding_mode_convergence(gains, CAR).holds
+    if not tied:
+        (violation,) = named.values()
+        assert violation.condition.startswith("Omega_5") and violation.amount == pytest.approx(EXACT[5] * share, rel=1e-3)
