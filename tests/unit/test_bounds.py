@@ -269,4 +269,6 @@ def test_the_equality_of_two_gains_is_read_to_nine_digits(share: float, tied: bo
     assert sliding_mode_convergence(gains, CAR).holds
     if not tied:
         (violation,) = named.values()
-        assert violation.condition.startswith("Omega_5") and violation.amount == pytest.approx(EXACT[5] * share, rel=1e-3)
+        assert violation.condition.startswith("Omega_5") and violation.amount == pytest.approx(
+            EXACT[5] * share, rel=1e-3
+        )
