@@ -42,12 +42,12 @@ def hill(places: tuple[Fraction, ...], height: Fraction) -> PolynomialMatrix:
     return PolynomialMatrix(terms, (1, 1), v)
 
 
-def loop_of(A: PolynomialMatrix, gain: float = 0.0, update: Update = "held") -> ObserverLoop:
+def loop_of(A: PolynomialMatrix, gain: float = 0.0, update: Update = "held", rounded: bool = False) -> ObserverLoop:
     """The same gain at every breakpoint."""
     v = A.variables
     table = {index: fmpq_mat([[rational(Fraction(gain))]]) for index in product((0, 1), repeat=v)}
     one = constant(fmpq_mat([[1]]), v)
-    return ObserverLoop(plant(A, one), ((fmpq(-1), fmpq(1)),) * v, table, update, fmpq(1, 10), False)
+    return ObserverLoop(plant(A, one), ((fmpq(-1), fmpq(1)),) * v, table, update, fmpq(1, 10), rounded)
 
 
 @pytest.mark.parametrize("places", [(Fraction(1, 3),), (Fraction(-7, 11),), (Fraction(1, 3), Fraction(-7, 11))])
@@ -67,6 +67,15 @@ def test_a_place_that_is_given_is_tried_first() -> None:
     needle = loop_of(hill((top,), Fraction(1, 10**20)))  # too narrow for any climb
     assert unstable_place(needle, fmpq(0)) is None
     assert unstable_place(needle, fmpq(0), [(rational(top),)]) == (rational(top),)
+
+
+def test_what_rounding_leaves_open_refutes_nothing() -> None:
+    """Unstable by 1e-18 on a point of the grid: certain of the exact loop, and not of one that is evaluated in float64."""
+    hardly = hill((Fraction(1, 4),), Fraction(1, 10**18))
+    assert unstable_place(loop_of(hardly), fmpq(0)) == (fmpq(1, 4),)
+    assert unstable_place(loop_of(hardly, rounded=True), fmpq(0)) is None
+    clearly = hill((Fraction(1, 4),), Fraction(1, 10**12))
+    assert unstable_place(loop_of(clearly, rounded=True), fmpq(0)) == (fmpq(1, 4),)
 
 
 def test_hidden_modes_count_only_if_they_do_not_decay() -> None:

@@ -57,8 +57,9 @@ def test_gains_that_show_detectability_are_in_the_given_units(discrete: bool) ->
 
 def test_stochastic_records_that_overflow_or_do_not_fit_are_refused() -> None:
     seen, silent = [[1.0, 0.0]], np.zeros((2, 2))
-    with pytest.raises(AnalysisError, match="overflows at sample 1"):  # M alone: without noise N stays zero
-        stochastic_observability(held(1e200 * np.eye(2), 1), held(seen, 1), silent, [[1.0]])
+    with pytest.raises(AnalysisError, match="overflows at sample 3"):  # M alone: without noise N stays finite
+        A = np.stack([np.eye(2), np.eye(2), np.diag([1.0, 1e200])])
+        stochastic_observability(A, held(seen, 3), silent, [[1.0]])
     with pytest.raises(AnalysisError, match="K, n, n"):
         stochastic_observability(np.ones((3, 3, 2, 2)), np.ones((3, 1, 2)), np.eye(2), [[1.0]])
 
