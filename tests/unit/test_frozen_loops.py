@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 from math import exp, log
@@ -10,8 +11,11 @@ import numpy as np
 import pytest
 from flint import fmpq, fmpq_mat
 
+from synthesis.certificate.claims import Claim, ClaimChannel
 from synthesis.certificate.frozen import critical_probability, frozen_gain, slowest_decay
-from synthesis.certificate.refute import undetectable_place, unstable_place
+from synthesis.certificate.inside_sample import inside_sample
+from synthesis.certificate.refute import refuting_place, undetectable_place, unstable_place
+from synthesis.certificate.verify import Names, Verifier
 from synthesis.loop.observer import ObserverLoop, Update
 from synthesis.loop.plant import Axis, Plant
 from synthesis.polynomials.enclosure import PolynomialMatrix, constant
@@ -76,6 +80,43 @@ def test_what_rounding_leaves_open_refutes_nothing() -> None:
     assert unstable_place(loop_of(hardly, rounded=True), fmpq(0)) is None
     clearly = hill((Fraction(1, 4),), Fraction(1, 10**12))
     assert unstable_place(loop_of(clearly, rounded=True), fmpq(0)) == (fmpq(1, 4),)
+
+
+LEVELS = {"decay rate": 0.0, "gain": 100.0, "sampled gain": 100.0, "internal update": 0.0, "drop probability": 0.5}
+
+
+@pytest.mark.parametrize(("kind", "level"), LEVELS.items())
+def test_a_pole_on_the_level_refutes_only_where_it_is_certain(kind: str, level: float) -> None:
+    """-(u - 1/4)^2 has the pole zero at one point of the grid; rounded it may be on either side, a little higher it is not."""
+
+    def place(height: Fraction, rounded: bool) -> object:
+        channel = ClaimChannel({"d": 1.0}, ("x",)) if "gain" in kind else None
+        claim = Claim(kind, level, constant(fmpq_mat([[1]]), 1), channel)  # type: ignore[arg-type]
+        loop = loop_of(hill((Fraction(1, 4),), height), rounded=rounded)
+        return refuting_place(Verifier(loop, Names(("x",), ("d",))), claim)
+
+    assert place(Fraction(0), rounded=True) is None
+    assert place(Fraction(1, 10**6), rounded=True) == (fmpq(1, 4),)
+    if kind in ("decay rate", "gain"):
+        assert place(Fraction(0), rounded=False) == (fmpq(1, 4),)
+
+
+def test_the_fastest_pole_on_the_level_refutes_only_where_it_is_certain() -> None:
+    claim = Claim("fastest pole", 1.0, constant(fmpq_mat([[1]]), 1), None)
+    for rounded, found in ((False, True), (True, False)):
+        loop = loop_of(constant(fmpq_mat([[-1]]), 1), rounded=rounded)
+        assert (refuting_place(Verifier(loop, Names(("x",), ("d",))), claim) is not None) is found
+
+
+@pytest.mark.parametrize("rates", [(-5, 1), (-1, 5)])
+def test_the_faster_of_both_rates_bounds_what_moves_inside_a_sample(rates: tuple[int, int]) -> None:
+    """x' = u x, |u| <= 1: q T^2/2 e^T 1 e^T, q = 5 the largest rate."""
+    A = PolynomialMatrix({(1,): fmpq_mat([[1]])}, (1, 1), 1)
+    still = loop_of(A)
+    axis = replace(still.plant.axes[0], rate_low=fmpq(rates[0]), rate_high=fmpq(rates[1]))
+    found = inside_sample(replace(still, plant=replace(still.plant, axes=(axis,)), _systems={}))
+    assert found is not None
+    assert found.of_states[0][0] == pytest.approx(5.0 * 0.1**2 / 2.0 * exp(0.2), rel=1e-6)
 
 
 def test_hidden_modes_count_only_if_they_do_not_decay() -> None:

@@ -87,12 +87,14 @@ def test_window_constants_in_closed_form() -> None:
     np.testing.assert_allclose(found.information, energy * share, rtol=1e-9)
     assert found.verdict is Verdict.CERTIFIED
     np.testing.assert_allclose(found.round_off, energy * 64.0 * np.finfo(float).eps, rtol=1e-9)
-    for factor, verdict in (
-        (1.0 - 1e-9, Verdict.CERTIFIED),
-        (1.0 + 1e-9, Verdict.REFUTED),
-        (1.0, Verdict.INCONCLUSIVE),  # within round-off of what is required
+    least, slack = float(found.information[0]), float(found.round_off[0])
+    for required, verdict in (
+        (least * (1.0 - 1e-9), Verdict.CERTIFIED),
+        (least - 2.0 * slack, Verdict.CERTIFIED),
+        (least - 0.5 * slack, Verdict.INCONCLUSIVE),  # within round-off of what is required
+        (least + 0.5 * slack, Verdict.INCONCLUSIVE),
+        (least + 2.0 * slack, Verdict.REFUTED),
     ):
-        required = float(found.information[0]) * factor
         assert uniform_detectability(A, C, window, contraction=c, required=required).verdict is verdict
     one_bad = np.concatenate([held(np.diag([a, b]), 9), held(np.diag([a, 0.99]), 9)])
     judged = uniform_detectability(one_bad, held([[1.0, 0.0]], 18), window, contraction=c)
