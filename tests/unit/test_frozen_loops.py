@@ -110,13 +110,15 @@ def test_the_fastest_pole_on_the_level_refutes_only_where_it_is_certain() -> Non
 
 @pytest.mark.parametrize("rates", [(-5, 1), (-1, 5)])
 def test_the_faster_of_both_rates_bounds_what_moves_inside_a_sample(rates: tuple[int, int]) -> None:
-    """x' = u x, |u| <= 1: q T^2/2 e^T 1 e^T, q = 5 the largest rate."""
+    """x' = p/3 x, |p| <= 3: q T^2/2 e^T (1/3) e^T, q = 5 the largest rate."""
     A = PolynomialMatrix({(1,): fmpq_mat([[1]])}, (1, 1), 1)
     still = loop_of(A)
-    axis = replace(still.plant.axes[0], rate_low=fmpq(rates[0]), rate_high=fmpq(rates[1]))
-    found = inside_sample(replace(still, plant=replace(still.plant, axes=(axis,)), _systems={}))
+    axis = replace(still.plant.axes[0], low=fmpq(-3), high=fmpq(3), rate_low=fmpq(rates[0]), rate_high=fmpq(rates[1]))
+    found = inside_sample(
+        replace(still, plant=replace(still.plant, axes=(axis,)), breakpoints=((fmpq(-3), fmpq(3)),), _systems={})
+    )
     assert found is not None
-    assert found.of_states[0][0] == pytest.approx(5.0 * 0.1**2 / 2.0 * exp(0.2), rel=1e-6)
+    assert found.of_states[0][0] == pytest.approx(5.0 / 3.0 * 0.1**2 / 2.0 * exp(0.2), rel=1e-6)
 
 
 def test_hidden_modes_count_only_if_they_do_not_decay() -> None:

@@ -11,10 +11,12 @@ from analysis.errors import AnalysisError
 from analysis.observability.continuous import continuous_gramian
 from analysis.observability.detectability import detectable
 from analysis.observability.gramians import sequence_controllability, sequence_observability
+from analysis.observability.hidden_modes import undetectable_mode
 from analysis.observability.real_roots import real_roots
 from analysis.observability.stochastic import RANK_TOLERANCE, stochastic_observability
 from analysis.observability.windows import uniform_detectability, uniform_stabilisability
 from synthesis.lmi.result import Verdict
+from tests.support.lmi_cases import small_model
 
 x = sp.Symbol("x")
 
@@ -150,3 +152,14 @@ def test_the_continuous_gramian_to_the_last_digits() -> None:
     np.testing.assert_allclose(kick.transition, 2.0, rtol=1e-8)
     with pytest.raises(AnalysisError, match="could not be integrated"):
         continuous_gramian(lambda t: np.array([[2e3]]), lambda t: np.eye(1), 0.0, 1.0)
+
+
+def test_a_hidden_oscillation_keeps_its_frequency() -> None:
+    """x2, x3 grow as e^(t/10) and turn at 2 rad/s, unseen; a hidden real mode has no imaginary part."""
+    tenth = sp.Rational(1, 10)
+    for block, wanted in (([[tenth, 2], [-2, tenth]], 0.1 + 2.0j), ([[tenth, 1], [0, -1]], 0.1 + 0.0j)):
+        A = sp.diag(-2 - sp.Symbol("p"), sp.Matrix(block))
+        found = undetectable_mode(small_model(A, [[1, 0, 0]]))
+        assert found is not None
+        value = complex(found.eigenvalue)
+        assert complex(value.real, abs(value.imag)) == pytest.approx(wanted, abs=1e-9)
