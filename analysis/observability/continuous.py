@@ -40,16 +40,17 @@ def continuous_gramian(
     edges = np.linspace(start, stop, intervals + 1)
     half = 0.5 * np.diff(edges)
     times = (0.5 * (edges[:-1] + edges[1:])[:, None] + half[:, None] * nodes).ravel()
-    solution = solve_ivp(
-        lambda t, phi: (np.asarray(A(t), float) @ phi.reshape(n, n)).ravel(),
-        (start, stop),
-        np.eye(n).ravel(),
-        method="DOP853",
-        t_eval=[*times, stop],
-        rtol=relative_tolerance,
-        atol=1e-14,
-        max_step=(stop - start) / intervals,
-    )
+    with np.errstate(all="ignore"):  # what overflows is refused below
+        solution = solve_ivp(
+            lambda t, phi: (np.asarray(A(t), float) @ phi.reshape(n, n)).ravel(),
+            (start, stop),
+            np.eye(n).ravel(),
+            method="DOP853",
+            t_eval=[*times, stop],
+            rtol=relative_tolerance,
+            atol=1e-14,
+            max_step=(stop - start) / intervals,
+        )
     if not solution.success or not np.isfinite(solution.y).all():
         raise AnalysisError(f"the transition matrix could not be integrated ({solution.message}); shorten the interval")
     phi = solution.y.T.reshape(-1, n, n)

@@ -166,6 +166,8 @@ def ball_rank(rows: list[list[Any]]) -> tuple[int, float]:
 
 def _null_space(rows: list[list[Any]], rank: int) -> FloatArray:
     """Orthonormal basis from the midpoints; each row scaled to unit length first, orders differ by many decades."""
+    from scipy.linalg import qr
+
     middle = np.array([[float(entry.mid()) for entry in row] for row in rows])
     size = np.linalg.norm(middle, axis=1, keepdims=True)
     scaled = middle / np.where(size > 0.0, size, 1.0)
@@ -173,7 +175,13 @@ def _null_space(rows: list[list[Any]], rank: int) -> FloatArray:
     columns = np.where(columns > 0.0, columns, 1.0)
     _, _, right = np.linalg.svd(scaled / columns)
     basis = right[rank:].T / columns[:, None]
-    return np.asarray(np.linalg.qr(basis)[0]) if basis.shape[1] else basis
+    if not basis.shape[1]:
+        return basis
+    # rows of very different size keep their digits if the largest come first and columns are exchanged (Cox, Higham 1998)
+    order = np.argsort(-np.abs(basis).max(axis=1))
+    orthonormal = np.empty_like(basis)
+    orthonormal[order] = qr(basis[order], mode="economic", pivoting=True)[0]
+    return orthonormal
 
 
 def _coefficient(entries: list[Any], rows: int, columns: int, k: int) -> Any:

@@ -37,7 +37,7 @@ FUNCTIONS: Mapping[type, Callable[[Series], Series]] = {
     sp.erf: lambda s: s.erf(),
 }
 NUMBERS: Mapping[Any, Callable[[], Any]] = {sp.pi: arb.pi, sp.E: arb.const_e}
-LOGICAL = (sp.core.relational.Relational, sp.And, sp.Or, sp.Not)
+LOGICAL = (sp.core.relational.Relational, sp.And, sp.Or, sp.Not, sp.ITE)
 
 
 @contextmanager
@@ -110,7 +110,7 @@ def _value(expression: sp.Expr, known: Mapping[str, Series]) -> Series:
         )
     try:
         return _finite(function(arguments[0]), expression)
-    except ZeroDivisionError:
+    except (ZeroDivisionError, ValueError):  # flint: a quotient by a series that begins with zero
         raise AnalysisError(f"{expression} has no Taylor series at this point; the model is singular here") from None
 
 
@@ -141,6 +141,9 @@ def _holds(condition: sp.Basic, known: Mapping[str, Series]) -> bool:
         return True
     if condition.is_Symbol:
         return bool(known[str(condition)])
+    if isinstance(condition, sp.ITE):  # what sympy makes of cases inside a comparison
+        first, then, otherwise = condition.args
+        return _holds(then if _holds(first, known) else otherwise, known)
     if isinstance(condition, sp.And | sp.Or | sp.Not):
         parts = [_holds(part, known) for part in condition.args]
         return (

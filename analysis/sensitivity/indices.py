@@ -118,7 +118,11 @@ def variance_indices(
     values = evaluate(measure, box.columns(points))
     sums = SaltelliSums(len(box.names), min(GROUPS, samples), values.shape[1:])
     blocks = values.reshape(samples, -1, *values.shape[1:])
-    sums.add(blocks - blocks[0, 0], np.arange(samples) * len(sums.count) // samples)
+    moved = blocks - blocks[0, 0]
+    moved[np.abs(moved) <= 8.0 * np.finfo(float).eps * np.abs(blocks[0, 0])] = (
+        0.0  # rounding of a constant is no variance
+    )
+    sums.add(moved, np.arange(samples) * len(sums.count) // samples)
     lead = (Axis("parameter", np.array(box.names)), *(axes or plain_axes(values.shape[1:])))
     notes = {"design": "saltelli", "seed": seed, "samples": samples, "ranges": {k: list(v) for k, v in ranges.items()}}
     shares = sums.shares()

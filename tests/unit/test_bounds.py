@@ -237,3 +237,38 @@ def test_smallest_widths_are_the_limits_of_single_loops() -> None:
 def test_bad_input_is_refused(call: Any, word: str) -> None:
     with pytest.raises(AnalysisError, match=word):
         call()
+
+
+def test_the_best_split_is_stationary() -> None:
+    """d/dxi of e0 e^(-K (1 - xi) t) + b/(2 K sqrt(xi (1 - xi))) vanishes."""
+    K, b, e0, t = 5.0, 2.0, 10.0, 0.3
+    xi = best_split(K, b, e0, t)
+    falls = b / (2.0 * K) * (1.0 - 2.0 * xi) / (2.0 * (xi * (1.0 - xi)) ** 1.5)
+    assert e0 * K * t * np.exp(-K * (1.0 - xi) * t) == pytest.approx(falls, rel=1e-6)
+
+
+def test_the_linear_zones_see_what_the_vehicle_measures() -> None:
+    """Yaw rate alone, the sum of both lateral forces over the mass, the longitudinal force over the mass."""
+    unit = SlidingModeGains(np.vstack([np.eye(3), np.zeros((1, 3))]))
+    with_zones = linear_zone_matrix(unit, CAR, dict(zip(OUTPUTS, (1.0, 2.0, 4.0), strict=True)))
+    without = linear_zone_matrix(SlidingModeGains(np.zeros((4, 3))), CAR, dict.fromkeys(OUTPUTS, 1.0))
+    m, lever = CAR.mass, np.array([CAR.front_axle_distance, -CAR.rear_axle_distance]) / CAR.yaw_inertia
+    np.testing.assert_allclose(without, [[0.0, *lever, 0.0], *np.zeros((3, 4))], rtol=1e-15)
+    seen = [[1.0, 0.0, 0.0, 0.0], [0.0, 0.5 / m, 0.5 / m, 0.0], [0.0, 0.0, 0.0, 0.25 / m], [0.0, 0.0, 0.0, 0.0]]
+    np.testing.assert_allclose(without - with_zones, seen, rtol=1e-12, atol=1e-18)
+
+
+@pytest.mark.parametrize(("share", "tied"), [(1e-12, True), (1e-6, False), (-1e-6, False)])
+def test_the_equality_of_two_gains_is_read_to_nine_digits(share: float, tied: bool) -> None:
+    matrix = EXACT.matrix.copy()
+    place = np.argwhere(matrix == EXACT[5])[0]
+    matrix[tuple(place)] *= 1.0 + share
+    gains = SlidingModeGains(matrix)
+    named = {v.condition: v for v in sliding_mode_convergence(gains, CAR).violations}
+    assert (named == {}) is tied and (reaching_time(gains, CAR, 0.1, 0.0) < np.inf) is tied
+    assert sliding_mode_convergence(gains, CAR).holds
+    if not tied:
+        (violation,) = named.values()
+        assert violation.condition.startswith("Omega_5") and violation.amount == pytest.approx(
+            EXACT[5] * share, rel=1e-3
+        )

@@ -206,3 +206,15 @@ def test_tensor_coefficients_enclose_values() -> None:
         ]
         values = polynomial.polygrid2d(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21), array)
         assert min(numbers) <= values.min() + 1e-12 and values.max() <= max(numbers) + 1e-12
+
+
+@pytest.mark.parametrize("value", [-1, 1])
+def test_what_is_too_large_to_look_at_decides_nothing(value: int) -> None:
+    """value + (t s)^d / 2: of either sign, and beyond 20 000 coefficients neither is said."""
+
+    def sign(degree: int) -> Sign:
+        terms = {(0, 0): fmpq_mat([[value]]), (degree, degree): fmpq_mat([[fmpq(1, 2)]])}
+        return sign_on_box(PolynomialMatrix(terms, (1, 1), 2).balls())
+
+    assert sign(200) == Sign(False)
+    assert sign(4).positive is (value > 0) and (sign(4).fails_at is None) is (value > 0)

@@ -21,6 +21,7 @@ from analysis import (
     recovery_regions,
     stable_recovery_intervals,
 )
+from analysis.drops import regions
 from analysis.drops.crossing import largest_real
 from analysis.drops.planar import critical_planar
 from analysis.drops.rational import exact_critical_drop, exact_critical_recovery
@@ -92,6 +93,21 @@ def test_regions_fill_the_line_and_agree_with_the_radius() -> None:
             assert (drop_radius(A0, A1, np.linspace(low + 1e-9, high - 1e-9, 30)) > 1.0).all()
         assert sum(high - low for low, high in found.undecided) < 1e-10
         assert len(mean_square_stable_intervals(A0, A1)) == len(found.stable)
+
+
+def test_cells_that_touch_are_one_interval(monkeypatch: pytest.MonkeyPatch) -> None:
+    eye, none = np.eye(2), np.zeros((2, 2))
+    assert regions.singular_cells(eye, eye, none, none) == ((0.0, 1.0),)  # singular everywhere: no cell stands alone
+    assert regions.regions(eye, eye, none, none) == regions.Regions((), (), ((0.0, 1.0),))
+    # eigenvalues 1.5 - 2 x and 0.5 + 2 x / 3 pass 1 at 1/4 and 3/4, the first an edge of cells on both sides
+    F, G = np.diag([1.5, 0.5]), np.diag([-0.5, 7.0 / 6.0])
+    (first, second) = regions.singular_cells(F, G, none, none)
+    assert first[0] < 0.25 < first[1] < first[0] + 1e-10 and second[0] < 0.75 < second[1] < second[0] + 1e-10
+    found = regions.regions(F, G, none, none)
+    assert found.undecided == (first, second) and found.stable == ((first[1], second[0]),)
+    assert found.unstable == ((0.0, first[0]), (second[1], 1.0))
+    monkeypatch.setattr(regions, "_status", lambda *_: "undecided")  # what lies between is joined as well
+    assert regions.regions(F, G, none, none) == regions.Regions((), (), ((0.0, 1.0),))
 
 
 def test_intervals_of_simple_pairs() -> None:

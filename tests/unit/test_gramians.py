@@ -173,6 +173,7 @@ def test_sampled_sequence_holds_the_parameters_over_each_sample() -> None:
     np.testing.assert_allclose(found.A, Phi, rtol=1e-13, atol=1e-16)
     np.testing.assert_allclose(found.B, Gamma, rtol=1e-12, atol=1e-18)
     assert found.E.shape == (2, 3, 4) and found.C.shape == (2, 1, 3)
+    np.testing.assert_allclose(found.E, zero_order_hold(numeric.A, numeric.E, 0.005)[1], rtol=1e-12, atol=1e-18)
 
 
 @pytest.mark.parametrize(

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import mpmath as mp
 import numpy as np
+import pytest
 
 from analysis.norms.compensated import expanded
 from analysis.norms.frequency_response import Systems, largest_gain
+from analysis.norms.hinf import hinf_norm
 from analysis.norms.invariants import Invariants, invariants
-from analysis.norms.level_proof import Level, _lower_bound, _tail, level_of
+from analysis.norms.level_proof import Level, _lower_bound, _tail, level_of, level_proof
 from analysis.norms.modal import modal_form
 
 COUNT = 400
@@ -99,3 +101,22 @@ def test_determinants_keep_their_digits_where_products_cancel() -> None:
                 p, q, r, s = (mp.mpf(float(x[i])) for x in (a, b, c, d))
                 truth = one + trace * (p + s) + p * s - q * r
                 assert abs(found[i] - truth) <= 1e-15 * abs(truth) + 1e-31
+
+
+def test_a_peak_beyond_all_poles_speaks_against_a_level() -> None:
+    """G = 1 + (b s - 1/2)/(s^2 + 1.2 s + 1): |G|^2 - 1 = (d x - 3/4)/(x^2 - 0.56 x + 1) is largest near x = 1.5/d."""
+    d = 1e-3  # b^2 + 2.4 b + 1
+    b = -1.2 + np.sqrt(0.44 + d)
+    systems = Systems(
+        np.array([[[0.0, 1.0], [-1.0, -1.2]]]), np.array([[[0.0], [1.0]]]), np.array([[[-0.5, b]]]), np.ones((1, 1, 1))
+    )
+    x = (0.75 + np.sqrt(0.75**2 + d**2 - 0.75 * 0.56 * d)) / d  # a root of the derivative
+    above = (d * x - 0.75) / (x * x - 0.56 * x + 1.0)
+    np.testing.assert_allclose(largest_gain(systems, np.array([[1j * np.sqrt(x)]]))[0, 0] ** 2 - 1.0, above, atol=1e-14)
+    parts, whole = invariants(modal_form(systems)), np.array([[0.0], [np.inf]])
+    assert np.sqrt(x) > 30.0  # poles have the modulus one
+    found, against = level_proof(parts, np.sqrt(1.0 + 0.5 * above)[None], np.zeros(1), whole)
+    assert not found[0]
+    np.testing.assert_allclose(against, np.sqrt(x), rtol=0.05)
+    assert level_proof(parts, np.array([1.1]), np.zeros(1), whole)[0][0]
+    assert hinf_norm(systems.A, systems.B, systems.C, systems.D).norm[0] ** 2 - 1.0 == pytest.approx(above, rel=1e-6)

@@ -43,6 +43,7 @@ def ramp_model() -> LpvModel:
 
 def test_frozen_rank_is_lower_than_the_time_varying_one() -> None:
     frozen = frozen_observability_matrix(ramp_model())
+    assert frozen.state_names == tuple(s.name for s in ramp_model().states)
     moving = observability_matrix(ramp_model())
     assert frozen.frozen and not moving.frozen
     assert "not observability" in frozen.describe()

@@ -192,3 +192,15 @@ def test_bernstein_coefficients_and_their_halves_are_values_at_the_ends() -> Non
         assert polygon[0][0][0] == cubic(fmpq(low))
         assert polygon[-1][0][0] == cubic(fmpq(high))
     assert all(a != b for a, b in pairwise(point[0][0] for point in left))
+
+
+def test_what_rounding_may_have_made_is_neither_proved_nor_refuted() -> None:
+    """1 + c u with 1 - c = 2^-53; and 1e-12 where numbers of size 1e6 were added up."""
+    hardly = MatrixPolynomial(np.array([1.0, 1.0 - 2.0**-53]).reshape(2, 1, 1, 1))
+    found = prove_positive(hardly)
+    assert not found.proved and not found.refuted and found.smallest > 0.0
+    small = MatrixPolynomial(np.array([1e-12]).reshape(1, 1, 1, 1))
+    assert prove_positive(small).proved
+    cancelled = prove_positive(small, magnitude=1e6)
+    assert not cancelled.proved and not cancelled.refuted
+    assert prove_positive(MatrixPolynomial(np.array([-1.0]).reshape(1, 1, 1, 1)), magnitude=1e6).refuted

@@ -234,3 +234,38 @@ def test_perturbed_models_check_names_ranges_and_denominators() -> None:
         PerturbedModel(model).at(p=1.0, c=[1.0, 0.0])
     measure = error_measure(PerturbedModel(model), [0.5], lambda A, B: A[..., 0, 0], p=[1.0, 2.0])
     np.testing.assert_allclose(measure({"c": np.array([1.0, 2.0, 4.0])}), [[-1.5, -2.5], [-1.0, -1.5], [-0.75, -1.0]])
+
+
+def test_evaluations_are_all_counted_and_results_named() -> None:
+    seen: list[int] = []
+
+    def hill(s):
+        seen.append(len(s["x"]))
+        return -((s["x"] - 0.3) ** 2) - (s["y"] - 0.6) ** 4
+
+    found = worst_case(hill, {"x": (0.0, 1.0), "y": (0.0, 1.0)}, seed=1)
+    assert found.evaluations == sum(seen) > len(seen) > 1
+    indices = variance_indices(hill, {"x": (0.0, 1.0), "y": (0.0, 1.0)}, samples=64)
+    assert indices.first_order.name.startswith("first-order index of") and indices.total.name.startswith(
+        "total index of"
+    )
+
+
+@pytest.mark.parametrize("value", [0.1, 1.0 / 3.0, 1e6 + 0.1])
+def test_rounding_of_a_constant_is_no_variance(value: float) -> None:
+    found = variance_indices(lambda s: (value + s["x"]) - s["x"], {"x": (0.0, 1.0), "y": (0.0, 1.0)}, samples=1024)
+    assert np.isnan(found.first_order.values).all() and np.isnan(found.total.values).all()
+    slight = variance_indices(lambda s: value * (1.0 + 1e-5 * s["x"]), {"x": (0.0, 1.0), "y": (0.0, 1.0)}, samples=1024)
+    np.testing.assert_allclose(slight.first_order.values, [1.0, 0.0], atol=0.05)
+
+
+def test_the_highest_of_many_peaks_is_found() -> None:
+    """A shifted Rastrigin function: 1e2 local peaks, the highest, zero, at its shift."""
+
+    def peaks(s):
+        x, y = s["x"] - 1.37, s["y"] + 2.21
+        return 10.0 * (np.cos(2.0 * np.pi * x) + np.cos(2.0 * np.pi * y) - 2.0) - x**2 - y**2
+
+    found = worst_case(peaks, {"x": (-5.12, 5.12), "y": (-5.12, 5.12)}, samples=64, seed=0)
+    assert found.value == pytest.approx(0.0, abs=1e-9)
+    assert found.parameters == pytest.approx({"x": 1.37, "y": -2.21}, abs=1e-6)

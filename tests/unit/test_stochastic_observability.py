@@ -7,7 +7,7 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_are
 
@@ -17,7 +17,7 @@ from synthesis.models.catalogue.longitudinal_speed import longitudinal_speed_mod
 from synthesis.models.parameter_set import load_parameter_set
 
 Array = Any
-PSI = 10**18
+PSI = 10**30  # what is left of order 1/psi must not show, even where C is nearly singular (seed 41360: N = 7e10)
 SPEED = longitudinal_speed_model(load_parameter_set("longitudinal-speed"))
 
 
@@ -42,6 +42,7 @@ def random_problem(seed: int, n: int, m: int, count: int = 7) -> tuple[Array, Ar
 
 @settings(max_examples=8, deadline=None)
 @given(seed=st.integers(0, 10**6), n=st.integers(1, 4), m=st.integers(1, 3))
+@example(seed=41360, n=3, m=3)  # C is nearly singular
 def test_m_and_n_are_the_expansion_of_the_riccati_recursion_in_psi(seed: int, n: int, m: int) -> None:
     A, C, Q, R = random_problem(seed, n, m)
     found = stochastic_observability(A, C, Q, R)
