@@ -18,6 +18,7 @@ from estimators.errors import unknown
 from estimators.vehicle import VehicleParameters
 from studies.drives import quantities as si
 from studies.drives.columns import Column, LogFile, check_alignment, check_logs
+from studies.drives.mounted import Mountings, check_mountings
 from studies.drives.quantities import CORNERS, REFERENCES, SIGNALS
 from synthesis.toml_file import StrictTable, load_toml
 
@@ -227,6 +228,7 @@ class DriveFile(StrictTable):
 
     ``schedules`` are for the corner observers: without them the pipeline of the fusion runs alone.
 
+    ``mounting``: where the inertial unit and the reference sit, if not at the centre of gravity and along the axes of the car.
     ``check``: compare the signals of the log with one another (:mod:`.frames`) before anything is estimated from them.
     """
 
@@ -235,6 +237,7 @@ class DriveFile(StrictTable):
     source: str = ""
     sample_time: si.Duration = Field(examples=["5 ms"])
     vehicle: Vehicle
+    mounting: Mountings = Mountings()
     schedules: Schedules | None = None
     check: bool = True
     observer: Observer = Observer()
@@ -249,6 +252,7 @@ class DriveFile(StrictTable):
         check_columns(self.signals, self.reference, self.log, self.vehicle)
         check_alignment({**self.reference, **self.signals}, self.log)
         check_signals(self.signals, self.vehicle)
+        check_mountings(self.mounting, self.signals, self.reference)
         check_estimators(self.estimators, self.signals, self.vehicle, self.schedules)
         return self
 

@@ -134,6 +134,7 @@ Stiffness = Annotated[float, BeforeValidator(_quantity("N/rad", 0.0, inclusive=F
 Lag = Annotated[float, BeforeValidator(_quantity("s", 0.0, inclusive=True))]
 Offset = Annotated[float, BeforeValidator(_quantity("s", -math.inf, inclusive=False))]
 Place = Annotated[float, BeforeValidator(_quantity("m", -math.inf, inclusive=False))]
+Angle = Annotated[float, BeforeValidator(_quantity("rad", -math.inf, inclusive=False))]
 Velocity = Annotated[float, BeforeValidator(_quantity("m/s", -math.inf, inclusive=False))]
 Torque = Annotated[float, BeforeValidator(_quantity("N*m", 0.0, inclusive=False))]
 Power = Annotated[float, BeforeValidator(_quantity("W", 0.0, inclusive=False))]
