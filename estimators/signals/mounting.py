@@ -65,7 +65,8 @@ class Mounting:
         about_x = np.array([[1.0, 0.0, 0.0], [0.0, a, -p], [0.0, p, a]])
         about_y = np.array([[b, 0.0, q], [0.0, 1.0, 0.0], [-q, 0.0, b]])
         about_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return about_z @ about_y @ about_x
+        turn: FloatArray = about_z @ about_y @ about_x
+        return turn
 
     @property
     def turned(self) -> bool:

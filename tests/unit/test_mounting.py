@@ -212,7 +212,7 @@ def test_a_lever_arm_in_the_drive_file_mends_the_lateral_velocity(lane_change: t
 def test_the_frame_check_sees_the_signals_in_the_axes_of_the_car(
     lane_change: tuple[Path, Path], tmp_path: Path
 ) -> None:
-    """A unit that looks backwards: refused as it stands, as it should be with its yaw angle, refused with another."""
+    """A unit that looks backwards contradicts the wheels, and agrees with them once its yaw angle is given."""
     log, drive = lane_change
     text = drive.read_text(encoding="utf-8")
     for name in ("ax", "ay", "roll_rate", "pitch_rate"):
@@ -220,7 +220,10 @@ def test_the_frame_check_sees_the_signals_in_the_axes_of_the_car(
     for yaw, agrees in (("0 deg", False), ("180 deg", True), ("-180 deg", True)):
         path = tmp_path / "backwards.toml"
         path.write_text(text + f'\n[mounting.inertial]\nx = "1.2 m"\nyaw = "{yaw}"\n', encoding="utf-8")
-        assert (check_drive([log], path).complaint is None) == agrees
+        rows = {row["comparison"]: row for row in check_drive([log], path).rows()}
+        compared = rows["ay over yaw rate times speed"]
+        assert (compared["slope"] > 0.0) == agrees
+        assert (compared["verdict"] == "agrees") == agrees
 
 
 @pytest.mark.parametrize(
