@@ -92,7 +92,7 @@ class CornerObservers(Memory):
         self.suspension: SuspensionCompliance | None = None
         if suspension is not None:
             self.suspension = SuspensionCompliance(suspension, self.sample_time, self.batch_shape)
-        self.uses_vertical_load = suspension is not None  # the pipeline gives F_z of the wheels as `vertical_load`
+        self.uses_forces = suspension is not None  # the pipeline gives F_x and F_y of the tires as `forces`
         self._rigid = np.zeros((*self.batch_shape, 4, 2))
         self._rigid.flags.writeable = False
         self._judged = self.along.judges_slip or (self.across is not None and self.across.judges_slip)
@@ -119,11 +119,12 @@ class CornerObservers(Memory):
         longitudinal_use: npt.ArrayLike,
         lateral_use: npt.ArrayLike,
         vy: npt.ArrayLike = 0.0,
-        vertical_load: npt.ArrayLike = math.nan,
+        forces: tuple[npt.ArrayLike, npt.ArrayLike] = (math.nan, math.nan),
     ) -> CornerSetStep:
         """One sample: rad/s, rad (..., 4); m/s^2, m/s^2, rad/s (...); F_x/F_z and F_y/F_z (..., 4), NaN where unknown.
 
-        `vy` (...) m/s serves where there is no lateral observer, `vertical_load` (..., 4) N where the suspension is compliant.
+        `vy` (...) m/s serves where there is no lateral observer, `forces` F_x, F_y (..., 4) N in the tire frame where the
+        suspension is compliant.
 
         Raises:
             EstimatorError: another shape, or not numbers.
@@ -196,7 +197,7 @@ class CornerObservers(Memory):
         share_x, share_y = self._shares()
         found_x, found_y = weighed(kit, seen_x, share_x)[0], weighed(kit, seen_y, share_y)[0]
         self.vx, self.vy = choose(kit.known(found_x), found_x, vx), choose(kit.known(found_y), found_y, left)
-        wheels = self._compliant(steer, longitudinal_use, lateral_use, vertical_load)
+        wheels = self._compliant(steer, forces)
         self._remember(held[:4], ahead, beside, sine, cosine, wheels)
         outputs = kit.table(((self.vx, self.vy), seen_x, seen_y), shape)
         if not calm:
@@ -228,21 +229,14 @@ class CornerObservers(Memory):
             lambda slip, angle: (kit.where(here, 0.0, slip), kit.where(here, 0.0, angle)), self.slip, self.angle
         )
 
-    def _compliant(
-        self,
-        steer: npt.ArrayLike,
-        longitudinal_use: npt.ArrayLike,
-        lateral_use: npt.ArrayLike,
-        vertical_load: npt.ArrayLike,
-    ) -> FloatArray:
-        """psi' (..., 4, 2), m/s, from the forces of the tires in the body frame; a missing one is held."""
+    def _compliant(self, steer: npt.ArrayLike, forces: tuple[npt.ArrayLike, npt.ArrayLike]) -> FloatArray:
+        """psi' (..., 4, 2), m/s, from the forces of the tires turned into the body frame; a missing one is held."""
         if self.suspension is None:
             return self._rigid
         four = (*self.batch_shape, 4)
-        load = entries(vertical_load, four, "vertical_load")
-        use = (entries(value, four, "use") * load for value in (longitudinal_use, lateral_use))
-        force = vehicle_frame(CornerVectors(*use), entries(steer, four, "steer"))
-        return self.suspension.step(force.x, force.y).velocity
+        tires = CornerVectors(*(entries(value, four, "forces") for value in forces))
+        body = vehicle_frame(tires, entries(steer, four, "steer"))
+        return self.suspension.step(body.x, body.y).velocity
 
     def _remember(
         self, speed: Signals, ahead: Signals, beside: Signals, sine: Signals, cosine: Signals, wheels: FloatArray

@@ -99,7 +99,7 @@ class CornerVelocity(Memory):
         normalised_force: npt.ArrayLike,
         elapsed: npt.ArrayLike | None = None,
         lateral_use: npt.ArrayLike = math.nan,
-        vertical_load: npt.ArrayLike = math.nan,
+        forces: tuple[npt.ArrayLike, npt.ArrayLike] = (math.nan, math.nan),
     ) -> CornerVelocityStep:
         """One sample, as `VelocityFusion.step`; `lateral_use` (..., 4) F_y/F_z, NaN where unknown; `elapsed` is not used.
 
@@ -108,7 +108,7 @@ class CornerVelocity(Memory):
         """
         kit, shape = self._kit, self.batch_shape
         uses = normalised_force, lateral_use
-        found = self.corners.step(wheel_speed, steer, ax, ay, yaw_rate, *uses, vertical_load=vertical_load)
+        found = self.corners.step(wheel_speed, steer, ax, ay, yaw_rate, *uses, forces=forces)
         used = found.used & np.isfinite(found.corner_vx)
         moved = self._moved(found, used, ax, ay, yaw_rate)
         held = kit.rows(self.corners.slope.value, 9)

@@ -119,7 +119,7 @@ class EstimationPipeline(Memory):
         check_parts({name: getattr(self, name) for name in self._named}, shape, time, CORNER_PARTS)
         self.parts = tuple(name for name in self._named if hasattr(getattr(self, name), "save"))
         self._lateral_first = bool(getattr(self.velocity, "uses_lateral_force", False))
-        self._compliant = bool(getattr(corner_observers, "uses_vertical_load", False))
+        self._compliant = bool(getattr(corner_observers, "uses_forces", False))
         self._use_across = self._lateral_first or self.corner_observers is not None
         self._total_deviation = vehicle.mass * setting(acceleration_deviation, "acceleration_deviation", "m/s^2")
         self._least_load = _LIFTED * vehicle.static_loads
@@ -164,13 +164,13 @@ class EstimationPipeline(Memory):
         yaw_acceleration = choose(abs(turned) < math.inf, kit.own(yaw_acceleration), math.nan)
         lateral = self.lateral_force.step(own_x, own_y, yaw_acceleration, angle, agreed.force, loads.load)
         across = self._normalised(lateral.corner_force, loads.load, None) if self._use_across else None
-        more = {"lateral_use": across, "vertical_load": loads.load} if self._lateral_first else {}
+        more = {"lateral_use": across, "forces": (agreed.force, lateral.corner_force)} if self._lateral_first else {}
         moved = self.velocity.step(w, steer, free_x, free_y, turn, use, signals.elapsed, **more)
         corners = None
         if self.corner_observers is not None and across is not None:
             corners = self.corner_observers.step(
                 *(w, steer, own_x, own_y, turn, use, across, moved.vy),
-                **({"vertical_load": loads.load} if self._compliant else {}),
+                **({"forces": (agreed.force, lateral.corner_force)} if self._compliant else {}),
             )
         beside = None
         if self.sideslip is not None:
