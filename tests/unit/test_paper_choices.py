@@ -224,6 +224,11 @@ def test_slips_on_compliant_suspensions_are_those_of_the_wheel_centres() -> None
             )
             for force in pull * np.sin(6.0 * time)
         ]
+        last = found[name][-1].corners
+        along = CAR.radius * 45.0 - last.relative_velocity + last.suspension_velocity[:, 0]
+        np.testing.assert_allclose(
+            corners.slip, slip_ratio(CAR.radius * 45.0, along), atol=1e-12
+        )  # what switches the gains
     wheels = np.array([step.corners.suspension_velocity for step in found["compliant"]])
     answer = s / (soft.unsprung_mass * s * s + soft.damping_x * s + soft.stiffness_x)
     expected = pull * np.imag(answer * np.exp(s * (time + 0.5 * TIME)))[:, None]  # held forces: half a sample
