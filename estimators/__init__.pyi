@@ -17,6 +17,7 @@ from .lpv import LpvObserver as LpvObserver
 from .lpv import LpvObserverStep as LpvObserverStep
 from .pipeline import CornerObservers as CornerObservers
 from .pipeline import EstimationPipeline as EstimationPipeline
+from .pipeline import MountedUnit as MountedUnit
 from .pipeline import PipelineStep as PipelineStep
 from .pipeline import VehicleSignals as VehicleSignals
 from .schedule import GainSchedule as GainSchedule
@@ -26,6 +27,7 @@ from .sideslip import FourWheel as FourWheel
 from .sideslip import FourWheelObserver as FourWheelObserver
 from .sideslip import SingleTrack as SingleTrack
 from .sideslip import SlidingModeObserver as SlidingModeObserver
+from .signals import Mounting as Mounting
 from .vehicle import VehicleParameters as VehicleParameters
 from .velocity import KinematicKalman as KinematicKalman
 from .velocity import LpvStep as LpvStep

@@ -44,6 +44,7 @@ _KINDS = {
     "front_relaxation": _Kind("m", 1e-3, 10.0, "the relaxation length of the tires, " + _LENGTH),
     "rear_relaxation": _Kind("m", 1e-3, 10.0, "the relaxation length of the tires, " + _LENGTH),
     "friction": _Kind("(no unit)", 1e-3, 10.0, "of tire and road, about 1 on dry asphalt"),
+    "bearing_friction": _Kind("N m s/rad", 0.0, 100.0, "drag torque of a wheel over its speed, 0 to leave it out"),
     "rolling_resistance": _Kind("(no unit)", 0.0, 0.2, "about 0.01 on asphalt, 0 to leave it out"),
 }
 
@@ -131,6 +132,7 @@ class VehicleParameters(RigidBody):
     effective_radius: float | Sequence[float]  # R_e, m: one, front and rear, or fl, fr, rl, rr; kept as four
     roll_center_height: float = 0.0  # h_rc, m
     rolling_resistance: float = 0.0  # c_rr: the wheel loses R_e c_rr F_z to it; the papers have 0
+    bearing_friction: float = 0.0  # C_b of P2 (1), N m s/rad; the paper neglects it
     radii: tuple[float, float, float, float] = field(init=False)  # R_e of fl, fr, rl, rr, m
 
     def __post_init__(self) -> None:

@@ -107,7 +107,7 @@ class PidForceObserver(Memory):
         if fresh is not None:
             seen = seen & mask(fresh, self.batch_shape, "fresh")
         time, (eta1, _, eta3) = self.inputs.sample_time, self.gains
-        m = (signals.torque - self.inputs.inertia * rate) / self.inputs.radius
+        m = self._measured(signals, rate)
         again = self.starts | ~used
         error = np.where(seen & ~again, signals.speed - self.speed - time * rate, 0.0)
         last = np.where(again, m, self.force)
@@ -134,7 +134,7 @@ class PidForceObserver(Memory):
         """The step where everything is there: the same equations, without the choices."""
         # twice as fast for one car
         time, (eta1, _, eta3) = self.inputs.sample_time, self.gains
-        m = (signals.torque - self.inputs.inertia * rate) / self.inputs.radius
+        m = self._measured(signals, rate)
         virtual = self.speed + time * rate
         error = signals.speed - virtual
         innovation = m - self.force
@@ -147,6 +147,12 @@ class PidForceObserver(Memory):
         self.before = m
         used, none = np.ones(self.batch_shape, dtype=np.bool_), signals.stopped.copy()
         return WheelForceStep(self.force.copy(), deviation, innovation, used, none, none.copy(), signals.flags)
+
+    def _measured(self, signals: WheelSignals, rate: FloatArray) -> FloatArray:
+        """The force of the wheel equation, N."""
+        torque = signals.torque - self.inputs.friction * signals.speed if self.inputs.friction else signals.torque
+        force: FloatArray = (torque - self.inputs.inertia * rate) / self.inputs.radius
+        return force
 
     def reset(self, where: npt.ArrayLike | None = None) -> None:
         """Starts the entries `where` (bool mask of the batch shape; None: all) afresh; flagged RESET at the next step."""

@@ -14,21 +14,22 @@ from estimators.vehicle import VehicleParameters
 
 
 class UnknownInputForceObserver(IntervalObserver):
-    """I_w dwhat/dt = T - R_e f_0 + K_p (w - what),  F_x = f_0 - K_p (w - what)/R_e: P2 (1)-(3).
+    """I_w dwhat/dt = T - R_e f_0 - C_b w + K_p (w - what),  F_x = f_0 - K_p (w - what)/R_e: P2 (1)-(3).
 
     Equal to a first-order lag of the force, F_x = f_0 + K/(s + K) (F_x - f_0) with K = K_p/I_w, and without dw/dt. Here
     it is integrated exactly for wheel speeds that are linear between samples and torques that are held:
 
-        F_k = F_j + (1 - e^(-K n Ts)) (m_k - F_j),   m_k = (mean T - I_w (w_k - w_j)/(n Ts))/R_e,
+        F_k = F_j + (1 - e^(-K n Ts)) (m_k - F_j),   m_k = (mean T - C_b (w_k + w_j)/2 - I_w (w_k - w_j)/(n Ts))/R_e,
 
-    with the last new speed w_j, n samples ago (`SpeedInterval`). The state is F; the virtual speed follows from it,
-    w - what = (f_0 - F) R_e/K_p (`speed_error`). Theorem 1: |R_e (F_x - f_0)/I_w| < b bounds that error by b/K.
+    with C_b of the vehicle (P2 neglects it) and the last new speed w_j, n samples ago (`SpeedInterval`). The state is F; the
+    virtual speed follows from it, w - what = (f_0 - F) R_e/K_p (`speed_error`). Theorem 1: |R_e (F_x - f_0)/I_w| < b bounds
+    that error by b/K.
 
     A force that cannot be known (wheel stopped, torque or speed missing) fades to f_0 and is flagged; what a speed that
     is not new leaves open is decided when the next new one comes. The innovation of a step is m - F, N.
 
     Args:
-        vehicle: radii, wheel inertia, rolling resistance.
+        vehicle: radii, wheel inertia, rolling resistance, bearing friction.
         sample_time: Ts, s.
         batch_shape: ends with the four corners.
         lag: 1/K, s. 0 takes the mean force of the last interval as it is.

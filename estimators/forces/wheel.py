@@ -1,8 +1,8 @@
 """What the wheel equation needs at each corner, and when it says nothing: shared by the longitudinal force observers.
 
-Wheel dynamics, P1 (1), P2 (1), with rolling resistance as an option (the papers have c_rr = C_b = 0):
+Wheel dynamics, P1 (1), P2 (1), with rolling resistance and bearing friction as options (the papers have c_rr = C_b = 0):
 
-    I_w dw/dt = T - R_e (F_x + c_rr F_z sign(w))
+    I_w dw/dt = T - C_b w - R_e (F_x + c_rr F_z sign(w))
 
 F_x along the wheel plane, forward positive; T drive minus brake; w positive forward, so a car in reverse has w < 0.
 """
@@ -56,7 +56,7 @@ class WheelInputs(Renewable):
     still held. A missing load is held, from the static one on.
 
     Args:
-        vehicle: radii, wheel inertia, rolling resistance, static loads.
+        vehicle: radii, wheel inertia, rolling resistance, bearing friction, static loads.
         sample_time: s.
         batch_shape: ends with the four corners.
         stopped_below: rad/s.
@@ -83,6 +83,7 @@ class WheelInputs(Renewable):
         self.fade = math.exp(-self.sample_time / setting(fade_time, "fade_time", "s"))
         self.radius, self.inertia = vehicle.radius, vehicle.wheel_inertia
         self.sensor_gain: FloatArray = np.sqrt(2.0) * self.inertia / (self.radius * self.sample_time)  # N s/rad
+        self.friction = vehicle.bearing_friction  # C_b, N m s/rad
         self._resistance = vehicle.radius * vehicle.rolling_resistance
         self._rolls = vehicle.rolling_resistance > 0
         self.speed = Held(self.batch_shape, "wheel_speed", limit=limits.WHEEL_SPEED)

@@ -40,7 +40,7 @@ class WheelForceFilter(IntervalObserver):
         batch_shape: ends with the four corners.
         force_rate: N/sqrt(s); 4000 lets the force move by 280 N in a sample of 5 ms.
         speed_deviation: rad/s, of the wheel speed sensor.
-        bearing_friction: C_b, N m s/rad.
+        bearing_friction: C_b, N m s/rad; None: that of the vehicle.
         stopped_below, fade_time: as `WheelInputs`.
         method: "unscented", as published, or "linear": the same filter, faster, as the model is linear.
 
@@ -58,7 +58,7 @@ class WheelForceFilter(IntervalObserver):
         batch_shape: tuple[int, ...] = (4,),
         force_rate: float = 4000.0,
         speed_deviation: float = 0.05,
-        bearing_friction: float = 0.0,
+        bearing_friction: float | None = None,
         stopped_below: float = 1.0,
         fade_time: float = 0.2,
         method: Literal["unscented", "linear"] = "unscented",
@@ -69,7 +69,8 @@ class WheelForceFilter(IntervalObserver):
         self.method = method
         self.process_variance = setting(force_rate, "force_rate", "N/sqrt(s)") ** 2 * self.inputs.sample_time
         self.measurement_variance = 2.0 * setting(speed_deviation, "speed_deviation", "rad/s") ** 2
-        self._friction = setting(bearing_friction, "bearing_friction", "N m s/rad", low_allowed=True)
+        friction = vehicle.bearing_friction if bearing_friction is None else bearing_friction
+        self._friction = setting(friction, "bearing_friction", "N m s/rad", low_allowed=True)
         self._prior = np.broadcast_to(vehicle.static_loads**2, self.batch_shape)
         self.before: FloatArray = np.zeros(self.batch_shape)
         start, spread = np.zeros((*self.batch_shape, 1)), self._prior[..., None, None]

@@ -3,6 +3,7 @@
 from estimators.pipeline.corner_kinds import CornerSample, CornerStep, KalmanCorners, ScheduledCorners, SwitchedCorners
 from estimators.pipeline.corner_set import CornerObservers, CornerSetStep
 from estimators.pipeline.corner_velocity import CornerVelocity
+from estimators.pipeline.mounted_unit import MountedUnit
 from estimators.pipeline.pipeline import EstimationPipeline
 from estimators.pipeline.result import Check, Consistency, PipelineStep
 from estimators.pipeline.sideslip_parts import FourWheelSideslip, StiffnessSideslip
@@ -21,6 +22,7 @@ __all__ = [
     "EstimationPipeline",
     "FourWheelSideslip",
     "KalmanCorners",
+    "MountedUnit",
     "PipelineStep",
     "ScheduledCorners",
     "StiffnessSideslip",

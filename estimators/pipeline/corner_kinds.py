@@ -120,6 +120,7 @@ class KalmanCorners(Memory):
         batch_shape: ends with the four corners.
         states: 3 as printed; 2: the equivalent form that is observable at constant speed.
         settings: of the high-slip detection; None: those of the paper.
+        process: covariance of the process, "input" or "identity", as `LtvKalmanObserver`.
 
     Raises:
         EstimatorError: as `LtvKalmanObserver` and `HighSlipDetector`.
@@ -135,9 +136,10 @@ class KalmanCorners(Memory):
         batch_shape: tuple[int, ...] = (4,),
         states: Literal[2, 3] = 3,
         settings: HighSlipSettings | None = None,
+        process: str = "input",
     ) -> None:
         self.batch_shape, self.sample_time = batch(batch_shape, corners=True), sample_time
-        self.observer = LtvKalmanObserver(tire, sample_time, self.batch_shape, states=states)
+        self.observer = LtvKalmanObserver(tire, sample_time, self.batch_shape, states=states, process=process)
         self.detector = HighSlipDetector(settings, self.batch_shape[:-1])
 
     def step(self, sample: CornerSample) -> CornerStep:

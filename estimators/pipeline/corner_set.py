@@ -18,9 +18,10 @@ from estimators.pipeline.corner_kinds import CornerKind, CornerSample, Scheduled
 from estimators.schedule import GainSchedule
 from estimators.signals import FilteredDerivative, limits
 from estimators.vehicle import VehicleParameters
-from estimators.velocity.corners import rotated, tire_motion
+from estimators.velocity.corners import CornerVectors, rotated, tire_motion, vehicle_frame
 from estimators.velocity.mapping import SlipWeights, weighed
 from estimators.velocity.slip import slips
+from estimators.velocity.suspension import SuspensionCompliance, SuspensionParameters
 
 _MOST = np.array([limits.WHEEL_SPEED] * 4 + [limits.ANGLE] * 4 + [limits.YAW_RATE])
 
@@ -37,6 +38,9 @@ class CornerSetStep(NamedTuple):
     used: BoolArray  # (..., 4)
     flags: FlagArray  # (..., 4), longitudinal and lateral together
     high_slip: BoolArray  # (..., 4) whether the longitudinal observer took the wheel for one that slips much
+    suspension_velocity: (
+        FloatArray  # (..., 4, 2) psi' of the wheels against the body, m/s, body frame; zero on rigid ones
+    )
 
 
 class CornerObservers(Memory):
@@ -47,6 +51,9 @@ class CornerObservers(Memory):
     plain numbers, several on arrays, by the same formulas (`arithmetic`). What no car measures (`signals.limits`) is missing;
     a missing steering angle or yaw rate is held and flagged MISSING_INPUT at the corners concerned, a missing
     acceleration counts as zero.
+
+    With `suspension`, slips (the ones by which axles are weighed and gains switched) are those of the wheel centres, which
+    move against the body, V_xc = Vbar_xc + psi_x', P3 (14)-(15); the centre of gravity does not (P3 notes 9 item 11).
 
     Args:
         vehicle: radii and lever arms.
@@ -71,6 +78,7 @@ class CornerObservers(Memory):
         batch_shape: tuple[int, ...] = (),
         weights: SlipWeights | None = None,
         lag: float = 0.01,
+        suspension: SuspensionParameters | None = None,
     ) -> None:
         self.vehicle, self.batch_shape, self.weights = vehicle, batch(batch_shape), weights
         self.along = self._observer(longitudinal)
@@ -81,10 +89,16 @@ class CornerObservers(Memory):
                 f"the longitudinal and the lateral observer are for sample times {self.sample_time:g} s and "
                 f"{self.across.sample_time:g} s; design both for one"
             )
+        self.suspension: SuspensionCompliance | None = None
+        if suspension is not None:
+            self.suspension = SuspensionCompliance(suspension, self.sample_time, self.batch_shape)
+        self.uses_forces = suspension is not None  # the pipeline gives F_x and F_y of the tires as `forces`
+        self._rigid = np.zeros((*self.batch_shape, 4, 2))
+        self._rigid.flags.writeable = False
         self._judged = self.along.judges_slip or (self.across is not None and self.across.judges_slip)
         self._no_slip = np.zeros((*self.batch_shape, 4))
         self.slope = FilteredDerivative(self.sample_time, lag, (*self.batch_shape, 9))
-        self.parts: tuple[str, ...] = ("along", "slope") if lateral is None else ("along", "across", "slope")
+        self.parts: tuple[str, ...] = ("along", "across", "slope", "suspension")  # without what is None
         self._count = math.prod(self.batch_shape)
         self._kit = kit = arithmetic((self._count,))
         lever_x, lever_y = vehicle.corner_x.tolist(), vehicle.corner_y.tolist()
@@ -105,10 +119,12 @@ class CornerObservers(Memory):
         longitudinal_use: npt.ArrayLike,
         lateral_use: npt.ArrayLike,
         vy: npt.ArrayLike = 0.0,
+        forces: tuple[npt.ArrayLike, npt.ArrayLike] = (math.nan, math.nan),
     ) -> CornerSetStep:
         """One sample: rad/s, rad (..., 4); m/s^2, m/s^2, rad/s (...); F_x/F_z and F_y/F_z (..., 4), NaN where unknown.
 
-        `vy` (...) m/s serves where there is no lateral observer.
+        `vy` (...) m/s serves where there is no lateral observer, `forces` F_x, F_y (..., 4) N in the tire frame where the
+        suspension is compliant.
 
         Raises:
             EstimatorError: another shape, or not numbers.
@@ -181,14 +197,14 @@ class CornerObservers(Memory):
         share_x, share_y = self._shares()
         found_x, found_y = weighed(kit, seen_x, share_x)[0], weighed(kit, seen_y, share_y)[0]
         self.vx, self.vy = choose(kit.known(found_x), found_x, vx), choose(kit.known(found_y), found_y, left)
-        if self.weights is not None or self._judged:
-            self.slip, self.angle = kit.each(self._slips, held[:4], ahead, beside, radius)
+        wheels = self._compliant(steer, forces)
+        self._remember(held[:4], ahead, beside, sine, cosine, wheels)
         outputs = kit.table(((self.vx, self.vy), seen_x, seen_y), shape)
         if not calm:
             no_angle = np.logical_not(good[..., 4:8] & good[..., 8:])
             flags = flags | np.where(no_angle, np.int32(Flag.MISSING_INPUT), np.int32(0))
         corners = outputs[..., 2:6], outputs[..., 6:], relative, along.innovation, along.used
-        return CornerSetStep(outputs[..., 0], outputs[..., 1], *corners, flags, along.high_slip)
+        return CornerSetStep(outputs[..., 0], outputs[..., 1], *corners, flags, along.high_slip, wheels)
 
     def reset(self, where: npt.ArrayLike | None = None, vx: npt.ArrayLike = math.nan, vy: npt.ArrayLike = 0.0) -> None:
         """Starts the entries `where` (bool mask of the batch shape; None: all) afresh, without relative velocity.
@@ -204,12 +220,34 @@ class CornerObservers(Memory):
             if observer is not None:
                 observer.reset(corners)
         self.slope.reset(np.repeat(chosen[..., None], 9, axis=-1))
+        if self.suspension is not None:
+            self.suspension.reset(chosen)
         kit, here = self._kit, self._kit.rows(chosen, 1)[0]
         start = kit.car(vx, self.batch_shape, "vx"), kit.car(vy, self.batch_shape, "vy")
         self.vx, self.vy = kit.where(here, start[0], self.vx), kit.where(here, start[1], self.vy)
         self.slip, self.angle = kit.each(
             lambda slip, angle: (kit.where(here, 0.0, slip), kit.where(here, 0.0, angle)), self.slip, self.angle
         )
+
+    def _compliant(self, steer: npt.ArrayLike, forces: tuple[npt.ArrayLike, npt.ArrayLike]) -> FloatArray:
+        """psi' (..., 4, 2), m/s, from the forces of the tires turned into the body frame; a missing one is held."""
+        if self.suspension is None:
+            return self._rigid
+        four = (*self.batch_shape, 4)
+        tires = CornerVectors(*(entries(value, four, "forces") for value in forces))
+        body = vehicle_frame(tires, entries(steer, four, "steer"))
+        return self.suspension.step(body.x, body.y).velocity
+
+    def _remember(
+        self, speed: Signals, ahead: Signals, beside: Signals, sine: Signals, cosine: Signals, wheels: FloatArray
+    ) -> None:
+        """Slips and slip angles for the next sample, if somebody asks for them; `wheels` are psi'."""
+        if self.weights is None and not self._judged:
+            return
+        if self.suspension is not None:
+            psi = (self._kit.rows(wheels[..., k], 4) for k in (0, 1))
+            ahead, beside = self._kit.each(_at_wheel, ahead, beside, *psi, sine, cosine)
+        self.slip, self.angle = self._kit.each(self._slips, speed, ahead, beside, self._wheels[0])
 
     def _observer(self, given: GainSchedule | CornerKind) -> CornerKind:
         """A schedule becomes its observer; one that is given must fit."""
@@ -242,3 +280,11 @@ class CornerObservers(Memory):
         ahead = self._kit.where(known, ahead, 0.0)
         slip, angle = slips(self._kit, radius * w, ahead, beside)
         return self._kit.where(known, slip, 0.0), angle
+
+
+def _at_wheel(
+    ahead: Number, beside: Number, along: Number, across: Number, sine: Number, cosine: Number
+) -> tuple[Number, Number]:
+    """Velocity of a wheel centre in the tire frame: that of the body there and psi' of the body frame, P3 (15)."""
+    more_x, more_y = rotated(along, across, sine, cosine)
+    return ahead + more_x, beside + more_y

@@ -99,6 +99,7 @@ class CornerVelocity(Memory):
         normalised_force: npt.ArrayLike,
         elapsed: npt.ArrayLike | None = None,
         lateral_use: npt.ArrayLike = math.nan,
+        forces: tuple[npt.ArrayLike, npt.ArrayLike] = (math.nan, math.nan),
     ) -> CornerVelocityStep:
         """One sample, as `VelocityFusion.step`; `lateral_use` (..., 4) F_y/F_z, NaN where unknown; `elapsed` is not used.
 
@@ -106,17 +107,22 @@ class CornerVelocity(Memory):
             EstimatorError: another shape, or not numbers.
         """
         kit, shape = self._kit, self.batch_shape
-        found = self.corners.step(wheel_speed, steer, ax, ay, yaw_rate, normalised_force, lateral_use)
+        uses = normalised_force, lateral_use
+        found = self.corners.step(wheel_speed, steer, ax, ay, yaw_rate, *uses, forces=forces)
         used = found.used & np.isfinite(found.corner_vx)
         moved = self._moved(found, used, ax, ay, yaw_rate)
         held = kit.rows(self.corners.slope.value, 9)
         vx, vy, turn = kit.own(moved.vx), kit.own(moved.vy), held[8]
 
-        def mapped(w: Number, angle: Number, radius: float, x: float, y: float) -> tuple[Number, Number]:
-            ahead, beside = rotated(vx - turn * y, vy + turn * x, kit.sin(angle), kit.cos(angle))
+        moves = (kit.rows(found.suspension_velocity[..., k], 4) for k in (0, 1))  # P3 (15)
+
+        def mapped(
+            w: Number, angle: Number, radius: float, x: float, y: float, along: Number, across: Number
+        ) -> tuple[Number, Number]:
+            ahead, beside = rotated(vx - turn * y + along, vy + turn * x + across, kit.sin(angle), kit.cos(angle))
             return slips(kit, radius * w, ahead, beside)
 
-        outputs = kit.table(kit.each(mapped, held[:4], held[4:8], *self._wheels), shape)
+        outputs = kit.table(kit.each(mapped, held[:4], held[4:8], *self._wheels, *moves), shape)
         pulls = kit.car(ax, shape, "ax"), kit.car(ay, shape, "ay")
         lost = kit.no(abs(kit.car(yaw_rate, shape, "yaw_rate")) <= limits.YAW_RATE)
         for value in pulls:

@@ -158,7 +158,7 @@ class CornerPart(Protocol):
         lateral_use: npt.ArrayLike,
         vy: npt.ArrayLike = 0.0,
     ) -> CornerSetStep:
-        """One sample: rad/s, rad, m/s^2, rad/s, F_x/F_z and F_y/F_z, m/s."""
+        """One sample: rad/s, rad, m/s^2, rad/s, F_x/F_z and F_y/F_z, m/s; with `uses_forces`, `forces` in N, too."""
 
 
 class SideslipPart(Protocol):

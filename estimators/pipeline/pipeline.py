@@ -39,6 +39,7 @@ from estimators.pipeline.signals import VehicleSignals
 from estimators.signals import FilteredDerivative, limits
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import VelocityFusion
+from estimators.velocity.rear_wheels import rear_wheel_speed
 from estimators.velocity.slip import LEAST_SPEED
 
 REAL_SENSORS = (0.3, 0.1, 0.3)
@@ -69,6 +70,7 @@ class EstimationPipeline(Memory):
         batch_shape: leading axes of every signal; () for one car.
         longitudinal_force, loads, lateral_force, velocity: parts; None: the default one.
         attitude, corner_observers, sideslip: parts; None: without. The car is then level, and tilt counts as bias.
+        speed_of_rear_wheels: V_g of the sideslip part is the mean of the rear wheels, P4 (9), and not the V_x that was found.
         acceleration_deviation: m/s^2, how wrong a_x may be where it corrects the sum of the wheels' forces.
         repeat_time: s, the longest interval of the wheel speed sensors.
         unsigned_wheels: the sensors do not tell backward from forward (most cars): `direction` does, or the accelerometer.
@@ -91,11 +93,12 @@ class EstimationPipeline(Memory):
         velocity: VelocityPart | None = None,
         corner_observers: CornerPart | None = None,
         sideslip: SideslipPart | None = None,
+        speed_of_rear_wheels: bool = False,
         acceleration_deviation: float = 0.15,
         repeat_time: float = 0.025,
         unsigned_wheels: bool = False,
     ) -> None:
-        self.vehicle, self.batch_shape = vehicle, batch(batch_shape)
+        self.vehicle, self.batch_shape, self._rear = vehicle, batch(batch_shape), speed_of_rear_wheels
         shape = self.batch_shape
         time = self.sample_time = setting(sample_time, "sample_time", "s")
         four = (*shape, 4)
@@ -119,6 +122,7 @@ class EstimationPipeline(Memory):
         self.parts = tuple(name for name in self._named if hasattr(getattr(self, name), "save"))
         self.parts += ("last", "direction") if unsigned_wheels else ("last",)
         self._lateral_first = bool(getattr(self.velocity, "uses_lateral_force", False))
+        self._compliant = bool(getattr(corner_observers, "uses_forces", False))
         self._use_across = self._lateral_first or self.corner_observers is not None
         self._total_deviation = vehicle.mass * setting(acceleration_deviation, "acceleration_deviation", "m/s^2")
         self._least_load = _LIFTED * vehicle.static_loads
@@ -165,16 +169,22 @@ class EstimationPipeline(Memory):
         yaw_acceleration = choose(abs(turned) < math.inf, kit.own(yaw_acceleration), math.nan)
         lateral = self.lateral_force.step(own_x, own_y, yaw_acceleration, angle, agreed.force, loads.load)
         across = self._normalised(lateral.corner_force, loads.load, None) if self._use_across else None
-        more = {"lateral_use": across} if self._lateral_first else {}
+        more = {"lateral_use": across, "forces": (agreed.force, lateral.corner_force)} if self._lateral_first else {}
         moved = self.velocity.step(w, steer, free_x, free_y, turn, use, signals.elapsed, **more)
         corners = None
         if self.corner_observers is not None and across is not None:
-            corners = self.corner_observers.step(w, steer, own_x, own_y, turn, use, across, moved.vy)
+            corners = self.corner_observers.step(
+                *(w, steer, own_x, own_y, turn, use, across, moved.vy),
+                **({"forces": (agreed.force, lateral.corner_force)} if self._compliant else {}),
+            )
         beside = None
         if self.sideslip is not None:
-            steered, turning, pull_x, pull_y = (np.asarray(v).reshape(shape) for v in (angle, turned, own_x, own_y))
+            steered, turning, speed, pull_x, pull_y = (
+                np.asarray(v).reshape(shape)
+                for v in (angle, turned, rear_wheel_speed(car, w, turned) if self._rear else moved.vx, own_x, own_y)
+            )
             beside = self.sideslip.step(
-                steered, turning, moved.vx, pull_x, pull_y, agreed.force, loads.load, lateral.axle_force
+                steered, turning, speed, pull_x, pull_y, agreed.force, loads.load, lateral.axle_force
             )
         open_ = kit.rows(unknown, 4)
         lost = open_[0] | open_[1] | open_[2] | open_[3]

@@ -74,6 +74,7 @@ class StiffnessSideslip(Memory):
         batch_shape: () for one car.
         adaptive: False keeps the stiffnesses given.
         sliding: forces from yaw rate and accelerations by `SlidingModeObserver`.
+        noise_time: s, for which the covariances hold, as `AdaptiveStiffnessObserver`; None: per sample.
     """
 
     def __init__(
@@ -83,10 +84,11 @@ class StiffnessSideslip(Memory):
         batch_shape: tuple[int, ...] = (),
         adaptive: bool = True,
         sliding: bool = False,
+        noise_time: float | None = None,
     ) -> None:
         self.batch_shape = batch_shape
         kind = AdaptiveStiffnessObserver if adaptive else FixedStiffnessObserver
-        self.observer = kind(vehicle, batch_shape, sample_time=sample_time)
+        self.observer = kind(vehicle, batch_shape, sample_time=sample_time, noise_time=noise_time)
         self.sliding = SlidingModeObserver(vehicle, batch_shape, sample_time) if sliding else None
         self.parts = ("observer", "sliding") if sliding else ("observer",)
 

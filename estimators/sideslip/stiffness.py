@@ -22,6 +22,7 @@ GOOD_NOISE = (0.1, 0.1, 0.1)  # zones 5, 6: N^2, N^2, (m/s^2)^2, per sample; P5 
 POOR_NOISE = (1e6, 1e6, 1e6)  # zones 1 to 4
 SIDESLIP_NOISE = 1e-13  # rad^2 per sample
 STIFFNESS_NOISE = 0.24  # (N/rad)^2 per sample, zones 5, 6 alone
+PUBLISHED_TIME = 0.01  # s between the samples of the paper
 _MOST = np.array([limits.FORCE, limits.FORCE, limits.ACCELERATION])  # of the measurement
 _LIMITS = ((-1.0, 1.0), (-10.0, 10.0), (0.0, 200.0), (-1e5, 1e5))  # rad, rad/s, m/s, N
 
@@ -51,6 +52,10 @@ class AdaptiveStiffnessObserver(Renewable):
     Stiffnesses are kept between 0.05 and 2 times the given ones. Below `standstill_speed`, where (16) is singular, the
     entry is at rest: sideslip fades to zero with 0.1 s and measurements are not used.
 
+    With `noise_time` the covariances hold for samples at that distance, and keep their density in continuous time at any
+    other: process noise times Ts/noise_time, measurement noise times noise_time/Ts. Then the estimate's variance does not
+    depend on how often the same sensors are read.
+
     Args:
         vehicle: parameters; the stiffnesses are the starting ones.
         batch_shape: shape of each input.
@@ -60,6 +65,7 @@ class AdaptiveStiffnessObserver(Renewable):
         initial_covariance: variances rad^2, (N/rad)^2, (N/rad)^2 (not published).
         standstill_speed: m/s.
         gate: probability with which a good channel passes, or None.
+        noise_time: s, `PUBLISHED_TIME` for the paper's; None: the covariances are per sample, whatever the sample time.
 
     Raises:
         EstimatorError: an option that means nothing; a standstill speed at which Euler steps are unstable.
@@ -78,6 +84,7 @@ class AdaptiveStiffnessObserver(Renewable):
         initial_covariance: tuple[float, float, float] = (1e-2, 1e6, 1e6),
         standstill_speed: float = 3.0,
         gate: float | None = None,
+        noise_time: float | None = None,
     ) -> None:
         if switching not in ("axle", "both"):
             raise EstimatorError(f"switching = {switching!r} is not known; use 'axle' or 'both'")
@@ -85,6 +92,7 @@ class AdaptiveStiffnessObserver(Renewable):
         self.vehicle, self.switching, self.gate = vehicle, switching, gate
         self.sample_time = setting(sample_time, "sample_time", "s")
         self.standstill_speed = setting(standstill_speed, "standstill_speed", "m/s")
+        self._share = 1.0 if noise_time is None else self.sample_time / setting(noise_time, "noise_time", "s")
         rate = 2 * (vehicle.front_stiffness + vehicle.rear_stiffness) / (vehicle.mass * self.standstill_speed)
         if rate * self.sample_time > 1.5:
             raise EstimatorError(
@@ -133,9 +141,11 @@ class AdaptiveStiffnessObserver(Renewable):
         model = self._model([held.within(value, flags) for held, value in zip(self.inputs, shaped, strict=True)])
         present = np.absolute(measured) <= _MOST  # False for NaN
         excited = self._excited(model, measured, present)
-        self.filter.predict(before.transition, before.transition_jacobian, self._process(excited))
+        process = self._share * self._process(excited)
+        self.filter.predict(before.transition, before.transition_jacobian, process)
         usable = np.where(present & ~model.at_rest[..., None], measured, np.nan)
-        noise = np.where(self._good(excited), GOOD_NOISE, POOR_NOISE)[..., None] * np.eye(3)
+        variances = np.where(self._good(excited), GOOD_NOISE, POOR_NOISE) / self._share
+        noise = variances[..., None] * np.eye(3)
         step = self.filter.correct(usable, model.measurement, model.measurement_jacobian, noise, self.gate)
         step = self._limited(step)
         raise_flag(flags, np.logical_not(present.all(axis=-1)), Flag.MISSING_MEASUREMENT)

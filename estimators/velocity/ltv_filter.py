@@ -30,11 +30,19 @@ class LtvFilter(CovarianceFilter):
         batch_shape: one entry a corner.
         tire: constants of the bristle model.
         time: T_s, s.
+        identity: Q = q I, else q B B' with B = [0 1 1]'.
     """
 
-    def __init__(self, covariance: FloatArray, batch_shape: tuple[int, ...], tire: BristleTire, time: float) -> None:
+    def __init__(
+        self,
+        covariance: FloatArray,
+        batch_shape: tuple[int, ...],
+        tire: BristleTire,
+        time: float,
+        identity: bool = False,
+    ) -> None:
         super().__init__(np.zeros((*batch_shape, len(covariance))), covariance)
-        self.tire, self.time = tire, time
+        self.tire, self.time, self.identity = tire, time, identity
         rows, columns = np.tril_indices(self.size)
         square = np.zeros((self.size, self.size), dtype=np.int64)
         square[rows, columns] = square[columns, rows] = np.arange(rows.size)
@@ -109,12 +117,13 @@ class LtvFilter(CovarianceFilter):
             d1 = d2 = d3 = b3 = 0.0  # last row of A, last entry of B
         x1, x2, x3 = E * x1 + s0 * x2 + b1 * u, x2 + T * u, d1 * x1 + d2 * x2 + d3 * x3 + b3 * u
         gain = (E * k1 + s0 * k2, k2, d1 * k1 + d2 * k2 + d3 * k3)
-        # rows of A P, then A P A' + q on V_r and z'
+        # rows of A P, then A P A' + Q
         e1, e2, e3 = E * p11 + s0 * p12, E * p12 + s0 * p22, E * p13 + s0 * p23
         f1, f2, f3 = d1 * p11 + d2 * p12 + d3 * p13, d1 * p12 + d2 * p22 + d3 * p23, d1 * p13 + d2 * p23 + d3 * p33
         third = q if three else 0.0
-        p13, p23 = e1 * d1 + e2 * d2 + e3 * d3, p12 * d1 + p22 * d2 + p23 * d3 + third
-        p11, p12, p22 = E * e1 + s0 * e2, e2, p22 + q
+        first, common = (q, 0.0) if self.identity else (0.0, third)
+        p13, p23 = e1 * d1 + e2 * d2 + e3 * d3, p12 * d1 + p22 * d2 + p23 * d3 + common
+        p11, p12, p22 = E * e1 + s0 * e2 + first, e2, p22 + q
         p33 = f1 * d1 + f2 * d2 + f3 * d3 + third
         known = p22 < LARGEST_SPREAD**2
         n, size = self.size, len(self._wide)

@@ -2,7 +2,8 @@
 
 Predictor form: correct with mu_k, then predict with u_k, which is (21)-(22) term by term. Q is one number in the paper;
 here it drives the model through its input, Q = q B B': errors of the acceleration move V_r (and with it z'), nothing
-else. q I_3 would let z absorb the correction and leave V_r to open-loop integration (P2 notes 10).
+else. `process = "identity"` takes q I, the other reading: z then absorbs the correction and leaves V_r to open-loop
+integration (P2 notes 10).
 In high slip friction hides the slip velocity: there q and r change to values that follow the kinematics.
 """
 
@@ -15,7 +16,7 @@ import numpy.typing as npt
 
 from estimators.arguments import batch, entries, mask, quiet, setting
 from estimators.arrays import BoolArray, FlagArray, FloatArray
-from estimators.errors import EstimatorError
+from estimators.errors import EstimatorError, unknown
 from estimators.faults import Flag, raise_flag
 from estimators.memory import Renewable
 from estimators.velocity.ltv_filter import LtvFilter
@@ -23,6 +24,7 @@ from estimators.velocity.ltv_model import BristleTire
 
 NORMAL = (2.5e-3, 1e-3)
 """q in (m/s)^2 a sample and r, P2 section IV."""
+PROCESSES = ("input", "identity")
 HIGH_SLIP = (3.3e-4, 2.1e-1)
 _LARGEST = 1e6  # of u, w and dw/dt: more is not a reading
 
@@ -50,9 +52,10 @@ class LtvKalmanObserver(Renewable):
         normal: (q, r) in normal driving.
         high_slip: (q, r) where `step` is told so.
         spread: initial standard deviation of V_r, m/s.
+        process: "input", Q = q B B', or "identity", Q = q I.
 
     Raises:
-        EstimatorError: a value that is not above zero, another number of states.
+        EstimatorError: a value that is not above zero, another number of states, another process.
     """
 
     memory = ("seen", "renewed")
@@ -67,7 +70,10 @@ class LtvKalmanObserver(Renewable):
         normal: tuple[float, float] = NORMAL,
         high_slip: tuple[float, float] = HIGH_SLIP,
         spread: float = 1.0,
+        process: str = "input",
     ) -> None:
+        if process not in PROCESSES:
+            raise EstimatorError(unknown("process", process, PROCESSES))
         if states not in (2, 3):
             raise EstimatorError(f"states = {states!r}; use 3, as published, or 2")
         super().__init__(batch(batch_shape))
@@ -81,7 +87,7 @@ class LtvKalmanObserver(Renewable):
         wide = setting(spread, "spread", "m/s") ** 2
         # z follows V_r within a hundredth of a metre; z' is V_r while z is unknown
         self._initial = np.diag([1e-4, wide, wide][:states])
-        self.filter = LtvFilter(self._initial, self.batch_shape, tire, self.sample_time)
+        self.filter = LtvFilter(self._initial, self.batch_shape, tire, self.sample_time, process == "identity")
         self.seen: FloatArray = np.zeros((3, *self.batch_shape))  # last finite u, w, w'
 
     def step(

@@ -15,6 +15,7 @@ from estimators.arrays import FloatArray, IntArray
 from estimators.pipeline.corner_kinds import CornerKind
 from estimators.pipeline.pipeline import REAL_SENSORS
 from estimators.sideslip import FourWheel, SingleTrack
+from estimators.sideslip.stiffness import PUBLISHED_TIME
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import KinematicKalman, SlipWeights
 from studies.drives.drive_file import DriveFile
@@ -66,10 +67,11 @@ def pipeline_of(
         "unscented": forces.WheelForceFilter, "linear": partial(forces.WheelForceFilter, method="linear"),
     }  # fmt: skip
     method: Any = chosen.lateral_force
+    suspension = car.suspension.parameters if chosen.suspension == "compliant" else None
     weights = SlipWeights() if chosen.axle_weights == "slip" else None
     corners: parts.CornerObservers | None = None
     if longitudinal is not None and lateral is not None:
-        corners = parts.CornerObservers(vehicle, longitudinal, lateral, weights=weights)
+        corners = parts.CornerObservers(vehicle, longitudinal, lateral, weights=weights, suspension=suspension)
     velocity: parts.CornerVelocity | None = None  # the fusion; else a paper's own chain
     if chosen.velocity != "fusion" and corners is not None:
         velocity = parts.CornerVelocity(corners, KinematicKalman(time) if chosen.velocity == "kinematic" else None)
@@ -83,6 +85,7 @@ def pipeline_of(
         velocity=velocity,
         corner_observers=corners if velocity is None else None,
         sideslip=_sideslip_of(drive, vehicle),
+        speed_of_rear_wheels=chosen.sideslip_speed == "rear-wheels",
     )
     return pipeline, assumptions
 
@@ -95,9 +98,12 @@ def _sideslip_of(drive: DriveFile, vehicle: VehicleParameters) -> Any:
     base = (vehicle.mass, vehicle.yaw_inertia, vehicle.front_axle_distance, vehicle.rear_axle_distance)
     if kind.endswith("stiffness") or kind == "sliding-mode":
         car_model, fixed, sliding = SingleTrack(*base, front, rear), kind == "fixed-stiffness", kind == "sliding-mode"
-        return parts.StiffnessSideslip(car_model, drive.sample_time, adaptive=not fixed, sliding=sliding)
+        noise_time = PUBLISHED_TIME if drive.estimators.stiffness_noise == "per-time" else None
+        return parts.StiffnessSideslip(
+            car_model, drive.sample_time, adaptive=not fixed, sliding=sliding, noise_time=noise_time
+        )
     track, length = 0.5 * (vehicle.front_track + vehicle.rear_track), car.relaxation_length or 0.5
-    wheels = FourWheel(*base, track, front / 2, rear / 2, length, length)
+    wheels = FourWheel(*base, track, front / 2, rear / 2, length, length, car.friction)
     method: Any = kind.removeprefix("four-wheel-")
     return parts.FourWheelSideslip(wheels, drive.sample_time, method=method)
 

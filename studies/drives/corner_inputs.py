@@ -41,14 +41,17 @@ def wheel_forces(
     radius: FloatArray,
     rolling_resistance: float,
     stopped_below: float,
+    bearing_friction: float = 0.0,
 ) -> FloatArray:
-    """Longitudinal forces (n, 4), N, from wheel dynamics: F_x = (T - I_w dw/dt)/R_e - c_rr F_z sign(w), P1 (1).
+    """Longitudinal forces (n, 4), N, from wheel dynamics: F_x = (T - I_w dw/dt - C_b w)/R_e - c_rr F_z sign(w), P2 (1).
 
-    ``torque`` N m (drive minus brake), ``wheel_acceleration`` rad/s^2, ``radius`` (4,) m. P1 has no rolling
-    resistance (c_rr = 0). NaN where the torque is unknown and where the wheel stands still (|w| < ``stopped_below``,
-    rad/s): a stopped brake holds whatever friction asks of it, so its commanded torque says nothing about the force.
+    ``torque`` N m (drive minus brake), ``wheel_acceleration`` rad/s^2, ``radius`` (4,) m, ``bearing_friction`` C_b N m s/rad.
+    The papers neglect both losses (c_rr = C_b = 0). NaN where the torque is unknown and where the wheel stands still
+    (|w| < ``stopped_below``, rad/s): a stopped brake holds whatever friction asks of it, so its commanded torque says nothing
+    about the force.
     """
-    force = (torque - inertia * wheel_acceleration) / radius - rolling_resistance * vertical_load * np.sign(wheel_speed)
+    push = torque - inertia * wheel_acceleration - bearing_friction * wheel_speed
+    force = push / radius - rolling_resistance * vertical_load * np.sign(wheel_speed)
     stopped = np.abs(wheel_speed) < stopped_below
     stopped[1:] |= stopped[:-1]  # dw/dt behind a stop spans an interval with the wheel still held
     return np.where(stopped, np.nan, force)
@@ -86,13 +89,32 @@ def mean_over(values: FloatArray) -> FloatArray:
 def integrated_acceleration(
     ax: FloatArray, yaw_rate: FloatArray, vy: FloatArray, sample_time: float, start: float
 ) -> FloatArray:
-    """V_x(t) = V_x(0) + integral of (a_x + r V_y) dt, m/s, P1 notes 5, by the trapezoidal rule.
+    """V_x(t) = V_x(0) + integral of (a_x + r V_y) dt, m/s, P1 notes 5, by the trapezoidal rule, where V_y is measured.
 
     Drifts with sensor bias and road grade; a missing sample keeps the last known acceleration.
     """
-    rate = held(ax + yaw_rate * vy)
-    steps = (rate[1:] + rate[:-1]) / 2 * sample_time
-    return start + np.concatenate([[0.0], np.cumsum(steps)])
+    return start + sample_time * _integral(held(ax + yaw_rate * vy))
+
+
+def dead_reckoning(
+    ax: FloatArray, ay: FloatArray, yaw_rate: FloatArray, sample_time: float, start: float
+) -> tuple[FloatArray, FloatArray]:
+    """V_x, V_y (n,), m/s, of V_x' = a_x + r V_y, V_y' = a_y - r V_x, P2 (15) without biases, from (start, 0).
+
+    With the heading psi = integral of r, the velocity in axes that do not turn is the integral of R(psi) a: trapezoidal rule on
+    both, no error of the turning itself. Drifts with sensor bias, grade and bank; a missing sample keeps the last known one.
+    """
+    ax, ay, turn = (held(value) for value in (ax, ay, yaw_rate))
+    heading = sample_time * _integral(turn)
+    cosine, sine = np.cos(heading), np.sin(heading)
+    east = start + sample_time * _integral(cosine * ax - sine * ay)
+    north = sample_time * _integral(sine * ax + cosine * ay)
+    return cosine * east + sine * north, cosine * north - sine * east
+
+
+def _integral(value: FloatArray) -> FloatArray:
+    """Cumulative trapezoids (n,) of samples at a distance of 1, from 0."""
+    return np.concatenate([[0.0], np.cumsum((value[1:] + value[:-1]) / 2)])
 
 
 def held(value: FloatArray) -> FloatArray:

@@ -18,6 +18,8 @@ from estimators.errors import unknown
 from estimators.vehicle import VehicleParameters
 from studies.drives import quantities as si
 from studies.drives.columns import Column, LogFile, check_alignment, check_logs
+from studies.drives.compliance import Suspension
+from studies.drives.mounted import Mountings, check_mountings
 from studies.drives.quantities import CORNERS, REFERENCES, SIGNALS
 from synthesis.toml_file import StrictTable, load_toml
 
@@ -37,11 +39,14 @@ class Vehicle(StrictTable):
     effective_radius_rear: si.Length = Field(examples=["0.34 m"])
     wheel_inertia: si.Inertia | None = None
     rolling_resistance: float = Field(default=0.0, ge=0.0, le=0.2, examples=[0.012])
+    bearing_friction: si.Damping = 0.0  # C_b of P2 (1), drag torque of a wheel over its speed
     steering_ratio: float | None = Field(default=None, gt=0.0, examples=[15.0])
     yaw_inertia: si.Inertia | None = None
     cornering_stiffness_front: si.Stiffness | None = None  # of the axle, both wheels
     cornering_stiffness_rear: si.Stiffness | None = None
     relaxation_length: si.Length | None = None
+    suspension: Suspension = Suspension()
+    friction: float = Field(default=1.0, gt=0.0, le=10.0, examples=[0.9])  # of tire and road, P4 (5)
 
     @cached_property
     def parameters(self) -> VehicleParameters:
@@ -52,7 +57,7 @@ class Vehicle(StrictTable):
             wheel_inertia=self.wheel_inertia or WHEEL_INERTIA, front_axle_distance=self.front_axle_distance,
             rear_axle_distance=self.rear_axle_distance, cg_height=self.cg_height, front_track=self.front_track,
             rear_track=self.rear_track, effective_radius=(self.effective_radius_front, self.effective_radius_rear),
-            rolling_resistance=self.rolling_resistance,
+            rolling_resistance=self.rolling_resistance, bearing_friction=self.bearing_friction,
         )  # fmt: skip
 
     @model_validator(mode="after")
@@ -82,7 +87,11 @@ CHOICES = {
     "velocity": ("fusion", "corners", "kinematic"),
     "corner_velocity": ("lpv", "gain-switched", "kalman-three-state", "kalman-two-state"),
     "axle_weights": ("equal", "slip"),
+    "process_covariance": ("input", "identity"),
+    "suspension": ("rigid", "compliant"),
     "sideslip": ("none", "four-wheel-extended", "four-wheel-unscented", "adaptive-stiffness", "fixed-stiffness", "sliding-mode"),
+    "sideslip_speed": ("estimated", "rear-wheels"),
+    "stiffness_noise": ("per-sample", "per-time"),
 }  # fmt: skip
 """Names of the estimators."""
 
@@ -93,6 +102,9 @@ class Estimators(StrictTable):
     ``corner_velocity`` is what the result calls corner observers; the same kind cross-checks the pipeline where a lateral
     schedule is given. With ``velocity = "corners"`` they are its only source of velocities, as in the papers; with
     ``"kinematic"`` they correct the kinematic model with bias states, P2 (15). ``axle_weights``: P1 weighs by slip.
+    ``process_covariance`` of the Kalman corner observers: Q = q B B' or q I of P2 (22). ``suspension``: slips of the wheel
+    centres on compliant suspensions, P3 (14)-(15). ``sideslip_speed``: V_g of the sideslip observers is the pipeline's V_x, or
+    the mean of the rear wheels, P4 (9). ``stiffness_noise``: the variances of P5 hold for every sample, or for every 10 ms.
     """
 
     longitudinal_force: str = "unknown-input"
@@ -102,7 +114,11 @@ class Estimators(StrictTable):
     velocity: str = "fusion"
     corner_velocity: str = "lpv"
     axle_weights: str = "equal"
+    process_covariance: str = "input"
+    suspension: str = "rigid"
     sideslip: str = "none"
+    sideslip_speed: str = "estimated"
+    stiffness_noise: str = "per-sample"
 
     @field_validator("*")
     @classmethod
@@ -192,6 +208,17 @@ def check_estimators(
             f"schedules.lateral: missing, but estimators.velocity = '{chosen.velocity}' has V_y from nothing else; "
             'add it, such as lateral = "corner-estimation-lateral"'
         )
+    if chosen.suspension == "compliant" and (schedules is None or schedules.lateral is None):
+        raise ValueError(
+            "schedules.lateral: missing, but estimators.suspension = 'compliant' belongs to corner observers of both "
+            'directions; add it, such as lateral = "corner-estimation-lateral"'
+        )
+    for own, (other, kinds) in _PARTS_OF.items():
+        if own in chosen.model_fields_set and getattr(chosen, other) not in kinds:
+            raise ValueError(
+                f"estimators.{own}: belongs to {other} = {' or '.join(kinds)}, and {other} is '{getattr(chosen, other)}'; "
+                "choose one of them, or leave it out"
+            )
     for place, estimator in ((name, str(getattr(chosen, name))) for name in chosen.model_fields_set):
         needs = f"missing, but estimators.{place} = '{estimator}' needs it"
         for parameter, example in _PARAMETERS.get((place, estimator), ()):
@@ -205,6 +232,11 @@ def check_estimators(
             raise ValueError(f"signals.steering: {needs}; {add}")
 
 
+_PARTS_OF = {
+    "process_covariance": ("corner_velocity", ("kalman-three-state", "kalman-two-state")),
+    "sideslip_speed": ("sideslip", CHOICES["sideslip"][1:]),
+    "stiffness_noise": ("sideslip", ("adaptive-stiffness", "fixed-stiffness", "sliding-mode")),
+}
 _YAW = ("yaw_inertia", "3900 kg*m^2")
 _STIFFNESS = (_YAW, ("cornering_stiffness_front", "160 kN/rad"), ("cornering_stiffness_rear", "180 kN/rad"))
 _TIRE = (*_STIFFNESS, ("relaxation_length", "0.5 m"))
@@ -227,6 +259,7 @@ class DriveFile(StrictTable):
 
     ``schedules`` are for the corner observers: without them the pipeline of the fusion runs alone.
 
+    ``mounting``: where the inertial unit and the reference sit, if not at the centre of gravity and along the axes of the car.
     ``check``: compare the signals of the log with one another (:mod:`.frames`) before anything is estimated from them.
     """
 
@@ -235,6 +268,7 @@ class DriveFile(StrictTable):
     source: str = ""
     sample_time: si.Duration = Field(examples=["5 ms"])
     vehicle: Vehicle
+    mounting: Mountings = Mountings()
     schedules: Schedules | None = None
     check: bool = True
     observer: Observer = Observer()
@@ -249,6 +283,7 @@ class DriveFile(StrictTable):
         check_columns(self.signals, self.reference, self.log, self.vehicle)
         check_alignment({**self.reference, **self.signals}, self.log)
         check_signals(self.signals, self.vehicle)
+        check_mountings(self.mounting, self.signals, self.reference)
         check_estimators(self.estimators, self.signals, self.vehicle, self.schedules)
         return self
 

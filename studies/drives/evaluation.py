@@ -19,7 +19,7 @@ from studies.drives.chain import Chain
 from studies.drives.corner_inputs import held, integrated_acceleration, mean_over, shared_forces
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
-from studies.drives.prepare import CornerInputs
+from studies.drives.prepare import CornerInputs, dead_reckoned, first_speed
 from studies.drives.quantities import CORNERS
 from studies.drives.replay import Replay, centre_map
 
@@ -76,13 +76,12 @@ def deviation(estimate: FloatArray, reference: FloatArray, unit: str) -> Deviati
 
 
 def lateral_motion(chain: Chain, log: DriveLog, inputs: CornerInputs, drive: DriveFile) -> dict[str, dict[str, Any]]:
-    """V_y and sideslip of the pipeline, the corner observers, the sideslip part, and the integral of a_y - r V_x."""
+    """V_y and sideslip of the pipeline, the corner observers, the sideslip part, and of planar dead reckoning."""
     reference, found = log.reference, {}
     if "vy" not in reference:
         return {}
-    ay = log.signals.get("ay", np.zeros_like(log.time))
+    integrated = dead_reckoned(inputs, drive.sample_time)[1]
     wheels = np.nan_to_num(held(inputs.surface_speed.mean(axis=1)))
-    integrated = integrated_acceleration(ay, -inputs.yaw_rate, wheels, drive.sample_time, 0.0)
     estimates = {"pipeline": chain.vy, "corner_observers": chain.corner_vy, "integrated_acceleration": integrated}
     found["vy"] = _deviations(estimates, reference["vy"], "m/s")
     if "vx" in reference:
@@ -187,11 +186,13 @@ class DriveData:
     @cached_property
     def baselines(self) -> dict[str, FloatArray]:
         """V_x (n,) without an observer, m/s, by name."""
-        given = self.inputs
-        wheels = mean_over(given.surface_speed)
-        start = float(wheels[np.flatnonzero(np.isfinite(wheels))[:1]].sum())
-        integrated = integrated_acceleration(given.ax, given.yaw_rate, given.vy, self.drive.sample_time, start)
-        return {"mean_wheel_speed": wheels, "integrated_acceleration": integrated}
+        given, time = self.inputs, self.drive.sample_time
+        if "vy" in self.log.signals:
+            start = first_speed(given)
+            integrated = integrated_acceleration(given.ax, given.yaw_rate, given.vy, time, start)
+        else:
+            integrated = dead_reckoned(given, time)[0]
+        return {"mean_wheel_speed": mean_over(given.surface_speed), "integrated_acceleration": integrated}
 
     @cached_property
     def slip(self) -> FloatArray:

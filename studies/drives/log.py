@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from studies.drives.align import find_offset
 from studies.drives.columns import Column, LogFile
 from studies.drives.drive_file import DriveFile
 from studies.drives.formats import is_bag_folder, read_table
+from studies.drives.mounted import PULLS, RATES, centred_reference, centred_signals
 from studies.drives.plausible import check_plausible
 from studies.drives.quantities import REFERENCES, SIGNALS, factor_to
 from studies.drives.stamps import Stamped, clean_stamps, resample
@@ -32,13 +33,16 @@ MOST_SAMPLES = 5_000_000  # of the common grid, seven hours at 5 ms: all signals
 class DriveLog:
     """Signals and references in SI over ``time``, s, n samples; NaN where nothing was measured.
 
-    ``report`` says for every log what was read, repaired, bridged and found.
+    Both are of the centre of gravity, along the axes of the car, if the drive file's ``mounting`` is right; ``unit`` holds the
+    accelerations and rates as the inertial unit reads them. ``report`` says for every log what was read, repaired, bridged
+    and found.
     """
 
     time: FloatArray
     signals: dict[str, FloatArray]
     reference: dict[str, FloatArray]
     report: dict[str, Any]
+    unit: dict[str, FloatArray] = field(default_factory=dict)
 
     @property
     def files(self) -> dict[str, str]:
@@ -79,12 +83,15 @@ def read_log(paths: Sequence[Path], drive: DriveFile) -> DriveLog:
 
     signals, reference = on_grid(drive.signals, "signals"), on_grid(drive.reference, "reference")
     check_plausible(drive, signals, reference, {name: path.name for name, path in files.items()})
+    unit = {name: signals[name] for name in (*PULLS, *RATES) if name in signals}
+    signals = centred_signals(signals, drive.mounting.inertial, drive.sample_time)
+    reference = centred_reference(reference, signals, drive.mounting.reference)
     missing = {name: int(np.count_nonzero(np.isnan(value))) for name, value in {**reference, **signals}.items()}
     report["grid"] = {
         "samples": int(grid.size), "sample_time_s": drive.sample_time, "start_s": float(grid[0]),
         "end_s": float(grid[-1]), "missing_samples": {name: count for name, count in missing.items() if count},
     }  # fmt: skip
-    return DriveLog(time=grid, signals=signals, reference=reference, report=report)
+    return DriveLog(time=grid, signals=signals, reference=reference, report=report, unit=unit)
 
 
 def assign_files(paths: Sequence[Path], entries: Sequence[LogFile]) -> dict[str, Path]:

@@ -49,6 +49,17 @@ class CornerInputs:
         return self.radius * self.wheel_speed
 
 
+def first_speed(inputs: CornerInputs) -> float:
+    """Mean of the wheel surface speeds where they are first known, m/s."""
+    wheels = corner_inputs.mean_over(inputs.surface_speed)
+    return float(wheels[np.flatnonzero(np.isfinite(wheels))[:1]].sum())
+
+
+def dead_reckoned(inputs: CornerInputs, sample_time: float) -> tuple[FloatArray, FloatArray]:
+    """V_x, V_y (n,) of the accelerations and the yaw rate alone, from the first wheel speeds on, m/s."""
+    return corner_inputs.dead_reckoning(inputs.ax, inputs.ay, inputs.yaw_rate, sample_time, first_speed(inputs))
+
+
 def corner_inputs_of(log: DriveLog, drive: DriveFile) -> CornerInputs:
     """Everything the observers need from a log; signals that are not measured count as zero, and are listed."""
     car, lag, step = drive.vehicle, drive.observer.derivative_lag, drive.sample_time
@@ -108,7 +119,7 @@ def _forces(
     car = drive.vehicle
     dynamics = corner_inputs.wheel_forces(
         _four(log, "torque"), wheel_speed, dw, load, car.wheel_inertia or 0.0, radius,
-        car.rolling_resistance, drive.observer.stopped_below,
+        car.rolling_resistance, drive.observer.stopped_below, car.bearing_friction,
     )  # fmt: skip
     known = np.array([f"torque_{corner}" in log.signals for corner in CORNERS])
     sources = tuple("wheel dynamics" if k else "m*a_x shared by load" for k in known)

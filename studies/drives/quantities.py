@@ -40,7 +40,7 @@ _QUANTITY = re.compile(r"\s*([-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]{1,3})?)\s*(.*
 _EXAMPLES = {
     "s": "s, ms, us, min", "Hz": "Hz, kHz", "rad": "rad, deg", "rad/s": "rad/s, deg/s, rpm", "m/s": "m/s, km/h, mph",
     "m/s^2": "m/s^2, g", "N": "N, kN", "N/rad": "N/rad, kN/rad", "N*m": "N*m, kN*m", "kg": "kg, t",
-    "kg*m^2": "kg*m^2", "m": "m, cm, mm",
+    "N/m": "N/m, kN/m", "N*s/m": "N*s/m", "N*m*s/rad": "N*m*s/rad", "kg*m^2": "kg*m^2", "m": "m, cm, mm",
 }  # fmt: skip
 
 
@@ -133,7 +133,11 @@ Duration = Annotated[float, BeforeValidator(_quantity("s", 0.0, inclusive=False)
 Stiffness = Annotated[float, BeforeValidator(_quantity("N/rad", 0.0, inclusive=False))]
 Lag = Annotated[float, BeforeValidator(_quantity("s", 0.0, inclusive=True))]
 Offset = Annotated[float, BeforeValidator(_quantity("s", -math.inf, inclusive=False))]
+Spring = Annotated[float, BeforeValidator(_quantity("N/m", 0.0, inclusive=False))]
+Damper = Annotated[float, BeforeValidator(_quantity("N*s/m", 0.0, inclusive=True))]
+Damping = Annotated[float, BeforeValidator(_quantity("N*m*s/rad", 0.0, inclusive=True))]
 Place = Annotated[float, BeforeValidator(_quantity("m", -math.inf, inclusive=False))]
+Angle = Annotated[float, BeforeValidator(_quantity("rad", -math.inf, inclusive=False))]
 Velocity = Annotated[float, BeforeValidator(_quantity("m/s", -math.inf, inclusive=False))]
 Torque = Annotated[float, BeforeValidator(_quantity("N*m", 0.0, inclusive=False))]
 Power = Annotated[float, BeforeValidator(_quantity("W", 0.0, inclusive=False))]

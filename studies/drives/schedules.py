@@ -181,4 +181,5 @@ def corner_observer(drive: DriveFile, folder: Path, schedule: GainSchedule) -> C
         if kind == "lpv":
             return ScheduledCorners(schedule)
         tire = load_tire(drive.schedules.longitudinal if drive.schedules is not None else "", folder)
-        return KalmanCorners(tire, schedule.sample_time, states=3 if kind == "kalman-three-state" else 2)
+        states: Literal[2, 3] = 3 if kind == "kalman-three-state" else 2
+        return KalmanCorners(tire, schedule.sample_time, states=states, process=drive.estimators.process_covariance)

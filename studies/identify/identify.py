@@ -17,6 +17,7 @@ from studies.identify.estimate import Estimate
 from studies.identify.inertia import fit_inertia
 from studies.identify.lateral import LateralSlip
 from studies.identify.longitudinal import LongitudinalSlip, wheel_force
+from studies.identify.mounting import MountingFit, fit_mounting
 from studies.identify.settings import IdentifySettings
 from studies.identify.slip_limit import LimitedFit, fit_low_slip
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
@@ -37,6 +38,7 @@ class Identification:
     inertia: Estimate | None
     wheel_inertia: float
     absent: dict[str, str]
+    mounting: MountingFit
 
     @property
     def velocity_reference(self) -> str:
@@ -56,7 +58,7 @@ def identify_drive(
     settings: IdentifySettings | None = None,
     progress: Progress = lambda _done: None,
 ) -> Identification:
-    """Fit wheel inertia, longitudinal and lateral tire from the ``logs`` that the ``drive`` file describes.
+    """Fit wheel inertia, both tires and the mounting of the inertial unit to the ``logs`` that the ``drive`` file describes.
 
     Raises SpecError (drive file, base set), LogError (logs), IdentifyError (no reference, standstill, too short), one line.
     """
@@ -98,9 +100,12 @@ def identify_log(
         force = np.nan_to_num(wheel_force(data, inertia), nan=0.0)
         across = LateralSlip(data, base.tire["lateral"], force, yaw_inertia_prior(drive), chosen)
         correlation = across.filter.correlation
-        fits["lateral"] = fit_low_slip(across, chosen, correlation, lambda done: progress(0.55 + 0.45 * done))
+        fits["lateral"] = fit_low_slip(across, chosen, correlation, lambda done: progress(0.55 + 0.35 * done))
+    unit = fit_mounting(log, drive, chosen)
+    if unit.absent:
+        absent["mounting"] = unit.absent
     progress(1.0)
-    return Identification(drive, base, names, data, chosen, fits, spin, inertia, absent)
+    return Identification(drive, base, names, data, chosen, fits, spin, inertia, absent, unit)
 
 
 def torque_delay(spin: Estimate | None, settings: IdentifySettings) -> tuple[float, float]:

@@ -133,5 +133,5 @@ def wheel_force(data: DriveSignals, inertia: float) -> FloatArray:
         return shared_forces(inputs.ax, data.load, car.mass, nothing, known)
     return wheel_forces(
         data.torque, inputs.wheel_speed, np.gradient(inputs.wheel_speed, data.step, axis=0), data.load, inertia,
-        inputs.radius, car.rolling_resistance, data.drive.observer.stopped_below,
+        inputs.radius, car.rolling_resistance, data.drive.observer.stopped_below, car.bearing_friction,
     )  # fmt: skip

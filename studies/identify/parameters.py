@@ -9,13 +9,15 @@ import numpy as np
 
 from studies.identify.estimate import Estimate
 from studies.identify.identify import Identification, yaw_inertia_prior
+from studies.identify.mounting import ANGLES, ARMS
 from studies.identify.slip_limit import LimitedFit
 from synthesis.models.parameter_set import quantities
 
 
 @dataclass(frozen=True)
 class Identified:
-    """One parameter: ``interval`` is None where the value is not from the log; ``half_width`` what the log allowed, relative."""
+    """One parameter: ``interval`` is None where the value is not from the log; ``half_width`` is what the log allowed, relative
+    (of a mounting: in its unit)."""
 
     value: float
     unit: str
@@ -108,6 +110,22 @@ def vehicle_parameters(found: Identification) -> dict[str, Identified]:
     if across is not None:
         guess, given = yaw_inertia_prior(found.drive), "m L_f L_r" if car.yaw_inertia is None else name
         out["yaw_inertia"] = fitted(across.fit, "yaw_inertia", "kg*m^2", guess, given, plain)
+    return out
+
+
+def mounting_parameters(found: Identification) -> dict[str, Identified]:
+    """Lever arm, m, and angles, rad, of the inertial unit: identified, or as the drive file has them; none without a fit."""
+    fit, logs, out = found.mounting.fit, ", ".join(found.logs), dict[str, Identified]()
+    if fit is None:
+        return out
+    for name in (*ARMS, *ANGLES):
+        yes = fit.excited[name]
+        source = f"identified from {logs}: {fit.samples} rows" if yes else f"not excited by {logs}; prior: drive file"
+        value = fit.value(name) if yes else float(getattr(found.mounting.given, name))
+        interval = fit.interval(name) if yes else None
+        out[name] = Identified(
+            value, "m" if name in ARMS else "rad", interval, yes, fit.samples, source, fit.half[name]
+        )
     return out
 
 

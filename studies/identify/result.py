@@ -10,13 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from studies.drives.mounted import Mountings
 from studies.execution.files import only_run, ready_folder, whole_file, write_json
 from studies.identify.identify import Identification
-from studies.identify.parameters import Identified, tire_parameters, vehicle_parameters
+from studies.identify.parameters import Identified, mounting_parameters, tire_parameters, vehicle_parameters
 from studies.identify.plots import figures
 from studies.identify.slip_limit import LimitedFit
 from studies.plots.save import write_figures
 from synthesis.models.parameter_set import Quantity, Tire, load_parameter_set
+from synthesis.toml_file import StrictTable, load_toml
 
 SCHEMA = "gainsmith.identification/1"
 HEADER = ("parameter", "value", "95 % interval", "unit", "excited", "rows")
@@ -62,12 +64,13 @@ def tire_residual(found: Identification, direction: str, tire: Tire, limit: floa
 
 
 def all_parameters(found: Identification) -> dict[str, dict[str, Identified]]:
-    """By group: vehicle, longitudinal, lateral."""
+    """By group: vehicle, longitudinal, lateral, mounting."""
     groups: dict[str, dict[str, Identified]] = {"vehicle": vehicle_parameters(found)}
     for direction in ("longitudinal", "lateral"):
         if direction in found.base.tire:
             groups[direction] = tire_parameters(found, direction)
-    return groups
+    mounted = mounting_parameters(found)
+    return groups | ({"mounting": mounted} if mounted else {})
 
 
 def identified_tire(found: Identification, direction: str) -> Tire:
@@ -104,6 +107,8 @@ def warnings(found: Identification) -> list[str]:
                 continue
             half = entry.half_width
             width = "no trace in the log" if half is None or half > 10 else f"half width {100 * half:.0f} %"
+            if group == "mounting" and width.endswith("%"):
+                width = f"half width {half:.2g} {entry.unit}"
             lines.append(f"{group} {name}: not excited ({width}); {entry.source.split('; ', 1)[-1]}")
     return lines
 
@@ -167,6 +172,25 @@ def parameter_file(found: Identification) -> str:
     return "\n".join(lines) + "\n"
 
 
+class MountingFile(StrictTable):
+    """What `mounting.toml` holds."""
+
+    mounting: Mountings
+
+
+def mounting_file(found: Identification) -> str:
+    """The table `[mounting.inertial]` of a drive file: what was identified, and what the drive file had besides."""
+    lines = [f"# {', '.join(found.logs)}: into the drive file", "[mounting.inertial]"]
+    for name, entry in mounting_parameters(found).items():
+        if entry.interval is not None:
+            lines.append(
+                f'{name} = "{entry.value:.4g} {entry.unit}"  # 95 % [{entry.interval[0]:.4g}, {entry.interval[1]:.4g}]'
+            )
+        elif entry.value:
+            lines.append(f'{name} = "{entry.value!r} {entry.unit}"  # not excited')
+    return "\n".join(lines) + "\n"
+
+
 def note(found: Identification) -> str:
     """What the file is, and what in it is not from the log."""
     held = [
@@ -205,4 +229,9 @@ def write_identification(found: Identification, out: Path) -> tuple[Path, ...]:
             beside.write_text(parameter_file(found), encoding="utf-8")
             load_parameter_set(beside)
         write_json(paths[1], content(found))
+        if any(entry.excited for entry in mounting_parameters(found).values()):
+            paths.append(out / "mounting.toml")
+            with whole_file(paths[2]) as beside:
+                beside.write_text(mounting_file(found), encoding="utf-8")
+                load_toml(beside, MountingFile, "mounting")
         return (*paths, *write_figures(figures(found), out))

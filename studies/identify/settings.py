@@ -31,6 +31,8 @@ class IdentifySettings:
     radius_width: float = 0.005  # relative; pressure, wear and catalogue leave 1.5 %
     saturation_width: float = 0.3  # of s [1]: at a tenth of friction 1 it is worth 3 % of stiffness
     inertia_width: float = 0.2  # relative, wheel and yaw; rim and tire catalogues are no better
+    arm_width: float = 0.15  # m, lever arm of the inertial unit
+    mounting_width: float = 0.01  # rad, its angles
     # standard deviations of what is held at its prior, and of nuisances
     stiffness_spread: float = 0.8  # natural logarithm: 15 to 80 about the middle
     relaxation_spread: float = 0.6  # natural logarithm: 0.08 to 0.4 m
@@ -54,6 +56,18 @@ class IdentifySettings:
     drag_prior: float = 0.45  # N s^2/m^2: half air density, frontal area 2.4 m^2, coefficient 0.3
     drag_spread: float = 0.3
     acceleration_bias: float = 0.2  # m/s^2: accelerometer bias, and grade of 1 %
+    arm_spread: float = 1.0  # m: from the middle of a car to its ends
+    mounting_spread: float = 0.05  # rad: units are fitted by hand, or stand on a seat
+    tilt_spread: float = 0.004  # rad/(m/s^2): a body rolls by 3 to 8 deg/g and pitches by 1 to 3 deg/g
+    tilt_delay: float = 0.05  # s, of roll and pitch against the accelerations
+    sway: float = 0.003  # (rad/s)/(m/s^2) of the body in phase with a_y: what a delay leaves of a second-order motion
+    heave_arm: float = (
+        0.2  # m: a body pitches about a point ahead of or behind its centre of gravity, and rolls beside it
+    )
+    jacking: float = 0.01  # of 1: vertical acceleration of a body in proportion to a_y
+    scale_spread: float = 0.01  # relative, of accelerometers
+    reference_delay: float = 0.01  # s, of the reference against the inertial unit, and of the body's roll against a_y
+    rate_bias: float = 0.005  # rad/s, of gyros
     free_rolling: float = 0.05  # |mu| below which wheels may be told apart though only the sum of forces is known
     cross_force: float = 0.2  # share of the load used sideways (lengthways): a friction ellipse of radius 1 loses 2 %
     least_load: float = 0.2  # of the static load: a lighter wheel is about to lift
