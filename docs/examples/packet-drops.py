@@ -57,7 +57,7 @@ fig.savefig("drops-mean-square.svg")
 for failure, recovery in ((0.5, 1.0), (0.05, 0.1)):
     system = gilbert_elliott(lost, received, failure, recovery)
     share = failure / (failure + recovery)
-    print(f"{share:.2f} lost, {1 / recovery:.0f} in a row on average: {system.verdict}")
+    print(f"{share:.2f} lost, {1 / recovery:.0f} in a row on average: {system.verdict()}")
 
 # %% [markdown]
 # Of a shipped schedule, over its whole range, with the parameter frozen; `gainsmith certify` proves the number that holds in motion.

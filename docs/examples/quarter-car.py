@@ -46,15 +46,15 @@ fig.savefig("quarter-car-gains.svg")
 
 # %%
 T, random = spec.deploy.sample_time, np.random.default_rng(0)
-x, estimate, rows = np.zeros(4), np.zeros(4), []
-for n in range(1500):
+x, estimate, road, rows = np.zeros(4), np.zeros(4), 0.0, []
+for n in range(1000):
     c = 1500.0 + 900.0 * np.sin(2.0 * np.pi * 0.8 * n * T)
     at = model.on([c])
     A, C, E = at.A[0], at.C[0], at.E[0][:, :1]
     y = C @ x + [0.001, 0.1] * random.standard_normal(2)
     gain = [[np.interp(c, damping, deployment.table[:, i, j]) for j in range(2)] for i in range(4)]
     estimate = expm(T * A) @ estimate + np.array(gain) @ (y - C @ estimate)
-    road = 0.3 * random.standard_normal()
+    road = 0.96 * road + 0.08 * random.standard_normal()  # 0.3 m/s RMS, up to about 3 Hz
     both = expm(T * np.block([[A, E], [np.zeros((1, 5))]]))
     x = (both @ [*x, road])[:4]
     rows.append((T * (n + 1), x[2], estimate[2]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import sys
 
 from docs.tools.fences import blocks
@@ -25,7 +26,7 @@ def unknown_commands(texts: dict[str, str]) -> list[str]:
     for place, text in texts.items():
         for block in blocks(text):
             for line in block.code.splitlines() if block.language == "console" else ():
-                words = re.sub(r"^\$ ", "", line.partition("  #")[0]).split()
+                words = shlex.split(line.removeprefix("$ "), comments=True)
                 if words[:1] == ["gainsmith"]:
                     try:
                         parser().parse_args(words[1:])

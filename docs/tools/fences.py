@@ -5,7 +5,8 @@
     ```toml title="x"    written to the file x of the page's folder (any language with a title)
     ```console           shown only, for what a page cannot do (installing, an hour's work); its gainsmith lines must parse
 
-Options after the language: `quiet` shows no output, `head=N` only its first N lines. Other languages are shown only.
+Options after the language: `quiet` shows no output, `head=N` only its first N lines, `hide` runs the block and shows only what it
+prints. Other languages are shown only.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ class Block:
     code: str
     title: str | None
     quiet: bool
+    hide: bool
     head: int | None
     line: int
 
@@ -36,6 +38,7 @@ def block_of(match: re.Match[str]) -> Block:
     title, head = re.search(r'title="([^"]+)"', options), re.search(r"head=(\d+)", options)
     return Block(
         match["language"], dedent(match["code"]), title[1] if title else None, bool(re.search(r"\bquiet\b", options)),
+        bool(re.search(r"\bhide\b", options)),
         int(head[1]) if head else None, match.string.count("\n", 0, match.start()) + 1,
     )  # fmt: skip
 
@@ -51,13 +54,13 @@ def with_outputs(text: str, outputs: list[str]) -> str:
 
     def shown(match: re.Match[str]) -> str:
         block, output = block_of(match), next(left)
-        title = f' title="{block.title}"' if block.title and block.language not in RUN else ""
-        lines = [f"```{block.language}{title}", *block.code.splitlines(), "```"]
+        title = f' title="{block.title}"' if block.title else ""
+        lines = [] if block.hide else [f"```{block.language}{title}", *block.code.splitlines(), "```"]
         if output and not block.quiet:
             said = output.rstrip("\n").splitlines()
             if block.head is not None and len(said) > block.head:
                 said = [*said[: block.head], f"... ({len(said) - block.head} more lines)"]
-            lines += ["", "```{ .text .output }", *said, "```"]
+            lines += [*([""] if lines else []), "```{ .text .output }", *said, "```"]
         return "\n".join(match["indent"] + line for line in lines)
 
     return FENCE.sub(shown, text)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import inspect
 import re
 from html import escape
 from importlib import import_module
 
+from docs.tools.file_formats import files_page
 from docs.tools.pages import ROOT
 
 DOORS = {
@@ -21,7 +23,8 @@ DOCTEST = re.compile(r"^\s*>>> ", re.M)
 
 def reference_pages() -> dict[str, str]:
     """Place in the site -> Markdown."""
-    return {f"reference/{door}.md": _door(door) for door in DOORS} | {"reference/commands.md": _commands()}
+    made = {f"reference/{door}.md": _door(door) for door in DOORS}
+    return made | {"reference/commands.md": _commands(), "reference/files.md": files_page()}
 
 
 def entries(door: str) -> dict[str, str]:
@@ -50,7 +53,8 @@ def _described(found: object) -> bool:
 
 
 def _methods(found: type) -> list[tuple[str, object]]:
-    public = {key: value for key, value in vars(found).items() if not key.startswith("_")}
+    fields = {field.name for field in dataclasses.fields(found)} if dataclasses.is_dataclass(found) else set()
+    public = {key: value for key, value in vars(found).items() if not key.startswith("_") and key not in fields}
     kinds = (classmethod, staticmethod, property)
     return [(key, getattr(found, key)) for key, value in public.items() if inspect.isfunction(value) or isinstance(value, kinds)]
 
