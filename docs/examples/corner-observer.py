@@ -1,8 +1,8 @@
 # %% [markdown]
 # # A shipped schedule on a simulated car
 #
-# The five shipped schedules are for vehicle velocity: bristle deflection of the tire and relative velocity at a wheel, scheduled by
-# wheel speed. Here one of them runs for 1000 launches at once.
+# The five shipped schedules are for vehicle velocity: bristle deflection of the tire and relative velocity at a
+# wheel, scheduled by wheel speed. Here one of them runs for 1000 launches at once.
 
 # %%
 import matplotlib.pyplot as plt
@@ -22,8 +22,8 @@ for axis, i in zip(axes, (0, 1), strict=True):
 fig.savefig("corner-gains.svg")
 
 # %% [markdown]
-# The plant of the schedule file is the true one here, with noise on the measured force and 10 % of the samples lost. A missing
-# measurement is a NaN: the observer coasts, and says so in its flags.
+# The plant of the schedule file is the true one here, with noise on the measured force and 10 % of the samples lost.
+# A missing measurement is a NaN: the observer coasts, and says so in its flags.
 
 # %%
 cars, random, dt = 1000, np.random.default_rng(3), schedule.sample_time

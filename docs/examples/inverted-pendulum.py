@@ -1,8 +1,8 @@
 # %% [markdown]
 # # An inverted pendulum on a lifted base
 #
-# The third shipped example has an unstable plant: an error grows by itself, so every lost sample costs. The scheduling parameter is
-# the gravity that the pendulum feels while its base is lifted and lowered.
+# The third shipped example has an unstable plant: an error grows by itself, so every lost sample costs. The
+# scheduling parameter is the gravity that the pendulum feels while its base is lifted and lowered.
 
 # %%
 import matplotlib.pyplot as plt
@@ -17,7 +17,8 @@ poles = np.linalg.eigvals(model.on(gravity).A)
 print(f"fastest growth: {poles.real.max():.2f} 1/s; hidden modes that do not decay: {undetectable_mode(model)}")
 
 # %% [markdown]
-# Design for an observer that corrects every 5 ms, and prove. The proof says which share of lost samples is surely survived.
+# Design for an observer that corrects every 5 ms, and prove. The proof says which share of lost samples is surely
+# survived.
 
 # %%
 deployment = deploy(spec.design(model), spec.deploy_settings())
@@ -26,14 +27,16 @@ for proof in proofs:
     print("proved" if proof.proved else "not proved", f"{proof.claim}: {proof.level:.4g} {proof.unit}")
 
 # %% [markdown]
-# Beside the proof, for every parameter value in its range and every admissible motion, stands what frozen parameters would allow: an
-# upper limit that proves nothing about motion, and shows how little is given away.
+# Beside the proof, for every parameter value in its range and every admissible motion, stands what frozen parameters
+# would allow: an upper limit that proves nothing about motion, and shows how little is given away.
 
 # %%
 from scipy.linalg import expm
 
 lost = np.array([expm(spec.deploy.sample_time * A) for A in model.on(gravity).A])
-columns = [[np.interp(gravity, deployment.breakpoints[0], deployment.table[:, i, j]) for j in range(2)] for i in range(4)]
+columns = [
+    [np.interp(gravity, deployment.breakpoints[0], deployment.table[:, i, j]) for j in range(2)] for i in range(4)
+]
 gain = np.moveaxis(np.array(columns), 2, 0)
 received = lost - gain @ model.on(gravity).C
 frozen = critical_drop_probability(lost, received)

@@ -1,8 +1,9 @@
 # %% [markdown]
 # # A mass on a spring that stiffens
 #
-# The whole way in one script: equations, gains, a table, its proof, and the observer that runs. The plant is a mass on a spring
-# whose stiffness is measured and varies between 10 and 40 N/m; the sensor sees the position, and we want the velocity.
+# The whole way in one script: equations, gains, a table, its proof, and the observer that runs. The plant is a mass
+# on a spring whose stiffness is measured and varies between 10 and 40 N/m; the sensor sees the position, and we want
+# the velocity.
 
 # %%
 import matplotlib.pyplot as plt
@@ -44,9 +45,9 @@ model = LpvModel(
 )
 
 # %% [markdown]
-# What is asked: the velocity error that an unknown force of 1 N together with 2 mm of noise can cause shall be as small as possible,
-# for an observer that predicts and then corrects once every 10 ms. The answer is an interval: a lower bound for all gains of this
-# form, and the level that was reached.
+# What is asked: the velocity error that an unknown force of 1 N together with 2 mm of noise can cause shall be as
+# small as possible, for an observer that predicts and then corrects once every 10 ms. The answer is an interval: a
+# lower bound for all gains of this form, and the level that was reached.
 
 # %%
 channel = Channel(("force", "noise"), ("velocity",), weights=(1.0, 0.002))

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Norms and detectability with proofs
 #
-# Numbers that other tools give without saying how far they can be trusted come here with two sides, and with a third answer where the
-# precision of the data ends.
+# Numbers that other tools give without saying how far they can be trusted come here with two sides, and with a third
+# answer where the precision of the data ends.
 
 # %%
 import control
@@ -12,8 +12,8 @@ import numpy as np
 from gainsmith import detectable, distance_to_undetectability, h2_norm, hinf_norm
 
 # %% [markdown]
-# The H-infinity norm of a lightly damped oscillator has a closed form, 1/(2 z sqrt(1 - z^2)). The result has the peak, its frequency,
-# and an upper bound that is proved. System objects of python-control are taken as they are.
+# The H-infinity norm of a lightly damped oscillator has a closed form, 1/(2 z sqrt(1 - z^2)). The result has the
+# peak, its frequency, and an upper bound that is proved. System objects of python-control are taken as they are.
 
 # %%
 z = 0.05
@@ -36,8 +36,8 @@ axis.set(xlabel="damping ratio", ylabel="H-infinity norm")
 fig.savefig("oscillators.svg")
 
 # %% [markdown]
-# A rotation by 0.3 rad per sample neither grows nor decays, but its entries are rounded: within the precision of the data it may do
-# either, so the norm is `undecided`.
+# A rotation by 0.3 rad per sample neither grows nor decays, but its entries are rounded: within the precision of the
+# data it may do either, so the norm is `undecided`.
 
 # %%
 rotation = [[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]]
@@ -45,8 +45,8 @@ on_the_border = hinf_norm(rotation, [[0.0], [1.0]], [[1.0, 0.0]], discrete=True)
 print("undecided:", bool(on_the_border.undecided), " norm:", on_the_border.norm, " upper bound:", on_the_border.upper)
 
 # %% [markdown]
-# Detectability has three verdicts, too. The first pair sees its unstable mode; the second hides it; in the third the sensor sees it by
-# 1e-17, which is less than the last digit of the other entries.
+# Detectability has three verdicts, too. The first pair sees its unstable mode; the second hides it; in the third the
+# sensor sees it by 1e-17, which is less than the last digit of the other entries.
 
 # %%
 unstable = [[1.0, 0.0], [0.0, -2.0]]

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # How many lost samples does an observer survive?
 #
-# A measurement that arrives corrects the error, one that is lost lets it grow. With losses at random the error is a Markov jump
-# system; it is mean-square stable below a critical drop probability.
+# A measurement that arrives corrects the error, one that is lost lets it grow. With losses at random the error is a
+# Markov jump system; it is mean-square stable below a critical drop probability.
 
 # %%
 import matplotlib.pyplot as plt
@@ -50,8 +50,8 @@ axis.legend(title="drop probability")
 fig.savefig("drops-mean-square.svg")
 
 # %% [markdown]
-# Losses come in bursts. In the model of Gilbert and Elliott the channel fails with one probability and recovers with another; a third
-# of the samples is lost in both of these, but one loses them singly and the other in a row.
+# Losses come in bursts. In the model of Gilbert and Elliott the channel fails with one probability and recovers with
+# another; a third of the samples is lost in both of these, but one loses them singly and the other in a row.
 
 # %%
 for failure, recovery in ((0.5, 1.0), (0.05, 0.1)):
@@ -60,7 +60,8 @@ for failure, recovery in ((0.5, 1.0), (0.05, 0.1)):
     print(f"{share:.2f} lost, {1 / recovery:.0f} in a row on average: {system.verdict()}")
 
 # %% [markdown]
-# Of a shipped schedule, over its whole range, with the parameter frozen; `gainsmith certify` proves the number that holds in motion.
+# Of a shipped schedule, over its whole range, with the parameter frozen; `gainsmith certify` proves the number that
+# holds in motion.
 
 # %%
 print(frozen_critical_probability(GainSchedule.shipped("resilient-velocity-lateral")).message)

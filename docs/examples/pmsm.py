@@ -1,8 +1,9 @@
 # %% [markdown]
 # # Currents of a synchronous machine at 12 kHz
 #
-# Another shipped example. The currents of a permanent-magnet machine are coupled through the electrical speed, which is the scheduling
-# parameter; it runs from -471 to 471 rad/s. The observer filters the measured currents without delay.
+# Another shipped example. The currents of a permanent-magnet machine are coupled through the electrical speed, which
+# is the scheduling parameter; it runs from -471 to 471 rad/s. The observer filters the measured currents without
+# delay.
 
 # %%
 import matplotlib.pyplot as plt
@@ -30,8 +31,8 @@ for axis, kind in zip(axes, ("own", "coupling"), strict=True):
 fig.savefig("pmsm-gains.svg")
 
 # %% [markdown]
-# How large are the poles of the machine itself, beside the sample time of 83 microseconds? The prediction is exact, so the observer
-# does not care; Euler steps would.
+# How large are the poles of the machine itself, beside the sample time of 83 microseconds? The prediction is exact,
+# so the observer does not care; Euler steps would.
 
 # %%
 poles = np.linalg.eigvals(model.on(np.linspace(-471.0, 471.0, 5)).A)

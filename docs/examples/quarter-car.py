@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Wheel load of a quarter car
 #
-# A shipped example: four states, two sensors, a damper whose valve is set while driving. The tire deflection, and with it the wheel
-# load, is not measured; the observer finds it from suspension deflection and body acceleration.
+# A shipped example: four states, two sensors, a damper whose valve is set while driving. The tire deflection, and
+# with it the wheel load, is not measured; the observer finds it from suspension deflection and body acceleration.
 
 # %%
 import matplotlib.pyplot as plt
@@ -16,7 +16,8 @@ model = spec.plant(folder).model
 print(model.name, [s.name for s in model.states], "from", [s.name for s in model.outputs])
 
 # %% [markdown]
-# Can it work at all? Observability is decided over the whole range of the damping and of its rate, not at frozen points.
+# Can it work at all? Observability is decided over the whole range of the damping and of its rate, not at frozen
+# points.
 
 # %%
 found = observability_over_range(model)
@@ -41,8 +42,9 @@ axes[0].legend(fontsize=7)
 fig.savefig("quarter-car-gains.svg")
 
 # %% [markdown]
-# A rough road, the valve switching between soft and firm: the tire deflection, true and estimated. The update is written out here, so
-# that every line of it can be seen: predict over the sample, then correct with the gain at the damping of now.
+# A rough road, the valve switching between soft and firm: the tire deflection, true and estimated. The update is
+# written out here, so that every line of it can be seen: predict over the sample, then correct with the gain at the
+# damping of now.
 
 # %%
 T, random = spec.deploy.sample_time, np.random.default_rng(0)
@@ -66,4 +68,6 @@ axis.plot(time, 190.0 * found, "--", color="tab:orange", label="estimated")
 axis.set(xlabel="time [s]", ylabel="wheel load, change [kN]", xlim=(1.0, 2.0))
 axis.legend(loc="upper right")
 fig.savefig("quarter-car-load.svg")
-print(f"change of wheel load: {190e3 * true.std():.0f} N RMS, error of its estimate {190e3 * (found - true).std():.0f} N RMS")
+print(
+    f"change of wheel load: {190e3 * true.std():.0f} N RMS, error of its estimate {190e3 * (found - true).std():.0f} N RMS"
+)

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Which parameter eats the margin?
 #
-# An observer was designed for published tire values. On the road they are off. How much does each one matter: alone, in the worst
-# corner, and as a share of the variance?
+# An observer was designed for published tire values. On the road they are off. How much does each one matter: alone,
+# in the worst corner, and as a share of the variance?
 
 # %%
 import matplotlib.pyplot as plt

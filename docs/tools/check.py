@@ -39,7 +39,9 @@ def unknown_commands(texts: dict[str, str]) -> list[str]:
 def outside_navigation(places: set[str]) -> list[str]:
     """Pages that the navigation lacks, and entries of it without a page."""
     listed = set(re.findall(r"[\w/-]+\.md", (ROOT / "docs/mkdocs.yml").read_text(encoding="utf-8")))
-    return [f"docs/mkdocs.yml: {name} is in the navigation or in the pages, not in both" for name in sorted(places ^ listed)]
+    return [
+        f"docs/mkdocs.yml: {name} is in the navigation or in the pages, not in both" for name in sorted(places ^ listed)
+    ]
 
 
 def main() -> int:

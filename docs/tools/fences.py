@@ -15,7 +15,9 @@ import re
 from dataclasses import dataclass
 from textwrap import dedent
 
-FENCE = re.compile(r"^(?P<indent>[ ]*)```(?P<language>\w+)(?P<options>[^\n]*)\n(?P<code>.*?)^(?P=indent)```[ ]*$", re.M | re.S)
+FENCE = re.compile(
+    r"^(?P<indent>[ ]*)```(?P<language>\w+)(?P<options>[^\n]*)\n(?P<code>.*?)^(?P=indent)```[ ]*$", re.M | re.S
+)
 RUN = ("python", "sh")
 
 

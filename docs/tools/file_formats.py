@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import types
 import typing
@@ -20,21 +21,28 @@ def files_page() -> str:
 
     def table(match: re.Match[str]) -> str:
         model = getattr(import_module(match[1]), match[2])
-        return "\n".join(["| key | value | default |", "|---|---|---|", *(_row(*item) for item in model.model_fields.items())])
+        return "\n".join(
+            ["| key | value | default |", "|---|---|---|", *(_row(*item) for item in model.model_fields.items())]
+        )
 
     text = (ROOT / "docs/pages/reference/files.md.in").read_text(encoding="utf-8")
     return re.sub(r"^\{\{ ([\w.]+):(\w+) \}\}$", table, text, flags=re.M)
 
 
 def _row(key: str, field: Any) -> str:
-    quantity = any("BeforeValidator" in str(entry) for entry in field.metadata) or "BeforeValidator" in str(field.annotation)
-    value = 'quantity such as `"5 ms"`' if quantity else _words(field.annotation)
+    read_by = f"{field.annotation} {field.metadata}"
+    if "_quantity" in read_by:
+        value = 'quantity such as `"5 ms"`'
+    elif "BeforeValidator" in read_by:
+        value = "name = formula"
+    else:
+        value = _words(field.annotation)
     if field.is_required():
         default = "needed"
     elif field.default_factory is not None or isinstance(field.default, BaseModel):
         default = "see its own keys" if isinstance(field.default, BaseModel) else "empty"
     else:
-        default = "none" if field.default in (None, "") else f"`{field.default!r}`".replace("'", '"')
+        default = "none" if field.default in (None, "") else f"`{json.dumps(field.default)}`"
     return f"| `{field.alias or key}` | {value} | {default} |"
 
 
@@ -47,7 +55,11 @@ def _words(kind: Any) -> str:
     if origin in (types.UnionType, typing.Union):
         return " or ".join(_words(part) for part in inside)
     if origin is list:
-        return f"list of {_words(inside[0])}" if not _is_table(inside[0]) else "tables, see below"
+        return (
+            f"list of {_words(inside[0])}".replace("number", "numbers")
+            if not _is_table(inside[0])
+            else "tables, see below"
+        )
     if origin is tuple:
         return f"list of {len(inside)} numbers" if Ellipsis not in inside else f"list of {_words(inside[0])}"
     if origin is dict:

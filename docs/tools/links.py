@@ -21,7 +21,9 @@ def anchors(text: str) -> set[str]:
     return found
 
 
-def broken_links(texts: Mapping[str, str], pictures: Mapping[str, Collection[str]], stored: Collection[str]) -> Iterator[str]:
+def broken_links(
+    texts: Mapping[str, str], pictures: Mapping[str, Collection[str]], stored: Collection[str]
+) -> Iterator[str]:
     """What each page links to and is not there; `pictures` are those that its blocks draw, `stored` the site's other files."""
     for place, text in texts.items():
         for picture, target in LINK.findall(FENCE.sub("", text)):
@@ -29,10 +31,7 @@ def broken_links(texts: Mapping[str, str], pictures: Mapping[str, Collection[str
                 continue
             path, _, anchor = target.partition("#")
             full = posixpath.normpath(posixpath.join(posixpath.dirname(place), path)) if path else place
-            if picture:
-                there = full in stored or path in pictures.get(place, ())
-            else:
-                there = full in texts or full in stored
+            there = full in stored or (path in pictures.get(place, ()) if picture else full in texts)
             if not there:
                 yield f"{place}: nothing at {target}"
             elif anchor and full in texts and anchor not in anchors(texts[full]):

@@ -32,4 +32,6 @@ def as_page(percent: str, file: str) -> str:
 
 
 def _figures(body: str) -> str:
-    return "".join(f"\n\n![What the code above draws]({name})" for name in re.findall(r'savefig\("([\w-]+\.svg)"', body))
+    return "".join(
+        f"\n\n![What the code above draws]({name})" for name in re.findall(r'savefig\("([\w-]+\.svg)"', body)
+    )

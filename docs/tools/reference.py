@@ -56,13 +56,17 @@ def _methods(found: type) -> list[tuple[str, object]]:
     fields = {field.name for field in dataclasses.fields(found)} if dataclasses.is_dataclass(found) else set()
     public = {key: value for key, value in vars(found).items() if not key.startswith("_") and key not in fields}
     kinds = (classmethod, staticmethod, property)
-    return [(key, getattr(found, key)) for key, value in public.items() if inspect.isfunction(value) or isinstance(value, kinds)]
+    return [
+        (key, getattr(found, key))
+        for key, value in public.items()
+        if inspect.isfunction(value) or isinstance(value, kinds)
+    ]
 
 
 def _door(door: str) -> str:
     parts = [
         f"# {door}: {DOORS[door][0].lower() + DOORS[door][1:]}",
-        f"`from gainsmith import NAME`, or `from {door} import NAME`. {len(entries(door))} names, made from the code's docstrings.",
+        f"`from gainsmith import NAME`, or `from {door} import NAME`. {len(entries(door))} names, from the code's docstrings.",
     ]
     groups: dict[str, list[str]] = {}
     for name, module in entries(door).items():
@@ -74,7 +78,11 @@ def _door(door: str) -> str:
 
 
 def _entry(name: str, found: object) -> str:
-    lines = [f"### {name} {{ #{name} }}", f"```python\n{_signature(name, found)}\n```", as_html(inspect.getdoc(found) or "")]
+    lines = [
+        f"### {name} {{ #{name} }}",
+        f"```python\n{_signature(name, found)}\n```",
+        as_html(inspect.getdoc(found) or ""),
+    ]
     if inspect.isclass(found) and not issubclass(found, BaseException):
         for key, method in _methods(found):
             text = inspect.getdoc(method) or ""
@@ -143,7 +151,10 @@ def _commands() -> str:
     from studies.cli import parser
 
     (subparsers,) = (a for a in parser()._actions if isinstance(a, argparse._SubParsersAction))
-    parts = ["# Commands", "What `gainsmith COMMAND --help` prints. Every command takes `--json`; exit codes stand at the end."]
+    parts = [
+        "# Commands",
+        "What `gainsmith COMMAND --help` prints. Every command takes `--json`; exit codes stand at the end.",
+    ]
     for name, command in subparsers.choices.items():
         command.prog = f"gainsmith {name}"
         parts += [f"## gainsmith {name}", f"```text\n{command.format_help().rstrip()}\n```"]

@@ -37,21 +37,21 @@ def run_pages(texts: dict[str, str]) -> dict[str, PageRun]:
     """Run every page that has something to run, two at a time."""
     jobs = {place: text for place, text in texts.items() if any(b.language in RUN for b in blocks(text))}
     done = {place: PageRun([""] * len(blocks(text))) for place, text in texts.items()}
-    _preload()
-    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("fork")) as pool:
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn"), _set_look) as pool:
         done |= zip(jobs, pool.map(_run_page, jobs, jobs.values()), strict=True)
     return done
 
 
-def _preload() -> None:
-    """What most pages import, once, before the pages' processes split off."""
-    os.environ |= {"COLUMNS": WIDTH, "NO_COLOR": "1", "MPLBACKEND": "svg", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    import cvxpy  # noqa: F401
+def _set_look() -> None:
+    """How outputs and figures look in a worker."""
+    os.environ |= {
+        "COLUMNS": WIDTH,
+        "NO_COLOR": "1",
+        "MPLBACKEND": "svg",
+        "OMP_NUM_THREADS": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+    }
     import matplotlib.pyplot as plt
-    import scipy.linalg  # noqa: F401
-    import sympy  # noqa: F401
-
-    import studies.cli  # noqa: F401
 
     plt.rcParams |= {
         "figure.figsize": (7.2, 3.4), "figure.constrained_layout.use": True, "axes.grid": True, "grid.alpha": 0.3,
