@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: schedules test lint bench mutants studies sweep clean
+.PHONY: schedules test lint docs docs-check bench mutants studies sweep clean
 
 schedules: $(STAMP)
 	$(BIN)/gainsmith schedules --out estimators/schedules
@@ -16,6 +16,13 @@ lint: $(STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+docs: $(STAMP)
+	$(BIN)/python -m pip install -qq --editable '.[docs]'
+	$(BIN)/mkdocs build --config-file docs/mkdocs.yml
+
+docs-check: $(STAMP)
+	$(BIN)/python -m docs.tools.check
 
 studies: $(STAMP)
 	$(BIN)/gainsmith study --all --out out/studies

@@ -123,6 +123,9 @@ class VehicleParameters(RigidBody):
     """What the force, load and velocity estimators need to know of a car.
 
     Lengths and inertias as in P1 Table I; `published_suv()` is that table. The tracks are those of the wheel centres.
+
+    >>> VehicleParameters.published_suv().mass
+    2270.0
     """
 
     wheel_inertia: float  # kg m^2, one wheel with everything that turns with it

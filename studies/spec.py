@@ -196,7 +196,11 @@ class Variant:
 
 
 def shipped_specs() -> dict[str, Path]:
-    """The specifications that come with the package, by name."""
+    """The specifications that come with the package, by name.
+
+    >>> "longitudinal-speed" in shipped_specs()
+    True
+    """
     return shipped_files("studies", "specs")
 
 
@@ -222,6 +226,10 @@ def load_spec(name: str | Path) -> tuple[ScheduleSpec, Path]:
     """A shipped specification (of a schedule or an example) by name, or one of your own by path; returns it with its folder.
 
     Raises SpecError with the file, the key and what is wrong.
+
+    >>> spec, folder = load_spec("quarter-car-observer")
+    >>> spec.deploy.update, spec.plant(folder).model.name
+    ('sampled', 'quarter-car')
     """
     observers = {name: path for name, path in _examples().items() if name.endswith(OBSERVER)}
     path = find_toml(name, {**shipped_specs(), **observers}, "specification")

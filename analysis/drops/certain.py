@@ -48,6 +48,9 @@ def drop_verdict(
     For every pair whose entries differ from the given ones by no more than the part `relative` of their size (rounding to the
     nearest float unless said otherwise). Arguments broadcast as in `drop_radius`; one verdict, or an object array.
     Raises AnalysisError as `drop_radius`, or for a `relative` outside [0, 0.01].
+
+    >>> [str(drop_verdict([[1.2]], [[0.5]], p, relative=0.01)) for p in (0.5, 0.63, 0.7)]
+    ['certified', 'inconclusive', 'refuted']
     """
     share = _share(relative)
     A0, A1 = balanced(*pair(open_loop, closed_loop))
@@ -75,6 +78,10 @@ def critical_drop_interval(open_loop: ArrayLike, closed_loop: ArrayLike, relativ
     """Where `critical_drop_probability` of every pair within `relative` of one pair (n, n) lies. Raises as `drop_regions`.
 
     An interval that reaches 1 says that some pair within the error may be stable for every p below 1.
+
+    >>> found = critical_drop_interval([[1.2]], [[0.5]], relative=1e-3)
+    >>> bool(found.lower < 0.75 / 1.19 < found.upper)
+    True
     """
     A0, A1 = _one_pair(open_loop, closed_loop)
     found = drop_regions(A0, A1, relative)

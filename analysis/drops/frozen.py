@@ -65,6 +65,9 @@ def critical_drop_probability(open_loop: ArrayLike, closed_loop: ArrayLike) -> F
 
     Raises AnalysisError for matrices that are not square, not finite or do not fit, or for an ill-posed pair of more than 8
     states.
+
+    >>> round(float(critical_drop_probability([[1.2]], [[0.5]])), 4)  # p 1.2^2 + (1 - p) 0.5^2 = 1
+    0.6303
     """
     A0, A1 = np.broadcast_arrays(*balanced(*pair(open_loop, closed_loop)))
     p, open_ = critical_planar(A0, A1) if A0.shape[-1] == 2 else _by_eigenvalues(A0, A1)

@@ -42,6 +42,9 @@ def gilbert_elliott(
     """The jump system with mode 0 good (closed_loop) and mode 1 bad (open_loop); all arguments broadcast.
 
     Raises AnalysisError for matrices that do not fit or probabilities outside [0, 1].
+
+    >>> print(gilbert_elliott([[1.2]], [[0.5]], failure=0.1, recovery=0.5).verdict())
+    certified
     """
     A0, A1 = pair(open_loop, closed_loop)
     A0, A1 = np.broadcast_arrays(A0, A1)

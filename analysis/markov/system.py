@@ -48,6 +48,10 @@ class MarkovJumpSystem:
 
     Raises:
         AnalysisError: matrices that are not square, finite or stochastic, or that do not fit.
+
+    >>> system = MarkovJumpSystem([[[0.5]], [[1.2]]], [[0.9, 0.1], [0.8, 0.2]])
+    >>> print(system.verdict())
+    certified
     """
 
     def __init__(self, modes: ArrayLike, transition: ArrayLike) -> None:

@@ -25,6 +25,9 @@ def h2_norm(
     Stacks or a system object as in `hinf_norm`; an array over the leading axes. Unstable systems give inf, and so does a
     continuous system with D != 0 (white noise passes straight through); NaN where a pole lies on the stability boundary
     within the precision of the data. Raises AnalysisError for matrices that do not fit or are not finite.
+
+    >>> round(float(h2_norm([[-2.0]], [[1.0]], [[1.0]])), 12)  # 1/(s + 2): sqrt(1/4)
+    0.5
     """
     shape, systems = read_systems(A, B, C, D, discrete)
     discrete, found = systems.discrete, stability(systems.A, systems.discrete)

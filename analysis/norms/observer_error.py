@@ -35,6 +35,11 @@ def error_hinf_norm(
     `gain` (nx, ny), or (g, nx, ny) with one gain for each grid point; `grid` (g, p), or (g,) for one parameter; `errors`
     defaults to all states. Arrays of the result have the shape (g,). The units are those of the named signals as they
     stand: nothing is weighted. Raises AnalysisError for unknown names and gains that do not fit.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> norm = error_hinf_norm(model, [[0.68], [183.1]], [0.0, 70.0, 140.0], ["force_noise"], ["relative_velocity"]).norm
+    >>> norm.shape
+    (3,)
     """
     d, z = selection(model, disturbances, tuple(errors) if errors is not None else tuple(s.name for s in model.states))
     A_e, B_e = model.on(grid).error_dynamics(checked_gain(model, gain))

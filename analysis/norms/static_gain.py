@@ -30,6 +30,10 @@ def static_gain(model: LpvModel, disturbance: str, error: str) -> StaticGain:
     For the corner models friction -> relative velocity is -sigma0/(sigma0 + sigma2 a), a = kappa R_e |omega|, for every L:
     at standstill of the error friction cannot be told from slip velocity. Raises AnalysisError for unknown names and for
     a model whose error has an integrator that no gain reaches.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> print(static_gain(model, "friction", "relative_velocity").expression)  # no gain L in it
+    -sigma0/(effective_radius*kappa*sigma2*wheel_speed + sigma0)
     """
     d, z = selection(model, (disturbance,), (error,))
     gain = sp.Matrix(len(model.states), len(model.outputs), lambda i, j: sp.Symbol(f"L_{i + 1}_{j + 1}"))

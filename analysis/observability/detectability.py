@@ -70,6 +70,12 @@ def detectable(
     entries, or beside the largest one where states are less than a thousand apart in size; default 8 n eps, numbers that are
     exact but for rounding. Units are balanced first (`pair_balance`).
     Raises AnalysisError for shapes that do not fit, values not finite, several pairs at once and a precision outside (0, 1).
+
+    >>> unstable = [[1.0, 0.0], [0.0, -2.0]]
+    >>> print(detectable(unstable, [[1.0, 1.0]]).verdict, detectable(unstable, [[0.0, 1.0]]).verdict)
+    certified refuted
+    >>> print(detectable(unstable, [[1e-17, 1.0]]).verdict)
+    inconclusive
     """
     A, C, time = observed_pair(A, C, discrete)
     return _judge(A, C, time, precision)
@@ -78,7 +84,11 @@ def detectable(
 def stabilizable(
     A: Any, B: ArrayLike | None = None, discrete: bool | None = None, precision: float | None = None
 ) -> Detectability:
-    """Can a state feedback of A (n, n), B (n, m) be stable: is every mode reached that does not decay? Dual to `detectable`."""
+    """Can a state feedback of A (n, n), B (n, m) be stable: is every mode reached that does not decay? Dual to `detectable`.
+
+    >>> print(stabilizable([[1.0, 0.0], [0.0, -2.0]], [[1.0], [0.0]]).verdict)
+    certified
+    """
     A, B, time = driven_pair(A, B, discrete)
     return _judge(A, B, time, precision, dual=True)
 

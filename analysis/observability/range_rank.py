@@ -40,7 +40,12 @@ class RangeRank:
 
 
 def observability_over_range(model: LpvModel) -> RangeRank:
-    """With as few derivatives of the outputs as decide it."""
+    """With as few derivatives of the outputs as decide it.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> observability_over_range(model).verdict
+    'full'
+    """
     return _over_range(model, len(model.outputs), lambda blocks: observability_matrix(model, blocks))
 
 

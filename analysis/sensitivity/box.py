@@ -47,7 +47,11 @@ class Box:
 
 
 def around(nominal: Mapping[str, float], relative: float = 0.2) -> dict[str, tuple[float, float]]:
-    """Ranges nominal (1 - relative) .. nominal (1 + relative), in ascending order. A nominal of 0 has none."""
+    """Ranges nominal (1 - relative) .. nominal (1 + relative), in ascending order. A nominal of 0 has none.
+
+    >>> around({"mass": 10.0}, 0.2)
+    {'mass': (8.0, 12.0)}
+    """
     out = {}
     for name, value in nominal.items():
         edges = sorted((value * (1.0 - relative), value * (1.0 + relative)))

@@ -76,7 +76,11 @@ def one_at_a_time(
     name: str = "measure",
     unit: str = "1",
 ) -> OneAtATime:
-    """Each parameter times each factor, the others nominal (P3 Figs 3-5); `axes` name the measure's own axes, if any."""
+    """Each parameter times each factor, the others nominal (P3 Figs 3-5); `axes` name the measure's own axes, if any.
+
+    >>> one_at_a_time(lambda at: at["a"] + 0.1 * at["b"], {"a": 1.0, "b": 1.0}).ranking()[0][0]
+    'a'
+    """
     names = tuple(nominal)
     start = np.array([float(as_stack(key, value, ndim=0)) for key, value in nominal.items()])
     scale = as_stack("factors", factors, ndim=1).ravel()

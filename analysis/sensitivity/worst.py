@@ -59,6 +59,9 @@ def worst_case(
     whole populations, then a bounded simplex descent from the best point in unit coordinates; the best of all wins. An
     infinite value (an unstable model, say) ends the search: nothing is worse. Raises AnalysisError for bad ranges and
     measures that are not scalar.
+
+    >>> round(worst_case(lambda at: at["a"] - at["b"] ** 2, {"a": (0.0, 1.0), "b": (-1.0, 1.0)}).value, 6)
+    1.0
     """
     box = Box.of(ranges)
     sign = -1.0 if largest else 1.0

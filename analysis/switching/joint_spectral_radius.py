@@ -60,6 +60,10 @@ def joint_spectral_radius(
 
     `depth` bounds the length of products in the search, `most_vertices` the polytope (4000 in the plane, 250 above, where
     each gauge is a linear program). Raises AnalysisError for modes that are not finite square matrices of one size.
+
+    >>> found = joint_spectral_radius([[[0.5, 0.0], [0.0, 0.9]], [[0.8, 0.0], [0.0, 0.3]]])
+    >>> round(found.lower, 3), round(found.upper, 3)
+    (0.9, 0.9)
     """
     A = square("modes", state_matrices(modes, discrete=True)[0], ndim=3)
     if A.ndim != 3 or not len(A):

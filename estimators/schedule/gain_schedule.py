@@ -62,6 +62,10 @@ class GainSchedule:
     order. The plant is xdot = A x + B u + E d, y = C x + D u + F d. `sample_time` in s. `update` "held": the gains L belong
     to the continuous-time observer, integrated exactly with y held over a sample; "sampled": the gains K correct once a
     sample (see `LpvVelocityObserver`).
+
+    >>> schedule = GainSchedule.shipped("corner-estimation-longitudinal")
+    >>> schedule.parameter.name, schedule.gain(35.0).shape, schedule.gain_units
+    ('wheel_speed', (2, 1), (('m/s',), ('m/s^2',)))
     """
 
     name: str

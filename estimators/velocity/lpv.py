@@ -173,6 +173,11 @@ class LpvVelocityObserver(TwoStateObserver):
     Raises:
         EstimatorError: a schedule of another size, or an option that means nothing.
         ScheduleError: gains or a model whose error grows beyond all bounds within one sample.
+
+    >>> observer = LpvVelocityObserver(GainSchedule.shipped("corner-estimation-longitudinal"), batch_shape=(2,))
+    >>> step = observer.step(0.3, [0.21, float("nan")], 35.0)  # one corner lost its sample
+    >>> step.used.tolist(), step.flags.tolist()
+    ([True, False], [0, 1])
     """
 
     def __init__(

@@ -121,7 +121,11 @@ class Manoeuvre(StrictTable):
 
 
 def shipped_manoeuvres(paper: str = "") -> dict[str, Path]:
-    """The manoeuvre files that come with the package, by name; those of one paper (``"P1"``) if asked."""
+    """The manoeuvre files that come with the package, by name; those of one paper (``"P1"``) if asked.
+
+    >>> sorted(shipped_manoeuvres("P5"))
+    ['p5-roundabout', 'p5-slalom']
+    """
     found = shipped_files("studies", "manoeuvres")
     return {name: path for name, path in found.items() if name.startswith(paper.lower())}
 
@@ -130,6 +134,9 @@ def load_manoeuvre(name: str | Path) -> Manoeuvre:
     """A shipped manoeuvre by name, or one of your own by its path (ends with .toml).
 
     Raises SpecError, one line: file, key, what is wrong, what would be right.
+
+    >>> load_manoeuvre("p1-launch-split").title
+    'Launch on split friction: right wheels on ice, left wheels on dry'
     """
     return load_toml(find_toml(name, shipped_manoeuvres(), "manoeuvre"), Manoeuvre, "manoeuvre")
 

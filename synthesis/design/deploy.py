@@ -72,6 +72,13 @@ def deploy(
     """Tabulate on the coarsest breakpoints that cost less than the allowed share of every gain, and prove claims.
 
     Raises ProblemError if the gains are not certified, if the design is ill-posed, or if no table is fine enough.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> channels = (Channel(("friction",), ("relative_velocity",), bound=1.05), Channel(("force_noise",), ("relative_velocity",)))
+    >>> gains = design_observer(model, ObserverDesign(channels, degree=0, decay_rate=80.0, fastest_pole=600.0))
+    >>> deployment = deploy(gains, DeploySettings(sample_time=0.005))
+    >>> len(deployment.breakpoints[0]) == len(deployment.table), deployment.cost < 0.01
+    (True, True)
     """
     settings = settings or DeploySettings()
     model, design = gains.model, gains.design

@@ -44,6 +44,9 @@ class Channel:
     """The L2 gain from some disturbances to some estimation errors: bounded by `bound`, or minimised if None.
 
     `weights` multiply the disturbances (their sizes), in the order of `disturbances`.
+
+    >>> Channel(("force", "noise"), ("velocity",), weights=(1.0, 0.002)).name
+    'force+noise -> velocity'
     """
 
     disturbances: tuple[str, ...]
@@ -59,7 +62,12 @@ class Channel:
 
 @dataclass(frozen=True)
 class ObserverDesign:
-    """What is asked of the gains."""
+    """What is asked of the gains.
+
+    >>> bounded = Channel(("friction",), ("relative_velocity",), bound=1.05)
+    >>> ObserverDesign((bounded, Channel(("force_noise",), ("relative_velocity",))), decay_rate=80.0).minimised.name
+    'force_noise -> relative_velocity'
+    """
 
     channels: tuple[Channel, ...]
     degree: int = 1  # of P and X in the parameters
@@ -135,6 +143,14 @@ def design_observer(model: LpvModel, design: ObserverDesign) -> ObserverGains:
     The optimum itself is attained only at the boundary of feasibility, where gains may be unbounded, and largest margins are
     flat: so the last step is strictly convex, and every number that is handed on is rounded to the digits that matter.
     Raises ProblemError if nothing is found; a model with a hidden unstable mode is called undetectable.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> channels = (Channel(("friction",), ("relative_velocity",), bound=1.05), Channel(("force_noise",), ("relative_velocity",)))
+    >>> gains = design_observer(model, ObserverDesign(channels, decay_rate=80.0, fastest_pole=600.0))
+    >>> print(gains.verdict)
+    certified
+    >>> gains.gain([0.0, 140.0]).shape, bool(gains.gamma_lower <= gains.gamma)
+    ((2, 2, 1), True)
     """
     scale, clock = timed_scale(model, design)
 

@@ -47,6 +47,12 @@ def design_sampled_observer(model: LpvModel, design: ObserverDesign, sample_time
     """K(p) for the given sample time; `gain` of the result gives K in the units state/output.
 
     Raises ProblemError for a rational model, a bound on the fastest pole (an update has none), and as `design_observer`.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> wanted = Channel(("friction", "force_noise"), ("relative_velocity",), weights=(1.0, 0.1))
+    >>> gains = design_sampled_observer(model, ObserverDesign((wanted,)), sample_time=0.005)
+    >>> print(gains.verdict, gains.update, gains.sample_time)
+    certified sampled 0.005
     """
     if not sample_time > 0.0:
         raise ProblemError(f"sample time {sample_time} s must be positive")

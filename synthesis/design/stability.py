@@ -40,7 +40,11 @@ Form = Literal["primal", "dual"]
 
 @dataclass(frozen=True)
 class GainBox:
-    """All gains L with lower <= L <= upper, entry by entry; arrays (nx, ny)."""
+    """All gains L with lower <= L <= upper, entry by entry; arrays (nx, ny).
+
+    >>> GainBox(lower=[[0.5], [60.0]], upper=[[0.9], [210.0]]).vertices().shape
+    (4, 2, 1)
+    """
 
     lower: FloatArray
     upper: FloatArray
@@ -88,6 +92,12 @@ def affine_quadratic_stability(
     CERTIFIED: proved for the exact model on the continuum of parameters, rates and gains, in ball arithmetic. REFUTED: a frozen
     pole is not left of -decay_rate, by exact signs.
     INCONCLUSIVE: neither; the message names the tightest inequality. Raises ProblemError for gains of a wrong shape.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> print(affine_quadratic_stability(model, [[0.68], [183.1]], degree=1).verdict)
+    certified
+    >>> print(affine_quadratic_stability(model, [[0.68], [-183.1]], degree=1).verdict)
+    refuted
     """
     settings = settings or LmiSettings()
     box = gains if isinstance(gains, GainBox) else GainBox(np.asarray(gains, float), np.asarray(gains, float))

@@ -49,7 +49,12 @@ class WellPosedness:
 
 
 def well_posedness(model: LpvModel, design: ObserverDesign, backoffs: tuple[float, ...] = BACKOFFS) -> WellPosedness:
-    """Minimise gamma, then the gain energy at several distances from it. Raises ProblemError if nothing is feasible."""
+    """Minimise gamma, then the gain energy at several distances from it. Raises ProblemError if nothing is feasible.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> well_posedness(model, ObserverDesign((Channel(("friction",), ("relative_velocity",)),))).ill_posed
+    True
+    """
     scale, clock = timed_scale(model, design)
     optimum = solve(observer_problem(model, design, scale, clock=clock), design.settings)
     if optimum.objective is None or not optimum.margins:

@@ -31,6 +31,11 @@ def load_model(path: str | FilePath) -> LpvModel:
 
     Raises SpecError for a file that is no model file, and ModelError for a model that cannot be: names, cycles, units, shapes,
     ranges. Both name the file, the line and the column.
+
+    >>> from importlib.resources import files
+    >>> model = load_model(files("studies") / "examples/quarter-car.toml")
+    >>> model.name, len(model.states)
+    ('quarter-car', 4)
     """
     path = FilePath(path)
     data = read_toml(path, "model")

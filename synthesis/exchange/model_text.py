@@ -14,7 +14,16 @@ SIGNALS = ("states", "inputs", "outputs", "disturbances")
 
 
 def save_model(model: LpvModel, path: str | Path) -> None:
-    """Write `model_text` beside the place of the file and rename it: never half a file."""
+    """Write `model_text` beside the place of the file and rename it: never half a file.
+
+    >>> from importlib.resources import files
+    >>> from tempfile import TemporaryDirectory
+    >>> model = load_model(files("studies") / "examples/pmsm.toml")
+    >>> with TemporaryDirectory() as folder:
+    ...     save_model(model, f"{folder}/copy.toml")
+    ...     print(load_model(f"{folder}/copy.toml").A == model.A)
+    True
+    """
     path = Path(path)
     part = path.with_name(f"{path.name}.part")
     part.write_text(model_text(model), encoding="utf-8")

@@ -35,6 +35,17 @@ class LpvModel(Display):
 
     Raises ModelError for a stray symbol, a shape that does not fit, a parameter or constant that never appears, a
     dependence that is not rational, a denominator that vanishes inside the range, and repeated names.
+
+    >>> import sympy as sp
+    >>> k = sp.Symbol("stiffness")
+    >>> model = LpvModel(
+    ...     name="oscillator", source="Newton, mass 1 kg", states=(Signal("position", "m"), Signal("velocity", "m/s")),
+    ...     outputs=(Signal("measured_position", "m"),),
+    ...     parameters=(SchedulingParameter("stiffness", "1/s^2", 1.0, 4.0, -1.0, 1.0),),
+    ...     A=sp.Matrix([[0, 1], [-k, 0]]), C=sp.Matrix([[1, 0]]),
+    ... )
+    >>> model.on([1.0, 4.0]).A[:, 1, 0].tolist()
+    [-1.0, -4.0]
     """
 
     name: str

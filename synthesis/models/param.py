@@ -54,7 +54,11 @@ def check_name(name: str, what: str) -> None:
 
 @dataclass(frozen=True)
 class Constant:
-    """A number of the model with its unit and where it was published."""
+    """A number of the model with its unit and where it was published.
+
+    >>> Constant(2.0, "kg", "scale").value
+    2.0
+    """
 
     value: float
     unit: str
@@ -70,7 +74,11 @@ class Constant:
 
 @dataclass(frozen=True)
 class Signal:
-    """A named state, input, output or disturbance."""
+    """A named state, input, output or disturbance.
+
+    >>> Signal("wheel_speed", "rad/s").unit
+    'rad/s'
+    """
 
     name: str
     unit: str
@@ -86,6 +94,9 @@ class SchedulingParameter:
 
     An infinite rate means that the parameter may jump; then no Lyapunov function may depend on it.
     `absolute` says that the runtime signal enters by its absolute value (wheel speed in reverse).
+
+    >>> SchedulingParameter("wheel_speed", "rad/s", 0.0, 140.0, -800.0, 800.0).middle
+    70.0
     """
 
     name: str

@@ -64,6 +64,9 @@ def load_parameter_set(name: str | Path, folder: Path = Path()) -> ParameterSet:
     """A shipped set by its name, or a set of your own by its path from ``folder`` (ends with .toml).
 
     Raises SpecError naming the file, the key and the remedy.
+
+    >>> load_parameter_set("corner-estimation").vehicle["effective_radius"].value
+    0.33
     """
     return load_toml(folder / find_toml(name, shipped_parameter_sets(), "parameter set"), ParameterSet, "parameter")
 

@@ -29,6 +29,10 @@ def corner_velocity_model(
     u is R_e omega' - v_xt' (longitudinal) or -v_yt' (lateral); v_r is R_e omega - v_xt or -v_yt. The disturbance
     `friction` stands for -sigma0 |v_r| z / (theta g) (bounded, P1 notes 11 item 6); `force_noise` n is the error of the
     normalised force. The absolute value of P1 (18), (20) is kept throughout (P1 notes 11 item 5).
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> [state.name for state in model.states]
+    ['bristle_deflection', 'relative_velocity']
     """
     if direction not in parameters.tire:
         raise ModelError(f"parameter set '{parameters.id}': {unknown('tire direction', direction, parameters.tire)}")

@@ -1,0 +1,1 @@
+"""What builds and checks the guide: pages whose blocks run, a reference made from docstrings, links that are followed."""
