@@ -19,7 +19,7 @@ lint: $(STAMP)
 
 docs: $(STAMP)
 	$(BIN)/python -m pip install -qq --editable '.[docs]'
-	$(BIN)/mkdocs build --config-file docs/mkdocs.yml
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --config-file docs/mkdocs.yml
 
 docs-check: $(STAMP)
 	$(BIN)/python -m docs.tools.check
