@@ -12,13 +12,15 @@ import sympy as sp
 from analysis.errors import AnalysisError
 from analysis.observability.exact_expression import exact
 from analysis.observability.pair_balance import balanced_pair
-from analysis.observability.pairs import observed_pair, unit_pair, without_dust
+from analysis.observability.pairs import EPSILON, observed_pair, unit_pair, without_dust
 from analysis.observability.real_roots import numerator
 from analysis.observability.staircase import separate
 from estimators.arrays import BoolArray, ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+CANCELLED = 2.0**12 * EPSILON  # beside the largest entry of a row: what is left of terms a thousand times as large
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ def hautus_test(
     count = int(np.prod(lead))
     pairs, outputs = A.reshape(count, n, n), C.reshape(count, *C.shape[-2:])
     found = _modes(pairs, outputs, time, tolerance)
-    clean = without_dust(pairs, outputs)
+    clean = without_dust(pairs, outputs, CANCELLED)
     dusty = np.flatnonzero((clean[0] != pairs).any(axis=(-2, -1)) | (clean[1] != outputs).any(axis=(-2, -1)))
     if len(dusty):  # entries that are rounding may hide as well as show: the worse answer counts
         other = _modes(clean[0][dusty], clean[1][dusty], time, tolerance)

@@ -56,12 +56,11 @@ def unit_pair(A: FloatArray, C: FloatArray) -> tuple[FloatArray, FloatArray, Flo
     return A / size, C / seen, size
 
 
-def without_dust(A: FloatArray, C: FloatArray) -> tuple[FloatArray, FloatArray]:
+def without_dust(A: FloatArray, C: FloatArray, rounding: float = 4.0 * EPSILON) -> tuple[FloatArray, FloatArray]:
     """Entries below rounding beside the others of their row (and, in A, of their column) set to zero.
 
     cos(pi/2) = 6e-17 is no sensor.
     """
-    rounding = 4.0 * EPSILON
 
     def small(matrix: FloatArray, axis: int) -> Any:
         size = np.abs(matrix)

@@ -252,3 +252,12 @@ def test_continuous_gramian_refuses_bad_input() -> None:
         continuous_gramian(zero, lambda t: np.full((1, 2), np.nan), 0.0, 1.0)
     with pytest.raises(AnalysisError, match="intervals = 0"):
         continuous_gramian(zero, zero, 0.0, 1.0, intervals=0)
+
+
+@pytest.mark.parametrize(
+    ("entry", "hidden"), [(-2.7e-15, True), (3e-13, True), (0.0, True), (1e-9, False), (-0.02, False)]
+)
+def test_what_cancellation_leaves_in_an_entry_is_no_sensor(entry: float, hidden: bool) -> None:
+    """0.821 beside the difference of two numbers of some 400, each rounded: up to 2e-13 of it is no information."""
+    test = hautus_test([[-160.0, 1.0], [0.0, 0.0]], [[entry, 0.821]])
+    assert test.frozen_observable == (not hidden)
