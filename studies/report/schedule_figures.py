@@ -67,7 +67,7 @@ def curves_of(content: Mapping[str, Any]) -> list[tuple[str, FloatArray]]:
     second, count = others[0], len(others[0]["breakpoints"])
     return [
         (
-            f"{second['name'].replace('_', ' ')} {second['breakpoints'][k]:g} {second['unit']}",
+            f"{second['name'].replace('_', ' ')} {second['breakpoints'][k]:g} {second['unit']}".removesuffix(" 1"),
             table[:, k],
         )
         for k in dict.fromkeys((0, count // 2, count - 1))

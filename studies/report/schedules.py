@@ -96,7 +96,7 @@ def _row(content: Any, level: FrozenLevel | None, proof: Any) -> tuple[str | flo
 
 def _box(content: Any) -> str:
     ranges = [
-        f"{words(p['name'])} from {shown(p['min'])} to {shown(p['max'])} {p['unit']} and "
+        f"{words(p['name'])} from {shown(p['min'])} to {shown(p['max'])}{_unit(p['unit'])} and "
         + (
             "any jump of it"
             if p["rate_min"] is None
@@ -105,6 +105,11 @@ def _box(content: Any) -> str:
         for p in content["scheduling"]
     ]
     return ", ".join(ranges) or "time"
+
+
+def _unit(unit: str) -> str:
+    """Behind a number; a pure number has none."""
+    return "" if unit == "1" else f" {unit}"
 
 
 def _rate(unit: str) -> str:
@@ -127,7 +132,7 @@ def place(content: Any, level: FrozenLevel) -> str:
     """Where a claim is tightest: every parameter with its unit."""
     point = level.points[level.tightest]
     named = zip(content["scheduling"], point, strict=True)
-    return ", ".join(f"{words(p['name'])} = {shown(float(value))} {p['unit']}" for p, value in named)
+    return ", ".join(f"{words(p['name'])} = {shown(float(value))}{_unit(p['unit'])}" for p, value in named)
 
 
 def words(name: str) -> str:
