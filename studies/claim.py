@@ -14,6 +14,7 @@ JsonValue = Any
 """Numbers, texts, lists and dictionaries of them: what a JSON file can hold."""
 
 
+SENTENCE_FAILS = "The sentence about this claim cannot be filled"
 PAPERS = ("P1", "P2", "P3", "P4", "P5")
 
 
@@ -79,11 +80,11 @@ class Claim:
         }  # fmt: skip
 
     def _filled(self, template: str) -> str:
-        """The sentence, empty where a field has no value: hours of computing are not lost to a misspelt one (tests refuse it)."""
+        """The sentence, or which field of it has no value: a misspelt one costs no hours of computing, and tests refuse it."""
         try:
             return fill(template, self.finding.computed)
-        except ValueError:
-            return ""
+        except ValueError as error:
+            return f"{SENTENCE_FAILS} ({error})"
 
 
 ClaimFunction = Callable[[], Finding]

@@ -9,6 +9,11 @@ from estimators.errors import EstimatorError, GainsmithError
 from synthesis.errors import SpecError
 
 
+def escaped(text: str) -> str:
+    """Control characters as their escapes: a name from a file must not move the cursor."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
 class LogError(GainsmithError):
     """A log that cannot be replayed: the message names the file, the line or column, and the remedy."""
 

@@ -1,5 +1,6 @@
 r"""L2 gain, H2 norms and decay rate of a given LPV system: proved from both sides, on the continuum of parameters and rates.
- From above (a decay rate: from below) by a Lyapunov function x'P(p)x whose coefficients a solver finds and which is then proved
+
+From above (a decay rate: from below) by a Lyapunov function x'P(p)x whose coefficients a solver finds and which is then proved
 in ball arithmetic (`synthesis.certificate.verify`); from below by a periodic parameter trajectory or a frozen place, proved in
 ball arithmetic as well. The gap between the two is what better trajectories and Lyapunov functions of higher degree might still
 move.

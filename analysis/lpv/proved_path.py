@@ -1,5 +1,6 @@
 r"""What the system certainly does along one periodic path: the map over a period enclosed in balls, and what follows from it.
- Ratio: for the input that a search found, the periodic answer is solved for in balls. The ratio of the energies over one period
+
+Ratio: for the input that a search found, the periodic answer is solved for in balls. The ratio of the energies over one period
 is a lower bound of the L2 gain (Cantoni, Sandberg 2009; Peni, Seiler 2016): the input, repeated often enough and then ended,
 comes as near to it as one likes. (Along a path that is not stable the gain is infinite, and any number is a lower bound.)
 Growth: a monodromy matrix with an eigenvalue that is certainly not inside the circle of radius e^(-aT) decays no faster than a.

@@ -1,5 +1,6 @@
 r"""One short step of a system whose parameters move along a line, enclosed in balls.
- A step of length h obeys Psi' = h M(s) Psi on s in [0, 1], M = [[A - jw, B], [0, 0]] a polynomial in s (over a denominator: a
+
+A step of length h obeys Psi' = h M(s) Psi on s in [0, 1], M = [[A - jw, B], [0, 0]] a polynomial in s (over a denominator: a
 Taylor polynomial of A/d with a bounded rest). A Taylor polynomial of Psi leaves the residual R(s) in that equation, of terms
 s^k with k >= K only; the error is below e^(h |M|) |R| in the largest row sum, everywhere on the step, and is put on the
 constant term as a ball.

@@ -1,5 +1,6 @@
 """A search for bad parameter trajectories: periodic paths along which inputs are amplified most, or the state falls most slowly.
- Paths of KNOTS knots at equal distances, first simple ones of many periods (back and forth, each parameter alone and all
+
+Paths of KNOTS knots at equal distances, first simple ones of many periods (back and forth, each parameter alone and all
 together, with shifts), then the best of them improved by a simplex search over period, ratio of its halves, knots and carrier.
 Floats: what counts is proved afterwards.
 """

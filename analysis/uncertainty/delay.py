@@ -1,10 +1,12 @@
 r"""Constant delay of the measurements of a sampled observer: which delays it stands.
- A measurement taken at t_k - d is compared with the estimate of its own time (it carries a time stamp), and the correction is
+
+A measurement taken at t_k - d is compared with the estimate of its own time (it carries a time stamp), and the correction is
 made when it comes, at t_k; between samples the corrected estimate runs on. With e_k the error before the correction at t_k and
 d = s T + r, 0 <= r < T, the error at t_k - d is e^(-rA) e_(k-s), so
 
     e_(k+1) = e^(TA) e_k - K C e^(-rA) e_(k-s)          (without delay the update e+ = (e^(TA) - K C) e).
- The delay is constant, so that every value of it is either stable or not. All delays of an interval at once: the interval is a
+
+The delay is constant, so that every value of it is either stable or not. All delays of an interval at once: the interval is a
 ball, the exponentials are enclosed, and the signs of the stability test count only where they are certain
 (`synthesis.polynomials.stable`); else it is halved.
 """

@@ -1,7 +1,8 @@
 r"""Sample-time jitter of a sampled observer: how far the sample time may wander from its nominal value, in any order.
 
     e+ = (e^(T_k A) - K C) e,    T_k anywhere in [(1 - j) T, (1 + j) T]
- From below by e'P(T)e with P polynomial in the sample time (a different one in every sample: Daafouz, Bernussou 2001), proved
+
+From below by e'P(T)e with P polynomial in the sample time (a different one in every sample: Daafouz, Bernussou 2001), proved
 on the whole interval with enclosed matrix exponentials; from above by a sequence of sample times whose product certainly has a
 spectral radius of one or more.
 """

@@ -1,5 +1,6 @@
 r"""A sampled observer whose sample time varies: e+ = (e^(T A) - K C) e with T anywhere in an interval at every sample.
- The sample time is one more parameter, which may jump; the gain is that of the table, whatever T is. Scheduling parameters of
+
+The sample time is one more parameter, which may jump; the gain is that of the table, whatever T is. Scheduling parameters of
 the observer keep their rates, over the longest sample. One sample is the unit of time.
 """
 

@@ -1,12 +1,14 @@
 r"""Stability and gain of a whole family of systems as signs of polynomials in its parameters: exact, and nothing is lost.
- Stability. chi(s; u) = det(s I - A(u)) = c_n s^n + .. + c_0 with c_n > 0. If one member is stable and, on a connected set of u,
+
+Stability. chi(s; u) = det(s I - A(u)) = c_n s^n + .. + c_0 with c_n > 0. If one member is stable and, on a connected set of u,
 c_n > 0, c_0 > 0 and the Hurwitz determinant H_(n-1) > 0, then all are: roots move continuously, and one that reaches the
 imaginary axis makes c_0 or H_(n-1) zero (Orlando's formula). In discrete time z = (1 + s)/(1 - s) leads to the same.
 
 Gain. On the imaginary axis det M(jw; u) = +-|chi(jw)|^2 det(g^2 I - G(jw)* G(jw)) with
 
     M(s) = [[A - s I, 0, B], [-C'C, -A' - s I, -C'D], [D'C, B', D'D - g^2 I]].
- If all members are stable, one of them has a gain below g, and this polynomial in x = w^2 and u has no zero, then every gain is
+
+If all members are stable, one of them has a gain below g, and this polynomial in x = w^2 and u has no zero, then every gain is
 below g.
 """
 

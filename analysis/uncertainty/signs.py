@@ -1,5 +1,6 @@
 """Are polynomials positive on a whole box? Bernstein coefficients, and boxes that are halved until it shows.
- Many boxes at once in float64 with a guard for all rounding, and what the guard leaves open in balls of 128 bits. A point where
+
+Many boxes at once in float64 with a guard for all rounding, and what the guard leaves open in balls of 128 bits. A point where
 a polynomial is not positive counts only if its exact value there is not.
 """
 

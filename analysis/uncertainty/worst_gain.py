@@ -1,5 +1,6 @@
 r"""Worst-case gain under real parametric uncertainty: the largest H-infinity norm over a box of constant parameters.
- From above the polynomial |chi(jw)|^2 det(g^2 I - G*G) is proved positive on the box and on all frequencies together: frequency
+
+From above the polynomial |chi(jw)|^2 det(g^2 I - G*G) is proved positive on the box and on all frequencies together: frequency
 is one more parameter, w^2 = centre (1 + v)/(1 - v) with v in [-1, 1], so that nothing can hide between the points of a grid.
 From below one member of the family, its gain at one frequency enclosed in balls.
 """

@@ -8,14 +8,16 @@ import sys
 
 from docs.tools.fences import blocks
 from docs.tools.links import broken_links
-from docs.tools.pages import PAGES, ROOT, page_texts
+from docs.tools.pages import PAGES, PICTURES, ROOT, page_texts
 from docs.tools.reference import reference_pages, undescribed
 from docs.tools.running import run_pages
 
 
 def stored_files() -> set[str]:
     """What lies in the site as it is: style sheets, stored pictures."""
-    return {str(path.relative_to(PAGES)) for path in PAGES.rglob("*") if path.is_file() and path.suffix != ".md"}
+    return set(PICTURES) | {
+        str(path.relative_to(PAGES)) for path in PAGES.rglob("*") if path.is_file() and path.suffix != ".md"
+    }
 
 
 def unknown_commands(texts: dict[str, str]) -> list[str]:

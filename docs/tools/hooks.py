@@ -13,7 +13,7 @@ from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 
 from docs.tools.fences import with_outputs
-from docs.tools.pages import page_texts
+from docs.tools.pages import PICTURES, page_texts
 from docs.tools.reference import reference_pages
 from docs.tools.running import run_pages
 
@@ -27,6 +27,8 @@ def on_files(files: Files, config: Any) -> Files:
     made = {place: with_outputs(text, runs[place].outputs) for place, text in written.items()} | reference_pages()
     for place, text in made.items():
         _put(files, File.generated(config, place, content=text))
+    for place, picture in PICTURES.items():
+        _put(files, File.generated(config, place, content=picture.read_bytes()))
     for place, run in runs.items():
         for name, picture in run.pictures.items():
             if f"({name})" in written[place]:

@@ -8,6 +8,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PAGES = ROOT / "docs/pages"
 EXAMPLES = ROOT / "docs/examples"
+PICTURES = {"assets/corner-estimation-longitudinal.svg": ROOT / ".readme/corner-estimation-longitudinal.svg"}
+"""Place in the site -> picture that the read-me shows, too."""
 
 
 def page_texts() -> dict[str, str]:

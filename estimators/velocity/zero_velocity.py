@@ -19,9 +19,8 @@ from estimators.velocity.longitudinal_fusion import SPEED, LongitudinalFusion
 
 _STEEPEST = 4.0  # m/s^2 of gravity along or across a slope on which cars are parked: 40 %
 
-_PATIENCE = (
-    0.5  # s of accelerations that stay the same, where these are not level: sensors that start up may be silent first
-)
+_PATIENCE = 0.5
+"""s of accelerations that stay the same, where these are not level: sensors that start up may be silent first."""
 
 
 class ZeroVelocityDetector(CarsMemory):

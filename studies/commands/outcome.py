@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
+from studies.errors import escaped
+
 DONE, BAD, REFUSED = 0, 1, 2
 LONGEST = 300  # characters of a message
 AGAIN = 0.05  # s
@@ -73,7 +75,7 @@ def refuse(message: str) -> int:
 def one_line(text: str, most: int = LONGEST) -> str:
     """Control characters escaped; of what is too long the middle is left out, for the remedy stands at the end."""
     shown = text[: most + 1] if len(text) <= most else text[: 2 * most] + text[-2 * most :]
-    clean = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in shown)
+    clean = escaped(shown)
     if len(text) <= most and len(clean) <= most:
         return clean
     tail = most // 2

@@ -29,10 +29,8 @@ UNITS = {
 AS_GOOD = 0.1  # by which the misfits of two explanations may differ to be told apart: 10 %
 MOST_NAMED = 3  # explanations in one line
 LONGEST = 130  # characters of all explanations in one line
-MANY, NEAR = (
-    80,
-    0.95,
-)  # points and quality of a line that may show a factor that is no unit: a slide looks like one for a while
+MANY, NEAR = 80, 0.95
+"""Points and quality of a line that may show a factor that is no unit: a slide looks like one for a while."""
 WEIGHTLESS = 0.05  # az over g below which gravity was taken out
 ESCAPE = "correct the drive file (or --no-check)"
 

@@ -15,6 +15,8 @@ from typing import Annotated
 import pint
 from pydantic import BeforeValidator
 
+from studies.errors import escaped
+
 CORNERS = ("fl", "fr", "rl", "rr")  # corner order of every array: front left, front right, rear left, rear right
 
 
@@ -50,7 +52,7 @@ LONGEST_UNIT, LONGEST_QUANTITY = 40, 80  # characters: what is longer is no unit
 def short(text: str, most: int = 60) -> str:
     """``text`` fit for a message: at most ``most`` characters, control characters escaped."""
     shown = text if len(text) <= most else f"{text[: most - 3]}..."
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in shown)
+    return escaped(shown)
 
 
 def wheel_factor(unit: str, radius: float) -> float:

@@ -1,11 +1,11 @@
 r"""Prove claims about a loop without a solver: the inequalities of `synthesis.certificate.inequalities`, in ball arithmetic.
 
-Read this together with `synthesis.polynomials.enclosure` and `.definite`; the three are all there is to a proof. On every cell of
-the table the closed loop is a polynomial (with an enclosed remainder where it holds a matrix exponential), so every inequality is
-a symmetric matrix polynomial M(t, r), t the place in the cell, r the place of the rates between their bounds. All its Bernstein
-coefficients positive definite proves M > 0 on the cell. A cell that decides nothing is halved. Every number is a ball of 128
-bits around the exact one: a sign counts only if it is certain, whatever processor computed it. Cells with room to spare are
-proved all at once before (`synthesis.certificate.quick`), in float64 with bounds of what it rounds.
+Read this together with `synthesis.polynomials.enclosure` and `.definite`. On every cell of the table the closed loop is a
+polynomial (with an enclosed remainder where it holds a matrix exponential), so every inequality is a symmetric matrix polynomial
+M(t, r), t the place in the cell, r the place of the rates between their bounds. All its Bernstein coefficients positive definite
+proves M > 0 on the cell. A cell that decides nothing is halved. Every number is a ball of 128 bits around the exact one: a sign
+counts only if it is certain, whatever processor computed it. Cells with room to spare are proved before, all at once, in float64
+with a bound of everything that it rounds (`synthesis.certificate.quick`).
 
 A failed proof says only that this P does not do. What the loop itself does is asked separately (`synthesis.certificate.refute`).
 """

@@ -27,10 +27,8 @@ ROUNDS = 20
 MORE = 6  # places that one inequality gains in a round
 SHARE = 0.1  # of the worst violation; what is broken by less waits
 EDGE = 1e-7  # every inequality is solved for with this margin, and half of it may be missing where it is only looked at
-KEPT, NEARLY = (
-    12,
-    1e-4,
-)  # places of an inequality that the next problem starts with: the tightest ones, relative to its size
+KEPT, NEARLY = 12, 1e-4
+"""Places of an inequality that the next problem starts with: the tightest ones, relative to its size."""
 LOOKED_AT = {0: 1, 1: 9}  # points for each parameter, by their number; 5 for more
 SLACK = 0.02  # share of the common margin by which a place that is only looked at may fall short
 STEADY = 1e-5  # relative change of an objective that nothing will be proved at

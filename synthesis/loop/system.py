@@ -4,32 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 from flint import fmpq
 
 from synthesis.polynomials.enclosure import PolynomialMatrix
 
 Time = Literal["continuous", "discrete"]
-
-
-class Ring(Protocol):
-    """What an inequality asks of matrix polynomials: with balls it is proved, with unknowns it is solved for.
-
-    `PolynomialMatrix` and `MatrixPolynomial` are both of this kind.
-    """
-
-    @property
-    def T(self) -> Any: ...  # noqa: D102
-    @property
-    def shape(self) -> tuple[int, int]: ...  # noqa: D102
-    def __add__(self, other: Any) -> Any: ...
-    def __sub__(self, other: Any) -> Any: ...
-    def __neg__(self) -> Any: ...
-    def __mul__(self, factor: Any) -> Any: ...
-    def __matmul__(self, other: Any) -> Any: ...
-    def scaled_by(self, scalar: Any) -> Any: ...  # noqa: D102
-    def derivative(self, variable: int) -> Any: ...  # noqa: D102
 
 
 @dataclass(frozen=True)

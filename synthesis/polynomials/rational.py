@@ -42,11 +42,6 @@ def polynomial_matrix(monomials: Sequence[Sequence[int]], coefficients: Sequence
     return [[fmpq_poly(entry) for entry in row] for row in out]
 
 
-def compose(matrix: Matrix, inner: fmpq_poly) -> Matrix:
-    """Every entry with its variable replaced by a polynomial."""
-    return [[entry(inner) for entry in row] for row in matrix]
-
-
 def derivative(matrix: Matrix) -> Matrix:
     """Entrywise derivative."""
     return [[entry.derivative() for entry in row] for row in matrix]

@@ -15,7 +15,7 @@ from synthesis.polynomials.enclosure import Entries
 
 
 def is_hurwitz(matrix: Entries) -> bool | None:
-    """True or False where it is certain, else None; entries are rationals or balls."""
+    """True or False where it is certain, else None; entries are rationals or balls. True of an empty matrix."""
     return _left(_ascending(matrix), _kind(matrix))
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from studies.claim import Claim, ClaimVerdict, Finding, Published
+from studies.claim import SENTENCE_FAILS, Claim, ClaimVerdict, Finding, Published
 from studies.papers.published import published_claims
 from studies.registry import SHIPPED
 from studies.report.overview import overview, sentence
@@ -74,9 +74,9 @@ def claim(found: dict[str, str], reading: str = "What follows. And more.", compu
 def test_a_sentence_holds_for_the_verdict_it_was_written_for() -> None:
     assert sentence(claim({"reproduced": "It is {a} m."}).row()) == "It is 1.5 m."
     assert sentence(claim({"erratum": "It is off by {a} m."}).row()) == "What follows."
-    assert (
-        sentence(claim({"reproduced": "It is {b} m."}).row()) == "What follows."
-    )  # a run of hours is not lost to a key
+    assert sentence(claim({"reproduced": "It is {b} m."}).row()).startswith(
+        SENTENCE_FAILS
+    )  # a run of hours is not lost to a key, and the page says what is missing
     assert (
         sentence(claim({}, "word " * 100).row()).endswith("word …")
         and len(sentence(claim({}, "word " * 100).row())) <= 200
@@ -98,3 +98,12 @@ def test_every_published_claim_has_a_sentence_and_derived_ones_are_told_apart() 
     first = overview(rows)
     assert sum(len(group.claims) for group in (*first.holds, *first.does_not)) == 59
     assert sum(is_published(row) for row in rows) == 59
+
+
+def test_a_sentence_that_cannot_be_filled_says_which_field_and_is_refused_by_the_check_of_claims() -> None:
+    found = {ClaimVerdict.REPRODUCED: "The pole is {poel_1_s} 1/s."}
+    entry = Published("P1-x", "P1", "(1)", "a pole", 1.0, "half a digit", found=found)
+    said = Claim(entry, Finding(COMPUTED, ClaimVerdict.REPRODUCED, "read.")).row()["found"]
+    assert said.startswith(SENTENCE_FAILS) and "{poel_1_s}" in said
+    with pytest.raises(AssertionError):
+        check_sentence(said)
