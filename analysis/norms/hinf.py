@@ -35,10 +35,11 @@ class HinfNorm:
     r"""sup_w sigma_max(G(j w)) for each system; arrays over the leading axes.
 
     `norm` is attained at `frequency` (rad/s, or rad/sample for a discrete system; inf: approached as w grows). No gain
-    exceeds `upper`, which is (1 + tolerance + what rounding does to the gain) norm; inf where that is not proved (more than
-    twelve states with nearly dependent eigenvectors). A system that is not stable has the norm inf and the frequency NaN. One
-    that is `undecided`, with a pole on the stability boundary within the precision of its entries, has the norm NaN and the
-    upper bound inf.
+    exceeds `upper`, which is (1 + tolerance + what rounding does to the gain) norm; inf where that is not shown (more
+    than twelve states with nearly dependent eigenvectors). Rounding is bounded to first order, as a backward error of
+    the eigenvalues; with three or more inputs and outputs a level rests on computed eigenvalues of a Hamiltonian
+    matrix. A system that is not stable has the norm inf and the frequency NaN. One that is `undecided`, with a pole on
+    the stability boundary within the precision of its entries, has the norm NaN and the upper bound inf.
     """
 
     norm: FloatArray
