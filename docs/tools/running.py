@@ -18,6 +18,7 @@ from tempfile import TemporaryDirectory
 
 from docs.tools.fences import RUN, Block, blocks
 
+ROOT = str(Path(__file__).parents[2])
 KEPT = (".svg", ".png")
 LONGEST = 180  # s of a page, on a loaded machine
 WIDTH = "92"  # columns of tables in the outputs
@@ -37,6 +38,8 @@ def run_pages(texts: dict[str, str]) -> dict[str, PageRun]:
     """Run every page that has something to run, two at a time."""
     jobs = {place: text for place, text in texts.items() if any(b.language in RUN for b in blocks(text))}
     done = {place: PageRun([""] * len(blocks(text))) for place, text in texts.items()}
+    if ROOT not in sys.path:  # MkDocs takes back what its hook added; the workers import this module by its name
+        sys.path.insert(0, ROOT)
     with ProcessPoolExecutor(2, multiprocessing.get_context("spawn"), _set_look) as pool:
         done |= zip(jobs, pool.map(_run_page, jobs, jobs.values()), strict=True)
     return done

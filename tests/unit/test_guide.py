@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -16,6 +18,7 @@ from docs.tools.reference import as_html, reference_pages, undescribed
 from docs.tools.running import run_pages
 from studies.drives.drive_file import Estimators
 
+ROOT = Path(__file__).parents[2]
 WRITTEN = page_texts()
 EVERY = WRITTEN | reference_pages()
 DRAWN = {place: set(re.findall(r"!\[[^\]]*\]\(([^)/]+)\)", text)) for place, text in WRITTEN.items()}
@@ -96,3 +99,15 @@ def test_the_estimators_that_a_drive_file_can_choose_are_all_there() -> None:
         known = re.search(r"known: ([a-z, -]+)", str(caught.value))
         assert known is not None
         assert {name.strip() for name in known[1].split(",")} == names
+
+
+def test_pages_run_where_the_project_is_not_on_the_path(tmp_path: Path) -> None:
+    """As under MkDocs, which forgets what a hook added to the path."""
+    script = tmp_path / "build.py"
+    script.write_text(
+        f"import sys\nsys.path.insert(0, {str(ROOT)!r})\nfrom docs.tools.running import run_pages\n"
+        f"sys.path.remove({str(ROOT)!r})\nif __name__ == '__main__':\n"
+        "    print(run_pages({'a.md': '```python\\nprint(6 * 7)\\n```\\n'})['a.md'].outputs)\n"
+    )
+    ended = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout) == (0, "['42\\n']\n"), ended.stderr
