@@ -62,17 +62,30 @@ def tire_unknowns(tire: Tire, settings: IdentifySettings) -> tuple[Unknown, ...]
     )  # fmt: skip
 
 
-def slip_velocity(
-    p: Mapping[str, float], mu: FloatArray, rolling: FloatArray, filter_: Prefilter, step: float
-) -> FloatArray:
-    """F[v_r] (n, k), m/s, that belongs to the normalised force mu (n, k) [1] at the rolling speed R|w| (n, k), m/s."""
-    s, c = p["saturation"], p["bend"]
-    lagged = first_order_lag(mu, step, p["damping_time"], filter_.runs)
+KEPT = 2
+"""Calls whose filtered parts are remembered: a fit changes one unknown at a time, and many are not felt by a part."""
+FELT = ("damping_time", "saturation", "bend")  # by the filtered parts of the slip velocity
+
+
+def filtered_parts(
+    curve: tuple[float, float, float], mu: FloatArray, rolling: FloatArray, filter_: Prefilter, step: float
+) -> tuple[FloatArray, FloatArray]:
+    """D[G] and F[.] of the module's equation, (n, k) each, m/s; ``curve`` holds the unknowns `FELT`.
+
+    From the normalised force mu (n, k) [1] at the rolling speed R|w| (n, k), m/s.
+    """
+    damping, s, c = curve
+    lagged = first_order_lag(mu, step, damping, filter_.runs)
     size = np.abs(lagged)
     used = np.minimum(s * size, MOST_USED)
     bristles = size if abs(s) < 1e-6 else -np.log(1.0 - used) / s
     left = 1.0 - np.minimum(used + c * size**2, MOST_USED)
     odd = 1.0 - np.minimum(c * size**2, MOST_USED)
     stretched = np.sign(lagged) * (bristles + size / odd - size)
-    moved = p["relaxation_length"] * filter_.rate(stretched)
-    return np.asarray((moved + filter_.smooth(rolling * lagged / left)) / p["slip_stiffness"])
+    return filter_.rate(stretched), filter_.smooth(rolling * lagged / left)
+
+
+def slip_velocity(p: Mapping[str, float], parts: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """F[v_r] (n, k), m/s, of its `filtered_parts`."""
+    moved, rolled = parts
+    return np.asarray((p["relaxation_length"] * moved + rolled) / p["slip_stiffness"])

@@ -17,11 +17,12 @@ with the third and fifth power of the filter's lag, so the filter here is slower
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
-from studies.identify.bristle import slip_velocity, tire_unknowns
+from studies.identify.bristle import FELT, KEPT, filtered_parts, slip_velocity, tire_unknowns
 from studies.identify.data import DriveSignals
 from studies.identify.estimate import Unknown
 from studies.identify.prefilter import Prefilter
@@ -73,6 +74,7 @@ class LateralSlip:
         self.speed = np.abs(data.vx[:, None] * self._cosine + ends * steered)
         self._viscous = tire.sigma2.value * self.relative
         self._measured = self.filter.smooth(self.relative), self.filter.smooth(self.speed)
+        self._parts = lru_cache(KEPT)(self._filtered_parts)
 
     def force(self, yaw_inertia: float) -> FloatArray:
         """F_y of both axles in the tire frame (n, 2), N."""
@@ -80,11 +82,15 @@ class LateralSlip:
 
     def residual(self, p: Mapping[str, float]) -> FloatArray:
         """F[v_ry] minus what the axle force asks for, m/s."""
-        mu = self.force(p["yaw_inertia"]) / self.load - self._viscous
-        asked = slip_velocity(p, mu, self.speed, self.filter, self.data.step)
+        damping, saturation, bend = (p[name] for name in FELT)
+        asked = slip_velocity(p, self._parts(p["yaw_inertia"], (damping, saturation, bend)))
         asked = asked * np.exp(p.get("axle_ratio", 0.0) * np.array([-1.0, 1.0]))
         relative, speed = self._measured
         return np.asarray(relative + np.array([p[name] for name in ANGLES]) * speed - asked)
+
+    def _filtered_parts(self, yaw_inertia: float, curve: tuple[float, float, float]) -> tuple[FloatArray, FloatArray]:
+        mu = self.force(yaw_inertia) / self.load - self._viscous
+        return filtered_parts(curve, mu, self.speed, self.filter, self.data.step)
 
     def slip(self, p: Mapping[str, float]) -> FloatArray:
         """F[v_ry]/F[v_xt] (n, 2) [1], the tangent of the slip angle."""

@@ -8,13 +8,14 @@ rolling, |mu| < 0.05, where there is no force to share wrongly. That is also wha
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
 from estimators.vehicle import GRAVITY
 from studies.drives.corner_inputs import shared_forces, wheel_forces
-from studies.identify.bristle import slip_velocity, tire_unknowns
+from studies.identify.bristle import FELT, KEPT, filtered_parts, slip_velocity, tire_unknowns
 from studies.identify.data import DriveSignals
 from studies.identify.estimate import Unknown
 from studies.identify.prefilter import pitched
@@ -24,6 +25,7 @@ from synthesis.models.parameter_set import Tire
 RADII = ("radius_front", "radius_rear")
 SIDES = ("side_front", "side_rear")
 DAMPINGS = ("pitch_damping_front", "pitch_damping_rear")
+PITCHING = ("torque_delay", "pitch_frequency", *DAMPINGS)
 
 
 class LongitudinalSlip:
@@ -72,13 +74,16 @@ class LongitudinalSlip:
         ay = data.ay if data.ay is not None else np.zeros_like(data.vx)
         self._turning = np.abs(data.filter.smooth(ay)) > settings.cross_force * GRAVITY
         self._measured = data.filter.smooth(self.surface), data.filter.smooth(self.along)
+        self._pitched = lru_cache(KEPT)(self._pitched_friction)
+        self._parts = lru_cache(KEPT)(self._filtered_parts)
 
     def residual(self, p: Mapping[str, float]) -> FloatArray:
         """F[R_e w - v_xt] minus what the force asks for, m/s."""
         ratio = self._ratio(p)
         surface, along = self._measured
-        mu = self._friction(p) / (ratio if self.torques_known else 1.0)
-        asked = slip_velocity(p, mu, np.abs(self.surface) * ratio, self.data.filter, self.data.step)
+        pitching = tuple(p[name] for name in PITCHING) if self.torques_known else ()
+        damping, saturation, bend = (p[name] for name in FELT)
+        asked = slip_velocity(p, self._parts(tuple(ratio.tolist()), pitching, (damping, saturation, bend)))
         corners = surface * ratio - along - asked
         return np.concatenate([corners, np.sum(self.share * corners, axis=1, keepdims=True)], axis=1)
 
@@ -87,17 +92,23 @@ class LongitudinalSlip:
         sides = np.outer([p.get(name, 0.0) for name in SIDES], [1.0, -1.0]).ravel()
         return np.asarray(np.repeat([p.get(name, 1.0) for name in RADII], 2) * (1.0 + sides))
 
-    def _friction(self, p: Mapping[str, float]) -> FloatArray:
+    def _filtered_parts(
+        self, ratio: tuple[float, ...], pitching: tuple[float, ...], curve: tuple[float, float, float]
+    ) -> tuple[FloatArray, FloatArray]:
+        radii = np.array(ratio)
+        # shared by load mu is a_x/g at every wheel, whatever the radii
+        mu = self._pitched(*pitching) / radii if pitching else self.mu
+        return filtered_parts(curve, mu, np.abs(self.surface) * radii, self.data.filter, self.data.step)
+
+    def _pitched_friction(self, delay: float, frequency: float, *dampings: float) -> FloatArray:
         """mu (n, 4): transferred load follows acceleration as the body pitches."""
-        if not self.torques_known:
-            return self.mu  # shared by load: mu is a_x/g at every wheel
         moved, step, runs = self.data.load - self._static, self.data.step, self.data.filter.runs
         sides = [
-            pitched(moved[:, axle], step, p["pitch_frequency"], p[name], runs)
-            for axle, name in zip((slice(0, 2), slice(2, 4)), DAMPINGS, strict=True)
+            pitched(moved[:, axle], step, frequency, damping, runs)
+            for axle, damping in zip((slice(0, 2), slice(2, 4)), dampings, strict=True)
         ]
         load = np.maximum(self._static + np.concatenate(sides, axis=1), self._least)
-        return np.asarray((self.force - p["torque_delay"] * self._late) / load - self.viscous)
+        return np.asarray((self.force - delay * self._late) / load - self.viscous)
 
     def slip(self, p: Mapping[str, float]) -> FloatArray:
         """F[R_e w - v_xt]/F[v_xt] (n, 4) [1]: what the slip limit is compared with."""
