@@ -9,7 +9,7 @@ schedules: $(STAMP)
 	$(BIN)/gainsmith schedules --out estimators/schedules
 
 test: $(STAMP)
-	$(BIN)/pytest -n auto
+	$(BIN)/pytest -n auto --dist worksteal # neighbours on one process: they share what is slow to make
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
