@@ -327,8 +327,7 @@ READ = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("shape", [(), (3,)], ids=["one car", "three cars"])
-@pytest.mark.parametrize("factor", [1.0, 1e28])
+@pytest.mark.parametrize(("shape", "factor"), [((), 1e28), ((3,), 1.0)], ids=["one car", "three cars"])
 @pytest.mark.parametrize("name", READ)
 def test_what_no_sensor_reads_is_estimated_as_if_it_were_missing(
     name: str, factor: float, shape: tuple[int, ...]
