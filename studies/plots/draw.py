@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import singledispatch
 from itertools import product
@@ -22,7 +22,8 @@ PATTERN: Mapping[str, Any] = {
     "solid": "-", "dashed": (0, (5, 2)), "dotted": (0, (1, 1.5)), "dash-dot": (0, (6, 1.5, 1, 1.5)),
     "long dash": (0, (8, 2, 2, 2, 2, 2)), "none": "",
 }  # fmt: skip
-LETTERS = 12.5  # of a title fit into an inch
+LETTERS, SMALL_LETTERS = 12.5, 15.0  # of a title, and of a legend, fit into an inch
+HANDLE = 0.45  # inches of a legend beside its words
 STYLE: Any = {
     "font.size": 9,
     "axes.titlesize": 9.5,
@@ -72,8 +73,16 @@ def draw(figure: Figure) -> Sheet:
                 for handle, text in reversed(list(zip(*axes.get_legend_handles_labels(), strict=True)))
             }
             order = list(dict.fromkeys(text for axes in sheet.axes for text in axes.get_legend_handles_labels()[1]))
-            sheet.legend([shown[text] for text in order], order, loc="outside lower center", ncols=figure.columns)
+            columns = fitting_columns(order, figure.size[0], figure.columns)
+            if order:
+                sheet.legend([shown[text] for text in order], order, loc="outside lower center", ncols=columns)
         return sheet
+
+
+def fitting_columns(labels: Sequence[str], width: float, most: int) -> int:
+    """How many columns of a legend stay inside a sheet of so many inches, at most ``most``."""
+    widest = HANDLE + max(map(len, labels), default=0) / SMALL_LETTERS
+    return max(1, min(most, int(width / widest)))
 
 
 def _draw_panel(axes: Any, panel: Panel) -> None:
@@ -88,6 +97,8 @@ def _draw_panel(axes: Any, panel: Panel) -> None:
         draw_mark(mark, axes)
     _run(axes, "x", x)
     _run(axes, "y", y)
+    if panel.bare:
+        axes.set_axis_off()
     if panel.equal:
         axes.set_aspect("equal", adjustable="datalim")
     if panel.title:

@@ -30,7 +30,10 @@ class Axis:
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes; a text in the place of an axis is its label. ``legend`` says where it stands inside ("upper left")."""
+    """One pair of axes; a text in the place of an axis is its label. ``legend`` says where it stands inside ("upper left").
+
+    A ``bare`` panel has words alone: no axes, no grid.
+    """
 
     marks: Sequence[Mark]
     x: Axis | str = ""
@@ -41,6 +44,7 @@ class Panel:
     columns: int = 1  # of the legend
     heading: str = ""  # of the legend
     equal: bool = False  # x and y on one scale
+    bare: bool = False
 
 
 @dataclass(frozen=True)
