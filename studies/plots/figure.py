@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from estimators.display import Display
 from studies.plots.marks import Mark
 
 Scale = Literal["linear", "log", "symlog"]
@@ -28,8 +29,8 @@ class Axis:
     turned: float = 0.0  # degrees by which the words at the ticks are turned
 
 
-@dataclass(frozen=True)
-class Panel:
+@dataclass(frozen=True, repr=False)
+class Panel(Display):
     """One pair of axes; a text in the place of an axis is its label. ``legend`` says where it stands inside ("upper left").
 
     A ``bare`` panel has words alone: no axes, no grid.
@@ -47,8 +48,8 @@ class Panel:
     bare: bool = False
 
 
-@dataclass(frozen=True)
-class Figure:
+@dataclass(frozen=True, repr=False)
+class Figure(Display):
     """Panels in rows, written as SVG and PNG under ``name``; ``alternative`` is the text for readers who cannot see it.
 
     ``size`` in inches. The legend "below" collects the labels of all panels under them. Axes are shared along "row", "col"
