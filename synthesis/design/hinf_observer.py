@@ -24,9 +24,9 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from estimators.display import Display
-from synthesis.certificate.claims import quotient
 from synthesis.certificate.refute import undetectable_place
 from synthesis.certificate.rounding import round_down, round_up
+from synthesis.design.gains_summary import gains_summary
 from synthesis.errors import ProblemError
 from synthesis.lmi.exchange import Memory
 from synthesis.lmi.problem import LmiProblem
@@ -127,26 +127,7 @@ class ObserverGains(Display):
 
     def summary(self) -> tuple[str, ...]:
         """Verdict, level with its lower bound, how the gains are run, the tightest inequality."""
-        bound = "no lower bound" if self.gamma_lower is None else f"at least {self.gamma_lower:.6g}"
-        channels = [f"{' + '.join(c.disturbances)} -> {' + '.join(c.errors)}" for c in self.design.channels]
-        period = "" if self.sample_time is None else f", every {1e3 * self.sample_time:g} ms"
-        return (
-            f"ObserverGains of '{self.model.name}': {self.verdict}",
-            f"gamma: {self.gamma:.6g} {self._unit()}".removesuffix(" 1") + f", {bound}",
-            f"channels: {'; '.join(channels)}",
-            f"update: {self.update}{period}, degree {self.design.degree}",
-            f"tightest: {self.result.tightest.name}, margin {self.result.tightest.value:.3g}"
-            if self.result.margins
-            else "tightest: none",
-        )
-
-    def _unit(self) -> str:
-        """Of gamma: error over disturbance; with weights, or several disturbances, these are numbers of their sizes."""
-        channel, model = self.design.minimised, self.model
-        above = {s.unit for s in model.states if s.name in channel.errors}
-        below = [s.unit for s in model.disturbances if s.name in channel.disturbances]
-        top = above.pop() if len(above) == 1 else "(mixed units)"
-        return quotient(top, below[0]) if len(below) == 1 and channel.weights is None else top
+        return gains_summary(self)
 
     @property
     def verdict(self) -> Verdict:
