@@ -13,6 +13,8 @@ from studies.sweeps.observer import Observer
 from studies.sweeps.summary import Summary
 from studies.sweeps.sweep import Sweep
 
+DIGITS = 3  # behind the point
+ROOM, LITTLE = 0.22, 0.02  # of the axis, beside the bars
 KINDS = (("total", "total index, 95 % confidence", BLUE, 0.2), ("first-order", "first-order index", ORANGE, -0.2))
 
 
@@ -33,21 +35,28 @@ def _panel(sweep: Sweep, summary: Summary, observer: Observer, measure: Measure)
         return None
     order = sorted(totals, key=lambda name: totals[name])
     marks: list[Mark] = []
-    ends = [1.0]
+    ends = [0.0, 1.0]
     for kind, label, colour, offset in KINDS:
         found = [summary.of(observer.name, measure.name, f"{kind} index {name}") for name in order]
         values = np.array([np.nan if f is None else f.value for f in found])
         widths = np.array([0.0 if f is None else f.confidence or 0.0 for f in found])
+        values = np.where(np.abs(values) < 0.5 * 10.0**-DIGITS, 0.0, values)  # an estimate of nothing may be −1e-7
         places = np.arange(len(order)) + offset
         marks.append(
-            Bars(places, values, label, colour, 0.36, flat=True, errors=np.array([widths, widths]), numbers="%.3f")
+            Bars(
+                places,
+                values,
+                label,
+                colour,
+                0.36,
+                flat=True,
+                errors=np.array([widths, widths]),
+                numbers=f"%.{DIGITS}f",
+            )
         )
-        ends.append(float(np.nanmax(values + widths)))
-    x = Axis(
-        f"share of the variance of {spread_of(measure)} [1]",
-        min(0.0, -0.02),
-        1.22 * max(ends),
-        ticks=(0.0, 0.25, 0.5, 0.75, 1.0),
-    )
+        ends += [float(np.nanmin(values - widths)), float(np.nanmax(values + widths))]
+    low = min(ends) - ROOM if min(ends) < -LITTLE else -LITTLE  # room for numbers on both sides
+    label = f"share of the variance of {spread_of(measure)} [1]"
+    x = Axis(label, low, max(ends) + ROOM, ticks=(0.0, 0.25, 0.5, 0.75, 1.0))
     y = Axis("", -0.6, len(order) - 0.4, ticks={place: words(name) for place, name in enumerate(order)})
     return Panel(marks, x, y, words(measure.name))

@@ -91,7 +91,7 @@ def index_table(sweep: Sweep, summary: Summary, observer: Observer) -> Table:
                 summary.of(observer.name, measure.name, f"{kind} index {v.name}") for kind in ("first-order", "total")
             ]
             if None not in found:
-                cells = [f"{shown(f.value, 3)} ± {shown(f.confidence or 0.0, 2)}" for f in found if f is not None]
+                cells = [f"{_share(f.value)} ± {_share(f.confidence or 0.0)}" for f in found if f is not None]
                 rows.append((spread_of(measure), words(v.name), *cells))
     caption = (
         "Sobol indices: the share of the variance that a parameter has alone, and with all that it takes part in; a share has no "
@@ -117,6 +117,11 @@ def unit_of(measure: Measure) -> str:
 def spread_of(measure: Measure) -> str:
     """What the variance is taken of: a measure that may be infinite goes in as its reciprocal."""
     return words(measure.name) if measure.variance == "value" else f"1 / {words(measure.name)}"
+
+
+def _share(value: float) -> str:
+    """Of a variance: four digits behind the point."""
+    return f"{round(value, 4) + 0.0:.4f}".replace("-", "−")
 
 
 def percent(share: float) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterator
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import MISSING, dataclass, fields, is_dataclass, make_dataclass
 from enum import Enum
 from functools import cache
 from importlib import import_module
@@ -172,6 +172,9 @@ def test_the_check_sees_a_long_text_and_units_stand_behind_numbers() -> None:
         values: list[float]
 
     assert not short(Long([0.123456789] * 200))
+
+    wide = make_dataclass("Wide", [f"a_field_with_a_long_name_{k}" for k in range(40)], bases=(Display,), repr=False)
+    assert short(wide(*["a text of fifty-five characters that no line holds twice"] * 40))
 
     @displayed({"speed": "m/s"})
     @dataclass(repr=False)
