@@ -16,6 +16,7 @@ from matplotlib.figure import Figure as Sheet
 from matplotlib.patches import Rectangle
 
 from studies.plots.figure import Axis, Figure, Panel, axis
+from studies.plots.fit import LABEL, TITLE, along, fitted, places, upward
 from studies.plots.marks import Band, Bars, Box, ColouredDots, Contours, ErrorBars, Level, Line, Map, Mark, Shade, Words
 
 PATTERN: Mapping[str, Any] = {
@@ -55,12 +56,13 @@ def draw(figure: Figure) -> Sheet:
             len(rows), across, squeeze=False, sharex=figure.share_x or False, sharey=figure.share_y or False,
             gridspec_kw={"width_ratios": figure.widths, "height_ratios": figure.heights},
         )  # fmt: skip
+        widths, heights = places(figure)
         for i, j in product(range(len(rows)), range(across)):
             panel = rows[i][j] if j < len(rows[i]) else None
             if panel is None:
                 grid[i, j].set_visible(False)
             else:
-                _draw_panel(grid[i, j], panel)
+                _draw_panel(grid[i, j], panel, along(panel, widths[j]), upward(heights[i]))
         if figure.bar:
             meshes = [mesh for axes in sheet.axes for mesh in axes.collections if isinstance(mesh, QuadMesh)]
             sheet.colorbar(meshes[0], ax=sheet.axes, label=figure.bar, shrink=0.6, aspect=40)
@@ -85,7 +87,7 @@ def fitting_columns(labels: Sequence[str], width: float, most: int) -> int:
     return max(1, min(most, int(width / widest)))
 
 
-def _draw_panel(axes: Any, panel: Panel) -> None:
+def _draw_panel(axes: Any, panel: Panel, wide: float, high: float) -> None:
     axes.grid(visible=panel.grid)
     x, y = axis(panel.x), axis(panel.y)
     for name, given in (("x", x), ("y", y)):  # scales first: what is drawn on them may depend on it
@@ -95,20 +97,20 @@ def _draw_panel(axes: Any, panel: Panel) -> None:
             )
     for mark in panel.marks:
         draw_mark(mark, axes)
-    _run(axes, "x", x)
-    _run(axes, "y", y)
+    _run(axes, "x", x, wide)
+    _run(axes, "y", y, high)
     if panel.bare:
         axes.set_axis_off()
     if panel.equal:
         axes.set_aspect("equal", adjustable="datalim")
     if panel.title:
-        axes.set_title(panel.title, loc="left")
+        axes.set_title(fitted(panel.title, wide, TITLE), loc="left")
     if panel.legend:
         axes.legend(loc=panel.legend, ncols=panel.columns, title=panel.heading or None)
 
 
-def _run(axes: Any, name: str, given: Axis) -> None:
-    getattr(axes, f"set_{name}label")(given.label)
+def _run(axes: Any, name: str, given: Axis, inches: float) -> None:
+    getattr(axes, f"set_{name}label")(fitted(given.label, inches, LABEL))
     if given.ticks is not None:
         words = (
             list(given.ticks.values())

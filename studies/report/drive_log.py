@@ -43,7 +43,7 @@ def agreeing(report: Report) -> str:
     """How many comparisons of the signals with one another agree."""
     frames = report.get("frames", ())
     told = [row for row in frames if row["verdict"] == "agrees"]
-    if not frames:
+    if not told:
         return ""
     agree = f"{len(told)} of {len(frames)} comparisons of the signals with one another agree"
     return f"{agree}." if len(told) == len(frames) else f"{agree}; the others are in the table of the log."

@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 from studies.report.html.page import filled
 from studies.report.sweep_figures import index_figure
 from studies.report.sweep_tables import (
+    NOTHING,
     asked_tables,
     gate_table,
     index_table,
@@ -136,6 +137,9 @@ def tightest(result: SweepResult) -> Iterator[str]:
                 found.append((measure.loss(nominal.value, worst.value), nominal, worst))
         if found:
             loss, nominal, worst = max(found, key=lambda each: each[0])
+            if loss < NOTHING:
+                yield f"{words(measure.name)}: no design loses anything."
+                continue
             unit = unit_of(measure)
             ends = f"from {shown(nominal.value)}{unit} to {shown(worst.value)}{unit}"
             yield (
@@ -175,13 +179,13 @@ def _part(result: SweepResult, index: int, folder: Path) -> Part:
     seen, more = [], []
     if any(bars.values()):
         caption = "One parameter at a time through its range, the others nominal; every measure at its worst place of the grid."
-        seen.append(tiled(tornado_figure(rows, bars), folder, caption, 0.9 + 0.4 * d, SHARE))
+        seen.append(tiled(tornado_figure(rows, bars), folder, caption, 1.1 + 0.4 * d, SHARE))
     shares = index_figure(sweep, summary, observer)
     if shares is not None:
         caption = (
             "Sobol indices: the share of the variance that a parameter has alone, and with all that it takes part in."
         )
-        seen.append(tiled(shares, folder, caption, 0.9 + 0.4 * d, SHARE))
+        seen.append(tiled(shares, folder, caption, 1.1 + 0.4 * d, SHARE))
     maps = [(m, found) for m in rows.measures if (found := worst_map(result.folder, rows, index, m)) is not None]
     if maps:
         figures = [map_figure(result, rows, [each]) for each in maps]
@@ -206,7 +210,7 @@ def _counts(result: SweepResult, observer: Observer) -> str:
     own = [s for s in result.summary.statistics if s.observer == observer.name and s.kind == "count"]
     counts = ", ".join(f"{shown(int(s.value))} {s.name}" for s in own if s.value or s.name == "designs")
     update = "correction held over a sample" if observer.update == "held" else "one correction a sample"
-    return f"{counts}; gains of {observer.origin}, {update}, sample time {shown(1e3 * observer.sample_time)} ms."
+    return f"{counts} of {observer.origin}; {update}, sample time {shown(1e3 * observer.sample_time)} ms."
 
 
 def _counted(number: int, what: str) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from studies.plots import Axis, Bars, Figure, Mark, Panel
 from studies.plots.colours import BLUE, ORANGE
-from studies.report.sweep_tables import spread_of
+from studies.report.sweep_tables import spread_of, varies
 from studies.sweeps.labels import paneled, words
 from studies.sweeps.measures import Measure
 from studies.sweeps.observer import Observer
@@ -31,7 +31,7 @@ def _panel(sweep: Sweep, summary: Summary, observer: Observer, measure: Measure)
     totals = {
         n: f.value for n in names if (f := summary.of(observer.name, measure.name, f"total index {n}")) is not None
     }
-    if not totals:
+    if not totals or not varies(summary, observer, measure):
         return None
     order = sorted(totals, key=lambda name: totals[name])
     marks: list[Mark] = []
@@ -56,7 +56,6 @@ def _panel(sweep: Sweep, summary: Summary, observer: Observer, measure: Measure)
         )
         ends += [float(np.nanmin(values - widths)), float(np.nanmax(values + widths))]
     low = min(ends) - ROOM if min(ends) < -LITTLE else -LITTLE  # room for numbers on both sides
-    label = f"share of the variance of {spread_of(measure)} [1]"
-    x = Axis(label, low, max(ends) + ROOM, ticks=(0.0, 0.25, 0.5, 0.75, 1.0))
+    x = Axis("share of the variance [1]", low, max(ends) + ROOM, ticks=(0.0, 0.25, 0.5, 0.75, 1.0))
     y = Axis("", -0.6, len(order) - 0.4, ticks={place: words(name) for place, name in enumerate(order)})
-    return Panel(marks, x, y, words(measure.name))
+    return Panel(marks, x, y, spread_of(measure))

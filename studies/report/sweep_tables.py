@@ -16,6 +16,7 @@ from studies.sweeps.sweep import Sweep
 
 QUANTILES = ("nominal", "median", "quantile 95 %", "quantile 99 %", "worst")
 DIGITS = 5
+NOTHING = 1e-9  # a share: less is rounding
 
 
 def asked_tables(sweep: Sweep) -> list[Table]:
@@ -78,14 +79,14 @@ def worst_table(sweep: Sweep, summary: Summary, observer: Observer) -> Table:
             at = [worst.at.get(name) for name, _ in named]
             places = [None if value is None else shown(value, DIGITS) for value in at]
             rows.append((words(measure.name), f"{shown(worst.value, DIGITS)}{unit_of(measure)}", *places))
-    columns = ("measure", "worst", *(f"{words(name)} [{unit}]" for name, unit in named))
+    columns = ("measure", "worst", *(f"{words(name)} [{unit.removesuffix('/(1)')}]" for name, unit in named))
     return Table(f"worst-{observer.name}", "Worst points: the design and the place of the grid.", columns, rows)
 
 
 def index_table(sweep: Sweep, summary: Summary, observer: Observer) -> Table:
     """First-order and total Sobol index of every parameter with the half-width of 95 % confidence."""
     rows = []
-    for measure in sweep.measures:
+    for measure in (m for m in sweep.measures if varies(summary, observer, m)):
         for v in sweep.ranges[observer.name]:
             found = [
                 summary.of(observer.name, measure.name, f"{kind} index {v.name}") for kind in ("first-order", "total")
@@ -119,11 +120,17 @@ def spread_of(measure: Measure) -> str:
     return words(measure.name) if measure.variance == "value" else f"1 / {words(measure.name)}"
 
 
+def varies(summary: Summary, observer: Observer, measure: Measure) -> bool:
+    """Whether the worst design differs from the nominal one by more than rounding: else shares of a variance mean nothing."""
+    nominal, worst = (summary.of(observer.name, measure.name, name) for name in ("nominal", "worst"))
+    return nominal is None or worst is None or not abs(measure.loss(nominal.value, worst.value)) < NOTHING
+
+
 def _share(value: float) -> str:
     """Of a variance: four digits behind the point."""
     return f"{round(value, 4) + 0.0:.4f}".replace("-", "−")
 
 
 def percent(share: float) -> str:
-    """A share in per cent, without its sign."""
-    return shown(100.0 * share, 3) if math.isfinite(share) else "all"
+    """A share in per cent."""
+    return "0" if abs(share) < NOTHING else shown(100.0 * share, 3) if math.isfinite(share) else "all"

@@ -93,7 +93,8 @@ def tornado_panel(measure: Measure, bars: Sequence[Bar]) -> Panel:
     for place, bar in enumerate(bars):
         if not np.isfinite(bar.values).all():
             notes.append(_note(nominal, place, "unstable", 1.0))
-    room = 0.24 * (max(ends) - min(ends)) or 0.1 * abs(nominal) or 1.0  # numbers stand beside the bars
+    span = max(ends) - min(ends)
+    room = 0.24 * span if span > NOTHING * abs(nominal) else 0.1 * abs(nominal) or 1.0  # numbers stand beside the bars
     low, high = min(ends) - room, max(ends) + room
     x = Axis(f"{titled(measure)}, nominal {_digits(nominal, LEAST_DIGITS)}", low, high, ticks=round_ticks(low, high))
     y = Axis(ticks={place: words(bar.parameter) for place, bar in enumerate(bars)}, low=-0.6, high=len(bars) - 0.4)

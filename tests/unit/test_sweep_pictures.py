@@ -11,6 +11,7 @@ import pytest
 
 from studies.plots import Axis, Bars, Figure, Panel, Words
 from studies.plots.draw import draw
+from studies.plots.fit import fitted
 from studies.sweeps.change import Change, change_panel
 from studies.sweeps.measures import Measure
 from studies.sweeps.tornado import Bar, round_ticks, told_apart, tornado_panel
@@ -88,6 +89,25 @@ def test_changes_are_counted_and_written_and_statistics_do_not_cover_each_other(
     panel = change_panel(result(("one",)), MEASURE, changes)
     assert panel.title == "noise norm: 1 shrank, 3 moved" and words(panel) == ["−4.8", "+3.1", "−0.5"]
     assert len({change.y for change in changes}) == 5
+
+
+def test_titles_and_labels_of_panels_are_broken_where_they_do_not_fit_and_only_there() -> None:
+    long = cast(
+        Measure,
+        SimpleNamespace(name="second_moment_radius p 0.25 hold-last-value", unit="1", better="smaller", sign=1.0),
+    )
+    panels = [tornado_panel(measure, bars([1.3, 1.2, 1.1, 1.4])) for measure in (long, MEASURE)]
+    sheet = draw(Figure("tiles", "c", "a", panels, size=(8.8, 2.6), legend="below"))
+    sheet.draw_without_rendering()
+    first, second = (axes.title if axes.get_title() else axes._left_title for axes in sheet.axes)
+    for axes, title in zip(sheet.axes, (first, second), strict=True):
+        for text in (title, axes.xaxis.label):
+            box = text.get_window_extent()
+            assert sheet.bbox.x0 <= box.x0 and box.x1 <= sheet.bbox.x1
+    assert (
+        first.get_window_extent().x1 < sheet.bbox.x1 / 2 and "\n" in first.get_text() and "\n" not in second.get_text()
+    )
+    assert fitted("$\\alpha$ as it is, a formula of any length that nobody breaks", 1.0, 9.0).count("\n") == 0
 
 
 @pytest.mark.parametrize("columns", [1, 2])
