@@ -8,6 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 from studies.plots import Axis, Bars, Figure, Panel, Words
 from studies.plots.draw import draw
@@ -99,7 +100,10 @@ def test_titles_and_labels_of_panels_are_broken_where_they_do_not_fit_and_only_t
     panels = [tornado_panel(measure, bars([1.3, 1.2, 1.1, 1.4])) for measure in (long, MEASURE)]
     sheet = draw(Figure("tiles", "c", "a", panels, size=(8.8, 2.6), legend="below"))
     sheet.draw_without_rendering()
-    first, second = (axes.title if axes.get_title() else axes._left_title for axes in sheet.axes)
+    first, second = (
+        next(text for text in axes.findobj(Text) if text.get_text() == axes.get_title(loc="left"))
+        for axes in sheet.axes
+    )
     for axes, title in zip(sheet.axes, (first, second), strict=True):
         for text in (title, axes.xaxis.label):
             box = text.get_window_extent()
