@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.errors import unknown
 from estimators.whole_files import write_bytes
 
@@ -31,8 +32,8 @@ class Axis:
     unit: str = "1"
 
 
-@dataclass(frozen=True)
-class LabelledArray:
+@dataclass(frozen=True, repr=False)
+class LabelledArray(Display):
     """`values` with one named axis for each dimension, a unit, and notes (plain text and numbers) on where it comes from.
 
     Values may be NaN (not known), and are stored as float64. Raises AnalysisError if an axis is repeated or does not have as many

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from analysis.checks import as_stack
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.forces import levelled
 from estimators.vehicle import GRAVITY
 from synthesis.models.parameter_set import ParameterSet
@@ -22,9 +23,13 @@ NEEDED = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Loads:
+@dataclass(frozen=True, repr=False)
+class Loads(Display):
     """Vertical loads in N, positive when pressing on the road; every array has the broadcast shape of the inputs."""
+
+    shown_units: ClassVar = {
+        "front": "N", "rear": "N", "front_left": "N", "front_right": "N", "rear_left": "N", "rear_right": "N",
+    }  # fmt: skip
 
     front: FloatArray
     rear: FloatArray

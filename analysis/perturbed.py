@@ -14,6 +14,7 @@ from analysis.checks import as_stack
 from analysis.errors import AnalysisError
 from analysis.norms.observer_error import checked_gain
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.errors import unknown
 from synthesis.models.extract import MATRICES
 from synthesis.models.lpv import LpvModel
@@ -35,8 +36,8 @@ class Matrices:
         return self.A - gain @ self.C, self.E - gain @ self.F
 
 
-@dataclass(frozen=True)
-class PerturbedModel:
+@dataclass(frozen=True, repr=False)
+class PerturbedModel(Display):
     """An LpvModel compiled over all its symbols, so that thousands of perturbed copies cost one array expression.
 
     `names` lists scheduling parameters first, then constants; `nominal` holds the values of the constants.

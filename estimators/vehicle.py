@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.errors import EstimatorError
 
 GRAVITY = 9.80665
@@ -49,13 +50,17 @@ _KINDS = {
 }
 
 
-@dataclass(frozen=True)
-class RigidBody:
+@dataclass(frozen=True, repr=False)
+class RigidBody(Display):
     """The car in the plane, SI units: what every kind of vehicle has.
 
     Raises:
         EstimatorError: a value that is missing, not finite, or impossible in its unit; all of them are listed.
     """
+
+    shown_units: ClassVar = {name: kind.unit for name, kind in _KINDS.items() if kind.unit != "(no unit)"} | {
+        "radii": "m"
+    }
 
     mass: float  # kg, total
     yaw_inertia: float  # kg m^2
@@ -98,7 +103,7 @@ class RigidBody:
         return np.array([front, front, rear, rear])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SingleTrack(RigidBody):
     """With the cornering stiffness of each axle (both wheels): P5."""
 
@@ -106,7 +111,7 @@ class SingleTrack(RigidBody):
     rear_stiffness: float  # N/rad
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FourWheel(RigidBody):
     """With the stiffness of one tire, the relaxation lengths of the tires and the friction of the road: P4."""
 
@@ -118,7 +123,7 @@ class FourWheel(RigidBody):
     friction: float = 1.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class VehicleParameters(RigidBody):
     """What the force, load and velocity estimators need to know of a car.
 

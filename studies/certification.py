@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+from typing import ClassVar
 
+from estimators.display import Display
 from estimators.errors import GainsmithError
 from estimators.schedule import read_content
 from estimators.schedule.checker import printable
@@ -17,9 +19,11 @@ LONGEST = 300  # characters of a message
 UNTIED = "format 1: constants and units are words only, tied to nothing that is proved"
 
 
-@dataclass(frozen=True)
-class Certification:
+@dataclass(frozen=True, repr=False)
+class Certification(Display):
     """One file: its proofs and what is to be said beside them, or why it was refused."""
+
+    shown_units: ClassVar = {"seconds": "s"}
 
     path: Path
     name: str

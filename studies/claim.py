@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
+from estimators.display import Display
 from studies.sentence import fill
 
 JsonValue = Any
@@ -54,8 +55,8 @@ class Published:
     claimed: bool = True
 
 
-@dataclass(frozen=True)
-class Finding:
+@dataclass(frozen=True, repr=False)
+class Finding(Display):
     """Our half: the value computed now, the verdict that follows from it, and the reading under which it holds."""
 
     computed: JsonValue
@@ -63,8 +64,8 @@ class Finding:
     reading: str
 
 
-@dataclass(frozen=True)
-class Claim:
+@dataclass(frozen=True, repr=False)
+class Claim(Display):
     """A published claim beside our finding."""
 
     published: Published

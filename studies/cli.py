@@ -108,6 +108,7 @@ def _drives(command: Command) -> None:
             "--drive", required=needed, type=Path, metavar="DRIVE.toml", help="columns, units, signs, vehicle"
         )
         reader.add_argument("--out", required=needed, type=Path, metavar="DIR", help=f"where {text} go")
+    run.add_argument("--report", type=Path, metavar="FILE", help="one page: estimates, errors, flags, the log")
     checks = run.add_mutually_exclusive_group()
     checks.add_argument("--check", action="store_true", help="only compare the signals of the log with one another")
     checks.add_argument(
@@ -142,6 +143,12 @@ def _studies(command: Command) -> None:
         "--baseline", type=Path, metavar="FILE", help="fail when a statistic shrank beyond its tolerance"
     )
     sweep.add_argument("--update-baseline", action="store_true", help="write the baseline instead of comparing")
+    sweep.add_argument(
+        "--report",
+        type=Path,
+        metavar="FILE",
+        help="one page: the gate, tornado, quantiles, Sobol indices, worst points",
+    )
     sweep.add_argument("--junit", type=Path, metavar="FILE", help="the gate as JUnit XML")
     sweep.add_argument("--summary", type=Path, metavar="FILE", help="the gate as Markdown")
 

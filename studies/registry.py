@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module, resources
 
+from estimators.display import Display
 from estimators.errors import unknown
 from studies.study import Study
 from synthesis.errors import SpecError
@@ -24,8 +25,8 @@ MODULES = {
 }
 
 
-@dataclass(frozen=True)
-class Registry:
+@dataclass(frozen=True, repr=False)
+class Registry(Display):
     """Studies by id, each the name of a module with ``STUDY``, or ``module:NAME``."""
 
     modules: Mapping[str, str]

@@ -7,6 +7,7 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from estimators.display import Display
 from studies.execution.files import discard_unfinished, only_run, ready_folder, write_bytes, write_json
 from studies.execution.fingerprint import Sources
 from studies.execution.processes import Processes
@@ -32,8 +33,8 @@ class Outcome:
     message: str = ""
 
 
-@dataclass(frozen=True)
-class RunSummary:
+@dataclass(frozen=True, repr=False)
+class RunSummary(Display):
     """What a run did: an outcome for each part, the studies that the report shows, and the files."""
 
     outcomes: tuple[Outcome, ...]

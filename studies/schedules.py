@@ -12,10 +12,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
+from estimators.display import Display
 from estimators.errors import GainsmithError
 from estimators.schedule import read_content
 from studies.execution.processes import available_cores, in_order
@@ -33,13 +34,15 @@ AS_IT_IS = Variant()
 LARGER_IS_BETTER = ("decay rate", "internal update", "sampled error", "drop probability")
 
 
-@dataclass(frozen=True)
-class ScheduleRun:
+@dataclass(frozen=True, repr=False)
+class ScheduleRun(Display):
     """One specification, done: `state` is written, kept, same (--check), drift, missing or failed.
 
     `proofs` are those of the file that is there now, `least` the largest frozen gain of every channel (a bound from below), and
     `moved` how far the fresh gains lie from the stored ones, as a share of the largest: reported, not judged.
     """
+
+    shown_units: ClassVar = {"seconds": "s"}
 
     name: str
     state: str

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from estimators.display import Display, displayed
 from studies.claim import Claim
 from studies.plots import Figure
 
@@ -27,8 +28,8 @@ class Scope:
 QUICK = Scope(quick=True, seeds=12)
 
 
-@dataclass(frozen=True)
-class Table:
+@dataclass(frozen=True, repr=False)
+class Table(Display):
     """A table with a caption that stands on its own; units belong into the column names: ``speed [m/s]``."""
 
     name: str
@@ -37,8 +38,8 @@ class Table:
     rows: Sequence[Sequence[Cell]]
 
 
-@dataclass(frozen=True)
-class PartResult:
+@dataclass(frozen=True, repr=False)
+class PartResult(Display):
     """What one part found; ``notes`` are paragraphs of the report, ``measures`` single numbers for machines."""
 
     claims: Sequence[Claim] = ()
@@ -63,8 +64,8 @@ class Preparation:
     cost: float = 1.0
 
 
-@dataclass(frozen=True)
-class Part:
+@dataclass(frozen=True, repr=False)
+class Part(Display):
     """A named piece of a study; ``cost`` in rough seconds of one core lets the runner start the longest first.
 
     ``quick`` is False for a part that a quick run leaves out, because another one shows the same on fewer drives.
@@ -78,7 +79,8 @@ class Part:
     quick: bool = True
 
 
-@dataclass(frozen=True)
+@displayed({})
+@dataclass(frozen=True, repr=False)
 class Study:
     """A study as users select it by ``id``; ``paper`` is P1..P5, or empty for studies beyond the papers."""
 

@@ -9,6 +9,7 @@ from typing import Any, get_args
 
 from flint import fmpq, fmpq_poly
 
+from estimators.display import Display
 from estimators.errors import unknown
 from synthesis.design.stability import Form
 from synthesis.errors import ProblemError
@@ -27,8 +28,8 @@ from synthesis.polynomials.rational import (
 )
 
 
-@dataclass(frozen=True)
-class CertifiedRange:
+@dataclass(frozen=True, repr=False)
+class CertifiedRange(Display):
     """Open intervals of the parameter on which every inequality holds; `everywhere` on the whole range asked for."""
 
     intervals: tuple[tuple[float, float], ...]

@@ -17,11 +17,13 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
+from estimators.display import displayed
 from estimators.errors import unknown
 from synthesis.errors import SpecError
 from synthesis.toml_places import Places
 
 
+@displayed({})
 class StrictTable(BaseModel):
     """A table that is read once and stays as it is: no unknown key, no number in quotes, no infinity."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -11,14 +11,17 @@ from scipy.optimize import minimize_scalar
 from analysis.checks import as_stack, positive
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
+from estimators.display import Display
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-@dataclass(frozen=True)
-class ExponentialBound:
+@dataclass(frozen=True, repr=False)
+class ExponentialBound(Display):
     """|e(t)| <= initial exp(-decay_rate t) + ultimate, decay_rate in 1/s, the others in the unit of e."""
+
+    shown_units: ClassVar = {"decay_rate": "1/s"}
 
     initial: float
     decay_rate: float

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from analysis.checks import positive, square
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.errors import unknown
 from synthesis.models.param import Constant
 
@@ -18,8 +19,8 @@ Output = Literal["yaw_rate", "lateral_acceleration", "longitudinal_acceleration"
 OUTPUTS: tuple[Output, ...] = ("yaw_rate", "lateral_acceleration", "longitudinal_acceleration")
 
 
-@dataclass(frozen=True)
-class SlidingModeGains:
+@dataclass(frozen=True, repr=False)
+class SlidingModeGains(Display):
     """Omega_1 .. Omega_12 of P5 (6): rows x_1 .. x_4, columns sign(y_1), sign(y_2), sign(y_3); rad/s^2 and N/s."""
 
     matrix: FloatArray
@@ -81,8 +82,8 @@ class Violation:
     meaning: str
 
 
-@dataclass(frozen=True)
-class SlidingModeConvergence:
+@dataclass(frozen=True, repr=False)
+class SlidingModeConvergence(Display):
     r"""What P5 Appendix A says of a set of gains; s = L_1 x2 - L_2 x3 is the yaw moment error [N*m].
 
     yaw_moment_limit: (A.4) holds while |s| < I_z (Omega_1 - |Omega_2| - |Omega_3|) [N*m]: a local condition.
@@ -91,6 +92,10 @@ class SlidingModeConvergence:
     split_residual: -L_1 Omega_5 + L_2 Omega_8 [N*m/s] left over in (A.11) when (7) is rounded.
     split_ultimate: |s| in the end [N*m] under the residual and force rates given.
     """
+
+    shown_units: ClassVar = {
+        "yaw_moment_limit": "N m", "split_decay_rate": "1/s", "split_residual": "N m/s", "split_ultimate": "N m",
+    }  # fmt: skip
 
     yaw_moment_limit: float
     yaw_margin: float

@@ -20,6 +20,7 @@ from analysis.markov.regular import radius_verdicts
 from analysis.markov.second_moment import lifted
 from analysis.markov.system import second_moment_operator
 from estimators.arrays import AnyArray, FloatArray
+from estimators.display import Display
 from synthesis.lmi.result import Verdict
 
 if TYPE_CHECKING:
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
 MOST_ERROR = 1e-2
 
 
-@dataclass(frozen=True)
-class CriticalInterval:
+@dataclass(frozen=True, repr=False)
+class CriticalInterval(Display):
     """lower <= critical probability <= upper for every pair within the error; `exact` for the entries as they are stored.
 
     `exact` is NaN where exact fractions would take too long.

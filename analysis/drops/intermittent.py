@@ -40,6 +40,7 @@ from analysis.errors import AnalysisError
 from analysis.markov.enclosure import EPS
 from analysis.markov.second_moment import lifted, spectral_radius
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.errors import unknown
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings
@@ -61,8 +62,8 @@ class StaticGain:
     radius: float
 
 
-@dataclass(frozen=True)
-class CriticalArrival:
+@dataclass(frozen=True, repr=False)
+class CriticalArrival(Display):
     """Bracket of the critical arrival rate: `lower` is refuted, and the static `gain` K (n, k) has `radius` < 1 at `arrival`.
 
     `upper` is that rate, or with one output the same as `lower`: the answer is a theorem then. `verdict` is CERTIFIED if the
@@ -77,8 +78,8 @@ class CriticalArrival:
     arrival: float
 
 
-@dataclass(frozen=True)
-class KalmanArrival:
+@dataclass(frozen=True, repr=False)
+class KalmanArrival(Display):
     """Bounds of the critical arrival rate of the Kalman filter; `exact` if a theorem makes the lower bound the answer."""
 
     lower: float

@@ -27,6 +27,7 @@ from analysis.errors import AnalysisError
 from analysis.markov.coupled_lmi import weighted_sum
 from analysis.markov.second_moment import lifted, pack, unpack
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.schedule import GainSchedule
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings
@@ -37,8 +38,8 @@ SHARE = 4  # cells of the LMI to a segment of P
 MOST_CELLS = 2000  # open at once before a proof gives up
 
 
-@dataclass(frozen=True)
-class MeanSquareSchedule:
+@dataclass(frozen=True, repr=False)
+class MeanSquareSchedule(Display):
     """Verdict about one drop probability for every admissible motion of the parameter.
 
     CERTIFIED: the inequality is proved on the whole range by P, `lyapunov` (b, n, n) at `nodes` (b,). REFUTED: the second moment

@@ -27,6 +27,7 @@ from analysis.checks import as_stack, leading, positive, square
 from analysis.errors import AnalysisError
 from analysis.mode_objects import with_output
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.errors import unknown
 from estimators.schedule import GainSchedule, Update
 from synthesis.models.discretise import zero_order_hold
@@ -37,8 +38,8 @@ if TYPE_CHECKING:
 DropPolicy = Literal["coast", "hold", "hold with plant"]
 
 
-@dataclass(frozen=True)
-class DropModes:
+@dataclass(frozen=True, repr=False)
+class DropModes(Display):
     """Update matrices (..., N, N) of a dropped and of a received sample on the states of the policy.
 
     coast: e. hold: (e, s), the motion of the plant acting from outside. hold with plant: (e, x, measurement used last), an

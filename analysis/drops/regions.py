@@ -17,6 +17,7 @@ from analysis.exact import radius_below_one
 from analysis.markov.enclosure import EPS, enclosed
 from analysis.markov.regular import EXACT, regular_cells
 from estimators.arrays import FloatArray
+from estimators.display import Display
 
 Interval: TypeAlias = tuple[float, float]
 START, MOST = 16, 256  # cells at first, and at most in one round of halving
@@ -24,8 +25,8 @@ FINEST = 2.0**-50  # width of a cell
 PLACES = (0.5, 0.25, 0.75, 0.05, 0.95)  # of a region, where its radius is asked for
 
 
-@dataclass(frozen=True)
-class Regions:
+@dataclass(frozen=True, repr=False)
+class Regions(Display):
     """Intervals that fill [0, 1], each in order: radius < 1, radius > 1, and undecided, for all data within their error."""
 
     stable: tuple[Interval, ...]

@@ -11,11 +11,12 @@ from analysis.drops.frozen import critical_drop_probability
 from analysis.drops.modes import DropPolicy, schedule_drop_modes
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.schedule import GainSchedule
 
 
-@dataclass(frozen=True)
-class FrozenDropProbability:
+@dataclass(frozen=True, repr=False)
+class FrozenDropProbability(Display):
     """`smallest` critical drop probability and the parameter `place` where it is taken; (g,) samples of the whole range.
 
     Frozen: the parameter stands still. It bounds from above what holds while the parameter moves

@@ -9,12 +9,13 @@ from flint import fmpq
 
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.loop.plant import Axis
 from synthesis.polynomials.rational import rational
 
 
-@dataclass(frozen=True)
-class Trajectory:
+@dataclass(frozen=True, repr=False)
+class Trajectory(Display):
     """Parameters that run through `start[k]` -> `end[k]` (K, p), linearly in `durations[k]` (K,), and then again.
 
     Durations are seconds, or whole samples in discrete time, where a parameter has the values at the beginning of each. A

@@ -22,13 +22,14 @@ from analysis.markov.second_moment import triangle
 from analysis.markov.system import LARGE, LIFTED, MarkovJumpSystem
 from analysis.mode_objects import state_matrices
 from estimators.arrays import AnyArray, BoolArray, FloatArray
+from estimators.display import Display
 from synthesis.lmi.result import Verdict
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-class MarkovJumpProcess:
+class MarkovJumpProcess(Display):
     """x' = A_i x with mode i following a Markov process.
 
     Args:

@@ -14,14 +14,15 @@ from analysis.constant_lmi import constant_problem, matrix_of
 from analysis.errors import AnalysisError
 from analysis.markov.system import MarkovJumpSystem
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.lmi.result import LmiResult, Margin, Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
 from synthesis.polynomials.matrix import MatrixPolynomial
 
 
-@dataclass(frozen=True)
-class MeanSquareCertificate:
+@dataclass(frozen=True, repr=False)
+class MeanSquareCertificate(Display):
     """Verdict with the Lyapunov matrices (m, n, n) in the states as given, and the margins of the inequalities.
 
     CERTIFIED: proved by these matrices. REFUTED: the second-moment radius is not below 1, for any

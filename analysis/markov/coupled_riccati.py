@@ -20,6 +20,7 @@ from analysis.markov.coupled_lmi import single
 from analysis.markov.coupled_lyapunov import solve_coupled_lyapunov
 from analysis.markov.system import MarkovJumpSystem
 from estimators.arrays import FloatArray
+from estimators.display import Display
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -30,8 +31,8 @@ NEWTON_STEPS = 50  # policy iteration converges quadratically; more than a dozen
 RESIDUAL = 1e-10  # of the Riccati equations, relative to the largest entry of X, at which a solution is accepted
 
 
-@dataclass(frozen=True)
-class JumpRegulator:
+@dataclass(frozen=True, repr=False)
+class JumpRegulator(Display):
     """u = `gains`[mode] x (m, k, n) with cost x' `cost`[mode] x, cost (m, n, n); `radius` of the closed loop is below 1.
 
     `residual` is the largest error of the Riccati equations relative to the largest entry of the cost.

@@ -14,13 +14,14 @@ from analysis.markov.chain import distribution, sample_paths
 from analysis.markov.coupled_lmi import single
 from analysis.markov.system import MarkovJumpSystem
 from estimators.arrays import FloatArray
+from estimators.display import Display
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-@dataclass(frozen=True)
-class SecondMomentCheck:
+@dataclass(frozen=True, repr=False)
+class SecondMomentCheck(Display):
     """E|x(k)|^2 for k = 0..steps, all arrays (steps + 1,): exact, estimated, and bounds of the estimate.
 
     The bounds hold for all steps together with the given confidence (Bonferroni), as far as the mean of `runs` values is

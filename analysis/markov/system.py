@@ -27,6 +27,7 @@ from analysis.markov.regular import radius_verdicts
 from analysis.markov.second_moment import lifted, spectral_radius
 from analysis.mode_objects import state_matrices
 from estimators.arrays import AnyArray, BoolArray, FloatArray
+from estimators.display import Display
 from synthesis.lmi.result import Verdict
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ LIFTED = (
 )  # relative error of an entry p_ij a_kl a_rs of the operator: rounded data, and products of them
 
 
-class MarkovJumpSystem:
+class MarkovJumpSystem(Display):
     """x+ = A_i x with mode i following a Markov chain.
 
     Args:

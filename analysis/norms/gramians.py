@@ -17,6 +17,7 @@ from analysis.norms.frequency_response import read_systems
 from analysis.norms.stability import require_stable
 from analysis.state_space import given_pair, state_space
 from estimators.arrays import FloatArray
+from estimators.display import Display
 
 if TYPE_CHECKING:
     import control
@@ -28,8 +29,8 @@ RESIDUAL = 1e-9  # of a Lyapunov equation, relative to its terms
 BALANCED = 1e-6  # of the recomputed gramians of a balanced realisation, relative to the Hankel singular values
 
 
-@dataclass(frozen=True)
-class BalancedRealization:
+@dataclass(frozen=True, repr=False)
+class BalancedRealization(Display):
     r"""A `control.StateSpace` whose gramians are both diag(`singular_values`), x = `transformation` x_balanced.
 
     `singular_values` (n,) are those of the given system, descending; of fewer kept states `error_bound` = 2 sum of those left

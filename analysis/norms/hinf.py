@@ -25,13 +25,14 @@ from analysis.norms.two_states import handles, planar_peaks
 from analysis.norms.zero import is_zero
 from analysis.state_space import given_system
 from estimators.arrays import BoolArray, FloatArray
+from estimators.display import Display
 
 CHUNK = 500_000  # matrix entries treated at once, to bound memory
 SMALL = 4_096  # and systems of two states: what fits a cache
 
 
-@dataclass(frozen=True)
-class HinfNorm:
+@dataclass(frozen=True, repr=False)
+class HinfNorm(Display):
     r"""sup_w sigma_max(G(j w)) for each system; arrays over the leading axes.
 
     `norm` is attained at `frequency` (rad/s, or rad/sample for a discrete system; inf: approached as w grows). No gain

@@ -8,11 +8,12 @@ import sympy as sp
 
 from analysis.errors import AnalysisError
 from analysis.norms.observer_error import selection
+from estimators.display import Display
 from synthesis.models.lpv import LpvModel
 
 
-@dataclass(frozen=True)
-class StaticGain:
+@dataclass(frozen=True, repr=False)
+class StaticGain(Display):
     """`expression` in the model's symbols and the entries L_i_j of the gain; `free_of_gain` if none of them is left."""
 
     expression: sp.Expr

@@ -12,6 +12,7 @@ from analysis.observability.hautus_distance import Region, below, descend, least
 from analysis.observability.pairs import EPSILON, driven_pair, observed_pair
 from analysis.observability.witness_gain import witness_gain
 from estimators.arrays import FloatArray
+from estimators.display import Display
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -20,8 +21,8 @@ GAP = 0.01
 EVALUATIONS = 40_000  # at most, of the smallest singular value
 
 
-@dataclass(frozen=True)
-class HiddenModeDistance:
+@dataclass(frozen=True, repr=False)
+class HiddenModeDistance(Display):
     r"""lower <= min over z of sigma_min [A - z I; C] <= upper, which is attained at z = `mode` (1/s or per sample) [Eising1984].
 
     That minimum is the least spectral norm of a change (E, G), complex numbers allowed, for which (A + E, C + G) has a hidden

@@ -10,6 +10,7 @@ import numpy as np
 from analysis.checks import as_stack, positive, square
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.models.discretise import zero_order_hold
 from synthesis.models.lpv import LpvModel
 
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-@dataclass(frozen=True)
-class Gramians:
+@dataclass(frozen=True, repr=False)
+class Gramians(Display):
     r"""Gramians as triangular factors R (..., n, n), gramian = R'R, so that small singular values keep their digits.
 
     `transition` (..., n, n) is phi from the first to behind the last sample of each window. Singular values, ranks and

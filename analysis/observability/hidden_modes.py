@@ -10,6 +10,7 @@ from flint import fmpq
 
 from analysis.observability.modes import hautus_test
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.certificate.refute import undetectable_place
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.plant import Plant
@@ -18,8 +19,8 @@ from synthesis.models.lpv import LpvModel
 SHARE = 0.1  # of the largest component of an eigenvector: smaller ones are not named
 
 
-@dataclass(frozen=True)
-class HiddenMode:
+@dataclass(frozen=True, repr=False)
+class HiddenMode(Display):
     """A mode that does not decay and that no output shows, or no input moves, where the parameters stand still at `place`.
 
     `eigenvalue` [1/s]; `states` are the names of those that take part in it, the largest part first, each in its own unit.

@@ -16,6 +16,7 @@ from analysis.observability.exact_expression import exact, in_cases
 from analysis.observability.lie_series import Evaluator, ball, series_arithmetic
 from analysis.observability.matrix import exact_number
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.errors import unknown
 from synthesis.models.nonlinear import NonlinearModel
 
@@ -23,8 +24,8 @@ Number: TypeAlias = float | int | str | Any  # or an exact sympy number
 BITS = 320
 
 
-@dataclass(frozen=True, eq=False)
-class LieRank:
+@dataclass(frozen=True, eq=False, repr=False)
+class LieRank(Display):
     r"""Rank of d/dx [h; L_f h; ...; L_f^k h] at one point, inputs and their derivatives given.
 
     `by_order[k]` is the rank with derivatives up to k. Each is proved from below (pivots of an elimination in ball
@@ -49,7 +50,7 @@ class LieRank:
         return len(self.state_names) - self.rank
 
 
-class LieRankTest:
+class LieRankTest(Display):
     """The symbolic work (Jacobians, shared subexpressions) done once for many points of one model.
 
     `order` Lie derivatives, 2 nx - 1 if None: nx - 1 reach the generic rank, but at a special point (a state at zero) more may

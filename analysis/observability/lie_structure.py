@@ -13,13 +13,14 @@ import sympy as sp
 from analysis.errors import AnalysisError
 from analysis.observability.lie_rank import LieRank, LieRankTest, ball_rank, exact_model
 from analysis.observability.matrix import exact_number
+from estimators.display import Display
 from synthesis.models.nonlinear import NonlinearModel
 
 Range = tuple[float, float]
 
 
-@dataclass(frozen=True, eq=False)
-class StructuralDirections:
+@dataclass(frozen=True, eq=False, repr=False)
+class StructuralDirections(Display):
     """Constant state directions V (nx, d), exact: `proved` if h_x V = 0 and f_x V = V K for every state and input.
 
     Then moving the state along V changes no output, however the inputs move, and the hidden part w (d,) obeys w' = K w
@@ -41,8 +42,8 @@ class StructuralDirections:
         return tuple(words)
 
 
-@dataclass(frozen=True, eq=False)
-class GenericRank:
+@dataclass(frozen=True, eq=False, repr=False)
+class GenericRank(Display):
     """The largest rank over random rational points: proved from below for almost every point of the analytic piece.
 
     `samples` are the single results; `structure` holds what all of them miss. With `structure.proved` the rank is

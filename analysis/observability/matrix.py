@@ -12,6 +12,7 @@ import sympy as sp
 
 from analysis.errors import AnalysisError
 from analysis.observability.exact_expression import exact
+from estimators.display import Display
 from estimators.errors import unknown
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter
@@ -24,8 +25,8 @@ def rate_symbol(name: str, order: int = 1) -> sp.Symbol:
     return sp.Symbol(f"{name}_rate{'' if order == 1 else order}")
 
 
-@dataclass(frozen=True, eq=False)
-class ObservabilityMatrix:
+@dataclass(frozen=True, eq=False, repr=False)
+class ObservabilityMatrix(Display):
     r"""O_n = [xi_1; ...; xi_n], xi_1 = C, xi_{i+1} = xi_i A + d(xi_i)/dt (P1 (12); P2 (24); P3 (9)), (n ny, nx).
 
     `frozen` says that the parameters were held, so that d/dt was dropped: such a rank is not observability. `values` are

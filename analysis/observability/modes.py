@@ -16,6 +16,7 @@ from analysis.observability.pairs import EPSILON, observed_pair, unit_pair, with
 from analysis.observability.real_roots import numerator
 from analysis.observability.staircase import separate
 from estimators.arrays import BoolArray, ComplexArray, FloatArray
+from estimators.display import Display
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 CANCELLED = 2.0**12 * EPSILON  # beside the largest entry of a row: what is left of terms a thousand times as large
 
 
-@dataclass(frozen=True)
-class HautusTest:
+@dataclass(frozen=True, repr=False)
+class HautusTest(Display):
     r"""Which modes of frozen pairs are hidden: the Popov-Belevitch-Hautus test behind a staircase form.
 
     All arrays (..., n), in the order of `eigenvalues` [1/s, or 1 for discrete time]: first those of what is seen, then those
@@ -144,8 +145,8 @@ def _smallest(A: FloatArray, C: FloatArray | None, points: ComplexArray) -> Floa
     return np.asarray(np.linalg.svd(matrix, compute_uv=False)[..., -1])
 
 
-@dataclass(frozen=True, eq=False)
-class FrozenMode:
+@dataclass(frozen=True, eq=False, repr=False)
+class FrozenMode(Display):
     """A symbolic mode of a held pair: `hidden_if` vanishes where its outputs C v lose rank; `always` if they must.
 
     `leftover` are the maximal minors divided by `hidden_if`: where all of them vanish together the mode is hidden as well (fewer

@@ -13,6 +13,7 @@ from flint import fmpq, fmpq_mat
 
 from analysis.observability.matrix import ObservabilityMatrix, controllability_matrix, observability_matrix, rate_symbol
 from analysis.observability.rank_loss import RankLoss, rank_loss
+from estimators.display import Display
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter
 from synthesis.polynomials.definite import sign_on_box
@@ -24,8 +25,8 @@ MOST_MINORS = 120  # of a symbolic matrix: more take minutes
 PARTS = 8  # along every variable, where two signs are looked for
 
 
-@dataclass(frozen=True, eq=False)
-class RangeRank:
+@dataclass(frozen=True, eq=False, repr=False)
+class RangeRank(Display):
     r"""The rank over the box of parameters and rates.
 
     `verdict`: "full": everywhere, proved by the sign of a minor's common factor in ball arithmetic; "lost": on the set

@@ -10,13 +10,14 @@ import sympy as sp
 from analysis.errors import AnalysisError
 from analysis.observability.matrix import ObservabilityMatrix, exact_number
 from analysis.observability.real_roots import numerator, real_roots
+from estimators.display import Display
 from estimators.errors import unknown
 
 Interval = tuple[sp.Expr, sp.Expr]
 
 
-@dataclass(frozen=True, eq=False)
-class RankLoss:
+@dataclass(frozen=True, eq=False, repr=False)
+class RankLoss(Display):
     r"""The set {condition = 0} in the space of parameters and their time derivatives.
 
     `condition` is the determinant, or for more rows than states the greatest common divisor of the maximal minors;

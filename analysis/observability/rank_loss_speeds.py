@@ -12,13 +12,14 @@ import sympy as sp
 from analysis.errors import AnalysisError
 from analysis.observability.matrix import observability_matrix, rate_symbol
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.models.lpv import LpvModel
 
 REAL = 1e-7  # imaginary part of a real root, relative to its size: double roots split by the root of the rounding error
 
 
-@dataclass(frozen=True, eq=False)
-class RankLossSpeeds:
+@dataclass(frozen=True, eq=False, repr=False)
+class RankLossSpeeds(Display):
     r"""The determinant c(p, p', constants) of the time-varying observability matrix, compiled over the constants.
 
     Rank is lost at p if c(p, p') = 0 for some rate p' in its bounds. c is linear in p', so that is where c has two signs, or

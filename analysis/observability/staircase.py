@@ -10,13 +10,14 @@ import numpy as np
 from analysis.errors import AnalysisError
 from analysis.observability.pairs import EPSILON, driven_pair, observed_pair, unit_pair
 from estimators.arrays import ComplexArray, FloatArray, IntArray
+from estimators.display import Display
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-@dataclass(frozen=True)
-class Staircase:
+@dataclass(frozen=True, repr=False)
+class Staircase(Display):
     r"""Orthogonal T (n, n) with T'AT = [[A_seen, 0], [*, A_hidden]], C T = [C_seen, 0], but for `residual`.
 
     For controllability everything is transposed: T'AT = [[A_reached, *], [0, A_unreached]], T'B = [B_reached; 0]. `stages` are

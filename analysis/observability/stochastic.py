@@ -24,6 +24,7 @@ from analysis.checks import as_stack, positive_definite, positive_semidefinite, 
 from analysis.errors import AnalysisError
 from analysis.observability.gramians import sampled_sequence
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.models.lpv import LpvModel
 
 if TYPE_CHECKING:
@@ -32,8 +33,8 @@ if TYPE_CHECKING:
 RANK_TOLERANCE = 1e-9
 
 
-@dataclass(frozen=True)
-class StochasticObservability:
+@dataclass(frozen=True, repr=False)
+class StochasticObservability(Display):
     r"""Step by step for k = 0..K: predicted covariance psi M_k + N_k + O(1/psi) before sample k is used.
 
     M, N (K+1, n, n); `directions` (K+1,) the rank of M_k, by construction and not by a threshold on M. A direction of

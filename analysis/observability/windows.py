@@ -11,6 +11,7 @@ from analysis.checks import positive
 from analysis.errors import AnalysisError
 from analysis.observability.gramians import Gramians, sliding_controllability, sliding_observability
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.lmi.result import Verdict
 
 if TYPE_CHECKING:
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
-@dataclass(frozen=True)
-class WindowTest:
+@dataclass(frozen=True, repr=False)
+class WindowTest(Display):
     r"""For which c_2 does |phi v| >= c_1 |v| imply v' V v >= c_2 v'v, window by window (P2 Definition 1)?
 
     `information` (..., windows) is the largest such c_2, inf where no direction lasts (|phi| < c_1); `uniform` (...) the

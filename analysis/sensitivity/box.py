@@ -11,12 +11,13 @@ import numpy as np
 from analysis.checks import as_stack
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
+from estimators.display import Display
 
 Ranges: TypeAlias = Mapping[str, Sequence[float]]
 
 
-@dataclass(frozen=True, eq=False)
-class Box:
+@dataclass(frozen=True, eq=False, repr=False)
+class Box(Display):
     """Names of d parameters, with `low`, `high` and `nominal` values (d,)."""
 
     names: tuple[str, ...]

@@ -24,6 +24,7 @@ from analysis.sensitivity.box import Box, Ranges
 from analysis.sensitivity.designs import Saltelli, require_power
 from analysis.sensitivity.measure import Measure, evaluate, plain_axes
 from estimators.arrays import FloatArray, IndexArray
+from estimators.display import Display
 
 GROUPS = 32
 HALF_WIDTH = float(ndtri(0.975))
@@ -86,8 +87,8 @@ class SaltelliSums:
         return VarianceShares(*whole, HALF_WIDTH * errors[0], HALF_WIDTH * errors[1], int(count.sum()))
 
 
-@dataclass(frozen=True)
-class SobolIndices:
+@dataclass(frozen=True, repr=False)
+class SobolIndices(Display):
     """Arrays with the axes (parameter, ...); NaN where the measure does not vary. `evaluations` of the measure."""
 
     first_order: LabelledArray

@@ -20,12 +20,13 @@ from analysis.labelled import Axis, LabelledArray
 from analysis.sensitivity.box import Box, Ranges
 from analysis.sensitivity.designs import Design
 from estimators.arrays import FloatArray
+from estimators.display import Display
 
 Measure: TypeAlias = Callable[[Mapping[str, FloatArray]], ArrayLike]
 
 
-@dataclass(frozen=True)
-class OneAtATime:
+@dataclass(frozen=True, repr=False)
+class OneAtATime(Display):
     """`nominal` value, and `values` and `deviations` = values - nominal with the axes (parameter, factor, ...)."""
 
     nominal: LabelledArray

@@ -14,6 +14,7 @@ from analysis.sensitivity.box import Box, Ranges
 from analysis.sensitivity.designs import Design, FullGrid, Sobol, require_power
 from analysis.sensitivity.measure import Measure, evaluate
 from estimators.arrays import FloatArray
+from estimators.display import Display
 
 MOST_CORNERS = 12  # parameters; beyond, the search starts from samples alone
 
@@ -31,8 +32,8 @@ class WorstCaseSearch(Design):
         require_power("samples", self.samples)
 
 
-@dataclass(frozen=True)
-class WorstCase:
+@dataclass(frozen=True, repr=False)
+class WorstCase(Display):
     """`value` at `parameters`; `sampled` is the worst of the corners and samples the search began with.
 
     A search bounds the true worst case from one side only; it proves nothing about what it has not visited.

@@ -22,6 +22,7 @@ from analysis.errors import AnalysisError
 from analysis.exact import Rational, congruence, is_positive, rationals, total
 from analysis.mode_objects import state_matrices
 from estimators.arrays import FloatArray, IndexArray
+from estimators.display import Display
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.settings import LmiSettings
@@ -30,8 +31,8 @@ from synthesis.lmi.solve import solve
 SETTINGS = LmiSettings(relaxation="vertex")
 
 
-@dataclass(frozen=True)
-class CommonLyapunov:
+@dataclass(frozen=True, repr=False)
+class CommonLyapunov(Display):
     """CERTIFIED with `P` (n, n), REFUTED with the multipliers `X` (m, k, k), or INCONCLUSIVE with neither proved.
 
     The multipliers belong to `states`, a diagonal block that no mode leaves and enters again: all states unless some are

@@ -21,14 +21,15 @@ from analysis.switching.jsr_ellipsoid import Ellipsoid, best_ellipsoid
 from analysis.switching.jsr_polytope import grow_polytope, proved_polytope_bound
 from analysis.switching.jsr_products import multiply_out, proved_rate, search_products, vanishes
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.lmi.result import Verdict
 
 Proof = Literal["ellipsoid", "polytope", "nilpotent"]
 FRACTIONS = (0.8, 0.4)  # of the tolerance, by which modes are scaled down before a polytope is grown
 
 
-@dataclass(frozen=True)
-class JointSpectralRadius:
+@dataclass(frozen=True, repr=False)
+class JointSpectralRadius(Display):
     """lower <= rho <= upper, both proved. `product` attains the lower one: the mode applied first stands first.
 
     `proof` says what bounds from above: `P` (n, n) with A_i'P A_i <= upper^2 P, or `vertices` (k, n) with A_i v_j in

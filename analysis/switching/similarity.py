@@ -10,6 +10,7 @@ With e_bar = T e, A_bar = T A T^-1, B_bar = T B, A_s = (A_bar + A_bar')/2 and V 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,11 +19,14 @@ from analysis.checks import as_stack, positive, square
 from analysis.errors import AnalysisError
 from analysis.mode_objects import state_matrices
 from estimators.arrays import FloatArray
+from estimators.display import Display
 
 
-@dataclass(frozen=True)
-class SimilarityBound:
+@dataclass(frozen=True, repr=False)
+class SimilarityBound(Display):
     """V' <= eta1 V + eta2, worst case over the stack: `eta1` in 1/s, `eta2` in the unit of V per second."""
+
+    shown_units: ClassVar = {"eta1": "1/s", "growth": "1/s"}
 
     eta1: float
     eta2: float
@@ -50,8 +54,8 @@ class SimilarityBound:
         return np.sqrt(2.0 * self.energy(time, start))
 
 
-@dataclass(frozen=True)
-class DiagonalTransform:
+@dataclass(frozen=True, repr=False)
+class DiagonalTransform(Display):
     """Best T = diag(gamma, 1) for 2 x 2 matrices: `growth` = lambda_max(A_s) with it, arrays over the leading axes.
 
     Where `attained` is false the infimum needs gamma -> 0 or infinity (a triangular matrix); `gamma` is 0 or inf there.

@@ -14,6 +14,7 @@ ball, the exponentials are enclosed, and the signs of the stability test count o
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from flint import arb, arb_mat, fmpq
@@ -22,6 +23,7 @@ from numpy.typing import ArrayLike
 from analysis.checks import positive
 from analysis.uncertainty.jitter import observer_matrices
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.polynomials.rational import rational
 from synthesis.polynomials.stable import is_schur
 
@@ -30,9 +32,11 @@ COARSEST = 4  # halvings to begin with
 BEYOND = 20  # doublings of the smallest piece in the search for a witness
 
 
-@dataclass(frozen=True)
-class DelayMargin:
+@dataclass(frozen=True, repr=False)
+class DelayMargin(Display):
     """Stable for every constant delay in [0, lower) s; not stable at the delay `upper` s (inf: none found up to `looked` s)."""
+
+    shown_units: ClassVar = {"lower": "s", "upper": "s", "looked": "s"}
 
     lower: float
     upper: float

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from flint import arb, arb_mat, fmpq
@@ -22,6 +23,7 @@ from analysis.errors import AnalysisError
 from analysis.switching.jsr_products import search_products
 from analysis.uncertainty.jitter_loop import NAME, JitterLoop, observer_of
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.certificate.claims import Claim
 from synthesis.certificate.search import Search, Wish
 from synthesis.certificate.verify import Names, Verifier
@@ -38,13 +40,17 @@ LARGEST = 0.999  # of the nominal sample time: no sample has no length
 DIGITS, REGIONS = 15, 600
 
 
-@dataclass(frozen=True)
-class Jitter:
+@dataclass(frozen=True, repr=False)
+class Jitter(Display):
     """Stable for every sequence of sample times within +-`lower` of nominal (relative).
 
     The sequence `witness` (s), within +-`upper` and repeated for ever, is not stable; `upper` is inf where none was found.
     `claim` holds P(T) with which stability was proved.
     """
+
+    shown_units: ClassVar = {
+        "lower": "of the sample time", "upper": "of the sample time", "sample_time": "s", "witness": "s",
+    }  # fmt: skip
 
     lower: float
     upper: float

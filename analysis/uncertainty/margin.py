@@ -23,6 +23,7 @@ from analysis.lpv.question import Question, ask
 from analysis.uncertainty.polynomials import Family
 from analysis.uncertainty.signs import all_positive
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.lmi.result import Verdict
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.rational import rational
@@ -35,8 +36,8 @@ SHRINKS = (1.0, 0.99, 0.95, 0.9, 0.75, 0.5, 0.2, 0.05)
 EXCHANGES, PULLS = 20, 80
 
 
-@dataclass(frozen=True)
-class RobustStabilityMargin:
+@dataclass(frozen=True, repr=False)
+class RobustStabilityMargin(Display):
     """lower <= k* <= upper: the whole box grown `lower` times is stable, `witness`, in that grown `upper` times, is not."""
 
     lower: float

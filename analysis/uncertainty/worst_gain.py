@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from flint import fmpq, fmpq_mat
@@ -23,6 +24,7 @@ from analysis.norms.hinf import hinf_norm
 from analysis.uncertainty.polynomials import Family, over_frequencies
 from analysis.uncertainty.signs import Decision, all_positive
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.certificate.rounding import round_up
 from synthesis.lmi.result import Verdict
 from synthesis.models.lpv import LpvModel
@@ -34,12 +36,14 @@ HALVINGS = 20
 LEVEL_DIGITS = 8
 
 
-@dataclass(frozen=True)
-class WorstCaseGain:
+@dataclass(frozen=True, repr=False)
+class WorstCaseGain(Display):
     """lower <= max over the box of the H-infinity norm <= upper.
 
     At `witness` (name: value) and `frequency` rad/s it is at least `lower`.
     """
+
+    shown_units: ClassVar = {"frequency": "rad/s"}
 
     lower: float
     upper: float

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from estimators.arguments import LIMIT, batch, finite, mask, numbers, quiet
 from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.display import displayed
 from estimators.errors import EstimatorError
 from estimators.lpv.exact_step import ExactStep
 from estimators.lpv.inputs import SignalMonitor
@@ -20,6 +21,7 @@ from estimators.schedule import GainSchedule
 _CHUNK = 4096  # entries worked on at once: what lies between the operations stays in the cache
 
 
+@displayed({})
 class LpvObserverStep(NamedTuple):
     """What one step returns, ready for a log; leading axes are those of the batch."""
 

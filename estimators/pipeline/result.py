@@ -5,7 +5,11 @@ from __future__ import annotations
 from enum import IntFlag
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from estimators.arrays import FlagArray, FloatArray
+from estimators.display import counted, displayed, ends
+from estimators.faults import Flag
 from estimators.forces import AttitudeStep, LateralForceStep, LoadStep, Reconciled, WheelForceStep
 
 
@@ -36,6 +40,7 @@ class Consistency(NamedTuple):
     failed: FlagArray  # (...) sums of `Check`
 
 
+@displayed({})
 class PipelineStep(NamedTuple):
     """Leading axes `...` are those of the batch; corners fl, fr, rl, rr. Everything above `consistency` is finite, but
     for deviations that the velocity part does not state."""
@@ -66,3 +71,28 @@ class PipelineStep(NamedTuple):
     attitude: AttitudeStep | None  # None without that part
     corners: Any  # `CornerSetStep`, None without that part
     sideslip_step: Any  # of the sideslip part, None without one
+
+    def summary(self) -> tuple[str, ...]:
+        """Velocities with their deviations, forces and loads of the wheels, flags by name."""
+        speed = [
+            f"V_x {ends(self.vx)} m/s (± {ends(self.vx_deviation)})", f"V_y {ends(self.vy)} m/s (± {ends(self.vy_deviation)})",
+            f"sideslip {ends(self.sideslip)} rad",
+        ]  # fmt: skip
+        return (
+            f"PipelineStep of {counted(np.asarray(self.vx).size, 'car')}",
+            f"motion: {', '.join(speed)}",
+            f"forces fl, fr, rl, rr: F_x {_wheels(self.force_x)} N, F_z {_wheels(self.force_z)} N",
+            f"axles front, rear: F_y {_wheels(self.axle_force_y)} N; yaw rate {ends(self.yaw_rate)} rad/s",
+            f"flags: {_raised(self.flags, Flag)}; failed checks: {_raised(self.consistency.failed, Check)}",
+        )
+
+
+def _raised(flags: FlagArray, names: type[IntFlag]) -> str:
+    """Names of what any car of the batch carries."""
+    found = int(np.bitwise_or.reduce(np.asarray(flags).ravel(), initial=0))
+    return ", ".join(str(one.name).lower() for one in names if one.value & found) or "none"
+
+
+def _wheels(force: FloatArray) -> str:
+    """One car's wheels or axles in full."""
+    return ends(force) if force.ndim > 1 else f"[{', '.join(f'{one:.5g}' for one in force)}]"

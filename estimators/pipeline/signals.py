@@ -9,8 +9,15 @@ import numpy.typing as npt
 
 from estimators.arguments import entries
 from estimators.arrays import FloatArray
+from estimators.display import displayed
+
+UNITS = {
+    "wheel_speed": "rad/s", "ax": "m/s^2", "ay": "m/s^2", "yaw_rate": "rad/s", "steer": "rad", "torque": "N m", "az": "m/s^2",
+    "roll_rate": "rad/s", "pitch_rate": "rad/s", "grade": "rad", "bank": "rad", "elapsed": "s",
+}  # fmt: skip
 
 
+@displayed(UNITS)
 class VehicleSignals(NamedTuple):
     """Arrays of the batch shape `...`, or one number for all; NaN (or infinite) where missing. ISO frame, SI units.
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.errors import EstimatorError, RangeError, ScheduleError
 from estimators.interpolate import Multilinear, PiecewiseLinear
 from estimators.schedule.check import SHAPES, SIGNALS, check_content, check_depth
@@ -53,8 +54,8 @@ class PlantMatrices(NamedTuple):
     D: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class GainSchedule:
+@dataclass(frozen=True, eq=False, repr=False)
+class GainSchedule(Display):
     """Gains over scheduling parameters, with the plant, the units and the update that they are proved for.
 
     `table` has the shape (breakpoints of each parameter, states, outputs), `grid` the breakpoints (b_i,) of each parameter;
@@ -80,6 +81,26 @@ class GainSchedule:
     outputs: tuple[Signal, ...]
     disturbances: tuple[Signal, ...]
     sha256: str
+
+    def summary(self) -> tuple[str, ...]:
+        """Scheduling with range and rates, gains with their units, how it is run."""
+        scheduling = [
+            f"{p.name} {p.min:g} to {p.max:g} {p.unit}, {p.rate_min:g} to {p.rate_max:g} {_per_second(p.unit)}, {len(b)} points"
+            for p, b in zip(self.parameters, self.grid, strict=True)
+        ]
+        gains = [
+            f"{state.name}{f' by {output.name}' if len(self.outputs) > 1 else ''} {entry.min():.4g} to {entry.max():.4g} {unit}"
+            for i, (state, units) in enumerate(zip(self.states, self.gain_units, strict=True))
+            for j, (output, unit) in enumerate(zip(self.outputs, units, strict=True))
+            for entry in (self.table[..., i, j],)
+        ]
+        return (
+            f"GainSchedule '{self.name}'",
+            f"scheduling: {'; '.join(scheduling) or 'none'}",
+            f"gains: {'; '.join(gains)}",
+            f"update: {self.update}, every {1e3 * self.sample_time:g} ms",
+            f"sha256: {self.sha256[:16]}",
+        )
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> GainSchedule:

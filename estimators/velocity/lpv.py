@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from estimators.arguments import LIMIT, batch, entries, finite, mask, quiet
 from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.display import displayed
 from estimators.errors import EstimatorError
 from estimators.memory import Renewable, Saved
 from estimators.schedule import GainSchedule
@@ -20,6 +21,7 @@ from estimators.velocity.input_monitor import FEW, InputMonitor, MonitoredInputs
 _CHUNK = 4096  # entries worked on at once: what lies between the operations stays in the cache
 
 
+@displayed({})
 class LpvStep(NamedTuple):
     """What one step returns, ready for a log; leading axes are those of the batch.
 

@@ -84,11 +84,12 @@ baselines that the drive file names. Signs, units and sides that contradict one 
 mend: --check does only that, --no-check runs in spite of it. --guess writes a first drive file from the columns' names.
 
 Writes into DIR: estimates.csv (one row a sample: time, estimates, standard deviations, flags), metrics.json, and
-plots as SVG and PNG. SI units, ISO axes: x forward, y left, z up.""",
+plots as SVG and PNG; with --report one page that says what holds, what does not, and what was wrong with the log.
+SI units, ISO axes: x forward, y left, z up.""",
         """\
 gainsmith run LOG.csv --guess --drive DRIVE.toml  write a first drive file, to be edited
 gainsmith run LOG.csv --drive DRIVE.toml --check  compare the signals only
-gainsmith run LOG.csv --drive DRIVE.toml --out out/run""",
+gainsmith run LOG.csv --drive DRIVE.toml --out out/run --report out/run.html""",
     ),
     "identify": Help(
         "fit tire, radius and wheel inertia to a recorded drive",
@@ -118,10 +119,10 @@ Evaluates margins of observers over many designs, draws of parameters or corners
 statistic with a baseline. Same bytes for any number of workers; memory does not grow with the number of designs.
 
 Writes into DIR: rows/*.parquet (every design), summary.json, report.md and pictures; with --junit and --summary the
-gate for a CI.""",
+gate for a CI; with --report one page: gate, tornado, quantiles, Sobol indices, worst points.""",
         """\
 gainsmith sweep tire-vehicle --quick --baseline studies/sweeps/baselines/tire-vehicle.quick.toml
-gainsmith sweep my-sweep.toml --workers 4 --resume""",
+gainsmith sweep my-sweep.toml --workers 4 --resume --report out/sweep.html""",
     ),
     "list": Help(
         "what is shipped: specifications, parameter sets, models, schedules, studies, sweeps",

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.commands.outcome import one_line
+from studies.commands.pages import write_page
 from studies.commands.terminal import print_table, progress_bar
 from studies.drives.frames import FrameReport
 from studies.drives.run import RunResult, check_drive, run_drive
@@ -58,8 +59,11 @@ def run_log(
     no_check: bool,
     as_json: bool,
     guess: bool = False,
+    report: Path | None = None,
 ) -> int:
     """Replay the log and print the metrics beside the baselines, or check it only; 0 when done."""
+    if report is not None and (guess or check):
+        raise SpecError("run: --report is about a whole run; leave out --check and --guess")
     if guess:
         return _guess(logs, drive, as_json)
     if drive is None:
@@ -73,6 +77,10 @@ def run_log(
         result = run_drive(
             logs, drive, out, check=not no_check, progress=lambda done: progress.update(task, completed=done)
         )
+    if report is not None:
+        from studies.report.drive import drive_page
+
+        write_page(report, drive_page(result))
     if as_json:
         print(json.dumps(result.metrics, indent=1))
         return 0

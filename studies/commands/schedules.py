@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from studies.commands.pages import write_page
 from studies.commands.terminal import print_table, progress_bar
 from studies.drives.quantities import to_si
-from studies.execution.files import write_bytes
 from studies.plots.save import save_figure
 from studies.preflight import check_before_design
 from studies.report.schedule_figures import gain_figure
@@ -65,8 +65,7 @@ def run_schedules(
     if report is not None:
         from studies.report.schedules import schedules_page
 
-        report.parent.mkdir(parents=True, exist_ok=True)
-        write_bytes(report, schedules_page(runs).encode())
+        write_page(report, schedules_page(runs))
     if as_json:
         print(json.dumps([_row(run) for run in runs], indent=1))
     else:

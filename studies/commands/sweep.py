@@ -9,6 +9,7 @@ from typing import Any
 
 from rich.console import Console
 
+from studies.commands.pages import write_page
 from studies.commands.terminal import print_table, progress_bar
 from studies.execution.cluster import Cluster
 from studies.execution.files import write_bytes
@@ -40,6 +41,7 @@ def run_sweep(
     junit: Path | None,
     summary: Path | None,
     as_json: bool,
+    report: Path | None = None,
 ) -> int:
     """Run a sweep, hold it against a baseline; 0 good, 1 something shrank, 2 bad input or a measure that is not a number."""
     if update_baseline and baseline is None:
@@ -60,8 +62,11 @@ def run_sweep(
         compared = compare(sweep, result.summary, before) if before is not None else None
         bar.update(task, description="drawing", refresh=True)
         pictures = _draw(result, before, compared)
-    report = markdown(result.summary, compared, pictures)
-    write_bytes(folder / "report.md", report.encode())
+        if report is not None:
+            from studies.report.sweep import sweep_page
+
+            write_page(report, sweep_page(result, before, str(baseline), compared))
+    write_bytes(folder / "report.md", markdown(result.summary, compared, pictures).encode())
     reports = (junit_xml(sweep.name, result.summary, compared), markdown(result.summary, compared).encode())
     for path, data in zip((junit, summary), reports, strict=True):
         if path is not None:

@@ -31,7 +31,8 @@ class Chain:
     """What the pipeline made of n samples; corner order fl, fr, rl, rr, SI.
 
     ``corner_vy`` is V_y of the corner observers, ``sideslip_part`` that of the chosen sideslip estimator: NaN without
-    them. ``flags`` and ``checks`` (n,) are sums of ``estimators.Flag`` and ``estimators.pipeline.Check``.
+    them. A ``*_deviation`` is the standard deviation that the pipeline states, NaN where it states none. ``flags`` and ``checks``
+    (n,) are sums of ``estimators.Flag`` and ``estimators.pipeline.Check``.
     """
 
     vx: FloatArray
@@ -44,6 +45,10 @@ class Chain:
     force_z: FloatArray
     slip: FloatArray
     slip_angle: FloatArray
+    vx_deviation: FloatArray
+    vy_deviation: FloatArray
+    force_x_deviation: FloatArray
+    axle_force_y_deviation: FloatArray
     flags: IntArray
     checks: IntArray
     assumptions: tuple[str, ...]
@@ -130,7 +135,8 @@ def run_chain(
         corner = np.nan if step.corners is None else step.corners.vy
         rows.append((
             step.vx, step.vy, step.sideslip, part, corner, step.force_x, step.axle_force_y, step.force_z, step.slip,
-            step.slip_angle, int(step.flags), int(step.consistency.failed),
+            step.slip_angle, step.vx_deviation, step.vy_deviation, step.force_x_deviation, step.lateral.deviation[..., :2],
+            int(step.flags), int(step.consistency.failed),
         ))  # fmt: skip
         if k % max(1, n // PROGRESS_STEPS) == 0:
             progress(k / n)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from studies.drives.agreement import Comparison, compare, wheels_apart
 from studies.drives.drive_file import WHEEL_SPEEDS, DriveFile
 from studies.drives.plausible import ACCELERATION_UNITS, ANGLE_UNITS, RATE_UNITS, STANDING, WHEEL_UNITS
@@ -51,8 +52,8 @@ Compared = Callable[[float], Sequence[Comparison]]
 """The comparisons of a log whose wheel speeds are too large by a factor: they enter the steering's prediction nonlinearly."""
 
 
-@dataclass(frozen=True)
-class FrameReport:
+@dataclass(frozen=True, repr=False)
+class FrameReport(Display):
     """The comparisons of a log, and in one line what contradicts and how to mend it.
 
     None where nothing does, and where no mistake explains what is off: then it is the drive (slip, drift, bank), no column.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -11,20 +12,24 @@ from estimators.arrays import FloatArray
 from studies.drives import evaluation
 from studies.drives.chain import Chain
 from studies.drives.evaluation import AXLES, DriveData
+from studies.drives.flag_plot import flag_figure
 from studies.drives.quantities import CORNERS
-from studies.plots import ZERO, Figure, Line, Mark, Panel, colours
+from studies.drives.raised import raised
+from studies.plots import ZERO, Axis, Band, Figure, Line, Mark, Panel, colours
 
 REFERENCE = partial(Line, label="reference", color=colours.TRUTH, width=1.8)
-ESTIMATE = partial(Line, label="corner observers", color=colours.OWN_OBSERVERS, width=1.1)
+ESTIMATE = partial(Line, label="corner observers", color=colours.OWN_OBSERVERS, dash="dashed", width=1.2)
 PIPELINE = partial(Line, label="pipeline", color=colours.PIPELINE, width=1.2)
-SIDESLIP_PART = partial(Line, color=colours.SCHEDULE, dash="dashed", width=1.1)
-QUASI_STATIC = partial(Line, label="quasi-static", color=colours.MEAN_WHEEL_SPEED, dash="dashed", width=1.1)
+SIDESLIP_PART = partial(Line, color=colours.SCHEDULE, dash="dash-dot", width=1.2)
+TWO_SIGMA = partial(Band, label="pipeline ±2σ", color=colours.PIPELINE)
+QUASI_STATIC = partial(Line, label="quasi-static", color=colours.INTEGRATED_ACCELERATION, dash="dashed", width=1.1)
 BASELINES = {
     "mean_wheel_speed": partial(Line, label="mean wheel speed", color=colours.MEAN_WHEEL_SPEED, width=2.4),
     "integrated_acceleration": partial(
-        Line, label="integrated acceleration", color=colours.INTEGRATED_ACCELERATION, dash="dashed", width=1.3
+        Line, label="integrated acceleration", color=colours.INTEGRATED_ACCELERATION, dash="dotted", width=1.3
     ),
 }
+MOST_BAND = 0.6  # of the span of the curves, to either side: a wide band must not flatten them
 TITLES = ("front left", "front right", "rear left", "rear right")
 
 
@@ -33,7 +38,8 @@ def figures(data: DriveData) -> list[Figure]:
     drawn = [velocity(data), slip(data), forces(data)]
     if data.chain is not None:
         drawn += [lateral(data, data.chain), axle_forces(data, data.chain), loads(data, data.chain)]
-    return drawn
+    flags = flag_figure(data.drive.name, raised(data))
+    return drawn if flags is None else [*drawn, flags]
 
 
 def velocity(data: DriveData) -> Figure:
@@ -45,10 +51,13 @@ def velocity(data: DriveData) -> Figure:
     if data.chain is not None:
         values.append((PIPELINE, data.chain.vx))
     lines: list[Mark] = [style(time, value) for style, value in values]
-    panels = [("longitudinal velocity (m/s)", lines)]
+    panels = [("longitudinal velocity [m/s]", lines)]
     if reference is not None:
         lines.insert(0, REFERENCE(time, reference))
-        panels.append(("estimate − reference (m/s)", [*(style(time, v - reference) for style, v in values), ZERO]))
+        errors: list[Mark] = [*(style(time, v - reference) for style, v in values), ZERO]
+        if data.chain is not None:
+            errors = [*_band(time, data.chain.vx - reference, data.chain.vx_deviation), *errors]
+        panels.append(("estimate − reference [m/s]", errors))
     return _stacked(data, "velocity", "longitudinal velocity", panels)
 
 
@@ -65,7 +74,7 @@ def slip(data: DriveData) -> Figure:
             marks.append(PIPELINE(data.log.time, _while_driving(data.chain, data.chain.slip[:, k])))
         return marks
 
-    return _corners(data, "slip", "slip ratio from the velocity at the centre of gravity", "slip ratio (1)", corner)
+    return _corners(data, "slip", "slip ratio from the velocity at the centre of gravity", "slip ratio [1]", corner)
 
 
 def forces(data: DriveData) -> Figure:
@@ -76,17 +85,18 @@ def forces(data: DriveData) -> Figure:
         marks = _measured(data, f"force_x_{CORNERS[k]}", scale)
         marks.append(ESTIMATE(data.log.time, data.inputs.force[:, k] / scale, label="observer input"))
         if data.chain is not None:
-            marks.append(PIPELINE(data.log.time, data.chain.force_x[:, k] / scale))
+            value, deviation = data.chain.force_x[:, k] / scale, data.chain.force_x_deviation[:, k] / scale
+            marks += [*_band(data.log.time, value, deviation), PIPELINE(data.log.time, value)]
         return marks
 
     sources = ", ".join(sorted(set(data.inputs.force_sources)))
-    return _corners(data, "forces", f"longitudinal force ({sources})", f"longitudinal force ({unit})", corner)
+    return _corners(data, "forces", f"longitudinal force ({sources})", f"longitudinal force [{unit}]", corner)
 
 
 def lateral(data: DriveData, chain: Chain) -> Figure:
     """V_y and sideslip angle of the pipeline, and of the corner observers and the sideslip part where they run."""
     time, reference = data.log.time, data.log.reference
-    sideways, angles = list[Mark](), list[Mark]()
+    sideways, angles = _band(time, chain.vy, chain.vy_deviation), list[Mark]()
     if "vy" in reference:
         sideways.append(REFERENCE(time, reference["vy"]))
         if "vx" in reference:
@@ -98,7 +108,7 @@ def lateral(data: DriveData, chain: Chain) -> Figure:
         name = data.drive.estimators.sideslip.replace("-", " ")
         angles.append(SIDESLIP_PART(time, np.degrees(chain.sideslip_part), label=f"{name} estimator"))
     angles.append(PIPELINE(time, np.degrees(_while_driving(chain, chain.sideslip))))
-    panels = [("lateral velocity (m/s)", sideways), ("sideslip angle (deg)", angles)]
+    panels = [("lateral velocity [m/s]", sideways), ("sideslip angle [deg]", angles)]
     return _stacked(data, "lateral", "lateral motion at the centre of gravity", panels)
 
 
@@ -110,8 +120,9 @@ def axle_forces(data: DriveData, chain: Chain) -> Figure:
     for k, axle in enumerate(AXLES):
         reference = evaluation.reference_axle_force(data.log, axle)
         marks: list[Mark] = [] if reference is None else [REFERENCE(time, reference / scale)]
-        marks += [QUASI_STATIC(time, rigid[:, k] / scale), PIPELINE(time, chain.axle_force_y[:, k] / scale)]
-        panels.append((f"lateral force ({unit})", marks))
+        value, deviation = chain.axle_force_y[:, k] / scale, chain.axle_force_y_deviation[:, k] / scale
+        marks = [*_band(time, value, deviation), *marks, QUASI_STATIC(time, rigid[:, k] / scale), PIPELINE(time, value)]
+        panels.append((f"lateral force [{unit}]", marks))
     titles = [f"{axle} axle" for axle in AXLES]
     return _stacked(data, "axle_forces", "lateral force of the axles", panels, titles)
 
@@ -126,7 +137,32 @@ def loads(data: DriveData, chain: Chain) -> Figure:
             PIPELINE(data.log.time, chain.force_z[:, k] / 1e3),
         ]
 
-    return _corners(data, "loads", "vertical load of the wheels", "vertical load (kN)", corner)
+    return _corners(data, "loads", "vertical load of the wheels", "vertical load [kN]", corner)
+
+
+def _band(time: FloatArray, value: FloatArray, deviation: FloatArray) -> list[Mark]:
+    """Two standard deviations to either side, where any are stated."""
+    return [TWO_SIGMA(time, value - 2.0 * deviation, value + 2.0 * deviation)] if np.isfinite(deviation).any() else []
+
+
+def _axis(label: str, marks: Sequence[Mark]) -> Axis:
+    """As far as the curves go, and of the bands so much as leaves the curves readable."""
+    curves, bands = (_ends(marks, kind) for kind in (Line, Band))
+    if bands is None or curves is None:
+        return Axis(label)
+    room = MOST_BAND * (curves[1] - curves[0]) or np.inf
+    low, high = max(bands[0], curves[0] - room), min(bands[1], curves[1] + room)
+    low, high = min(low, curves[0]), max(high, curves[1])
+    edge = 0.04 * (high - low)
+    return Axis(label, low - edge, high + edge)
+
+
+def _ends(marks: Sequence[Mark], kind: type[Line | Band]) -> tuple[float, float] | None:
+    """The smallest and the largest y of all marks of a kind."""
+    found = [y for m in marks if isinstance(m, kind) for y in ((m.y,) if isinstance(m, Line) else (m.low, m.high))]
+    values = np.concatenate([np.ravel(np.asarray(y, float)) for y in found]) if found else np.empty(0)
+    values = values[np.isfinite(values)]
+    return (float(values.min()), float(values.max())) if values.size else None
 
 
 def _measured(data: DriveData, name: str, scale: float) -> list[Mark]:
@@ -148,7 +184,7 @@ def _stacked(
 ) -> Figure:
     """Panels with their y labels below each other."""
     rows = [
-        [Panel(marks, "time (s)" if k == len(panels) - 1 else "", label, titles[k] if titles else "")]
+        [Panel(marks, "time [s]" if k == len(panels) - 1 else "", _axis(label, marks), titles[k] if titles else "")]
         for k, (label, marks) in enumerate(panels)
     ]
     return _figure(data, name, what, rows)
@@ -156,21 +192,26 @@ def _stacked(
 
 def _corners(data: DriveData, name: str, what: str, label: str, corner: Callable[[int], list[Mark]]) -> Figure:
     """Four panels, front above rear, left beside right."""
+    marks = [corner(k) for k in range(4)]
+    shared = _axis(label, [mark for own in marks for mark in own])
     rows = [
-        [Panel(corner(k), "time (s)" if k > 1 else "", "" if k % 2 else label, TITLES[k]) for k in row]
+        [
+            Panel(marks[k], "time [s]" if k > 1 else "", replace(shared, label="") if k % 2 else shared, TITLES[k])
+            for k in row
+        ]
         for row in ((0, 1), (2, 3))
     ]
     return _figure(data, name, what, rows, share_y=True)
 
 
 def _figure(data: DriveData, name: str, what: str, rows: list[list[Panel]], share_y: bool = False) -> Figure:
-    labels = {mark.label for row in rows for panel in row for mark in panel.marks if isinstance(mark, Line)}
+    labels = {mark.label for row in rows for panel in row for mark in panel.marks if isinstance(mark, Line | Band)}
     title = f"{data.drive.name}: {what}"
     return Figure(
         name,
         title,
         f"Time histories of the {what}: {', '.join(sorted(labels))}.",
         rows,
-        size=(9.0, 5.6 if len(rows) > 1 else 3.6), legend="below", columns=len(labels), share_x="all",
+        size=(9.0, 5.6 if len(rows) > 1 else 3.6), legend="below", columns=6, share_x="all",
         share_y="all" if share_y else "", title=title,
     )  # fmt: skip

@@ -30,7 +30,7 @@ Columns = dict[str, AnyArray]
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a run produced: ``metrics`` as written to metrics.json, what reading the log found, and the files.
+    """What a run produced: ``metrics`` as written to metrics.json, what reading the log found, the files, and the arrays.
 
     ``replaced``: the drive whose results were in the folder before; empty if there were none.
     """
@@ -38,6 +38,7 @@ class RunResult:
     metrics: dict[str, Any]
     log_report: dict[str, Any]
     paths: tuple[Path, ...]
+    data: DriveData
     replaced: str = ""
 
 
@@ -62,7 +63,7 @@ def run_drive(
         write_json(paths[1], metrics)
         paths += write_figures(figures(data), out, lambda done: progress(0.4 + 0.6 * done))
     progress(1.0)
-    return RunResult(metrics, data.log.report, tuple(paths), replaced)
+    return RunResult(metrics, data.log.report, tuple(paths), data, replaced)
 
 
 def _drive_of(metrics: Path) -> str:
@@ -139,7 +140,10 @@ def chain_columns(chain: Chain) -> Columns:
         "pipeline_force_y_front_N": chain.axle_force_y[:, 0], "pipeline_force_y_rear_N": chain.axle_force_y[:, 1],
         "pipeline_flags": chain.flags, "pipeline_checks": chain.checks,
     }  # fmt: skip
-    parts = {"sideslip_part_rad": chain.sideslip_part, "corner_observers_vy_mps": chain.corner_vy}
+    parts = {
+        "sideslip_part_rad": chain.sideslip_part, "corner_observers_vy_mps": chain.corner_vy,
+        "pipeline_vx_deviation_mps": chain.vx_deviation, "pipeline_vy_deviation_mps": chain.vy_deviation,
+    }  # fmt: skip
     columns |= {name: value for name, value in parts.items() if np.isfinite(value).any()}
     columns |= _by_corner({
         "pipeline_force_x_{}_N": chain.force_x, "pipeline_force_z_{}_N": chain.force_z, "pipeline_slip_{}": chain.slip,

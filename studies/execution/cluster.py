@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from itertools import islice
 from typing import Any
 
+from estimators.display import Display
 from studies.execution.processes import Finished, Function
 from synthesis.errors import SpecError
 
@@ -19,7 +20,7 @@ RETRIES = 3  # times that a task is given to another worker after one was lost w
 IN_FLIGHT = 3  # tasks a thread has waiting: results are never held in numbers
 
 
-class Cluster:
+class Cluster(Display):
     """Workers of a Dask scheduler; they need the same gainsmith installed, and no shared folder.
 
     A worker that is lost gives its tasks to the others. Raises SpecError for an address that does not answer or has no workers.

@@ -18,6 +18,7 @@ from time import perf_counter
 from typing import Any, Protocol, TypeVar
 from warnings import catch_warnings, simplefilter
 
+from estimators.display import Display
 from synthesis.errors import SpecError
 
 TICK = 0.2  # s between two looks at the progress bar
@@ -45,7 +46,7 @@ class Executor(Protocol):
         ...
 
 
-class Serial:
+class Serial(Display):
     """In this process."""
 
     def run(self, function: Function, shared: Any, tasks: Iterable[Any]) -> Generator[Finished, None, None]:
@@ -53,7 +54,7 @@ class Serial:
         return (Finished(task, function(shared, task)) for task in tasks)
 
 
-class Processes:
+class Processes(Display):
     """Processes of this machine: forked where that is safe, else fresh interpreters. They end when their parent is gone.
 
     A worker has up to ``ahead`` tasks at once, so that it need not wait; results are never held in numbers. With ``once``

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from estimators.display import Display
 from studies.drives.drive_file import DriveFile, read_drive
 from studies.drives.log import DriveLog, read_log
 from studies.drives.replay import Progress
@@ -25,8 +26,8 @@ from synthesis.models.parameter_set import ParameterSet, load_parameter_set
 BASE = "corner-estimation"  # the parameter set whose values stand where a log says nothing
 
 
-@dataclass(frozen=True)
-class Identification:
+@dataclass(frozen=True, repr=False)
+class Identification(Display):
     """What one drive says about the car: the fits, and why a direction has none (``absent``)."""
 
     drive: DriveFile

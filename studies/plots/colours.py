@@ -15,13 +15,15 @@ FORBIDDEN = "#f2c4c4"
 FITTED, LEFT_OUT = "#d1495b", "0.8"
 DEPLOYED = "#aa3377"
 """Gains as a schedule has them."""
-NOMINAL, WORST, BEST = "0.1", RED, "#4d9a2a"
+NOMINAL, WORST, BEST = "0.1", RED, BLUE
 """Designs of a sweep."""
-BELOW, ABOVE = BLUE, FITTED
+BELOW, ABOVE = BLUE, ORANGE
 """A parameter below and above its nominal value; what won and what lost."""
 DIVERGING = "RdBu_r"
-LOWER_END, MIDDLE, UPPER_END = "#053061", "#f7f7f7", "#67001f"
-"""A map of colours, and what stands at its ends and in its middle."""
+"""A map of colours, for values to either side of a middle."""
+ALONG = "cividis"
+LOWER_END, MIDDLE, UPPER_END = "#00224e", "#7d7c78", "#fee838"
+"""A map of colours from dark to light, and what stands at its ends and in its middle: its order survives a grey print."""
 
 TEAL, RUST, MINT, PLUM, SAND = "#1f6f8b", "#c2571a", "#3a9e6f", "#7a3b8f", "#c9a227"
 TRUTH = "black"
@@ -31,8 +33,8 @@ OWN_OBSERVERS = KALMAN = EXTENDED = RUST
 PIPELINE = MINT
 SCHEDULE = PLUM
 SECOND_FILTER = "#d9a441"
-MEAN_WHEEL_SPEED = STEADY = "#8a8a8a"
-INTEGRATED_ACCELERATION = "#b9b9b9"
+MEAN_WHEEL_SPEED = STEADY = "#ababab"
+INTEGRATED_ACCELERATION = "#707070"
 LIMIT = "#c23b3b"
 HIGH_SLIP = "#f3d9c8"
 """Shade of where a detector speaks."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import singledispatch
 from itertools import product
@@ -16,13 +16,15 @@ from matplotlib.figure import Figure as Sheet
 from matplotlib.patches import Rectangle
 
 from studies.plots.figure import Axis, Figure, Panel, axis
+from studies.plots.fit import LABEL, TITLE, along, fitted, places, upward
 from studies.plots.marks import Band, Bars, Box, ColouredDots, Contours, ErrorBars, Level, Line, Map, Mark, Shade, Words
 
 PATTERN: Mapping[str, Any] = {
     "solid": "-", "dashed": (0, (5, 2)), "dotted": (0, (1, 1.5)), "dash-dot": (0, (6, 1.5, 1, 1.5)),
     "long dash": (0, (8, 2, 2, 2, 2, 2)), "none": "",
 }  # fmt: skip
-LETTERS = 12.5  # of a title fit into an inch
+LETTERS, SMALL_LETTERS = 12.5, 15.0  # of a title, and of a legend, fit into an inch
+HANDLE = 0.45  # inches of a legend beside its words
 STYLE: Any = {
     "font.size": 9,
     "axes.titlesize": 9.5,
@@ -54,12 +56,13 @@ def draw(figure: Figure) -> Sheet:
             len(rows), across, squeeze=False, sharex=figure.share_x or False, sharey=figure.share_y or False,
             gridspec_kw={"width_ratios": figure.widths, "height_ratios": figure.heights},
         )  # fmt: skip
+        widths, heights = places(figure)
         for i, j in product(range(len(rows)), range(across)):
             panel = rows[i][j] if j < len(rows[i]) else None
             if panel is None:
                 grid[i, j].set_visible(False)
             else:
-                _draw_panel(grid[i, j], panel)
+                _draw_panel(grid[i, j], panel, along(panel, widths[j]), upward(heights[i]))
         if figure.bar:
             meshes = [mesh for axes in sheet.axes for mesh in axes.collections if isinstance(mesh, QuadMesh)]
             sheet.colorbar(meshes[0], ax=sheet.axes, label=figure.bar, shrink=0.6, aspect=40)
@@ -72,11 +75,19 @@ def draw(figure: Figure) -> Sheet:
                 for handle, text in reversed(list(zip(*axes.get_legend_handles_labels(), strict=True)))
             }
             order = list(dict.fromkeys(text for axes in sheet.axes for text in axes.get_legend_handles_labels()[1]))
-            sheet.legend([shown[text] for text in order], order, loc="outside lower center", ncols=figure.columns)
+            columns = fitting_columns(order, figure.size[0], figure.columns)
+            if order:
+                sheet.legend([shown[text] for text in order], order, loc="outside lower center", ncols=columns)
         return sheet
 
 
-def _draw_panel(axes: Any, panel: Panel) -> None:
+def fitting_columns(labels: Sequence[str], width: float, most: int) -> int:
+    """How many columns of a legend stay inside a sheet of so many inches, at most ``most``."""
+    widest = HANDLE + max(map(len, labels), default=0) / SMALL_LETTERS
+    return max(1, min(most, int(width / widest)))
+
+
+def _draw_panel(axes: Any, panel: Panel, wide: float, high: float) -> None:
     axes.grid(visible=panel.grid)
     x, y = axis(panel.x), axis(panel.y)
     for name, given in (("x", x), ("y", y)):  # scales first: what is drawn on them may depend on it
@@ -86,18 +97,20 @@ def _draw_panel(axes: Any, panel: Panel) -> None:
             )
     for mark in panel.marks:
         draw_mark(mark, axes)
-    _run(axes, "x", x)
-    _run(axes, "y", y)
+    _run(axes, "x", x, wide)
+    _run(axes, "y", y, high)
+    if panel.bare:
+        axes.set_axis_off()
     if panel.equal:
         axes.set_aspect("equal", adjustable="datalim")
     if panel.title:
-        axes.set_title(panel.title, loc="left")
+        axes.set_title(fitted(panel.title, wide, TITLE), loc="left")
     if panel.legend:
         axes.legend(loc=panel.legend, ncols=panel.columns, title=panel.heading or None)
 
 
-def _run(axes: Any, name: str, given: Axis) -> None:
-    getattr(axes, f"set_{name}label")(given.label)
+def _run(axes: Any, name: str, given: Axis, inches: float) -> None:
+    getattr(axes, f"set_{name}label")(fitted(given.label, inches, LABEL))
     if given.ticks is not None:
         words = (
             list(given.ticks.values())

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from estimators.display import Display
 from studies.plots.marks import Mark
 
 Scale = Literal["linear", "log", "symlog"]
@@ -28,9 +29,12 @@ class Axis:
     turned: float = 0.0  # degrees by which the words at the ticks are turned
 
 
-@dataclass(frozen=True)
-class Panel:
-    """One pair of axes; a text in the place of an axis is its label. ``legend`` says where it stands inside ("upper left")."""
+@dataclass(frozen=True, repr=False)
+class Panel(Display):
+    """One pair of axes; a text in the place of an axis is its label. ``legend`` says where it stands inside ("upper left").
+
+    A ``bare`` panel has words alone: no axes, no grid.
+    """
 
     marks: Sequence[Mark]
     x: Axis | str = ""
@@ -41,10 +45,11 @@ class Panel:
     columns: int = 1  # of the legend
     heading: str = ""  # of the legend
     equal: bool = False  # x and y on one scale
+    bare: bool = False
 
 
-@dataclass(frozen=True)
-class Figure:
+@dataclass(frozen=True, repr=False)
+class Figure(Display):
     """Panels in rows, written as SVG and PNG under ``name``; ``alternative`` is the text for readers who cannot see it.
 
     ``size`` in inches. The legend "below" collects the labels of all panels under them. Axes are shared along "row", "col"

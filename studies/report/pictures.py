@@ -43,14 +43,18 @@ def pictures(drawings: Sequence[tuple[Path, str]], budget: int = BUDGET) -> dict
 
 
 def picture(folder: Path, name: str, share: int = LARGEST_SVG) -> Picture:
-    """One drawing in at most ``share`` bytes where a form is that small. ValueError for a foreign SVG."""
+    """One drawing in at most ``share`` bytes where a form is that small; its PNG is read where its SVG is too large.
+
+    Raises ValueError for a foreign SVG.
+    """
     return _picture(folder, name, *_form(folder, name, share))
 
 
 def _form(folder: Path, name: str, share: int) -> tuple[bytes, str]:
-    vector, pixels = ((folder / f"{name}.{kind}").read_bytes() for kind in ("svg", "png"))
+    vector = (folder / f"{name}.svg").read_bytes()
     if len(vector) <= min(share, LARGEST_SVG):
         return vector, "svg+xml"
+    pixels = (folder / f"{name}.png").read_bytes()
     if len(pixels) <= share:
         return pixels, "png"
     content = b""

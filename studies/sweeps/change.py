@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import fill
 from typing import Literal
 
 import numpy as np
@@ -19,6 +20,14 @@ from studies.sweeps.summary import number
 STATISTICS = {"nominal": "o", "median": "s", "quantile 95 %": "^", "quantile 99 %": "D", "worst": "X"}
 """With their markers; in this order from the top of a row to its foot."""
 ROUNDING = 1e-3  # per cent: less is how a baseline rounds its numbers
+NAME = 18  # letters of an observer in a line
+WRITTEN = ("nominal", "quantile 99 %", "worst")  # of what did not change
+COLUMNS: tuple[tuple[float, Literal["left", "right"]], ...] = (
+    (0.0, "left"),
+    (0.6, "right"),
+    (0.83, "right"),
+    (1.0, "right"),
+)
 MOST_NUMBERS = 12  # written in a panel, the largest changes first
 
 
@@ -49,8 +58,9 @@ def change_figure(result: SweepResult, before: Baseline) -> Figure:
         else f"all {len(all_of_them)} statistics are unchanged"
     )
     panels = [change_panel(result, measure, found[measure.name]) for measure in result.sweep.measures]
+    height = 1.3 + 0.55 * len(result.sweep.observers) if moved else 0.6 + 0.28 * len(result.sweep.observers)
     title = f"Sweep {result.sweep.name} against its baseline: {says}"
-    return paneled("before-after", title, panels, 5.6, 1.3 + 0.55 * len(result.sweep.observers))
+    return paneled("before-after", title, panels, 5.6, height)
 
 
 def _changes(result: SweepResult, before: Baseline, measure: Measure) -> list[Change]:
@@ -70,11 +80,9 @@ def change_panel(result: SweepResult, measure: Measure, changes: Sequence[Change
     moved = [change for change in changes if abs(change.percent) > ROUNDING]
     shrunk = sum(change.percent < -tolerance for change in changes)
     names = [s.name for s in result.sweep.observers]
-    y = Axis("", len(names) - 0.5, -0.5, ticks=dict(enumerate(names)))
     if not moved:
-        return Panel(
-            _unchanged(changes), Axis("change [%]", -1.0, 1.0, ticks=(0.0,)), y, f"{words(measure.name)}: unchanged"
-        )
+        return _unchanged(measure, names, changes)
+    y = Axis("", len(names) - 0.5, -0.5, ticks={k: fill(name, NAME) for k, name in enumerate(names)})
     reach = max([2.0 * tolerance, *(abs(change.percent) for change in moved if np.isfinite(change.percent))])
     marks: list[Mark] = [
         Shade(-tolerance, 0.0, "x", "tolerance", "0.92", 1.0),
@@ -102,15 +110,17 @@ def change_panel(result: SweepResult, measure: Measure, changes: Sequence[Change
     return Panel(marks, x, y, f"{words(measure.name)}: {shrunk} shrank, {len(moved)} moved")
 
 
-def _unchanged(changes: Sequence[Change]) -> list[Mark]:
-    """What each observer has still: its nominal and its worst value in words."""
-    rows: dict[int, list[str]] = {}
-    for change in changes:
-        if change.name in ("nominal", "worst"):
-            unit = "" if change.unit == "1" else f" {change.unit}"
-            rows.setdefault(change.place, []).append(f"{change.name} {number(change.value, 4)}{unit}")
-    still = [
-        Words(0.0, place, ", ".join(texts), size=7.0, offset=(7.0, 0.0), vertical="center")
-        for place, texts in rows.items()
+def _unchanged(measure: Measure, names: Sequence[str], changes: Sequence[Change]) -> Panel:
+    """In words: what each observer has still."""
+    unit = "" if measure.unit == "1" else f" [{measure.unit}]"
+    lines: list[tuple[str, ...]] = [("", *WRITTEN)]
+    for place, observer in enumerate(names):
+        values = {change.name: number(change.value, 4).replace("-", "−") for change in changes if change.place == place}
+        lines.append((observer, *(values.get(name, "") for name in WRITTEN)))
+    marks: list[Mark] = [
+        Words(x, 1.0 - (row + 0.5) / len(lines), text, size=8.0, relative=True, horizontal=side, vertical="center")
+        for row, line in enumerate(lines)
+        for text, (x, side) in zip(line, COLUMNS, strict=True)
+        if text
     ]
-    return [Level(x=0.0, color=NOMINAL, width=0.9), dots([0.0] * len(rows), list(rows), "unchanged", BELOW), *still]
+    return Panel(marks, title=f"{words(measure.name)}{unit}: all {len(changes)} statistics are unchanged", bare=True)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
+from estimators.display import displayed
 from studies.execution.files import json_bytes, write_bytes
 from studies.execution.processes import Executor, Processes, Serial, available_cores
 from studies.sweeps.reports import markdown
@@ -21,7 +22,8 @@ from synthesis.errors import SpecError
 Progress = Callable[[int, int], None]
 
 
-@dataclass(frozen=True)
+@displayed({"seconds": "s"})
+@dataclass(frozen=True, repr=False)
 class SweepResult:
     """A complete sweep: its folder, its statistics, the chunks computed by this run, and the seconds that their measures took."""
 

@@ -17,6 +17,7 @@ from analysis.drops.modes import DropModes, DropPolicy
 from analysis.norms.hinf import hinf_norm
 from analysis.norms.planar import planar_hinf_norm
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from studies.sweeps.observer import Batch, Observer
 from synthesis.errors import SpecError
 from synthesis.models.selection import selection
@@ -27,8 +28,8 @@ def _nothing(*_observer: Observer) -> None:
     pass
 
 
-@dataclass(frozen=True)
-class Measure:
+@dataclass(frozen=True, repr=False)
+class Measure(Display):
     """`function(batch)` returns (designs, grid), or (designs,) for a number that belongs to no place of the grid.
 
     The batch holds the designs' parameter values, the observer (model, gains, sample time) and the grid, with all matrices made.

@@ -11,7 +11,7 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from studies.plots import Axis, Band, ColouredDots, Figure, Line, Map, Mark, Panel, dots
-from studies.plots.colours import BEST, DIVERGING, LOWER_END, MIDDLE, NOMINAL, UPPER_END, WORST
+from studies.plots.colours import ALONG, BEST, LOWER_END, MIDDLE, NOMINAL, UPPER_END, WORST
 from studies.plots.save import save_figure
 from studies.sweeps.baseline import Baseline
 from studies.sweeps.change import change_figure
@@ -176,7 +176,7 @@ def _envelope(measure: Measure, found: WorstMap) -> Panel:
 def _position(rows: Rows, found: WorstMap, label: str) -> Panel:
     """Where in its range the worst design has each parameter, as colours."""
     d = len(rows.ranges)
-    marks: list[Mark] = [Map(found.points, np.arange(d), found.position, "", DIVERGING, 0.0, 1.0, smooth=False)]
+    marks: list[Mark] = [Map(found.points, np.arange(d), found.position, "", ALONG, 0.0, 1.0, smooth=False)]
     for name, colour in (
         ("parameter at its lower end", LOWER_END), ("in the middle", MIDDLE), ("at its upper end", UPPER_END),
     ):  # fmt: skip

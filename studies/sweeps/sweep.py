@@ -13,6 +13,7 @@ from analysis.errors import AnalysisError
 from analysis.sensitivity.box import Box
 from analysis.sensitivity.designs import Design, Nominal
 from analysis.sensitivity.worst import WorstCaseSearch
+from estimators.display import Display
 from studies.sweeps.measures import Measure
 from studies.sweeps.observer import Observer
 from studies.sweeps.plant import Grid
@@ -35,8 +36,8 @@ class Chunk:
     design: int
 
 
-@dataclass(frozen=True, eq=False)
-class Sweep:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sweep(Display):
     """Everything a worker must know. Raises SpecError for names that do not exist, ranges that are empty, and repeated names.
 
     `vary` is one table for all observers, or a table for each by observer name. `points` of every scheduling parameter make the

@@ -16,9 +16,11 @@ from studies.sweeps.labels import better, paneled, titled, words
 from studies.sweeps.measures import Measure
 from studies.sweeps.store import Rows
 
-SIDES = (("parameter below its nominal value", BELOW, -1.0, 0.2), ("parameter above it", ABOVE, 1.0, -0.2))
+SIDES = (("parameter below nominal", BELOW, -1.0, 0.2), ("parameter above nominal", ABOVE, 1.0, -0.2))
 """Label, colour, sign of the levels, and the place of the bar in its row: side by side, neither hides the other."""
 NOTHING = 1e-9  # a share of the nominal value: less is rounding
+LEAST_DIGITS, MOST_DIGITS = 4, 9  # of the number at a bar, and as many as tell it from the nominal value
+LEAST_TICKS = 3
 
 
 @dataclass(frozen=True)
@@ -91,9 +93,10 @@ def tornado_panel(measure: Measure, bars: Sequence[Bar]) -> Panel:
     for place, bar in enumerate(bars):
         if not np.isfinite(bar.values).all():
             notes.append(_note(nominal, place, "unstable", 1.0))
-    room = 0.24 * (max(ends) - min(ends)) or 0.1 * abs(nominal) or 1.0  # numbers stand beside the bars
+    span = max(ends) - min(ends)
+    room = 0.24 * span if span > NOTHING * abs(nominal) else 0.1 * abs(nominal) or 1.0  # numbers stand beside the bars
     low, high = min(ends) - room, max(ends) + room
-    x = Axis(titled(measure), low, high, ticks=round_ticks(low, high))
+    x = Axis(f"{titled(measure)}, nominal {_digits(nominal, LEAST_DIGITS)}", low, high, ticks=round_ticks(low, high))
     y = Axis(ticks={place: words(bar.parameter) for place, bar in enumerate(bars)}, low=-0.6, high=len(bars) - 0.4)
     return Panel([*marks, *notes], x, y, better(measure))
 
@@ -101,9 +104,20 @@ def tornado_panel(measure: Measure, bars: Sequence[Bar]) -> Panel:
 def _numbers(low: float, high: float, nominal: float, place: float) -> list[Mark]:
     """The measure at the ends of a bar that leave the nominal value."""
     moved = [(end, sign) for end, sign in ((low, -1.0), (high, 1.0)) if abs(end - nominal) > NOTHING * abs(nominal)]
-    return [_note(end, place, f"{end:.4g}".replace("-", "−"), sign) for end, sign in moved] or [
+    return [_note(end, place, told_apart(end, nominal), sign) for end, sign in moved] or [
         _note(nominal, place, "no change", 1.0)
     ]
+
+
+def told_apart(value: float, nominal: float) -> str:
+    """In four significant digits, or as many as it takes to read another number than the nominal one."""
+    counts = range(LEAST_DIGITS, MOST_DIGITS)
+    digits = next((n for n in counts if _digits(value, n) != _digits(nominal, n)), MOST_DIGITS)
+    return _digits(value, digits)
+
+
+def _digits(value: float, digits: int) -> str:
+    return f"{value:.{digits}g}".replace("-", "−")
 
 
 def _note(x: float, place: float, text: str, sign: float) -> Words:
@@ -112,9 +126,10 @@ def _note(x: float, place: float, text: str, sign: float) -> Words:
 
 
 def round_ticks(low: float, high: float) -> list[float]:
-    """About four round values, far enough apart for their digits."""
-    rough = (high - low) / 4.0
-    unit = 10.0 ** np.floor(np.log10(rough))
-    step = unit * next(factor for factor in (1.0, 2.0, 2.5, 5.0, 10.0) if factor * unit >= rough * (1.0 - 1e-9))
-    places = np.arange(np.ceil(low / step), np.floor(high / step) + 1.0)
+    """Round values inside, as few as there can be from three on, far enough apart for their digits."""
+    unit = 10.0 ** np.floor(np.log10((high - low) / 2.0))
+    for step in (factor * unit for factor in (5.0, 2.5, 2.0, 1.0, 0.5)):
+        places = np.arange(np.ceil(low / step), np.floor(high / step) + 1.0)
+        if len(places) >= LEAST_TICKS:
+            break
     return [float(f"{place * step:.12g}") for place in places]

@@ -7,24 +7,28 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 from zlib import crc32
 
 import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
+from estimators.display import Display
 from estimators.errors import unknown
 from studies.truth.signals import UNITS
 from studies.truth.vehicle import TruthVehicle
 from synthesis.errors import SpecError
 
 
-@dataclass(frozen=True)
-class Truth:
+@dataclass(frozen=True, repr=False)
+class Truth(Display):
     """B runs over n samples. `signals`: name -> (B, n) of the car or (B, n, 4) of the corners fl, fr, rl, rr, SI.
 
     `duration` (B,) s: a batch goes on to the end of its longest run, and what a shorter one does after its own end means
     nothing; `valid` masks it. `vehicles` are the cars as they were driven.
     """
+
+    shown_units: ClassVar = {"time": "s", "duration": "s"}
 
     time: FloatArray  # (n,) s
     signals: dict[str, FloatArray]

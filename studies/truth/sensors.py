@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
+from typing import ClassVar
 from zlib import crc32
 
 import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
+from estimators.display import Display
 from estimators.pipeline.signals import VehicleSignals
 from estimators.signals.ticks import TickSpeed
 from studies.truth.record import Truth
@@ -153,8 +155,8 @@ class Ticks:
         return np.stack([meter.step(counts[:, :, k]).speed for k in range(counts.shape[2])], axis=2)
 
 
-@dataclass(frozen=True)
-class Sensors:
+@dataclass(frozen=True, repr=False)
+class Sensors(Display):
     """The sensors of a car; the defaults are those of a good production car at 200 Hz."""
 
     wheel_speed: Channel = Channel(noise=0.05)  # rad/s
@@ -168,12 +170,14 @@ class Sensors:
 PERFECT = Sensors(Channel(), Channel(), Channel(), Channel(), Channel())  # sensors without any error
 
 
-@dataclass(frozen=True)
-class Measured:
+@dataclass(frozen=True, repr=False)
+class Measured(Display):
     """Measured signals of S seeds x B runs over n samples, arrays (S, B, n) and (S, B, n, 4); SI, ISO frame.
 
     ``at(k)`` is what an `EstimationPipeline` of ``batch_shape`` (S, B) takes at sample k.
     """
+
+    shown_units: ClassVar = {"time": "s"}
 
     time: FloatArray  # (n,) s
     signals: dict[str, FloatArray]

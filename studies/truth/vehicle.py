@@ -10,6 +10,7 @@ from zlib import crc32
 
 import numpy as np
 
+from estimators.display import Display
 from estimators.errors import unknown
 from estimators.vehicle import VehicleParameters
 from estimators.velocity.suspension import SuspensionParameters
@@ -48,8 +49,8 @@ class Chassis:
                 raise SpecError(f"chassis.{entry.name} = {value!r}: must be finite and {bound}")
 
 
-@dataclass(frozen=True)
-class TruthVehicle:
+@dataclass(frozen=True, repr=False)
+class TruthVehicle(Display):
     """One car of the truth; `parameters` is what estimators may be told of it (exactly, or with an error of their own)."""
 
     name: str

@@ -8,6 +8,7 @@ from typing import Any
 
 from flint import fmpq
 
+from estimators.display import Display
 from estimators.schedule import FIRST_FORMAT, check_content, upgraded
 from synthesis.certificate.claims import Claim, claim_name, claim_unit
 from synthesis.certificate.content import Subject, claims_of, subject_of
@@ -17,8 +18,8 @@ from synthesis.certificate.verify import Outcome, Verifier
 from synthesis.loop.plant import Axis
 
 
-@dataclass(frozen=True)
-class Proof:
+@dataclass(frozen=True, repr=False)
+class Proof(Display):
     """One claim: proved on the whole range and rate box, or the place where the proof fails.
 
     `claim`, `level` and `unit` are derived from what was proved, never read. `refuted`: the loop itself breaks the claim at

@@ -10,6 +10,7 @@ import numpy as np
 from flint import fmpq_mat
 
 from estimators.arrays import FloatArray
+from estimators.display import Display, counted
 from synthesis.certificate.claims import Claim, ClaimChannel
 from synthesis.certificate.levels import held_claims, sampled_claims
 from synthesis.certificate.rounding import significant
@@ -25,6 +26,7 @@ from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.rational import decimal
 
 SEGMENTS = (7, 14, 28, 56, 112)
+RATES = ("decay rate", "fastest pole", "internal update", "sampled error")  # claims in 1/s
 MOST_PARAMETERS = 3  # of a proof: polynomials of order 8 in more of them have too many terms
 MOST_ENTRIES, FINEST = 4000, 64  # breakpoints of a table with several parameters, and segments along one of them
 REFINEMENT = 4  # a table is compared with one of so many times its segments
@@ -49,8 +51,8 @@ class DeploySettings:
             raise ProblemError(f"interpolation cost {self.interpolation_cost} must lie between 0 and 1")
 
 
-@dataclass(frozen=True)
-class Deployment:
+@dataclass(frozen=True, repr=False)
+class Deployment(Display):
     """A table with the claims that are proved for it: `table` (b_1, .., b_p, nx, ny) as stored, `breakpoints` (b_i,) each."""
 
     gains: ObserverGains
@@ -59,6 +61,22 @@ class Deployment:
     table: FloatArray
     claims: tuple[Claim, ...]
     cost: float  # relative loss of the worst gain through tabulation and rounding
+
+    def summary(self) -> tuple[str, ...]:
+        """The table over its breakpoints, what it cost, and the claims by kind and level."""
+        model = self.gains.model
+        over = [f"{p.name} [{p.unit}]" for p in model.parameters]
+        levels = [
+            f"{claim.kind} {claim.level:.4g}{' 1/s' if claim.kind in RATES else ''}" for claim in self.claims[::-1]
+        ]
+        limit = self.settings.interpolation_cost
+        return (
+            f"Deployment of '{model.name}'",
+            f"table: {self.table.shape} over {', '.join(over) or 'nothing'}, {self.settings.dtype}",
+            f"update: {self.gains.update}, every {1e3 * self.settings.sample_time:g} ms",
+            f"cost of tabulation: {max(100.0 * self.cost, 0.0):.2f} % of the worst gain, {100.0 * limit:g} % allowed",
+            f"{counted(len(self.claims), 'claim')}: {', '.join(levels)}",
+        )
 
     @property
     def loop(self) -> ObserverLoop:

@@ -18,12 +18,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.certificate.refute import undetectable_place
 from synthesis.certificate.rounding import round_down, round_up
+from synthesis.design.gains_summary import gains_summary
 from synthesis.errors import ProblemError
 from synthesis.lmi.exchange import Memory
 from synthesis.lmi.problem import LmiProblem
@@ -39,8 +42,8 @@ from synthesis.models.selection import selection
 from synthesis.polynomials.matrix import symmetric_block
 
 
-@dataclass(frozen=True)
-class Channel:
+@dataclass(frozen=True, repr=False)
+class Channel(Display):
     """The L2 gain from some disturbances to some estimation errors: bounded by `bound`, or minimised if None.
 
     `weights` multiply the disturbances (their sizes), in the order of `disturbances`.
@@ -60,14 +63,16 @@ class Channel:
         return f"{'+'.join(self.disturbances)} -> {'+'.join(self.errors)}"
 
 
-@dataclass(frozen=True)
-class ObserverDesign:
+@dataclass(frozen=True, repr=False)
+class ObserverDesign(Display):
     """What is asked of the gains.
 
     >>> bounded = Channel(("friction",), ("relative_velocity",), bound=1.05)
     >>> ObserverDesign((bounded, Channel(("force_noise",), ("relative_velocity",))), decay_rate=80.0).minimised.name
     'force_noise -> relative_velocity'
     """
+
+    shown_units: ClassVar = {"decay_rate": "1/s", "fastest_pole": "1/s"}
 
     channels: tuple[Channel, ...]
     degree: int = 1  # of P and X in the parameters
@@ -101,8 +106,8 @@ class ObserverDesign:
         return next(channel for channel in self.channels if channel.bound is None)
 
 
-@dataclass(frozen=True)
-class ObserverGains:
+@dataclass(frozen=True, repr=False)
+class ObserverGains(Display):
     """L(p) = P(p)^-1 X(p) (or K(p) = G(p)^-1 X(p) of a sampled design) with the bound that was minimised.
 
     `gamma_lower` is a bound from below for every P and X of this degree (weak duality, margins taken out), where there is one;
@@ -119,6 +124,10 @@ class ObserverGains:
     scale: FloatArray
     update: Update = "held"
     sample_time: float | None = None
+
+    def summary(self) -> tuple[str, ...]:
+        """Verdict, level with its lower bound, how the gains are run, the tightest inequality."""
+        return gains_summary(self)
 
     @property
     def verdict(self) -> Verdict:

@@ -16,6 +16,7 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.errors import unknown
 from synthesis.certificate.claims import Claim
 from synthesis.certificate.proof import place_words
@@ -38,8 +39,8 @@ PRECISE = 15  # digits of P when it is proved right here
 Form = Literal["primal", "dual"]
 
 
-@dataclass(frozen=True)
-class GainBox:
+@dataclass(frozen=True, repr=False)
+class GainBox(Display):
     """All gains L with lower <= L <= upper, entry by entry; arrays (nx, ny).
 
     >>> GainBox(lower=[[0.5], [60.0]], upper=[[0.9], [210.0]]).vertices().shape
@@ -63,8 +64,8 @@ class GainBox:
         return np.asarray(0.5 * (np.asarray(self.lower, float) + np.asarray(self.upper, float)))
 
 
-@dataclass(frozen=True)
-class StabilityResult:
+@dataclass(frozen=True, repr=False)
+class StabilityResult(Display):
     """Verdict, the Lyapunov matrix as coefficients in the physical parameters and states, and the margins.
 
     `lyapunov` has the shape (d_1+1, ..., d_p+1, nx, nx); it is P in the primal form and Q in the dual one. `unstable`

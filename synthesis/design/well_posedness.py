@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.design.hinf_observer import ObserverDesign, observer_problem, timed_scale, to_gamma
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
@@ -24,8 +25,8 @@ BACKOFFS = (1e-1, 1e-2, 1e-3)  # closer than this the margins of the solver deci
 GROWTH = 2.0  # energy that grows by more than this for every decade of back-off is taken as unbounded
 
 
-@dataclass(frozen=True)
-class WellPosedness:
+@dataclass(frozen=True, repr=False)
+class WellPosedness(Display):
     """`gamma` the infimum found; `energy` the least gain energy at (1 + backoff) gamma for every back-off.
 
     `ill_posed` when the energy keeps growing with every decade; then the optimum has no gains to export.

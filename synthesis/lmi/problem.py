@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from estimators.arrays import FloatArray
+from estimators.display import Display, counted
 from synthesis.errors import ProblemError
 from synthesis.lmi.basis import chebyshev_basis
 from synthesis.models.param import SchedulingParameter
@@ -34,8 +35,8 @@ class Inequality:
     floor: float = 0.0
 
 
-@dataclass
-class LmiProblem:
+@dataclass(repr=False)
+class LmiProblem(Display):
     """Variables and inequalities in scaled coordinates: parameters and rates run over [-1, 1].
 
     The variables of every polynomial are (u_1..u_p, r_1..r_p) with p_i = middle_i + half_i u_i and
@@ -64,6 +65,18 @@ class LmiProblem:
         if self.maximise_margin:
             self.scalar(MARGIN)
             self.maximise(MARGIN)
+
+    def summary(self) -> tuple[str, ...]:
+        """Unknowns and inequalities by name and size, the box, what is optimised."""
+        box = [f"{p.name} {p.minimum:g} to {p.maximum:g} {p.unit}" for p in self.parameters]
+        aim = "none" if self.objective is None else f"{'minimise' if self.sense > 0.0 else 'maximise'} {self.objective}"
+        return (
+            f"LmiProblem: {counted(self.decisions, 'decision')}, {counted(len(self.inequalities), 'inequality')}",
+            f"unknowns: {', '.join(f'{n} {v.shape}' for n, v in self.unknowns.items()) or 'none'}",
+            f"inequalities: {', '.join(f'{i.name} {i.matrix.shape}' for i in self.inequalities) or 'none'}",
+            f"parameters: {', '.join(box) or 'none'}",
+            f"objective: {'least norm' if self.least_norm else aim}",
+        )
 
     @property
     def variables(self) -> int:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from estimators.arrays import FloatArray
+from estimators.display import Display, counted
 from synthesis.polynomials.matrix import MatrixPolynomial
 
 
@@ -17,8 +18,8 @@ class Verdict(StrEnum):
     INCONCLUSIVE = "inconclusive"
 
 
-@dataclass(frozen=True)
-class Margin:
+@dataclass(frozen=True, repr=False)
+class Margin(Display):
     """One named inequality, re-evaluated outside the solver.
 
     `value` is the smallest eigenvalue found, divided by the largest eigenvalue magnitude of the same matrix over the
@@ -45,8 +46,8 @@ class SolverReport:
     dual_bound: float
 
 
-@dataclass(frozen=True)
-class LmiResult:
+@dataclass(frozen=True, repr=False)
+class LmiResult(Display):
     """Verdict, margins by name, values of the unknowns (in scaled parameters) and the solver's own report.
 
     A REFUTED verdict means: the solver gave a certificate of infeasibility of a necessary condition.
@@ -60,6 +61,22 @@ class LmiResult:
     objective: float | None
     lower_bound: float | None
     report: SolverReport
+
+    def summary(self) -> tuple[str, ...]:
+        """Verdict, objective with its bound, the tightest inequality, what the solver said."""
+        objective = "none" if self.objective is None else f"{self.objective:.6g}"
+        bound = "" if self.lower_bound is None else f", at least {self.lower_bound:.6g}"
+        tight, verdict = "none", str(self.verdict)
+        if self.margins:
+            tight = f"{self.tightest.name}, margin {self.tightest.value:.3g} at {self.tightest.place}"
+        said = self.report
+        return (
+            f"LmiResult: {self.message if self.message.startswith(verdict) else f'{verdict}; {self.message}'}",
+            f"objective: {objective}{bound}",
+            f"tightest of {counted(len(self.margins), 'inequality')}: {tight}",
+            f"unknowns: {', '.join(f'{n} {v.shape}' for n, v in self.values.items()) or 'none'}",
+            f"solver (no evidence): {said.solver}, {said.status}, {said.iterations} iterations, {said.seconds:.3g} s",
+        )
 
     @property
     def tightest(self) -> Margin:

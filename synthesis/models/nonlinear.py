@@ -9,14 +9,15 @@ import numpy as np
 import sympy as sp
 
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.errors import unknown
 from synthesis.errors import ModelError
 from synthesis.models.param import Constant, Signal
 from synthesis.models.symbols import plain
 
 
-@dataclass(frozen=True, eq=False)
-class NonlinearModel:
+@dataclass(frozen=True, eq=False, repr=False)
+class NonlinearModel(Display):
     r"""x' = f(x, u), y = h(x, u); f (nx, 1) and h (ny, 1) use the names of states, inputs and constants as symbols.
 
     Raises ModelError for a stray symbol, a shape that does not fit, a repeated name or a missing source.

@@ -96,7 +96,7 @@ def test_every_file_is_written_and_nothing_else(whole_run: tuple[RunResult, Path
     assert names == {
         *("estimates.csv", "metrics.json", "velocity.svg", "velocity.png"),
         *("slip.svg", "slip.png", "forces.svg", "forces.png", "lateral.svg", "lateral.png"),
-        *("axle_forces.svg", "axle_forces.png", "loads.svg", "loads.png"),
+        *("axle_forces.svg", "axle_forces.png", "loads.svg", "loads.png", "flags.svg", "flags.png"),
     }
     assert (out / "velocity.png").read_bytes().startswith(b"\x89PNG")
     assert "<svg" in (out / "velocity.svg").read_text()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -15,7 +13,7 @@ from studies.run import run_studies
 from studies.schedules import ScheduleRun
 from studies.study import QUICK
 from synthesis.certificate.proof import Proof
-from tests.support.browser import Page, find_chromium
+from tests.support.browser import Page
 from tests.support.study_fakes.registry import REGISTRY
 
 HERE = Path(__file__).parent
@@ -27,19 +25,6 @@ BREADTH = "document.documentElement.scrollWidth"
 CONTRAST = (HERE / "contrast.js").read_text()
 UNFOLD = "document.querySelectorAll('details').forEach(d => { d.open = true })"
 SEEN = "(r => r.top >= 0 && r.bottom <= innerHeight)(document.querySelector('nav a').getBoundingClientRect())"
-
-
-@pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    program = find_chromium()
-    if program is None:
-        missing = "Chromium is not installed (Debian: apt-get install chromium)"
-        if os.environ.get("GAINSMITH_CHROMIUM") == "required":
-            pytest.fail(missing)
-        pytest.skip(missing)
-    opened = Page(program, tmp_path_factory.mktemp("profile"))
-    yield opened
-    opened.close()
 
 
 @pytest.fixture(scope="module")
