@@ -1,0 +1,137 @@
+"""What a schedule's certified levels look like from below: the largest amplification that runs show, beside each level.
+
+Random admissible trajectories, each with the input that is amplified most along it; the worst frozen place; a periodic
+trajectory found by search. The worst of all is run again by plant and runtime, from rest. None of it may exceed what is
+certified: a test of every proof that shares nothing with it but the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from analysis.errors import AnalysisError
+from analysis.simulation.error_update import channel_of
+from analysis.simulation.searched import ScheduleQuestion, bad_trajectories, least_decay
+from analysis.simulation.simulate import simulate
+from analysis.simulation.simulation import Simulation
+from analysis.simulation.trajectories import random_trajectories
+from analysis.simulation.worst_input import worst_inputs
+from estimators.arrays import FloatArray
+from estimators.schedule import FIRST_FORMAT, GainSchedule, upgraded
+from synthesis.certificate.claims import GAINS, UPDATE_OF, Claim, ClaimChannel, claim_name, claim_unit
+from synthesis.certificate.content import claims_of, subject_of
+from synthesis.certificate.proof import certificate
+
+SETTLED = 5.0  # decay times that a run lasts
+FEWEST, MOST = 200, 1500  # samples
+MOST_WORK = 2_000_000  # runs times samples: memory
+MEASURED = ("sampled gain", "motion gain")
+ROUNDING = 1e-9  # relative, of runs: a level is not beaten by less
+
+
+@dataclass(frozen=True)
+class Amplification:
+    """One claim: `level` in `unit`, and what runs show of it.
+
+    `mean` and `largest` over the random trajectories (NaN for a decay rate), `worst` along `trajectory` (N+1, p) under `inputs`
+    (N, m), numbers of their sizes, by `names`. A decay rate is beaten from below, a gain from above.
+    """
+
+    claim: str
+    kind: str
+    level: float
+    unit: str
+    proved: bool
+    mean: float
+    largest: float
+    worst: float
+    every: FloatArray  # (runs,) of the random trajectories
+    trajectory: FloatArray
+    inputs: FloatArray
+    names: tuple[str, ...]
+    errors: tuple[str, ...]
+
+    @property
+    def share(self) -> float:
+        """Of the certified level that was reached."""
+        return self.level / self.worst if self.is_decay else self.worst / self.level
+
+    @property
+    def beaten(self) -> bool:
+        """Whether a run contradicts the claim."""
+        return self.share > 1.0 + ROUNDING
+
+    @property
+    def is_decay(self) -> bool:
+        """Whether the claim says how fast an error falls."""
+        return self.kind not in GAINS
+
+
+def amplification(
+    content: Mapping[str, Any], runs: int = 60, samples: int | None = None, seed: int = 0
+) -> tuple[Amplification, ...]:
+    """Every claim about gain or decay of the update of a schedule file's content, proved again, beside what runs show.
+
+    `samples` of a run; None: five decay times, 200 to 1500. Raises ScheduleError for a content that is no schedule, and
+    AnalysisError for counts below one or beyond memory.
+
+    >>> from estimators.schedule import SHIPPED, read_content
+    >>> found = amplification(read_content(SHIPPED / "longitudinal-speed.json"), runs=6, samples=60)
+    >>> all(one.proved and not one.beaten for one in found)
+    True
+    """
+    if content.get("schema") == FIRST_FORMAT:
+        content = upgraded(content, "schedule content")
+    schedule = GainSchedule.from_content(content)
+    subject = subject_of(content, schedule.name)
+    claims = claims_of(content, subject, schedule.name)
+    proofs = certificate(content, schedule.name).proofs
+    decay = next(c.level for c in claims if c.kind == UPDATE_OF[schedule.update])
+    if samples is None:
+        samples = int(np.clip(np.ceil(SETTLED / (decay * schedule.sample_time)), FEWEST, MOST))
+    if runs * samples > MOST_WORK:
+        raise AnalysisError(f"{runs} runs of {samples} samples; their product may be {MOST_WORK} at most")
+    paths = random_trajectories(schedule, samples, runs, seed=seed)
+    found = []
+    for claim, proof in zip(claims, proofs, strict=True):
+        if claim.kind not in (*MEASURED, UPDATE_OF[schedule.update]):
+            continue
+        measured = _decay if claim.channel is None else _gain
+        words = claim_name(claim.kind, claim.channel, subject.units), claim.kind, claim.level
+        unit = claim_unit(claim.kind, claim.channel, subject.units)
+        found.append(Amplification(*words, unit, proof.proved, *measured(schedule, claim, paths, seed)))
+    return tuple(found)
+
+
+def replayed(schedule: GainSchedule, found: Amplification) -> Simulation:
+    """Plant and runtime from rest along the worst trajectory of a gain from disturbances, under its worst input."""
+    given = {name: found.inputs[:, i] for i, name in enumerate(found.names)}
+    return simulate(schedule, schedule, found.trajectory[None], disturbances=given)
+
+
+def _gain(schedule: GainSchedule, claim: Claim, paths: FloatArray, seed: int) -> tuple[Any, ...]:
+    assert claim.channel is not None
+    question = ScheduleQuestion(schedule, claim.kind, claim.channel)
+    count = paths.shape[1]
+    every = np.concatenate([paths, bad_trajectories(question, count)])
+    system = channel_of(schedule, claim.kind, claim.channel, every)
+    start = np.random.default_rng(seed).standard_normal((len(every), count - 1, system.B.shape[-1]))
+    ratios, w = worst_inputs(system, start)
+    best, random = int(ratios.argmax()), ratios[: len(paths)]
+    sizes = np.array(list(claim.channel.inputs.values()))
+    return (
+        float(random.mean()), float(random.max()), float(ratios[best]), random, every[best], w[best] * sizes,
+        tuple(claim.channel.inputs), claim.channel.errors,
+    )  # fmt: skip
+
+
+def _decay(schedule: GainSchedule, claim: Claim, paths: FloatArray, seed: int) -> tuple[Any, ...]:
+    everything = ClaimChannel({s.name: 1.0 for s in schedule.disturbances}, tuple(s.name for s in schedule.states))
+    question = ScheduleQuestion(schedule, "sampled gain", everything)
+    rate, path = least_decay(question, paths.shape[1])
+    none = np.empty((len(path) - 1, 0))
+    return np.nan, np.nan, rate, np.empty(0), path, none, (), everything.errors

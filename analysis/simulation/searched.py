@@ -1,0 +1,86 @@
+"""The update of a schedule as a system that the search of `analysis.lpv` can look for bad trajectories of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from analysis.lpv.frozen import largest_gain, slowest_decay
+from analysis.lpv.lifted import samples
+from analysis.lpv.trajectory import Path, float_of
+from analysis.lpv.worst_path import gain_of, growth_of, worst_path
+from analysis.simulation.box import box_of
+from analysis.simulation.error_update import channel_of
+from estimators.arrays import FloatArray
+from estimators.schedule import GainSchedule
+from synthesis.certificate.claims import ClaimChannel
+from synthesis.loop.plant import Axis
+from synthesis.polynomials.rational import decimal
+
+EVALUATIONS = 40  # of a search: its result is improved with the worst input afterwards
+
+
+@dataclass(frozen=True)
+class ScheduleQuestion:
+    """e+ = A(p) e + B(p) w, z = C e of one channel; a sample is the unit of time."""
+
+    schedule: GainSchedule
+    kind: str
+    channel: ClaimChannel
+    discrete: bool = True
+    order: int = 1
+
+    @cached_property
+    def axes(self) -> tuple[Axis, ...]:
+        """Ranges, and rates per sample."""
+        box, period = box_of(self.schedule), decimal(self.schedule.sample_time)
+        rows = zip(*box, strict=True)
+        return tuple(
+            Axis(
+                name,
+                unit,
+                decimal(float(low)),
+                decimal(float(high)),
+                *(decimal(float(rate)) * period if np.isfinite(rate) else None for rate in rates),
+            )
+            for name, unit, low, high, *rates in rows
+        )
+
+    def frozen(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """A, B, C, D at scaled parameters (g, p)."""
+        return tuple(channel_of(self.schedule, self.kind, self.channel, self.physical(u)))  # type: ignore[return-value]
+
+    def physical(self, u: FloatArray) -> FloatArray:
+        """Parameter values of scaled ones, inside the range."""
+        box = box_of(self.schedule)
+        middle, half = (np.array([float_of(getattr(axis, key)) for axis in self.axes]) for key in ("middle", "half"))
+        found: FloatArray = np.clip(middle + half * u, box.low, box.high)
+        return found
+
+    def repeated(self, path: Path, count: int) -> FloatArray:
+        """`count` samples of a periodic path, (count, p), admissible to the last bit."""
+        once = self.physical(samples(path))
+        many = np.tile(once, (-(-count // len(once)), 1))[None, :count]
+        found: FloatArray = box_of(self.schedule).limited(many, self.schedule.sample_time)[0]
+        return found
+
+
+def bad_trajectories(question: ScheduleQuestion, count: int) -> FloatArray:
+    """Two trajectories (2, count, p): the place where the frozen gain is largest, and the worst periodic path that was found."""
+    place, _, frequency = largest_gain(question)
+    standing = np.broadcast_to(question.physical(place[None]), (count, len(place)))
+    path, _ = worst_path(question, gain_of(question), tuple(dict.fromkeys((0.0, frequency))), place, EVALUATIONS)
+    return np.stack([standing, question.repeated(path, count)])
+
+
+def least_decay(question: ScheduleQuestion, count: int) -> tuple[float, FloatArray]:
+    """The slowest decay found, 1/s, frozen or along a periodic path, whose monodromy matrix has it; and that path (count, p)."""
+    period = question.schedule.sample_time
+    place, rate = slowest_decay(question)
+    path, _ = worst_path(question, growth_of(question), (0.0,), place, EVALUATIONS)
+    along = -growth_of(question)(path, 0.0)
+    if along < rate:
+        return along / period, question.repeated(path, count)
+    return rate / period, np.broadcast_to(question.physical(place[None]), (count, len(place)))

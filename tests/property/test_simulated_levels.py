@@ -1,0 +1,49 @@
+"""No run may beat a certified level, the worst found comes close to it, and a level that is a little better is beaten."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.simulation.amplification import amplification, replayed
+from estimators.schedule import SHIPPED, GainSchedule, read_content
+from estimators.schedule.files import write_content
+from studies.cli import main
+
+SCHEDULES = ("corner-estimation-lateral", "resilient-velocity-longitudinal")
+
+
+def few_claims(name: str) -> dict[str, Any]:
+    """A shipped schedule with the claim about its update and the last gain from disturbances alone."""
+    content = dict(read_content(SHIPPED / f"{name}.json"))
+    del content["sha256"], content["section_sha256"]
+    update = [claim for claim in content["claims"] if claim["kind"] == "internal update"]
+    return content | {"claims": [*update, [c for c in content["claims"] if c["kind"] == "sampled gain"][-1]]}
+
+
+@pytest.mark.parametrize("name", SCHEDULES)
+def test_runs_stay_below_the_certified_level_and_reach_nearly_all_of_it(name: str) -> None:
+    content = few_claims(name)
+    for one in amplification(content, runs=6, samples=200):
+        assert one.proved and not one.beaten
+        assert 0.9 < one.share <= 1.0
+        if not one.is_decay:  # the runtime beside its plant does what the recursion says; the plant does not move by force noise
+            schedule = GainSchedule.from_content(content)
+            run = replayed(schedule, one)
+            energy = np.linalg.norm(run.error[0][:, [run.states.index(name) for name in one.errors]])
+            assert energy / np.linalg.norm(one.inputs) == pytest.approx(one.worst, rel=1e-9)
+
+
+def test_a_level_that_is_too_good_is_beaten_by_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    content = copy.deepcopy(few_claims(SCHEDULES[1]))
+    content["claims"][0]["level"] *= 1.1  # decay
+    content["claims"][1]["level"] *= 0.9  # gain
+    assert all(one.beaten and not one.proved for one in amplification(content, runs=3, samples=200))
+    write_content(tmp_path / "wrong.json", content)
+    assert main(["simulate", str(tmp_path / "wrong.json"), "--runs", "3", "--samples", "200"]) == 1
+    assert capsys.readouterr().out.count("BEATEN") == 2
+    assert main(["simulate", str(tmp_path / "wrong.json"), "--runs", "0"]) == 2
