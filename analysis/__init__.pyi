@@ -138,6 +138,8 @@ from .sensitivity.measure import sample as sample
 from .sensitivity.measure import sample_grid as sample_grid
 from .sensitivity.worst import WorstCase as WorstCase
 from .sensitivity.worst import worst_case as worst_case
+from .simulation.amplification import Amplification as Amplification
+from .simulation.amplification import amplification as amplification
 from .simulation.nonlinear import NonlinearPlant as NonlinearPlant
 from .simulation.simulate import simulate as simulate
 from .simulation.simulation import Simulation as Simulation

@@ -56,7 +56,7 @@ def worst_path(
     """The path and carrier frequency with the best score found; `place` is the worst frozen one, which some paths stay near."""
     tried = [
         (score(path, carrier), path, carrier)
-        for path in _simple(question, place) for carrier in carriers
+        for path in simple_paths(question, place) for carrier in carriers
     ]  # fmt: skip
     tried.sort(key=lambda entry: -entry[0])
     best = tried[0]
@@ -67,7 +67,8 @@ def worst_path(
     return best[1], best[2]
 
 
-def _simple(question: Searched, place: FloatArray) -> Iterator[Path]:
+def simple_paths(question: Searched, place: FloatArray) -> Iterator[Path]:
+    """Back and forth, each parameter alone (the others at `place`) and all together, with shifts, for every period."""
     axes = question.axes
     count = len(axes)
     phases = np.arange(KNOTS) / KNOTS

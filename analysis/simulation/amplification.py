@@ -27,7 +27,7 @@ from synthesis.certificate.content import claims_of, subject_of
 from synthesis.certificate.proof import certificate
 
 SETTLED = 5.0  # decay times that a run lasts
-FEWEST, MOST = 200, 1500  # samples
+FEWEST, MOST = 200, 3000  # samples
 MOST_WORK = 2_000_000  # runs times samples: memory
 MEASURED = ("sampled gain", "motion gain")
 ROUNDING = 1e-9  # relative, of runs: a level is not beaten by less
@@ -76,7 +76,7 @@ def amplification(
 ) -> tuple[Amplification, ...]:
     """Every claim about gain or decay of the update of a schedule file's content, proved again, beside what runs show.
 
-    `samples` of a run; None: five decay times, 200 to 1500. Raises ScheduleError for a content that is no schedule, and
+    `samples` of a run; None: five decay times, 200 to 3000. Raises ScheduleError for a content that is no schedule, and
     AnalysisError for counts below one or beyond memory.
 
     >>> from estimators.schedule import SHIPPED, read_content
@@ -117,7 +117,7 @@ def _gain(schedule: GainSchedule, claim: Claim, paths: FloatArray, seed: int) ->
     assert claim.channel is not None
     question = ScheduleQuestion(schedule, claim.kind, claim.channel)
     count = paths.shape[1]
-    every = np.concatenate([paths, bad_trajectories(question, count)])
+    every = np.concatenate([paths, bad_trajectories(question, count, seed)])
     system = channel_of(schedule, claim.kind, claim.channel, every)
     start = np.random.default_rng(seed).standard_normal((len(every), count - 1, system.B.shape[-1]))
     ratios, w = worst_inputs(system, start)

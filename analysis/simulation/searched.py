@@ -9,17 +9,20 @@ import numpy as np
 
 from analysis.lpv.frozen import largest_gain, slowest_decay
 from analysis.lpv.lifted import samples
-from analysis.lpv.trajectory import Path, float_of
-from analysis.lpv.worst_path import gain_of, growth_of, worst_path
+from analysis.lpv.trajectory import Path, admissible, float_of
+from analysis.lpv.worst_path import growth_of, simple_paths, worst_path
 from analysis.simulation.box import box_of
 from analysis.simulation.error_update import channel_of
+from analysis.simulation.worst_input import worst_inputs
 from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule
 from synthesis.certificate.claims import ClaimChannel
 from synthesis.loop.plant import Axis
 from synthesis.polynomials.rational import decimal
 
-EVALUATIONS = 40  # of a search: its result is improved with the worst input afterwards
+EVALUATIONS = 40  # of the search for slow decay
+GENERATIONS, BEST, CHILDREN, CHANGE = 2, 4, 8, 0.4  # of the search for large gains
+ROUGH, SHORT = 6, 400  # rounds of the worst input, and samples of a run, while searching
 
 
 @dataclass(frozen=True)
@@ -67,12 +70,36 @@ class ScheduleQuestion:
         return found
 
 
-def bad_trajectories(question: ScheduleQuestion, count: int) -> FloatArray:
-    """Two trajectories (2, count, p): the place where the frozen gain is largest, and the worst periodic path that was found."""
-    place, _, frequency = largest_gain(question)
+def bad_trajectories(question: ScheduleQuestion, count: int, seed: int) -> FloatArray:
+    """Trajectories (1 + BEST, count, p): the place where the frozen gain is largest, and the worst periodic paths found.
+
+    Simple paths first, then some generations of random changes of the best ones, a whole generation in one batch.
+    """
+    rng = np.random.default_rng(seed)
+    place, _, _ = largest_gain(question)
+    known: list[tuple[float, Path]] = []
+    paths = list(simple_paths(question, place))
+    for generation in range(GENERATIONS + 1):
+        known += zip(_ratios(question, paths, min(count, SHORT), rng), paths, strict=True)
+        known = sorted(known, key=lambda entry: -entry[0])[:BEST]
+        if generation < GENERATIONS:
+            paths = [_changed(path, question.axes, rng) for _, path in known for _ in range(CHILDREN)]
     standing = np.broadcast_to(question.physical(place[None]), (count, len(place)))
-    path, _ = worst_path(question, gain_of(question), tuple(dict.fromkeys((0.0, frequency))), place, EVALUATIONS)
-    return np.stack([standing, question.repeated(path, count)])
+    return np.stack([standing, *(question.repeated(path, count) for _, path in known)])
+
+
+def _ratios(question: ScheduleQuestion, paths: list[Path], count: int, rng: np.random.Generator) -> list[float]:
+    """Amplification of a nearly worst input along each path."""
+    p = np.stack([question.repeated(path, count) for path in paths])
+    system = channel_of(question.schedule, question.kind, question.channel, p)
+    start = rng.standard_normal((len(p), count - 1, system.B.shape[-1]))
+    return [float(ratio) for ratio in worst_inputs(system, start, ROUGH)[0]]
+
+
+def _changed(path: Path, axes: tuple[Axis, ...], rng: np.random.Generator) -> Path:
+    """A path nearby; durations stay whole samples."""
+    durations = np.maximum(1.0, np.round(path.durations * np.exp(CHANGE * rng.standard_normal(len(path.durations)))))
+    return admissible(path.knots + CHANGE * rng.standard_normal(path.knots.shape), durations, axes)
 
 
 def least_decay(question: ScheduleQuestion, count: int) -> tuple[float, FloatArray]:

@@ -31,7 +31,9 @@ def test_runs_stay_below_the_certified_level_and_reach_nearly_all_of_it(name: st
     for one in amplification(content, runs=6, samples=200):
         assert one.proved and not one.beaten
         assert 0.9 < one.share <= 1.0
-        if not one.is_decay:  # the runtime beside its plant does what the recursion says; the plant does not move by force noise
+        if (
+            not one.is_decay
+        ):  # the runtime beside its plant does what the recursion says; the plant does not move by force noise
             schedule = GainSchedule.from_content(content)
             run = replayed(schedule, one)
             energy = np.linalg.norm(run.error[0][:, [run.states.index(name) for name in one.errors]])

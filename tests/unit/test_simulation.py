@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -36,7 +37,7 @@ def broken(path: np.ndarray, rates: tuple[float, float], period: float, ends: tu
     """Whether a trajectory (n,) leaves its box, in exact rationals of its floats."""
     exact = [Fraction(float(v)) for v in path]
     low, high = (Fraction(repr(r)) * Fraction(repr(period)) for r in rates)
-    steps = [b - a for a, b in zip(exact, exact[1:], strict=False)]
+    steps = [b - a for a, b in pairwise(exact)]
     return not all(ends[0] <= v <= ends[1] for v in exact) or not all(low <= s <= high for s in steps)
 
 
@@ -119,7 +120,9 @@ def test_lost_measurements_are_flagged_and_the_law_closes_the_loop() -> None:
     schedule = GainSchedule.shipped("corner-estimation-longitudinal")
     paths = random_trajectories(schedule, 30, 4)
     inputs = {"relative_acceleration": 1.0}
-    one, other = (simulate(schedule, schedule, paths, inputs=inputs, observer=kind) for kind in ("any size", "velocity"))  # type: ignore[arg-type]
+    one, other = (
+        simulate(schedule, schedule, paths, inputs=inputs, observer=kind) for kind in ("any size", "velocity")
+    )  # type: ignore[arg-type]
     assert one.estimate == pytest.approx(other.estimate, rel=1e-9, abs=1e-13)
     lost = simulate(schedule, schedule, paths, drops=1.0)
     assert ((lost.flags & int(Flag.MISSING_MEASUREMENT)) > 0).all()
@@ -135,7 +138,9 @@ def test_lost_measurements_are_flagged_and_the_law_closes_the_loop() -> None:
 
 def test_the_nonlinear_truth_is_integrated_and_schedules_itself() -> None:
     """x' = -x^3 is x0/sqrt(1 + 2 x0^2 t); as x' = -p x with p = x^2 the observer sees it."""
-    model = NonlinearModel("cubic", "closed form", (Signal("x", "1"),), (Signal("y", "1"),), sp.Matrix([-(X**3)]), sp.Matrix([X]))
+    model = NonlinearModel(
+        "cubic", "closed form", (Signal("x", "1"),), (Signal("y", "1"),), sp.Matrix([-(X**3)]), sp.Matrix([X])
+    )
     run = simulate(NonlinearPlant(model, {"p": X**2}), runs=2, samples=20, sample_time=0.1, start=[[1.0], [0.5]])
     x0 = np.array([[1.0], [0.5]])
     assert run.of("x") == pytest.approx(x0 / np.sqrt(1.0 + 2.0 * x0**2 * run.time), rel=1e-7)
@@ -147,7 +152,11 @@ def test_the_nonlinear_truth_is_integrated_and_schedules_itself() -> None:
 def test_the_worst_input_is_that_of_the_dense_operator() -> None:
     """Ten samples of a time-varying system: the largest singular value of its block triangular matrix."""
     rng, N = np.random.default_rng(4), 10
-    A, B, C = 0.5 * rng.normal(size=(1, N + 1, 2, 2)), rng.normal(size=(1, N + 1, 2, 2)), rng.normal(size=(1, N + 1, 1, 2))
+    A, B, C = (
+        0.5 * rng.normal(size=(1, N + 1, 2, 2)),
+        rng.normal(size=(1, N + 1, 2, 2)),
+        rng.normal(size=(1, N + 1, 1, 2)),
+    )
     D = rng.normal(size=(1, N + 1, 1, 2))
     dense = np.zeros((N + 1, 2 * N))
     for j in range(N):
