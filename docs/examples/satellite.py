@@ -29,7 +29,7 @@ print("breakpoints:", *(len(points) for points in deployment.breakpoints), "of",
 # %%
 schedule = GainSchedule.from_content(content)
 paths = random_trajectories(schedule, samples=600, runs=20)
-sizes = {"disturbing_torque": 0.01, "bus_noise": 1e-4, "instrument_noise": 1e-4}
+sizes = {"disturbing_torque": 0.001, "bus_noise": 1e-4, "instrument_noise": 1e-4}
 for drops in (0.0, 0.1):
     run = simulate(schedule, schedule, paths, disturbances=sizes, drops=drops)
     for i, name in ((2, "bus"), (3, "instrument")):
