@@ -140,6 +140,7 @@ from .sensitivity.worst import WorstCase as WorstCase
 from .sensitivity.worst import worst_case as worst_case
 from .simulation.amplification import Amplification as Amplification
 from .simulation.amplification import amplification as amplification
+from .simulation.continuous_loop import ContinuousLoop as ContinuousLoop
 from .simulation.nonlinear import NonlinearPlant as NonlinearPlant
 from .simulation.simulate import simulate as simulate
 from .simulation.simulation import Simulation as Simulation

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analysis.errors import AnalysisError
+from analysis.simulation.continuous_loop import ContinuousLoop
 from analysis.simulation.laws import RuntimeObserver
 from analysis.simulation.nonlinear import NonlinearPlant
 from analysis.simulation.plants import LinearPlant, SimulatedPlant
@@ -23,7 +24,7 @@ Feedback = Callable[[int, FloatArray, FloatArray, FloatArray], npt.ArrayLike]
 
 
 def simulate(
-    plant: GainSchedule | LpvModel | NonlinearPlant,
+    plant: GainSchedule | LpvModel | NonlinearPlant | ContinuousLoop,
     schedule: GainSchedule | None = None,
     parameters: npt.ArrayLike | None = None,
     *,
@@ -42,7 +43,8 @@ def simulate(
     """x' = A x + B u + E d, y = C x + D u + F d (or the nonlinear truth) beside the runtime of `schedule`, u and d held.
 
     Args:
-        plant: a schedule (its own plant, in the numbers of the runtime), a model, or a `NonlinearPlant`, which schedules itself.
+        plant: a schedule (its own plant, in the numbers of the runtime), a model, a `NonlinearPlant`, which schedules itself, or
+            a `ContinuousLoop`, which has its law inside.
         schedule: its runtime estimates, with inputs and measurements of the plant found by name; None: the plant alone.
         parameters: (runs, samples + 1, p) at the sample instants, as `random_trajectories` makes them; for a nonlinear plant
             give `runs` and `samples` instead.
@@ -68,12 +70,13 @@ def simulate(
         body: SimulatedPlant = plant
         path = np.zeros((runs, samples + 1, len(plant.parameters)))
     else:
-        body = LinearPlant(plant, PARTS if between == "moving" else 0)
+        system = plant.schedule if isinstance(plant, ContinuousLoop) else plant
+        body = plant if isinstance(plant, ContinuousLoop) else LinearPlant(plant, PARTS if between == "moving" else 0)
         if parameters is None:
             raise AnalysisError(
                 f"'{plant.name}' needs parameters (runs, samples + 1, p); random_trajectories() makes some"
             )
-        path = followed(plant, parameters)
+        path = followed(system, parameters)
     count, length = path.shape[0], path.shape[1] - 1
     if not (count >= 1 and length >= 1):
         raise AnalysisError(f"runs = {count}, samples = {length}; give 1 of each at least")
@@ -115,8 +118,8 @@ def simulate(
 
 def _period(plant: object, schedule: GainSchedule | None, given: float | None) -> float:
     """Raises AnalysisError for a sample time that is missing or not the schedule's."""
-    own = schedule or (plant if isinstance(plant, GainSchedule) else None)
-    if given is None and own is not None:
+    own = schedule or (plant.schedule if isinstance(plant, ContinuousLoop) else plant)
+    if given is None and isinstance(own, GainSchedule):
         return own.sample_time
     if given is None or not 0.0 < given < np.inf:
         raise AnalysisError(f"sample_time = {given} s; without a schedule give a positive one")

@@ -11,7 +11,7 @@ from analysis.simulation.amplification import Amplification, amplification
 from estimators.schedule import GainSchedule, read_content
 from studies.commands.certify import shipped
 from studies.commands.simulate_figure import simulation_figures
-from studies.commands.terminal import print_table
+from studies.commands.terminal import print_table, progress_bar
 from studies.execution.files import ready_folder
 from studies.plots.save import write_figures
 from synthesis.certificate.claims import written
@@ -26,7 +26,9 @@ CAPTION = (
 def run_simulate(schedule: Path, runs: int, samples: int | None, seed: int, out: Path | None, as_json: bool) -> int:
     """Print the table and, with `out`, draw; 0 if every claim is proved and no run beats one, else 1."""
     content = read_content(shipped(schedule))
-    found = amplification(content, runs, samples, seed)
+    with progress_bar() as progress:
+        progress.add_task("proving and running", total=None)
+        found = amplification(content, runs, samples, seed)
     drawn: list[Path] = []
     if out is not None:
         ready_folder(out)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from analysis import AnalysisError, NonlinearPlant, random_trajectories, simulate
+from analysis import AnalysisError, ContinuousLoop, NonlinearPlant, random_trajectories, simulate
 from analysis.simulation.error_update import Linear, error_update
 from analysis.simulation.flow import moving, phi_times
 from analysis.simulation.trajectories import FAMILIES
@@ -134,6 +135,28 @@ def test_lost_measurements_are_flagged_and_the_law_closes_the_loop() -> None:
     ):  # fmt: skip
         with pytest.raises(AnalysisError, match=words):
             simulate(**({"plant": schedule, "schedule": schedule, "parameters": paths} | wrong))  # type: ignore[arg-type]
+
+
+def test_a_continuous_law_has_the_error_of_the_error_equation() -> None:
+    """At a constant parameter e(t) = e^((A - LC) t) e(0) + the integral of constant d; the input has no part in it."""
+    schedule = any_schedule(parameters=1)
+    path = np.full((1, 31, 1), 0.9)
+    given: dict[str, Any] = {
+        "disturbances": {"d0": np.ones(30)},
+        "inputs": {"i0": 2.0, "i1": -1.0},
+        "start": np.arange(6.0),
+    }
+    run = simulate(ContinuousLoop(schedule), None, path, **given)
+    plant, L = schedule.plant_at(np.array(0.9)), schedule.gain(0.9)
+    E, F = (schedule.plant[key].at(np.array(0.9)) for key in "EF")
+    closed, driven = plant.A - L @ plant.C, E - L @ F
+    flow = expm(np.block([[closed, driven], [np.zeros((1, 4))]]) * run.time[-1])
+    wanted = flow[:3, :3] @ [-3.0, -3.0, -3.0] + flow[:3, 3]
+    assert run.state[0, -1, :3] - run.state[0, -1, 3:] == pytest.approx(wanted, rel=1e-9)
+    held = simulate(schedule, schedule, path, disturbances=given["disturbances"], start=[0, 1, 2], estimate=[3, 4, 5])
+    assert np.abs(held.error[0, -1] - wanted).max() > 1e-4  # the runtime sees y once a sample only
+    with pytest.raises(AnalysisError, match="once a sample"):
+        ContinuousLoop(any_schedule(update="sampled"))
 
 
 def test_the_nonlinear_truth_is_integrated_and_schedules_itself() -> None:
