@@ -14,22 +14,25 @@ from typing import Any
 import numpy as np
 
 from analysis.errors import AnalysisError
-from analysis.simulation.error_update import channel_of
-from analysis.simulation.searched import ScheduleQuestion, bad_trajectories, least_decay
+from analysis.simulation.error_update import Linear, channel_of
+from analysis.simulation.norms_along import h2_along, peak_along
+from analysis.simulation.searched import Measure, ScheduleQuestion, bad_trajectories, least_decay
 from analysis.simulation.simulate import simulate
 from analysis.simulation.simulation import Simulation
 from analysis.simulation.trajectories import random_trajectories
 from analysis.simulation.worst_input import worst_inputs
 from estimators.arrays import FloatArray
 from estimators.schedule import FIRST_FORMAT, GainSchedule, upgraded
-from synthesis.certificate.claims import GAINS, UPDATE_OF, Claim, ClaimChannel, claim_name, claim_unit
+from synthesis.certificate.claims import GAINS, UPDATE_OF, WITH_CHANNEL, Claim, ClaimChannel, claim_name, claim_unit
 from synthesis.certificate.content import claims_of, subject_of
 from synthesis.certificate.proof import certificate
 
 SETTLED = 5.0  # decay times that a run lasts
 FEWEST, MOST = 200, 3000  # samples
 MOST_WORK = 2_000_000  # runs times samples: memory
-MEASURED = ("sampled gain", "motion gain")
+ALONG = {"sampled H2 norm": h2_along, "sampled energy to peak": peak_along}
+MEASURED = ("sampled gain", "motion gain", *ALONG)
+ROUGH, ROUNDS = 6, 20  # of the worst input, while searching and in the end
 ROUNDING = 1e-9  # relative, of runs: a level is not beaten by less
 
 
@@ -68,7 +71,7 @@ class Amplification:
     @property
     def is_decay(self) -> bool:
         """Whether the claim says how fast an error falls."""
-        return self.kind not in GAINS
+        return self.kind not in WITH_CHANNEL
 
 
 def amplification(
@@ -100,7 +103,7 @@ def amplification(
     for claim, proof in zip(claims, proofs, strict=True):
         if claim.kind not in (*MEASURED, UPDATE_OF[schedule.update]):
             continue
-        measured = _decay if claim.channel is None else _gain
+        measured = _decay if claim.channel is None else _norm
         words = claim_name(claim.kind, claim.channel, subject.units), claim.kind, claim.level
         unit = claim_unit(claim.kind, claim.channel, subject.units)
         found.append(Amplification(*words, unit, proof.proved, *measured(schedule, claim, paths, seed)))
@@ -113,19 +116,32 @@ def replayed(schedule: GainSchedule, found: Amplification) -> Simulation:
     return simulate(schedule, schedule, found.trajectory[None], disturbances=given)
 
 
-def _gain(schedule: GainSchedule, claim: Claim, paths: FloatArray, seed: int) -> tuple[Any, ...]:
+def _norm(schedule: GainSchedule, claim: Claim, paths: FloatArray, seed: int) -> tuple[Any, ...]:
+    """A gain by the input that is amplified most, another norm by its gramians."""
     assert claim.channel is not None
-    question = ScheduleQuestion(schedule, claim.kind, claim.channel)
-    count = paths.shape[1]
-    every = np.concatenate([paths, bad_trajectories(question, count, seed)])
-    system = channel_of(schedule, claim.kind, claim.channel, every)
-    start = np.random.default_rng(seed).standard_normal((len(every), count - 1, system.B.shape[-1]))
-    ratios, w = worst_inputs(system, start)
+    channel, count = claim.channel, paths.shape[1]
+    rng = np.random.default_rng(seed)
+
+    def amplified_most(system: Linear, rounds: int = ROUGH) -> tuple[FloatArray, FloatArray]:
+        start = rng.standard_normal((len(system.A), system.A.shape[1] - 1, system.B.shape[-1]))
+        return worst_inputs(system, start, rounds)
+
+    def roughly(system: Linear) -> FloatArray:
+        return amplified_most(system)[0]
+
+    measure: Measure = ALONG.get(claim.kind, roughly)
+    question = ScheduleQuestion(schedule, claim.kind, channel)
+    every = np.concatenate([paths, bad_trajectories(question, measure, count, seed)])
+    system = channel_of(schedule, claim.kind, channel, every)
+    if claim.kind in GAINS:
+        ratios, w = amplified_most(system, ROUNDS)
+    else:
+        ratios, w = measure(system), np.zeros((len(every), count - 1, len(channel.inputs)))
     best, random = int(ratios.argmax()), ratios[: len(paths)]
-    sizes = np.array(list(claim.channel.inputs.values()))
+    sizes = np.array(list(channel.inputs.values()))
     return (
         float(random.mean()), float(random.max()), float(ratios[best]), random, every[best], w[best] * sizes,
-        tuple(claim.channel.inputs), claim.channel.errors,
+        tuple(channel.inputs), channel.errors,
     )  # fmt: skip
 
 

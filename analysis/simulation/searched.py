@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,8 +13,7 @@ from analysis.lpv.lifted import samples
 from analysis.lpv.trajectory import Path, admissible, float_of
 from analysis.lpv.worst_path import growth_of, simple_paths, worst_path
 from analysis.simulation.box import box_of
-from analysis.simulation.error_update import channel_of
-from analysis.simulation.worst_input import worst_inputs
+from analysis.simulation.error_update import Linear, channel_of
 from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule
 from synthesis.certificate.claims import ClaimChannel
@@ -22,7 +22,8 @@ from synthesis.polynomials.rational import decimal
 
 EVALUATIONS = 40  # of the search for slow decay
 GENERATIONS, BEST, CHILDREN, CHANGE = 2, 4, 8, 0.4  # of the search for large gains
-ROUGH, SHORT = 6, 400  # rounds of the worst input, and samples of a run, while searching
+SHORT = 400  # samples of a run while searching
+Measure = Callable[[Linear], FloatArray]  # of systems along trajectories (R, N+1, ..): how bad each is (R,)
 
 
 @dataclass(frozen=True)
@@ -70,30 +71,25 @@ class ScheduleQuestion:
         return found
 
 
-def bad_trajectories(question: ScheduleQuestion, count: int, seed: int) -> FloatArray:
+def bad_trajectories(question: ScheduleQuestion, measure: Measure, count: int, seed: int) -> FloatArray:
     """Trajectories (1 + BEST, count, p): the place where the frozen gain is largest, and the worst periodic paths found.
 
-    Simple paths first, then some generations of random changes of the best ones, a whole generation in one batch.
+    `measure` says how bad a trajectory is. Simple paths first, then some generations of random changes of the best ones, a
+    whole generation in one batch.
     """
     rng = np.random.default_rng(seed)
     place, _, _ = largest_gain(question)
     known: list[tuple[float, Path]] = []
     paths = list(simple_paths(question, place))
     for generation in range(GENERATIONS + 1):
-        known += zip(_ratios(question, paths, min(count, SHORT), rng), paths, strict=True)
+        p = np.stack([question.repeated(path, min(count, SHORT)) for path in paths])
+        system = channel_of(question.schedule, question.kind, question.channel, p)
+        known += zip((float(value) for value in measure(system)), paths, strict=True)
         known = sorted(known, key=lambda entry: -entry[0])[:BEST]
         if generation < GENERATIONS:
             paths = [_changed(path, question.axes, rng) for _, path in known for _ in range(CHILDREN)]
     standing = np.broadcast_to(question.physical(place[None]), (count, len(place)))
     return np.stack([standing, *(question.repeated(path, count) for _, path in known)])
-
-
-def _ratios(question: ScheduleQuestion, paths: list[Path], count: int, rng: np.random.Generator) -> list[float]:
-    """Amplification of a nearly worst input along each path."""
-    p = np.stack([question.repeated(path, count) for path in paths])
-    system = channel_of(question.schedule, question.kind, question.channel, p)
-    start = rng.standard_normal((len(p), count - 1, system.B.shape[-1]))
-    return [float(ratio) for ratio in worst_inputs(system, start, ROUGH)[0]]
 
 
 def _changed(path: Path, axes: tuple[Axis, ...], rng: np.random.Generator) -> Path:

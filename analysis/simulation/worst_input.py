@@ -12,8 +12,6 @@ import numpy as np
 from analysis.simulation.error_update import Linear
 from estimators.arrays import FloatArray
 
-ROUNDS = 20
-
 
 def amplified(system: Linear, w: FloatArray) -> tuple[FloatArray, FloatArray]:
     """States (R, N+1, n) and outputs (R, N+1, q) under inputs w (R, N, m), from zero; the last output without an input.
@@ -30,7 +28,7 @@ def amplified(system: Linear, w: FloatArray) -> tuple[FloatArray, FloatArray]:
     return x, z
 
 
-def worst_inputs(system: Linear, w: FloatArray, rounds: int = ROUNDS) -> tuple[FloatArray, FloatArray]:
+def worst_inputs(system: Linear, w: FloatArray, rounds: int) -> tuple[FloatArray, FloatArray]:
     """Ratios |z|/|w| (R,) and the inputs (R, N, m) that have them, of energy one, after so many rounds from w."""
     w = _unit(w)
     _, z = amplified(system, w)

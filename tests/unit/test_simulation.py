@@ -15,6 +15,7 @@ from scipy.linalg import expm
 from analysis import AnalysisError, ContinuousLoop, NonlinearPlant, random_trajectories, simulate
 from analysis.simulation.error_update import Linear, error_update
 from analysis.simulation.flow import moving, phi_times
+from analysis.simulation.norms_along import h2_along, peak_along
 from analysis.simulation.trajectories import FAMILIES
 from analysis.simulation.worst_input import worst_inputs
 from estimators.faults import Flag
@@ -170,6 +171,16 @@ def test_the_nonlinear_truth_is_integrated_and_schedules_itself() -> None:
     assert run.of("p") == pytest.approx(run.of("x") ** 2, rel=1e-15)
     with pytest.raises(AnalysisError, match="neither a state nor an input"):
         NonlinearPlant(model, {"p": P})
+
+
+def test_gramians_along_a_constant_trajectory_give_the_norms_of_the_system() -> None:
+    """x+ = a x + b w, z = x + d w: H2 norm and energy to peak are both sqrt(b^2/(1 - a^2) + d^2)."""
+    system = [np.full((1, 400, 1, 1), value) for value in (0.9, 0.5, 1.0, 0.3)]
+    wanted = np.sqrt(0.25 / (1.0 - 0.81) + 0.09)
+    assert h2_along(Linear(*system)) == pytest.approx([wanted], rel=1e-12)
+    assert peak_along(Linear(*system)) == pytest.approx([wanted], rel=1e-12)
+    short = Linear(*(part[:, :3] for part in system))  # two samples: 0.25 (1 + 0.81) + 0.09
+    assert h2_along(short) == peak_along(short) == pytest.approx([np.sqrt(0.25 * 1.81 + 0.09)], rel=1e-12)
 
 
 def test_the_worst_input_is_that_of_the_dense_operator() -> None:
