@@ -29,7 +29,7 @@ from synthesis.certificate.proof import certificate
 
 SETTLED = 5.0  # decay times that a run lasts
 FEWEST, MOST = 200, 3000  # samples
-MOST_WORK = 2_000_000  # runs times samples: memory
+MOST_NUMBERS = 50_000_000  # of all matrices along all runs: 400 MB
 ALONG = {"sampled H2 norm": h2_along, "sampled energy to peak": peak_along}
 MEASURED = ("sampled gain", "motion gain", *ALONG)
 ROUGH, ROUNDS = 6, 20  # of the worst input, while searching and in the end
@@ -94,10 +94,16 @@ def amplification(
     claims = claims_of(content, subject, schedule.name)
     proofs = certificate(content, schedule.name).proofs
     decay = next(c.level for c in claims if c.kind == UPDATE_OF[schedule.update])
+    most = int(
+        MOST_NUMBERS / (max(runs, 1) * len(schedule.states) * (2 * len(schedule.states) + len(schedule.disturbances)))
+    )
     if samples is None:
-        samples = int(np.clip(np.ceil(SETTLED / (decay * schedule.sample_time)), FEWEST, MOST))
-    if runs * samples > MOST_WORK:
-        raise AnalysisError(f"{runs} runs of {samples} samples; their product may be {MOST_WORK} at most")
+        wanted = np.ceil(SETTLED / (decay * schedule.sample_time))
+        samples = int(np.clip(wanted, FEWEST, max(FEWEST, min(MOST, most))))
+    if samples > most:
+        raise AnalysisError(
+            f"{runs} runs of {samples} samples are too many; take {most} samples at most, or fewer runs"
+        )
     paths = random_trajectories(schedule, samples, runs, seed=seed)
     found = []
     for claim, proof in zip(claims, proofs, strict=True):
