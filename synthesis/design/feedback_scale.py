@@ -36,7 +36,8 @@ def feedback_scale(model: LpvModel, channels: Sequence[FeedbackChannel]) -> Feed
 
     A state is scaled by the square root of what one of it costs under the best feedback, where every performance signal counts in
     the smallest size that a channel gives it. An input is scaled by what the best feedback commands for a scaled state, over
-    `HEAVY`: decisions of least norm are gains of least norm first. The clock is a power of 1e6, one for speeds from 0.01 to 1e4 1/s.
+    `HEAVY`: decisions of least norm are gains of least norm first. The clock is a power of 1e6, and one for speeds from 0.01 to
+    1e4 1/s.
     """
     count = len(model.parameters)
     middle = model.on(np.array([[p.middle for p in model.parameters]]).reshape(1, count))
