@@ -17,51 +17,13 @@ from scipy.linalg import LinAlgError, solve_continuous_are
 
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
+from synthesis.design.feedback_channel import FeedbackChannel, feedback_channel_matrices
 from synthesis.errors import ProblemError
 from synthesis.lmi.scaling import error_scale
 from synthesis.models.lpv import LpvModel
 
-
 SHAKE = 1e-6  # of the mean variance, on every state: what nothing excites, or nothing weighs, has no size of its own
 REGULAR = (0.0, 1e-6, 1e-3, 1.0)  # of the mean variance of the measurements, where some have none
-
-
-@dataclass(frozen=True)
-class FeedbackChannel:
-    """The L2 gain from some disturbances to some performance signals: bounded by `bound`, or minimised if None.
-
-    `weights` are the sizes of the disturbances, `sizes` those of the performance signals, in their orders (None: one each).
-
-    >>> FeedbackChannel(("gust", "noise"), ("roll", "aileron"), sizes=(0.1, 0.5)).name
-    'gust+noise -> roll+aileron'
-    """
-
-    disturbances: tuple[str, ...]
-    performance: tuple[str, ...]
-    bound: float | None = None
-    weights: tuple[float, ...] | None = None
-    sizes: tuple[float, ...] | None = None
-
-    def __post_init__(self) -> None:
-        where = f"channel '{self.name}'"
-        if not self.disturbances or not self.performance:
-            raise ProblemError(f"{where} needs at least one disturbance and one performance signal")
-        if self.bound is not None and not 0.0 < self.bound < np.inf:
-            raise ProblemError(f"{where} has the bound {self.bound}; give a positive number")
-        for what, given, names in (
-            ("weights", self.weights, self.disturbances),
-            ("sizes", self.sizes, self.performance),
-        ):
-            if given is not None and (len(given) != len(names) or not all(0.0 < x < np.inf for x in given)):
-                raise ProblemError(
-                    f"{where} has the {what} {list(given)}; give {len(names)} positive numbers, one for each of "
-                    f"{', '.join(names)}"
-                )
-
-    @property
-    def name(self) -> str:
-        """Disturbances and performance signals in words."""
-        return f"{'+'.join(self.disturbances)} -> {'+'.join(self.performance)}"
 
 
 @dataclass(frozen=True)
@@ -113,9 +75,10 @@ class GeneralisedPlant:
 
 @dataclass(frozen=True)
 class Frame:
-    """Coordinates in which the solver works: states T x (`states` is T), inputs and outputs over their sizes, time in units of 1/clock s.
+    """Coordinates in which the solver works: states T x (`states` is T), inputs and outputs over their sizes.
 
-    A gain of `unit` is one. The answer does not depend on them; how well it is found does.
+    Time is counted in units of 1/clock s, and a gain of `unit` is one. The least gain does not depend on them; how well it is
+    found does.
     """
 
     states: FloatArray
@@ -128,12 +91,8 @@ class Frame:
 def generalised_plant(
     model: LpvModel, channels: Sequence[FeedbackChannel], measured: Sequence[str] | None = None
 ) -> GeneralisedPlant:
-    """Numerators of all matrices. Raises ProblemError for unknown names and for a model without inputs."""
-    if not model.inputs:
-        raise ProblemError(f"model '{model.name}' has no inputs; a feedback design needs one")
-    poly = model.polynomial
-    outputs = [signal.name for signal in model.outputs]
-    rows = _places("output", measured or outputs, outputs, f"model '{model.name}', measured")
+    """Numerators of all matrices. Raises ProblemError for unknown names."""
+    poly, rows = model.polynomial, measured_rows(model, measured)
     return GeneralisedPlant(
         poly.A,
         poly.B,
@@ -144,29 +103,26 @@ def generalised_plant(
     )
 
 
+def measured_rows(model: LpvModel, measured: Sequence[str] | None) -> list[int]:
+    """Places of the measured outputs among those of the model; None: all. Raises ProblemError for an unknown name."""
+    outputs = [signal.name for signal in model.outputs]
+    for name in measured or ():
+        if name not in outputs:
+            raise ProblemError(f"model '{model.name}', measured: {unknown('output', name, outputs)}")
+    return [outputs.index(name) for name in measured or outputs]
+
+
 def _channel_plant(model: LpvModel, channel: FeedbackChannel, rows: list[int]) -> ChannelPlant:
-    poly, where = model.polynomial, f"channel '{channel.name}'"
-    columns = _places("disturbance", channel.disturbances, [s.name for s in model.disturbances], where)
-    W = np.eye(len(model.disturbances))[:, columns] * np.array(channel.weights or (1.0,) * len(columns))
-    groups = (model.states, model.outputs, model.inputs)
-    places = _places("signal", channel.performance, [s.name for group in groups for s in group], where)
-    nx, ny, nu, nd = (len(s) for s in (*groups, model.disturbances))
-    below = poly.denominator
+    poly, below = model.polynomial, model.polynomial.denominator
+    W, Z = feedback_channel_matrices(model, channel)
+    nx, nu, nd = len(model.states), len(model.inputs), len(model.disturbances)
     blocks = {
         "Cz": (below * np.eye(nx), poly.C, np.zeros((nu, nx))),
         "Dzu": (np.zeros((nx, nu)), poly.D, below * np.eye(nu)),
         "Dzd": (np.zeros((nx, nd)), poly.F, np.zeros((nu, nd))),
     }
-    weights = 1.0 / np.array(channel.sizes or (1.0,) * len(places))
-    Z = {key: _stacked(parts, poly.parameters)[..., places, :] * weights[:, None] for key, parts in blocks.items()}
-    return ChannelPlant(channel, poly.E @ W, poly.F[..., rows, :] @ W, Z["Cz"], Z["Dzd"] @ W, Z["Dzu"])
-
-
-def _places(what: str, names: Sequence[str], known: list[str], where: str) -> list[int]:
-    for name in names:
-        if name not in known:
-            raise ProblemError(f"{where}: {unknown(what, name, known)}")
-    return [known.index(name) for name in names]
+    shown = {key: Z @ _stacked(parts, poly.parameters) for key, parts in blocks.items()}
+    return ChannelPlant(channel, poly.E @ W, poly.F[..., rows, :] @ W, shown["Cz"], shown["Dzd"] @ W, shown["Dzu"])
 
 
 def _stacked(parts: Sequence[FloatArray], count: int) -> FloatArray:
@@ -184,25 +140,31 @@ def frame_of(plant: GeneralisedPlant) -> Frame:
     """From the filter and the regulator in the middle of the range (two Riccati equations).
 
     With error covariance S and cost matrix R, X is about gamma S^-1 and Y about gamma R^-1, and gamma^2 exceeds the largest
-    eigenvalue of S R, whose root is the unit. With T T = G, the geometric mean of S^-1 and R (G S G = R), both become alike; it is
-    the only symmetric T that does that, so that nothing turns where modes are alike.
+    eigenvalue of S R, whose root is the unit. With T T = G, the geometric mean of S^-1 and R (G S G = R), both become alike. It
+    is the only symmetric T that does that: nothing turns where modes are alike.
     """
     A, B, C = (_middle(getattr(plant, key), plant.denominator) for key in ("A", "B", "C"))
     E, F, Cz, Dzu = (_gathered(plant, key) for key in ("E", "F", "Cz", "Dzu"))
     balanced = error_scale(A)
     A, B, E = A * balanced[:, None] / balanced, B * balanced[:, None], E * balanced[:, None]
     C, Cz = C / balanced, Cz / balanced
-    speed = float(np.linalg.norm(A, 2))
-    clock = 10.0 ** round(np.log10(speed)) if 0.0 < speed < np.inf else 1.0
-    S, R = _variance(A / clock, C, E / clock, F), _variance(A.T / clock, B.T / clock, Cz.T, Dzu.T)
-    root_of_S = _power(S, 0.5)
-    between = root_of_S @ R @ root_of_S
+    S, R = _variance(A, C, E, F), _variance(A.T, B.T, Cz.T, Dzu.T)
+    even = (
+        np.diag(R) / np.diag(S)
+    ) ** 0.25  # so that units of states do not choose the axes along which T is symmetric
+    S, R = even[:, None] * S * even, R / even[:, None] / even
+    A, B, C, balanced = even[:, None] * A / even, even[:, None] * B, C / even, balanced * even
+    half = _power(S, 0.5)
+    between, back = half @ R @ half, np.linalg.inv(half)
     unit = float(np.sqrt(np.linalg.eigvalsh(between)[-1]))
-    back = np.linalg.inv(root_of_S)
     T = _power(back @ _power(between, 0.5) @ back, 0.5)
+    speed = float(np.linalg.norm(T @ A @ np.linalg.inv(T), 2))
+    clock = speed if 0.0 < speed < np.inf else 1.0
+    T = T * np.sqrt(clock)  # in that time errors vary by S / clock, and states cost clock R
     root = np.sqrt(unit)
     inputs = 1.0 / _norms(Dzu / root, T @ B / clock)
-    return Frame(T * balanced, inputs, _norms(F.T / root, np.linalg.solve(T, C.T)), unit, clock)
+    outputs = _norms(F.T / root, np.asarray(np.linalg.solve(T, C.T), float))
+    return Frame(T * balanced, inputs, outputs, unit, clock)
 
 
 def _variance(A: FloatArray, C: FloatArray, E: FloatArray, F: FloatArray) -> FloatArray:
@@ -214,7 +176,11 @@ def _variance(A: FloatArray, C: FloatArray, E: FloatArray, F: FloatArray) -> Flo
         floor = regular * (float(np.trace(sensor)) / len(sensor) or 1.0)
         try:
             found = solve_continuous_are(
-                A.T, C.T, process + max(regular, SHAKE) * size * np.eye(n), sensor + floor * np.eye(len(sensor)), s=cross
+                A.T,
+                C.T,
+                process + max(regular, SHAKE) * size * np.eye(n),
+                sensor + floor * np.eye(len(sensor)),
+                s=cross,
             )
         except (LinAlgError, ValueError):
             continue

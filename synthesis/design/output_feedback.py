@@ -9,25 +9,32 @@ what is claimed of it is proved of that table, whatever the inequalities here ha
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 
 from estimators.arrays import FloatArray
-from synthesis.certificate.refute import undetectable_place
-from synthesis.design.generalised_plant import FeedbackChannel, Frame, GeneralisedPlant, frame_of, generalised_plant
+from synthesis.design.feedback_channel import FeedbackChannel, check_channels
+from synthesis.design.generalised_plant import Frame, GeneralisedPlant, frame_of, generalised_plant, measured_rows
 from synthesis.design.output_feedback_lmi import Still, Wanted, build
 from synthesis.design.reconstruct import reconstructed
-from synthesis.design.settle import Build, Optimum, optimum, settle
+from synthesis.design.refusals import refuse_undetectable, refuse_unstabilisable
+from synthesis.design.three_solves import Problem, least, three_solves
 from synthesis.errors import ProblemError
 from synthesis.lmi.exchange import Memory
 from synthesis.lmi.problem import LmiProblem
+from synthesis.lmi.relaxation import rate_vertices
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
-from synthesis.loop.from_model import plant_of
-from synthesis.loop.plant import Plant
 from synthesis.models.lpv import LpvModel
 from synthesis.models.numeric import values
+
+START = {
+    0: 1,
+    1: 5,
+    2: 3,
+}  # places along each parameter that are solved for from the start, by their number; 2 for more
 
 
 @dataclass(frozen=True)
@@ -53,15 +60,17 @@ class OutputFeedbackDesign:
     def __post_init__(self) -> None:
         if not 0 <= self.degree <= 8:
             raise ProblemError(f"degree {self.degree} of the controller must lie between 0 and 8")
-        if sum(channel.bound is None for channel in self.channels) != 1:
-            raise ProblemError("exactly one channel must have no bound: it is the one that is minimised")
+        check_channels(self.channels)
         if not 0.0 <= self.decay_rate < np.inf:
             raise ProblemError(f"decay rate {self.decay_rate} 1/s must be a number and must not be negative")
         if self.fastest_pole is not None and not self.decay_rate < self.fastest_pole < np.inf:
             raise ProblemError(f"fastest pole {self.fastest_pole} 1/s must exceed the decay rate {self.decay_rate} 1/s")
-        for name in ("backoff", "reserve"):
-            if not 0.0 < getattr(self, name) < 1.0:
-                raise ProblemError(f"{name} {getattr(self, name)} must lie between 0 and 1")
+        if not 0.0 < self.backoff < 1.0:
+            raise ProblemError(
+                f"backoff {self.backoff} must lie between 0 and 1: gains grow without end at the optimum"
+            )
+        if not 0.0 <= self.reserve < 1.0:
+            raise ProblemError(f"reserve {self.reserve} must lie in [0, 1)")
 
     @property
     def minimised(self) -> FeedbackChannel:
@@ -73,9 +82,9 @@ class OutputFeedbackDesign:
 class OutputFeedback:
     """A controller with the bound that was minimised.
 
-    `gamma` is the level that the inequalities prove, `gamma_lower` a bound from below for every X and Y of these degrees in one of
-    the two forms (weak duality), where there is one. `result` carries verdict and margins, `optimum` the first solve; `wanted.still`
-    says which form was taken.
+    `gamma` is the level that the inequalities prove, `gamma_lower` a bound from below for every X and Y of these degrees in one
+    of the two forms (weak duality), where there is one. `result` carries verdict and margins, `optimum` the first solve, and
+    `wanted.still` says which form was taken.
     """
 
     design: OutputFeedbackDesign
@@ -135,36 +144,57 @@ def design_output_feedback(model: LpvModel, design: OutputFeedbackDesign) -> Out
     certified
     (None, (3, 1, 1))
     """
+    refuse_unstabilisable(model)
+    refuse_undetectable(model, measured_rows(model, design.measured))
     plant = generalised_plant(model, design.channels, design.measured)
-    feedthrough = _feedthrough(model, design, plant)
-    _refuse_hidden(model, design)
-    frame = frame_of(plant)
-    scaled, where = plant.scaled(frame), f"model '{model.name}'"
-    tried: list[tuple[Optimum, Wanted, Build, Memory]] = []
-    for still in _forms(model, design):
-        tight = 1.0 + design.reserve
-        radius = None if design.fastest_pole is None else design.fastest_pole / tight / frame.clock
-        wanted = Wanted(
-            design.degree, design.decay_rate * tight / frame.clock, radius, feedthrough, still, frame.clock
-        )
+    feedthrough, frame = _feedthrough(model, design, plant), frame_of(plant)
+    scaled, tight = plant.scaled(frame), 1.0 + design.reserve
+    radius = None if design.fastest_pole is None else design.fastest_pole / tight / frame.clock
+    settings = design.settings
+    if settings.relaxation == "auto":  # unknowns that run away at the optimum end other solvers early
+        settings = replace(settings, relaxation="exchange")
+    tried: list[tuple[LmiResult, Wanted, Problem, Memory]] = []
+    for form in _forms(model, design):
+        wanted = Wanted(design.degree, design.decay_rate * tight / frame.clock, radius, feedthrough, form, frame.clock)
 
         def problem(
-            level: float | None, margin: bool = False, floor: float = 0.0, wanted: Wanted = wanted
+            gamma: float | None, margin: bool = True, floor: float = 0.0, wanted: Wanted = wanted
         ) -> LmiProblem:
-            levels = {c: level if c.bound is None else c.bound / frame.unit for c in design.channels}
-            return build(scaled, model.parameters, wanted, levels, margin, floor)
+            bounds = {c: gamma if c.bound is None else c.bound for c in design.channels}
+            levels = {c: None if bound is None else bound / frame.unit for c, bound in bounds.items()}
+            return build(scaled, model.parameters, wanted, levels, margin and gamma is not None, floor)
 
-        memory: Memory = {}
-        tried.append((optimum(problem, design.settings, memory), wanted, problem, memory))
-    first, wanted, problem, memory = min(tried, key=lambda entry: entry[0].level)
-    if not np.isfinite(first.level):
-        raise ProblemError(f"{where}: {first.result.message}; loosen a bound, the decay rate or the fastest pole")
-    settled = settle(problem, first, design.backoff, design.settings, where, memory)
-    lower = [entry[0].lower for entry in tried]
-    least = None if None in lower else max(min(x for x in lower if x is not None), 0.0) * frame.unit
-    return OutputFeedback(
-        design, model, least, settled.level * frame.unit, settled.result, first.result, frame, wanted
-    )
+        memory = _places(problem(None))
+        tried.append((least(problem, design.backoff, settings, memory), wanted, problem, memory))
+    found = [entry[0] for entry in tried]
+    optimum, wanted, problem, memory = min(tried, key=lambda entry: _named(entry[0]))
+    settled = three_solves(model.name, problem, lambda x: x * frame.unit, design.backoff, settings, optimum, memory)
+    lower = [result.lower_bound for result in found if np.isfinite(_named(result))]
+    bound = None if None in lower else max(min(x for x in lower if x is not None), 0.0) * frame.unit
+    return OutputFeedback(design, model, bound, settled.gamma, settled.result, optimum, frame, wanted)
+
+
+def _named(result: LmiResult) -> float:
+    """The level that a first solve ends at; infinite if it found none."""
+    level = result.objective
+    usable = level is not None and level > 0.0 and not result.report.status.endswith("Infeasible")
+    return float(level) if usable and level is not None else np.inf
+
+
+def _places(problem: LmiProblem) -> Memory:
+    """Where the solves start: in the corners alone, little is asked of laws that are free elsewhere, and unknowns run away."""
+    count = len(problem.parameters)
+    line = np.linspace(-1.0, 1.0, START.get(count, 2))
+    points = list(product(line, repeat=count))  # one empty point without parameters
+    grid = np.array(points).reshape(len(points), count)
+    out: Memory = {}
+    for entry in problem.inequalities:
+        vertices = rate_vertices(entry.matrix, count)
+        rates = np.array(vertices).reshape(len(vertices), count)
+        own = grid * (np.array(entry.matrix.degrees[:count]) > 0)
+        whole = np.hstack([np.repeat(own, len(rates), axis=0), np.tile(rates, (len(own), 1))])
+        out[entry.name] = np.unique(whole, axis=0)
+    return out
 
 
 def _forms(model: LpvModel, design: OutputFeedbackDesign) -> tuple[Still, ...]:
@@ -186,38 +216,3 @@ def _feedthrough(model: LpvModel, design: OutputFeedbackDesign, plant: Generalis
         )
         raise ProblemError(f"model '{model.name}' takes no feedthrough: {why}; leave `feedthrough` out")
     return not (loops or rational) if design.feedthrough is None else design.feedthrough
-
-
-def _refuse_hidden(model: LpvModel, design: OutputFeedbackDesign) -> None:
-    """Raise ProblemError where an unstable mode cannot be moved by the inputs or does not show in the measured outputs."""
-    plant, names = plant_of(model), [signal.name for signal in model.outputs]
-    rows = [names.index(name) for name in design.measured or names]
-    A, B = plant.matrices["A"], plant.matrices["B"]
-    C = plant.matrices["C"].map(lambda m: type(m)([m.tolist()[i] for i in rows]))
-    C = type(C)(C.terms, (len(rows), C.shape[1]), C.variables)
-    for pair, word, action, signals, remedy in (
-        ((A, C), "detectable", "does not show in the output(s)", design.measured or names, "measure it"),
-        ((A.T, B.T), "stabilisable", "is not moved by the input(s)", [s.name for s in model.inputs], "actuate it"),
-    ):
-        place = undetectable_place(Plant(plant.axes, {"A": pair[0], "C": pair[1]}, plant.denominator))
-        if place is None:
-            continue
-        u = np.array([int(x.p) / int(x.q) for x in place])
-        where = ", ".join(
-            f"{p.name} = {p.middle + p.half_width * x:.6g} {p.unit}" for p, x in zip(model.parameters, u, strict=True)
-        )
-        raise ProblemError(
-            f"model '{model.name}' is not {word} at {where or 'its only point'}: {_mode(model, word, u)} {action} "
-            f"{', '.join(signals)}; {remedy}, or shrink the range"
-        )
-
-
-def _mode(model: LpvModel, word: str, u: FloatArray) -> str:
-    """The least visible of the modes that do not decay, in words."""
-    p = model.parameters
-    here = model.on(np.array([[q.middle + q.half_width * x for q, x in zip(p, u, strict=True)]]).reshape(1, len(p)))
-    A, C = (here.A[0], here.C[0]) if word == "detectable" else (here.A[0].T, here.B[0].T)
-    roots, vectors = np.linalg.eig(A)
-    shown = np.linalg.norm(C @ vectors, axis=0) + np.where(roots.real >= -1e-9 * max(np.abs(A).max(), 1e-300), 0.0, np.inf)
-    root = roots[int(np.argmin(shown))]
-    return f"the mode at {root.real:.4g}{'' if abs(root.imag) < 1e-9 else f' +- {abs(root.imag):.4g}j'} 1/s"

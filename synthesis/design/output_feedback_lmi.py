@@ -8,8 +8,8 @@ with [Y I; M' 0] makes of the closed loop
     A_c = [A Y + B Ch, A + B Dh C; Ah, X A + Bh C],  B_c = [E + B Dh F; X E + Bh F],  C_c = [Cz Y + Dzu Ch, Cz + Dzu Dh C]
     D_c = Dzd + Dzu Dh F,   P_c = [Y I; I X],   dP/dt: [-dY/dt, -(X dY/dt + N dM'/dt)'; *, dX/dt]
 
-The off-diagonal term is the only place where Ak would need the rate. It vanishes if Y stands still (with M = Y) or if X does (with
-N = -X): so one of both depends on no moving parameter. A parameter whose rate bounds are zero counts as standing still.
+The off-diagonal term is the only place where Ak would need the rate. It vanishes if Y stands still (with M = Y) or if X does
+(with N = -X): so one of both depends on no moving parameter. A parameter whose rate bounds are zero counts as standing still.
 
     coupling       P_c > 0
     channel        [A_c + A_c' + dP/dt, B_c, C_c'; *, -g I, D_c'; *, *, -g I] < 0          L2 gain at most g
@@ -27,7 +27,8 @@ from typing import Literal
 
 import numpy as np
 
-from synthesis.design.generalised_plant import ChannelPlant, FeedbackChannel, GeneralisedPlant
+from synthesis.design.feedback_channel import FeedbackChannel
+from synthesis.design.generalised_plant import ChannelPlant, GeneralisedPlant
 from synthesis.lmi.problem import LmiProblem
 from synthesis.models.param import SchedulingParameter
 from synthesis.polynomials.matrix import MatrixPolynomial, padded, symmetric_block
@@ -106,9 +107,7 @@ class _Loop:
         self.Ch = problem.matrix("Ch", m, n, wanted.degree)
         self.Dh = problem.matrix("Dh", m, k, wanted.degree) if wanted.feedthrough else None
         # What stands in the upper right of A_c + A_c': Ah' and the known part that would only have to be cancelled.
-        self.cross = (
-            None if wanted.eliminated(len(plant.channels)) else problem.matrix("cross", n, n, wanted.degree)
-        )
+        self.cross = None if wanted.eliminated(len(plant.channels)) else problem.matrix("cross", n, n, wanted.degree)
 
     @property
     def coupling(self) -> MatrixPolynomial:
@@ -154,7 +153,9 @@ class _Loop:
         w, z = (self.problem.constant(np.eye(size)).scaled_by(level) for size in (direct.shape[1], direct.shape[0]))
         return symmetric_block([[rate, inputs, outputs], [None, -w, direct.T], [None, None, -z]])
 
-    def _with_feedthrough(self, own: MatrixPolynomial, left: MatrixPolynomial, right: MatrixPolynomial) -> MatrixPolynomial:
+    def _with_feedthrough(
+        self, own: MatrixPolynomial, left: MatrixPolynomial, right: MatrixPolynomial
+    ) -> MatrixPolynomial:
         return own if self.Dh is None else own + left @ self.Dh @ right
 
 
@@ -164,9 +165,7 @@ def _degrees(problem: LmiProblem, wanted: Wanted, name: str) -> tuple[int, ...]:
     def moves(p: SchedulingParameter) -> bool:
         return p.rate_minimum < 0.0 or p.rate_maximum > 0.0
 
-    return tuple(
-        0 if p.may_jump or (name == wanted.still and moves(p)) else wanted.degree for p in problem.parameters
-    )
+    return tuple(0 if p.may_jump or (name == wanted.still and moves(p)) else wanted.degree for p in problem.parameters)
 
 
 def _across(left: MatrixPolynomial, right: MatrixPolynomial) -> MatrixPolynomial:
@@ -189,4 +188,3 @@ def _over(upper: MatrixPolynomial, lower: MatrixPolynomial) -> MatrixPolynomial:
             axis=-3,
         )
     )
-

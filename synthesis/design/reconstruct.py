@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from estimators.arrays import FloatArray
-from synthesis.design.generalised_plant import ChannelPlant, GeneralisedPlant
+from synthesis.design.generalised_plant import GeneralisedPlant
 from synthesis.design.output_feedback_lmi import Wanted
 from synthesis.lmi.result import LmiResult
 from synthesis.models.numeric import values
@@ -25,7 +25,9 @@ def reconstructed(
     below = values(plant.denominator, points)
     A, B, C = (values(getattr(plant, key), points) / below for key in ("A", "B", "C"))
     X, Y, Bh, Ch = (result.values[name].at(still)[..., 0] for name in ("X", "Y", "Bh", "Ch"))
-    Dk = result.values["Dh"].at(still)[..., 0] if wanted.feedthrough else np.zeros((len(points), B.shape[2], C.shape[1]))
+    Dk = (
+        result.values["Dh"].at(still)[..., 0] if wanted.feedthrough else np.zeros((len(points), B.shape[2], C.shape[1]))
+    )
     if wanted.eliminated(len(plant.channels)):
         part = {key: values(getattr(plant.channels[0], key), points) / below for key in ("E", "F", "Cz", "Dzd", "Dzu")}
         cross = _cross(part, X, Y, B, C, Bh, Ch, Dk, level)
@@ -41,7 +43,8 @@ def reconstructed(
     Ck = (Ch - Dk @ C @ Y) @ right
     NBk = Bh - X @ B @ Dk
     NAk = (Ah - NBk @ C @ Y - X @ closed @ Y) @ right - X @ B @ Ck
-    return np.linalg.solve(N, NAk), np.linalg.solve(N, NBk), Ck, Dk
+    Ak, Bk = (np.asarray(np.linalg.solve(N, right), float) for right in (NAk, NBk))
+    return Ak, Bk, np.asarray(Ck), np.asarray(Dk)
 
 
 def _cross(

@@ -42,17 +42,32 @@ class Settled:
     optimum: LmiResult
 
 
-def three_solves(name: str, problem: Problem, level: Level, backoff: float, settings: LmiSettings) -> Settled:
+def least(problem: Problem, backoff: float, settings: LmiSettings, memory: Memory) -> LmiResult:
+    """The first of the solves: minimise. `memory` keeps the places that decided for the others."""
+    first = problem(None)
+    # By exchange it is not handed on: it need not hold on the continuum, only the level a back-off above it.
+    bounding = backoff > 0.0 and relaxation_of(first, settings) == "exchange"
+    return solve(first, replace(settings, verify=not bounding), memory)
+
+
+def three_solves(
+    name: str,
+    problem: Problem,
+    level: Level,
+    backoff: float,
+    settings: LmiSettings,
+    optimum: LmiResult | None = None,
+    memory: Memory | None = None,
+) -> Settled:
     """Minimise, then give back `backoff` of the optimum and choose the gains there.
 
     `problem(gamma, maximise_margin, floor)` builds the inequalities, `level` turns their objective into a gain; `name` is that
-    of the model, for messages. Raises ProblemError if nothing is found.
+    of the model, for messages. A first solve that was done already (`least`) is not done again. Raises ProblemError if nothing
+    is found.
     """
-    memory: Memory = {}
-    first = problem(None)
-    bounding = backoff > 0.0 and relaxation_of(first, settings) == "exchange"
-    # The optimum itself is not handed on then: it need not hold on the continuum, only the level a back-off above it.
-    optimum = solve(first, replace(settings, verify=not bounding), memory)
+    memory = {} if memory is None else memory
+    optimum = least(problem, backoff, settings, memory) if optimum is None else optimum
+    bounding = optimum.report.relaxation == "exchange" and backoff > 0.0
     lower = None if optimum.lower_bound is None else level(max(optimum.lower_bound, 0.0))
     named = optimum.objective is not None and optimum.objective > 0.0
     if bounding and named and optimum.report.status == "Solved":
