@@ -35,6 +35,7 @@ from synthesis.polynomials.matrix import MatrixPolynomial, variable
 
 ANGLES = np.concatenate([[0.0], np.geomspace(1e-3, np.pi, 15)])  # per sample, where the size of a gain is looked for
 ACCURACY = 1e-4  # relative, of a least gain or a largest margin: what holds is proved afterwards
+STALLED = (1.0005, 1.002, 1.01, 1.05, 1.2)  # times the level that a stalled solve names
 PROOFS = 3  # of one wish: a place where one fails is solved for, too
 
 
@@ -137,9 +138,15 @@ class Search:
             asked = self._asked(replace(wish, level=None))
             found = None if asked is None else self._solved(asked, wish)
             square = np.nan if found is None or asked is None else float(asked.problem.cost @ found.decisions)
-            solved = found is not None and found.status.endswith("Solved") and square > 0.0
-            self._least[key] = float(np.sqrt(square)) * self._unit(wish) if solved else np.inf
+            named = float(np.sqrt(square)) * self._unit(wish) if 0.0 < square < np.inf else np.inf
+            solved = found is not None and found.status.endswith("Solved")
+            self._least[key] = named if solved else self._held_level(wish, named)
         return self._least[key]
+
+    def _held_level(self, wish: Wish, named: float) -> float:
+        """The first level above one that a stalled solve named at which all inequalities have a margin; inf if none of a few has."""
+        levels = (named * step for step in STALLED) if np.isfinite(named) else ()
+        return next((x for x in levels if self.largest_margin(replace(wish, level=x)) > 0.0), np.inf)
 
     def _solved(self, asked: Asked, wish: Wish) -> RawAnswer:
         found = exchange(asked.problem, asked.families, replace(self.settings, verify=False), ACCURACY)
