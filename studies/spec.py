@@ -9,7 +9,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from estimators.errors import unknown
-from synthesis.design.deploy import DeploySettings
+from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
 from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.errors import SpecError

@@ -1,8 +1,8 @@
 from .certificate.proof import Proof as Proof
 from .certificate.proof import prove as prove
 from .design.deploy import Deployment as Deployment
-from .design.deploy import DeploySettings as DeploySettings
 from .design.deploy import deploy as deploy
+from .design.deploy_settings import DeploySettings as DeploySettings
 from .design.export import export as export
 from .design.export import schedule_content as schedule_content
 from .design.hinf_observer import Channel as Channel

@@ -1,0 +1,35 @@
+"""What the rows and columns of a table of gains stand for, by name and unit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+Named = Mapping[str, str]
+
+
+def gain_signals(content: Mapping[str, Any]) -> tuple[list[Named], list[Named]]:
+    """Rows and columns of `gain.table` of a checked content, each {"name", "unit"}.
+
+    Of an observer: its states by the outputs. Of a feedback law: its own states and the plant's inputs by its own states and what
+    it measures, states or outputs; its own states are numbers without unit.
+    """
+    model, update = content["model"], content["update"]
+    if update["kind"] != "feedback":
+        return list(model["states"]), list(model["outputs"])
+    own = [{"name": f"law_state_{k + 1}", "unit": "1"} for k in range(update["order"])]
+    return [*own, *model["inputs"]], [*own, *model[update["measured"]]]
+
+
+def quotient(unit: str, per_second: bool, below: str) -> str:
+    """The unit of a gain: unit/below, per second where the gain feeds a derivative."""
+    above = _per_second(unit) if per_second else unit
+    return above if below == "1" else f"({above})/({below})"
+
+
+def _per_second(unit: str) -> str:
+    if unit == "1":
+        return "1/s"
+    if unit.endswith("/s"):
+        return f"{unit}^2"
+    return f"({unit})/s" if any(c in unit for c in "*/") else f"{unit}/s"
