@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from analysis.errors import AnalysisError
-from analysis.simulation.error_update import Linear, channel_of
+from analysis.simulation.channel import channel_of
+from analysis.simulation.linear import Linear
 from analysis.simulation.norms_along import h2_along, peak_along
 from analysis.simulation.searched import Measure, ScheduleQuestion, bad_trajectories, least_decay
 from analysis.simulation.simulate import simulate

@@ -8,24 +8,12 @@ with everything at the parameter of the sample's start (synthesis.loop.observer)
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from analysis.simulation.flow import phi_times
 from analysis.simulation.plants import matrices_of
 from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule
-from synthesis.certificate.claims import WITH_CHANNEL, ClaimChannel, rows_of
-
-
-class Linear(NamedTuple):
-    """x+ = A x + B w, z = C x + D w; stacks (..., rows, columns)."""
-
-    A: FloatArray
-    B: FloatArray
-    C: FloatArray
-    D: FloatArray
 
 
 def error_update(schedule: GainSchedule, p: FloatArray) -> tuple[FloatArray, dict[str, FloatArray]]:
@@ -41,23 +29,3 @@ def error_update(schedule: GainSchedule, p: FloatArray) -> tuple[FloatArray, dic
     closed = phi_times(M, np.concatenate([M, period * (E - gain @ F), period * eye], axis=-1))
     coast = phi_times(period * A, period * eye)
     return eye + closed[..., :n], {"disturbances": closed[..., n:-n], "motion": coast - closed[..., -n:]}
-
-
-def channel_of(schedule: GainSchedule, kind: str, channel: ClaimChannel, p: FloatArray) -> Linear:
-    """The channel of a claim at parameters (..., p): its inputs in their sizes, its errors as outputs."""
-    flat = p.reshape(-1, p.shape[-1])
-    A, B = error_update(schedule, flat)
-    group = WITH_CHANNEL[kind]
-    signals = schedule.disturbances if group == "disturbances" else schedule.states
-    places, sizes = rows_of([s.name for s in signals], channel)
-    states = [s.name for s in schedule.states]
-    C = np.eye(len(states))[[states.index(name) for name in channel.errors]]
-    into = B[group][..., places] * np.array(sizes)
-    lead = p.shape[:-1]
-    D = np.zeros((len(C), len(places)))
-    return Linear(
-        A.reshape(*lead, *A.shape[1:]),
-        into.reshape(*lead, *into.shape[1:]),
-        np.broadcast_to(C, (*lead, *C.shape)),
-        np.broadcast_to(D, (*lead, *D.shape)),
-    )

@@ -13,7 +13,8 @@ from analysis.lpv.lifted import samples
 from analysis.lpv.trajectory import Path, admissible, float_of
 from analysis.lpv.worst_path import growth_of, simple_paths, worst_path
 from analysis.simulation.box import box_of
-from analysis.simulation.error_update import Linear, channel_of
+from analysis.simulation.channel import channel_of
+from analysis.simulation.linear import Linear
 from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule
 from synthesis.certificate.claims import ClaimChannel
@@ -28,7 +29,7 @@ Measure = Callable[[Linear], FloatArray]  # of systems along trajectories (R, N+
 
 @dataclass(frozen=True)
 class ScheduleQuestion:
-    """e+ = A(p) e + B(p) w, z = C e of one channel; a sample is the unit of time."""
+    """x+ = A(p) x + B(p) w, z = C(p) x + D(p) w of one channel; a sample is the unit of time."""
 
     schedule: GainSchedule
     kind: str

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.simulation.error_update import Linear
+from analysis.simulation.linear import Linear
 from estimators.arrays import FloatArray
 
 

@@ -13,8 +13,10 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from analysis import AnalysisError, ContinuousLoop, NonlinearPlant, random_trajectories, simulate
-from analysis.simulation.error_update import Linear, error_update
+from analysis.simulation.closed_loop import closed_loop
+from analysis.simulation.error_update import error_update
 from analysis.simulation.flow import moving, phi_times
+from analysis.simulation.linear import Linear
 from analysis.simulation.norms_along import h2_along, peak_along
 from analysis.simulation.trajectories import FAMILIES
 from analysis.simulation.worst_input import worst_inputs
@@ -171,6 +173,31 @@ def test_the_nonlinear_truth_is_integrated_and_schedules_itself() -> None:
     assert run.of("p") == pytest.approx(run.of("x") ** 2, rel=1e-15)
     with pytest.raises(AnalysisError, match="neither a state nor an input"):
         NonlinearPlant(model, {"p": P})
+
+
+@pytest.mark.parametrize("by_states", [True, False])
+def test_a_feedback_loop_is_what_its_parts_do(by_states: bool) -> None:
+    """Three samples of plant and law, step by step with scipy's exponential, against the matrices of the loop."""
+    rng, T, nk = np.random.default_rng(5), 0.3, 2
+    A, B, C, E, F = (rng.normal(size=shape) for shape in ((3, 3), (3, 2), (2, 3), (3, 1), (2, 1)))
+    D = np.array([[0.0, 0.0], [0.4, -0.7]])
+    K = rng.normal(size=(nk + 2, nk + (3 if by_states else 2)))
+    if not by_states:
+        K[nk:, nk + 1] = 0.0  # the output that the input acts on at once
+    loop = closed_loop(tuple(m[None] for m in (A, B, C, D, E, F)), K[None], by_states, nk, T)
+    whole = expm(T * np.block([[A, B, E], [np.zeros((3, 6))]]))[:3]
+    x, own = rng.normal(size=3), rng.normal(size=nk)
+    state = np.concatenate([x, own])
+    for _ in range(3):
+        d = rng.normal(size=1)
+        free = C @ x + F @ d  # outputs without the input
+        u = K[nk:, :nk] @ own + K[nk:, nk:] @ (x if by_states else free)
+        y = free + D @ u
+        assert (loop.C[0] @ state + loop.D[0] @ d) == pytest.approx(np.concatenate([x, y, u]), rel=1e-10)
+        own = K[:nk, :nk] @ own + K[:nk, nk:] @ (x if by_states else y)
+        x = whole @ np.concatenate([x, u, d])
+        state = loop.A[0] @ state + loop.B[0] @ d
+        assert state == pytest.approx(np.concatenate([x, own]), rel=1e-10)
 
 
 def test_gramians_along_a_constant_trajectory_give_the_norms_of_the_system() -> None:
