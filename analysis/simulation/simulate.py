@@ -10,12 +10,13 @@ import numpy.typing as npt
 
 from analysis.errors import AnalysisError
 from analysis.simulation.continuous_loop import ContinuousLoop
-from analysis.simulation.laws import RuntimeObserver
+from analysis.simulation.laws import Beside, beside
 from analysis.simulation.nonlinear import NonlinearPlant
 from analysis.simulation.plants import LinearPlant, SimulatedPlant
-from analysis.simulation.signals import Signals, begun, followed, laid, places, white_or_given
+from analysis.simulation.signals import Signals, begun, followed, laid, white_or_given
 from analysis.simulation.simulation import Simulation
-from estimators.arrays import FlagArray, FloatArray
+from analysis.simulation.tape import Tape
+from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule
 from synthesis.models.lpv import LpvModel
 
@@ -45,7 +46,7 @@ def simulate(
     Args:
         plant: a schedule (its own plant, in the numbers of the runtime), a model, a `NonlinearPlant`, which schedules itself, or
             a `ContinuousLoop`, which has its law inside.
-        schedule: its runtime estimates, with inputs and measurements of the plant found by name; None: the plant alone.
+        schedule: its runtime estimates, or commands the plant's inputs; signals are found by name. None: the plant alone.
         parameters: (runs, samples + 1, p) at the sample instants, as `random_trajectories` makes them; for a nonlinear plant
             give `runs` and `samples` instead.
         disturbances: by name a size (standard deviation of a white sequence, one value a sample) or the values themselves,
@@ -80,40 +81,39 @@ def simulate(
     count, length = path.shape[0], path.shape[1] - 1
     if not (count >= 1 and length >= 1):
         raise AnalysisError(f"runs = {count}, samples = {length}; give 1 of each at least")
-    period, rng = _period(plant, schedule, sample_time), np.random.default_rng(seed)
+    period, rng, size = _period(plant, schedule, sample_time), np.random.default_rng(seed), len(body.states)
     d = white_or_given(disturbances or {}, body.disturbances, (count, length), rng)
-    feedback = inputs if callable(inputs) else None
     u = laid({} if callable(inputs) else inputs or {}, body.inputs, (count, length), "input")
-    lost = rng.uniform(size=(length, count)) < drops
-    states = np.empty((count, length + 1, len(body.states)))
-    states[:, 0] = begun(start, states[:, 0].shape, "start")
-    y, guesses = np.empty((count, length, len(body.outputs))), None
-    flags: FlagArray = np.zeros((count, length), np.int32)
-    if schedule is not None:
-        into = places([s.name for s in schedule.inputs], body.inputs, "input", body.name)
-        seen = places([s.name for s in schedule.outputs], body.outputs, "output", body.name)
-        guesses = np.empty((count, length + 1, len(schedule.states)))
-        guesses[:, 0] = begun(estimate, guesses[:, 0].shape, "estimate")
-        law = RuntimeObserver(schedule, count, observer == "velocity")
-        law.start(guesses[:, 0])
-    for k in range(length):
-        x = states[:, k]
-        if isinstance(body, NonlinearPlant):
-            path[:, k] = body.scheduled(x, u[:, k], d[:, k])
-        if feedback is not None:
-            known = x if guesses is None else guesses[:, k]
-            u[:, k] = np.asarray(feedback(k, x, known, path[:, k]), float)
-        y[:, k] = body.output(x, u[:, k], d[:, k], path[:, k])
-        if guesses is not None:
-            measured = np.where(lost[k][:, None], np.nan, y[:, k, seen])
-            guesses[:, k + 1], flags[:, k] = law.step(u[:, k, into], measured, path[:, k])
-        states[:, k + 1] = body.advance(x, u[:, k], d[:, k], path[:, k], path[:, k + 1], period)
-    if isinstance(body, NonlinearPlant):
-        path[:, length] = body.scheduled(states[:, length], u[:, -1], d[:, -1])
+    lost = rng.uniform(size=(count, length)) < drops
+    x = np.empty((count, length + 1, size))
+    x[:, 0] = begun(start, (count, size), "start")
+    y = np.empty((count, length, len(body.outputs)))
+    tape = Tape(x, path, u, d, y, np.zeros((count, length), np.int32), lost)
+    law = beside(schedule, body, tape, estimate, observer == "velocity")
+    _run(body, law, inputs if callable(inputs) else None, tape, period)
+    time: FloatArray = np.asarray(period * np.arange(length + 1), float)
     return Simulation(
-        np.asarray(period * np.arange(length + 1), float), states, guesses, path, u, d, y, flags,
+        time, tape.x, tape.estimate, tape.p, tape.u, tape.d, tape.y, tape.flags,
         body.states, body.parameters, body.inputs, body.disturbances, body.outputs,
     )  # fmt: skip
+
+
+def _run(body: SimulatedPlant, law: Beside, feedback: Feedback | None, tape: Tape, period: float) -> None:
+    """All samples, one after the other; every operation is on all runs."""
+    for k in range(tape.u.shape[1]):
+        x, d, p = tape.x[:, k], tape.d[:, k], tape.p[:, k]
+        if isinstance(body, NonlinearPlant):
+            p[:] = body.scheduled(x, tape.u[:, k], d)
+        if feedback is not None:
+            known = x if tape.estimate is None else tape.estimate[:, k]
+            tape.u[:, k] = np.asarray(feedback(k, x, known, p), float)
+        law.before(tape, k)
+        u = tape.u[:, k]
+        tape.y[:, k] = body.output(x, u, d, p)
+        law.after(tape, k)
+        tape.x[:, k + 1] = body.advance(x, u, d, p, tape.p[:, k + 1], period)
+    if isinstance(body, NonlinearPlant):
+        tape.p[:, -1] = body.scheduled(tape.x[:, -1], tape.u[:, -1], tape.d[:, -1])
 
 
 def _period(plant: object, schedule: GainSchedule | None, given: float | None) -> float:

@@ -37,7 +37,7 @@ class Simulation:
     def error(self) -> FloatArray:
         """State less estimate (R, N+1, nx). Raises AnalysisError without an observer."""
         if self.estimate is None:
-            raise AnalysisError("nothing was estimated in this simulation; give simulate() a schedule")
+            raise AnalysisError("nothing was estimated in this simulation; give simulate() the schedule of an observer")
         return self.state - self.estimate
 
     def of(self, name: str) -> FloatArray:

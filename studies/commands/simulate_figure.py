@@ -41,15 +41,16 @@ def _figure(schedule: GainSchedule, one: Amplification, number: int) -> Figure:
     y = Axis("parameter, its range = 0..1", -0.05, 1.05)
     panels.append(Panel(marks, "time [s]", y, "Worst trajectory; three random ones", "upper right"))
     errors: list[Mark] = [Level(y=0.0)]
+    word = "signal" if schedule.update == "feedback" else "error"
     for name, color in zip(one.errors, COLOURS, strict=False):
-        error = run.error[0, :, run.states.index(name)]
-        errors.append(Line(time, error / max(float(np.abs(error).max()), 1e-300), name, color))
+        value = run.of(name)[0] if schedule.update == "feedback" else run.error[0, :, run.states.index(name)]
+        errors.append(Line(time[: len(value)], value / max(float(np.abs(value).max()), 1e-300), name, color))
     panels.append(
-        Panel(errors, "time [s]", "error, its largest = 1", "The runtime along it, worst input", "upper right")
+        Panel(errors, "time [s]", f"{word}, its largest = 1", "The runtime along it, worst input", "upper right")
     )
     return Figure(
         f"{schedule.name}-simulation-{number}",
         f"{one.claim}: certified {one.level:g} {one.unit}, worst found {one.worst:.4g}.",
-        "Amplification of random runs as a share of the certified level; the worst parameter trajectory; the error along it.",
+        "Amplification of random runs as a share of the certified level; the worst parameter trajectory; the runtime along it.",
         panels, size=(12.6, 3.9), title=f"{schedule.name}: {one.claim}",
     )  # fmt: skip

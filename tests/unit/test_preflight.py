@@ -8,8 +8,9 @@ import pytest
 
 from estimators.errors import GainsmithError
 from studies.cli import main
+from studies.commands.listing import example_specs
 from studies.preflight import check_before_design
-from studies.spec import load_spec, shipped_examples, shipped_specs
+from studies.spec import load_spec, shipped_specs
 
 TEMPLATES = Path(__file__).parents[2] / "studies" / "templates"
 MODEL, SPEC = ((TEMPLATES / name).read_text() for name in ("model.toml", "observer.toml"))
@@ -23,7 +24,7 @@ def check(folder: Path, model: str = MODEL, spec: str = SPEC) -> None:
     check_before_design(found, found.plant(place).model)
 
 
-@pytest.mark.parametrize("name", [*(f"{example}-observer" for example in shipped_examples()), *shipped_specs()])
+@pytest.mark.parametrize("name", [*example_specs(), *shipped_specs()])
 def test_what_is_shipped_passes(name: str) -> None:
     found, place = load_spec(name)
     check_before_design(found, found.plant(place).model)

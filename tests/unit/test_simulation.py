@@ -18,6 +18,7 @@ from analysis.simulation.error_update import error_update
 from analysis.simulation.flow import moving, phi_times
 from analysis.simulation.linear import Linear
 from analysis.simulation.norms_along import h2_along, peak_along
+from analysis.simulation.plants import matrices_of
 from analysis.simulation.trajectories import FAMILIES
 from analysis.simulation.worst_input import worst_inputs
 from estimators.faults import Flag
@@ -118,6 +119,34 @@ def test_the_runtime_follows_the_error_recursion(update: str) -> None:
         e = (A[at] @ e[..., None] + driven)[..., 0]
         assert e == pytest.approx(run.error[:, k + 1], rel=1e-9, abs=1e-12)
     assert not (run.flags[:, 1:]).any()
+
+
+@pytest.mark.parametrize(("measured", "order"), [("states", 0), ("outputs", 2)])
+def test_the_runtime_of_a_feedback_law_follows_the_closed_loop(measured: str, order: int) -> None:
+    """The plant's inputs act on its outputs at once: the runtime accounts for the command that was held while it measured."""
+    rng = np.random.default_rng(2)
+    table = 0.2 * rng.normal(size=(3, 3, order + 2, order + (3 if measured == "states" else 2)))
+    if order:
+        table[..., order:, order:] = 0.0
+    law: dict[str, Any] = {"update": "feedback", "measured": measured, "order": order, "table": table}
+    schedule = any_schedule(limits=(None, None), **law)
+    paths = random_trajectories(schedule, 30, 4, seed=3)
+    run = simulate(schedule, schedule, paths, disturbances={"d0": 0.7}, start=0.5)
+    flat = paths[:, :-1].reshape(-1, 2)
+    loop = closed_loop(
+        matrices_of(schedule, flat), schedule.gain(flat), measured == "states", order, schedule.sample_time
+    )
+    state = np.concatenate([run.state[:, 0], np.zeros((4, order))], axis=1)
+    for k in range(30):
+        at = np.arange(4) * 30 + k
+        d = run.disturbance[:, k, :, None]
+        shown = (loop.C[at] @ state[..., None] + loop.D[at] @ d)[..., 0]
+        assert shown[:, -2:] == pytest.approx(run.input[:, k], rel=1e-9, abs=1e-12)
+        assert shown[:, 3:5] == pytest.approx(run.measurement[:, k], rel=1e-9, abs=1e-12)
+        state = (loop.A[at] @ state[..., None] + loop.B[at] @ d)[..., 0]
+        assert state[:, :3] == pytest.approx(run.state[:, k + 1], rel=1e-9, abs=1e-12)
+    with pytest.raises(AnalysisError, match="nothing was estimated"):
+        _ = run.error
 
 
 def test_lost_measurements_are_flagged_and_the_law_closes_the_loop() -> None:
