@@ -167,11 +167,13 @@ def test_examples_are_complete() -> None:
     """Every constant has a source, every example its specification, and no unit is left out."""
     names = {
         "battery",
+        "cruise",
         "inverted-pendulum",
         "missile",
         "pmsm",
         "quarter-car",
         "satellite",
+        "turbine-pitch",
         "vehicle-speed",
         "wind-turbine",
     }
