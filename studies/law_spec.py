@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from studies.spec_tables import DeploySpec, DesignSpec
 from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.design.state_feedback import GainLimits, StateFeedbackDesign
 from synthesis.lmi.settings import LmiSettings
-
-if TYPE_CHECKING:
-    from studies.spec import DesignSpec, ScheduleSpec
 
 OF_LAWS = ("damping", "input_limits", "state_sizes")  # keys of [design]
 OF_CHANNELS = ("errors", "performance", "sizes")  # one of the first two is there
 
 
-def check_keys(spec: ScheduleSpec) -> None:
+def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
     """Raise ValueError for a key that the law has no use for, or that it lacks."""
-    design, feedback = spec.gains, spec.gains.law is not None
+    feedback = design.law is not None
     who = f"the law '{design.law}'" if feedback else "an observer"
     for index, channel in enumerate(design.channels):
         place = f"design.channels[{index}]"
@@ -28,14 +26,14 @@ def check_keys(spec: ScheduleSpec) -> None:
             raise ValueError(f"{place}: {wanted} is missing; {who} needs it")
         if channel.sizes is not None and not feedback:
             raise ValueError(f"{place}: sizes are not for an observer; remove them")
-    if feedback and "update" in spec.deploy.model_fields_set:
+    if feedback and "update" in deploy.model_fields_set:
         raise ValueError(f"deploy.update is not for {who}, which runs once a sample; remove it")
     if feedback and (design.input_limits is None) != (design.state_sizes is None):
         raise ValueError("design: input_limits and state_sizes belong together; a limit holds for states of a size")
     given = next((key for key in OF_LAWS if getattr(design, key) is not None), None)
     if not feedback and given is not None:
         raise ValueError(f'design.{given} is not for an observer; remove it, or name a law: law = "state feedback"')
-    if not feedback and spec.deploy.limits is not None:
+    if not feedback and deploy.limits is not None:
         raise ValueError("deploy.limits are not for an observer, which commands nothing; remove them")
 
 

@@ -147,6 +147,19 @@ def test_a_start_is_without_a_bump() -> None:
     several = LpvController(law_schedule(parameters=2))
     several.start([0.3, -0.2], [0.1, 0.5], [0.8, 1.9])
     np.testing.assert_allclose(several.step([0.1, 0.5], [0.8, 1.9]).command, [0.3, -0.2], rtol=1e-9)
+    # Three states for two inputs: of all that command it, the one that moves least (conditions of Lagrange).
+    schedule = law_schedule(3)
+    resting, (u, y) = LpvController(schedule), (np.array([0.3, -0.2]), np.array([0.1, 0.5]))
+    resting.start(u, y, 0.8)
+    Ak, Bk, Ck, Dk = parts(schedule, np.array([0.8]))
+    drift = np.eye(3) - Ak
+    kkt = np.block([[drift.T @ drift, Ck.T], [Ck, np.zeros((2, 2))]])
+    nearest = np.linalg.solve(kkt, np.concatenate([drift.T @ Bk @ y, u - Dk @ y]))[:3]
+    np.testing.assert_allclose(resting.state, nearest, rtol=1e-6)
+    # Without measurements the law waits: state and command are kept.
+    kept = resting.step([np.nan, 0.5], 0.8)
+    np.testing.assert_array_equal(kept.command, u)
+    np.testing.assert_allclose(resting.state, nearest, rtol=1e-6)
     with pytest.raises(RangeError, match="outside the certified range"):
         several.start([0.3, -0.2], [0.1, 0.5], [0.8, 9.0])
     with pytest.raises(EstimatorError, match="not finite"):
