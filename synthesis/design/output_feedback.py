@@ -27,6 +27,7 @@ from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.relaxation import rate_vertices
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
+from synthesis.loop.feedback import Measured
 from synthesis.models.lpv import LpvModel
 from synthesis.models.numeric import values
 
@@ -35,6 +36,7 @@ START = {
     1: 5,
     2: 3,
 }  # places along each parameter that are solved for from the start, by their number; 2 for more
+RATIONAL = 2
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,17 @@ class OutputFeedback:
     optimum: LmiResult
     frame: Frame
     wanted: Wanted
+    measured: Measured = "outputs"
+
+    @property
+    def order(self) -> int:
+        """Of the controller: that of the plant."""
+        return len(self.model.states)
+
+    @property
+    def rational(self) -> int:
+        """Degrees more that P has in claims: of both forms, that with a moving Y has (Y - X^-1)^-1 in its P."""
+        return RATIONAL if self.wanted.still == "X" else 0
 
     @property
     def verdict(self) -> Verdict:
@@ -102,9 +115,9 @@ class OutputFeedback:
         return self.result.verdict
 
     def controller(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Ak (g, nx, nx), Bk (g, nx, ny), Ck (g, nu, nx) and Dk (g, nu, ny) at parameter values (g,) or (g, p), in 1/s.
+        """Ak (g, nx, nx), Bk (g, nx, ny), Ck (g, nu, nx) and Dk (g, nu, ny) at parameter values (g,) or (g, p).
 
-        The states are an estimate of those of the plant, in their units; ny counts the outputs that are measured.
+        The states are an estimate of those of the plant, in their units. Columns of outputs that are not measured are zero.
         """
         count, grid = len(self.model.parameters), np.asarray(points, float)
         grid = grid.reshape(-1, count) if count else grid.reshape(len(grid), 0)
@@ -116,7 +129,8 @@ class OutputFeedback:
         back = np.linalg.inv(T) * clock
         Ak, Bk, Ck, Dk = back @ Ak @ T, back @ Bk / y, u * Ck @ T, u * Dk / y
         D = values(given.D, (grid - middle) / half) / values(given.denominator, (grid - middle) / half)
-        return Ak - Bk @ D @ Ck, Bk, Ck, Dk  # designed for y - D u, and Dk D = 0
+        seen = np.eye(len(self.model.outputs))[measured_rows(self.model, self.design.measured)]
+        return Ak - Bk @ D @ Ck, Bk @ seen, Ck, Dk @ seen  # designed for y - D u, and Dk D = 0
 
     @property
     def level(self) -> float:
