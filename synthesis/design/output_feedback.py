@@ -10,7 +10,6 @@ what is claimed of it is proved of that table, whatever the inequalities here ha
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from itertools import product
 
 import numpy as np
 
@@ -20,23 +19,17 @@ from synthesis.design.generalised_plant import Frame, GeneralisedPlant, frame_of
 from synthesis.design.output_feedback_lmi import Still, Wanted, build
 from synthesis.design.reconstruct import reconstructed
 from synthesis.design.refusals import refuse_undetectable, refuse_unstabilisable
-from synthesis.design.three_solves import Problem, least, three_solves
+from synthesis.design.three_solves import Problem, least, starting_places, three_solves
 from synthesis.errors import ProblemError
 from synthesis.lmi.exchange import Memory
 from synthesis.lmi.problem import LmiProblem
-from synthesis.lmi.relaxation import rate_vertices
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.loop.feedback import Measured
 from synthesis.models.lpv import LpvModel
 from synthesis.models.numeric import values
 
-START = {
-    0: 1,
-    1: 5,
-    2: 3,
-}  # places along each parameter that are solved for from the start, by their number; 2 for more
-RATIONAL = 2
+RATIONAL = 2  # degrees of P that come close to an inverse
 
 
 @dataclass(frozen=True)
@@ -178,7 +171,7 @@ def design_output_feedback(model: LpvModel, design: OutputFeedbackDesign) -> Out
             levels = {c: None if bound is None else bound / frame.unit for c, bound in bounds.items()}
             return build(scaled, model.parameters, wanted, levels, margin and gamma is not None, floor)
 
-        memory = _places(problem(None))
+        memory = starting_places(problem(None))
         tried.append((least(problem, design.backoff, settings, memory), wanted, problem, memory))
     found = [entry[0] for entry in tried]
     optimum, wanted, problem, memory = min(tried, key=lambda entry: _named(entry[0]))
@@ -193,22 +186,6 @@ def _named(result: LmiResult) -> float:
     level = result.objective
     usable = level is not None and level > 0.0 and not result.report.status.endswith("Infeasible")
     return float(level) if usable and level is not None else np.inf
-
-
-def _places(problem: LmiProblem) -> Memory:
-    """Where the solves start: in the corners alone, little is asked of laws that are free elsewhere, and unknowns run away."""
-    count = len(problem.parameters)
-    line = np.linspace(-1.0, 1.0, START.get(count, 2))
-    points = list(product(line, repeat=count))  # one empty point without parameters
-    grid = np.array(points).reshape(len(points), count)
-    out: Memory = {}
-    for entry in problem.inequalities:
-        vertices = rate_vertices(entry.matrix, count)
-        rates = np.array(vertices).reshape(len(vertices), count)
-        own = grid * (np.array(entry.matrix.degrees[:count]) > 0)
-        whole = np.hstack([np.repeat(own, len(rates), axis=0), np.tile(rates, (len(own), 1))])
-        out[entry.name] = np.unique(whole, axis=0)
-    return out
 
 
 def _forms(model: LpvModel, design: OutputFeedbackDesign) -> tuple[Still, ...]:
