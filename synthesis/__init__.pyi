@@ -5,6 +5,7 @@ from .design.deploy import deploy as deploy
 from .design.deploy_settings import DeploySettings as DeploySettings
 from .design.export import export as export
 from .design.export import schedule_content as schedule_content
+from .design.feedback_channel import FeedbackChannel as FeedbackChannel
 from .design.hinf_observer import Channel as Channel
 from .design.hinf_observer import ObserverDesign as ObserverDesign
 from .design.hinf_observer import ObserverGains as ObserverGains
@@ -13,6 +14,10 @@ from .design.sampled_observer import design_sampled_observer as design_sampled_o
 from .design.stability import GainBox as GainBox
 from .design.stability import StabilityResult as StabilityResult
 from .design.stability import affine_quadratic_stability as affine_quadratic_stability
+from .design.state_feedback import GainLimits as GainLimits
+from .design.state_feedback import StateFeedbackDesign as StateFeedbackDesign
+from .design.state_feedback import StateFeedbackGains as StateFeedbackGains
+from .design.state_feedback import design_state_feedback as design_state_feedback
 from .design.well_posedness import WellPosedness as WellPosedness
 from .design.well_posedness import well_posedness as well_posedness
 from .errors import ModelError as ModelError

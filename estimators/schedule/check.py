@@ -167,6 +167,8 @@ def _claim(check: Checker, claim: Any, place: str, parameters: int, loop: LoopSi
         check.keys(channel, f"{place}.channel", ("inputs", "errors"))
         _sized(check, channel["inputs"], f"{place}.channel.inputs", max(MOST.values()))
         if isinstance(channel["errors"], Mapping):
+            if not channel["errors"]:
+                check.fail(f"{place}.channel.errors", "is empty; a channel needs at least one error")
             _sized(check, channel["errors"], f"{place}.channel.errors", loop.outputs)
         else:
             for i, error in enumerate(check.items(channel["errors"], f"{place}.channel.errors", most=loop.outputs)):

@@ -144,7 +144,7 @@ class Search:
         return self._least[key]
 
     def _held_level(self, wish: Wish, named: float) -> float:
-        """The first level above one that a stalled solve named at which all inequalities have a margin; inf if none of a few has."""
+        """The first level above one that a stalled solve named where all inequalities have a margin; inf if none of a few has."""
         levels = (named * step for step in STALLED) if np.isfinite(named) else ()
         return next((x for x in levels if self.largest_margin(replace(wish, level=x)) > 0.0), np.inf)
 

@@ -113,10 +113,10 @@ def test_a_better_claim_and_a_wrong_sign_are_not_proved(content: dict[str, Any])
     def smaller_size(c: dict[str, Any]) -> None:
         c["claims"][1]["channel"]["errors"]["x1"] = 0.05
 
-    for change, refuted in ((better, False), (wrong_sign, True), (smaller_size, True)):
+    for change in (better, wrong_sign, smaller_size):
         proofs = prove(changed(content, change))
         assert not all(proof.proved for proof in proofs)
-        assert any(proof.refuted for proof in proofs) is refuted
+        assert any(proof.refuted for proof in proofs)  # by the loop itself, where the parameter stands still
 
 
 def _update(**new: Any) -> Callable[[dict[str, Any]], None]:
@@ -140,7 +140,7 @@ BROKEN: list[tuple[Callable[[dict[str, Any]], None], str]] = [
     (_update(kind="lead"), r"update\.(kind|measured).*(not known|unknown key)"),
     (_channel({"x9": 1.0}), r"channel: 'x9' is none of x1, x2, y1, y2, u1"),
     (_channel({"x1": 0.0}), r"channel\.errors\.x1: 0\.0 must be positive"),
-    (_channel({}), r"needs at least one input and one error"),
+    (_channel({}), r"channel\.errors: is empty"),
     (lambda c: c["claims"][0].update(kind="drop probability"), r"says nothing about the update 'feedback'"),
     (lambda c: c["claims"].pop(0), r"none about the update that the runtime performs"),
 ]

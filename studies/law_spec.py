@@ -1,0 +1,68 @@
+"""Keys of a specification that belong to an observer or to a feedback law, and the design of the latter."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from studies.spec_tables import DeploySpec, DesignSpec
+from synthesis.design.feedback_channel import FeedbackChannel
+from synthesis.design.state_feedback import GainLimits, StateFeedbackDesign
+from synthesis.lmi.settings import LmiSettings
+
+OF_LAWS = ("damping", "input_limits", "state_sizes")  # keys of [design]
+OF_CHANNELS = ("errors", "performance", "sizes")  # one of the first two is there
+
+
+def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
+    """Raise ValueError for a key that the law has no use for, or that it lacks."""
+    feedback = design.law is not None
+    who = f"the law '{design.law}'" if feedback else "an observer"
+    for index, channel in enumerate(design.channels):
+        place = f"design.channels[{index}]"
+        wanted, other = ("performance", "errors") if feedback else ("errors", "performance")
+        if getattr(channel, other) is not None:
+            raise ValueError(f"{place}: {other} is not for {who}; give {wanted}")
+        if getattr(channel, wanted) is None:
+            raise ValueError(f"{place}: {wanted} is missing; {who} needs it")
+        if channel.sizes is not None and not feedback:
+            raise ValueError(f"{place}: sizes are not for an observer; remove them")
+    if feedback and "update" in deploy.model_fields_set:
+        raise ValueError(f"deploy.update is not for {who}, which runs once a sample; remove it")
+    if feedback and (design.input_limits is None) != (design.state_sizes is None):
+        raise ValueError("design: input_limits and state_sizes belong together; a limit holds for states of a size")
+    given = next((key for key in OF_LAWS if getattr(design, key) is not None), None)
+    if not feedback and given is not None:
+        raise ValueError(f'design.{given} is not for an observer; remove it, or name a law: law = "state feedback"')
+    if not feedback and deploy.limits is not None:
+        raise ValueError("deploy.limits are not for an observer, which commands nothing; remove them")
+
+
+def feedback_design(spec: DesignSpec) -> StateFeedbackDesign:
+    """As the synthesis takes it."""
+    channels = tuple(
+        FeedbackChannel(
+            tuple(c.disturbances), tuple(c.performance or ()), c.bound, _numbers(c.weights), _numbers(c.sizes)
+        )
+        for c in spec.channels
+    )
+    limits = None if spec.input_limits is None else GainLimits(spec.input_limits, spec.state_sizes or {})
+    settings = LmiSettings(relaxation=spec.relaxation, points=spec.points, solver=spec.solver)
+    return StateFeedbackDesign(
+        channels, spec.degree, spec.decay_rate, spec.fastest_pole, spec.damping, limits, spec.backoff, settings=settings
+    )
+
+
+def without_other_laws(resolved: dict[str, Any]) -> dict[str, Any]:
+    """A dumped specification without the keys that its law does not have: digests of observers stay what they were."""
+    design, deploy = dict(resolved["design"]), dict(resolved["deploy"])
+    if design["law"] is None:
+        design = {key: value for key, value in design.items() if key not in ("law", *OF_LAWS)}
+        deploy.pop("limits")
+    else:
+        deploy.pop("update")
+    dropped = [{k: v for k, v in c.items() if v is not None or k not in OF_CHANNELS} for c in design["channels"]]
+    return {**resolved, "design": {**design, "channels": dropped}, "deploy": deploy}
+
+
+def _numbers(values: list[float] | None) -> tuple[float, ...] | None:
+    return None if values is None else tuple(values)
