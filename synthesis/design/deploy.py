@@ -15,8 +15,8 @@ from synthesis.certificate.search import Search, Wish
 from synthesis.certificate.verify import Names
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_names
-from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains
-from synthesis.design.law_table import Gains, LawDesign, deployed_loop, extra_digits, table_at, update_section
+from synthesis.design.hinf_observer import Channel, ObserverGains
+from synthesis.design.law_table import Gains, deployed_loop, extra_digits, table_at, update_section
 from synthesis.design.well_posedness import well_posedness
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import Verdict
@@ -195,12 +195,16 @@ def _tabulated(
     names = names_of(model) if isinstance(gains, ObserverGains) else feedback_names(model)
     loop = deployed_loop(gains, points, table, settings.sample_time)
     return (
-        Search(loop, names, model.parameters, lyapunov_degree(model, design), design.settings),
+        Search(loop, names, model.parameters, lyapunov_degree(model, gains), design.settings),
         points,
         table,
     )
 
 
-def lyapunov_degree(model: LpvModel, design: ObserverDesign | LawDesign) -> tuple[int, ...]:
-    """Degree of P in the claims for each parameter: that of the gains, at least one; none in a parameter that may jump."""
-    return tuple(0 if p.may_jump else max(design.degree, 1) for p in model.parameters)
+def lyapunov_degree(model: LpvModel, gains: Gains) -> tuple[int, ...]:
+    """Degree of P in the claims for each parameter: that of the gains, at least one; none in a parameter that may jump.
+
+    A law whose own P is rational in the parameters says how many degrees more come close to it.
+    """
+    more = 0 if isinstance(gains, ObserverGains) else gains.rational
+    return tuple(0 if p.may_jump else max(gains.design.degree, 1) + more for p in model.parameters)

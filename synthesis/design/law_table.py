@@ -59,6 +59,8 @@ class FeedbackLaw(Protocol):
     def measured(self) -> Measured: ...  # noqa: D102
     @property
     def order(self) -> int: ...  # noqa: D102
+    @property
+    def rational(self) -> int: ...  # noqa: D102
     def controller(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Ak (g, nk, nk), Bk (g, nk, nv), Ck (g, nu, nk), Dk (g, nu, nv) in continuous time."""
 

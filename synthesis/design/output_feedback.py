@@ -10,7 +10,6 @@ what is claimed of it is proved of that table, whatever the inequalities here ha
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from itertools import product
 
 import numpy as np
 
@@ -20,21 +19,17 @@ from synthesis.design.generalised_plant import Frame, GeneralisedPlant, frame_of
 from synthesis.design.output_feedback_lmi import Still, Wanted, build
 from synthesis.design.reconstruct import reconstructed
 from synthesis.design.refusals import refuse_undetectable, refuse_unstabilisable
-from synthesis.design.three_solves import Problem, least, three_solves
+from synthesis.design.three_solves import Problem, least, starting_places, three_solves
 from synthesis.errors import ProblemError
 from synthesis.lmi.exchange import Memory
 from synthesis.lmi.problem import LmiProblem
-from synthesis.lmi.relaxation import rate_vertices
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
+from synthesis.loop.feedback import Measured
 from synthesis.models.lpv import LpvModel
 from synthesis.models.numeric import values
 
-START = {
-    0: 1,
-    1: 5,
-    2: 3,
-}  # places along each parameter that are solved for from the start, by their number; 2 for more
+RATIONAL = 2  # degrees of P that come close to an inverse
 
 
 @dataclass(frozen=True)
@@ -95,6 +90,17 @@ class OutputFeedback:
     optimum: LmiResult
     frame: Frame
     wanted: Wanted
+    measured: Measured = "outputs"
+
+    @property
+    def order(self) -> int:
+        """Of the controller: that of the plant."""
+        return len(self.model.states)
+
+    @property
+    def rational(self) -> int:
+        """Degrees more that P has in claims: of both forms, that with a moving Y has (Y - X^-1)^-1 in its P."""
+        return RATIONAL if self.wanted.still == "X" else 0
 
     @property
     def verdict(self) -> Verdict:
@@ -102,9 +108,9 @@ class OutputFeedback:
         return self.result.verdict
 
     def controller(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Ak (g, nx, nx), Bk (g, nx, ny), Ck (g, nu, nx) and Dk (g, nu, ny) at parameter values (g,) or (g, p), in 1/s.
+        """Ak (g, nx, nx), Bk (g, nx, ny), Ck (g, nu, nx) and Dk (g, nu, ny) at parameter values (g,) or (g, p).
 
-        The states are an estimate of those of the plant, in their units; ny counts the outputs that are measured.
+        The states are an estimate of those of the plant, in their units. Columns of outputs that are not measured are zero.
         """
         count, grid = len(self.model.parameters), np.asarray(points, float)
         grid = grid.reshape(-1, count) if count else grid.reshape(len(grid), 0)
@@ -116,7 +122,8 @@ class OutputFeedback:
         back = np.linalg.inv(T) * clock
         Ak, Bk, Ck, Dk = back @ Ak @ T, back @ Bk / y, u * Ck @ T, u * Dk / y
         D = values(given.D, (grid - middle) / half) / values(given.denominator, (grid - middle) / half)
-        return Ak - Bk @ D @ Ck, Bk, Ck, Dk  # designed for y - D u, and Dk D = 0
+        seen = np.eye(len(self.model.outputs))[measured_rows(self.model, self.design.measured)]
+        return Ak - Bk @ D @ Ck, Bk @ seen, Ck, Dk @ seen  # designed for y - D u, and Dk D = 0
 
     @property
     def level(self) -> float:
@@ -164,7 +171,7 @@ def design_output_feedback(model: LpvModel, design: OutputFeedbackDesign) -> Out
             levels = {c: None if bound is None else bound / frame.unit for c, bound in bounds.items()}
             return build(scaled, model.parameters, wanted, levels, margin and gamma is not None, floor)
 
-        memory = _places(problem(None))
+        memory = starting_places(problem(None))
         tried.append((least(problem, design.backoff, settings, memory), wanted, problem, memory))
     found = [entry[0] for entry in tried]
     optimum, wanted, problem, memory = min(tried, key=lambda entry: _named(entry[0]))
@@ -179,22 +186,6 @@ def _named(result: LmiResult) -> float:
     level = result.objective
     usable = level is not None and level > 0.0 and not result.report.status.endswith("Infeasible")
     return float(level) if usable and level is not None else np.inf
-
-
-def _places(problem: LmiProblem) -> Memory:
-    """Where the solves start: in the corners alone, little is asked of laws that are free elsewhere, and unknowns run away."""
-    count = len(problem.parameters)
-    line = np.linspace(-1.0, 1.0, START.get(count, 2))
-    points = list(product(line, repeat=count))  # one empty point without parameters
-    grid = np.array(points).reshape(len(points), count)
-    out: Memory = {}
-    for entry in problem.inequalities:
-        vertices = rate_vertices(entry.matrix, count)
-        rates = np.array(vertices).reshape(len(vertices), count)
-        own = grid * (np.array(entry.matrix.degrees[:count]) > 0)
-        whole = np.hstack([np.repeat(own, len(rates), axis=0), np.tile(rates, (len(own), 1))])
-        out[entry.name] = np.unique(whole, axis=0)
-    return out
 
 
 def _forms(model: LpvModel, design: OutputFeedbackDesign) -> tuple[Still, ...]:

@@ -31,7 +31,7 @@ from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.design.generalised_plant import ChannelPlant, GeneralisedPlant
 from synthesis.lmi.problem import LmiProblem
 from synthesis.models.param import SchedulingParameter
-from synthesis.polynomials.matrix import MatrixPolynomial, padded, symmetric_block
+from synthesis.polynomials.matrix import MatrixPolynomial, across, over, symmetric_block
 
 Still = Literal["X", "Y"]  # which of both does not move
 
@@ -78,8 +78,8 @@ def build(
         disc = loop.coupling.scaled_by(loop.below) * wanted.radius
         problem.require("fastest pole", symmetric_block([[disc, loop.closed_loop()], [None, disc]]))
     for part, level in parts:
-        inputs = _over(loop.input(part, "Y"), loop.input(part, "X"))
-        outputs = _over(loop.output(part, "Y").T, loop.output(part, "X").T)
+        inputs = over(loop.input(part, "Y"), loop.input(part, "X"))
+        outputs = over(loop.output(part, "Y").T, loop.output(part, "X").T)
         problem.require(f"gain {part.channel.name}", -loop.gain(part, level, rate, inputs, outputs))
     return problem
 
@@ -131,7 +131,7 @@ class _Loop:
         """A_c."""
         assert self.cross is not None
         right = self._with_feedthrough(self.A, self.B, self.C)
-        return _over(_across(self.closed("Y"), right), _across(self.cross.T - right.T, self.closed("X")))
+        return over(across(self.closed("Y"), right), across(self.cross.T - right.T, self.closed("X")))
 
     def input(self, part: ChannelPlant, half: str) -> MatrixPolynomial:
         """E + B Dh F or X E + Bh F."""
@@ -166,25 +166,3 @@ def _degrees(problem: LmiProblem, wanted: Wanted, name: str) -> tuple[int, ...]:
         return p.rate_minimum < 0.0 or p.rate_maximum > 0.0
 
     return tuple(0 if p.may_jump or (name == wanted.still and moves(p)) else wanted.degree for p in problem.parameters)
-
-
-def _across(left: MatrixPolynomial, right: MatrixPolynomial) -> MatrixPolynomial:
-    """[left, right]."""
-    return _over(left.T, right.T).T
-
-
-def _over(upper: MatrixPolynomial, lower: MatrixPolynomial) -> MatrixPolynomial:
-    """[upper; lower]."""
-    count = upper.variables
-    rest = (upper.shape[0], lower.shape[0])
-    leading = np.maximum(upper.coefficients.shape[:count], lower.coefficients.shape[:count])
-    width = max(upper.decisions, lower.decisions) + 1
-    return MatrixPolynomial(
-        np.concatenate(
-            [
-                padded(part.coefficients, (*(int(n) for n in leading), rows, part.shape[1], width))
-                for part, rows in zip((upper, lower), rest, strict=True)
-            ],
-            axis=-3,
-        )
-    )

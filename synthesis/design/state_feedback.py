@@ -106,6 +106,7 @@ class StateFeedbackGains:
     scale: FeedbackScale
     measured: Measured = "states"
     order: int = 0
+    rational: int = 0  # degrees more that P has in claims (`synthesis.design.deploy.lyapunov_degree`)
 
     @property
     def verdict(self) -> Verdict:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from synthesis.certificate.rounding import round_down, round_up
 from synthesis.errors import ProblemError
 from synthesis.lmi.exchange import Memory
 from synthesis.lmi.problem import LmiProblem
-from synthesis.lmi.relaxation import relaxation_of
+from synthesis.lmi.relaxation import rate_vertices, relaxation_of
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
@@ -24,6 +25,8 @@ from synthesis.lmi.solve import solve
 KEPT = 0.95  # of the largest common margin, when the gains are chosen
 STEPS = (1.001, 1.01, 1.1, 1.5, 3.0, 10.0, 100.0)  # from the level that a solver names to one that holds
 BISECTIONS = 14
+# Places along each parameter that are solved for from the start, by their number; 2 for more
+START = {0: 1, 1: 5, 2: 3}
 
 Problem = Callable[..., LmiProblem]
 Level = Callable[[float], float]
@@ -48,6 +51,22 @@ def least(problem: Problem, backoff: float, settings: LmiSettings, memory: Memor
     # By exchange it is not handed on: it need not hold on the continuum, only the level a back-off above it.
     bounding = backoff > 0.0 and relaxation_of(first, settings) == "exchange"
     return solve(first, replace(settings, verify=not bounding), memory)
+
+
+def starting_places(problem: LmiProblem) -> Memory:
+    """Where the solves start: in the corners alone, little is asked of laws that are free elsewhere, and unknowns run away."""
+    count = len(problem.parameters)
+    line = np.linspace(-1.0, 1.0, START.get(count, 2))
+    points = list(product(line, repeat=count))  # one empty point without parameters
+    grid = np.array(points).reshape(len(points), count)
+    out: Memory = {}
+    for entry in problem.inequalities:
+        vertices = rate_vertices(entry.matrix, count)
+        rates = np.array(vertices).reshape(len(vertices), count)
+        own = grid * (np.array(entry.matrix.degrees[:count]) > 0)
+        whole = np.hstack([np.repeat(own, len(rates), axis=0), np.tile(rates, (len(own), 1))])
+        out[entry.name] = np.unique(whole, axis=0)
+    return out
 
 
 def three_solves(

@@ -1,0 +1,108 @@
+"""The inequalities of one step of `synthesis.design.static_feedback`: for P and a given K, or for both near a given pair."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimators.arrays import FloatArray
+from synthesis.design.generalised_plant import ChannelPlant, GeneralisedPlant
+from synthesis.lmi.problem import LmiProblem
+from synthesis.lmi.result import LmiResult
+from synthesis.polynomials.matrix import MatrixPolynomial, across, symmetric_block
+
+SQUARE_OF_WEIGHT = (0.1, 1e3)  # of U against V, where one of both is next to nothing
+
+
+@dataclass(frozen=True)
+class Point:
+    """P and K as known polynomials, in the coordinates of the plant."""
+
+    P: MatrixPolynomial
+    K: MatrixPolynomial
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Which entries of K may be other than zero (nu, ny), and the degree of each in the parameters."""
+
+    entries: FloatArray
+    degree: int
+
+
+class StaticLoop:
+    """A problem in P, with K given (`at` None) or unknown near the pair `at`; time in units of 1/clock s."""
+
+    def __init__(
+        self,
+        problem: LmiProblem,
+        plant: GeneralisedPlant,
+        clock: float,
+        degree: int,
+        gain: MatrixPolynomial | Structure,
+        at: Point | None = None,
+    ) -> None:
+        self.problem, self.at = problem, at
+        self.A, self.B, self.C = (problem.scaled(getattr(plant, key)) for key in "ABC")
+        degrees = tuple(0 if p.may_jump else degree for p in problem.parameters)
+        self.P = problem.symmetric("P", self.A.shape[0], degrees)
+        self.K = self._unknown(gain) if isinstance(gain, Structure) else gain
+        product = self.P @ self.A
+        self.rate = product + product.T + problem.time_derivative(self.P) * (1.0 / clock)
+        problem.require("P > 0", self.P)
+
+    def require_gain(self, part: ChannelPlant, level: MatrixPolynomial) -> None:
+        """The L2 gain of a channel."""
+        E, F, Cz, Dzd, Dzu = (self.problem.scaled(getattr(part, key)) for key in ("E", "F", "Cz", "Dzd", "Dzu"))
+        outputs, direct = Cz + Dzu @ self.K @ self.C, Dzd + Dzu @ self.K @ F
+        w, z = (self.problem.constant(np.eye(size)).scaled_by(level) for size in (E.shape[1], Cz.shape[0]))
+        own = symmetric_block([[self.rate, self.P @ E, outputs.T], [None, -w, direct.T], [None, None, -z]])
+        self._require(f"gain {part.channel.name}", own, across(self.C, F))
+
+    def require_decay(self, rate: float) -> None:
+        """|x|_P falls at least like exp(-rate t)."""
+        self._require("decay rate", self.rate + self.P * (2.0 * rate), self.C)
+
+    def _require(self, name: str, own: MatrixPolynomial, seen: MatrixPolynomial) -> None:
+        """own + U'V + V'U < 0 with U = [B'P, 0], V = [K seen, 0]."""
+        size = own.shape[0]
+
+        def padded(matrix: MatrixPolynomial) -> MatrixPolynomial:
+            missing = size - matrix.shape[1]
+            return across(matrix, self.problem.constant(np.zeros((matrix.shape[0], missing)))) if missing else matrix
+
+        def pair(P: MatrixPolynomial, K: MatrixPolynomial) -> tuple[MatrixPolynomial, MatrixPolynomial]:
+            return padded(self.B.T @ P), padded(K @ seen)
+
+        U, V = pair(self.P, self.K)
+        if self.at is None:
+            self.problem.require(name, -(own + U.T @ V + V.T @ U))
+            return
+        U0, V0 = pair(self.at.P, self.at.K)
+        sizes = [float(np.linalg.norm(m.coefficients)) for m in (V0, U0)]
+        square = sizes[0] / max(sizes[1], 1e-300)
+        weight = float(np.sqrt(np.clip(square, *SQUARE_OF_WEIGHT)))
+
+        def apart(U: MatrixPolynomial, V: MatrixPolynomial, sign: float) -> MatrixPolynomial:
+            return U * (weight / np.sqrt(2.0)) + V * (sign / (weight * np.sqrt(2.0)))
+
+        S, D, D0 = apart(U, V, 1.0), apart(U, V, -1.0), apart(U0, V0, -1.0)
+        cross = D0.T @ D
+        unit = self.problem.constant(np.eye(S.shape[0]))
+        self.problem.require(name, symmetric_block([[cross + cross.T - D0.T @ D0 - own, S.T], [None, unit]]))
+
+    def _unknown(self, structure: Structure) -> MatrixPolynomial:
+        rows, columns = structure.entries.shape
+        total = self.problem.constant(np.zeros((rows, columns)))
+        for i, j in zip(*np.nonzero(structure.entries), strict=True):
+            left, right = np.zeros((rows, 1)), np.zeros((1, columns))
+            left[i, 0] = right[0, j] = 1.0
+            entry = self.problem.matrix(f"K{i},{j}", 1, 1, structure.degree)
+            placed: MatrixPolynomial = self.problem.constant(left) @ entry @ self.problem.constant(right)
+            total = total + placed
+        return total
+
+    def found(self, result: LmiResult) -> Point:
+        """P and K that a solve ended with."""
+        return Point(result.values["P"], self.K.substitute(result.decisions) if self.K.decisions else self.K)
