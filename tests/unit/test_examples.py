@@ -46,6 +46,26 @@ def test_turbine_gives_the_published_gains_of_its_baseline_controller() -> None:
     assert line[1] == pytest.approx(2.0 * line[0])
 
 
+def test_files_about_one_plant_have_one_set_of_numbers() -> None:
+    for first, second in (("wind-turbine", "turbine-pitch"), ("vehicle-speed", "cruise")):
+        one, other = constants(any_model(first)), constants(any_model(second))
+        assert {name: one[name] for name in other} == other
+
+
+def test_cruise_control_leaves_no_error_on_a_slope_and_respects_its_limits() -> None:
+    """With the integral as a state every constant road force is answered by traction alone: F in the end, the error zero."""
+    spec, folder = load_spec("cruise-feedback")
+    content = schedule_content(deploy(spec.design(spec.plant(folder).model), spec.deploy_settings()), spec.name)
+    assert all(proof.proved for proof in prove(content))
+    schedule = GainSchedule.from_content(content)
+    paths, force = np.full((2, 1601, 1), 30.0), np.array([[900.0], [9000.0]])
+    run = simulate(schedule, schedule, paths, disturbances={"road_force": np.repeat(force, 1600, axis=1)})
+    assert run.of("speed_error")[0, -1] == pytest.approx(0.0, abs=1e-3)
+    assert run.of("wanted_traction")[0, -1] == pytest.approx(900.0, abs=1.0)
+    assert run.of("wanted_traction")[1].max() == 4000.0  # the limit of the file: too little for this road
+    assert run.of("speed_error")[1, -1] < -10.0
+
+
 def test_satellite_has_the_mode_of_two_bodies_on_a_spring() -> None:
     A = any_model("satellite").on([[0.25, 0.0038]]).A[0]
     frequency = np.abs(np.linalg.eigvals(A)).max()
