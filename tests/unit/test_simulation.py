@@ -16,11 +16,8 @@ from analysis import AnalysisError, ContinuousLoop, NonlinearPlant, random_traje
 from analysis.simulation.closed_loop import closed_loop
 from analysis.simulation.error_update import error_update
 from analysis.simulation.flow import moving, phi_times
-from analysis.simulation.linear import Linear
-from analysis.simulation.norms_along import h2_along, peak_along
 from analysis.simulation.plants import matrices_of
 from analysis.simulation.trajectories import FAMILIES
-from analysis.simulation.worst_input import worst_inputs
 from estimators.faults import Flag
 from estimators.schedule import GainSchedule
 from synthesis import LpvModel, NonlinearModel, SchedulingParameter, Signal
@@ -227,35 +224,3 @@ def test_a_feedback_loop_is_what_its_parts_do(by_states: bool) -> None:
         x = whole @ np.concatenate([x, u, d])
         state = loop.A[0] @ state + loop.B[0] @ d
         assert state == pytest.approx(np.concatenate([x, own]), rel=1e-10)
-
-
-def test_gramians_along_a_constant_trajectory_give_the_norms_of_the_system() -> None:
-    """x+ = a x + b w, z = x + d w: H2 norm and energy to peak are both sqrt(b^2/(1 - a^2) + d^2)."""
-    system = [np.full((1, 400, 1, 1), value) for value in (0.9, 0.5, 1.0, 0.3)]
-    wanted = np.sqrt(0.25 / (1.0 - 0.81) + 0.09)
-    assert h2_along(Linear(*system)) == pytest.approx([wanted], rel=1e-12)
-    assert peak_along(Linear(*system)) == pytest.approx([wanted], rel=1e-12)
-    short = Linear(*(part[:, :3] for part in system))  # two samples: 0.25 (1 + 0.81) + 0.09
-    assert h2_along(short) == peak_along(short) == pytest.approx([np.sqrt(0.25 * 1.81 + 0.09)], rel=1e-12)
-
-
-def test_the_worst_input_is_that_of_the_dense_operator() -> None:
-    """Ten samples of a time-varying system: the largest singular value of its block triangular matrix."""
-    rng, N = np.random.default_rng(4), 10
-    A, B, C = (
-        0.5 * rng.normal(size=(1, N + 1, 2, 2)),
-        rng.normal(size=(1, N + 1, 2, 2)),
-        rng.normal(size=(1, N + 1, 1, 2)),
-    )
-    D = rng.normal(size=(1, N + 1, 1, 2))
-    dense = np.zeros((N + 1, 2 * N))
-    for j in range(N):
-        dense[j, 2 * j : 2 * j + 2] = D[0, j]
-        reach = B[0, j]
-        for i in range(j + 1, N + 1):
-            dense[i, 2 * j : 2 * j + 2] = C[0, i] @ reach
-            reach = A[0, i] @ reach
-    values = np.linalg.svd(dense, compute_uv=False)
-    few, many = (worst_inputs(Linear(A, B, C, D), rng.normal(size=(1, N, 2)), rounds)[0][0] for rounds in (2, 200))
-    assert many == pytest.approx(values[0], rel=1e-9)
-    assert few <= values[0] * (1.0 + 1e-12)
