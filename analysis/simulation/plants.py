@@ -49,10 +49,13 @@ class LinearPlant:
         self.outputs = tuple(s.name for s in system.outputs)
         self.disturbances = tuple(s.name for s in system.disturbances)
         self.parameters = tuple(p.name for p in system.parameters)
+        self._last: tuple[FloatArray, Matrices] | None = None
 
     def matrices(self, p: FloatArray) -> Matrices:
-        """A, B, C, D, E, F at parameters (g, p), stacked."""
-        return matrices_of(self.system, p)
+        """A, B, C, D, E, F at parameters (g, p), stacked; outputs and motion of a sample ask for the same."""
+        if self._last is None or not np.array_equal(self._last[0], p):
+            self._last = p.copy(), matrices_of(self.system, p)
+        return self._last[1]
 
     def output(self, x: FloatArray, u: FloatArray, d: FloatArray, p: FloatArray) -> FloatArray:
         """C x + D u + F d."""
