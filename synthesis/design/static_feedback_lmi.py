@@ -12,6 +12,7 @@ from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult
 from synthesis.polynomials.matrix import MatrixPolynomial, across, symmetric_block
 
+HALF = 0.5**0.5
 SQUARE_OF_WEIGHT = (0.1, 1e3)  # of U against V, where one of both is next to nothing
 
 
@@ -69,8 +70,8 @@ class StaticLoop:
         size = own.shape[0]
 
         def padded(matrix: MatrixPolynomial) -> MatrixPolynomial:
-            missing = size - matrix.shape[1]
-            return across(matrix, self.problem.constant(np.zeros((matrix.shape[0], missing)))) if missing else matrix
+            missing = np.zeros((matrix.shape[0], size - matrix.shape[1]))
+            return across(matrix, self.problem.constant(missing)) if missing.size else matrix
 
         def pair(P: MatrixPolynomial, K: MatrixPolynomial) -> tuple[MatrixPolynomial, MatrixPolynomial]:
             return padded(self.B.T @ P), padded(K @ seen)
@@ -85,7 +86,7 @@ class StaticLoop:
         weight = float(np.sqrt(np.clip(square, *SQUARE_OF_WEIGHT)))
 
         def apart(U: MatrixPolynomial, V: MatrixPolynomial, sign: float) -> MatrixPolynomial:
-            return U * (weight / np.sqrt(2.0)) + V * (sign / (weight * np.sqrt(2.0)))
+            return U * (weight * HALF) + V * (sign * HALF / weight)
 
         S, D, D0 = apart(U, V, 1.0), apart(U, V, -1.0), apart(U0, V0, -1.0)
         cross = D0.T @ D
