@@ -24,7 +24,8 @@ def check(folder: Path, model: str = MODEL, spec: str = SPEC) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["quarter-car-observer", "pmsm-observer", "inverted-pendulum-observer", *shipped_specs()]
+    "name",
+    ["quarter-car-observer", "pmsm-observer", "inverted-pendulum-observer", "quarter-car-feedback", *shipped_specs()],
 )
 def test_what_is_shipped_passes(name: str) -> None:
     found, place = load_spec(name)
