@@ -12,13 +12,17 @@ import sympy as sp
 from analysis.observability.hidden_modes import undetectable_mode, unstabilisable_mode
 from estimators.arrays import FloatArray
 from estimators.schedule import check_content
+from studies.law_spec import form_of
 from studies.spec import ScheduleSpec
 from synthesis.certificate.content import subject_of
 from synthesis.design.deploy import Deployment
 from synthesis.design.export import schedule_content
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_channel_matrices
+from synthesis.design.generalised_plant import measured_rows
 from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains, channel_matrices
-from synthesis.design.state_feedback import check_limits
+from synthesis.design.output_feedback import OutputFeedbackDesign
+from synthesis.design.refusals import refuse_undetectable
+from synthesis.design.state_feedback import StateFeedbackDesign, check_limits
 from synthesis.errors import ProblemError
 from synthesis.models.lpv import LpvModel
 
@@ -53,8 +57,10 @@ def _check_feedback(spec: ScheduleSpec, model: LpvModel) -> None:
     """Names, sizes and limits; a mode that no input moves; inputs that cost nothing, whose gains have no bound."""
     design = spec.feedback_design()
     pairs = [feedback_channel_matrices(model, channel) for channel in design.channels]
-    check_limits(model, design.limits)
-    _check_effect(model, design.channels, [W for W, _ in pairs])
+    limits = design.limits if isinstance(design, StateFeedbackDesign) else None
+    check_limits(model, limits)
+    forces = [W for W, _ in pairs]
+    _check_effect(model, design.channels, forces)
     if not model.inputs:
         raise ProblemError(f"model '{model.name}' has no input; a feedback law needs one")
     hidden = unstabilisable_mode(model)
@@ -63,16 +69,21 @@ def _check_feedback(spec: ScheduleSpec, model: LpvModel) -> None:
             f"model '{model.name}' is not stabilisable: {hidden.words} does not decay and is moved by none of the input(s) "
             f"{', '.join(u.name for u in model.inputs)}; give it an input, or shrink the range"
         )
+    if not isinstance(design, StateFeedbackDesign):
+        refuse_undetectable(model, measured_rows(model, getattr(design, "measured", None)))
     if design.fastest_pole is not None:
         return
-    limited = () if design.limits is None else tuple(design.limits.inputs)
+    if isinstance(design, OutputFeedbackDesign):
+        _check_noise(model, forces, measured_rows(model, design.measured))
+    limited = () if limits is None else tuple(limits.inputs)
+    bounds = "fastest_pole or input_limits" if isinstance(design, StateFeedbackDesign) else "fastest_pole"
     acting = sp.Matrix.vstack(model.D, sp.eye(len(model.inputs)))
     for i, signal in enumerate(model.inputs):
         rows = [len(model.states) + k for k, entry in enumerate(acting[:, i]) if entry != 0]
         if signal.name not in limited and not any(Z[:, rows].any() for _, Z in pairs):
             raise ProblemError(
                 f"model '{model.name}': no channel sees the input {signal.name}, so its gains have no bound; put it into the "
-                "performance of a channel with a size, or give fastest_pole or input_limits"
+                f"performance of a channel with a size, or give {bounds}"
             )
 
 
@@ -81,8 +92,10 @@ def check_file(spec: ScheduleSpec, model: LpvModel) -> None:
     lines = tuple(np.array([p.minimum, p.maximum]) for p in model.parameters)
     gains: Any
     if spec.law is not None:
-        shape = len(model.inputs), len(model.states)
-        gains = SimpleNamespace(model=model, design=spec.feedback_design(), measured="states", order=0)
+        design = spec.feedback_design()
+        measured, order = form_of(model, design)
+        shape = order + len(model.inputs), order + len(model.states if measured == "states" else model.outputs)
+        gains = SimpleNamespace(model=model, design=design, measured=measured, order=order)
     else:
         shape, empty = (len(model.states), len(model.outputs)), cast(Any, None)
         gains = ObserverGains(
@@ -125,13 +138,14 @@ def _check_effect(model: LpvModel, channels: Sequence[Channel | FeedbackChannel]
                 )
 
 
-def _check_noise(model: LpvModel, forces: list[FloatArray]) -> None:
+def _check_noise(model: LpvModel, forces: list[FloatArray], rows: Sequence[int] | None = None) -> None:
     """Without noise on some combination of outputs, gains grow without bound while the level falls: a singular problem."""
     corners = np.stack(np.meshgrid(*[[p.minimum, p.middle, p.maximum] for p in model.parameters], indexing="ij"), -1)
-    F = model.on(corners.reshape(-1, len(model.parameters))).F @ np.hstack(forces)
+    places = range(len(model.outputs)) if rows is None else rows
+    F = model.on(corners.reshape(-1, len(model.parameters))).F[:, list(places)] @ np.hstack(forces)
     size = np.linalg.norm(F, axis=-1, keepdims=True)
     scaled = F / np.where(size > 0.0, size, 1.0)  # outputs in units of their noise
-    values, names = np.linalg.svd(scaled, compute_uv=False), [o.name for o in model.outputs]
+    values, names = np.linalg.svd(scaled, compute_uv=False), [model.outputs[i].name for i in places]
     rank = (values > RANK * np.maximum(values[:, :1], 1e-300)).sum(axis=-1).min() if F.shape[-1] else 0
     if rank < len(names):
         free = [name for name, row in zip(names, size[..., 0].T, strict=True) if not row.all()] or names

@@ -9,13 +9,12 @@ from typing import Any, Self
 from pydantic import Field, model_validator
 
 from estimators.errors import unknown
-from studies.law_spec import check_keys, feedback_design, without_other_laws
+from studies.law_spec import FeedbackDesign, check_keys, design_feedback, feedback_design, without_other_laws
 from studies.spec_tables import DeploySpec, DesignSpec, ModelSpec
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.design.law_table import Gains
 from synthesis.design.sampled_observer import design_sampled_observer
-from synthesis.design.state_feedback import StateFeedbackDesign, design_state_feedback
 from synthesis.errors import SpecError
 from synthesis.exchange.model_file import load_model
 from synthesis.exchange.model_text import model_text
@@ -107,14 +106,14 @@ class ScheduleSpec(StrictTable):
             channels, spec.degree, spec.decay_rate, spec.fastest_pole, backoff=spec.backoff, settings=settings
         )
 
-    def feedback_design(self) -> StateFeedbackDesign:
+    def feedback_design(self) -> FeedbackDesign:
         """As the synthesis takes it, of a feedback law."""
         return feedback_design(self.gains)
 
     def design(self, model: LpvModel) -> Gains:
         """The gains for the law and the update that the specification names."""
         if self.law is not None:
-            return design_state_feedback(model, self.feedback_design())
+            return design_feedback(model, self.feedback_design())
         if self.deploy.update == "sampled":
             return design_sampled_observer(model, self.observer_design(), self.deploy.sample_time)
         return design_observer(model, self.observer_design())

@@ -47,13 +47,17 @@ class ChannelSpec(StrictTable):
 class DesignSpec(StrictTable):
     """What is asked of the gains of an observer (synthesis.design.hinf_observer), or of the feedback law that is named."""
 
-    law: Literal["state feedback"] | None = None
+    law: Literal["state feedback", "output feedback", "static output feedback"] | None = None
     degree: int = 1
     decay_rate: float = 0.0
     fastest_pole: float | None = None
     damping: float | None = None
     input_limits: dict[str, float] | None = None
     state_sizes: dict[str, float] | None = None
+    feedthrough: bool | None = None
+    measured: list[str] | None = Field(default=None, min_length=1)
+    start: list[list[float]] | None = Field(default=None, min_length=1)
+    uses: list[Annotated[list[str], Field(min_length=2, max_length=2)]] | None = Field(default=None, min_length=1)
     backoff: float = 0.02
     relaxation: Literal["auto", "grid", "vertex", "exact"] = "auto"
     points: int = 140

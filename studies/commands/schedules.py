@@ -129,9 +129,11 @@ def _cells(run: ScheduleRun) -> tuple[str, ...]:
 
 
 def _short(channel: str) -> str:
-    """Of many disturbances the first; `--json` and `certify` have all."""
-    first, _, rest = channel.partition(" + ")
-    return channel if len(channel) <= LONGEST_CHANNEL or not rest else f"{first} + .. ->{channel.rpartition('->')[2]}"
+    """Of many disturbances, and of many signals behind the arrow, the first; `--json` and `certify` have all."""
+    if len(channel) <= LONGEST_CHANNEL:
+        return channel
+    sides = (side.partition(" + ") for side in channel.split(" -> "))
+    return " -> ".join(f"{first} + .." if rest else first for first, _, rest in sides)
 
 
 def _row(run: ScheduleRun) -> dict[str, Any]:

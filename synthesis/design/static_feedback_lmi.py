@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,10 @@ from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult
 from synthesis.polynomials.matrix import MatrixPolynomial, across, symmetric_block
 
+HALF = 0.5**0.5
 SQUARE_OF_WEIGHT = (0.1, 1e3)  # of U against V, where one of both is next to nothing
+
+Pair = Callable[[MatrixPolynomial, MatrixPolynomial], tuple[MatrixPolynomial, MatrixPolynomial]]
 
 
 @dataclass(frozen=True)
@@ -58,23 +62,38 @@ class StaticLoop:
         outputs, direct = Cz + Dzu @ self.K @ self.C, Dzd + Dzu @ self.K @ F
         w, z = (self.problem.constant(np.eye(size)).scaled_by(level) for size in (E.shape[1], Cz.shape[0]))
         own = symmetric_block([[self.rate, self.P @ E, outputs.T], [None, -w, direct.T], [None, None, -z]])
-        self._require(f"gain {part.channel.name}", own, across(self.C, F))
+        n, seen = own.shape[0], across(self.C, F)
+        self._require(
+            f"gain {part.channel.name}",
+            own,
+            lambda P, K: (self._within(self.B.T @ P, 0, n), self._within(K @ seen, 0, n)),
+        )
 
     def require_decay(self, rate: float) -> None:
         """|x|_P falls at least like exp(-rate t)."""
-        self._require("decay rate", self.rate + self.P * (2.0 * rate), self.C)
+        own = self.rate + self.P * (2.0 * rate)
+        self._require("decay rate", own, lambda P, K: (self.B.T @ P, K @ self.C))
 
-    def _require(self, name: str, own: MatrixPolynomial, seen: MatrixPolynomial) -> None:
-        """own + U'V + V'U < 0 with U = [B'P, 0], V = [K seen, 0]."""
-        size = own.shape[0]
+    def require_disc(self, radius: float) -> None:
+        """Every frozen pole lies within the disc about zero: [r P, P A; *, r P] > 0 of the closed loop."""
+        disc, n = self.P * -radius, self.A.shape[0]
+        own = symmetric_block([[disc, -(self.P @ self.A)], [None, disc]])
+        self._require(
+            "fastest pole",
+            own,
+            lambda P, K: (self._within(-(self.B.T @ P), 0, 2 * n), self._within(K @ self.C, n, 2 * n)),
+        )
 
-        def padded(matrix: MatrixPolynomial) -> MatrixPolynomial:
-            missing = size - matrix.shape[1]
-            return across(matrix, self.problem.constant(np.zeros((matrix.shape[0], missing)))) if missing else matrix
+    def _within(self, matrix: MatrixPolynomial, start: int, width: int) -> MatrixPolynomial:
+        """[0, matrix, 0] of the given width."""
+        rows, columns = matrix.shape
+        sides = (start, width - start - columns)
+        blanks = [self.problem.constant(np.zeros((rows, size))) for size in sides]
+        blocks = [*blanks[: int(sides[0] > 0)], matrix, *(blanks[1:] if sides[1] else [])]
+        return across(*blocks)
 
-        def pair(P: MatrixPolynomial, K: MatrixPolynomial) -> tuple[MatrixPolynomial, MatrixPolynomial]:
-            return padded(self.B.T @ P), padded(K @ seen)
-
+    def _require(self, name: str, own: MatrixPolynomial, pair: Pair) -> None:
+        """own + U'V + V'U < 0 with U, V = pair(P, K)."""
         U, V = pair(self.P, self.K)
         if self.at is None:
             self.problem.require(name, -(own + U.T @ V + V.T @ U))
@@ -85,7 +104,7 @@ class StaticLoop:
         weight = float(np.sqrt(np.clip(square, *SQUARE_OF_WEIGHT)))
 
         def apart(U: MatrixPolynomial, V: MatrixPolynomial, sign: float) -> MatrixPolynomial:
-            return U * (weight / np.sqrt(2.0)) + V * (sign / (weight * np.sqrt(2.0)))
+            return U * (weight * HALF) + V * (sign * HALF / weight)
 
         S, D, D0 = apart(U, V, 1.0), apart(U, V, -1.0), apart(U0, V0, -1.0)
         cross = D0.T @ D

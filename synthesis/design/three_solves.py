@@ -26,7 +26,7 @@ KEPT = 0.95  # of the largest common margin, when the gains are chosen
 STEPS = (1.001, 1.01, 1.1, 1.5, 3.0, 10.0, 100.0)  # from the level that a solver names to one that holds
 BISECTIONS = 14
 # Places along each parameter that are solved for from the start, by their number; 2 for more
-START = {0: 1, 1: 5, 2: 3}
+START = {1: 5, 2: 3}
 
 Problem = Callable[..., LmiProblem]
 Level = Callable[[float], float]
@@ -54,18 +54,22 @@ def least(problem: Problem, backoff: float, settings: LmiSettings, memory: Memor
 
 
 def starting_places(problem: LmiProblem) -> Memory:
-    """Where the solves start: in the corners alone, little is asked of laws that are free elsewhere, and unknowns run away."""
+    """Where the solves start: in the corners alone, little is asked of laws that are free elsewhere, and unknowns run away.
+
+    With one parameter as many places as the degree of the inequality has coefficients, denser towards the ends.
+    """
     count = len(problem.parameters)
-    line = np.linspace(-1.0, 1.0, START.get(count, 2))
-    points = list(product(line, repeat=count))  # one empty point without parameters
-    grid = np.array(points).reshape(len(points), count)
     out: Memory = {}
     for entry in problem.inequalities:
-        vertices = rate_vertices(entry.matrix, count)
-        rates = np.array(vertices).reshape(len(vertices), count)
-        own = grid * (np.array(entry.matrix.degrees[:count]) > 0)
-        whole = np.hstack([np.repeat(own, len(rates), axis=0), np.tile(rates, (len(own), 1))])
-        out[entry.name] = np.unique(whole, axis=0)
+        degrees = entry.matrix.degrees[:count]
+        numbers = [max(START.get(count, 2), degree + 1 if count == 1 else 0) if degree else 1 for degree in degrees]
+        lines = [np.cos(np.linspace(np.pi, 0.0, n)) if n > 1 else np.zeros(1) for n in numbers]
+        points, vertices = (
+            list(product(*lines)),
+            rate_vertices(entry.matrix, count),
+        )  # one empty point without parameters
+        own, rates = (np.array(rows).reshape(len(rows), count) for rows in (points, vertices))
+        out[entry.name] = np.hstack([np.repeat(own, len(rates), axis=0), np.tile(rates, (len(own), 1))])
     return out
 
 

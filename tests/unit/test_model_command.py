@@ -171,6 +171,7 @@ def test_examples_are_complete() -> None:
         "inverted-pendulum",
         "missile",
         "pmsm",
+        "pmsm-pi",
         "quarter-car",
         "satellite",
         "turbine-pitch",
