@@ -17,14 +17,29 @@ from analysis.errors import AnalysisError
 from analysis.simulation.channel import channel_of
 from analysis.simulation.linear import Linear
 from analysis.simulation.norms_along import h2_along, peak_along
-from analysis.simulation.searched import Measure, ScheduleQuestion, bad_trajectories, least_decay
+from analysis.simulation.searched import (
+    Measure,
+    ScheduleQuestion,
+    bad_trajectories,
+    largest_continuous_gain,
+    least_decay,
+)
 from analysis.simulation.simulate import simulate
 from analysis.simulation.simulation import Simulation
 from analysis.simulation.trajectories import random_trajectories
 from analysis.simulation.worst_input import worst_inputs
 from estimators.arrays import FloatArray
 from estimators.schedule import FIRST_FORMAT, GainSchedule, upgraded
-from synthesis.certificate.claims import GAINS, UPDATE_OF, WITH_CHANNEL, Claim, ClaimChannel, claim_name, claim_unit
+from synthesis.certificate.claims import (
+    ERROR_EQUATION,
+    GAINS,
+    UPDATE_OF,
+    WITH_CHANNEL,
+    Claim,
+    ClaimChannel,
+    claim_name,
+    claim_unit,
+)
 from synthesis.certificate.content import claims_of, subject_of
 from synthesis.certificate.proof import certificate
 
@@ -32,17 +47,18 @@ SETTLED = 5.0  # decay times that a run lasts
 FEWEST, MOST = 200, 3000  # samples
 MOST_NUMBERS = 50_000_000  # of all matrices along all runs: 400 MB
 ALONG = {"sampled H2 norm": h2_along, "sampled energy to peak": peak_along}
+CONTINUOUS = ("decay rate", "gain")  # of the error equation
 MEASURED = ("sampled gain", "motion gain", *ALONG)
 ROUGH, ROUNDS = 6, 20  # of the worst input, while searching and in the end
-ROUNDING = 1e-9  # relative, of runs: a level is not beaten by less
+ROUNDING, QUADRATURE = 1e-9, 1e-4  # relative, of samples and of continuous time: a level is not beaten by less
 
 
 @dataclass(frozen=True)
 class Amplification:
     """One claim: `level` in `unit`, and what runs show of it.
 
-    `mean` and `largest` over the random trajectories (NaN for a decay rate), `worst` along `trajectory` (N+1, p) under `inputs`
-    (N, m), numbers of their sizes, by `names`. A decay rate is beaten from below, a gain from above.
+    `mean` and `largest` over the random trajectories (NaN for decay and for the error equation), `worst` along `trajectory`
+    (N+1, p) under `inputs` (N, m), numbers of their sizes, by `names`. A decay rate is beaten from below, a gain from above.
     """
 
     claim: str
@@ -61,13 +77,15 @@ class Amplification:
 
     @property
     def share(self) -> float:
-        """Of the certified level that was reached."""
-        return self.level / self.worst if self.is_decay else self.worst / self.level
+        """Of the certified level that was reached; infinite if what should decay grows."""
+        if self.is_decay:
+            return self.level / self.worst if self.worst > 0.0 else np.inf
+        return self.worst / self.level
 
     @property
     def beaten(self) -> bool:
         """Whether a run contradicts the claim."""
-        return self.share > 1.0 + ROUNDING
+        return self.share > 1.0 + (QUADRATURE if self.kind in ERROR_EQUATION else ROUNDING)
 
     @property
     def is_decay(self) -> bool:
@@ -108,9 +126,9 @@ def amplification(
     paths = random_trajectories(schedule, samples, runs, seed=seed)
     found = []
     for claim, proof in zip(claims, proofs, strict=True):
-        if claim.kind not in (*MEASURED, UPDATE_OF[schedule.update]):
+        if claim.kind not in (*MEASURED, *CONTINUOUS, UPDATE_OF[schedule.update]):
             continue
-        measured = _decay if claim.channel is None else _norm
+        measured = _searched if claim.channel is None or claim.kind in CONTINUOUS else _norm
         words = claim_name(claim.kind, claim.channel, subject.units), claim.kind, claim.level
         unit = claim_unit(claim.kind, claim.channel, subject.units)
         found.append(Amplification(*words, unit, proof.proved, *measured(schedule, claim, paths, seed)))
@@ -152,9 +170,11 @@ def _norm(schedule: GainSchedule, claim: Claim, paths: FloatArray, seed: int) ->
     )  # fmt: skip
 
 
-def _decay(schedule: GainSchedule, claim: Claim, paths: FloatArray, seed: int) -> tuple[Any, ...]:
+def _searched(schedule: GainSchedule, claim: Claim, paths: FloatArray, seed: int) -> tuple[Any, ...]:
+    """A decay, or a gain of the error equation: by the worst place and a periodic trajectory alone."""
+    count, kind = paths.shape[1], "gain" if claim.kind in ERROR_EQUATION else "sampled gain"
     everything = ClaimChannel({s.name: 1.0 for s in schedule.disturbances}, tuple(s.name for s in schedule.states))
-    question = ScheduleQuestion(schedule, "sampled gain", everything)
-    rate, path = least_decay(question, paths.shape[1])
-    none = np.empty((len(path) - 1, 0))
-    return np.nan, np.nan, rate, np.empty(0), path, none, (), everything.errors
+    channel = claim.channel or everything
+    look_for = least_decay if claim.channel is None else largest_continuous_gain
+    found, path = look_for(ScheduleQuestion(schedule, kind, channel), count)
+    return np.nan, np.nan, found, np.empty(0), path, np.empty((count - 1, 0)), (), channel.errors

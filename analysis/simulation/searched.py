@@ -1,4 +1,4 @@
-"""The update of a schedule as a system that the search of `analysis.lpv` can look for bad trajectories of."""
+"""A schedule's update, or its error equation, as a system that the search of `analysis.lpv` can look for bad trajectories of."""
 
 from __future__ import annotations
 
@@ -9,38 +9,43 @@ from functools import cached_property
 import numpy as np
 
 from analysis.lpv.frozen import largest_gain, slowest_decay
-from analysis.lpv.lifted import samples
+from analysis.lpv.lifted import lift, samples, worst_input
 from analysis.lpv.trajectory import Path, admissible, float_of
-from analysis.lpv.worst_path import growth_of, simple_paths, worst_path
+from analysis.lpv.worst_path import gain_of, growth_of, simple_paths, worst_path
 from analysis.simulation.box import box_of
 from analysis.simulation.channel import channel_of
 from analysis.simulation.linear import Linear
 from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule
-from synthesis.certificate.claims import ClaimChannel
+from synthesis.certificate.claims import ERROR_EQUATION, ClaimChannel
 from synthesis.loop.plant import Axis
 from synthesis.polynomials.rational import decimal
 
 EVALUATIONS = 40  # of the search for slow decay
 GENERATIONS, BEST, CHILDREN, CHANGE = 2, 4, 8, 0.4  # of the search for large gains
+PARTS = 16  # intervals of every piece of a path of the error equation
 SHORT = 400  # samples of a run while searching
 Measure = Callable[[Linear], FloatArray]  # of systems along trajectories (R, N+1, ..): how bad each is (R,)
 
 
 @dataclass(frozen=True)
 class ScheduleQuestion:
-    """x+ = A(p) x + B(p) w, z = C(p) x + D(p) w of one channel; a sample is the unit of time."""
+    """x+ or x' = A(p) x + B(p) w, z = C(p) x + D(p) w of one channel; in discrete time a sample is the unit of time."""
 
     schedule: GainSchedule
     kind: str
     channel: ClaimChannel
-    discrete: bool = True
-    order: int = 1
+    order: int = 6  # of the error equation along a line: more than plant and multilinear gains make
+
+    @property
+    def discrete(self) -> bool:
+        """Whether the claim is about the update."""
+        return self.kind not in ERROR_EQUATION
 
     @cached_property
     def axes(self) -> tuple[Axis, ...]:
-        """Ranges, and rates per sample."""
-        box, period = box_of(self.schedule), decimal(self.schedule.sample_time)
+        """Ranges, and rates per sample or per second."""
+        box, period = box_of(self.schedule), decimal(self.schedule.sample_time if self.discrete else 1.0)
         rows = zip(*box, strict=True)
         return tuple(
             Axis(
@@ -66,8 +71,12 @@ class ScheduleQuestion:
 
     def repeated(self, path: Path, count: int) -> FloatArray:
         """`count` samples of a periodic path, (count, p), admissible to the last bit."""
-        once = self.physical(samples(path))
-        many = np.tile(once, (-(-count // len(once)), 1))[None, :count]
+        if self.discrete:
+            once = self.physical(samples(path))
+            many = np.tile(once, (-(-count // len(once)), 1))[None, :count]
+        else:
+            time: FloatArray = np.asarray(self.schedule.sample_time * np.arange(count), float)
+            many = self.physical(_between(path, time))[None]
         found: FloatArray = box_of(self.schedule).limited(many, self.schedule.sample_time)[0]
         return found
 
@@ -99,12 +108,33 @@ def _changed(path: Path, axes: tuple[Axis, ...], rng: np.random.Generator) -> Pa
     return admissible(path.knots + CHANGE * rng.standard_normal(path.knots.shape), durations, axes)
 
 
+def _between(path: Path, time: FloatArray) -> FloatArray:
+    """u of a periodic path in continuous time at times (g,), s."""
+    ends = np.cumsum(path.durations)
+    within = np.mod(time, ends[-1])
+    piece = np.minimum(np.searchsorted(ends, within, side="right"), len(ends) - 1)
+    share = 1.0 - (ends[piece] - within) / path.durations[piece]
+    found: FloatArray = path.start[piece] + (path.end - path.start)[piece] * share[:, None]
+    return found
+
+
 def least_decay(question: ScheduleQuestion, count: int) -> tuple[float, FloatArray]:
     """The slowest decay found, 1/s, frozen or along a periodic path, whose monodromy matrix has it; and that path (count, p)."""
-    period = question.schedule.sample_time
+    unit = question.schedule.sample_time if question.discrete else 1.0
     place, rate = slowest_decay(question)
     path, _ = worst_path(question, growth_of(question), (0.0,), place, EVALUATIONS)
     along = -growth_of(question)(path, 0.0)
     if along < rate:
-        return along / period, question.repeated(path, count)
-    return rate / period, np.broadcast_to(question.physical(place[None]), (count, len(place)))
+        return along / unit, question.repeated(path, count)
+    return rate / unit, np.broadcast_to(question.physical(place[None]), (count, len(place)))
+
+
+def largest_continuous_gain(question: ScheduleQuestion, count: int) -> tuple[float, FloatArray]:
+    """The largest gain of an error equation found, at a frozen place or along a periodic path, and that path (count, p)."""
+    place, gain, frequency = largest_gain(question)
+    path, carrier = worst_path(question, gain_of(question), tuple(dict.fromkeys((0.0, frequency))), place, EVALUATIONS)
+    lifted = lift(question, path, carrier, PARTS)
+    along = 0.0 if lifted is None else worst_input(lifted)[0]
+    if along > gain:
+        return along, question.repeated(path, count)
+    return gain, np.broadcast_to(question.physical(place[None]), (count, len(place)))

@@ -55,7 +55,7 @@ def _verdict(one: Amplification) -> str:
 
 
 def _row(one: Amplification) -> dict[str, object]:
-    mean, largest = (None if one.is_decay else x for x in (one.mean, one.largest))
+    mean, largest = (None if math.isnan(x) else x for x in (one.mean, one.largest))
     return {
         "claim": one.claim, "kind": one.kind, "certified": one.level, "unit": one.unit, "proved": one.proved,
         "beaten": one.beaten, "mean": mean, "largest": largest, "worst": one.worst, "share": one.share,
