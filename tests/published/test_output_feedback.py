@@ -54,8 +54,9 @@ def closed(place: float) -> FloatArray:
 def table_loop(rate: float) -> tuple[FeedbackLoop, LpvModel]:
     """Ck is straight in p: two breakpoints hold the law exactly."""
     model = oscillator(rate)
-    table = {
-        (i,): fmpq_mat([[decimal(float(x)) for x in row] for row in cancelling(p)]) for i, p in enumerate((-1.0, 1.0))
+    table: dict[tuple[int, ...], fmpq_mat] = {
+        (i,): fmpq_mat([[decimal(float(x)) for x in row] for row in cancelling(place)])
+        for i, place in enumerate((-1.0, 1.0))
     }
     return FeedbackLoop(plant_of(model), ((fmpq(-1), fmpq(1)),), table, "outputs", 3), model
 
