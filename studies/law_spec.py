@@ -9,7 +9,8 @@ from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.design.law_table import FeedbackLaw
 from synthesis.design.output_feedback import OutputFeedbackDesign, design_output_feedback
 from synthesis.design.state_feedback import GainLimits, StateFeedbackDesign, design_state_feedback
-from synthesis.design.static_feedback import StaticFeedbackDesign, design_static_feedback
+from synthesis.design.static_feedback import design_static_feedback
+from synthesis.design.static_feedback_design import StaticFeedbackDesign
 from synthesis.lmi.settings import LmiSettings
 from synthesis.loop.feedback import Measured
 from synthesis.models.lpv import LpvModel

@@ -10,6 +10,9 @@ from .design.hinf_observer import Channel as Channel
 from .design.hinf_observer import ObserverDesign as ObserverDesign
 from .design.hinf_observer import ObserverGains as ObserverGains
 from .design.hinf_observer import design_observer as design_observer
+from .design.output_feedback import OutputFeedback as OutputFeedback
+from .design.output_feedback import OutputFeedbackDesign as OutputFeedbackDesign
+from .design.output_feedback import design_output_feedback as design_output_feedback
 from .design.sampled_observer import design_sampled_observer as design_sampled_observer
 from .design.stability import GainBox as GainBox
 from .design.stability import StabilityResult as StabilityResult
@@ -18,6 +21,9 @@ from .design.state_feedback import GainLimits as GainLimits
 from .design.state_feedback import StateFeedbackDesign as StateFeedbackDesign
 from .design.state_feedback import StateFeedbackGains as StateFeedbackGains
 from .design.state_feedback import design_state_feedback as design_state_feedback
+from .design.static_feedback import StaticFeedback as StaticFeedback
+from .design.static_feedback import design_static_feedback as design_static_feedback
+from .design.static_feedback_design import StaticFeedbackDesign as StaticFeedbackDesign
 from .design.well_posedness import WellPosedness as WellPosedness
 from .design.well_posedness import well_posedness as well_posedness
 from .errors import ModelError as ModelError
@@ -40,5 +46,6 @@ from .models.param import SchedulingParameter as SchedulingParameter
 from .models.param import Signal as Signal
 from .models.parameter_set import ParameterSet as ParameterSet
 from .models.parameter_set import load_parameter_set as load_parameter_set
+from .models.weighted import weighted as weighted
 from .published_certificate import CertifiedRange as CertifiedRange
 from .published_certificate import check_certificate as check_certificate

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from synthesis.design.generalised_plant import Frame, GeneralisedPlant
+from synthesis.design.static_feedback_design import StaticFeedbackDesign
 from synthesis.design.static_feedback_lmi import Point, StaticLoop, Structure
 from synthesis.design.three_solves import Problem, starting_places
 from synthesis.errors import ProblemError
@@ -20,9 +20,6 @@ from synthesis.lmi.solve import solve
 from synthesis.models.lpv import LpvModel
 from synthesis.models.numeric import values
 from synthesis.polynomials.matrix import MatrixPolynomial
-
-if TYPE_CHECKING:
-    from synthesis.design.static_feedback import StaticFeedbackDesign
 
 FINE = 1e-3  # relative fall of the level in one step, below which the steps end
 SHARE = 0.05  # by which a growth is exceeded on the way to stability

@@ -13,10 +13,11 @@ import sympy as sp
 from estimators.arrays import FloatArray
 from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.design.output_feedback import OutputFeedback, OutputFeedbackDesign, design_output_feedback
+from synthesis.design.output_feedback_lmi import Still
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import Verdict
 from synthesis.models.lpv import LpvModel
-from synthesis.models.param import Signal
+from synthesis.models.param import SchedulingParameter, Signal
 from tests.support.lmi_cases import parameter, small_model
 
 p = sp.Symbol("p")
@@ -145,6 +146,52 @@ def test_bounded_rates_buy_gain_and_no_gain_needs_the_rate() -> None:
     jumping = replace(OSCILLATOR, parameters=(parameter(rate=np.inf),))
     free = design_output_feedback(jumping, OutputFeedbackDesign((NOISY,)))
     assert free.gamma_lower is not None and free.gamma_lower > 1.05 * best.gamma
+
+
+@pytest.mark.parametrize("form", ["X", "Y"])
+def test_the_design_shows_its_gain_along_every_motion(form: Still) -> None:
+    """P of the loop from X and Y, its slope from differences: dV/dt + |z|^2/gamma - gamma |w|^2 < 0 at both ends of the rate.
+
+    The parameter rises fast and falls slowly, so that no sign of a slope can be wrong on both sides. With the slope the other way
+    round the inequality does not hold: the test can see it.
+    """
+    rising = replace(OSCILLATOR, parameters=(SchedulingParameter("p", "1", -1.0, 1.0, -0.01, 1.5),))
+    found = design_output_feedback(rising, OutputFeedbackDesign((NOISY,), degree=2, still=form))
+    frame, n, gamma = found.frame, 2, found.gamma
+    T = frame.states
+
+    def lyapunov(line: FloatArray) -> FloatArray:
+        u = np.stack([line, np.zeros_like(line)], axis=1)
+        X, Y = (found.result.values[name].at(u)[..., 0] for name in "XY")
+        X, inverse = T.T @ X @ T / frame.clock, T.T @ np.linalg.inv(Y) @ T / frame.clock
+        if form == "Y":  # V = x'Y^-1 x + (x - xk)'(X - Y^-1)(x - xk)
+            return np.block([[X, inverse - X], [inverse - X, X - inverse]])
+        other = np.linalg.inv(
+            np.linalg.inv(inverse) - np.linalg.inv(X)
+        )  # V = (x - xk)'X (x - xk) + xk'(Y - X^-1)^-1 xk
+        return np.block([[X, -X], [-X, X + other]])
+
+    line = np.linspace(-0.99, 0.99, 23)
+    A, B, C, D = closed(found, line)
+    Z = np.eye(4)[[0, 3]]
+    P, slope = lyapunov(line), (lyapunov(line + 1e-4) - lyapunov(line - 1e-4)) / 2e-4
+
+    def worst(rates: tuple[float, float]) -> float:
+        highest = -np.inf
+        for rate in rates:
+            fall = np.swapaxes(A, 1, 2) @ P + P @ A + rate * slope
+            shown = Z @ C, Z @ D
+            corner = np.swapaxes(shown[1], 1, 2) @ shown[1] / gamma - gamma * np.eye(2)
+            side = P @ B + np.swapaxes(shown[0], 1, 2) @ shown[1] / gamma
+            whole = np.block(
+                [[fall + np.swapaxes(shown[0], 1, 2) @ shown[0] / gamma, side], [np.swapaxes(side, 1, 2), corner]]
+            )
+            highest = max(highest, float(np.linalg.eigvalsh(whole).max()))
+        return highest
+
+    assert P.shape == (23, 2 * n, 2 * n) and np.linalg.eigvalsh(P).min() > 0.0
+    assert worst((-0.01, 1.5)) < 0.0
+    assert worst((0.01, -1.5)) > 0.0
 
 
 def test_several_channels_with_decay_and_a_disc_of_poles() -> None:

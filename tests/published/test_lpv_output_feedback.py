@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import control
 import numpy as np
 import pytest
 import sympy as sp
@@ -16,9 +17,11 @@ from synthesis.design.deploy import deploy
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_names
 from synthesis.design.output_feedback import OutputFeedbackDesign, design_output_feedback
+from synthesis.lmi.result import Verdict
 from synthesis.loop.feedback import FeedbackLoop
 from synthesis.loop.from_model import plant_of
 from synthesis.models.lpv import LpvModel
+from synthesis.models.weighted import weighted
 from synthesis.polynomials.rational import decimal
 from tests.support.lmi_cases import parameter, small_model
 
@@ -54,8 +57,9 @@ def closed(place: float) -> FloatArray:
 def table_loop(rate: float) -> tuple[FeedbackLoop, LpvModel]:
     """Ck is straight in p: two breakpoints hold the law exactly."""
     model = oscillator(rate)
-    table = {
-        (i,): fmpq_mat([[decimal(float(x)) for x in row] for row in cancelling(p)]) for i, p in enumerate((-1.0, 1.0))
+    table: dict[tuple[int, ...], fmpq_mat] = {
+        (i,): fmpq_mat([[decimal(float(x)) for x in row] for row in cancelling(place)])
+        for i, place in enumerate((-1.0, 1.0))
     }
     return FeedbackLoop(plant_of(model), ((fmpq(-1), fmpq(1)),), table, "outputs", 3), model
 
@@ -64,6 +68,35 @@ def decays(rate: float, degree: int) -> bool:
     loop, model = table_loop(rate)
     claim, _ = Search(loop, feedback_names(model), model.parameters, degree).prove(Wish("decay rate", 1e-3))
     return claim is not None
+
+
+def two_parameters() -> LpvModel:
+    """fdbianchi/LPVtools, demos/BasicExample: affine in two parameters in [0, 1], also the output; they may jump.
+
+    The error r - y is measured, weighed by 10/(s + 0.01), the input by (0.04 s + 0.1)/(0.004 s + 1).
+    """
+    a, b, tenth = sp.symbols("a"), sp.symbols("b"), sp.Rational(1, 10)
+    model = small_model(
+        sp.Matrix([[-2, 1], [-1, -2]]) + a * tenth * sp.Matrix([[-13, 1], [-1, -13]]) - b * sp.eye(2) / 2,
+        [[-10 - a * 2 * tenth, -10 - b * 3 * tenth]],
+        [parameter("a", 0.0, 1.0, np.inf), parameter("b", 0.0, 1.0, np.inf)], B=[[1], [1]], E=[[0], [0]], F=[[1]],
+    )  # fmt: skip
+    return weighted(model, {"y1": control.tf([10], [1, 0.01]), "u1": control.tf([0.04, 0.1], [0.004, 1])})
+
+
+def test_two_parameters_with_dynamic_weights_come_near_the_best_law_of_every_frozen_corner() -> None:
+    """The source compares with hinfsyn at the corners: no scheduled law beats the worst of those, and ours is within 1.05."""
+    model = two_parameters()
+    corners = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]])
+    at, frozen = model.on(corners), []
+    for i in range(4):
+        D = np.hstack([at.F[i], at.D[i]])
+        plant = control.ss(at.A[i], np.hstack([at.E[i], at.B[i]]), at.C[i][[1, 2, 0]], D[[1, 2, 0]])
+        frozen.append(control.hinfsyn(plant, 1, 1)[2])
+    channel = FeedbackChannel(("d1",), ("y1_weighted", "u1_weighted"))
+    found = design_output_feedback(model, OutputFeedbackDesign((channel,), measured=("y1",)))
+    assert found.verdict is Verdict.CERTIFIED and found.gamma_lower is not None
+    assert max(frozen) <= found.gamma_lower <= found.gamma <= 1.05 * max(frozen)
 
 
 def test_a_scheduled_law_that_is_stable_frozen_and_unstable_when_the_parameter_moves_is_refused() -> None:
