@@ -6,17 +6,10 @@ import json
 
 from estimators.schedule import SHIPPED
 from studies.registry import MODULES
-from studies.spec import FEEDBACK, OBSERVER, load_spec, shipped_examples, shipped_specs
+from studies.spec import example_specs, load_spec, shipped_specs
 from synthesis.models.catalogue import CATALOGUE
 from synthesis.models.parameter_set import shipped_parameter_sets
 from synthesis.toml_file import shipped_files
-
-
-def example_specs() -> list[str]:
-    """The specifications of the examples, by name."""
-    there = shipped_files("studies", "examples")
-    names = (f"{name}{ending}" for name in shipped_examples() for ending in (OBSERVER, FEEDBACK))
-    return [name for name in names if name in there]
 
 
 def run_list(as_json: bool) -> int:

@@ -8,9 +8,8 @@ import pytest
 
 from estimators.errors import GainsmithError
 from studies.cli import main
-from studies.commands.listing import example_specs
 from studies.preflight import check_before_design
-from studies.spec import load_spec, shipped_specs
+from studies.spec import example_specs, load_spec, shipped_specs
 
 TEMPLATES = Path(__file__).parents[2] / "studies" / "templates"
 MODEL, SPEC = ((TEMPLATES / name).read_text() for name in ("model.toml", "observer.toml"))
