@@ -138,6 +138,13 @@ from .sensitivity.measure import sample as sample
 from .sensitivity.measure import sample_grid as sample_grid
 from .sensitivity.worst import WorstCase as WorstCase
 from .sensitivity.worst import worst_case as worst_case
+from .simulation.amplification import Amplification as Amplification
+from .simulation.amplification import amplification as amplification
+from .simulation.continuous_loop import ContinuousLoop as ContinuousLoop
+from .simulation.nonlinear import NonlinearPlant as NonlinearPlant
+from .simulation.simulate import simulate as simulate
+from .simulation.simulation import Simulation as Simulation
+from .simulation.trajectories import random_trajectories as random_trajectories
 from .switching.common_lyapunov import CommonLyapunov as CommonLyapunov
 from .switching.common_lyapunov import common_quadratic_lyapunov as common_quadratic_lyapunov
 from .switching.joint_spectral_radius import JointSpectralRadius as JointSpectralRadius

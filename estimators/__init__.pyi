@@ -13,6 +13,8 @@ from .forces import PidForceObserver as PidForceObserver
 from .forces import UnknownInputForceObserver as UnknownInputForceObserver
 from .forces import VerticalLoads as VerticalLoads
 from .forces import WheelForceFilter as WheelForceFilter
+from .lpv import LpvController as LpvController
+from .lpv import LpvControllerStep as LpvControllerStep
 from .lpv import LpvObserver as LpvObserver
 from .lpv import LpvObserverStep as LpvObserverStep
 from .pipeline import CornerObservers as CornerObservers

@@ -67,6 +67,7 @@ def certify(path: Path) -> Certification:
     except GainsmithError as error:
         words = printable(str(error).removeprefix(f"{where}: "), LONGEST - len("refused: "))
         return Certification(path, path.stem, (), words, perf_counter() - start)
-    remarks = [f"a parameter moving inside a sample adds to the error of {line}" for line in found.inside_sample]
+    what = "moves" if found.feedback else "adds to the error of"
+    remarks = [f"a parameter moving inside a sample {what} {line}" for line in found.inside_sample]
     remarks += [] if found.tied else [UNTIED]
     return Certification(path, str(content["name"]), found.proofs, "", perf_counter() - start, tuple(remarks))

@@ -87,6 +87,13 @@ def _models(command: Command) -> None:
         "files", nargs="+", type=Path, metavar="FILE", help="schedule file, or the name of a shipped one"
     )
 
+    simulate = command("simulate", "simulate.run_simulate")
+    simulate.add_argument("schedule", type=Path, metavar="SCHEDULE", help="schedule file, or the name of a shipped one")
+    simulate.add_argument("--runs", type=int, default=60, metavar="N", help="random trajectories (default: 60)")
+    simulate.add_argument("--samples", type=int, metavar="N", help="of each (default: five decay times, 200 to 3000)")
+    simulate.add_argument("--seed", type=int, default=0, metavar="S", help="of the random numbers (default: 0)")
+    simulate.add_argument("--out", type=Path, metavar="DIR", help="draw trajectories and the worst run into DIR")
+
 
 def _drives(command: Command) -> None:
     """What reads recorded drives."""

@@ -26,7 +26,7 @@ from synthesis.certificate.frozen import frozen_gain
 from synthesis.certificate.proof import Proof, prove
 from synthesis.design.deploy import deploy, refuse_undeployable
 from synthesis.design.export import export, schedule_content
-from synthesis.design.hinf_observer import channel_matrices
+from synthesis.design.law_table import matrices_of
 
 # A stored claim may be worse than a fresh one by this share: levels are searched in steps, and solvers differ.
 WORSE = 0.02
@@ -91,7 +91,7 @@ def run_spec(name: str, out: Path, check: bool = False, variant: Variant = AS_IT
     deployment = deploy(spec.design(model), spec.deploy_settings())
     content = schedule_content(deployment, spec.name, spec.description, spec.resolved(plant))
     loop = deployment.loop
-    least = tuple(frozen_gain(loop, *channel_matrices(model, channel)) for channel in deployment.gains.design.channels)
+    least = tuple(frozen_gain(loop, *matrices_of(model, channel)) for channel in deployment.gains.design.channels)
     path = out / f"{spec.name}.json"
     fresh = tuple(prove(content, str(path)))
     state, message, proofs, moved = compare(path, content, fresh)

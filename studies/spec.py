@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 from pydantic import Field, model_validator
 
 from estimators.errors import unknown
-from synthesis.design.deploy import DeploySettings
-from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
+from studies.law_spec import FeedbackDesign, check_keys, design_feedback, feedback_design, without_other_laws
+from studies.spec_tables import DeploySpec, DesignSpec, ModelSpec
+from synthesis.design.deploy_settings import DeploySettings
+from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
+from synthesis.design.law_table import Gains
 from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.errors import SpecError
 from synthesis.exchange.model_file import load_model
@@ -22,59 +25,7 @@ from synthesis.models.parameter_set import ParameterSet, Quantity, load_paramete
 from synthesis.toml_file import StrictTable, find_toml, read_table, read_toml, shipped_files
 from synthesis.toml_places import Places
 
-OBSERVER = "-observer"  # ends the name of an example's specification
-
-
-class ModelSpec(StrictTable):
-    """A model file of your own, or a model of the catalogue with its parameter values and its box."""
-
-    file: str | None = Field(default=None, examples=["plant.toml"])
-    id: str | None = None
-    parameters: str | None = None
-    wheel_speed_maximum: float | None = Field(default=None, gt=0)
-    wheel_speed_rate: float | None = Field(default=None, ge=0)
-
-    @model_validator(mode="after")
-    def _one_or_the_other(self) -> Self:
-        catalogue = ("id", "parameters", "wheel_speed_maximum", "wheel_speed_rate")
-        given = [key for key in catalogue if getattr(self, key) is not None]
-        if self.file is not None and given:
-            raise ValueError(f"{given[0]} stands beside file; a model file says everything of its model, so remove it")
-        if self.file is None and len(given) < len(catalogue):
-            missing = next(key for key in catalogue if key not in given)
-            raise ValueError(f'{missing} is missing; add it, or name a model file: file = "plant.toml"')
-        return self
-
-
-class ChannelSpec(StrictTable):
-    """One channel of the design; without `bound` it is the one that is minimised."""
-
-    disturbances: list[str] = Field(min_length=1)
-    errors: list[str] = Field(min_length=1)
-    bound: float | None = Field(default=None, gt=0)
-    weights: list[float] | None = None
-
-
-class DesignSpec(StrictTable):
-    """What is asked of the gains (synthesis.design.hinf_observer)."""
-
-    degree: int = 1
-    decay_rate: float = 0.0
-    fastest_pole: float | None = None
-    backoff: float = 0.02
-    relaxation: Literal["auto", "grid", "vertex", "exact"] = "auto"
-    points: int = 140
-    solver: str = "CLARABEL"
-    channels: list[ChannelSpec] = Field(min_length=1)
-
-
-class DeploySpec(StrictTable):
-    """How the gains become a table (synthesis.design.deploy) and how they are run (synthesis.loop.observer)."""
-
-    update: Literal["held", "sampled"] = "held"
-    sample_time: float
-    dtype: Literal["float32", "float64"] = "float64"
-    interpolation_cost: float = 0.01
+OBSERVER, FEEDBACK = "-observer", "-feedback"  # end the names of examples' specifications
 
 
 @dataclass(frozen=True)
@@ -101,6 +52,16 @@ class ScheduleSpec(StrictTable):
     model: ModelSpec
     gains: DesignSpec = Field(alias="design")
     deploy: DeploySpec
+
+    @model_validator(mode="after")
+    def _keys_of_the_law(self) -> Self:
+        check_keys(self.gains, self.deploy)
+        return self
+
+    @property
+    def law(self) -> str | None:
+        """The feedback law that is designed; None for an observer."""
+        return self.gains.law
 
     def plant(self, folder: Path = Path(), radius: float | None = None) -> Plant:
         """The model: a file beside the specification, or one of the catalogue, on request with another effective radius, m."""
@@ -137,7 +98,7 @@ class ScheduleSpec(StrictTable):
         """As the synthesis takes it."""
         spec = self.gains
         channels = tuple(
-            Channel(tuple(c.disturbances), tuple(c.errors), c.bound, tuple(c.weights) if c.weights else None)
+            Channel(tuple(c.disturbances), tuple(c.errors or ()), c.bound, tuple(c.weights) if c.weights else None)
             for c in spec.channels
         )
         settings = LmiSettings(relaxation=spec.relaxation, points=spec.points, solver=spec.solver)
@@ -145,19 +106,27 @@ class ScheduleSpec(StrictTable):
             channels, spec.degree, spec.decay_rate, spec.fastest_pole, backoff=spec.backoff, settings=settings
         )
 
-    def design(self, model: LpvModel) -> ObserverGains:
-        """The gains for the update that the specification names."""
+    def feedback_design(self) -> FeedbackDesign:
+        """As the synthesis takes it, of a feedback law."""
+        return feedback_design(self.gains)
+
+    def design(self, model: LpvModel) -> Gains:
+        """The gains for the law and the update that the specification names."""
+        if self.law is not None:
+            return design_feedback(model, self.feedback_design())
         if self.deploy.update == "sampled":
             return design_sampled_observer(model, self.observer_design(), self.deploy.sample_time)
         return design_observer(model, self.observer_design())
 
     def deploy_settings(self) -> DeploySettings:
         """As the deployment takes it."""
-        return DeploySettings(self.deploy.sample_time, self.deploy.dtype, self.deploy.interpolation_cost)
+        deploy = self.deploy
+        limits = {name: (pair[0], pair[1]) for name, pair in (deploy.limits or {}).items()}
+        return DeploySettings(deploy.sample_time, deploy.dtype, deploy.interpolation_cost, limits=limits)
 
     def resolved(self, plant: Plant) -> dict[str, Any]:
         """The specification with the values of its model in it: what the digest in a schedule file speaks of."""
-        own = self.model_dump(mode="json", by_alias=True)
+        own = without_other_laws(self.model_dump(mode="json", by_alias=True))
         own["model"] = {key: value for key, value in own["model"].items() if value is not None}
         if plant.parameters is None:
             return {**own, "model_text": model_text(plant.model).splitlines()}
@@ -205,8 +174,13 @@ def shipped_specs() -> dict[str, Path]:
 
 
 def shipped_examples() -> dict[str, Path]:
-    """The model files of the examples by name; the specification of each is beside it (NAME-observer)."""
-    return {name: path for name, path in _examples().items() if not name.endswith(OBSERVER)}
+    """The model files of the examples by name; the specification of each is beside it (NAME-observer, NAME-feedback)."""
+    return {name: path for name, path in _examples().items() if not name.endswith((OBSERVER, FEEDBACK))}
+
+
+def example_specs() -> dict[str, Path]:
+    """The specifications of the examples by name: NAME-observer, NAME-feedback."""
+    return {name: path for name, path in _examples().items() if name.endswith((OBSERVER, FEEDBACK))}
 
 
 def _examples() -> dict[str, Path]:
@@ -231,8 +205,7 @@ def load_spec(name: str | Path) -> tuple[ScheduleSpec, Path]:
     >>> spec.deploy.update, spec.plant(folder).model.name
     ('sampled', 'quarter-car')
     """
-    observers = {name: path for name, path in _examples().items() if name.endswith(OBSERVER)}
-    path = find_toml(name, {**shipped_specs(), **observers}, "specification")
+    path = find_toml(name, {**shipped_specs(), **example_specs()}, "specification")
     data = read_toml(path, "specification")
     if "matrices" in data:
         raise SpecError(f'{path.name}: is a model file; a specification names it: file = "{path.name}" in [model]')

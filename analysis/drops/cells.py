@@ -61,7 +61,7 @@ def cell_updates(schedule: GainSchedule, cells: Cells, scale: FloatArray) -> Cel
     exponent = np.zeros((2, len(cells.low), max(A.shape[1], corrected.shape[1]), *A.shape[-2:]))
     added = np.zeros((2, *corrected.shape))
     exponent[:, :, : A.shape[1]] = schedule.sample_time * A
-    if schedule.update == "sampled":
+    if schedule.observer_update == "sampled":
         added[1] = corrected
     else:
         exponent[1, :, : corrected.shape[1]] += schedule.sample_time * corrected

@@ -111,4 +111,6 @@ def schedule_drop_modes(schedule: GainSchedule, parameter: ArrayLike, policy: Dr
     Raises RangeError outside the certified range; AnalysisError for an unknown policy.
     """
     plant = schedule.plant_at(np.asarray(parameter, float))
-    return runtime_drop_modes(plant.A, plant.C, schedule.gain(parameter), schedule.sample_time, policy, schedule.update)
+    return runtime_drop_modes(
+        plant.A, plant.C, schedule.gain(parameter), schedule.sample_time, policy, schedule.observer_update
+    )

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 from flint import fmpq_mat
 
-from analysis.lpv.question import Question
+from analysis.lpv.question import Question, Searched
 from analysis.norms.hinf import hinf_norm, stability_margin
 from estimators.arrays import FloatArray
 from synthesis.polynomials.rational import rational
@@ -18,7 +18,7 @@ POINTS = {0: 1, 1: 65, 2: 17, 3: 9}  # along every parameter
 FEWEST, HALVINGS, CLIMBS = 3, 20, 3
 
 
-def climb(question: Question, value: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, float]:
+def climb(question: Searched, value: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, float]:
     """The scaled place u where a function of places (g, p) is largest on a grid, moved uphill by steps that are halved."""
     count = len(question.axes)
     line = np.linspace(-1.0, 1.0, POINTS.get(count, FEWEST))
@@ -40,7 +40,7 @@ def climb(question: Question, value: Callable[[FloatArray], FloatArray]) -> tupl
     return best, most
 
 
-def largest_gain(question: Question) -> tuple[FloatArray, float, float]:
+def largest_gain(question: Searched) -> tuple[FloatArray, float, float]:
     """Place u, gain and its frequency of the frozen H-infinity norm; inf where a pole is not stable."""
 
     def norm(u: FloatArray) -> FloatArray:
@@ -52,7 +52,7 @@ def largest_gain(question: Question) -> tuple[FloatArray, float, float]:
     return place, gain, frequency if np.isfinite(frequency) else 0.0
 
 
-def slowest_decay(question: Question) -> tuple[FloatArray, float]:
+def slowest_decay(question: Searched) -> tuple[FloatArray, float]:
     """Place u and decay rate (1/s or 1/sample) of the frozen pole that falls most slowly."""
 
     def margin(u: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.lpv.question import Question
+from analysis.lpv.question import Searched
 from analysis.lpv.trajectory import Path
 from estimators.arrays import ComplexArray, FloatArray
 
@@ -44,7 +44,7 @@ class Lifted:
         return total
 
 
-def lift(question: Question, path: Path, frequency: float, parts: int) -> Lifted | None:
+def lift(question: Searched, path: Path, frequency: float, parts: int) -> Lifted | None:
     """Every piece of the path in `parts` intervals; None where the steps would be too many.
 
     In discrete time an interval is one sample and `parts` is the number of samples of a piece.
@@ -86,10 +86,10 @@ def samples(path: Path) -> FloatArray:
 
 
 def _taylor(
-    question: Question, start: FloatArray, change: FloatArray, frequency: float, h: FloatArray
+    question: Searched, start: FloatArray, change: FloatArray, frequency: float, h: FloatArray
 ) -> tuple[ComplexArray, ComplexArray]:
     """Step and energy of intervals of lengths h (N,) with u = start + change s, s in [0, 1]."""
-    order = 1 + (8 if question.rational else max(sum(m.degrees) for m in question.exact.values()))
+    order = question.order
     nodes = 0.5 - 0.5 * np.cos(np.pi * (np.arange(order) + 0.5) / order)
     inverse = np.linalg.inv(np.vander(nodes, order, increasing=True))
     places = (start[None] + change[None] * nodes[:, None, None]).reshape(-1, start.shape[1])
@@ -113,7 +113,7 @@ def _taylor(
     return np.sum(terms, axis=0), energy * h[:, None, None]
 
 
-def _discrete(question: Question, path: Path, frequency: float) -> Lifted:
+def _discrete(question: Searched, path: Path, frequency: float) -> Lifted:
     start = samples(path)
     A, B, C, D = question.frozen(start)
     n, m = A.shape[-1], B.shape[-1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from flint import fmpq, fmpq_mat
@@ -24,6 +25,29 @@ from synthesis.polynomials.exponential import balance
 from synthesis.polynomials.rational import decimal
 
 Inputs = Sequence[str] | Mapping[str, float]
+
+
+class Searched(Protocol):
+    """What a search for bad parameter trajectories needs to know of a system, in floats."""
+
+    @property
+    def discrete(self) -> bool:
+        """Whether a sample is the unit of time."""
+        ...
+
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """The parameters as axes u in [-1, 1]; rates per unit of time."""
+        ...
+
+    @property
+    def order(self) -> int:
+        """Number of points that a Taylor series of the system along a line needs; continuous time only."""
+        ...
+
+    def frozen(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """A, B, C, D at scaled parameters u (g, p), stacked."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -84,6 +108,11 @@ class Question:
             "D": left @ beside(m["D"], m["F"]) @ right,
             "denominator": plant.denominator,
         }
+
+    @property
+    def order(self) -> int:
+        """One more than the degree of a polynomial along a line; enough for a rational system."""
+        return 1 + (8 if self.rational else max(sum(m.degrees) for m in self.exact.values()))
 
     def frozen(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """A, B, C, D in floats at scaled parameters u (g, p), stacked."""

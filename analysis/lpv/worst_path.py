@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from analysis.lpv.lifted import lift, worst_input
-from analysis.lpv.question import Question
+from analysis.lpv.question import Searched
 from analysis.lpv.trajectory import Path, admissible, float_of
 from estimators.arrays import FloatArray
 
@@ -27,7 +27,7 @@ MOST_SAMPLES = 64  # of a period in discrete time
 Score = Callable[[Path, float], float]
 
 
-def gain_of(question: Question) -> Score:
+def gain_of(question: Searched) -> Score:
     """The ratio of output to input norm along a path; -inf where it cannot be had."""
 
     def score(path: Path, frequency: float) -> float:
@@ -37,7 +37,7 @@ def gain_of(question: Question) -> Score:
     return score
 
 
-def growth_of(question: Question) -> Score:
+def growth_of(question: Searched) -> Score:
     """The growth rate of the state along a path, 1/s or 1/sample."""
 
     def score(path: Path, _: float) -> float:
@@ -50,22 +50,25 @@ def growth_of(question: Question) -> Score:
     return score
 
 
-def worst_path(question: Question, score: Score, carriers: tuple[float, ...], place: FloatArray) -> tuple[Path, float]:
+def worst_path(
+    question: Searched, score: Score, carriers: tuple[float, ...], place: FloatArray, evaluations: int = EVALUATIONS
+) -> tuple[Path, float]:
     """The path and carrier frequency with the best score found; `place` is the worst frozen one, which some paths stay near."""
     tried = [
         (score(path, carrier), path, carrier)
-        for path in _simple(question, place) for carrier in carriers
+        for path in simple_paths(question, place) for carrier in carriers
     ]  # fmt: skip
     tried.sort(key=lambda entry: -entry[0])
     best = tried[0]
     for entry in tried[: REFINED if np.isfinite(best[0]) else 0]:
-        found = _refined(question, score, entry)
+        found = _refined(question, score, entry, evaluations)
         if found[0] > best[0]:
             best = found
     return best[1], best[2]
 
 
-def _simple(question: Question, place: FloatArray) -> Iterator[Path]:
+def simple_paths(question: Searched, place: FloatArray) -> Iterator[Path]:
+    """Back and forth, each parameter alone (the others at `place`) and all together, with shifts, for every period."""
     axes = question.axes
     count = len(axes)
     phases = np.arange(KNOTS) / KNOTS
@@ -90,7 +93,7 @@ def _triangle(phase: FloatArray) -> FloatArray:
     return np.asarray(1.0 - 4.0 * np.abs(phase - 0.5))
 
 
-def periods(question: Question) -> list[float]:
+def periods(question: Searched) -> list[float]:
     """From a fraction of the fastest time scale to many of the slowest: of poles, and of the way through every range and back."""
     if question.discrete:
         steps = [k for k in (1, 2, 4, 8, 16) if k * KNOTS <= MOST_SAMPLES]
@@ -105,7 +108,7 @@ def periods(question: Question) -> list[float]:
     return [float(x) for x in (*np.geomspace(low, high, PERIODS), *ways, *(2.0 * way for way in ways))]
 
 
-def _ways(question: Question) -> list[float]:
+def _ways(question: Searched) -> list[float]:
     """Times through the ranges and back, of parameters that take any."""
     found = []
     for axis in question.axes:
@@ -115,7 +118,9 @@ def _ways(question: Question) -> list[float]:
     return found
 
 
-def _refined(question: Question, score: Score, entry: tuple[float, Path, float]) -> tuple[float, Path, float]:
+def _refined(
+    question: Searched, score: Score, entry: tuple[float, Path, float], evaluations: int
+) -> tuple[float, Path, float]:
     """A simplex search from one path; the rounds of a search have no part in any bound."""
     _, path, carrier = entry
     shape, axes = path.knots.shape, question.axes
@@ -134,5 +139,5 @@ def _refined(question: Question, score: Score, entry: tuple[float, Path, float])
     start = np.concatenate([[0.0, 0.0, 0.0], path.knots.ravel()])
     moves = np.concatenate([[0.4, 0.3, 0.5], np.where(path.knots.ravel() < 0.0, 0.3, -0.3)])
     simplex = np.vstack([start, start + np.diag(moves)])
-    found = minimize(cost, start, method="Nelder-Mead", options={"maxfev": EVALUATIONS, "initial_simplex": simplex})
+    found = minimize(cost, start, method="Nelder-Mead", options={"maxfev": evaluations, "initial_simplex": simplex})
     return -float(found.fun), *path_of(np.asarray(found.x))

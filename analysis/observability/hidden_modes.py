@@ -54,9 +54,7 @@ def unstabilisable_mode(model: LpvModel) -> HiddenMode | None:
 
     Without inputs every mode that does not decay is one.
     """
-    plant = plant_of(model)
-    matrices = {**plant.matrices, "A": plant.matrices["A"].T, "C": plant.matrices["B"].T}
-    return _hidden(model, Plant(plant.axes, matrices, plant.denominator), dual=True)
+    return _hidden(model, plant_of(model).dual, dual=True)
 
 
 def _hidden(model: LpvModel, plant: Plant, dual: bool) -> HiddenMode | None:

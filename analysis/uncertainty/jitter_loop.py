@@ -50,6 +50,11 @@ class JitterLoop:
         return Plant((*axes, sample), self.observer.plant.matrices, self.observer.plant.denominator)
 
     @property
+    def states(self) -> int:
+        """Those of the observer's error."""
+        return self.observer.states
+
+    @property
     def breakpoints(self) -> tuple[tuple[fmpq, ...], ...]:
         """Of the table; the sample time has its ends."""
         return (*self.observer.breakpoints, (self.shortest, self.longest))

@@ -38,3 +38,31 @@ fig.savefig("pmsm-gains.svg")
 poles = np.linalg.eigvals(model.on(np.linspace(-471.0, 471.0, 5)).A)
 for at, pair in zip(np.linspace(-471.0, 471.0, 5), poles, strict=True):
     print(f"{at:6.0f} rad/s: poles {pair[0]:.0f}, {pair[1]:.0f} 1/s")
+
+# %% [markdown]
+# A run of the runtime itself, `LpvObserver` beside the machine: eight random speed trajectories inside range and rate,
+# voltages wrong by 5 V, currents read with a noise of 50 mA. The rate bound is hardly felt at 12 kHz: in a run of 50 ms the
+# speed changes by 140 rad/s at most.
+
+# %%
+from gainsmith import GainSchedule, random_trajectories, simulate
+
+schedule = GainSchedule.from_content(schedule_content(deployment, spec.name))
+sizes = {"d_voltage_error": 5.0, "q_voltage_error": 5.0, "d_current_noise": 0.05, "q_current_noise": 0.05}
+paths = random_trajectories(schedule, samples=600, runs=8)
+run = simulate(schedule, schedule, paths, disturbances=sizes, inputs={"magnet_flux": 0.545}, between="moving")
+print(f"speed changes by up to {np.ptp(paths, axis=1).max():.0f} rad/s in a run")
+for i, state in enumerate(model.states):
+    noise = run.of(f"measured_{state.name}") - run.of(state.name)[:, :-1]
+    late = run.error[:, 100:, i]
+    print(f"{state.name}: sensor {1e3 * noise.std():.0f} mA RMS, estimate {1e3 * late.std():.0f} mA RMS")
+
+# %% [markdown]
+# And the other end: the disturbance that this observer amplifies most, along the worst speed trajectory found, beside the
+# level that was proved (`gainsmith simulate` prints the same for any schedule file).
+
+# %%
+from gainsmith import amplification
+
+for one in amplification(schedule_content(deployment, spec.name), runs=20, samples=200):
+    print(f"{one.claim}: proved {one.level:.4g}, worst run {one.worst:.4g} {one.unit} ({100.0 * one.share:.0f} %)")

@@ -80,7 +80,7 @@ class ExactStep:
         first = schedule.plant["A"]
         self.middle: FloatArray = np.atleast_1d(first.middle)
         self.half: FloatArray = np.atleast_1d(first.half)
-        self.sampled = schedule.update == "sampled"
+        self.sampled = schedule.observer_update == "sampled"
         table = schedule.table if self.sampled else period * schedule.table
         self.gains = Multilinear(schedule.grid, table)
         sizes = {key: np.abs(part).sum(axis=tuple(range(count))) for key, part in stored.items()}

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
+from estimators.schedule.check_update import LoopSizes, check_gain, check_update
 from estimators.schedule.checker import DEEPEST, LONGEST_NAME, Checker, quoted, shown, too_deep
 
 SCHEMA = "gainsmith.schedule/2"
@@ -18,7 +17,6 @@ SEALS = ("section_sha256", "sha256")
 SECTIONS = (
     *("schema", "name", "description", "model", "scheduling", "update", "plant", "gain", "claims", "provenance"),
 )
-UPDATES = ("held", "sampled")
 SIGNALS = ("states", "inputs", "outputs", "disturbances")
 SHAPES = {  # rows and columns of the plant's matrices, by kinds of signals
     "A": ("states", "states"), "B": ("states", "inputs"), "C": ("outputs", "states"),
@@ -38,9 +36,10 @@ def check_content(content: Mapping[str, Any], where: str) -> None:
     """Checks the form of everything; digests are checked when a file is read.
 
     The plant is xdot = A x + B u + E d, y = C x + D u + F d, its matrices polynomials in u = (p - middle)/half of each parameter;
-    `gain.table` has the shape (breakpoints of each parameter, states, outputs). Rates are numbers, or both null: the parameter
-    may jump, and no P depends on it. `provenance` says where a file came from and is free (no control characters, no numbers that
-    other readers would read otherwise); nothing in it is believed.
+    `gain.table` has the shape (breakpoints of each parameter, rows, columns): an observer's states by outputs, or what
+    `gain_signals` names. Rates are numbers, or both null: the parameter may jump, and no P depends on it. `provenance` says where
+    a file came from and is free (no control characters, no numbers that other readers would read otherwise); nothing in it is
+    believed.
 
     Raises:
         ScheduleError: names `where`, the JSON place such as `gain.table[3]`, and what was expected there.
@@ -54,14 +53,14 @@ def check_content(content: Mapping[str, Any], where: str) -> None:
     check.text(content["description"], "description", empty=True)
     sizes = _model(check, content["model"])
     counts = _scheduling(check, content["scheduling"])
-    _update(check, content["update"])
+    loop = check_update(check, content["update"], sizes)
     check.keys(content["plant"], "plant", tuple(SHAPES))
     for key, kinds in SHAPES.items():
         shape = (sizes[kinds[0]], sizes[kinds[1]])
         check.polynomial(content["plant"][key], f"plant.{key}", len(counts), shape, HIGHEST_ORDER)
-    _gain(check, content["gain"], counts, sizes)
+    check_gain(check, content["gain"], (*counts, loop.rows, loop.columns))
     for index, claim in enumerate(check.items(content["claims"], "claims", most=MOST_CLAIMS)):
-        _claim(check, claim, f"claims[{index}]", len(counts), sizes["states"])
+        _claim(check, claim, f"claims[{index}]", len(counts), loop)
     check.mapping(content["provenance"], "provenance")
     check.plain(content["provenance"], "provenance", MOST_PROVENANCE)
 
@@ -94,7 +93,7 @@ def _model(check: Checker, model: Any) -> dict[str, int]:
             check.unit(signal["unit"], f"{place}.unit")
     for kind in ("states", "outputs"):
         if not model[kind]:
-            check.fail(f"model.{kind}", "an observer needs at least one")
+            check.fail(f"model.{kind}", "a model needs at least one")
     check.mapping(model["constants"], "model.constants", MOST_CONSTANTS)
     for name, constant in model["constants"].items():
         check.name(name, f"model.constants.{shown(name, 40)}")
@@ -158,42 +157,28 @@ def _parameter(check: Checker, entry: Any, place: str) -> None:
             check.fail(f"{place}.breakpoints[{i}]", words)
 
 
-def _update(check: Checker, update: Any) -> None:
-    check.keys(update, "update", ("kind", "sample_time"))
-    if update["kind"] not in UPDATES:
-        check.fail("update.kind", f"{quoted(update['kind'])} is not known; expected {' or '.join(UPDATES)}")
-    if not check.number(update["sample_time"], "update.sample_time") > 0.0:
-        check.fail("update.sample_time", f"{update['sample_time']} s must be positive")
-
-
-def _gain(check: Checker, gain: Any, counts: tuple[int, ...], sizes: Mapping[str, int]) -> None:
-    check.keys(gain, "gain", ("dtype", "interpolation", "table"))
-    if gain["interpolation"] != "linear":
-        check.fail("gain.interpolation", f"{quoted(gain['interpolation'])} is not known; expected 'linear'")
-    if gain["dtype"] not in ("float32", "float64"):
-        check.fail("gain.dtype", f"{quoted(gain['dtype'])} is not known; expected 'float32' or 'float64'")
-    shape = (*counts, sizes["states"], sizes["outputs"])
-    exact = np.array(check.array(gain["table"], "gain.table", shape)).reshape(shape)
-    if gain["dtype"] == "float32":
-        with np.errstate(over="ignore", under="ignore"):
-            wrong = np.argwhere(exact.astype(np.float32).astype(np.float64) != exact)
-        if wrong.size:
-            place = "gain.table" + "".join(f"[{index}]" for index in wrong[0])
-            check.fail(place, f"{float(exact[tuple(wrong[0])])!r} is not a float32 number; round it before storing")
-
-
-def _claim(check: Checker, claim: Any, place: str, parameters: int, states: int) -> None:
+def _claim(check: Checker, claim: Any, place: str, parameters: int, loop: LoopSizes) -> None:
     check.keys(claim, place, ("kind", "level", "P"), ("channel",))
     check.text(claim["kind"], f"{place}.kind", most=LONGEST_NAME)
     check.positive(claim["level"], f"{place}.level")
-    check.polynomial(claim["P"], f"{place}.P", parameters, (states, states), HIGHEST_ORDER)
+    check.polynomial(claim["P"], f"{place}.P", parameters, (loop.states, loop.states), HIGHEST_ORDER)
     if "channel" in claim:
         channel = claim["channel"]
         check.keys(channel, f"{place}.channel", ("inputs", "errors"))
-        check.mapping(channel["inputs"], f"{place}.channel.inputs", max(MOST.values()))
-        for name, size in channel["inputs"].items():
-            check.positive(size, f"{place}.channel.inputs.{check.name(name, f'{place}.channel.inputs')}")
-        for i, error in enumerate(check.items(channel["errors"], f"{place}.channel.errors", most=states)):
-            check.name(error, f"{place}.channel.errors[{i}]")
+        _sized(check, channel["inputs"], f"{place}.channel.inputs", max(MOST.values()))
+        if isinstance(channel["errors"], Mapping):
+            if not channel["errors"]:
+                check.fail(f"{place}.channel.errors", "is empty; a channel needs at least one error")
+            _sized(check, channel["errors"], f"{place}.channel.errors", loop.outputs)
+        else:
+            for i, error in enumerate(check.items(channel["errors"], f"{place}.channel.errors", most=loop.outputs)):
+                check.name(error, f"{place}.channel.errors[{i}]")
         if not channel["inputs"] or not channel["errors"] or len(set(channel["errors"])) < len(channel["errors"]):
             check.fail(f"{place}.channel", "needs at least one input and one error, each once")
+
+
+def _sized(check: Checker, signals: Any, place: str, most: int) -> None:
+    """Names with the size of each that counts as one."""
+    check.mapping(signals, place, most)
+    for name, size in signals.items():
+        check.positive(size, f"{place}.{check.name(name, place)}")

@@ -18,11 +18,14 @@ from estimators.interpolate import Multilinear, PiecewiseLinear
 from estimators.schedule.check import SHAPES, SIGNALS, check_content, check_depth
 from estimators.schedule.checker import shown
 from estimators.schedule.files import check_seal, read_content, sealed
+from estimators.schedule.gain_signals import gain_signals, per_second, quotient
 from estimators.schedule.plant import PlantPolynomial, PlantPolynomials, plant_of
 from estimators.schedule.upgrade import FIRST_FORMAT, upgraded
 
 SHIPPED = Path(__file__).parents[1] / "schedules"
-Update = Literal["held", "sampled"]
+Update = Literal["held", "sampled"]  # of an observer
+Kind = Literal["held", "sampled", "feedback"]
+Limit = tuple[float, float] | None
 
 
 class Signal(NamedTuple):
@@ -62,7 +65,9 @@ class GainSchedule(Display):
     arrays are read-only. One parameter is given as an array of any shape; several as arrays whose last axis holds them in
     order. The plant is xdot = A x + B u + E d, y = C x + D u + F d. `sample_time` in s. `update` "held": the gains L belong
     to the continuous-time observer, integrated exactly with y held over a sample; "sampled": the gains K correct once a
-    sample (see `LpvVelocityObserver`).
+    sample (see `LpvVelocityObserver`); "feedback": a law of `order` states from the `measured` signals to the plant's inputs,
+    each within its `limits` (min, max) or None (see `LpvController`); its table has the shape (breakpoints, order + inputs,
+    order + measured).
 
     >>> schedule = GainSchedule.shipped("corner-estimation-longitudinal")
     >>> schedule.parameter.name, schedule.gain(35.0).shape, schedule.gain_units
@@ -74,24 +79,28 @@ class GainSchedule(Display):
     grid: tuple[FloatArray, ...]
     table: FloatArray
     sample_time: float
-    update: Update
+    update: Kind
     plant: Mapping[str, PlantPolynomial | PlantPolynomials]
     states: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
     disturbances: tuple[Signal, ...]
     sha256: str
+    measured: Literal["states", "outputs"] = "outputs"
+    order: int = 0
+    limits: tuple[Limit, ...] = ()
 
     def summary(self) -> tuple[str, ...]:
         """Scheduling with range and rates, gains with their units, how it is run."""
+        rows, columns = self.gain_signals
         scheduling = [
-            f"{p.name} {p.min:g} to {p.max:g} {p.unit}, {p.rate_min:g} to {p.rate_max:g} {_per_second(p.unit)}, {len(b)} points"
+            f"{p.name} {p.min:g} to {p.max:g} {p.unit}, {p.rate_min:g} to {p.rate_max:g} {per_second(p.unit)}, {len(b)} points"
             for p, b in zip(self.parameters, self.grid, strict=True)
         ]
         gains = [
-            f"{state.name}{f' by {output.name}' if len(self.outputs) > 1 else ''} {entry.min():.4g} to {entry.max():.4g} {unit}"
-            for i, (state, units) in enumerate(zip(self.states, self.gain_units, strict=True))
-            for j, (output, unit) in enumerate(zip(self.outputs, units, strict=True))
+            f"{row.name}{f' by {column.name}' if len(columns) > 1 else ''} {entry.min():.4g} to {entry.max():.4g} {unit}"
+            for i, (row, units) in enumerate(zip(rows, self.gain_units, strict=True))
+            for j, (column, unit) in enumerate(zip(columns, units, strict=True))
             for entry in (self.table[..., i, j],)
         ]
         return (
@@ -177,11 +186,35 @@ class GainSchedule(Display):
             )
 
     @property
+    def observer_update(self) -> Update:
+        """How the gains of an observer are run.
+
+        Raises:
+            ScheduleError: the gains are those of a feedback law.
+        """
+        if self.update == "feedback":
+            raise ScheduleError(
+                f"schedule '{shown(self.name, 60)}' is a feedback law, what uses it here is an observer; take LpvController"
+            )
+        return self.update
+
+    @property
+    def gain_signals(self) -> tuple[tuple[Signal, ...], tuple[Signal, ...]]:
+        """What the rows and the columns of the table stand for: see `gain_signals` of this folder."""
+        if self.update != "feedback":
+            return self.states, self.outputs
+        own = tuple(Signal(f"law_state_{k + 1}", "1") for k in range(self.order))
+        return own + self.inputs, own + (self.states if self.measured == "states" else self.outputs)
+
+    @property
     def gain_units(self) -> tuple[tuple[str, ...], ...]:
-        """Units of the gains, one for every state and output: (state/s)/output where held, state/output where sampled."""
-        rate = "/s" if self.update == "held" else ""
+        """Units of the gains, one for every row and column: (state/s)/output where held, state/output where sampled.
+
+        Of a feedback law input/measurement; its own states are numbers without unit.
+        """
+        rows, columns = self.gain_signals
         return tuple(
-            tuple(_quotient(state.unit, rate, output.unit) for output in self.outputs) for state in self.states
+            tuple(quotient(row.unit, self.update == "held", column.unit) for column in columns) for row in rows
         )
 
     def gain(self, parameter: npt.ArrayLike) -> FloatArray:
@@ -239,19 +272,6 @@ def outside_range(parameter: SchedulingParameter, value: float, place: str) -> s
     return f"{parameter.name} = {value:.12g} {parameter.unit} is outside the certified range {box}{place}"
 
 
-def _quotient(unit: str, rate: str, below: str) -> str:
-    above = _per_second(unit) if rate else unit
-    return above if below == "1" else f"({above})/({below})"
-
-
-def _per_second(unit: str) -> str:
-    if unit == "1":
-        return "1/s"
-    if unit.endswith("/s"):
-        return f"{unit}^2"
-    return f"({unit})/s" if any(c in unit for c in "*/") else f"{unit}/s"
-
-
 def _frozen(value: Any, shape: tuple[int, ...]) -> FloatArray:
     array = np.array(value, dtype=np.float64).reshape(shape)
     array.flags.writeable = False
@@ -269,7 +289,9 @@ def _build(content: Mapping[str, Any]) -> GainSchedule:
             entry[key] = free if entry[key] is None else float(entry[key])
         parameters.append(SchedulingParameter(**entry))
         grid.append(_frozen(breakpoints, (len(breakpoints),)))
-    signals = {kind: tuple(Signal(signal["name"], signal["unit"]) for signal in model[kind]) for kind in SIGNALS}
+    signals: dict[str, Any] = {
+        kind: tuple(Signal(signal["name"], signal["unit"]) for signal in model[kind]) for kind in SIGNALS
+    }
     sizes = {kind: len(found) for kind, found in signals.items()}
     ranges = [(parameter.min, parameter.max) for parameter in parameters]
     plant = {
@@ -280,10 +302,19 @@ def _build(content: Mapping[str, Any]) -> GainSchedule:
         name=content["name"],
         parameters=tuple(parameters),
         grid=tuple(grid),
-        table=_frozen(content["gain"]["table"], (*map(len, grid), sizes["states"], sizes["outputs"])),
+        table=_frozen(content["gain"]["table"], (*map(len, grid), *map(len, gain_signals(content)))),
         sample_time=float(content["update"]["sample_time"]),
         update=content["update"]["kind"],
         plant=plant,
         sha256=content["sha256"],
         **signals,
+        **_law(content["update"]),
     )
+
+
+def _law(update: Mapping[str, Any]) -> dict[str, Any]:
+    """What a feedback law says beside its gains."""
+    if update["kind"] != "feedback":
+        return {}
+    limits = tuple(None if pair is None else (float(pair[0]), float(pair[1])) for pair in update.get("limits", ()))
+    return {"measured": update["measured"], "order": update["order"], "limits": limits}

@@ -42,7 +42,7 @@ def refuse_explosive(schedule: GainSchedule) -> None:
     """A proved schedule never comes here; a wrong sign or sample time must not end in an overflow."""
     largest = {key: float(np.abs(schedule.plant[key].coefficients).sum(axis=0).max(initial=0.0)) for key in "ABCD"}
     period, gain = schedule.sample_time, float(np.abs(schedule.table).max())
-    gain *= 1.0 if schedule.update == "sampled" else period
+    gain *= 1.0 if schedule.observer_update == "sampled" else period
     if not period * (largest["A"] + largest["B"]) + gain * (largest["C"] + largest["D"]) <= _LARGEST_STEP:
         raise ScheduleError(
             f"schedule '{schedule.name}': plant, gains and sample time multiply to more than {_LARGEST_STEP:g} in one "
@@ -50,7 +50,7 @@ def refuse_explosive(schedule: GainSchedule) -> None:
         )
     places = np.union1d(schedule.breakpoints, np.linspace(schedule.parameter.min, schedule.parameter.max, _LOOKS))
     plant = schedule.plant_at(places)
-    closed = plant.A - schedule.gain(places) @ plant.C if schedule.update == "held" else plant.A
+    closed = plant.A - schedule.gain(places) @ plant.C if schedule.observer_update == "held" else plant.A
     for matrices in (plant.A, closed):
         growth = period * np.linalg.eigvals(matrices).real.max(axis=-1)
         if not growth.max() <= _MOST_GROWTH:
@@ -69,7 +69,7 @@ class ExactUpdate:
         self.constants: list[Number] = [entry[0] if len(entry) == 1 else 0.0 for entry in entries]
         self.varying = [(place, entry) for place, entry in enumerate(entries) if len(entry) > 1]
         self.middle, self.half = schedule.plant["A"].middle, schedule.plant["A"].half
-        self.sampled = schedule.update == "sampled"
+        self.sampled = schedule.observer_update == "sampled"
         factor = 1.0 if self.sampled else schedule.sample_time
         self.gains = PiecewiseLinear(schedule.breakpoints, factor * schedule.table[:, :, 0])  # K or T L
 

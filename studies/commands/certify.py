@@ -14,7 +14,7 @@ from synthesis.certificate.claims import written
 
 def run_certify(files: list[Path], as_json: bool) -> int:
     """Certify every file; 0 if all are certified, 1 if one is refuted or not proved, 2 if one is no valid schedule."""
-    results = [certify(_shipped(path)) for path in files]
+    results = [certify(shipped(path)) for path in files]
     if as_json:
         rows = [
             {"path": str(r.path), "name": r.name, "certified": r.certified, "message": r.message, "seconds": r.seconds,
@@ -36,7 +36,7 @@ def run_certify(files: list[Path], as_json: bool) -> int:
     return 0 if all(result.certified for result in results) else 1
 
 
-def _shipped(path: Path) -> Path:
+def shipped(path: Path) -> Path:
     """A bare name that is no file here may be a shipped schedule."""
-    shipped = SHIPPED / f"{path.name}.json"
-    return shipped if path == Path(path.name) and not path.exists() and shipped.is_file() else path
+    there = SHIPPED / f"{path.name}.json"
+    return there if path == Path(path.name) and not path.exists() and there.is_file() else path

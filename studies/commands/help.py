@@ -63,6 +63,19 @@ gainsmith schedules my-observer.toml --out out    from a specification of your o
 gainsmith schedules --out out --report out/schedules.html   and one page: gains, proved levels, tightest places
 gainsmith schedules --out schedules --check       in CI: exit 1 if a claim fails, or can be had better""",
     ),
+    "simulate": Help(
+        "run a schedule along random and worst parameter trajectories, beside its certified levels",
+        """\
+Proves the claims of a schedule file again, and looks at them from below: random admissible parameter trajectories, each with
+the disturbance that is amplified most along it; the worst place; a periodic trajectory found by search. The worst of all is
+run by the runtime beside its plant. What any run shows must stay below the certified level (above a certified decay);
+a run that does not ends in exit code 1.
+
+Writes pictures of the trajectories and of the worst run into DIR if --out is given.""",
+        """\
+gainsmith simulate corner-estimation-longitudinal
+gainsmith simulate out/schedules/my-plant-observer.json --runs 200 --seed 1 --out out/simulation""",
+    ),
     "certify": Help(
         "re-prove schedule files without a solver",
         """\

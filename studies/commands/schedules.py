@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from estimators.schedule.gain_signals import gain_signals
 from studies.commands.pages import write_page
 from studies.commands.terminal import print_table, progress_bar
 from studies.drives.quantities import to_si
@@ -104,11 +105,13 @@ def _cells(run: ScheduleRun) -> tuple[str, ...]:
     if not run.content:
         return (run.name, *[""] * 9, run.state, f"{run.seconds:.1f}")
     table = np.array(run.content["gain"]["table"])
-    model, axes = run.content["model"], tuple(range(table.ndim - 2))
+    (above, beside), axes = gain_signals(run.content), tuple(range(table.ndim - 2))
     low, high = table.min(axis=axes), table.max(axis=axes)
     places = list(np.ndindex(*low.shape))
-    several = len(model["outputs"]) > 1
-    names = [model["states"][i]["name"] + (f" from y{j + 1}" if several else "") for i, j in places]
+    letter = "y" if run.content["update"].get("measured", "outputs") == "outputs" else "x"
+    own, several = run.content["update"].get("order", 0), len(beside) > 1
+    weighed = [f"law_state_{j + 1}" if j < own else f"{letter}{j + 1 - own}" for j in range(len(beside))]
+    names = [above[i]["name"] + (f" from {weighed[j]}" if several else "") for i, j in places]
     ranges = [f"{low[place]:.4g}..{high[place]:.4g}" for place in places]
     bands = [f"{a:g}..{b:g}" for a, b in run.published or ()]
     channels = [(_short(p.claim.removeprefix(CHANNEL)), p.level) for p in run.proofs if p.kind == "sampled gain"]
@@ -125,9 +128,11 @@ def _cells(run: ScheduleRun) -> tuple[str, ...]:
 
 
 def _short(channel: str) -> str:
-    """Of many disturbances the first; `--json` and `certify` have all."""
-    first, _, rest = channel.partition(" + ")
-    return channel if len(channel) <= LONGEST_CHANNEL or not rest else f"{first} + .. ->{channel.rpartition('->')[2]}"
+    """Of many disturbances, and of many signals behind the arrow, the first; `--json` and `certify` have all."""
+    if len(channel) <= LONGEST_CHANNEL:
+        return channel
+    sides = (side.partition(" + ") for side in channel.split(" -> "))
+    return " -> ".join(f"{first} + .." if rest else first for first, _, rest in sides)
 
 
 def _row(run: ScheduleRun) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from estimators.arrays import FloatArray
 from synthesis.certificate.claims import ERROR_EQUATION, WITH_CHANNEL, Claim, claim_name, claim_unit, rows_of
 from synthesis.certificate.content import claims_of, subject_of
 from synthesis.certificate.refute import grid
-from synthesis.loop.observer import ObserverLoop
+from synthesis.loop.loop import Loop
 from synthesis.loop.system import Region, System
 from synthesis.polynomials.enclosure import PolynomialMatrix
 
@@ -73,13 +73,13 @@ def frozen_levels(content: Mapping[str, Any], where: str = "schedule") -> list[F
     return found
 
 
-def _standing(loop: ObserverLoop, points: list[Any], time: Literal["continuous", "discrete"]) -> list[System | None]:
+def _standing(loop: Loop, points: list[Any], time: Literal["continuous", "discrete"]) -> list[System | None]:
     count = len(loop.plant.axes)
     still = (fmpq(0),) * count
     return [loop.system(Region((*point, *still), still * 2), time) for point in points]
 
 
-def _values(claim: Claim, systems: list[System], names: Any, loop: ObserverLoop) -> FloatArray:
+def _values(claim: Claim, systems: list[System], names: Any, loop: Loop) -> FloatArray:
     A = np.array([_matrix(system.A, system) for system in systems])
     poles = np.linalg.eigvals(A)
     match claim.kind:
@@ -97,8 +97,12 @@ def _values(claim: Claim, systems: list[System], names: Any, loop: ObserverLoop)
     inputs = names.disturbances if group == "disturbances" else names.states
     where, sizes = rows_of(inputs, claim.channel)
     B = np.array([_matrix(system.B[group], system)[:, where] * np.array(sizes) for system in systems])
-    C = np.array([[float(name == error) for name in names.states] for error in claim.channel.errors])
-    return hinf_norm(A, B, C, discrete=claim.kind != "gain").norm
+    channel = claim.channel
+    Z = np.array([[float(name == error) for name in names.errors] for error in channel.errors])
+    Z = Z / np.array(channel.error_sizes)[:, None]
+    C = np.array([Z @ _entries(system.C) for system in systems])
+    D = np.array([Z @ _entries(system.D[group])[:, where] * np.array(sizes) for system in systems])
+    return hinf_norm(A, B, C, D, discrete=claim.kind != "gain").norm
 
 
 def _matrix(matrix: PolynomialMatrix, system: System) -> FloatArray:

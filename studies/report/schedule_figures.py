@@ -32,17 +32,17 @@ def gain_figure(content: Mapping[str, Any], published: Sequence[Range] | None = 
         "$L$" if content["update"]["kind"] == "held" else "$K$",
     )
     first, curves = content["scheduling"][0], curves_of(content)
-    states, outputs = curves[0][1].shape[1:]
+    height, columns = curves[0][1].shape[1:]
     panels = []
-    for i, j in list(np.ndindex(states, outputs))[:MOST_PANELS]:
+    for i, j in list(np.ndindex(height, columns))[:MOST_PANELS]:
         marks: list[Mark] = [
             Line(first["breakpoints"], gains[:, i, j], label, DEPLOYED if len(curves) == 1 else CURVES[k], marker="o")
             for k, (label, gains) in enumerate(curves)
         ]
-        if published is not None and outputs == 1:
+        if published is not None and columns == 1:
             low, high = published[i]
             marks.insert(0, Shade(low, high, "y", f"published range {low:g} to {high:g}", PRINTED_BAND))
-        index = f"_{{{i + 1}}}" if outputs == 1 else f"_{{{i + 1},{j + 1}}}"
+        index = f"_{{{i + 1}}}" if columns == 1 else f"_{{{i + 1},{j + 1}}}"
         least = 0.0 if all(gains[:, i, j].min() >= 0.0 for _, gains in curves) else None
         y = Axis(f"{symbol}${index}$ [{units[i][j].replace('^2', '²')}]", low=least)
         panels.append(Panel(marks, _parameter(content), y, legend="best"))
@@ -58,7 +58,7 @@ def gain_figure(content: Mapping[str, Any], published: Sequence[Range] | None = 
 
 
 def curves_of(content: Mapping[str, Any]) -> list[tuple[str, FloatArray]]:
-    """Label and gains (breakpoints, states, outputs) of every curve."""
+    """Label and gains (breakpoints, rows, columns) of every curve."""
     table, others = np.array(content["gain"]["table"]), content["scheduling"][1:]
     if not others:
         return [("deployed, proved", table)]

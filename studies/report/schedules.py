@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from estimators.schedule.gain_signals import gain_signals
 from studies.plots import Figure
 from studies.plots.save import save_figure
 from studies.report.frozen_levels import FrozenLevel, frozen_levels
@@ -120,10 +121,9 @@ def _table(content: Any) -> tuple[tuple[str, ...], tuple[tuple[float, ...], ...]
     """The deployed table of one parameter: its breakpoints and all gains."""
     if len(content["scheduling"]) != 1:
         return (), ()
-    parameter, states = content["scheduling"][0], content["model"]["states"]
-    outputs = content["model"]["outputs"]
+    parameter, (above, beside) = content["scheduling"][0], gain_signals(content)
     columns = [f"{words(parameter['name'])} [{parameter['unit']}]"]
-    columns += [f"{words(state['name'])} by {words(output['name'])}" for state in states for output in outputs]
+    columns += [f"{words(row['name'])} by {words(column['name'])}" for row in above for column in beside]
     rows = zip(parameter["breakpoints"], content["gain"]["table"], strict=True)
     return tuple(columns), tuple((at, *(gain for row in table for gain in row)) for at, table in rows)
 

@@ -17,6 +17,7 @@ from studies.spec import ScheduleSpec
 from studies.sweeps.measures import MeasureSpec
 from studies.sweeps.observer import Batch, Observer
 from synthesis.design.deploy import claim_channel, deploy
+from synthesis.design.hinf_observer import ObserverGains
 from synthesis.errors import SpecError
 from synthesis.lmi.result import Verdict
 from synthesis.models.lpv import LpvModel
@@ -66,6 +67,7 @@ class CertifiedGamma(MeasureSpec):
 
     def _gamma(self, spec: ScheduleSpec, model: LpvModel) -> float:
         design, gains = spec.observer_design(), spec.design(model)
+        assert isinstance(gains, ObserverGains)  # an observer's schedule comes from an observer's specification
         wanted = self.channel or design.minimised.name
         asked = next(c for c in design.channels if c.name == wanted)
         if self.deployed:

@@ -92,7 +92,7 @@ class ObserverSpec(StrictTable):
         proved = {name: float(c["value"]) for name, c in content["model"]["constants"].items()}
         return Observer(
             self.name or schedule.name, plant, gains, schedule.sample_time, origin, designed_from(content), proved,
-            schedule.update,
+            schedule.observer_update,
         )  # fmt: skip
 
 

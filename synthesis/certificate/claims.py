@@ -33,8 +33,14 @@ KINDS_OF = {  # which kinds say something true about which update (synthesis.loo
         "drop probability",
     ),
     "sampled": ("sampled error", "sampled gain", "drop probability"),
+    "feedback": (
+        "sampled error",
+        "sampled gain",
+        "sampled H2 norm",
+        "sampled energy to peak",
+    ),  # synthesis.loop.feedback
 }
-UPDATE_OF = {"held": "internal update", "sampled": "sampled error"}
+UPDATE_OF = {"held": "internal update", "sampled": "sampled error", "feedback": "sampled error"}
 
 WORDS = {
     "decay rate": "error equation: decay rate",
@@ -54,10 +60,19 @@ WORDS = {
 
 @dataclass(frozen=True)
 class ClaimChannel:
-    """From inputs, each with the size that counts as one, to estimation errors. For motion the inputs are states."""
+    """From inputs, each with the size that counts as one, to estimation errors, or to performance signals of a feedback loop.
+
+    For motion the inputs are states. `sizes` of the errors that count as one, in their order; () where each counts in its unit.
+    """
 
     inputs: Mapping[str, float]
     errors: tuple[str, ...]
+    sizes: tuple[float, ...] = ()
+
+    @property
+    def error_sizes(self) -> tuple[float, ...]:
+        """One for every error."""
+        return self.sizes or (1.0,) * len(self.errors)
 
 
 @dataclass(frozen=True)
@@ -81,18 +96,22 @@ def claim_name(kind: str, channel: ClaimChannel | None, units: Mapping[str, str]
         f"{name}{mark}" if plain else f"{written(size)} {_unit(units[name], motion)} {name}{mark}"
         for name, size in channel.inputs.items()
     ]
-    return f"{WORDS[kind]} {' + '.join(parts)} -> {' + '.join(channel.errors)}"
+    shown = [
+        f"{written(size)} {units[name]} {name}" if channel.sizes else name
+        for name, size in zip(channel.errors, channel.error_sizes, strict=True)
+    ]
+    return f"{WORDS[kind]} {' + '.join(parts)} -> {' + '.join(shown)}"
 
 
 def claim_unit(kind: str, channel: ClaimChannel | None, units: Mapping[str, str]) -> str:
     """The unit of a claim's level.
 
     A gain from one input of size one has the unit error/input. With sizes the inputs are numbers of their sizes, and the gain has
-    the unit of the errors ('mixed' if they differ).
+    the unit of the errors ('mixed' if they differ, 1 if they have sizes, too).
     """
     if channel is None:
         return "1" if kind == "drop probability" else "1/s"
-    above = {units[name] for name in channel.errors}
+    above = {"1" if channel.sizes else units[name] for name in channel.errors}
     top = above.pop() if len(above) == 1 else "mixed"
     if not plain_unit(channel):
         return top

@@ -16,11 +16,13 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly_ctx
 
 from estimators.errors import ScheduleError
 from estimators.schedule.check import HIGHEST_ORDER, SHAPES, SIGNALS
+from estimators.schedule.gain_signals import gain_signals
 from estimators.schedule.upgrade import UNTIED
 from synthesis.certificate.claims import KINDS, KINDS_OF, UPDATE_OF, WITH_CHANNEL, Claim, ClaimChannel
 from synthesis.certificate.units import check_dimensions
 from synthesis.certificate.verify import Names
-from synthesis.errors import ModelError
+from synthesis.errors import ModelError, ProblemError
+from synthesis.loop.feedback import FeedbackLoop
 from synthesis.loop.observer import ObserverLoop
 from synthesis.loop.plant import Axis, Plant
 from synthesis.models.formula import parse, read, used
@@ -41,7 +43,7 @@ MOST_TEXT = 100_000  # characters of all formulas together
 class Subject:
     """What the claims of a file are about. `tied` is false for files of format 1, whose constants and units are mere words."""
 
-    loop: ObserverLoop
+    loop: ObserverLoop | FeedbackLoop
     names: Names
     units: Mapping[str, str]
     tied: bool
@@ -81,18 +83,26 @@ def subject_of(content: Mapping[str, Any], where: str) -> Subject:
         _check_stored(content["plant"][key], matrix, f"{where}: plant.{key}")
     table = {}
     counts = [len(p["breakpoints"]) for p in content["scheduling"]]
-    shape = (len(model["states"]), len(model["outputs"]))
+    shape = tuple(len(signals) for signals in gain_signals(content))
     for index in _indices(counts):
         rows = content["gain"]["table"]
         for i in index:
             rows = rows[i]
         table[index] = fmpq_mat(*shape, [decimal(number) for row in rows for number in row])
     breakpoints = tuple(tuple(decimal(value) for value in p["breakpoints"]) for p in content["scheduling"])
-    update = content["update"]
-    loop = ObserverLoop(plant, breakpoints, table, update["kind"], decimal(update["sample_time"]))
-    names = Names(tuple(s["name"] for s in model["states"]), tuple(s["name"] for s in model["disturbances"]))
     units = {s["name"]: s["unit"] for kind in SIGNALS for s in model[kind]}
-    return Subject(loop, names, units, tied)
+    signals = {kind: tuple(s["name"] for s in model[kind]) for kind in SIGNALS}
+    update = content["update"]
+    period = decimal(update["sample_time"])
+    if update["kind"] != "feedback":
+        loop = ObserverLoop(plant, breakpoints, table, update["kind"], period)
+        return Subject(loop, Names(signals["states"], signals["disturbances"]), units, tied)
+    try:
+        law = FeedbackLoop(plant, breakpoints, table, update["measured"], update["order"], period)
+    except ProblemError as error:
+        raise ScheduleError(f"{where}: gain.table: {error}") from None
+    shown = signals["states"] + signals["outputs"] + signals["inputs"]
+    return Subject(law, Names(signals["states"], signals["disturbances"], shown), units, tied)
 
 
 def claims_of(content: Mapping[str, Any], subject: Subject, where: str) -> list[Claim]:
@@ -112,9 +122,11 @@ def claims_of(content: Mapping[str, Any], subject: Subject, where: str) -> list[
             raise ScheduleError(f"{place}: a probability lies below 1, not at {claim['level']:g}")
         channel = None
         if "channel" in claim:
-            channel = ClaimChannel(dict(claim["channel"]["inputs"]), tuple(claim["channel"]["errors"]))
+            errors = claim["channel"]["errors"]
+            sizes = tuple(errors.values()) if isinstance(errors, Mapping) else ()
+            channel = ClaimChannel(dict(claim["channel"]["inputs"]), tuple(errors), sizes)
             group = subject.names.disturbances if WITH_CHANNEL[kind] == "disturbances" else subject.names.states
-            for names, known_names in ((channel.inputs, group), (channel.errors, subject.names.states)):
+            for names, known_names in ((channel.inputs, group), (channel.errors, subject.names.errors)):
                 for name in names:
                     if name not in known_names:
                         raise ScheduleError(f"{place}.channel: '{name}' is none of {', '.join(known_names)}")
@@ -131,7 +143,7 @@ def claims_of(content: Mapping[str, Any], subject: Subject, where: str) -> list[
 def _lyapunov(stored: Mapping[str, Any], subject: Subject, place: str) -> PolynomialMatrix:
     """P as it is written; raises ScheduleError for one that proves nothing."""
     axes = subject.loop.plant.axes
-    P = stored_polynomial(stored, len(axes), (len(subject.names.states),) * 2)
+    P = stored_polynomial(stored, len(axes), (subject.loop.states,) * 2)
     if prod((degree + 1) ** 2 for degree in P.degrees) > MOST_DENSE:
         raise ScheduleError(f"{place}: orders {list(P.degrees)} are too high for {P.variables} parameters")
     jumping = [axis.name for axis, degree in zip(axes, P.degrees, strict=True) if axis.may_jump and degree]

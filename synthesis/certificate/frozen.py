@@ -18,7 +18,7 @@ POWERS = 60  # of the second moment's map
 def frozen_gain(loop: Loop, d: FloatArray, z: FloatArray) -> float:
     """Largest gain from d w to z e over constant parameters and a grid of frequencies: a bound from below for the update.
 
-    d (disturbances, w) and z (errors, states) are those of a channel (`channel_matrices`).
+    d (disturbances, w) and z (errors, rows of C) are those of a channel (`channel_matrices`): the gain of z (C e + D d w).
 
     A constant parameter is one of the admissible motions, and every frequency bounds the gain there from below. The disturbances
     are held over a sample, as in the claims.
@@ -27,25 +27,23 @@ def frozen_gain(loop: Loop, d: FloatArray, z: FloatArray) -> float:
     if not systems:
         return 0.0
     A = np.array([_numbers(system.A) for system in systems])
-    B = np.array([_numbers(system.B["disturbances"]) @ d for system in systems])
+    B, D = (np.array([_numbers(getattr(system, key)["disturbances"]) @ d for system in systems]) for key in "BD")
+    C = np.array([_numbers(system.C) for system in systems])
     angles = np.concatenate([[0.0], np.geomspace(1e-4, np.pi, 41)])
     resolvent = np.exp(1j * angles)[:, None, None, None] * np.eye(A.shape[-1]) - A
-    response = z @ np.linalg.solve(resolvent, np.broadcast_to(B, (len(angles), *B.shape)))
+    response = z @ (C @ np.linalg.solve(resolvent, np.broadcast_to(B, (len(angles), *B.shape))) + D)
     return float(np.linalg.norm(response, 2, axis=(-2, -1)).max())
 
 
 def frozen_update(loop: Loop) -> tuple[FloatArray, FloatArray]:
     """A of the update (g, n, n) with and without a measurement, on a grid."""
-    received, lost = [], []
-    for system in _systems(loop, "discrete"):
-        received.append(_numbers(system.A))
-        lost.append(_numbers(system.coasting))
-    return np.array(received), np.array(lost)
+    systems = _systems(loop, "discrete")
+    return np.array([_numbers(system.A) for system in systems]), np.array([_numbers(s.coasting) for s in systems])
 
 
 def slowest_decay(loop: Loop) -> float:
     """The least decay rate of the update over constant parameters, 1/s; not positive where one is unstable."""
-    received, _ = frozen_update(loop)
+    received = np.array([_numbers(system.A) for system in _systems(loop, "discrete")])
     if not len(received) or loop.sample_time is None:
         return 0.0
     radius = np.abs(np.linalg.eigvals(received)).max()

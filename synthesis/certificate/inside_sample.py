@@ -6,7 +6,8 @@ The update freezes p at p_k. With the true x' = A(p(t)) x + B(p(t)) u, u held, t
 
 entry by entry, summed over the parameters: q the largest rate, |A'| the largest dA/dp, |B| the largest B, and X = e^(T M) with
 the comparison matrix M (M_ii = sup A_ii or 0 if that is negative, M_ij = sup |A_ij|), which bounds every transition matrix inside
-a sample, over a part of it or all of it: |Phi| <= X. It is the same for both kinds of update, and adds to their error e.
+a sample, over a part of it or all of it: |Phi| <= X. It is the same for all kinds of update: it adds to the error e of an
+observer, and to the states x of a feedback loop.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from flint import arb, arb_mat, fmpq
 
 from synthesis.certificate.claims import quotient
 from synthesis.certificate.rounding import round_up
-from synthesis.loop.observer import ObserverLoop
+from synthesis.loop.loop import Loop
 from synthesis.polynomials.enclosure import Entries, PolynomialMatrix, magnitudes
 
 
@@ -30,7 +31,7 @@ class InsideSample:
     of_inputs: tuple[tuple[float, ...], ...]
 
     def words(self, states: Sequence[str], inputs: Sequence[str], units: Mapping[str, str]) -> list[str]:
-        """One line for every state to whose error something is added."""
+        """One line for every state that is moved."""
         lines = []
         for row, more, state in zip(self.of_states, self.of_inputs, states, strict=True):
             parts = [
@@ -42,7 +43,7 @@ class InsideSample:
         return lines
 
 
-def inside_sample(loop: ObserverLoop) -> InsideSample | None:
+def inside_sample(loop: Loop) -> InsideSample | None:
     """The bounds for a loop with a sample time; None if a parameter may jump, or if a bound is not finite."""
     plant, period = loop.plant, loop.sample_time
     if period is None or any(axis.may_jump for axis in plant.axes):

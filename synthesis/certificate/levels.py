@@ -36,6 +36,13 @@ def sampled_claims(search: Search, channels: Sequence[ClaimChannel], settle: flo
     return _with_update(search, channels, [], settle)
 
 
+def feedback_claims(search: Search, channels: Sequence[ClaimChannel], settle: float) -> tuple[Claim, ...] | None:
+    """Claims of a feedback law that runs once a sample: decay and the gain of every channel; None if one cannot be had."""
+    found = [largest(search, UPDATE_OF["feedback"], slowest_decay(search.loop))]
+    found += [best_gain(search, Wish("sampled gain", None, channel), settle) for channel in channels]
+    return None if any(claim is None for claim in found) else tuple(claim for claim in found if claim is not None)
+
+
 def _with_update(
     search: Search, channels: Sequence[ClaimChannel], found: list[Claim | None], settle: float
 ) -> tuple[Claim, ...] | None:

@@ -42,6 +42,7 @@ class Certificate:
     proofs: tuple[Proof, ...]
     inside_sample: tuple[str, ...]
     tied: bool
+    feedback: bool = False
 
 
 def prove(content: Mapping[str, Any], where: str = "schedule") -> list[Proof]:
@@ -71,7 +72,7 @@ def certificate(content: Mapping[str, Any], where: str = "schedule") -> Certific
     bounds = inside_sample(subject.loop)
     inputs = [signal["name"] for signal in content["model"]["inputs"]]
     words = () if bounds is None else tuple(bounds.words(subject.names.states, inputs, subject.units))
-    return Certificate(proofs, words, subject.tied)
+    return Certificate(proofs, words, subject.tied, content["update"]["kind"] == "feedback")
 
 
 def _proof(claim: Claim, verifier: Verifier, subject: Subject) -> Proof:

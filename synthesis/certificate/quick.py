@@ -135,8 +135,9 @@ def _tiled(system: System, times: int, cells: int) -> System:
         system.time,
         more(system.A),
         {name: more(matrix) for name, matrix in system.B.items()},
-        system.C,
+        more(system.C),
         {name: more(matrix) for name, matrix in system.D.items()},
         more(system.coasting),
         more(system.denominator),
+        system.shared,
     )

@@ -15,6 +15,7 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from synthesis.certificate.claims import ERROR_EQUATION, WITH_CHANNEL, Claim, ClaimChannel, rows_of
+from synthesis.certificate.families import below_one, rate_places
 from synthesis.certificate.inequalities import Question, inequalities
 from synthesis.certificate.rounding import LYAPUNOV_DIGITS, rounded_lyapunov
 from synthesis.certificate.sampled_loop import SampledLoop
@@ -23,7 +24,6 @@ from synthesis.certificate.verify import MOST_REGIONS, Names, Outcome, Verifier
 from synthesis.lmi.clarabel_backend import RawAnswer
 from synthesis.lmi.exchange import Family, Memory, corners, exchange, recall, remember
 from synthesis.lmi.problem import LmiProblem
-from synthesis.lmi.relaxation import rate_samples
 from synthesis.lmi.samples import Samples, Sampling
 from synthesis.lmi.scaling import error_scale
 from synthesis.lmi.settings import LmiSettings
@@ -35,6 +35,7 @@ from synthesis.polynomials.matrix import MatrixPolynomial, variable
 
 ANGLES = np.concatenate([[0.0], np.geomspace(1e-3, np.pi, 15)])  # per sample, where the size of a gain is looked for
 ACCURACY = 1e-4  # relative, of a least gain or a largest margin: what holds is proved afterwards
+STALLED = (1.0005, 1.002, 1.01, 1.05, 1.2)  # times the level that a stalled solve names
 PROOFS = 3  # of one wish: a place where one fails is solved for, too
 
 
@@ -92,8 +93,8 @@ class Search:
         cells = list(self.loop.cells())
         middle = self.loop.system(cells[len(cells) // 2], self.loop.time)
         if middle is None:
-            return np.ones(self.loop.plant.states)
-        A = _value(in_scaled_states(middle, np.ones(self.loop.plant.states)).A)
+            return np.ones(self.loop.states)
+        A = _value(in_scaled_states(middle, np.ones(self.loop.states)).A)
         # Balancing looks at the diagonal, too; that of an update is near one whatever the units of the states are.
         return error_scale(A - np.eye(len(A)) if middle.time == "discrete" else A)
 
@@ -137,9 +138,15 @@ class Search:
             asked = self._asked(replace(wish, level=None))
             found = None if asked is None else self._solved(asked, wish)
             square = np.nan if found is None or asked is None else float(asked.problem.cost @ found.decisions)
-            solved = found is not None and found.status.endswith("Solved") and square > 0.0
-            self._least[key] = float(np.sqrt(square)) * self._unit(wish) if solved else np.inf
+            named = float(np.sqrt(square)) * self._unit(wish) if 0.0 < square < np.inf else np.inf
+            solved = found is not None and found.status.endswith("Solved")
+            self._least[key] = named if solved else self._held_level(wish, named)
         return self._least[key]
+
+    def _held_level(self, wish: Wish, named: float) -> float:
+        """The first level above one that a stalled solve named where all inequalities have a margin; inf if none of a few has."""
+        levels = (named * step for step in STALLED) if np.isfinite(named) else ()
+        return next((x for x in levels if self.largest_margin(replace(wish, level=x)) > 0.0), np.inf)
 
     def _solved(self, asked: Asked, wish: Wish) -> RawAnswer:
         found = exchange(asked.problem, asked.families, replace(self.settings, verify=False), ACCURACY)
@@ -154,7 +161,7 @@ class Search:
         if sampled.grid is None:
             return None
         problem = LmiProblem(self.parameters, maximise_margin=wish.level is not None)
-        size, count = self.loop.plant.states, len(self.parameters)
+        size, count = self.loop.states, len(self.parameters)
         discrete = time == "discrete"
         P = problem.symmetric("P", size, self._degrees(discrete) or 0)
         square = problem.scalar("gamma^2") if wish.level is None else None
@@ -205,7 +212,7 @@ class Search:
 
         families = [family(name) for name in named(places[:1])]
         if wish.level is not None and wish.channel is None:
-            families.append(_below_one(P, places, count))
+            families.append(below_one(P, places, count))
         recall(families, self._memory.get(wish.kind, {}))
         return Asked(problem, P, families)
 
@@ -231,7 +238,8 @@ class Search:
     def _errors(self, wish: Wish) -> FloatArray:
         assert wish.channel is not None
         errors = list(self.names.errors)
-        return np.eye(len(errors))[[errors.index(name) for name in wish.channel.errors]]
+        chosen = np.eye(len(errors))[[errors.index(name) for name in wish.channel.errors]]
+        return np.asarray(chosen / np.array(wish.channel.error_sizes)[:, None])
 
     def _output_unit(self, wish: Wish) -> float:
         """The errors of the channel are numbers near one in it when the scaled states are."""
@@ -261,46 +269,29 @@ class Search:
         if found is None:
             return 1.0
         system: System = in_scaled_states(found, self.scale)
-        A, B = _value(system.A), _value(system.B[WITH_CHANNEL[wish.kind]]) @ self._sizes(wish.channel, wish.kind)
-        ZC = self._errors(wish) @ _value(system.C)
+        group, W, Z = WITH_CHANNEL[wish.kind], self._sizes(wish.channel, wish.kind), self._errors(wish)
+        A, B, ZC, ZD = (
+            _value(system.A),
+            _value(system.B[group]) @ W,
+            Z @ _value(system.C),
+            Z @ _value(system.D[group]) @ W,
+        )
         if system.denominator is not None:
             below = float(_value(system.denominator)[0, 0])
             A, B = A / below, B / below
+            ZC, ZD = (ZC / below, ZD / below) if system.shared else (ZC, ZD)
         if system.time == "discrete":
             points = np.exp(1j * ANGLES)
         else:
             points = 1j * np.concatenate([[0.0], np.linalg.norm(A, 2) * np.geomspace(1e-3, 10.0, len(ANGLES) - 1)])
         resolvent = points[:, None, None] * np.eye(len(A)) - A
         try:
-            answer = ZC @ np.linalg.solve(resolvent, B[None].astype(complex))
+            answer = ZC @ np.linalg.solve(resolvent, B[None].astype(complex)) + ZD
             size = float(np.linalg.norm(answer, 2, axis=(-2, -1)).max())
         except np.linalg.LinAlgError:
             size = 0.0
         step = float(np.linalg.norm(ZC @ B))
         return next((x for x in (size, step) if 0.0 < x < np.inf), 1.0)
-
-
-def rate_places(grid: FloatArray, later: MatrixPolynomial, count: int) -> FloatArray:
-    """Every place of the grid with every vertex of the rates (and more, where P one sample later is not affine in them)."""
-    found = rate_samples(later, count)
-    moving = np.array(found).reshape(len(found), count)
-    return np.hstack([np.repeat(grid, len(moving), axis=0), np.tile(moving, (len(grid), 1))])
-
-
-def _below_one(P: MatrixPolynomial, places: FloatArray, count: int) -> Family:
-    """P < 1, which normalises the unknowns and takes no part in the verdict."""
-    still = np.unique(np.hstack([places[:, :count], np.zeros_like(places[:, count:])]), axis=0)
-    unit = np.eye(P.shape[0])
-
-    def rows(chosen: FloatArray) -> FloatArray:
-        values = -P.at(chosen)
-        values[..., 0] += unit
-        return values
-
-    def known(decisions: FloatArray, chosen: FloatArray) -> FloatArray:
-        return np.asarray(unit - P.substitute(decisions).at(chosen)[..., 0])
-
-    return Family("P < 1", still, rows, known, corners(still, count), strict=False)
 
 
 def _value(matrix: object) -> FloatArray:

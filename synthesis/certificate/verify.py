@@ -36,7 +36,10 @@ ORDER = 8  # total degree of the inequalities that is kept; products of exponent
 
 @dataclass(frozen=True)
 class Names:
-    """The signals of a loop in order; the outputs of an observer's error are its states, and are not named again."""
+    """The signals of a loop in order; the outputs of an observer's error are its states, and are not named again.
+
+    Of a feedback loop they are the plant's states, outputs and inputs (`synthesis.loop.feedback`).
+    """
 
     states: tuple[str, ...]
     disturbances: tuple[str, ...]
@@ -172,7 +175,11 @@ class Verifier:
             decimal(size) if i == place else fmpq(0)
             for i in range(len(inputs)) for place, size in zip(places, sizes, strict=True)
         ])  # fmt: skip
-        Z = fmpq_mat([[fmpq(int(name == error)) for name in self.names.errors] for error in claim.channel.errors])
+        channel = claim.channel
+        Z = fmpq_mat([
+            [1 / decimal(size) if name == error else fmpq(0) for name in self.names.errors]
+            for error, size in zip(channel.errors, channel.error_sizes, strict=True)
+        ])  # fmt: skip
         return Question(claim.kind, level, group, W, Z, period)
 
 

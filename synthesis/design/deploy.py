@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
-from flint import fmpq_mat
 
 from estimators.arrays import FloatArray
 from estimators.display import Display, counted
 from synthesis.certificate.claims import Claim, ClaimChannel
-from synthesis.certificate.levels import held_claims, sampled_claims
+from synthesis.certificate.levels import feedback_claims, held_claims, sampled_claims
 from synthesis.certificate.rounding import significant
 from synthesis.certificate.search import Search, Wish
 from synthesis.certificate.verify import Names
-from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains
+from synthesis.design.deploy_settings import DeploySettings
+from synthesis.design.feedback_channel import FeedbackChannel, feedback_names
+from synthesis.design.hinf_observer import Channel, ObserverGains
+from synthesis.design.law_table import Gains, deployed_loop, extra_digits, table_at, update_of, update_section
 from synthesis.design.well_posedness import well_posedness
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import Verdict
-from synthesis.loop.from_model import plant_of
+from synthesis.loop.feedback import FeedbackLoop
 from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.rational import decimal
 
 SEGMENTS = (7, 14, 28, 56, 112)
 RATES = ("decay rate", "fastest pole", "internal update", "sampled error")  # claims in 1/s
@@ -33,29 +33,14 @@ REFINEMENT = 4  # a table is compared with one of so many times its segments
 TABLE_DIGITS = 4  # of the largest gain of each entry; more would be digits of the solver and not of the guarantee
 
 
-@dataclass(frozen=True)
-class DeploySettings:
-    """How gains become a table."""
-
-    sample_time: float = 0.005  # s
-    dtype: Literal["float32", "float64"] = "float64"
-    interpolation_cost: float = 0.01  # largest loss of any gain against a table four times as fine
-    settle: float = 0.005  # certified bounds are this much above their infimum, which buys margin for the proof
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.sample_time < 1.0:
-            raise ProblemError(f"sample time {self.sample_time} s must lie between 0 and 1 s")
-        if self.dtype not in ("float32", "float64"):
-            raise ProblemError(f"dtype '{self.dtype}' of the table must be float32 or float64")
-        if not 0.0 < self.interpolation_cost < 1.0:
-            raise ProblemError(f"interpolation cost {self.interpolation_cost} must lie between 0 and 1")
-
-
 @dataclass(frozen=True, repr=False)
 class Deployment(Display):
-    """A table with the claims that are proved for it: `table` (b_1, .., b_p, nx, ny) as stored, `breakpoints` (b_i,) each."""
+    """A table with the claims that are proved for it: `table` (b_1, .., b_p, rows, columns) as stored, `breakpoints` (b_i,) each.
 
-    gains: ObserverGains
+    Of an observer (states, outputs), of a feedback law (its states + inputs, its states + measured signals).
+    """
+
+    gains: Gains
     settings: DeploySettings
     breakpoints: tuple[FloatArray, ...]
     table: FloatArray
@@ -73,19 +58,19 @@ class Deployment(Display):
         return (
             f"Deployment of '{model.name}'",
             f"table: {self.table.shape} over {', '.join(over) or 'nothing'}, {self.settings.dtype}",
-            f"update: {self.gains.update}, every {1e3 * self.settings.sample_time:g} ms",
+            f"update: {update_of(self.gains)}, every {1e3 * self.settings.sample_time:g} ms",
             f"cost of tabulation: {max(100.0 * self.cost, 0.0):.2f} % of the worst gain, {100.0 * limit:g} % allowed",
             f"{counted(len(self.claims), 'claim')}: {', '.join(levels)}",
         )
 
     @property
-    def loop(self) -> ObserverLoop:
+    def loop(self) -> ObserverLoop | FeedbackLoop:
         """The closed loop that was proved."""
         return deployed_loop(self.gains, self.breakpoints, self.table, self.settings.sample_time)
 
 
 def deploy(
-    gains: ObserverGains, settings: DeploySettings | None = None, progress: Callable[[str], None] = lambda _: None
+    gains: Gains, settings: DeploySettings | None = None, progress: Callable[[str], None] = lambda _: None
 ) -> Deployment:
     """Tabulate on the coarsest breakpoints that cost less than the allowed share of every gain, and prove claims.
 
@@ -103,15 +88,17 @@ def deploy(
     if gains.verdict is not Verdict.CERTIFIED:
         raise ProblemError(f"gains are not certified and are not deployed: {gains.result.message}")
     refuse_undeployable(model)
-    if gains.update == "sampled" and gains.sample_time != settings.sample_time:
+    observer = gains if isinstance(gains, ObserverGains) else None
+    update_section(gains, settings)  # refuses limits of inputs that there are not
+    if observer is not None and observer.update == "sampled" and observer.sample_time != settings.sample_time:
         raise ProblemError(
-            f"gains designed for a sample time of {gains.sample_time} s are not run at {settings.sample_time} s"
+            f"gains designed for a sample time of {observer.sample_time} s are not run at {settings.sample_time} s"
         )
-    if gains.update == "held" and design.fastest_pole is None:  # nothing bounds the gains but the channels themselves
-        posed = well_posedness(model, design)
+    if observer is not None and observer.update == "held" and observer.design.fastest_pole is None:
+        posed = well_posedness(model, observer.design)  # nothing bounds the gains but the channels themselves
         if posed.ill_posed:
             raise ProblemError(f"model '{model.name}' is not deployed: {posed.message}")
-    kind = "gain" if gains.update == "held" else "sampled gain"
+    kind = "gain" if observer is not None and observer.update == "held" else "sampled gain"
     channels = [claim_channel(channel) for channel in design.channels]
     for segments in _candidates(gains, settings):
         progress(f"{' x '.join(map(str, segments))} segments")
@@ -120,10 +107,7 @@ def deploy(
         cost = max(table_cost(search, finer, Wish(kind, None, channel)) for channel in channels)
         if not cost < settings.interpolation_cost:
             continue
-        if gains.update == "held":
-            claims = held_claims(search, channels, design.decay_rate, design.fastest_pole, settings.settle)
-        else:
-            claims = sampled_claims(search, channels, settings.settle)
+        claims = _claims(gains, search, channels, settings.settle)
         if claims is not None:
             return Deployment(gains, settings, points, table, claims, cost)
     raise ProblemError(
@@ -143,7 +127,7 @@ def refuse_undeployable(model: LpvModel) -> None:
         raise ProblemError(f"model '{model.name}' is rational; schedule files store polynomial plants")
 
 
-def _candidates(gains: ObserverGains, settings: DeploySettings) -> Iterator[tuple[int, ...]]:
+def _candidates(gains: Gains, settings: DeploySettings) -> Iterator[tuple[int, ...]]:
     """Segments along every parameter, coarsest first.
 
     With several parameters an axis is cut until interpolating along it alone costs no more than the allowed share of the
@@ -153,19 +137,19 @@ def _candidates(gains: ObserverGains, settings: DeploySettings) -> Iterator[tupl
     if count == 1:
         yield from ((number,) for number in SEGMENTS)
         return
-    segments: tuple[int, ...] = tuple(_along(gains, axis, settings.interpolation_cost) for axis in range(count))
+    segments: tuple[int, ...] = tuple(_along(gains, axis, settings) for axis in range(count))
     while np.prod([number + 1 for number in segments]) <= MOST_ENTRIES:
         yield segments
         segments = tuple(2 * number for number in segments)
 
 
-def _along(gains: ObserverGains, axis: int, share: float) -> int:
+def _along(gains: Gains, axis: int, settings: DeploySettings) -> int:
     """The least number of segments, a power of two, that interpolates well along one parameter, the others at both ends."""
     parameters = gains.model.parameters
     others = [np.array([p.minimum, p.maximum]) for p in parameters]
     others[axis] = np.linspace(parameters[axis].minimum, parameters[axis].maximum, FINEST + 1)
     grid = np.stack(np.meshgrid(*others, indexing="ij"), axis=-1)
-    found = gains.gain(grid.reshape(-1, len(parameters)))
+    found, share = table_at(gains, grid.reshape(-1, len(parameters)), settings.sample_time), settings.interpolation_cost
     values = np.moveaxis(found.reshape(*grid.shape[:-1], -1), axis, 0).reshape(FINEST + 1, -1, found[0].size)
     size = np.abs(values).max(axis=(0, 1)) + np.finfo(float).tiny
     for segments in (1, 2, 4, 8, 16, 32):
@@ -183,58 +167,62 @@ def table_cost(coarse: Search, fine: Search, wish: Wish) -> float:
     return least / best - 1.0 if np.isfinite(least) and np.isfinite(best) else np.inf
 
 
-def claim_channel(channel: Channel) -> ClaimChannel:
+def _claims(gains: Gains, search: Search, channels: Sequence[ClaimChannel], settle: float) -> tuple[Claim, ...] | None:
+    """What is claimed of a table, by how it is run; None if something of it cannot be proved."""
+    if not isinstance(gains, ObserverGains):
+        return feedback_claims(search, channels, settle)
+    if gains.update == "held":
+        return held_claims(search, channels, gains.design.decay_rate, gains.design.fastest_pole, settle)
+    return sampled_claims(search, channels, settle)
+
+
+def claim_channel(channel: Channel | FeedbackChannel) -> ClaimChannel:
     """A channel of the design as claims name it."""
+    if isinstance(channel, FeedbackChannel):
+        return channel.claim
     sizes = channel.weights or (1.0,) * len(channel.disturbances)
     return ClaimChannel(dict(zip(channel.disturbances, sizes, strict=True)), channel.errors)
 
 
-def deployed_loop(
-    gains: ObserverGains, breakpoints: tuple[FloatArray, ...], table: FloatArray, sample_time: float
-) -> ObserverLoop:
-    """A table in closed loop with its model, run with the update of its design."""
-    entries: dict[tuple[int, ...], fmpq_mat] = {
-        index: fmpq_mat([[decimal(float(x)) for x in row] for row in table[index]])
-        for index in np.ndindex(table.shape[:-2])
-    }
-    points = tuple(tuple(decimal(float(value)) for value in line) for line in breakpoints)
-    return ObserverLoop(plant_of(gains.model), points, entries, gains.update, decimal(sample_time))
-
-
 def tabulate(
-    gains: ObserverGains, segments: int | tuple[int, ...], dtype: str
+    gains: Gains, segments: int | tuple[int, ...], dtype: str, sample_time: float
 ) -> tuple[tuple[FloatArray, ...], FloatArray]:
     """Equidistant breakpoints of every parameter and gains there, rounded to a few digits and to the type that stores them."""
     parameters = gains.model.parameters
     numbers = (segments,) * len(parameters) if isinstance(segments, int) else segments
     lines = tuple(np.linspace(p.minimum, p.maximum, n + 1) for p, n in zip(parameters, numbers, strict=True))
     points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(lines))
-    table = gains.gain(points)
+    table, digits = table_at(gains, points, sample_time), TABLE_DIGITS + extra_digits(gains)
     largest = np.abs(table).max(axis=0)
     rounded = np.empty_like(table)
     for place, value in np.ndenumerate(table):
-        rounded[place] = significant(float(value), float(largest[place[1:]]), TABLE_DIGITS)
+        rounded[place] = significant(float(value), float(largest[place[1:]]), digits)
     return lines, rounded.reshape(*map(len, lines), *table.shape[1:]).astype(dtype).astype(np.float64)
 
 
 def names_of(model: LpvModel) -> Names:
-    """States and disturbances in order."""
+    """The signals of an observer's error: states and disturbances in order."""
     return Names(tuple(s.name for s in model.states), tuple(d.name for d in model.disturbances))
 
 
 def _tabulated(
-    gains: ObserverGains, segments: tuple[int, ...], settings: DeploySettings, dtype: str
+    gains: Gains, segments: tuple[int, ...], settings: DeploySettings, dtype: str
 ) -> tuple[Search, tuple[FloatArray, ...], FloatArray]:
     model, design = gains.model, gains.design
-    points, table = tabulate(gains, segments, dtype)
+    points, table = tabulate(gains, segments, dtype, settings.sample_time)
+    names = names_of(model) if isinstance(gains, ObserverGains) else feedback_names(model)
     loop = deployed_loop(gains, points, table, settings.sample_time)
     return (
-        Search(loop, names_of(model), model.parameters, lyapunov_degree(model, design), design.settings),
+        Search(loop, names, model.parameters, lyapunov_degree(model, gains), design.settings),
         points,
         table,
     )
 
 
-def lyapunov_degree(model: LpvModel, design: ObserverDesign) -> tuple[int, ...]:
-    """Degree of P in the claims for each parameter: that of the gains, at least one; none in a parameter that may jump."""
-    return tuple(0 if p.may_jump else max(design.degree, 1) for p in model.parameters)
+def lyapunov_degree(model: LpvModel, gains: Gains) -> tuple[int, ...]:
+    """Degree of P in the claims for each parameter: that of the gains, at least one; none in a parameter that may jump.
+
+    A law whose own P is rational in the parameters says how many degrees more come close to it.
+    """
+    more = 0 if isinstance(gains, ObserverGains) else gains.rational
+    return tuple(0 if p.may_jump else max(gains.design.degree, 1) + more for p in model.parameters)

@@ -19,6 +19,7 @@ from estimators.schedule.check import SHAPES, SIGNALS
 from synthesis.certificate.claims import Claim
 from synthesis.certificate.proof import Proof, prove
 from synthesis.design.deploy import Deployment
+from synthesis.design.law_table import update_section
 from synthesis.errors import ProblemError
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.chebyshev import to_chebyshev
@@ -41,7 +42,7 @@ def schedule_content(
              "absolute": p.absolute, "breakpoints": line.tolist()}
             for p, line in zip(model.parameters, deployment.breakpoints, strict=True)
         ],
-        "update": {"kind": deployment.gains.update, "sample_time": deployment.settings.sample_time},
+        "update": update_section(deployment.gains, deployment.settings),
         "plant": {key: stored(model.exact.matrices[key]) for key in SHAPES},
         "gain": {"dtype": deployment.settings.dtype, "interpolation": "linear", "table": gain.tolist()},
         "claims": [_claim(claim) for claim in deployment.claims],
@@ -117,7 +118,9 @@ def _model(model: LpvModel) -> dict[str, Any]:
 def _claim(claim: Claim) -> dict[str, Any]:
     out: dict[str, Any] = {"kind": claim.kind, "level": claim.level}
     if claim.channel is not None:
-        out["channel"] = {"inputs": dict(claim.channel.inputs), "errors": list(claim.channel.errors)}
+        channel = claim.channel
+        errors = dict(zip(channel.errors, channel.sizes, strict=True)) if channel.sizes else list(channel.errors)
+        out["channel"] = {"inputs": dict(channel.inputs), "errors": errors}
     return out | {"P": stored(claim.P)}
 
 

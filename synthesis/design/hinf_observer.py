@@ -16,7 +16,6 @@ of disturbances and states. A level counts only if every inequality holds at it 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -24,18 +23,14 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from estimators.display import Display
-from synthesis.certificate.refute import undetectable_place
-from synthesis.certificate.rounding import round_down, round_up
 from synthesis.design.gains_summary import gains_summary
+from synthesis.design.refusals import refuse_undetectable
+from synthesis.design.three_solves import Problem, three_solves
 from synthesis.errors import ProblemError
-from synthesis.lmi.exchange import Memory
 from synthesis.lmi.problem import LmiProblem
-from synthesis.lmi.relaxation import relaxation_of
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.scaling import observer_scale
 from synthesis.lmi.settings import LmiSettings
-from synthesis.lmi.solve import solve
-from synthesis.loop.from_model import plant_of
 from synthesis.loop.observer import Update
 from synthesis.models.lpv import LpvModel
 from synthesis.models.selection import selection
@@ -149,8 +144,6 @@ class ObserverGains(Display):
 def design_observer(model: LpvModel, design: ObserverDesign) -> ObserverGains:
     """Minimise the open channel, then give back `backoff` of it and take the gains that vary least and keep most of the margin.
 
-    The optimum itself is attained only at the boundary of feasibility, where gains may be unbounded, and largest margins are
-    flat: so the last step is strictly convex, and every number that is handed on is rounded to the digits that matter.
     Raises ProblemError if nothing is found; a model with a hidden unstable mode is called undetectable.
 
     >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
@@ -169,10 +162,6 @@ def design_observer(model: LpvModel, design: ObserverDesign) -> ObserverGains:
     return minimised(model, design, scale, problem)
 
 
-KEPT = 0.95  # of the largest common margin, when the gains are chosen
-Problem = Callable[..., LmiProblem]
-
-
 def minimised(
     model: LpvModel,
     design: ObserverDesign,
@@ -181,89 +170,16 @@ def minimised(
     update: Update = "held",
     sample_time: float | None = None,
 ) -> ObserverGains:
-    """The three solves of a design; `problem(gamma, maximise_margin, floor)` builds its inequalities."""
+    """The solves of a design (`three_solves`); `problem(gamma, maximise_margin, floor)` builds its inequalities."""
     refuse_undetectable(model)
-    memory: Memory = {}
-    first = problem(None)
-    bounding = design.backoff > 0.0 and relaxation_of(first, design.settings) == "exchange"
-    # The optimum itself is not handed on then: it need not hold on the continuum, only the level a back-off above it.
-    optimum = solve(first, replace(design.settings, verify=not bounding), memory)
-    lower = None if optimum.lower_bound is None else to_gamma(model, design, scale, max(optimum.lower_bound, 0.0))
-    named = optimum.objective is not None and optimum.objective > 0.0
-    if bounding and named and optimum.report.status == "Solved":
-        gamma = round_up(to_gamma(model, design, scale, optimum.objective or 0.0) * (1.0 + design.backoff))
-        result = solve(problem(gamma), design.settings, memory)
-        bounding = result.verdict is Verdict.CERTIFIED
-    else:
-        bounding = False
-    if not bounding:
-        if optimum.verdict is Verdict.CERTIFIED and named:
-            gamma, result = to_gamma(model, design, scale, optimum.objective or 0.0), optimum
-        else:
-            gamma, result = _least_certified(model, design, scale, problem, optimum)
-    if design.backoff > 0.0:
-        if not bounding:
-            gamma = round_up(gamma * (1.0 + design.backoff))
-            result = solve(problem(gamma), design.settings, memory)
-        if result.verdict is not Verdict.CERTIFIED:
-            raise ProblemError(f"model '{model.name}': {result.message}")
-        floor = round_down(KEPT * float(result.objective or 0.0), 2)
-        if floor > 0.0:
-            settled = solve(problem(gamma, False, floor), design.settings, memory)
-            result = settled if settled.verdict is Verdict.CERTIFIED else result
-    return ObserverGains(design, model, lower, gamma, result, optimum, scale, update, sample_time)
 
+    def level(objective: float) -> float:
+        return to_gamma(model, design, scale, objective)
 
-STEPS = (1.001, 1.01, 1.1, 1.5, 3.0, 10.0, 100.0)  # from the level that a solver names to one that holds
-BISECTIONS = 14
-
-
-def _least_certified(
-    model: LpvModel, design: ObserverDesign, scale: FloatArray, problem: Problem, optimum: LmiResult
-) -> tuple[float, LmiResult]:
-    """A solve that stalled names some level, below or above the least one where a largest margin is certified: bracket that."""
-    named = optimum.objective if optimum.objective is not None and optimum.objective > 0.0 else 1.0
-    level = low = to_gamma(model, design, scale, named)
-    found, high = None, low
-    for step in STEPS:
-        high = level * step
-        found = solve(problem(high), design.settings)
-        if found.verdict is Verdict.CERTIFIED:
-            break
-    if found is None or found.verdict is not Verdict.CERTIFIED:
-        raise ProblemError(
-            f"model '{model.name}': {optimum.message}; loosen a bound, the decay rate or the fastest pole"
-        )
-    for step in STEPS[1:] if high == level * STEPS[0] else ():  # the level that was named holds: what about lower ones?
-        low = level / step
-        tried = solve(problem(low), design.settings)
-        if tried.verdict is not Verdict.CERTIFIED:
-            break
-        found, high = tried, low
-    for _ in range(BISECTIONS):
-        if high <= low * 1.0005:
-            break
-        middle = float(np.sqrt(low * high))
-        tried = solve(problem(middle), design.settings)
-        if tried.verdict is Verdict.CERTIFIED:
-            found, high = tried, middle
-        else:
-            low = middle
-    return high, found
-
-
-def refuse_undetectable(model: LpvModel) -> None:
-    """Raise ProblemError where an unstable mode does not show in the output: no gain helps there."""
-    place = undetectable_place(plant_of(model))
-    if place is not None:
-        where = ", ".join(
-            f"{p.name} = {p.middle + p.half_width * int(u.p) / int(u.q):.6g} {p.unit}"
-            for p, u in zip(model.parameters, place, strict=True)
-        )
-        raise ProblemError(
-            f"model '{model.name}' is undetectable at {where or 'its only point'}: a mode that does not decay does not show in "
-            f"the output(s) {', '.join(o.name for o in model.outputs)}; measure it, or shrink the range"
-        )
+    found = three_solves(model.name, problem, level, design.backoff, design.settings)
+    return ObserverGains(
+        design, model, found.gamma_lower, found.gamma, found.result, found.optimum, scale, update, sample_time
+    )
 
 
 def design_scale(model: LpvModel, design: ObserverDesign) -> FloatArray:

@@ -26,6 +26,11 @@ class GivenLoop:
     _systems: dict[Any, System] = field(default_factory=dict, repr=False, compare=False)
 
     @property
+    def states(self) -> int:
+        """Number of states."""
+        return self.plant.states
+
+    @property
     def sample_time(self) -> fmpq | None:
         """One sample; None in continuous time."""
         return fmpq(1) if self.time == "discrete" else None

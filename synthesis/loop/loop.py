@@ -12,11 +12,15 @@ from synthesis.loop.system import Region, System, Time
 
 
 class Loop(Protocol):
-    """A law in closed loop with its plant (`ObserverLoop`), or a system as it is given (`GivenLoop`)."""
+    """A law in closed loop with its plant (`ObserverLoop`, `FeedbackLoop`), or a system as it is given (`GivenLoop`)."""
 
     @property
     def plant(self) -> Plant:
-        """Parameters as axes, and how many states there are."""
+        """Its parameters as axes."""
+
+    @property
+    def states(self) -> int:
+        """Number of states of the loop."""
 
     @property
     def breakpoints(self) -> tuple[tuple[fmpq, ...], ...]:

@@ -19,30 +19,28 @@ e' = (A - L C) e + (E - L F) d.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from itertools import pairwise, product
+from itertools import product
 from typing import Any, Literal
 
-import numpy as np
-from flint import arb, fmpq, fmpq_mat
+from flint import fmpq, fmpq_mat
 
 from synthesis.errors import ProblemError
-from synthesis.loop.on_boxes import HIGHEST, MOST_BOXES, gains, local, rounding_of, unit
+from synthesis.loop.on_boxes import local, unit
 from synthesis.loop.plant import Plant
 from synthesis.loop.system import Region, System, Time
+from synthesis.loop.tabulated import Tabulated
 from synthesis.polynomials import box_exponential
 from synthesis.polynomials import exponential as exponentials
-from synthesis.polynomials.enclosure import PolynomialMatrix, Powers, identity
+from synthesis.polynomials.enclosure import identity
 
 Update = Literal["held", "sampled"]
-ROUNDING = fmpq(1, 2**50)  # of float64, with room: every rounding below costs at most 2^-53 of what is rounded
 ORDER = 8  # total degree in the local parameters that products of exponentials keep
 
 
 @dataclass(frozen=True)
-class ObserverLoop:
+class ObserverLoop(Tabulated):
     """Plant, gains and update. `breakpoints` one tuple for every parameter; `table` maps a grid index to L or K (nx, ny).
 
     `sample_time` None: only the error equation is meant. With `rounded` the plant and the gains are balls that hold what the
@@ -70,14 +68,10 @@ class ObserverLoop:
         """Continuous for an observer that is integrated, discrete for one that corrects once a sample."""
         return "continuous" if self.update == "held" else "discrete"
 
-    def cells(self) -> Iterator[Region]:
-        """The boxes between neighbouring breakpoints."""
-        edges = [
-            [(axis.scaled(low), axis.scaled(high)) for low, high in pairwise(points)]
-            for axis, points in zip(self.plant.axes, self.breakpoints, strict=True)
-        ]
-        for cell in product(*edges):
-            yield Region.between(tuple(low for low, _ in cell), tuple(high for _, high in cell))
+    @property
+    def states(self) -> int:
+        """Those of the plant: the loop is that of the estimation error."""
+        return self.plant.states
 
     def system(self, region: Region, time: Literal["continuous", "discrete"]) -> System | None:
         """The error on a region (of one cell of the table): the error equation, or its update over a sample.
@@ -90,81 +84,24 @@ class ObserverLoop:
             self._systems[box] = self._error_equation(region) if time == "continuous" else self._error_update(region)
         return self._systems[box]
 
-    def local(self, matrix: PolynomialMatrix, region: Region) -> PolynomialMatrix:
-        """A polynomial in u in the local variables (t, r) of a region."""
-        return region.local(matrix)
-
-    def gain(self, region: Region) -> PolynomialMatrix:
-        """The multilinear gain on a region that lies in one cell."""
-        axes, count = self.plant.axes, region.parameters
-        cell, weights = [], []
-        for i, (axis, points) in enumerate(zip(axes, self.breakpoints, strict=True)):
-            middle = region.offset[i] * axis.half + axis.middle
-            k = next(j for j in range(len(points) - 1) if middle <= points[j + 1])
-            cell.append(k)
-            low, high = axis.scaled(points[k]), axis.scaled(points[k + 1])
-            ends = (region.offset[i] - low) / (high - low), region.factor[i] / (high - low)
-            weights.append(((1 - ends[0], -ends[1]), ends))
-        terms: dict[Powers, fmpq_mat] = {}
-        for corner in product((0, 1), repeat=count):
-            value = self.table[tuple(k + c for k, c in zip(cell, corner, strict=True))]
-            for powers in product((0, 1), repeat=count):
-                factor = fmpq(1)
-                for i in range(count):
-                    factor *= weights[i][corner[i]][powers[i]]
-                if factor != 0:
-                    place = (*powers, *(0,) * count)
-                    terms[place] = terms[place] + value * factor if place in terms else value * factor
-        nx, ny = self.plant.states, self.plant.matrices["C"].shape[0]
-        found = PolynomialMatrix(terms, (nx, ny), 2 * count).balls()
-        return found.blurred(lambda i, j: self._gain_rounding[i, j].abs_upper()) if self.rounded else found
-
-    @cached_property
-    def _gain_rounding(self) -> Any:
-        """What interpolation in float64 may be off: of the values, and of slopes times rounded distances."""
-        nx, ny = self.plant.states, self.plant.matrices["C"].shape[0]
-        steepest = fmpq(1)
-        for axis, points in zip(self.plant.axes, self.breakpoints, strict=True):
-            narrow = min(b - a for a, b in pairwise(points))
-            steepest += max(abs(axis.low), abs(axis.high)) / narrow
-        largest = [[max(abs(gain[i, j]) for gain in self.table.values()) for j in range(ny)] for i in range(nx)]
-        return {(i, j): arb(largest[i][j] * steepest * ROUNDING * 4) for i in range(nx) for j in range(ny)}
-
-    @cached_property
-    def _plant(self) -> dict[str, PolynomialMatrix]:
-        """Plant matrices in u, as balls; uncertain by what the runtime's evaluation in float64 may be off."""
-        matrices = {key: matrix.balls() for key, matrix in self.plant.matrices.items()}
-        if not self.rounded:
-            return matrices
-        # u = (p - middle) / half of a float64 p: the rounding of `middle` is felt in units of `half`.
-        axes = self.plant.axes
-        argument = [ROUNDING * (1 + max(abs(axis.low), abs(axis.high)) / axis.half) for axis in axes]
-        out = {}
-        for key, matrix in self.plant.matrices.items():
-            out[key] = matrices[key].blurred(_evaluation_error(matrix, argument))
-        return out
-
     def on_boxes(self, time: Time, cells: Sequence[Region]) -> System | None:
         """`system` on many regions at once, every matrix `Boxes`; None where they are too many or too large for that."""
-        axes = self.plant.axes
-        if not 1 <= len(axes) <= max(HIGHEST) or len(cells) > MOST_BOXES:
+        found = self._at_once(cells, "ACEF")
+        if found is None:
             return None
-        plant = {key: local(self._plant[key], cells) for key in "ACEF"}
-        shape = self.plant.states, self.plant.matrices["C"].shape[0]
-        rounding = rounding_of(self._gain_rounding, shape) if self.rounded else np.zeros(shape)
-        gain = gains(self.table, self.breakpoints, axes, cells, rounding)
+        (plant, gain), axes = found, self.plant.axes
         if time == "discrete":
             return self._updated(plant, gain, unit(self.plant.states, axes), box_exponential)
         below = None if self.plant.is_polynomial else local(self.plant.denominator, cells)
         return self._equation(plant, gain, unit(self.plant.states, axes), below)
 
     def _error_equation(self, region: Region) -> System:
-        plant = {key: self.local(self._plant[key], region) for key in "ACEF"}
-        below = None if self.plant.is_polynomial else self.local(self.plant.denominator, region)
+        plant = {key: region.local(self._plant[key]) for key in "ACEF"}
+        below = None if self.plant.is_polynomial else region.local(self.plant.denominator)
         return self._equation(plant, self.gain(region), identity(self.plant.states, 2 * region.parameters), below)
 
     def _error_update(self, region: Region) -> System | None:
-        plant = {key: self.local(self._plant[key], region) for key in "ACEF"}
+        plant = {key: region.local(self._plant[key]) for key in "ACEF"}
         return self._updated(plant, self.gain(region), identity(self.plant.states, 2 * region.parameters), exponentials)
 
     def _equation(self, plant: dict[str, Any], gain: Any, eye: Any, below: Any) -> System:
@@ -205,17 +142,3 @@ class ObserverLoop:
             }
         none = {name: matrix * 0 for name, matrix in B.items()}
         return System("discrete", A, B, eye, none, coasting)
-
-
-def _evaluation_error(matrix: PolynomialMatrix, argument: Sequence[fmpq]) -> Any:
-    """Bound, entry by entry, of coefficients, powers and argument in float64 for |u| <= 1."""
-    count = (sum(matrix.degrees) + 1) ** 2
-
-    def radius(i: int, j: int) -> Any:
-        total = fmpq(0)
-        for powers, entries in matrix.terms.items():
-            size = abs(entries[i, j])
-            total += size * (ROUNDING * count + sum((k * a for k, a in zip(powers, argument, strict=True)), fmpq(0)))
-        return arb(total).abs_upper()
-
-    return radius

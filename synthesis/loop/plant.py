@@ -55,6 +55,11 @@ class Plant:
         return self.matrices["A"].shape[0]
 
     @property
+    def dual(self) -> Plant:
+        """A' and C = B': what no input moves here does not show in the output there."""
+        return Plant(self.axes, {"A": self.matrices["A"].T, "C": self.matrices["B"].T}, self.denominator)
+
+    @property
     def is_polynomial(self) -> bool:
         """Whether the denominator is one."""
         return not any(self.denominator.degrees)

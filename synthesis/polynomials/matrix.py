@@ -186,3 +186,16 @@ def symmetric_block(rows: list[list[MatrixPolynomial | None]]) -> MatrixPolynomi
             if i != j:
                 out[..., ends[j] : ends[j + 1], ends[i] : ends[i + 1], :] = np.swapaxes(values, -3, -2)
     return MatrixPolynomial(out)
+
+
+def across(*blocks: MatrixPolynomial) -> MatrixPolynomial:
+    """[first, second, ..]."""
+    return over(*(block.T for block in blocks)).T
+
+
+def over(*blocks: MatrixPolynomial) -> MatrixPolynomial:
+    """[first; second; ..]."""
+    leading = np.max([block.coefficients.shape[: block.variables] for block in blocks], axis=0)
+    width = max(block.decisions for block in blocks) + 1
+    grown = [padded(b.coefficients, (*(int(n) for n in leading), *b.shape, width)) for b in blocks]
+    return MatrixPolynomial(np.concatenate(grown, axis=-3))

@@ -19,9 +19,11 @@ from estimators import GainSchedule, LpvObserver
 from synthesis.certificate.levels import held_claims
 from synthesis.certificate.proof import certificate, prove
 from synthesis.certificate.search import Search
-from synthesis.design.deploy import DeploySettings, claim_channel, deploy, deployed_loop, names_of, tabulate
+from synthesis.design.deploy import claim_channel, deploy, names_of, tabulate
+from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.export import schedule_content
 from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
+from synthesis.design.law_table import deployed_loop
 from synthesis.lmi.result import Verdict
 from tests.support.any_size import any_schedule, signals
 from tests.support.chain import chain, chain_design
@@ -108,7 +110,7 @@ def test_certify_a_table_of_ten_by_ten_cells(benchmark: Any) -> None:
     model = chain(4, 2)
     gains = design_observer(model, chain_design(model))
     small = deploy(gains)
-    lines, table = tabulate(gains, (10, 10), "float64")
+    lines, table = tabulate(gains, (10, 10), "float64", 0.005)
     search = Search(
         deployed_loop(gains, lines, table, 0.005), names_of(model), model.parameters, 1, gains.design.settings
     )

@@ -15,7 +15,8 @@ from scipy.linalg import expm, solve_sylvester
 
 from estimators import GainSchedule, LpvVelocityObserver
 from synthesis.certificate.proof import prove
-from synthesis.design.deploy import Deployment, DeploySettings, deploy
+from synthesis.design.deploy import Deployment, deploy
+from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.export import schedule_content
 from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.design.sampled_observer import design_sampled_observer

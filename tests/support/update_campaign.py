@@ -22,7 +22,8 @@ from synthesis.certificate.frozen import critical_probability, slowest_decay
 from synthesis.certificate.levels import best_gain, largest
 from synthesis.certificate.proof import prove
 from synthesis.certificate.search import Search, Wish
-from synthesis.design.deploy import Deployment, DeploySettings, names_of
+from synthesis.design.deploy import Deployment, names_of
+from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.export import schedule_content
 from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.design.sampled_observer import design_sampled_observer

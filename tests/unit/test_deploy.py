@@ -13,7 +13,8 @@ from synthesis.certificate.claims import Claim
 from synthesis.certificate.frozen import critical_probability, frozen_gain, slowest_decay
 from synthesis.certificate.proof import prove
 from synthesis.certificate.search import Search, Wish
-from synthesis.design.deploy import Deployment, DeploySettings, claim_channel, deploy, deployed_loop, names_of, tabulate
+from synthesis.design.deploy import Deployment, claim_channel, deploy, names_of, tabulate
+from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.export import export, schedule_content
 from synthesis.design.hinf_observer import (
     Channel,
@@ -23,6 +24,7 @@ from synthesis.design.hinf_observer import (
     design_observer,
     to_gamma,
 )
+from synthesis.design.law_table import deployed_loop
 from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.design.well_posedness import well_posedness
 from synthesis.errors import ProblemError
@@ -65,7 +67,7 @@ def claim_of(deployment: Deployment, kind: str, channel: Channel | None = None) 
 
 
 def search_of(gains: ObserverGains, segments: int) -> Search:
-    loop = deployed_loop(gains, *tabulate(gains, segments, "float64"), 0.005)
+    loop = deployed_loop(gains, *tabulate(gains, segments, "float64", 0.005), 0.005)
     return Search(loop, names_of(gains.model), gains.model.parameters, 1, gains.design.settings)
 
 
@@ -131,13 +133,13 @@ def test_interpolation_costs_less_than_allowed(gains: ObserverGains, deployment:
 
 
 def test_float32_table_is_rounded(gains: ObserverGains) -> None:
-    _, table = tabulate(gains, 7, "float32")
+    _, table = tabulate(gains, 7, "float32", 0.005)
     assert (table == table.astype(np.float32)).all()
-    assert np.abs(table / tabulate(gains, 7, "float64")[1] - 1.0).max() < 1e-7
+    assert np.abs(table / tabulate(gains, 7, "float64", 0.005)[1] - 1.0).max() < 1e-7
 
 
 def test_gains_keep_the_digits_that_the_guarantee_needs(gains: ObserverGains) -> None:
-    (points,), table = tabulate(gains, 7, "float64")
+    (points,), table = tabulate(gains, 7, "float64", 0.005)
     exact = gains.gain(points)
     largest = np.abs(exact).max(axis=0)
     assert (np.abs(table - exact) <= 0.5001e-3 * 10.0 ** np.floor(np.log10(largest))).all()
@@ -260,7 +262,7 @@ def test_table_that_only_interpolation_spoils_is_refused(monkeypatch: pytest.Mon
     grid = np.linspace(0.0, 140.0, 1401)
     law = lateral.on(grid).error_dynamics(dipped.gain(grid))[0]
     assert np.linalg.eigvals(law).real.max() < 0.0
-    (points,), table = tabulate(dipped, 7, "float64")
+    (points,), table = tabulate(dipped, 7, "float64", 0.005)
     between = np.stack([np.interp(grid, points, column) for column in table[..., 0].T], axis=1)[..., None]
     assert np.linalg.eigvals(lateral.on(grid).error_dynamics(between)[0]).real.max() > 0.0
     coarse = search_of(dipped, 7)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synthesis.design import hinf_observer
+from synthesis.design import three_solves
 from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
 from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.errors import ProblemError
@@ -75,7 +75,7 @@ def test_a_first_solve_that_stalls_costs_time_and_no_truth(
             return found
         return replace(found, verdict=Verdict.INCONCLUSIVE, objective=found.objective * factor**2, message="stalled")  # type: ignore[operator]
 
-    monkeypatch.setattr(hinf_observer, "solve", stalling)
+    monkeypatch.setattr(three_solves, "solve", stalling)
     gains = design_observer(scalar(a, b, c), DESIGN)
     best = least_gamma(a, b, c)
     assert gains.verdict is Verdict.CERTIFIED

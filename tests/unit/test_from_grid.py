@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from synthesis.certificate.proof import prove
-from synthesis.design.deploy import DeploySettings, deploy
+from synthesis.design.deploy import deploy
+from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.export import schedule_content
 from synthesis.design.hinf_observer import Channel, ObserverDesign
 from synthesis.design.sampled_observer import design_sampled_observer

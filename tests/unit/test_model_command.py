@@ -165,7 +165,20 @@ def test_gains_of_two_parameters_are_drawn_as_curves() -> None:
 
 def test_examples_are_complete() -> None:
     """Every constant has a source, every example its specification, and no unit is left out."""
-    assert set(shipped_examples()) == {"inverted-pendulum", "pmsm", "quarter-car"}
+    names = {
+        "battery",
+        "cruise",
+        "inverted-pendulum",
+        "missile",
+        "pmsm",
+        "pmsm-pi",
+        "quarter-car",
+        "satellite",
+        "turbine-pitch",
+        "vehicle-speed",
+        "wind-turbine",
+    }
+    assert set(shipped_examples()) == names
     for path in shipped_examples().values():
         found = load_model(path)
         assert all(isinstance(c, Constant) and c.source for c in found.constants.values())

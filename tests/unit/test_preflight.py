@@ -9,7 +9,7 @@ import pytest
 from estimators.errors import GainsmithError
 from studies.cli import main
 from studies.preflight import check_before_design
-from studies.spec import load_spec, shipped_specs
+from studies.spec import example_specs, load_spec, shipped_specs
 
 TEMPLATES = Path(__file__).parents[2] / "studies" / "templates"
 MODEL, SPEC = ((TEMPLATES / name).read_text() for name in ("model.toml", "observer.toml"))
@@ -23,9 +23,7 @@ def check(folder: Path, model: str = MODEL, spec: str = SPEC) -> None:
     check_before_design(found, found.plant(place).model)
 
 
-@pytest.mark.parametrize(
-    "name", ["quarter-car-observer", "pmsm-observer", "inverted-pendulum-observer", *shipped_specs()]
-)
+@pytest.mark.parametrize("name", [*example_specs(), *shipped_specs()])
 def test_what_is_shipped_passes(name: str) -> None:
     found, place = load_spec(name)
     check_before_design(found, found.plant(place).model)

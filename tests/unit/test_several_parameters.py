@@ -20,7 +20,8 @@ from synthesis.certificate.proof import certificate, prove
 from synthesis.certificate.quick import _Form, quickly_proved
 from synthesis.certificate.verify import Verifier
 from synthesis.design import deploy as deploying
-from synthesis.design.deploy import Deployment, DeploySettings, deploy, names_of
+from synthesis.design.deploy import Deployment, deploy, names_of
+from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.export import export, schedule_content
 from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.errors import ProblemError

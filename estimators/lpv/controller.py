@@ -1,0 +1,196 @@
+"""A feedback law of any size that follows a schedule over any number of parameters, for a batch of entries at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from estimators.arguments import LIMIT, batch, finite, mask, numbers, quiet
+from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.errors import EstimatorError, ScheduleError
+from estimators.lpv.inputs import SignalMonitor
+from estimators.lpv.law import Law
+from estimators.memory import Renewable, Saved
+from estimators.schedule import GainSchedule
+
+
+class LpvControllerStep(NamedTuple):
+    """What one step returns, ready for a log; leading axes are those of the batch."""
+
+    command: FloatArray  # (..., nu) u to be held over the sample, within its limits
+    limited: BoolArray  # (..., nu) whether a limit changed it
+    used: BoolArray  # (...) whether the measurements were used
+    flags: FlagArray  # (...) sums of `Flag`; 0 where nothing is wrong
+    parameter: FloatArray  # (..., parameters) that were used
+
+
+class LpvController(Renewable):
+    """u = Ck(p) xk + Dk(p) v, xk+ = Ak(p) xk + Bk(p) v once a sample, v the plant's states or outputs; static where it has no xk.
+
+    The gains are the table that was proved (`gainsmith certify`); proofs are about commands within the limits.
+
+    Where a limit cuts a command, the law's state is first moved to the nearest one that commands just that (conditioning, Hanus,
+    Kinnaert, Henrotte 1987), so it does not wind up. Where the plant's input acts on a measured output at once (D), the
+    measurement was taken while the command before was held: D (u - u before) is added.
+
+    Measurements that are missing (one of them not finite) or stale are not used: the law waits, and the command before is held
+    for `hold` samples, then halved with every sample towards the value within its limits that is nearest to zero. Nothing is
+    proved of such samples. A missing parameter is held at its last finite value; one outside its certified range is clipped to
+    it. All of this is flagged, and commands are finite always.
+
+    Args:
+        schedule: of a feedback law, of any size.
+        batch_shape: shape of every entry's signals given to `step`; () for one plant, (10000,) for many runs.
+        outside: a parameter or a rate outside the certified box is clipped and flagged ("flag") or raises ("refuse").
+        stale_after: measurements that all repeat exactly for more than so many samples are stale; None: never.
+        hold: samples for which a command is held without measurements.
+
+    Raises:
+        EstimatorError: an option that means nothing.
+        ScheduleError: the schedule of an observer, or gains beyond what float64 can multiply.
+    """
+
+    memory = ("_state", "_command", "waiting", "samples", "renewed")
+    parts: tuple[str, ...] = ("monitor",)
+
+    def __init__(
+        self,
+        schedule: GainSchedule,
+        batch_shape: tuple[int, ...] = (),
+        outside: Literal["flag", "refuse"] = "flag",
+        stale_after: int | None = None,
+        hold: int = 10,
+    ) -> None:
+        if schedule.update != "feedback":
+            raise ScheduleError(f"schedule '{schedule.name}' is that of an observer; take LpvObserver")
+        if outside not in ("flag", "refuse"):
+            raise EstimatorError(f"outside = {outside!r} is not known; use 'flag' or 'refuse'")
+        if stale_after is not None and stale_after < 1:
+            raise EstimatorError(f"stale_after = {stale_after} samples must be at least 1, or None")
+        if hold < 0:
+            raise EstimatorError(f"hold = {hold} samples must not be negative")
+        super().__init__(batch(batch_shape))
+        self.schedule, self.hold, count = schedule, int(hold), math.prod(self.batch_shape)
+        self.law = Law(schedule)
+        self.monitor = SignalMonitor(
+            schedule.parameters, (0, self.law.measured), schedule.sample_time, count, outside == "refuse", stale_after
+        )
+        self._state: FloatArray = np.zeros((count, self.law.order))
+        self._command: FloatArray = np.tile(self.law.rest, (count, 1))
+        self.waiting = np.zeros(count, dtype=np.int64)  # samples without measurements
+        self.samples = 0
+
+    @property
+    def state(self) -> FloatArray:
+        """A copy of the law's own state, shape (*batch_shape, order)."""
+        return self._state.copy().reshape(*self.batch_shape, self.law.order)
+
+    def step(self, measurement: npt.ArrayLike, parameter: npt.ArrayLike) -> LpvControllerStep:
+        """Commands for the sample that begins; arguments have the shapes (*batch_shape, nv) and (.., parameters).
+
+        The last axis may be left out where it is one long.
+
+        Raises:
+            EstimatorError: another shape, or not numbers.
+            RangeError: outside the certified box, if the controller refuses that; nothing is changed then.
+        """
+        shape = self.batch_shape
+        v = self._signals(measurement, self.law.measured, "measurement")
+        p = self._signals(parameter, len(self.schedule.parameters), "parameter")
+        seen = self.monitor(np.zeros((len(v), 0)), v, p, self.samples, shape)
+        found = self.law.advance(self._state, self._command, seen.measurement, seen.parameter)
+        state, command, limited = found
+        flags: FlagArray = np.zeros(shape, dtype=np.int32) if seen.flags is None else seen.flags.reshape(shape)
+        used: BoolArray = np.ones(len(v), dtype=np.bool_)
+        if seen.coast is not None:
+            used = ~seen.coast
+            self.waiting = np.where(used, 0, self.waiting + 1)
+            waits = seen.coast[:, None]
+            fading = (self.waiting > self.hold)[:, None]
+            kept = np.where(fading, self.law.rest + 0.5 * (self._command - self.law.rest), self._command)
+            state, command = np.where(waits, self._state, state), np.where(waits, kept, command)
+            limited = limited & ~waits
+        else:
+            self.waiting[:] = 0
+        if not (quiet(state.reshape(-1)) and quiet(command.reshape(-1))):
+            gone: BoolArray = np.asarray((~(np.absolute(np.hstack([state, command])) <= LIMIT)).any(axis=1))
+            state, command = np.where(gone[:, None], 0.0, state), np.where(gone[:, None], self.law.rest, command)
+            self._renew(gone.reshape(shape))
+        self._state, self._command = state, command
+        self.samples += 1
+        self._flag_renewed(flags)
+        nu = len(self.schedule.inputs)
+        return LpvControllerStep(
+            command.copy().reshape(*shape, nu),
+            limited.reshape(*shape, nu),
+            used.reshape(shape),
+            flags,
+            seen.parameter.reshape(*shape, len(self.schedule.parameters)),
+        )
+
+    def _signals(self, value: npt.ArrayLike, size: int, what: str) -> FloatArray:
+        array, wanted = numbers(value, what), (*self.batch_shape, size)
+        if array.shape != wanted and not (size == 1 and array.shape == self.batch_shape):
+            raise EstimatorError(f"{what} has shape {array.shape}, expected {wanted}")
+        return array.reshape(math.prod(self.batch_shape), size)
+
+    def reset(self, where: npt.ArrayLike | None = None) -> None:
+        """Sets the entries `where` (mask of the batch shape; None: all) to rest: state zero, the command nearest to zero.
+
+        The next step carries the flag RESET for these entries.
+
+        Raises:
+            EstimatorError: another shape.
+        """
+        self._forget(mask(where, self.batch_shape, "where"))
+
+    def start(
+        self,
+        command: npt.ArrayLike,
+        measurement: npt.ArrayLike,
+        parameter: npt.ArrayLike,
+        where: npt.ArrayLike | None = None,
+    ) -> None:
+        """Takes over from `command` without a bump: the next step with this measurement and parameter commands just that.
+
+        The law's state is the one that does, and that moves least from there. A law without states commands what it commands, and
+        one with too few comes as near as it can. Shapes as in `step`; the flag RESET follows.
+
+        Raises:
+            EstimatorError: another shape, or not finite.
+            RangeError: parameters outside the certified range.
+        """
+        nu, count = len(self.schedule.inputs), len(self.schedule.parameters)
+        chosen = mask(where, self.batch_shape, "where")
+        flat = chosen.reshape(-1)
+        sizes = (
+            (command, nu, "command"),
+            (measurement, self.law.measured, "measurement"),
+            (parameter, count, "parameter"),
+        )
+        u, v, p = (
+            finite(self._signals(value, size, what), (len(flat), size), what)[flat] for value, size, what in sizes
+        )
+        within = self.schedule.certified(p if count > 1 else p[:, 0]).reshape(len(u), count)
+        self._forget(chosen)
+        self._command[flat] = np.clip(u, self.law.low, self.law.high)
+        self._state[flat] = self.law.starting(self._command[flat], v, within)
+
+    def _forget(self, chosen: BoolArray) -> None:
+        flat = chosen.reshape(-1)
+        self._state[flat], self._command[flat], self.waiting[flat] = 0.0, self.law.rest, 0
+        self.monitor.forget(flat)
+        self._renew(chosen)
+
+    def save(self) -> Saved:
+        """Everything needed to continue later, and the digest of the schedule, as plain arrays."""
+        return super().save() | {"schedule_sha256": np.array(self.schedule.sha256)}
+
+    def _check(self, saved: Mapping[str, AnyArray]) -> None:
+        if "schedule_sha256" in saved and str(saved["schedule_sha256"]) != self.schedule.sha256:
+            raise EstimatorError(f"saved with another schedule than '{self.schedule.name}' {self.schedule.sha256[:12]}")
+        super()._check(saved)

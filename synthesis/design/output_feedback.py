@@ -1,0 +1,209 @@
+r"""Full-order dynamic output feedback for LPV plants by linear matrix inequalities, with gains that need no rate.
+
+    x' = A(p) x + B(p) u + E(p) d,   y = C(p) x + D(p) u + F(p) d;     xk' = Ak(p) xk + Bk(p) y,   u = Ck(p) xk + Dk(p) y
+
+What is asked for and how it becomes linear: `synthesis.design.output_feedback_lmi`. Both of its forms are tried (the one whose X
+follows the parameters, and the one whose Y does) and the better is taken. The controller is a design: what runs is a table, and
+what is claimed of it is proved of that table, whatever the inequalities here have said.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from estimators.arrays import FloatArray
+from synthesis.design.feedback_channel import FeedbackChannel, check_channels
+from synthesis.design.generalised_plant import Frame, GeneralisedPlant, frame_of, generalised_plant, measured_rows
+from synthesis.design.output_feedback_lmi import Still, Wanted, build
+from synthesis.design.reconstruct import reconstructed
+from synthesis.design.refusals import refuse_undetectable, refuse_unstabilisable
+from synthesis.design.three_solves import Problem, least, starting_places, three_solves
+from synthesis.errors import ProblemError
+from synthesis.lmi.exchange import Memory
+from synthesis.lmi.problem import LmiProblem
+from synthesis.lmi.result import LmiResult, Verdict
+from synthesis.lmi.settings import LmiSettings
+from synthesis.loop.feedback import Measured
+from synthesis.models.lpv import LpvModel
+from synthesis.models.numeric import values
+
+RATIONAL = 2  # degrees of P that come close to an inverse
+
+
+@dataclass(frozen=True)
+class OutputFeedbackDesign:
+    """What is asked of the controller.
+
+    >>> gain = FeedbackChannel(("gust",), ("roll",), bound=2.0)
+    >>> OutputFeedbackDesign((gain, FeedbackChannel(("noise",), ("aileron",))), decay_rate=0.5).minimised.name
+    'noise -> aileron'
+    """
+
+    channels: tuple[FeedbackChannel, ...]
+    degree: int = 1  # of all unknowns in the parameters
+    decay_rate: float = 0.0  # alpha, 1/s
+    fastest_pole: float | None = None  # radius of the disc about zero that holds every frozen pole, 1/s; None: no bound
+    feedthrough: bool | None = None  # whether y acts on u at once; None: where the plant allows it
+    measured: tuple[str, ...] | None = None  # the outputs that the controller sees, in this order; None: all
+    still: Still | None = None  # which Lyapunov matrix does not follow the parameters; None: the better of both
+    backoff: float = 0.01  # the minimised gain may be this fraction worse; what it buys is margin
+    reserve: float = 0.01  # poles are designed this much tighter than they are claimed, for the table's sake
+    settings: LmiSettings = field(default_factory=LmiSettings)
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.degree <= 8:
+            raise ProblemError(f"degree {self.degree} of the controller must lie between 0 and 8")
+        check_channels(self.channels)
+        if not 0.0 <= self.decay_rate < np.inf:
+            raise ProblemError(f"decay rate {self.decay_rate} 1/s must be a number and must not be negative")
+        if self.fastest_pole is not None and not self.decay_rate < self.fastest_pole < np.inf:
+            raise ProblemError(f"fastest pole {self.fastest_pole} 1/s must exceed the decay rate {self.decay_rate} 1/s")
+        if not 0.0 < self.backoff < 1.0:
+            raise ProblemError(
+                f"backoff {self.backoff} must lie between 0 and 1: gains grow without end at the optimum"
+            )
+        if not 0.0 <= self.reserve < 1.0:
+            raise ProblemError(f"reserve {self.reserve} must lie in [0, 1)")
+
+    @property
+    def minimised(self) -> FeedbackChannel:
+        """The channel without a bound."""
+        return next(channel for channel in self.channels if channel.bound is None)
+
+
+@dataclass(frozen=True)
+class OutputFeedback:
+    """A controller with the bound that was minimised.
+
+    `gamma` is the level that the inequalities prove, `gamma_lower` a bound from below for every X and Y of these degrees in one
+    of the two forms (weak duality), where there is one. `result` carries verdict and margins, `optimum` the first solve, and
+    `wanted.still` says which form was taken.
+    """
+
+    design: OutputFeedbackDesign
+    model: LpvModel
+    gamma_lower: float | None
+    gamma: float
+    result: LmiResult
+    optimum: LmiResult
+    frame: Frame
+    wanted: Wanted
+    measured: Measured = "outputs"
+
+    @property
+    def order(self) -> int:
+        """Of the controller: that of the plant."""
+        return len(self.model.states)
+
+    @property
+    def rational(self) -> int:
+        """Degrees more that P has in claims: of both forms, that with a moving Y has (Y - X^-1)^-1 in its P."""
+        return RATIONAL if self.wanted.still == "X" else 0
+
+    @property
+    def verdict(self) -> Verdict:
+        """Of the solve that the controller comes from."""
+        return self.result.verdict
+
+    def controller(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Ak (g, nx, nx), Bk (g, nx, ny), Ck (g, nu, nx) and Dk (g, nu, ny) at parameter values (g,) or (g, p).
+
+        The states are an estimate of those of the plant, in their units. Columns of outputs that are not measured are zero.
+        """
+        count, grid = len(self.model.parameters), np.asarray(points, float)
+        grid = grid.reshape(-1, count) if count else grid.reshape(len(grid), 0)
+        middle, half = (np.array([getattr(p, key) for p in self.model.parameters]) for key in ("middle", "half_width"))
+        given = generalised_plant(self.model, self.design.channels, self.design.measured)
+        found = reconstructed(given.scaled(self.frame), self.result, self.wanted, (grid - middle) / half, self.level)
+        Ak, Bk, Ck, Dk = found
+        T, u, y, clock = self.frame.states, self.frame.inputs[:, None], self.frame.outputs, self.frame.clock
+        back = np.linalg.inv(T) * clock
+        Ak, Bk, Ck, Dk = back @ Ak @ T, back @ Bk / y, u * Ck @ T, u * Dk / y
+        D = values(given.D, (grid - middle) / half) / values(given.denominator, (grid - middle) / half)
+        seen = np.eye(len(self.model.outputs))[measured_rows(self.model, self.design.measured)]
+        return Ak - Bk @ D @ Ck, Bk @ seen, Ck, Dk @ seen  # designed for y - D u, and Dk D = 0
+
+    @property
+    def level(self) -> float:
+        """gamma in the unit of the frame."""
+        return self.gamma / self.frame.unit
+
+
+def design_output_feedback(model: LpvModel, design: OutputFeedbackDesign) -> OutputFeedback:
+    """Minimise the open channel in both forms, then give back `backoff` of it and take the better form's answer of least norm.
+
+    Raises ProblemError for a plant that is not stabilisable or not detectable at some place (the mode and the place), for a
+    feedthrough that closes an algebraic loop or meets a rational plant, and if nothing is found.
+
+    >>> import sympy as sp
+    >>> from synthesis import SchedulingParameter, Signal
+    >>> p = sp.Symbol("p")
+    >>> names = {key: (Signal(name, "1"),) for key, name in (("states", "x"), ("inputs", "u"), ("outputs", "y"))}
+    >>> plant = LpvModel(
+    ...     name="unstable", source="made up", **names, disturbances=(Signal("w", "1"), Signal("n", "1")),
+    ...     parameters=(SchedulingParameter("p", "1", 1.0, 2.0, -1.0, 1.0),),
+    ...     A=sp.Matrix([[p]]), B=sp.Matrix([[1]]), C=sp.Matrix([[1]]), E=sp.Matrix([[1, 0]]), F=sp.Matrix([[0, 0.1]]),
+    ... )
+    >>> found = design_output_feedback(plant, OutputFeedbackDesign((FeedbackChannel(("w", "n"), ("x", "u")),)))
+    >>> print(found.verdict), found.controller([1.0, 1.5, 2.0])[0].shape
+    certified
+    (None, (3, 1, 1))
+    """
+    refuse_unstabilisable(model)
+    refuse_undetectable(model, measured_rows(model, design.measured))
+    plant = generalised_plant(model, design.channels, design.measured)
+    feedthrough, frame = _feedthrough(model, design, plant), frame_of(plant)
+    scaled, tight = plant.scaled(frame), 1.0 + design.reserve
+    radius = None if design.fastest_pole is None else design.fastest_pole / tight / frame.clock
+    settings = design.settings
+    if settings.relaxation == "auto":  # unknowns that run away at the optimum end other solvers early
+        settings = replace(settings, relaxation="exchange")
+    tried: list[tuple[LmiResult, Wanted, Problem, Memory]] = []
+    for form in _forms(model, design):
+        wanted = Wanted(design.degree, design.decay_rate * tight / frame.clock, radius, feedthrough, form, frame.clock)
+
+        def problem(
+            gamma: float | None, margin: bool = True, floor: float = 0.0, wanted: Wanted = wanted
+        ) -> LmiProblem:
+            bounds = {c: gamma if c.bound is None else c.bound for c in design.channels}
+            levels = {c: None if bound is None else bound / frame.unit for c, bound in bounds.items()}
+            return build(scaled, model.parameters, wanted, levels, margin and gamma is not None, floor)
+
+        memory = starting_places(problem(None))
+        tried.append((least(problem, design.backoff, settings, memory), wanted, problem, memory))
+    found = [entry[0] for entry in tried]
+    optimum, wanted, problem, memory = min(tried, key=lambda entry: _named(entry[0]))
+    settled = three_solves(model.name, problem, lambda x: x * frame.unit, design.backoff, settings, optimum, memory)
+    lower = [result.lower_bound for result in found if np.isfinite(_named(result))]
+    bound = None if None in lower else max(min(x for x in lower if x is not None), 0.0) * frame.unit
+    return OutputFeedback(design, model, bound, settled.gamma, settled.result, optimum, frame, wanted)
+
+
+def _named(result: LmiResult) -> float:
+    """The level that a first solve ends at; infinite if it found none."""
+    level = result.objective
+    usable = level is not None and level > 0.0 and not result.report.status.endswith("Infeasible")
+    return float(level) if usable and level is not None else np.inf
+
+
+def _forms(model: LpvModel, design: OutputFeedbackDesign) -> tuple[Still, ...]:
+    """Both, unless one is asked for or no Lyapunov matrix may follow a moving parameter anyway."""
+    if design.still is not None:
+        return (design.still,)
+    follows = any(not p.may_jump and (p.rate_minimum < 0.0 or p.rate_maximum > 0.0) for p in model.parameters)
+    return ("X", "Y") if follows and design.degree else ("Y",)
+
+
+def _feedthrough(model: LpvModel, design: OutputFeedbackDesign, plant: GeneralisedPlant) -> bool:
+    """Whether Dk is an unknown. Raises ProblemError where it is asked for and cannot be."""
+    loops, rational = bool(plant.D.any()), not model.polynomial.is_polynomial
+    if design.feedthrough and (loops or rational):
+        why = (
+            "the inputs act on a measured output at once (D), which would close an algebraic loop"
+            if loops
+            else "it is rational, and its product with a feedthrough is not linear over one denominator"
+        )
+        raise ProblemError(f"model '{model.name}' takes no feedthrough: {why}; leave `feedthrough` out")
+    return not (loops or rational) if design.feedthrough is None else design.feedthrough

@@ -1,0 +1,168 @@
+r"""Linear inequalities of full-order output feedback (Scherer, Gahinet, Chilali 1997; Apkarian, Adams 1998).
+
+    xk' = Ak xk + Bk y,   u = Ck xk + Dk y,     V = xi'P xi,  xi = [x; xk],  P = [X N; N' *],  P^-1 = [Y M; M' *],  M N' = I - Y X
+
+With Bh = N Bk + X B Dk, Ch = Ck M' + Dk C Y, Dh = Dk and Ah = N Ak M' + N Bk C Y + X B Ck M' + X (A + B Dk C) Y the congruence
+with [Y I; M' 0] makes of the closed loop
+
+    A_c = [A Y + B Ch, A + B Dh C; Ah, X A + Bh C],  B_c = [E + B Dh F; X E + Bh F],  C_c = [Cz Y + Dzu Ch, Cz + Dzu Dh C]
+    D_c = Dzd + Dzu Dh F,   P_c = [Y I; I X],   dP/dt: [-dY/dt, -(X dY/dt + N dM'/dt)'; *, dX/dt]
+
+The off-diagonal term is the only place where Ak would need the rate. It vanishes if Y stands still (with M = Y) or if X does
+(with N = -X): so one of both depends on no moving parameter. A parameter whose rate bounds are zero counts as standing still.
+
+    coupling       P_c > 0
+    channel        [A_c + A_c' + dP/dt, B_c, C_c'; *, -g I, D_c'; *, *, -g I] < 0          L2 gain at most g
+    decay          A_c + A_c' + dP/dt + 2 alpha P_c < 0
+    fastest pole   [r P_c, A_c; A_c', r P_c] > 0                                           every frozen pole within a disc
+
+Ah enters the upper right block of one inequality only where nothing else is asked for: then it is eliminated (projection lemma:
+both diagonal parts, each with its own share of the rest, suffice) and worked out place by place from the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from synthesis.design.feedback_channel import FeedbackChannel
+from synthesis.design.generalised_plant import ChannelPlant, GeneralisedPlant
+from synthesis.lmi.problem import LmiProblem
+from synthesis.models.param import SchedulingParameter
+from synthesis.polynomials.matrix import MatrixPolynomial, across, over, symmetric_block
+
+Still = Literal["X", "Y"]  # which of both does not move
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is asked of the closed loop, in the units of the frame: rates in its clock, bounds in its unit."""
+
+    degree: int
+    decay: float  # 0: none
+    radius: float | None  # of the disc of the poles
+    feedthrough: bool
+    still: Still
+    clock: float  # rates of parameters are given in 1/s
+
+    def eliminated(self, channels: int) -> bool:
+        """Whether there is one inequality in Ah only: that of one channel."""
+        return channels == 1 and self.radius is None and not self.decay
+
+
+def build(
+    plant: GeneralisedPlant,
+    parameters: tuple[SchedulingParameter, ...],
+    wanted: Wanted,
+    levels: dict[FeedbackChannel, float | None],
+    maximise_margin: bool = False,
+    floor: float = 0.0,
+) -> LmiProblem:
+    """The problem in the plant's coordinates; a level of None is the unknown `gamma` that is minimised."""
+    problem = LmiProblem(parameters, maximise_margin, least_norm=floor > 0.0, floor=floor)
+    loop = _Loop(problem, plant, wanted)
+    problem.require("coupling", loop.coupling)
+    parts = [(part, _level(problem, levels[part.channel])) for part in plant.channels]
+    if wanted.eliminated(len(parts)):
+        ((part, level),) = parts
+        for half, word in (("Y", "regulator"), ("X", "filter")):
+            block = loop.gain(part, level, loop.rate(half), loop.input(part, half), loop.output(part, half).T)
+            problem.require(f"gain {part.channel.name}, {word}", -block)
+        return problem
+    rate = symmetric_block([[loop.rate("Y"), loop.cross], [None, loop.rate("X")]])
+    if wanted.decay:
+        problem.require("decay rate", -(rate + loop.coupling.scaled_by(loop.below) * (2.0 * wanted.decay)))
+    if wanted.radius is not None:
+        disc = loop.coupling.scaled_by(loop.below) * wanted.radius
+        problem.require("fastest pole", symmetric_block([[disc, loop.closed_loop()], [None, disc]]))
+    for part, level in parts:
+        inputs = over(loop.input(part, "Y"), loop.input(part, "X"))
+        outputs = over(loop.output(part, "Y").T, loop.output(part, "X").T)
+        problem.require(f"gain {part.channel.name}", -loop.gain(part, level, rate, inputs, outputs))
+    return problem
+
+
+def _level(problem: LmiProblem, level: float | None) -> MatrixPolynomial:
+    if level is not None:
+        return problem.constant(np.array([[level]]))
+    unknown = problem.scalar("gamma")
+    problem.minimise("gamma")
+    return unknown
+
+
+class _Loop:
+    """The closed loop after the congruence, affine in the unknowns, over the denominator."""
+
+    def __init__(self, problem: LmiProblem, plant: GeneralisedPlant, wanted: Wanted) -> None:
+        self.problem, self.clock = problem, wanted.clock
+        self.A, self.B, self.C, self.below = (
+            problem.scaled(getattr(plant, key)) for key in ("A", "B", "C", "denominator")
+        )
+        n, m, k = self.A.shape[0], self.B.shape[1], self.C.shape[0]
+        degree = {"X": _degrees(problem, wanted, "X"), "Y": _degrees(problem, wanted, "Y")}
+        self.unknown = {name: problem.symmetric(name, n, degree[name]) for name in ("X", "Y")}
+        self.Bh = problem.matrix("Bh", n, k, wanted.degree)
+        self.Ch = problem.matrix("Ch", m, n, wanted.degree)
+        self.Dh = problem.matrix("Dh", m, k, wanted.degree) if wanted.feedthrough else None
+        # What stands in the upper right of A_c + A_c': Ah' and the known part that would only have to be cancelled.
+        self.cross = None if wanted.eliminated(len(plant.channels)) else problem.matrix("cross", n, n, wanted.degree)
+
+    @property
+    def coupling(self) -> MatrixPolynomial:
+        """[Y I; I X]."""
+        unit = self.problem.constant(np.eye(self.A.shape[0]))
+        return symmetric_block([[self.unknown["Y"], unit], [None, self.unknown["X"]]])
+
+    def closed(self, half: str) -> MatrixPolynomial:
+        """A Y + B Ch or X A + Bh C."""
+        if half == "Y":
+            return self.A @ self.unknown["Y"] + self.B @ self.Ch
+        return self.unknown["X"] @ self.A + self.Bh @ self.C
+
+    def rate(self, half: str) -> MatrixPolynomial:
+        """One diagonal block of A_c + A_c' + dP/dt."""
+        closed = self.closed(half)
+        moved = self.problem.time_derivative(self.unknown[half]).scaled_by(self.below) * (1.0 / self.clock)
+        return closed + closed.T + (moved * -1.0 if half == "Y" else moved)
+
+    def closed_loop(self) -> MatrixPolynomial:
+        """A_c."""
+        assert self.cross is not None
+        right = self._with_feedthrough(self.A, self.B, self.C)
+        return over(across(self.closed("Y"), right), across(self.cross.T - right.T, self.closed("X")))
+
+    def input(self, part: ChannelPlant, half: str) -> MatrixPolynomial:
+        """E + B Dh F or X E + Bh F."""
+        E, F = self.problem.scaled(part.E), self.problem.scaled(part.F)
+        return self._with_feedthrough(E, self.B, F) if half == "Y" else self.unknown["X"] @ E + self.Bh @ F
+
+    def output(self, part: ChannelPlant, half: str) -> MatrixPolynomial:
+        """Cz Y + Dzu Ch or Cz + Dzu Dh C."""
+        Cz, Dzu = self.problem.scaled(part.Cz), self.problem.scaled(part.Dzu)
+        return Cz @ self.unknown["Y"] + Dzu @ self.Ch if half == "Y" else self._with_feedthrough(Cz, Dzu, self.C)
+
+    def gain(
+        self, part: ChannelPlant, level: MatrixPolynomial, rate: MatrixPolynomial, inputs: MatrixPolynomial,
+        outputs: MatrixPolynomial,
+    ) -> MatrixPolynomial:  # fmt: skip
+        """The block of a channel; `outputs` is C_c'."""
+        direct = self._with_feedthrough(*(self.problem.scaled(m) for m in (part.Dzd, part.Dzu, part.F)))
+        level = level.scaled_by(self.below)
+        w, z = (self.problem.constant(np.eye(size)).scaled_by(level) for size in (direct.shape[1], direct.shape[0]))
+        return symmetric_block([[rate, inputs, outputs], [None, -w, direct.T], [None, None, -z]])
+
+    def _with_feedthrough(
+        self, own: MatrixPolynomial, left: MatrixPolynomial, right: MatrixPolynomial
+    ) -> MatrixPolynomial:
+        return own if self.Dh is None else own + left @ self.Dh @ right
+
+
+def _degrees(problem: LmiProblem, wanted: Wanted, name: str) -> tuple[int, ...]:
+    """Of X or Y in every parameter: none in one that may jump; of the one that stands still none in one that moves."""
+
+    def moves(p: SchedulingParameter) -> bool:
+        return p.rate_minimum < 0.0 or p.rate_maximum > 0.0
+
+    return tuple(0 if p.may_jump or (name == wanted.still and moves(p)) else wanted.degree for p in problem.parameters)

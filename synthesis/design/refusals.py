@@ -1,0 +1,74 @@
+"""Models for which no gain helps, refused before anything is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from flint import fmpq, fmpq_mat
+
+from estimators.arrays import FloatArray
+from synthesis.certificate.refute import undetectable_place
+from synthesis.errors import ProblemError
+from synthesis.loop.from_model import plant_of
+from synthesis.loop.plant import Plant
+from synthesis.models.lpv import LpvModel
+from synthesis.models.numeric import NumericModel
+from synthesis.polynomials.enclosure import PolynomialMatrix
+
+
+def refuse_undetectable(model: LpvModel, measured: Sequence[int] | None = None) -> None:
+    """Raise ProblemError where an unstable mode does not show in the output (or in some of its rows): no gain helps there."""
+    plant, rows = plant_of(model), range(len(model.outputs)) if measured is None else measured
+    if measured is not None:
+        C = plant.matrices["C"]
+        chosen = {
+            powers: fmpq_mat([[entries[i, j] for j in range(C.shape[1])] for i in rows])
+            for powers, entries in C.terms.items()
+        }
+        seen = PolynomialMatrix(chosen, (len(rows), C.shape[1]), C.variables)
+        plant = Plant(plant.axes, {**plant.matrices, "C": seen}, plant.denominator)
+    place = undetectable_place(plant)
+    if place is not None:
+        here = _here(model, place)
+        raise ProblemError(
+            f"model '{model.name}' is undetectable at {_where(model, place)}: a mode that does not decay "
+            f"({_mode(here.A[0], here.C[0][list(rows)])}) does not show in the output(s) "
+            f"{', '.join(model.outputs[i].name for i in rows)}; measure it, or shrink the range"
+        )
+
+
+def refuse_unstabilisable(model: LpvModel) -> None:
+    """Raise ProblemError where no input moves an unstable mode: no feedback helps there."""
+    if not model.inputs:
+        raise ProblemError(f"model '{model.name}' has no input; a feedback law needs one")
+    place = undetectable_place(plant_of(model).dual)
+    if place is not None:
+        here = _here(model, place)
+        raise ProblemError(
+            f"model '{model.name}' is not stabilisable at {_where(model, place)}: a mode that does not decay "
+            f"({_mode(here.A[0].T, here.B[0].T)}) is moved by none of the input(s) "
+            f"{', '.join(u.name for u in model.inputs)}; give it an input, or shrink the range"
+        )
+
+
+def _values(model: LpvModel, place: tuple[fmpq, ...]) -> list[float]:
+    return [p.middle + p.half_width * int(u.p) / int(u.q) for p, u in zip(model.parameters, place, strict=True)]
+
+
+def _where(model: LpvModel, place: tuple[fmpq, ...]) -> str:
+    values = [f"{p.name} = {x:.6g} {p.unit}" for p, x in zip(model.parameters, _values(model, place), strict=True)]
+    return ", ".join(values) or "its only point"
+
+
+def _here(model: LpvModel, place: tuple[fmpq, ...]) -> NumericModel:
+    return model.on(np.array(_values(model, place)).reshape(1, -1))
+
+
+def _mode(A: FloatArray, C: FloatArray) -> str:
+    """The pole, of those that do not decay, that shows least."""
+    poles, vectors = np.linalg.eig(A)
+    late = poles.real < -1e-9 * max(float(np.abs(A).max()), 1e-300)
+    pole = poles[int(np.argmin(np.linalg.norm(C @ vectors, axis=0) + np.where(late, np.inf, 0.0)))]
+    turning = "" if abs(pole.imag) <= 1e-9 * abs(pole) else f" +- {abs(pole.imag):.4g}j"
+    return f"pole {pole.real:.4g}{turning} 1/s"

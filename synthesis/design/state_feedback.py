@@ -1,0 +1,278 @@
+r"""H-infinity gain synthesis for LPV state feedback u = K(p) x with several channels, pole regions and limits on the gains.
+
+With Q(p) = P(p)^-1, V = x'P(p)x, Y = K Q, M = A Q + B Y and the performance signals z = Cz x + Dz u + Fz d (Bernussou, Peres,
+Geromel 1989; Wu, Yang, Packard, Becker 1996; regions: Chilali, Gahinet 1996):
+
+    decay          -(M + M' - dQ/dt + 2 alpha Q) > 0                         |x|_P decays at least like exp(-alpha t)
+    fastest pole   [r Q, M; M', r Q] > 0                                     every frozen pole s has |s| < r
+    damping        -[sin a (M + M'), cos a (M - M'); *, sin a (M + M')] > 0  |Im s| < tan a |Re s|, cos a the damping ratio
+    channel        -[M + M' - dQ/dt, E, (Cz Q + Dz Y)'; *, -g I, Fz'; *, *, -g I] > 0        L2 gain from d to z at most g
+    limit of u_i   [q c^2, Y_i; *, Q] > 0,  Q > q S^2                        |K_i x| < c for all x with x'S^-2 x <= 1
+
+One Q serves all channels and weighs channel i by 1/g_i. A denominator of a rational model multiplies every inequality (it is
+positive on the range). States are measured in the size that the cost of the channels gives them, inputs in the size that moves
+such states, so that the answer does not depend on units. It is the dual of `synthesis.design.hinf_observer`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
+from synthesis.design.feedback_channel import FeedbackChannel, check_channels, feedback_channel_matrices
+from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
+from synthesis.design.refusals import refuse_unstabilisable
+from synthesis.design.three_solves import three_solves
+from synthesis.errors import ProblemError
+from synthesis.lmi.problem import LmiProblem
+from synthesis.lmi.result import LmiResult, Verdict
+from synthesis.lmi.settings import LmiSettings
+from synthesis.loop.feedback import Measured
+from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.matrix import MatrixPolynomial, symmetric_block
+
+
+@dataclass(frozen=True)
+class GainLimits:
+    """The largest |u_i| of some inputs for every state in the ellipsoid sum over j of (x_j / sizes_j)^2 <= 1.
+
+    >>> GainLimits({"force": 3000.0}, {"deflection": 0.05, "speed": 0.5}).inputs["force"]
+    3000.0
+    """
+
+    inputs: Mapping[str, float]
+    sizes: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class StateFeedbackDesign:
+    """What is asked of the gains.
+
+    >>> road = FeedbackChannel(("road",), ("acceleration", "force"), sizes=(1.0, 500.0))
+    >>> StateFeedbackDesign((road,), decay_rate=2.0, fastest_pole=400.0).minimised.name
+    'road -> acceleration+force'
+    """
+
+    channels: tuple[FeedbackChannel, ...]
+    degree: int = 1  # of Q and Y in the parameters
+    decay_rate: float = 0.0  # alpha, 1/s
+    fastest_pole: float | None = None  # r, 1/s; None: no bound
+    damping: float | None = None  # least damping ratio of every frozen pole; None: no bound
+    limits: GainLimits | None = None
+    backoff: float = 0.01  # the minimised gain may be this fraction worse; what it buys is margin
+    reserve: float = (
+        0.01  # regions and limits are designed this much tighter than they are asked for, for the table's sake
+    )
+    settings: LmiSettings = field(default_factory=LmiSettings)
+
+    def __post_init__(self) -> None:
+        check_channels(self.channels)
+        if not 0 <= self.degree <= 8:
+            raise ProblemError(f"degree {self.degree} of the gains must lie between 0 and 8")
+        if not 0.0 <= self.decay_rate < np.inf:
+            raise ProblemError(f"decay rate {self.decay_rate} 1/s must be a number and must not be negative")
+        if self.fastest_pole is not None and not self.decay_rate < self.fastest_pole < np.inf:
+            raise ProblemError(f"fastest pole {self.fastest_pole} 1/s must exceed the decay rate {self.decay_rate} 1/s")
+        if self.damping is not None and not 0.0 < self.damping < 1.0:
+            raise ProblemError(f"damping {self.damping} must be a damping ratio between 0 and 1")
+        for name in ("backoff", "reserve"):
+            if not 0.0 <= getattr(self, name) < 1.0:
+                raise ProblemError(f"{name} {getattr(self, name)} must lie in [0, 1)")
+
+    @property
+    def minimised(self) -> FeedbackChannel:
+        """The channel without a bound."""
+        return next(channel for channel in self.channels if channel.bound is None)
+
+
+@dataclass(frozen=True)
+class StateFeedbackGains:
+    """K(p) = Y(p) Q(p)^-1, u = K x, with the bound that was minimised.
+
+    `gamma_lower` is a bound from below for every Q and Y of this degree (weak duality, margins taken out), where there is one;
+    `gamma` the verified level of the continuous-time loop. `result` carries verdict and margins, `optimum` the first solve.
+    """
+
+    design: StateFeedbackDesign
+    model: LpvModel
+    gamma_lower: float | None
+    gamma: float
+    result: LmiResult
+    optimum: LmiResult
+    scale: FeedbackScale
+    measured: Measured = "states"
+    order: int = 0
+    rational: int = 0  # degrees more that P has in claims (`synthesis.design.deploy.lyapunov_degree`)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Of the solve that the gains come from."""
+        return self.result.verdict
+
+    def gain(self, points: FloatArray) -> FloatArray:
+        """K at parameter values (g,) or (g, p): array (g, nu, nx)."""
+        count, grid = len(self.model.parameters), np.asarray(points, float)
+        grid = grid.reshape(-1, count) if count else grid.reshape(len(grid), 0)
+        middle = np.array([p.middle for p in self.model.parameters])
+        half = np.array([p.half_width for p in self.model.parameters])
+        scaled = np.hstack([(grid - middle) / half, np.zeros_like(grid)])
+        Q, Y = (self.result.values[key].at(scaled)[..., 0] for key in "QY")
+        K = np.swapaxes(np.linalg.solve(Q, np.swapaxes(Y, -1, -2)), -1, -2)  # Q is symmetric
+        return np.asarray(K * self.scale.inputs[:, None] * self.scale.states)
+
+    def controller(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Ak (g, 0, 0), Bk (g, 0, nx), Ck (g, nu, 0), Dk = K (g, nu, nx): a law without states of its own."""
+        K = self.gain(points)
+        g, nu, nx = K.shape
+        return np.zeros((g, 0, 0)), np.zeros((g, 0, nx)), np.zeros((g, nu, 0)), K
+
+
+def design_state_feedback(model: LpvModel, design: StateFeedbackDesign) -> StateFeedbackGains:
+    """Minimise the open channel, then give back `backoff` of it and take the gains that vary least and keep most of the margin.
+
+    Raises ProblemError if nothing is found, for unknown names, and for a model that is not stabilisable.
+
+    >>> import sympy as sp
+    >>> p = SchedulingParameter("p", "1", 1.0, 2.0, -1.0, 1.0)
+    >>> names = {key: (Signal(key[0], "1"),) for key in ("states", "outputs", "inputs", "disturbances")}
+    >>> one = sp.Matrix([[1]])
+    >>> model = LpvModel("grows", "an example", parameters=(p,), A=sp.Matrix([[sp.Symbol("p")]]), B=one, C=one, E=one, **names)
+    >>> gains = design_state_feedback(model, StateFeedbackDesign((FeedbackChannel(("d",), ("s", "i")),)))
+    >>> print(gains.verdict, gains.gain([1.0, 2.0]).shape, bool(gains.gain([2.0]) < -2.0))
+    certified (2, 1, 1) True
+    """
+    refuse_unstabilisable(model)
+    check_limits(model, design.limits)
+    scale = feedback_scale(model, design.channels)
+
+    def problem(gamma: float | None, maximise_margin: bool = True, floor: float = 0.0) -> LmiProblem:
+        return state_feedback_problem(model, design, scale, gamma, maximise_margin, floor)
+
+    def level(objective: float) -> float:
+        return scale.disturbance * float(np.sqrt(objective) if len(design.channels) == 1 else objective)
+
+    found = three_solves(model.name, problem, level, design.backoff, design.settings)
+    return StateFeedbackGains(design, model, found.gamma_lower, found.gamma, found.result, found.optimum, scale)
+
+
+def state_feedback_problem(
+    model: LpvModel,
+    design: StateFeedbackDesign,
+    scale: FeedbackScale,
+    gamma: float | None = None,
+    maximise_margin: bool = True,
+    floor: float = 0.0,
+) -> LmiProblem:
+    """The LMIs of the module docstring in scaled states, inputs, disturbances and time.
+
+    Without `gamma` the open channel is minimised; with it that channel is bounded by gamma and, unless told otherwise, a
+    common margin of all inequalities is maximised. With a `floor` every inequality keeps that margin, and the decisions of
+    least norm are sought. Of a single channel Q stands for g Q, and gamma^2 is minimised.
+    """
+    problem = LmiProblem(model.parameters, maximise_margin and gamma is not None, least_norm=floor > 0.0, floor=floor)
+    scaled, clock = scale.applied(model.polynomial), scale.clock
+    known = {key: problem.scaled(getattr(scaled, key)) for key in ("A", "B", "C", "D", "E", "F", "denominator")}
+    below, nx, nu = known["denominator"], len(model.states), len(model.inputs)
+    # A parameter that jumps may move the gains, but not the Lyapunov function.
+    jumps = any(p.may_jump for p in model.parameters)
+    Q = problem.symmetric(
+        "Q", nx, tuple(0 if p.may_jump else design.degree for p in model.parameters) if jumps else design.degree
+    )
+    Y = problem.matrix("Y", nu, nx, design.degree)
+    M = (known["A"] @ Q + known["B"] @ Y) * (1.0 / clock)
+    falling = problem.time_derivative(Q).scaled_by(below) * (1.0 / clock) - (M + M.T)
+    problem.require("Q > 0", Q)
+    if design.decay_rate > 0.0:
+        decay = 2.0 * design.decay_rate * (1.0 + design.reserve) / clock
+        problem.require("decay rate", falling - Q.scaled_by(below) * decay)
+    if design.fastest_pole is not None:
+        round_ = Q.scaled_by(below) * (design.fastest_pole / (1.0 + design.reserve) / clock)
+        problem.require("fastest pole", symmetric_block([[round_, M], [None, round_]]))
+    if design.damping is not None:
+        cosine = design.damping + design.reserve * (1.0 - design.damping)
+        both, across = (M + M.T) * -float(np.sqrt(1.0 - cosine**2)), (M.T - M) * cosine
+        problem.require("damping", symmetric_block([[both, across], [None, both]]))
+    if design.limits is not None:
+        _limit(problem, model, design, scale, Q, Y)
+    for channel in design.channels:
+        W, Z = feedback_channel_matrices(model, channel)
+        seen = _seen(problem, Z, known, Q, Y, model, scale) * (1.0 / clock)
+        force = known["E"] @ problem.constant(W / scale.disturbance)
+        through = problem.constant(Z[:, nx : len(Z.T) - nu]) @ known["F"] @ problem.constant(W / scale.disturbance)
+        level = channel.bound or gamma
+        name = "gamma^2" if len(design.channels) == 1 else "gamma"
+        if level is None:
+            size: MatrixPolynomial = problem.scalar(name)
+            problem.minimise(name)
+        else:
+            ratio = level / scale.disturbance
+            size = problem.constant(np.array([[ratio**2 if name == "gamma^2" else ratio]]))
+        ins, outs = (problem.constant(np.eye(k)).scaled_by(below) for k in (W.shape[1], len(Z)))
+        inner = ins if name == "gamma^2" else ins.scaled_by(size)
+        rows: list[list[MatrixPolynomial | None]] = [
+            [falling, -force, -seen.T],
+            [None, inner, -through.T],
+            [None, None, outs.scaled_by(size)],
+        ]
+        problem.require(f"gain {channel.name}", symmetric_block(rows))
+    return problem
+
+
+def _seen(
+    problem: LmiProblem,
+    Z: FloatArray,
+    known: Mapping[str, MatrixPolynomial],
+    Q: MatrixPolynomial,
+    Y: MatrixPolynomial,
+    model: LpvModel,
+    scale: FeedbackScale,
+) -> MatrixPolynomial:
+    """Cz Q + Dz Y, over the denominator, in scaled states: from states, outputs and inputs."""
+    nx, nu, below = len(model.states), len(model.inputs), known["denominator"]
+    of_x, of_y, of_u = Z[:, :nx] / scale.states, Z[:, nx : len(Z.T) - nu], Z[:, len(Z.T) - nu :] * scale.inputs
+    plain = problem.constant(of_x) @ Q + problem.constant(of_u) @ Y
+    return plain.scaled_by(below) + problem.constant(of_y) @ (known["C"] @ Q + known["D"] @ Y)
+
+
+def _limit(
+    problem: LmiProblem,
+    model: LpvModel,
+    design: StateFeedbackDesign,
+    scale: FeedbackScale,
+    Q: MatrixPolynomial,
+    Y: MatrixPolynomial,
+) -> None:
+    assert design.limits is not None
+    S = scale.states * np.array([design.limits.sizes[s.name] for s in model.states])
+    largest = float(S.max())
+    q = problem.scalar("q")  # of the docstring, times the largest size squared
+    problem.require("states within their sizes", Q - problem.constant(np.diag((S / largest) ** 2)).scaled_by(q))
+    for i, signal in enumerate(model.inputs):
+        if signal.name in design.limits.inputs:
+            most = design.limits.inputs[signal.name] / (1.0 + design.reserve) / scale.inputs[i] / largest
+            row = problem.constant(np.eye(len(model.inputs))[i : i + 1] / most) @ Y
+            problem.require(f"limit of {signal.name}", symmetric_block([[q, row], [None, Q]]))
+
+
+def check_limits(model: LpvModel, limits: GainLimits | None) -> None:
+    """Raise ProblemError for limits of unknown inputs, sizes of unknown states, missing ones, or ones that are not positive."""
+    if limits is None:
+        return
+    for what, given, signals in (("input", limits.inputs, model.inputs), ("state", limits.sizes, model.states)):
+        known = [s.name for s in signals]
+        for name, value in given.items():
+            if name not in known:
+                raise ProblemError(f"limits of model '{model.name}': {unknown(what, name, known)}")
+            if not 0.0 < value < np.inf:
+                raise ProblemError(
+                    f"limits of model '{model.name}': {what} '{name}' has {value}; give a positive number"
+                )
+    missing = [s.name for s in model.states if s.name not in limits.sizes]
+    if missing:
+        raise ProblemError(
+            f"limits of model '{model.name}': the state(s) {', '.join(missing)} have no size; a limit holds for states of a size"
+        )

@@ -1,0 +1,47 @@
+"""What is asked of static output feedback (`synthesis.design.static_feedback`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from synthesis.design.feedback_channel import FeedbackChannel, check_channels
+from synthesis.errors import ProblemError
+from synthesis.lmi.settings import LmiSettings
+
+
+@dataclass(frozen=True)
+class StaticFeedbackDesign:
+    """What is asked of the gains.
+
+    `start` (nu, ny) are constant gains in physical units to begin with (None: zero). `uses` names pairs (input, output) that K
+    may join (None: all): `(("force", "speed"), ("force", "speed_integral"))` is a PI law.
+
+    >>> StaticFeedbackDesign((FeedbackChannel(("gust",), ("roll",)),), uses=(("aileron", "roll"),)).degree
+    1
+    """
+
+    channels: tuple[FeedbackChannel, ...]
+    degree: int = 1  # of K and P in the parameters
+    decay_rate: float = 0.0  # alpha, 1/s
+    fastest_pole: float | None = None  # radius of the disc about zero that holds every frozen pole, 1/s; None: no bound
+    start: tuple[tuple[float, ...], ...] | None = None
+    uses: tuple[tuple[str, str], ...] | None = None
+    steps: int = 30  # at most, of those on the way to stability and of those that lower the level
+    backoff: float = 0.01  # the last solve is this fraction above the level that the steps ended with
+    reserve: float = 0.01  # poles are designed this much tighter than they are asked for, for the table's sake
+    settings: LmiSettings = field(default_factory=LmiSettings)
+
+    def __post_init__(self) -> None:
+        check_channels(self.channels)
+        if not 0 <= self.degree <= 8:
+            raise ProblemError(f"degree {self.degree} of the gains must lie between 0 and 8")
+        if not 0.0 <= self.decay_rate < np.inf:
+            raise ProblemError(f"decay rate {self.decay_rate} 1/s must be a number and must not be negative")
+        if self.fastest_pole is not None and not self.decay_rate < self.fastest_pole < np.inf:
+            raise ProblemError(f"fastest pole {self.fastest_pole} 1/s must exceed the decay rate {self.decay_rate} 1/s")
+        if self.steps < 1:
+            raise ProblemError(f"{self.steps} steps are none; give one at least")
+        if not (0.0 < self.backoff < 1.0 and 0.0 <= self.reserve < 1.0):
+            raise ProblemError(f"backoff {self.backoff} and reserve {self.reserve} must lie between 0 and 1")

@@ -1,0 +1,191 @@
+"""The steps of `synthesis.design.static_feedback`: to stability by falling growth, then down with the open channel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from estimators.arrays import FloatArray
+from estimators.errors import unknown
+from synthesis.design.generalised_plant import Frame, GeneralisedPlant
+from synthesis.design.static_feedback_design import StaticFeedbackDesign
+from synthesis.design.static_feedback_lmi import Point, StaticLoop, Structure
+from synthesis.design.three_solves import Problem, starting_places
+from synthesis.errors import ProblemError
+from synthesis.lmi.problem import LmiProblem
+from synthesis.lmi.result import LmiResult
+from synthesis.lmi.solve import solve
+from synthesis.models.lpv import LpvModel
+from synthesis.models.numeric import values
+from synthesis.polynomials.matrix import MatrixPolynomial
+
+FINE = 1e-3  # relative fall of the level in one step, below which the steps end
+SHARE = 0.05  # by which a growth is exceeded on the way to stability
+
+
+class Steps:
+    """The steps of one design, in the coordinates of its frame."""
+
+    def __init__(self, model: LpvModel, design: StaticFeedbackDesign, plant: GeneralisedPlant, frame: Frame) -> None:
+        self.model, self.design, self.plant, self.frame = model, design, plant, frame
+        self.settings = design.settings
+        if self.settings.relaxation == "auto":
+            self.settings = replace(self.settings, relaxation="exchange")
+        self.decay = design.decay_rate * (1.0 + design.reserve) / frame.clock
+        self.structure = Structure(_entries(model, design.uses), design.degree)
+
+    def start(self) -> MatrixPolynomial:
+        """The gains that the design starts with, in the frame. Raises ProblemError for a wrong shape or a stray entry."""
+        shape = len(self.model.inputs), len(self.model.outputs)
+        given = np.zeros(shape) if self.design.start is None else np.array(self.design.start, float)
+        if given.shape != shape or not np.isfinite(given).all() or given[self.structure.entries == 0.0].any():
+            raise ProblemError(
+                f"start has the shape {given.shape}; give {shape[0]} rows (inputs) of {shape[1]} numbers (outputs), zero where "
+                "K must not join them"
+            )
+        return LmiProblem(self.model.parameters).constant(given / self.frame.inputs[:, None] * self.frame.outputs)
+
+    def analysis(self, K: MatrixPolynomial) -> Problem:
+        """Of P alone, as `three_solves` asks for it."""
+
+        def problem(gamma: float | None, margin: bool = True, floor: float = 0.0) -> LmiProblem:
+            return self._problem(gamma, margin and gamma is not None, floor, K, None)[0]
+
+        return problem
+
+    def lowered(self, point: Point) -> tuple[Point, list[float]]:
+        """Steps down until they are short."""
+        best = self._solved(*self._problem(None, False, 0.0, point.K, None))
+        if best is None:
+            raise ProblemError(
+                f"model '{self.model.name}': the start is stable, but no level of the open channel was found"
+            )
+        levels, point = [best[1] * self.frame.unit], best[0]
+        for _ in range(self.design.steps):
+            found = self._solved(*self._problem(None, False, 0.0, self.structure, point))
+            if found is None:
+                break
+            before, point = levels[-1], found[0]
+            again = self._solved(
+                *self._problem(None, False, 0.0, point.K, None)
+            )  # the best P for this K, a new place to start
+            if again is not None and again[1] <= found[1]:
+                point = again[0]
+            levels.append(min(found[1], again[1] if again is not None else np.inf) * self.frame.unit)
+            if levels[-1] > before * (1.0 - FINE):
+                break
+        return point, levels
+
+    def stable(self, K: MatrixPolynomial) -> Point:
+        """A pair at which every channel has some level: the start itself, or what steps of falling growth lead to.
+
+        Growth g means that (A + B K C - g) decays. Each step takes the largest margin of that at the growth of the step before.
+        """
+        point = self._certain(K)
+        if point is None:
+            growth = self._first_growth(K)
+            for _ in range(self.design.steps):
+                problem, loop = self._shifted(self.structure if point is not None else K, point, growth)
+                result = solve(problem, replace(self.settings, verify=False))
+                if not self._usable(result) or not (result.objective or 0.0) > 0.0:
+                    break
+                point = loop.found(result)
+                growth = self._growth(point) + SHARE * abs(self._growth(point))
+                if growth < -self.decay and self._certain(point.K) is not None:
+                    break
+            point = None if point is None else self._certain(point.K)
+        if point is None:
+            raise ProblemError(
+                f"model '{self.model.name}': the steps found no stable loop; give another start, more steps, a higher degree, or "
+                "more measurements"
+            )
+        return point
+
+    def _certain(self, K: MatrixPolynomial) -> Point | None:
+        """K with a P that certifies some level of every channel, as the solver sees it."""
+        found = self._solved(*self._problem(None, False, 0.0, K, None))
+        return None if found is None else found[0]
+
+    def _problem(
+        self, gamma: float | None, margin: bool, floor: float, gain: MatrixPolynomial | Structure, at: Point | None
+    ) -> tuple[LmiProblem, StaticLoop]:
+        problem = LmiProblem(self.model.parameters, margin, least_norm=floor > 0.0, floor=floor)
+        loop = StaticLoop(problem, self.plant, self.frame.clock, self.design.degree, gain, at)
+        if self.decay:
+            loop.require_decay(self.decay)
+        if self.design.fastest_pole is not None:
+            loop.require_disc(self.design.fastest_pole / (1.0 + self.design.reserve) / self.frame.clock)
+        for part in self.plant.channels:
+            bound = gamma if part.channel.bound is None else part.channel.bound
+            if bound is None:
+                level = problem.scalar("gamma")
+                problem.minimise("gamma")
+            else:
+                level = problem.constant(np.array([[bound / self.frame.unit]]))
+            loop.require_gain(part, level)
+        return problem, loop
+
+    def _shifted(
+        self, gain: MatrixPolynomial | Structure, at: Point | None, growth: float
+    ) -> tuple[LmiProblem, StaticLoop]:
+        """The largest margin of decay with (growth) taken off A, P < 1."""
+        problem = LmiProblem(self.model.parameters, maximise_margin=True)
+        loop = StaticLoop(problem, self.plant, self.frame.clock, self.design.degree, gain, at)
+        loop.require_decay(-growth)
+        unit = problem.constant(np.eye(loop.P.shape[0]))
+        problem.require("P < 1", unit - loop.P, strict=False)
+        return problem, loop
+
+    def _solved(self, problem: LmiProblem, loop: StaticLoop) -> tuple[Point, float] | None:
+        """The pair and the level of a problem that minimises, unless the solver found none."""
+        result = solve(problem, replace(self.settings, verify=False), starting_places(problem))
+        level = result.objective
+        if not self._usable(result) or level is None or not 0.0 < level < np.inf:
+            return None
+        return loop.found(result), level
+
+    def _usable(self, result: LmiResult) -> bool:
+        return bool(np.isfinite(result.decisions).all()) and result.report.status.endswith("Solved")
+
+    def _first_growth(self, K: MatrixPolynomial) -> float:
+        """So fast that P = 1 shows it, whatever the rates."""
+        places = self._grid()
+        A = self._closed(K, places)
+        return float(1.0 + SHARE) * max(float(np.linalg.eigvalsh(0.5 * (A + np.swapaxes(A, 1, 2))).max()), SHARE)
+
+    def _growth(self, point: Point) -> float:
+        """The least growth that P shows on a grid of places and rates."""
+        problem = LmiProblem(self.model.parameters)
+        moved = problem.time_derivative(point.P) * (1.0 / self.frame.clock)
+        places = self._grid()
+        A, P, later = self._closed(point.K, places), point.P.at(places)[..., 0], moved.at(places)[..., 0]
+        inverse = np.linalg.inv(np.linalg.cholesky(P))
+        rate = 0.5 * (P @ A + np.swapaxes(P @ A, 1, 2) + later)
+        return float(np.linalg.eigvalsh(inverse @ rate @ np.swapaxes(inverse, 1, 2)).max())
+
+    def _grid(self) -> FloatArray:
+        """Scaled places with the ends of all rates (g, 2 p)."""
+        count = len(self.model.parameters)
+        line = np.linspace(-1.0, 1.0, 9 if count == 1 else 5)
+        points = list(product(*[line] * count, *[(-1.0, 1.0)] * count))
+        return np.array(points).reshape(len(points), 2 * count)
+
+    def _closed(self, K: MatrixPolynomial, places: FloatArray) -> FloatArray:
+        A, B, C = (values(getattr(self.plant, key), places[:, : places.shape[1] // 2]) for key in "ABC")
+        return np.asarray(A + B @ K.at(places)[..., 0] @ C)
+
+
+def _entries(model: LpvModel, uses: tuple[tuple[str, str], ...] | None) -> FloatArray:
+    """One where K may join an output to an input (nu, ny). Raises ProblemError for unknown names."""
+    inputs, outputs = ([s.name for s in group] for group in (model.inputs, model.outputs))
+    if uses is None:
+        return np.ones((len(inputs), len(outputs)))
+    found = np.zeros((len(inputs), len(outputs)))
+    for pair in uses:
+        for what, name, known in zip(("input", "output"), pair, (inputs, outputs), strict=True):
+            if name not in known:
+                raise ProblemError(f"model '{model.name}', uses: {unknown(what, name, known)}")
+        found[inputs.index(pair[0]), outputs.index(pair[1])] = 1.0
+    return found

@@ -1,0 +1,115 @@
+"""What every law with a table of gains shares: its cells, the multilinear gain on them, and what float64 rounds of both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from itertools import pairwise, product
+from typing import Any
+
+import numpy as np
+from flint import arb, fmpq, fmpq_mat
+
+from synthesis.loop.on_boxes import HIGHEST, MOST_BOXES, gains, local, rounding_of
+from synthesis.loop.plant import Plant
+from synthesis.loop.system import Region
+from synthesis.polynomials.boxes import Boxes
+from synthesis.polynomials.enclosure import PolynomialMatrix, Powers
+
+ROUNDING = fmpq(1, 2**50)  # of float64, with room: every rounding below costs at most 2^-53 of what is rounded
+
+
+class Tabulated:
+    """Cells and gains of a loop that has a plant, breakpoints and a table (a mapping from grid indices to matrices)."""
+
+    plant: Plant
+    breakpoints: tuple[tuple[fmpq, ...], ...]
+    table: Mapping[tuple[int, ...], fmpq_mat]
+    rounded: bool
+
+    def cells(self) -> Iterator[Region]:
+        """The boxes between neighbouring breakpoints."""
+        edges = [
+            [(axis.scaled(low), axis.scaled(high)) for low, high in pairwise(points)]
+            for axis, points in zip(self.plant.axes, self.breakpoints, strict=True)
+        ]
+        for cell in product(*edges):
+            yield Region.between(tuple(low for low, _ in cell), tuple(high for _, high in cell))
+
+    def gain(self, region: Region) -> PolynomialMatrix:
+        """The multilinear gain on a region that lies in one cell."""
+        axes, count = self.plant.axes, region.parameters
+        cell, weights = [], []
+        for i, (axis, points) in enumerate(zip(axes, self.breakpoints, strict=True)):
+            middle = region.offset[i] * axis.half + axis.middle
+            k = next(j for j in range(len(points) - 1) if middle <= points[j + 1])
+            cell.append(k)
+            low, high = axis.scaled(points[k]), axis.scaled(points[k + 1])
+            ends = (region.offset[i] - low) / (high - low), region.factor[i] / (high - low)
+            weights.append(((1 - ends[0], -ends[1]), ends))
+        terms: dict[Powers, fmpq_mat] = {}
+        for corner in product((0, 1), repeat=count):
+            value = self.table[tuple(k + c for k, c in zip(cell, corner, strict=True))]
+            for powers in product((0, 1), repeat=count):
+                factor = fmpq(1)
+                for i in range(count):
+                    factor *= weights[i][corner[i]][powers[i]]
+                if factor != 0:
+                    place = (*powers, *(0,) * count)
+                    terms[place] = terms[place] + value * factor if place in terms else value * factor
+        found = PolynomialMatrix(terms, self._gain_shape, 2 * count).balls()
+        return found.blurred(lambda i, j: self._gain_rounding[i, j].abs_upper()) if self.rounded else found
+
+    def _at_once(self, cells: Sequence[Region], letters: str) -> tuple[dict[str, Boxes], Boxes] | None:
+        """Plant matrices and gain on many regions; None where they are too many or too large for that."""
+        axes = self.plant.axes
+        if not 1 <= len(axes) <= max(HIGHEST) or len(cells) > MOST_BOXES:
+            return None
+        shape = self._gain_shape
+        rounding = rounding_of(self._gain_rounding, shape) if self.rounded else np.zeros(shape)
+        plant = {key: local(self._plant[key], cells) for key in letters}
+        return plant, gains(self.table, self.breakpoints, axes, cells, rounding)
+
+    @cached_property
+    def _gain_shape(self) -> tuple[int, int]:
+        first = next(iter(self.table.values()))
+        return first.nrows(), first.ncols()
+
+    @cached_property
+    def _gain_rounding(self) -> Any:
+        """What interpolation in float64 may be off: of the values, and of slopes times rounded distances."""
+        rows, columns = self._gain_shape
+        steepest = fmpq(1)
+        for axis, points in zip(self.plant.axes, self.breakpoints, strict=True):
+            narrow = min(b - a for a, b in pairwise(points))
+            steepest += max(abs(axis.low), abs(axis.high)) / narrow
+        largest = [[max(abs(gain[i, j]) for gain in self.table.values()) for j in range(columns)] for i in range(rows)]
+        return {(i, j): arb(largest[i][j] * steepest * ROUNDING * 4) for i in range(rows) for j in range(columns)}
+
+    @cached_property
+    def _plant(self) -> dict[str, PolynomialMatrix]:
+        """Plant matrices in u, as balls; uncertain by what the runtime's evaluation in float64 may be off."""
+        matrices = {key: matrix.balls() for key, matrix in self.plant.matrices.items()}
+        if not self.rounded:
+            return matrices
+        # u = (p - middle) / half of a float64 p: the rounding of `middle` is felt in units of `half`.
+        axes = self.plant.axes
+        argument = [ROUNDING * (1 + max(abs(axis.low), abs(axis.high)) / axis.half) for axis in axes]
+        return {
+            key: matrices[key].blurred(_evaluation_error(matrix, argument))
+            for key, matrix in self.plant.matrices.items()
+        }
+
+
+def _evaluation_error(matrix: PolynomialMatrix, argument: Sequence[fmpq]) -> Any:
+    """Bound, entry by entry, of coefficients, powers and argument in float64 for |u| <= 1."""
+    count = (sum(matrix.degrees) + 1) ** 2
+
+    def radius(i: int, j: int) -> Any:
+        total = fmpq(0)
+        for powers, entries in matrix.terms.items():
+            size = abs(entries[i, j])
+            total += size * (ROUNDING * count + sum((k * a for k, a in zip(powers, argument, strict=True)), fmpq(0)))
+        return arb(total).abs_upper()
+
+    return radius

@@ -1,0 +1,254 @@
+"""Output feedback by linear inequalities: against Riccati equations, frequency responses and the proof of the table that runs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import control
+import numpy as np
+import pytest
+import sympy as sp
+
+from estimators.arrays import FloatArray
+from synthesis.design.feedback_channel import FeedbackChannel
+from synthesis.design.output_feedback import OutputFeedback, OutputFeedbackDesign, design_output_feedback
+from synthesis.design.output_feedback_lmi import Still
+from synthesis.errors import ProblemError
+from synthesis.lmi.result import Verdict
+from synthesis.models.lpv import LpvModel
+from synthesis.models.param import SchedulingParameter, Signal
+from tests.support.lmi_cases import parameter, small_model
+
+p = sp.Symbol("p")
+FREQUENCIES = np.concatenate([[0.0], np.geomspace(1e-3, 1e4, 300)])
+WEIGHED = FeedbackChannel(("d1",), ("x1", "u1"))
+
+
+def constant_model(**matrices: Any) -> LpvModel:
+    """Without parameters; signals x1.., u1.., y1.., d1.."""
+    sizes = {"states": ("x", "A", 0), "inputs": ("u", "B", 1), "outputs": ("y", "C", 0), "disturbances": ("d", "E", 1)}
+    signals = {
+        key: tuple(Signal(f"{letter}{i + 1}", "1") for i in range(np.shape(matrices[name])[axis]))
+        for key, (letter, name, axis) in sizes.items()
+    }
+    exact = {key: sp.Matrix(value) for key, value in matrices.items()}
+    given: dict[str, Any] = signals | exact
+    return LpvModel(name="still", source="made for a test", parameters=(), **given)
+
+
+SCHERER = constant_model(  # Scherer, Gahinet, Chilali 1997, example 7 (data in python-control's examples)
+    A=[[0, 10, 2], [-1, 1, 0], [0, 2, -5]], B=[[0], [1], [0]], C=[[0, 1, 0]], E=[[1], [0], [1]], F=[[2]]
+)
+OSCILLATOR = small_model(  # the plant of MathWorks' gain-scheduled LQG example, with a force and noise on it
+    [[0, 1], [-1 - p / 2, sp.Rational(-1, 5)]], [[1, 0]], [parameter(rate=0.2)], B=[[0], [1]], E=[[0, 0], [1, 0]],
+    F=[[0, sp.Rational(1, 10)]],
+)  # fmt: skip
+NOISY = FeedbackChannel(("d1", "d2"), ("x1", "u1"))
+
+
+def closed(found: OutputFeedback, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """A, B, C, D from all disturbances to states, outputs and inputs, written out from the definition of the law."""
+    at = found.model.on(points)
+    Ak, Bk, Ck, Dk = found.controller(points)
+    n = at.A.shape[1]
+    # u = Ck xk + Dk (C x + F d): no law here has a feedthrough from an output that u acts on
+    u_x, u_d = np.concatenate([Dk @ at.C, Ck], axis=2), Dk @ at.F
+    y_x = np.concatenate([at.C, np.zeros((len(Ak), at.C.shape[1], n))], axis=2) + at.D @ u_x
+    y_d = at.F + at.D @ u_d
+    x = np.broadcast_to(np.eye(n, 2 * n), (len(Ak), n, 2 * n))
+    A = np.concatenate([at.A @ x + at.B @ u_x, Bk @ y_x], axis=1)
+    A[:, n:, n:] += Ak
+    B = np.concatenate([at.E + at.B @ u_d, Bk @ y_d], axis=1)
+    return A, B, np.concatenate([x, y_x, u_x], axis=1), np.concatenate([np.zeros_like(at.E), y_d, u_d], axis=1)
+
+
+def frozen_gain(found: OutputFeedback, channel: FeedbackChannel, points: FloatArray) -> float:
+    """The largest singular value over a grid of frequencies and the given places; infinite for a pole on the right."""
+    model = found.model
+    A, B, C, D = closed(found, points)
+    if np.linalg.eigvals(A).real.max() >= 0.0:
+        return np.inf
+    names = [s.name for s in (*model.states, *model.outputs, *model.inputs)]
+    rows = [names.index(name) for name in channel.performance]
+    columns = [[s.name for s in model.disturbances].index(name) for name in channel.disturbances]
+    Z = np.eye(len(names))[rows] / np.array(channel.sizes or (1.0,) * len(rows))[:, None]
+    W = np.eye(B.shape[2])[:, columns] * np.array(channel.weights or (1.0,) * len(columns))
+    resolvent = 1j * FREQUENCIES[:, None, None, None] * np.eye(A.shape[1]) - A
+    driven = np.broadcast_to((B @ W).astype(complex), (*resolvent.shape[:2], B.shape[1], len(columns)))
+    answer = Z @ C @ np.linalg.solve(resolvent, driven)
+    return float(np.linalg.norm(answer + Z @ D @ W, 2, axis=(-2, -1)).max())
+
+
+STILL = np.zeros((1, 0))
+
+
+@pytest.mark.parametrize("feedthrough", [None, False])
+def test_constant_plant_reaches_the_least_norm_of_two_riccati_equations(feedthrough: bool | None) -> None:
+    """SLICOT's sb10ad behind control.hinfsyn; printed 9.508. With noise on y and u weighed, Dk = 0 costs nothing."""
+    A, B, C, E, F = (np.array(getattr(SCHERER, key), float) for key in "ABCEF")
+    shown = np.vstack([np.eye(3)[:1], np.zeros((1, 3))])
+    plant = control.ss(A, np.hstack([E, B]), np.vstack([shown, C]), [[0, 0], [0, 1], [F[0, 0], 0]])
+    *_, gamma, _ = control.hinfsyn(plant, 1, 1)
+    found = design_output_feedback(SCHERER, OutputFeedbackDesign((WEIGHED,), feedthrough=feedthrough))
+    assert found.verdict is Verdict.CERTIFIED
+    assert found.optimum.objective is not None
+    assert found.optimum.objective * found.frame.unit == pytest.approx(gamma, rel=1e-3)
+    assert found.gamma_lower is not None and gamma * (1 - 2e-3) < found.gamma_lower <= gamma * (1 + 1e-6)
+    assert 0.99 * gamma < frozen_gain(found, WEIGHED, STILL) <= found.gamma
+    assert feedthrough is None or not found.controller(STILL)[3].any()
+
+
+def test_a_feedthrough_of_the_plant_is_taken_off_the_measurement() -> None:
+    """y = C x + D u + F d: the same least gain with D, for a law without feedthrough; with one the loop would be algebraic."""
+    acting = replace(SCHERER, D=sp.Matrix([[3]]))
+    found = design_output_feedback(acting, OutputFeedbackDesign((WEIGHED,)))
+    assert frozen_gain(found, WEIGHED, STILL) <= found.gamma < 9.509 * 1.012
+    with pytest.raises(ProblemError, match="algebraic loop"):
+        design_output_feedback(acting, OutputFeedbackDesign((WEIGHED,), feedthrough=True))
+
+
+def test_units_change_nothing() -> None:
+    """A state in thousandths, inputs in thousands, outputs in hundredths, time in minutes: the same gamma and the same law."""
+    T, u, y, minute = sp.diag(1, 1000, 1), 1000, 100, 60
+    A, B, C = (sp.Matrix(getattr(SCHERER, key)) for key in "ABC")
+    E, F = sp.Matrix([[1, 0], [0, 0], [1, 0]]), sp.Matrix([[0, 2]])  # noise of its own: the best filter is not perfect
+    plain = constant_model(A=A, B=B, C=C, E=E, F=F)
+    other = constant_model(
+        A=minute * T * A * T.inv(), B=minute * u * T * B, C=y * C * T.inv(), E=minute * T * E, F=y * F
+    )
+    weighed = replace(NOISY, sizes=(1.0, 1.0 / u))
+    first, second = (
+        design_output_feedback(model, OutputFeedbackDesign((channel,)))
+        for model, channel in ((plain, NOISY), (other, weighed))
+    )
+    assert second.gamma == pytest.approx(first.gamma, rel=1e-3)
+    there, back = (np.array(m, float) for m in (T, T.inv()))
+    K, (Ak, Bk, Ck, Dk) = first.controller(STILL), second.controller(STILL)
+    same = (back @ Ak @ there / minute, back @ Bk * y / minute, u * Ck @ there, u * Dk * y)
+    for one, another in zip(K, same, strict=True):
+        np.testing.assert_allclose(one, another, rtol=1e-3, atol=2e-3 * np.abs(one).max() + 1e-9)
+
+
+def test_bounded_rates_buy_gain_and_no_gain_needs_the_rate() -> None:
+    """Both forms: X follows the parameter or Y does; free to jump neither may, and the least gain is larger."""
+    line = np.linspace(-1.0, 1.0, 9)
+    gammas = {}
+    for form in ("X", "Y"):
+        found = design_output_feedback(OSCILLATOR, OutputFeedbackDesign((NOISY,), still=form))
+        assert found.verdict is Verdict.CERTIFIED
+        assert found.gamma_lower is not None and found.gamma_lower <= found.gamma
+        assert frozen_gain(found, NOISY, line) <= found.gamma
+        assert len({len(np.unique(m.round(9), axis=0)) for m in found.controller(line)[:3]} - {1, 9}) == 0
+        gammas[form] = found.gamma
+    best = design_output_feedback(OSCILLATOR, OutputFeedbackDesign((NOISY,)))
+    assert best.gamma == min(gammas.values())
+    jumping = replace(OSCILLATOR, parameters=(parameter(rate=np.inf),))
+    free = design_output_feedback(jumping, OutputFeedbackDesign((NOISY,)))
+    assert free.gamma_lower is not None and free.gamma_lower > 1.05 * best.gamma
+
+
+@pytest.mark.parametrize("form", ["X", "Y"])
+def test_the_design_shows_its_gain_along_every_motion(form: Still) -> None:
+    """P of the loop from X and Y, its slope from differences: dV/dt + |z|^2/gamma - gamma |w|^2 < 0 at both ends of the rate.
+
+    The parameter rises fast and falls slowly, so that no sign of a slope can be wrong on both sides. With the slope the other way
+    round the inequality does not hold: the test can see it.
+    """
+    rising = replace(OSCILLATOR, parameters=(SchedulingParameter("p", "1", -1.0, 1.0, -0.01, 1.5),))
+    found = design_output_feedback(rising, OutputFeedbackDesign((NOISY,), degree=2, still=form))
+    frame, n, gamma = found.frame, 2, found.gamma
+    T = frame.states
+
+    def lyapunov(line: FloatArray) -> FloatArray:
+        u = np.stack([line, np.zeros_like(line)], axis=1)
+        X, Y = (found.result.values[name].at(u)[..., 0] for name in "XY")
+        X, inverse = T.T @ X @ T / frame.clock, T.T @ np.linalg.inv(Y) @ T / frame.clock
+        if form == "Y":  # V = x'Y^-1 x + (x - xk)'(X - Y^-1)(x - xk)
+            return np.block([[X, inverse - X], [inverse - X, X - inverse]])
+        other = np.linalg.inv(
+            np.linalg.inv(inverse) - np.linalg.inv(X)
+        )  # V = (x - xk)'X (x - xk) + xk'(Y - X^-1)^-1 xk
+        return np.block([[X, -X], [-X, X + other]])
+
+    line = np.linspace(-0.99, 0.99, 23)
+    A, B, C, D = closed(found, line)
+    Z = np.eye(4)[[0, 3]]
+    P, slope = lyapunov(line), (lyapunov(line + 1e-4) - lyapunov(line - 1e-4)) / 2e-4
+
+    def worst(rates: tuple[float, float]) -> float:
+        highest = -np.inf
+        for rate in rates:
+            fall = np.swapaxes(A, 1, 2) @ P + P @ A + rate * slope
+            shown = Z @ C, Z @ D
+            corner = np.swapaxes(shown[1], 1, 2) @ shown[1] / gamma - gamma * np.eye(2)
+            side = P @ B + np.swapaxes(shown[0], 1, 2) @ shown[1] / gamma
+            whole = np.block(
+                [[fall + np.swapaxes(shown[0], 1, 2) @ shown[0] / gamma, side], [np.swapaxes(side, 1, 2), corner]]
+            )
+            highest = max(highest, float(np.linalg.eigvalsh(whole).max()))
+        return highest
+
+    assert P.shape == (23, 2 * n, 2 * n) and np.linalg.eigvalsh(P).min() > 0.0
+    assert worst((-0.01, 1.5)) < 0.0
+    assert worst((0.01, -1.5)) > 0.0
+
+
+def test_several_channels_with_decay_and_a_disc_of_poles() -> None:
+    """Every frozen pole within the disc and left of the decay rate; every channel at most its bound; mixed costs more."""
+    force, noise = FeedbackChannel(("d1",), ("x1", "u1"), bound=1.6), FeedbackChannel(("d2",), ("u1",))
+    design = OutputFeedbackDesign((force, noise), decay_rate=0.3, fastest_pole=12.0)
+    found = design_output_feedback(OSCILLATOR, design)
+    line = np.linspace(-1.0, 1.0, 9)
+    poles = np.linalg.eigvals(closed(found, line)[0])
+    assert found.verdict is Verdict.CERTIFIED
+    assert poles.real.max() < -0.3 and np.abs(poles).max() < 12.0
+    assert frozen_gain(found, force, line) <= 1.6
+    assert frozen_gain(found, noise, line) <= found.gamma
+    alone = design_output_feedback(OSCILLATOR, OutputFeedbackDesign((noise,)))
+    assert alone.gamma < found.gamma
+
+
+def test_singular_plants() -> None:
+    """No noise on y and no weight on u: nothing bounds the gains but the disc of the poles."""
+    bare = small_model(
+        [[0, 1], [-1 - p / 2, sp.Rational(-1, 5)]], [[1, 0]], [parameter(rate=0.2)], B=[[0], [1]], E=[[0], [1]]
+    )
+    channel = FeedbackChannel(("d1",), ("x1",))
+    found = design_output_feedback(bare, OutputFeedbackDesign((channel,), fastest_pole=10.0))
+    line = np.linspace(-1.0, 1.0, 5)
+    assert found.verdict is Verdict.CERTIFIED
+    assert frozen_gain(found, channel, line) <= found.gamma
+    assert np.abs(np.linalg.eigvals(closed(found, line)[0])).max() < 10.0
+
+
+def test_hidden_modes_are_refused_before_anything_is_solved() -> None:
+    """An unstable mode that the input does not move, or that the output does not show, with its place."""
+    channel = FeedbackChannel(("d1",), ("x1", "u1"))
+    A = [[p, 0], [0, -1]]
+    deaf = small_model(A, [[1, 1]], [parameter()], B=[[0], [1]], E=[[1], [0]], F=[[1]])
+    blind = small_model(A, [[0, 1]], [parameter()], B=[[1], [1]], E=[[1], [0]], F=[[1]])
+    with pytest.raises(ProblemError, match=r"not stabilisable at p = \S+ 1: .* u1"):
+        design_output_feedback(deaf, OutputFeedbackDesign((channel,)))
+    with pytest.raises(ProblemError, match=r"undetectable at p = \S+ 1: .* y1"):
+        design_output_feedback(blind, OutputFeedbackDesign((channel,)))
+    both = small_model(A, [[1, 0], [0, 1]], [parameter()], B=[[1], [1]], E=[[1], [0]], F=[[1], [1]])
+    with pytest.raises(ProblemError, match="undetectable"):
+        design_output_feedback(both, OutputFeedbackDesign((channel,), measured=("y2",)))
+    assert design_output_feedback(both, OutputFeedbackDesign((channel,), measured=("y1",))).verdict is Verdict.CERTIFIED
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"channels": (replace(NOISY, performance=("x3",)),)}, "x3"),
+        ({"channels": (replace(NOISY, bound=1.0),)}, "exactly one channel"),
+        ({"channels": (replace(NOISY, weights=(1.0,)),)}, "weights|sizes"),
+        ({"channels": (NOISY,), "fastest_pole": 0.1, "decay_rate": 0.2}, "fastest pole"),
+        ({"channels": (NOISY,), "measured": ("y7",)}, "y7"),
+        ({"channels": (NOISY,), "degree": 9}, "degree 9"),
+    ],
+)
+def test_bad_designs_are_refused(change: dict[str, Any], words: str) -> None:
+    with pytest.raises(ProblemError, match=words):
+        design_output_feedback(OSCILLATOR, OutputFeedbackDesign(**change))

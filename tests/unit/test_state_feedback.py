@@ -1,0 +1,204 @@
+"""State feedback design: closed forms, the duality with observers, published values, pole regions, limits, and refusals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from analysis import hinf_norm
+from estimators.arrays import FloatArray
+from synthesis.design.feedback_channel import FeedbackChannel
+from synthesis.design.feedback_scale import feedback_scale
+from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
+from synthesis.design.state_feedback import (
+    GainLimits,
+    StateFeedbackDesign,
+    design_state_feedback,
+    state_feedback_problem,
+)
+from synthesis.errors import ProblemError
+from synthesis.lmi.result import Verdict
+from synthesis.lmi.solve import solve
+from synthesis.models.lpv import LpvModel
+from synthesis.models.param import SchedulingParameter
+from tests.support.lmi_cases import parameter, small_model
+
+p, q = sp.symbols("p q")
+
+
+def loops(model: LpvModel, K: FloatArray, points: FloatArray) -> FloatArray:
+    """A + B K (g, n, n)."""
+    m = model.on(points)
+    return np.asarray(m.A + m.B @ K)
+
+
+def scalar(low: float = 1.0, high: float = 2.0, rate: float = 1.0) -> LpvModel:
+    """x' = p x + u + d."""
+    return small_model([[p]], [[1]], (parameter("p", low, high, rate),), B=[[1]], E=[[1]])
+
+
+@pytest.mark.parametrize("rate", [0.0, 1.0, np.inf])
+def test_scalar_plant_in_closed_form(rate: float) -> None:
+    """x' = p x + u + d with the cost of x and u: with u = k x the peak of the gain is sqrt(1 + k^2)/(-p - k), above 1 for all k.
+
+    The infimum 1 is approached by unbounded gains only where p > 0; at p < 0 it is 1/sqrt(1 + p^2), at k = 1/p.
+    """
+    model = scalar(rate=rate)
+    gains = design_state_feedback(model, StateFeedbackDesign((FeedbackChannel(("d1",), ("x1", "u1")),)))
+    assert gains.verdict is Verdict.CERTIFIED
+    points = np.linspace(1.0, 2.0, 9)
+    K = gains.gain(points)
+    norms = hinf_norm(loops(model, K, points), np.ones((9, 1, 1)), np.concatenate([np.ones((9, 1, 1)), K], axis=1)).norm
+    np.testing.assert_allclose(norms, np.hypot(1.0, K[:, 0, 0]) / (-points - K[:, 0, 0]), rtol=1e-6)
+    assert 1.0 <= norms.max() <= gains.gamma and gains.gamma_lower == pytest.approx(1.0, rel=1e-3)
+    stable = design_state_feedback(
+        scalar(-3.0, -2.0, rate), StateFeedbackDesign((FeedbackChannel(("d1",), ("x1", "u1")),))
+    )
+    assert stable.gamma == pytest.approx(1.0 / np.sqrt(5.0), rel=0.02)
+    np.testing.assert_allclose(stable.gain(np.array([-2.0])), -0.5, atol=0.1)
+
+
+def test_the_dual_observer_has_the_same_level() -> None:
+    """Transposed plant, disturbances and errors exchanged: one number on two roads, with two parameters and their rates."""
+    # What grows for the observer falls for the law: rates change their sign.
+    there, back = (
+        (SchedulingParameter("p", "1", -1.0, 3.0, *rates), parameter("q", 0.0, 1.0, 0.5))
+        for rates in ((-30.0, 0.0), (0.0, 30.0))
+    )
+    shift = q - sp.Rational(1, 2)
+    A = sp.Matrix([[-2 + p / 4 * shift, 1 + p], [-2 + shift, -3 + p / 2]])
+    C, E, F = sp.Matrix([[1, shift / 2]]), sp.Matrix([[1, 0], [0, 0]]), sp.Matrix([[0, 1]])
+    observed = small_model(A, C, there, E=E, F=F)
+    dual = small_model(A.T, E.T, back, B=C.T, D=F.T, E=sp.eye(2))
+    channel = Channel(("d1", "d2"), ("x2",), weights=(1.0, 0.2))
+    law = FeedbackChannel(("d2",), ("y1", "y2"), sizes=(1.0, 5.0))
+    left = design_observer(observed, ObserverDesign((channel,)))
+    right = design_state_feedback(dual, StateFeedbackDesign((law,)))
+    assert left.gamma_lower is not None and right.gamma_lower is not None
+    assert right.gamma == pytest.approx(left.gamma, rel=2e-3)
+    assert max(left.gamma_lower, right.gamma_lower) <= min(left.gamma, right.gamma)
+    middle = np.array([[1.0, 0.5]])
+    np.testing.assert_allclose(right.gain(middle)[0], -left.gain(middle)[0].T, atol=0.2)
+    # Two channels, one of them bounded.
+    several = (Channel(("d1",), ("x1",), bound=2.0 * left.gamma), Channel(("d2",), ("x2",)))
+    laws = (FeedbackChannel(("d1",), ("y1",), bound=2.0 * left.gamma), FeedbackChannel(("d2",), ("y2",)))
+    left = design_observer(observed, ObserverDesign(several, decay_rate=0.2))
+    right = design_state_feedback(dual, StateFeedbackDesign(laws, decay_rate=0.2))
+    assert right.gamma == pytest.approx(left.gamma, rel=2e-3)
+
+
+def test_published_lpv_state_feedback_of_yalmip() -> None:
+    """Loefberg, YALMIP example "State feedback design for LPV system": the largest trace of Q is 2.294 for a fixed gain.
+
+    x' = [0 1 a; 0 0 1; 0 0 0] x + [0 0 1]' u with |a| <= 0.1 and the cost of |x|^2 + u^2; a scheduled gain alone is no better.
+    """
+    A = sp.Matrix([[0, 1, p], [0, 0, 1], [0, 0, 0]])
+    model = small_model(A, sp.eye(3), (parameter("p", -0.1, 0.1, np.inf),), B=[[0], [0], [1]], E=sp.eye(3))
+    found = []
+    for degree in (0, 1):  # of a disturbance that is as good as none, only the cost is left of the channel
+        channel = FeedbackChannel(("d1", "d2", "d3"), ("x1", "x2", "x3", "u1"), weights=(1e-4,) * 3)
+        scale = feedback_scale(model, (channel,))
+        design = StateFeedbackDesign((channel,), degree=degree)
+        problem = state_feedback_problem(model, design, scale, 1.0, maximise_margin=False)
+        trace, Q = problem.scalar("trace"), problem.unknowns["Q"]
+        shares = (problem.constant(np.eye(3)[i : i + 1] / scale.states[i]) for i in range(3))
+        problem.require("trace", sum((row @ Q @ row.T for row in shares), -trace))
+        problem.maximise("trace")
+        found.append(float(solve(problem).objective or 0.0) * scale.disturbance**2)
+    assert found == pytest.approx([2.294, 2.294], abs=5e-4)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+def test_level_does_not_depend_on_units(unit: float) -> None:
+    parameters = (parameter("p", -1.0, 1.0, 2.0),)
+    A, B = sp.Matrix([[0, 1], [p - 2, -sp.Rational(1, 2)]]), sp.Matrix([[0], [1]])
+    T = sp.diag(1, sp.Rational(unit))
+    design = StateFeedbackDesign((FeedbackChannel(("d1",), ("x1", "u1"), sizes=(1.0, 2.0)),), decay_rate=0.3)
+    plain = small_model(A, sp.eye(2), parameters, B=B, E=[[0], [1]])
+    moved = small_model(T * A * T.inv(), sp.eye(2), parameters, B=T * B * 1000, E=T * sp.Matrix([[0], [1]]))
+    law = StateFeedbackDesign((FeedbackChannel(("d1",), ("x1", "u1"), sizes=(1.0, 0.002)),), decay_rate=0.3)
+    first, second = design_state_feedback(plain, design), design_state_feedback(moved, law)
+    assert second.gamma == pytest.approx(first.gamma, rel=1e-3)
+    expected = first.gain(np.array([0.3]))[0] @ np.diag([1.0, 1.0 / unit]) / 1000
+    np.testing.assert_allclose(second.gain(np.array([0.3]))[0], expected, rtol=2e-2)
+
+
+def test_pole_regions_count_imaginary_parts() -> None:
+    """An oscillator that is to be stiffened: without regions its poles leave the disc and the sector that are then asked for."""
+    model = small_model(
+        [[0, 1], [-4 - p, -sp.Rational(1, 10)]], [[1, 0]], (parameter("p", 0.0, 1.0, 1.0),), B=[[0], [1]], E=[[0], [1]]
+    )
+    channel = FeedbackChannel(("d1",), ("x1", "u1"), sizes=(0.05, 1.0))
+    points = np.linspace(0.0, 1.0, 11)
+
+    def poles(**more: Any) -> FloatArray:
+        gains = design_state_feedback(model, StateFeedbackDesign((channel,), **more))
+        return np.asarray(np.linalg.eigvals(loops(model, gains.gain(points), points)))
+
+    free, loose = poles(), poles(fastest_pole=4.0)
+    bound = poles(decay_rate=0.5, fastest_pole=4.0, damping=0.8)
+    assert np.abs(free).max() > 4.0
+    assert (-loose.real / np.abs(loose)).min() < 0.8
+    assert np.abs(bound).max() < 4.0 and (-bound.real / np.abs(bound)).min() > 0.8 and bound.real.max() < -0.5
+    with pytest.raises(ProblemError, match="loosen a bound"):
+        poles(decay_rate=3.0, fastest_pole=3.0001)
+
+
+def test_limits_of_gains_hold_on_the_ellipsoid_of_sizes() -> None:
+    model = scalar(-2.0, 1.0)
+    channel = FeedbackChannel(("d1",), ("x1",))
+    loose = StateFeedbackDesign((channel,), fastest_pole=50.0)
+    tight = StateFeedbackDesign((channel,), limits=GainLimits({"u1": 3.0}, {"x1": 0.5}))
+    points = np.linspace(-2.0, 1.0, 7)
+    free, kept = (design_state_feedback(model, design) for design in (loose, tight))
+    assert np.abs(free.gain(points)).max() * 0.5 > 3.0
+    assert np.abs(kept.gain(points)).max() * 0.5 <= 3.0
+    assert kept.gamma > free.gamma
+    with pytest.raises(ProblemError):  # x' = p x + u needs |K| > 1
+        design_state_feedback(model, StateFeedbackDesign((channel,), limits=GainLimits({"u1": 0.4}, {"x1": 0.5})))
+
+
+def test_rational_model() -> None:
+    """x' = x/p + u + d: the same level as x' = q x + u + d with q = 1/p, which may move as far."""
+    gains = [
+        design_state_feedback(model, StateFeedbackDesign((FeedbackChannel(("d1",), ("x1", "u1")),), degree=0))
+        for model in (
+            small_model([[1 / p]], [[1]], (parameter("p", 0.5, 1.0, np.inf),), B=[[1]], E=[[1]]),
+            scalar(1.0, 2.0, np.inf),
+        )
+    ]
+    assert gains[0].gamma == pytest.approx(gains[1].gamma, rel=1e-3)
+
+
+REFUSED: list[tuple[dict[str, Any], str]] = [
+    ({"channels": (FeedbackChannel(("d9",), ("x1",)),)}, "unknown disturbance 'd9'; known: d1"),
+    ({"channels": (FeedbackChannel(("d1",), ("z1",)),)}, "unknown performance signal 'z1'"),
+    ({"channels": (FeedbackChannel(("d1",), ("x1", "x1")),)}, "performance signal 'x1' twice"),
+    ({"channels": (FeedbackChannel(("d1",), ("x1",), sizes=(1.0, 2.0)),)}, r"2 sizes for 1 performance signal"),
+    ({"channels": (FeedbackChannel(("d1",), ("x1",), sizes=(0.0,)),)}, "positive numbers"),
+    ({"channels": (FeedbackChannel(("d1",), ("x1",), bound=1.0),)}, "exactly one channel must have no bound"),
+    ({"limits": GainLimits({"u2": 1.0}, {"x1": 1.0})}, "unknown input 'u2'; known: u1"),
+    ({"limits": GainLimits({"u1": 1.0}, {})}, r"state\(s\) x1 have no size"),
+    ({"damping": 1.0}, "damping ratio between 0 and 1"),
+    ({"decay_rate": 2.0, "fastest_pole": 1.0}, "must exceed the decay rate"),
+]
+
+
+@pytest.mark.parametrize(("change", "words"), REFUSED)
+def test_what_means_nothing_is_refused(change: dict[str, Any], words: str) -> None:
+    wanted = {"channels": (FeedbackChannel(("d1",), ("x1", "u1")),)} | change
+    with pytest.raises(ProblemError, match=words):
+        design_state_feedback(scalar(), StateFeedbackDesign(**wanted))
+
+
+def test_a_mode_that_no_input_moves_is_refused_with_its_place() -> None:
+    """x1 grows for p > 0 and is moved only through x2, with a strength that vanishes at p = 1/2."""
+    model = small_model([[p, 2 * p - 1], [0, -1]], [[1, 0]], (parameter("p", -1.0, 1.0),), B=[[0], [1]], E=[[1], [0]])
+    design = StateFeedbackDesign((FeedbackChannel(("d1",), ("x1",)),))
+    with pytest.raises(ProblemError, match=r"not stabilisable at p = 0\.5 1: a mode .* none of the input\(s\) u1"):
+        design_state_feedback(model, design)
+    with pytest.raises(ProblemError, match="has no input"):
+        design_state_feedback(small_model([[p]], [[1]], E=[[1]]), design)
