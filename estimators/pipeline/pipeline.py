@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -122,6 +123,7 @@ class EstimationPipeline(Memory):
         self.parts = tuple(name for name in self._named if hasattr(getattr(self, name), "save"))
         self.parts += ("last", "direction") if unsigned_wheels else ("last",)
         self._lateral_first = bool(getattr(self.velocity, "uses_lateral_force", False))
+        self._takes_gravity = bool(getattr(self.velocity, "uses_gravity", False))
         self._compliant = bool(getattr(corner_observers, "uses_forces", False))
         self._use_across = self._lateral_first or self.corner_observers is not None
         self._total_deviation = vehicle.mass * setting(acceleration_deviation, "acceleration_deviation", "m/s^2")
@@ -147,9 +149,9 @@ class EstimationPipeline(Memory):
         late = self._late(signals.elapsed)
         w, open_way = self._signed(w, signals, read_x)
         fresh = self.readings.step(w)
-        tilt, own_x, own_y, free_x, free_y = last.tilted(self.attitude, signals, read_x, read_y, turned)
-        own_x, own_y, turned = last.believed(own_x, own_y, turned)
-        read_x, read_y = last.believed(read_x, read_y)
+        tilt = last.tilted(self.attitude, signals, read_x, read_y, turned)
+        read_x, read_y, turned = last.believed(read_x, read_y, turned)
+        own_x, own_y = (read_x, read_y) if tilt is None else tilt.level(read_x, read_y)
         bias_x, bias_y = last.bias
         own_x, own_y = own_x - bias_x, own_y - bias_y
         lean, rise = (None, None) if tilt is None else (tilt.roll, tilt.pitch)
@@ -163,14 +165,18 @@ class EstimationPipeline(Memory):
         total = car.mass * own_x + self.front * kit.sin(self.angle)
         agreed = reconcile(wheels.force, wheels.deviation, total, self._total_deviation, loads.load, unknown)
         use = self._normalised(agreed.force, loads.load, unknown)
-        if tilt is None:  # untouched: the velocity part tells the impossible from the missing
-            free_x, free_y = ax, ay
         yaw_acceleration = self.yaw_slope.step(choose(late, math.nan, turned) if delayed else turned).derivative
         yaw_acceleration = choose(abs(turned) < math.inf, kit.own(yaw_acceleration), math.nan)
         lateral = self.lateral_force.step(own_x, own_y, yaw_acceleration, angle, agreed.force, loads.load)
         across = self._normalised(lateral.corner_force, loads.load, None) if self._use_across else None
-        more = {"lateral_use": across, "forces": (agreed.force, lateral.corner_force)} if self._lateral_first else {}
-        moved = self.velocity.step(w, steer, free_x, free_y, turn, use, signals.elapsed, **more)
+        more: dict[str, Any] = {}
+        if self._lateral_first:
+            more = {"lateral_use": across, "forces": (agreed.force, lateral.corner_force)}
+        if tilt is not None and self._takes_gravity:
+            more["gravity"] = tilt.gravity
+        elif tilt is not None:
+            ax, ay = ax - kit.own(tilt.gravity[..., 0]), ay - kit.own(tilt.gravity[..., 1])
+        moved = self.velocity.step(w, steer, ax, ay, turn, use, signals.elapsed, **more)
         corners = None
         if self.corner_observers is not None and across is not None:
             corners = self.corner_observers.step(
@@ -207,17 +213,17 @@ class EstimationPipeline(Memory):
             force_z=loads.load,
             slip=moved.slip,
             slip_angle=moved.slip_angle,
-            roll=self._level if tilt is None else tilt.roll,
-            pitch=self._level if tilt is None else tilt.pitch,
+            roll=self._level if tilt is None else tilt.step.roll,
+            pitch=self._level if tilt is None else tilt.step.pitch,
             consistency=consistency,
-            flags=self._flags(moved.flags | loads.flags | lateral.flags, tilt, late),
+            flags=self._flags(moved.flags | loads.flags | lateral.flags, None if tilt is None else tilt.step, late),
             wheel_flags=moved.wheel_flags | wheels.flags,
             wheels=wheels,
             reconciled=agreed,
             loads=loads,
             lateral=lateral,
             velocity=moved,
-            attitude=tilt,
+            attitude=None if tilt is None else tilt.step,
             corners=corners,
             sideslip_step=beside,
         )

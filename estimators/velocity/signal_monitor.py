@@ -1,19 +1,28 @@
-"""Monitor of yaw rate and lateral acceleration: each is predicted from the others with its uncertainty, and replaced by them.
+"""The signal monitor: every signal is predicted from the others with its uncertainty, loses its weight, and comes back.
 
-Five witnesses tell the same number, the centripetal acceleration of the car, m/s^2, each with an allowance for its error:
+Which witnesses tell the same number is in `parity`, what they say and by how much each may be off in `witnesses`, and who is
+outvoted in `signal_vote`. Of all signals alike:
 
-    yaw rate      V_x r                                                       bias and scale error, as far as they are known
-    a_y           a_y - b - g_bank - V_y',  V_y' = r' (L_r - V_x^2 c_1/g)     bias, bank, and V_y' itself
-    front wheels  V_x (v_fr - v_fl)/(t_f cos delta)                           slips that differ, radii as far as they are known
-    rear wheels   V_x (v_rr - v_rl)/t_r                                       likewise
-    steering      V_x^2 tan(delta)/L                                          half of itself: the tires slip
+    found      outvoted by others that agree; one that repeats itself (frozen, zero, clipped at its limit) by fewer
+    replaced   by what the others say that it should read, with their allowance as its noise: an error that stays counts
+               (2 j - 1) times in the j-th sample, up to `error_memory`. Nothing that is replaced teaches bias, scale or slope
+    flagged    GATED, and `FusionStep.inertial_used`
+    back       when no peer contradicts it and one has agreed with it for `error_memory`
 
-all low-passed alike (`wheel_lag`). Who is outvoted, and what can be told apart, is in `signal_vote`. A signal that is outvoted,
-or missing, is replaced by what the others say it should read, with their allowance as its noise; it comes back when nothing
-contradicts it and another has agreed with it for `error_memory`. Until it was found V_y followed it: its variance grows by that.
+**a_x.** While the wheels have not decided between a_x and the forces, a_x is as unsure as these are apart. Four wheels that slip
+against their force disprove it without any torque, for `lost_time`. Where neither a_x nor the forces tell, the wheels do, by
++-`unseen_acceleration`.
 
-**Bank.** A car that follows its steering while a_y, alive, contradicts it for `_PATIENCE` is on a banked road: the variance of
-the bank grows, and a_y is believed again. An a_y that has lost its gain looks the same.
+**a_y, yaw rate.** Until it was found V_y followed it: its variance grows by that. A car that follows its steering while a_y, alive,
+contradicts it for `_PATIENCE` is on a banked road: the variance of the bank grows, and a_y is believed again. An a_y that has lost
+its gain looks the same.
+
+**Attitude.** A levelled a_y that the turn contradicts while the one that is not levelled agrees: roll is wrong, and nothing is
+levelled. The contrary is a banked road, and no fault.
+
+**Steering.** The front axle condition predicts it from V_y, yaw rate and side force; while the rear axle's holds, its gate is a flag.
+
+**Wheels.** The gate of `longitudinal_fusion`: each innovation is a wheel against the estimate, that the others hold.
 """
 
 from __future__ import annotations
@@ -25,38 +34,43 @@ from estimators.arithmetic import Number, Signals, arithmetic
 from estimators.memory import CarsMemory
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity.fusion_inputs import ConditionedInputs
-from estimators.velocity.lateral_fusion import BANK, BIAS, SCALE, TIRES, YAW_BIAS, LateralFusion
-from estimators.velocity.longitudinal_fusion import RADIUS, LongitudinalFusion
-from estimators.velocity.signal_vote import FRONT, REAR, SIDE, STEERING, YAW_RATE, vote
+from estimators.velocity.lateral_fusion import BANK, BIAS, SCALE, AxleUpdate, LateralFusion
+from estimators.velocity.longitudinal_fusion import GRADE, LongitudinalFusion
+from estimators.velocity.parity import FRONT, PULL, REAR, SIDE, STEERING, TURN, YAW_RATE
+from estimators.velocity.signal_vote import Verdict, vote
+from estimators.velocity.witnesses import SHARE, UNDERSTEER, UNDULATION, PullWitnesses, Told, TurnWitnesses
 
-_UNDERSTEER = 1.0  # m/s^2 by which steering may be off where tires slip: 2 deg/g at 25 m/s
-_FOLLOW = 0.5  # share of itself: the same, and the lag of the car behind its steering
-_TOE = 0.02  # 1/m: 3.5 deg of steering over a wheelbase, all that is left of it at walking pace
-_SWAY = 1.0  # share of V_y' by which its model may be off: it is made of a yaw rate that may be at fault itself
-_UNDULATION = 0.5  # m/s^2 of side wind, ruts and body roll in a_y
-_UNLIKE = 0.001  # slip of a free-rolling wheel that the other one of its axle does not share
-_SHARE = 0.03  # relative: scale errors of both sensors and of V_x
 _PATIENCE = 0.5  # s for which a car that follows its steering contradicts its a_y before the road is taken for banked
 _BANK = 0.3  # rad: banked curves of test tracks are up to 0.5
+AX, AY, R, ROLL = range(4)
+
+
+class Gravity(NamedTuple):
+    """What an attitude part knows of gravity in a_x and a_y, m/s^2."""
+
+    total: Signals
+    road: Signals  # of it, from grade and bank: the tires carry that
 
 
 class Judged(NamedTuple):
-    """What the lateral filter is to use."""
+    """What the filters are to use; readings a_x, a_y, r without the gravity that is known."""
 
-    ay: Number  # m/s^2, the reading, or what it should be
-    yaw_rate: Number  # rad/s, likewise
-    noise_ay: Number
-    noise_yaw_rate: Number
-    used_ay: Number
-    used_yaw_rate: Number
+    reading: tuple[Number, Number, Number]  # what was read, or should have been
+    noise: tuple[Number, Number, Number]
+    used: tuple[Number, Number, Number]  # whether it is the reading
+    doubt: tuple[Number, Number]  # m/s^2 by which a_x and a_y may be off for long; 0 where they are believed
+    gravity: tuple[Number, Number]  # m/s^2 that was taken off a_x and a_y
+    road: tuple[Number, Number]  # of it, from grade and bank
+    mu: Signals  # F_x/F_z of the wheels, of a size that a tire can have; shares of a_x where unknown
+    blind: Number  # whether neither a_x nor the forces tell
     unknown: Number  # whether nothing tells the yaw rate
-    doubt: Number  # m/s^2 by which a replaced a_y may be off for long; 0 where it is the reading
+    gated: Number  # whether a signal is there, and is not believed
 
 
 class SignalMonitor(CarsMemory):
     """Remembers of `count` cars the low-passed witnesses and for how long who is not believed."""
 
-    memory = ("level", "remaining", "since", "sloped", "yaw_rate", "yaw_acceleration", "mu")
+    memory = ("level", "gap", "apart", "remaining", "since", "sloped", "astray", "yaw_rate", "yaw_acceleration", "mu")
     unknowns = ("yaw_rate",)
 
     def __init__(
@@ -64,119 +78,124 @@ class SignalMonitor(CarsMemory):
     ) -> None:
         self.settings, self.along, self.across = along.settings, along, across
         self.kit = kit = arithmetic((count,))
-        self._length, self._arm = vehicle.wheelbase, vehicle.rear_axle_distance
-        left, right = vehicle.corner_y[0::2], vehicle.corner_y[1::2]
-        self._tracks = (left - right).tolist()
+        self._turn, self._pull = TurnWitnesses(vehicle, along, across), PullWitnesses(vehicle, along)
         zero = kit.full(0.0)
         self._zero, self._never = zero, kit.full(False)
-        self.level: Signals = kit.stacked([zero] * 5)  # low-passed witnesses, m/s^2
-        self.remaining: Signals = kit.stacked([zero] * 2)  # s for which a_y, yaw rate are not believed
-        self.since: Signals = kit.stacked([zero] * 2)  # s for which a_y, yaw rate have been replaced
+        self.level: Signals = kit.stacked([zero] * (len(TURN.witnesses) + 1))  # of the turn, and V_y', low-passed, m/s^2
+        self.gap: Number = zero  # m/s^2, a_x - forces, low-passed
+        self.apart: Number = zero  # m/s^2, wheels - forces, low-passed since a_x is in doubt
+        self.remaining: Signals = kit.stacked([zero] * 4)  # s for which a_x, a_y, yaw rate, roll are not believed
+        self.since: Signals = kit.stacked([zero] * 3)  # s since a_x is in doubt, a_y and the yaw rate are replaced
         self.sloped: Number = zero  # s for which a_y has been off as on a bank
+        self.astray: Number = zero  # s for which the steering has been off
         self.mu: Signals = kit.stacked([zero] * 4)  # F_x/F_z of the wheels at the last sample
         self.yaw_rate: Number = kit.full(math.nan)  # the last one that was used, rad/s
         self.yaw_acceleration: Number = zero  # filtered, rad/s^2
 
-    def __call__(self, elapsed: Number, seen: ConditionedInputs) -> Judged:
-        """One sample."""
-        s, kit, along, across = self.settings, self.kit, self.along, self.across
-        x, y, speed = along.filter.mean, across.filter.mean, along.speed
+    def __call__(
+        self, elapsed: Number, seen: ConditionedInputs, given: Signals | None, slope: Signals, gravity: Gravity | None
+    ) -> Judged:
+        """One sample: `given` F_x/F_z of the wheels, not finite where unknown; `slope` of their speeds, rad/s^2.
+
+        What is known of `gravity` has been taken off the readings.
+        """
+        turn = self._turning(elapsed, seen, gravity)
+        pull = self._pulling(elapsed, seen, given, slope, self._zero if gravity is None else gravity.road[0])
+        self.mu = pull.mu
+        ahead = (self._zero, self._zero) if gravity is None else (gravity.total[0], gravity.road[0])
+        return Judged(
+            (pull.reading, *turn.reading),
+            (pull.noise, *turn.noise),
+            (pull.used, *turn.used),
+            (pull.doubt, turn.doubt),
+            (ahead[0], turn.gravity),
+            (ahead[1], turn.road),
+            pull.mu,
+            pull.blind,
+            turn.unknown,
+            pull.gated | self.kit.no(turn.used[0] & turn.used[1]) | (self.remaining[ROLL] > 0.0),
+        )
+
+    def learn(
+        self, elapsed: Number, seen: ConditionedInputs, innovation: Signals, axle: AxleUpdate, usable: Signals
+    ) -> Number:
+        """What the corrections say of a_x (`innovation` of the wheels, m/s) and of the steering; whether that is off."""
+        s, kit = self.settings, self.kit
+        impossible = self._pull.against_friction(seen, innovation, self.mu)
+        if kit.some(impossible):
+            left = kit.maximum(self.remaining[AX], kit.where(impossible, s.lost_time, 0.0))
+            self.remaining = kit.stacked([left, *self.remaining[1:]])
+        off = usable[0] & kit.no(axle.used[0]) & axle.used[1]
+        self.astray = kit.where(off, self.astray + elapsed, 0.0) if kit.some(off) else self._zero
+        return self.astray > s.wheel_lag
+
+    def _turning(self, elapsed: Number, seen: ConditionedInputs, gravity: Gravity | None) -> _Turn:
+        """a_y and the yaw rate."""
+        s, kit = self.settings, self.kit
         _, b, r = seen.inertial
-        fl, fr, rl, rr = seen.steer
-        angle = 0.5 * (fl + fr)
-        s_fl, s_fr, s_rl, s_rr = (
-            R * w * (1.0 + rho) for R, w, rho in zip(along.radius, seen.wheel_speed, x[RADIUS:], strict=True)
-        )
-        turn = across.yaw_rate(r)
-        square = speed * speed
-        sway = self.yaw_acceleration * (self._arm - square * y[TIRES + 2] / GRAVITY)
-        own = b * (1.0 - y[SCALE]) - y[BIAS] - y[BANK]
-        front, rear = self._tracks
-        now = (
-            speed * turn,
-            own - sway,
-            speed * (s_fr - s_fl) / (front * kit.cos(angle)),
-            speed * (s_rr - s_rl) / rear,
-            square * kit.tan(angle - 0.5 * (rl + rr)) / self._length,
-        )
+        off = (self._zero, self._zero) if gravity is None else (gravity.total[1], gravity.road[1])
+        now, surface = self._turn.say(seen, self.yaw_acceleration, None if gravity is None else off[0])
         kept = kit.exp(-elapsed / s.wheel_lag)
-        self.level = level = kit.stacked(
-            [kept * old + (1.0 - kept) * new for old, new in zip(self.level, now, strict=True)]
-        )
-        allowed, known = self._allowances(seen, level, sway, (s_fl, s_fr, s_rl, s_rr))
-        v_g, v_p, v_f, v_q, _ = level
-        t_g, t_p, t_f, t_q, _ = allowed
-        quiet = known[0] & known[1] & (abs(v_p - v_g) < t_p + t_g)
+        self.level = kit.stacked([kept * old + (1.0 - kept) * new for old, new in zip(self.level, now, strict=True)])
+        *level, sway = self.level
+        told = self._turn.judge(seen, level, sway, surface, self.mu, self._never if gravity is None else kit.no(self._never))
+        v_g, v_p, v_f, v_q = level[:4]
+        t_g, t_p, t_f, t_q = told.allowed[:4]
+        known = told.known
+        quiet = known[YAW_RATE] & known[SIDE] & (abs(v_p - v_g) < t_p + t_g)
         quiet = (
             quiet
-            & (kit.no(known[2]) | (abs(v_f - v_g) < t_f + t_g))
-            & (kit.no(known[3]) | (abs(v_q - v_g) < t_q + t_g))
+            & (kit.no(known[FRONT]) | (abs(v_f - v_g) < t_f + t_g))
+            & (kit.no(known[REAR]) | (abs(v_q - v_g) < t_q + t_g))
         )
-        quiet = quiet & (self.remaining[0] + self.remaining[1] == 0.0)
-        if not kit.some(kit.no(quiet)):
-            self._differentiate(r, self.since[1] > 0.0, elapsed)
-            self.since = kit.stacked([self._zero] * 2)
-            self.sloped = kit.maximum(self.sloped - elapsed, 0.0)
-            return Judged(b, r, seen.noise[1], seen.noise[2], known[1], known[0], self._never, self._zero)
-        return self._voted(elapsed, seen, allowed, known, sway)
+        quiet = quiet & (self.remaining[AY] + self.remaining[R] + self.remaining[ROLL] == 0.0)
+        if kit.some(kit.no(quiet)):
+            return self._outvoted(elapsed, seen, told, sway, off)
+        self._differentiate(r, self.since[R] > 0.0, elapsed)
+        self.since = kit.stacked([self.since[AX], self._zero, self._zero])
+        self.sloped = kit.maximum(self.sloped - elapsed, 0.0)
+        used = known[SIDE], known[YAW_RATE]
+        return _Turn((b, r), (seen.noise[1], seen.noise[2]), used, self._never, self._zero, *off)
 
-    def _allowances(
-        self, seen: ConditionedInputs, level: Signals, sway: Number, surface: Signals
-    ) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
-        """Of each witness, m/s^2, and whether it says anything."""
-        s, kit, speed = self.settings, self.kit, self.along.speed
-        P, Q, gate = self.across.filter.variance, self.along.filter.variance, s.gate
-        magnitude, largest = abs(speed), kit.maximum
-        t_g = magnitude * gate * kit.sqrt(P(YAW_BIAS) + s.yaw_rate_noise**2) + _SHARE * abs(level[YAW_RATE])
-        t_p = gate * kit.sqrt(P(BIAS) + P(BANK)) + _UNDULATION + _SHARE * abs(level[SIDE]) + _SWAY * abs(sway)
-        allowed, known = [t_g, t_p], [seen.good[2], seen.good[1]]
-        for axle, track in enumerate(self._tracks):
-            i, k = 2 * axle, 2 * axle + 1
-            a, c = RADIUS + i, RADIUS + k
-            force = largest(abs(self.mu[i]), abs(self.mu[k]))
-            share = _UNLIKE + (s.slip_linear + s.slip_cubic * force * force) * force
-            radii = kit.sqrt(largest(Q(a) + Q(c) - 2.0 * Q(a, c), 0.0))
-            allowed.append(magnitude * (magnitude * (share + radii) + s.slip_speed) / track)
-            rolls = abs(0.5 * (surface[i] + surface[k]) - speed) < s.agreement * magnitude + s.dead_speed
-            live = (
-                (seen.gap[i] < s.error_memory)
-                & (seen.gap[k] < s.error_memory)
-                & kit.no(seen.silent[i] | seen.silent[k])
-            )
-            known.append(live & rolls)
-        slow = _TOE * speed * speed
-        allowed.append(kit.minimum(_UNDERSTEER, slow) + _FOLLOW * abs(level[STEERING]))
-        known.append(seen.steered)
-        return tuple(allowed), tuple(known)
-
-    def _voted(
-        self,
-        elapsed: Number,
-        seen: ConditionedInputs,
-        allowed: tuple[Number, ...],
-        known: tuple[Number, ...],
-        sway: Number,
-    ) -> Judged:
+    def _outvoted(
+        self, elapsed: Number, seen: ConditionedInputs, told: Told, sway: Number, gravity: tuple[Number, Number]
+    ) -> _Turn:
         s, kit, no, largest = self.settings, self.kit, self.kit.no, self.kit.maximum
-        level, (_, stuck_y, stuck_r) = self.level, ((run - 1.0) * elapsed > s.slowest_unit for run in seen.run)
-        found = vote(kit, level, allowed, known, (stuck_y, stuck_r))
-        gap, (wrong_y, wrong_r) = level[YAW_RATE] - level[SIDE], found.wrong
+        level, known, never = told.level, told.known, self._never
+        _, stuck_y, stuck_r = ((run - 1.0) * elapsed > s.slowest_unit for run in seen.run)
+        # a car that slides is turned further than its side force carries it, never less
+        excess = (level[SIDE] * level[STEERING] < 0.0) | (abs(level[SIDE]) > abs(level[STEERING]))
+        always = no(never)
+        verdicts, agree = vote(kit, TURN, *told, (stuck_r, never, stuck_y), (always, always, excess))
+        yaw, roll, side = verdicts
+        gap = level[YAW_RATE] - level[SIDE]
         steady = abs(sway) < 0.5 * abs(gap)
-        apart = known[SIDE] & steady & (abs(gap) > allowed[YAW_RATE] + allowed[SIDE] - _SWAY * abs(sway))
-        straight = largest(abs(level[YAW_RATE]), abs(level[STEERING])) < _UNDERSTEER
-        banked = self._banked(elapsed, apart & found.grip & (no(wrong_y) | straight) & no(stuck_y), gap)
-        left = []
-        for wrong, contradicted, supported, before in zip(
-            (wrong_y & no(banked), wrong_r), found.contradicted, found.supported, self.remaining, strict=True
-        ):
-            fades = kit.where(contradicted | no(supported), before, largest(before - elapsed, 0.0))
-            left.append(kit.where(wrong, s.error_memory, fades))
-        begun_y, begun_r = ((now > 0.0) & (before == 0.0) for now, before in zip(left, self.remaining, strict=True))
+        apart = known[SIDE] & steady & (abs(gap) > told.allowed[YAW_RATE] + told.allowed[SIDE] - abs(sway))
+        straight = largest(abs(level[YAW_RATE]), abs(level[STEERING])) < UNDERSTEER
+        front, rear = (agree[YAW_RATE, i] & agree[i, STEERING] for i in (FRONT, REAR))
+        grip = agree[YAW_RATE, STEERING] & (front | rear)
+        banked = self._banked(elapsed, apart & grip & (no(side.wrong) | straight) & no(stuck_y | roll.wrong), gap)
+        before = self.remaining[AY:]
+        judged = (side._replace(wrong=side.wrong & no(banked)), yaw, roll)
+        left = [self._left(elapsed, verdict, old) for verdict, old in zip(judged, before, strict=True)]
+        begun_y, begun_r, begun_roll = ((now > 0.0) & (old == 0.0) for now, old in zip(left, before, strict=True))
         followed = kit.where(begun_r, level[YAW_RATE] - level[REAR], gap) * s.error_memory
-        self.across.filter.widen(begun_y | begun_r, followed * followed)
-        self.remaining = kit.stacked(left)
+        self.across.filter.widen(begun_y | begun_r | begun_roll, followed * followed)
+        self.remaining = kit.stacked([self.remaining[AX], *left])
         used_y, used_r = known[SIDE] & (left[0] == 0.0), known[YAW_RATE] & (left[1] == 0.0)
-        return self._replaced(elapsed, seen, allowed, known, used_y, used_r, sway)
+        levelled = left[2] == 0.0
+        off = tuple(kit.where(levelled, value, 0.0) for value in gravity)
+        if kit.some(no(levelled)):
+            a, b, r = seen.inertial
+            seen = seen._replace(inertial=kit.stacked((a, kit.where(levelled, b, b + gravity[0]), r)))
+        return self._replaced(elapsed, seen, told, used_y, used_r, sway)._replace(gravity=off[0], road=off[1])
+
+    def _left(self, elapsed: Number, verdict: Verdict, before: Number) -> Number:
+        """s for which a signal is not believed, now that the vote is known."""
+        kit = self.kit
+        held = verdict.contradicted | kit.no(verdict.supported)
+        fades = kit.where(held, before, kit.maximum(before - elapsed, 0.0))
+        return kit.where(verdict.wrong, kit.maximum(self.settings.error_memory, before), fades)
 
     def _banked(self, elapsed: Number, looks: Number, gap: Number) -> Number:
         """Cars whose road has looked banked for so long that the filter is to learn its bank."""
@@ -190,19 +209,12 @@ class SignalMonitor(CarsMemory):
         return found
 
     def _replaced(
-        self,
-        elapsed: Number,
-        seen: ConditionedInputs,
-        allowed: tuple[Number, ...],
-        known: tuple[Number, ...],
-        used_y: Number,
-        used_r: Number,
-        sway: Number,
-    ) -> Judged:
+        self, elapsed: Number, seen: ConditionedInputs, told: Told, used_y: Number, used_r: Number, sway: Number
+    ) -> _Turn:
         """Readings that are not used, from those that are."""
         s, kit, choose, no = self.settings, self.kit, self.kit.where, self.kit.no
         _, b, r = seen.inertial
-        level, y, speed = self.level, self.across.filter.mean, self.along.speed
+        (level, allowed, known), y, speed = told, self.across.filter.mean, self.along.speed
         pace = choose(abs(speed) > 1.0, speed, 1.0)
         front, rear = known[FRONT], known[REAR]
         wheels = front | rear
@@ -217,22 +229,77 @@ class SignalMonitor(CarsMemory):
         unknown = no(used_r | wheels | used_y | known[STEERING])
         turn = choose(used_r, self.across.yaw_rate(r), other / pace)
         yaw_rate = choose(used_r, r, self.across.reading(turn))
-        switched = (self.since[1] > 0.0) == used_r
-        self.since = kit.stacked(
-            [
-                choose(used, 0.0, kit.minimum(age + elapsed, s.error_memory))
-                for used, age in zip((used_y, used_r), self.since, strict=True)
-            ]
-        )
-        grown = [kit.sqrt(kit.maximum(2.0 * age / elapsed - 1.0, 1.0)) for age in self.since]
-        noise_r = choose(used_r, seen.noise[2], doubt / (s.gate * abs(pace)) * grown[1])
-        central = choose(used_r, speed * turn, other)
-        own = central + sway + y[BIAS] + y[BANK]
+        switched = (self.since[R] > 0.0) == used_r
+        ages = [
+            choose(used, 0.0, kit.minimum(age + elapsed, s.error_memory))
+            for used, age in zip((used_y, used_r), self.since[AY:], strict=True)
+        ]
+        self.since = kit.stacked([self.since[AX], *ages])
+        grown_y, grown_r = (self._grown(age, elapsed) for age in ages)
+        noise_r = choose(used_r, seen.noise[2], doubt / (s.gate * abs(pace)) * grown_r)
+        own = choose(used_r, speed * turn, other) + sway + y[BIAS] + y[BANK]
         ay = choose(used_y, b, own / (1.0 - y[SCALE]))
-        doubt_y = (_UNDULATION + _SWAY * abs(sway) + choose(used_r, allowed[YAW_RATE], doubt)) / s.gate
-        noise_y = choose(used_y, seen.noise[1], doubt_y * grown[0])
+        doubt_y = (UNDULATION + abs(sway) + choose(used_r, allowed[YAW_RATE], doubt)) / s.gate
+        noise_y = choose(used_y, seen.noise[1], doubt_y * grown_y)
         self._differentiate(yaw_rate, switched, elapsed)
-        return Judged(ay, yaw_rate, noise_y, noise_r, used_y, used_r, unknown, choose(used_y, 0.0, doubt_y))
+        doubt_y = choose(used_y, 0.0, doubt_y)
+        return _Turn((ay, yaw_rate), (noise_y, noise_r), (used_y, used_r), unknown, doubt_y, self._zero, self._zero)
+
+    def _pulling(
+        self, elapsed: Number, seen: ConditionedInputs, given: Signals | None, slope: Signals, road: Number
+    ) -> _Pull:
+        """a_x."""
+        s, kit, choose, no = self.settings, self.kit, self.kit.where, self.kit.no
+        reading, noise, before = seen.inertial[0], seen.noise[0], self.remaining[AX]
+        mu, known = self._pull.shares(given, reading + road)
+        force, t_f = self._pull.forces(mu, seen)
+        unit = self._pull.unit(reading + road)
+        kept = kit.exp(-elapsed / s.force_gap_memory)
+        self.gap = gap = choose(known & seen.alive, kept * self.gap + (1.0 - kept) * (unit - force), 0.0)
+        doubtful = no(seen.alive) | (abs(gap) > 0.5 * t_f) | (before > 0.0)
+        if not kit.some(doubtful):
+            self.since = kit.stacked([self._zero, *self.since[1:]])
+            return _Pull(reading, noise, seen.good[0], self._zero, mu, self._never, self._never)
+
+        believed = seen.alive & (before == 0.0)
+        blind, base = no(believed | known), choose(believed | known, force, 0.0)
+        middle = self._pull.wheels(slope, seen) + self.along.filter.mean[GRADE] + road
+        near = no(believed) | (kit.minimum(abs(middle - force), abs(middle - unit)) < s.excess_acceleration)
+        held = choose(before > 0.0, middle, unit)
+        fresh = choose(believed, 0.5 * gap, choose(known, 0.0, held))
+        apart = choose(self.since[AX] > 0.0, self.apart, fresh)
+        self.apart = apart = choose(near, kept * apart + (1.0 - kept) * (middle - base), apart)
+        age = choose(doubtful, kit.minimum(self.since[AX] + elapsed, s.error_memory), 0.0)
+        self.since = kit.stacked([age, *self.since[1:]])
+
+        told = Told(
+            (choose(known, gap, unit), self._zero, apart),
+            (SHARE * abs(unit), t_f, kit.maximum(0.5 * abs(gap), s.rolling)),
+            (seen.good[0], known, near),
+        )
+        (verdict,), _ = vote(kit, PULL, *told, (no(seen.alive),), (no(self._never),))
+        left = self._left(elapsed, verdict, before)
+        self.remaining = kit.stacked([left, *self.remaining[1:]])
+        used = seen.alive & (left == 0.0)
+        with_force = no(used) & known
+        pending = used & (abs(gap) > 0.5 * t_f) & (abs(apart) < abs(apart - gap))
+        explained = force * kit.sign(apart) > GRAVITY * s.unloaded  # wheels slip to the side of their force
+        leaves = choose(explained, 0.0, kit.minimum(kit.maximum(abs(apart) - t_f, 0.0), s.unseen_acceleration))
+        # forces that were corrected with a_x have a part of its error
+        doubt = choose(with_force, 0.5 * t_f + 0.25 * abs(gap) + leaves, choose(pending, abs(gap), 0.0))
+        blind = no(used | known)
+        doubt = choose(blind, s.unseen_acceleration, doubt)
+        instead = self._pull.reading(choose(blind, apart, force)) - road
+        reading = choose(used, reading, instead)
+        if kit.some(blind):
+            mu, _ = self._pull.shares(given, reading + road)
+        grown = kit.maximum(doubt * self._grown(age, elapsed), choose(seen.alive, noise, 0.0))
+        gated = seen.good[0] & no(used) & (seen.alive | verdict.contradicted)
+        return _Pull(reading, choose(doubt > 0.0, grown, noise), used, doubt, mu, blind, gated)
+
+    def _grown(self, age: Number, elapsed: Number) -> Number:
+        """By how much a deviation counts more in the integral, after `age` s of the same error."""
+        return self.kit.sqrt(self.kit.maximum(2.0 * age / elapsed - 1.0, 1.0))
 
     def _differentiate(self, yaw_rate: Number, switched: Number, elapsed: Number) -> None:
         """First-order filter of the slope; where the yaw rate comes from another source than before, that is no slope."""
@@ -241,3 +308,27 @@ class SignalMonitor(CarsMemory):
         slope = kit.where(steady, (yaw_rate - self.yaw_rate) / elapsed, self.yaw_acceleration)
         self.yaw_acceleration = kept * self.yaw_acceleration + (1.0 - kept) * slope
         self.yaw_rate = yaw_rate
+
+
+class _Turn(NamedTuple):
+    """Of a_y and the yaw rate, as in `Judged`."""
+
+    reading: tuple[Number, Number]
+    noise: tuple[Number, Number]
+    used: tuple[Number, Number]
+    unknown: Number
+    doubt: Number
+    gravity: Number
+    road: Number
+
+
+class _Pull(NamedTuple):
+    """Of a_x."""
+
+    reading: Number
+    noise: Number
+    used: Number
+    doubt: Number
+    mu: Signals
+    blind: Number
+    gated: Number

@@ -85,7 +85,7 @@ def test_a_slide_is_no_fault_of_the_accelerometer() -> None:
 def test_steering_alone_says_nothing_of_a_live_accelerometer() -> None:
     """Wheels lost: a_y and the yaw rate contradict each other, and nothing says which is right; both are kept."""
     course = turn(8.0, YAW)
-    course.signals.wheel_speed[480:900] = np.nan
+    course.signals.wheel_speed[450:900] = np.nan
     course.signals.yaw_rate[FAULT] *= 2.0
     found = run(course)
     assert found.used[FAULT.start : FAULT.start + 200].all()
