@@ -102,14 +102,16 @@ class LastSample(Memory):
         )
         up = read(signals.az, "az", limits.ACCELERATION)
         up = kit.where(abs(up) < math.inf, up, GRAVITY)
-        heavy, road, body = [], [], []
+        heavy: list[Number] = []
+        road: list[Number] = []
+        body: list[Number] = []
         angles = (tilt.pitch, tilt.total_pitch, ax, SOFTEST[0]), (tilt.roll, tilt.total_roll, ay, SOFTEST[1])
         for angle, total, felt, softest in angles:
             body.append(own_tilt(kit, kit.own(angle), kit.where(abs(felt) < math.inf, felt, 0.0), softest))
             heavy.append(GRAVITY * kit.sin(kit.own(total)))
             road.append(heavy[-1] - GRAVITY * kit.sin(body[-1]))
         self.heavy = heavy[0]
-        return Tilt(tilt, *body, up, kit.table(((*heavy, *road),), shape))
+        return Tilt(tilt, body[0], body[1], up, kit.table(((*heavy, *road),), shape))
 
 
 class Tilt(NamedTuple):

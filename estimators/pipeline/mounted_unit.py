@@ -28,9 +28,9 @@ class MountedUnit(Memory):
         a_cg = R a - w' x l - w x (w x l),   w = R w_unit                                   (`estimators.signals.mounting`)
 
     w' is a causal derivative with `lag`, so it comes late by lag + Ts/2. An axis that the car has no sensor for stays None; a
-    missing reading (NaN, or beyond `signals.limits`) makes the axes missing that it has a larger share of. An axis that consists
-    mostly of a reading that repeats its predecessor bit for bit repeats, too: what the others mix into a frozen reading would make
-    it look alive. `step` goes before `EstimationPipeline.step`: pipeline.step(unit.step(signals)).
+    missing reading (NaN, or beyond `signals.limits`) makes the axes missing that it has a larger share of. An axis that
+    consists mostly of a reading that repeats its predecessor bit for bit repeats, too: what the others mix into a frozen
+    reading would make it look alive. `step` goes before `EstimationPipeline.step`: pipeline.step(unit.step(signals)).
 
     Args:
         mounting: of the unit that measures a_x to the pitch rate.

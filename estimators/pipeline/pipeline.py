@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +21,7 @@ from estimators.forces import (
 from estimators.memory import Memory
 from estimators.pipeline.checks import CrossChecks
 from estimators.pipeline.direction import DirectionOfTravel
-from estimators.pipeline.last_sample import LastSample, possible
+from estimators.pipeline.last_sample import LastSample, Tilt, possible
 from estimators.pipeline.parts import (
     CORNER_PARTS,
     AttitudePart,
@@ -169,14 +168,9 @@ class EstimationPipeline(Memory):
         yaw_acceleration = choose(abs(turned) < math.inf, kit.own(yaw_acceleration), math.nan)
         lateral = self.lateral_force.step(own_x, own_y, yaw_acceleration, angle, agreed.force, loads.load)
         across = self._normalised(lateral.corner_force, loads.load, None) if self._use_across else None
-        more: dict[str, Any] = {}
-        if self._lateral_first:
-            more = {"lateral_use": across, "forces": (agreed.force, lateral.corner_force)}
-        if tilt is not None and self._takes_gravity:
-            more["gravity"] = tilt.gravity
-        elif tilt is not None:
-            ax, ay = ax - kit.own(tilt.gravity[..., 0]), ay - kit.own(tilt.gravity[..., 1])
-        moved = self.velocity.step(w, steer, ax, ay, turn, use, signals.elapsed, **more)
+        more = {"lateral_use": across, "forces": (agreed.force, lateral.corner_force)} if self._lateral_first else {}
+        ax, ay, heavy = self._with_gravity(ax, ay, tilt)
+        moved = self.velocity.step(w, steer, ax, ay, turn, use, signals.elapsed, **more, **heavy)
         corners = None
         if self.corner_observers is not None and across is not None:
             corners = self.corner_observers.step(
@@ -251,6 +245,15 @@ class EstimationPipeline(Memory):
         self.last.forget(here)
         if self.direction is not None:
             self.direction.forget(here if self._single else np.ravel(here))
+
+    def _with_gravity(self, ax: Number, ay: Number, tilt: Tilt | None) -> tuple[Number, Number, dict[str, FloatArray]]:
+        """a_x and a_y for the velocity part, and what it takes of gravity besides: nothing, if it has to be taken off before."""
+        if tilt is None:
+            return ax, ay, {}
+        if self._takes_gravity:
+            return ax, ay, {"gravity": tilt.gravity}
+        along, across = (self._kit.own(tilt.gravity[..., k]) for k in (0, 1))
+        return ax - along, ay - across, {}
 
     def _signed(self, w: FloatArray, signals: VehicleSignals, ax: Number) -> tuple[FloatArray, FloatArray | None]:
         """Wheel speeds with a sign, and the deviation of V_x, m/s, where it is open; as they are, and None, if they have one."""

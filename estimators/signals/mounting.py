@@ -123,8 +123,8 @@ class UnitAxes:
 
     def touched(self, readings: BoolArray, share: float) -> BoolArray:
         """Which axes of the car (..., 3) have a larger `share` of any of the `readings` (..., 3)."""
-        out: BoolArray = (readings[..., None, :] & (np.absolute(self._turn) > share)).any(axis=-1)
-        return out
+        needs: BoolArray = np.absolute(self._turn) > share
+        return np.asarray((readings[..., None, :] & needs).any(axis=-1))
 
 
 def lever_acceleration(lever: FloatArray, rate: FloatArray, slope: FloatArray) -> FloatArray:

@@ -19,7 +19,7 @@ from estimators.velocity.consistency_reset import LateralReset, LongitudinalRese
 from estimators.velocity.fusion_inputs import ConditionedInputs, FusionInputs
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.fusion_step import FusionStep, Outcome, fusion_step
-from estimators.velocity.signal_monitor import Gravity, SignalMonitor
+from estimators.velocity.signal_monitor import SignalMonitor
 from estimators.velocity.zero_velocity import ZeroVelocityDetector
 
 _MISSING_INPUT, _RESET, _GATED = int(Flag.MISSING_INPUT), int(Flag.RESET), int(Flag.GATED)
@@ -101,18 +101,15 @@ class VelocityFusion(Memory):
         """One sample on.
 
         Args:
-            wheel_speed: (..., 4) rad/s, signed.
-            steer: (..., 4) road-wheel angles, rad.
-            ax: (...) m/s^2, accelerometer at the centre of gravity.
-            ay: (...) m/s^2, likewise.
-            yaw_rate: (...) rad/s.
-            normalised_force: (..., 4) F_x/F_z of the wheels; NaN (or None) where unknown: then a_x/g.
-            elapsed: (...) s since the last step, if not `sample_time`: jitter, gaps.
-            gravity: (..., 4) m/s^2, finite, of attitude where it is known: its share in `ax` and `ay`, and of these what the road
+            wheel_speed: (..., 4) rad/s, signed. steer: (..., 4) road-wheel angles, rad. ax: (...) m/s^2, accelerometer at the
+            centre of gravity. ay: (...) m/s^2, likewise. yaw_rate: (...) rad/s. normalised_force: (..., 4) F_x/F_z of the
+            wheels; NaN (or None) where unknown: then a_x/g. elapsed: (...) s since the last step, if not `sample_time`:
+            jitter, gaps. gravity: (..., 4) m/s^2, finite, of attitude where it is known: its share in `ax` and `ay`, and of
+            these what the road
                 is tilted, not the body: the tires carry that. None: a level car, whose tilt counts as bias, grade and bank.
 
-        Whatever is not finite counts as missing and is flagged; the estimates stay finite. A car of which a signal contradicts the
-        others carries the flag GATED.
+        Whatever is not finite counts as missing and is flagged; the estimates stay finite. A car of which a signal
+        contradicts the others carries the flag GATED.
 
         Raises:
             EstimatorError: another shape, or not numbers.
@@ -124,18 +121,18 @@ class VelocityFusion(Memory):
         inertial = kit.stacked([kit.car(value, shape, name) for value, name in named])
         dt, odd = self._elapsed(elapsed)
         seen = self.inputs(inertial, wheels, turned, dt)
-        known = None if gravity is None else self._gravity(gravity)
-        if known is not None:
+        heavy = None if gravity is None else kit.wheels(gravity, shape, "gravity")
+        if heavy is not None:
             a, b, r = seen.inertial
-            seen = seen._replace(inertial=kit.stacked((a - known.total[0], b - known.total[1], r)))
+            seen = seen._replace(inertial=kit.stacked((a - heavy[0], b - heavy[1], r)))
         self._begin(seen)
         given = None if normalised_force is None else kit.wheels(normalised_force, shape, "normalised_force")
-        judged = self.signal_monitor(dt, seen, given, self.inputs.slope, known)
+        judged = self.signal_monitor(dt, seen, given, self.inputs.slope, heavy)
         (a, b, r), noise, used, doubt, taken, road, mu, blind, unknown, gated = judged
         turn, before = across.yaw_rate(r), along.speed
         along.predict(dt, a, noise[0], turn, across.speed, doubt[0] > 0.0)
         across.predict(dt, b, noise[1], r, noise[2], before, used[1] & used[2])
-        yaw_acceleration, left, felt = self.signal_monitor.yaw_acceleration, across.speed, b + road[1]
+        yaw_acceleration, left, felt = self.signal_monitor.turn.yaw_acceleration, across.speed, b + road[1]
         own = along.acceleration(a) + turn * left
 
         def moves(angle: Number, x: Number, y: Number) -> tuple[Number, ...]:
@@ -185,11 +182,6 @@ class VelocityFusion(Memory):
         start = [self._kit.where(chosen, new, old) for new, old in zip(asked, self.start, strict=True)]
         self.start = self._kit.stacked(start)
         self._forget(chosen)
-
-    def _gravity(self, given: npt.ArrayLike) -> Gravity:
-        """Of attitude."""
-        rows = self._kit.wheels(given, self.batch_shape, "gravity")
-        return Gravity(rows[:2], rows[2:])
 
     def _hidden(self) -> tuple[Number, Number]:
         """What none of the measurements tells: speeds below the dead band of the wheels, and which of two pairs is right."""

@@ -1,8 +1,9 @@
 """Which faults of sensors can be told apart, and what the signal monitor reports: derived from its parity relations.
 
-A residual is the difference of two witnesses of a relation (`parity`). It responds to a set of faults unless the same of them move
-both witnesses. The residuals that respond are the signature of the set: sets with the same one cannot be told apart by any rule,
-whatever their sizes. What is reported is the outcome of the votes of the monitor on that signature (Frank (1990), Gertler (1998)).
+A residual is the difference of two witnesses of a relation (`parity`). It responds to a set of faults unless the same of them
+move both witnesses. The residuals that respond are the signature of the set: sets with the same one cannot be told apart by
+any rule, whatever their sizes. What is reported is the outcome of the votes of the monitor on that signature (Frank (1990),
+Gertler (1998)).
 """
 
 from __future__ import annotations
@@ -13,11 +14,13 @@ from typing import NamedTuple
 
 from estimators.arithmetic import arithmetic
 from estimators.velocity.parity import CONDITIONS, RELATIONS, SIDE, TURN, UNLEVELLED, Relation, Witness
-from estimators.velocity.signal_vote import vote
+from estimators.velocity.signal_vote import Told, vote
 
 Residual = tuple[str, str, str]
 """The relation, and its two witnesses."""
-SIGNALS = tuple(dict.fromkeys(s for r in RELATIONS for w in r.witnesses for s in sorted(w.made_of) if s not in CONDITIONS))
+SIGNALS = tuple(
+    dict.fromkeys(s for r in RELATIONS for w in r.witnesses for s in sorted(w.made_of) if s not in CONDITIONS)
+)
 """What the relations are made of."""
 
 
@@ -89,7 +92,7 @@ def _reported(group: tuple[str, ...], levelled: bool, repeating: bool, large: bo
         blank = [0.0] * (len(relation.witnesses) - len(level))
         stuck = tuple(repeating and rule.signal in group for rule in relation.rules)
         plausible = tuple(large or not rule.one_sided for rule in relation.rules)
-        known = [True] * len(level) + [False] * len(blank)
-        verdicts, _ = vote(arithmetic(()), relation, level + blank, [0.1] * len(known), known, stuck, plausible)
+        told = Told((*level, *blank), (0.1,) * len(relation.witnesses), (True,) * len(level) + (False,) * len(blank))
+        verdicts, _ = vote(arithmetic(()), relation, told, stuck, plausible)
         found += [rule.signal for rule, verdict in zip(relation.rules, verdicts, strict=True) if verdict.wrong]
     return tuple(found)

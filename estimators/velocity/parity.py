@@ -6,9 +6,9 @@
     speed   m/s                  each wheel; the estimate, which the other wheels and the inertial unit hold
     axles   m/s, V_y             the front axle condition, the rear one; the estimate
 
-Any two witnesses of a relation are a residual: it responds to a fault unless the same signals at fault are in both. Road and tires
-move witnesses, too, and no sensor is at fault then (`CONDITIONS`). What of all this can be told apart is derived from here by
-`isolability`. `speed` and `axles` are voted on by the gates of the two filters.
+Any two witnesses of a relation are a residual: it responds to a fault unless the same signals at fault are in both. Road and
+tires move witnesses, too, and no sensor is at fault then (`CONDITIONS`). What of all this can be told apart is derived from
+here by `isolability`. `speed` and `axles` are voted on by the gates of the two filters.
 """
 
 from __future__ import annotations

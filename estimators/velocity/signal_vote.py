@@ -1,19 +1,27 @@
 """Who is outvoted: witnesses of one number, which of them contradict which, and by whom a signal loses its weight.
 
 Two witnesses contradict each other where they are further apart than both allowances, and agree where they are not; a live
-reading is doubted only where they are further apart by the margin of a slide, too. **A signal is outvoted by a group of others that
-agree with each other while each of them contradicts it**, unless a backer agrees with it. A reading that repeats itself (frozen,
-zero, clipped at its limit) is outvoted by smaller groups, whoever backs it. The groups are data (`parity`).
+reading is doubted only where they are further apart by the margin of a slide, too. **A signal is outvoted by a group of
+others that agree with each other while each of them contradicts it**, unless a backer agrees with it. A reading that repeats
+itself (frozen, zero, clipped at its limit) is outvoted by smaller groups, whoever backs it. The groups are data (`parity`).
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from estimators.arithmetic import Arithmetic, Number, Signals
+from estimators.arithmetic import Arithmetic, Number
 from estimators.velocity.parity import Groups, Relation
 
 Pairs = dict[tuple[int, int], Number]
+
+
+class Told(NamedTuple):
+    """By the witnesses of a relation, in its order."""
+
+    level: tuple[Number, ...]
+    allowed: tuple[Number, ...]  # by which each may be off
+    known: tuple[Number, ...]  # who says anything
 
 
 class Verdict(NamedTuple):
@@ -27,19 +35,16 @@ class Verdict(NamedTuple):
 def vote(
     kit: Arithmetic,
     relation: Relation,
-    level: Signals,
-    allowed: Signals,
-    known: Signals,
+    told: Told,
     stuck: tuple[Number, ...],
     plausible: tuple[Number, ...],
 ) -> tuple[tuple[Verdict, ...], Pairs]:
     """One verdict for each rule of the relation, in their order; and which two witnesses agree.
 
-    `level` of the witnesses with their allowances; `known`: who says anything; of each rule `stuck`: its signal repeats itself,
-    `plausible`: its live reading may be doubted at all.
+    Of each rule `stuck`: its signal repeats itself, `plausible`: its live reading may be doubted at all.
     """
     no, never = kit.no, kit.full(False)
-    against, agree, beyond = _pairs(kit, relation, level, allowed, known)
+    against, agree, beyond = _pairs(kit, relation, told)
     wrong: list[Number] = []
     out: dict[int, Number] = {}  # witnesses for which a signal is already found: no fault of another, and no voters
 
@@ -60,7 +65,7 @@ def vote(
         for friend in rule.backers:
             backed = backed | agree[me, friend]
         found = outvoted(me, rule.live, True, rule.second) & open_ & no(backed)
-        found = known[me] & (found | (repeats & outvoted(me, rule.repeating, False)))
+        found = told.known[me] & (found | (repeats & outvoted(me, rule.repeating, False)))
         wrong.append(found)
         out[me] = out.get(me, never) | found
     verdicts = []
@@ -73,12 +78,10 @@ def vote(
     return tuple(verdicts), agree
 
 
-def _pairs(
-    kit: Arithmetic, relation: Relation, level: Signals, allowed: Signals, known: Signals
-) -> tuple[Pairs, Pairs, Pairs]:
+def _pairs(kit: Arithmetic, relation: Relation, told: Told) -> tuple[Pairs, Pairs, Pairs]:
     """Which two contradict each other, agree, and are further apart than a slide can bring them."""
+    (level, allowed, known), (floor, share) = told, relation.slide
     found: tuple[Pairs, Pairs, Pairs] = ({}, {}, {})
-    floor, share = relation.slide
     for i in range(len(relation.witnesses)):
         for k in range(i):
             both, gap = known[i] & known[k], abs(level[i] - level[k]) - allowed[i] - allowed[k]
