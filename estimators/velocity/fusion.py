@@ -128,7 +128,7 @@ class VelocityFusion(Memory):
         self._begin(seen)
         given = None if normalised_force is None else kit.wheels(normalised_force, shape, "normalised_force")
         judged = self.signal_monitor(dt, seen, given, self.inputs.slope, heavy)
-        (a, b, r), noise, used, doubt, taken, road, mu, blind, unknown, gated = judged
+        (a, b, r), noise, used, doubt, taken, road, mu, blind, unknown, steered, gated = judged
         turn, before = across.yaw_rate(r), along.speed
         along.predict(dt, a, noise[0], turn, across.speed, doubt[0] > 0.0)
         across.predict(dt, b, noise[1], r, noise[2], before, used[1] & used[2])
@@ -151,11 +151,12 @@ class VelocityFusion(Memory):
         # wheels that slide sideways do not turn, and have no slip angle; no road is so slippery that the car feels nothing
         calm, silent = across.friction(b) < self.settings.unloaded, seen.silent
         front_rolls, rear_rolls = (calm | kit.no(silent[i] & silent[i + 1]) for i in (0, 2))
-        usable = kit.stacked((told & seen.steered & front_rolls & kit.no(front), told & rear_rolls & kit.no(rear)))
+        rolling = (told & seen.steered & front_rolls & kit.no(front), told & rear_rolls & kit.no(rear))
+        usable = kit.stacked((rolling[0] & steered, rolling[1]))
         fl, fr, rl, rr = seen.steer
         angles = kit.stacked((0.5 * (fl + fr), 0.5 * (rl + rr)))
         axle = across.correct(dt, felt, r, yaw_acceleration, angles, along.speed, a + road[0], usable, doubt[1])
-        gated = gated | self.signal_monitor.learn(dt, seen, wheel.innovation, axle, usable)
+        self.signal_monitor.learn(dt, seen, wheel.innovation, along.speed, axle, rolling)
         restarted = self.lateral_reset(dt, along.speed, axle, usable)
         across.blind(dt, unknown)
         across.zero_velocity_update(standing, r)

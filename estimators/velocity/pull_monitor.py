@@ -22,7 +22,6 @@ from estimators.velocity.judge import Judge
 from estimators.velocity.longitudinal_fusion import BIAS, GRADE, SCALE, SLIP, SPEED, LongitudinalFusion
 from estimators.velocity.parity import PULL
 from estimators.velocity.signal_vote import Told, vote
-from estimators.velocity.turn_monitor import SHARE
 
 _FAR = 1e9  # m/s
 LARGEST_ACCELERATION = limits.FRICTION * GRAVITY  # m/s^2 of a car on its tires
@@ -90,7 +89,7 @@ class PullMonitor(Judge):
 
         told = Told(
             (choose(known, gap, unit), self._zero, apart),
-            (SHARE * abs(unit), t_f, kit.maximum(0.5 * abs(gap), s.rolling)),
+            (self._zero, t_f, kit.maximum(0.5 * abs(gap), s.rolling)),
             (seen.good[0], known, near),
         )
         (verdict,), _ = vote(kit, PULL, told, (no(seen.alive),), (self._always,))

@@ -20,8 +20,9 @@ that has lost its gain looks the same.
 **Attitude.** A levelled a_y that the turn contradicts while the one that is not levelled agrees: roll is wrong, and nothing is
 levelled. The contrary is a banked road, and no fault.
 
-**Steering.** The front axle condition predicts it from V_y, yaw rate and side force; while the rear axle's holds, its gate is
-a flag.
+**Steering.** What the two axle conditions say of V_y differs by V_x delta - L r - |V_x| (alpha_f - alpha_r), whatever V_y is. Where
+that, low-passed, is more than the model explains and the front axle is the further one from the estimate, its condition is not
+used: a wrong steering angle looks like front tires beyond their grip.
 
 **Wheels.** The gate of `longitudinal_fusion`: each innovation is a wheel against the estimate, that the others hold.
 """
@@ -34,7 +35,7 @@ from estimators.arithmetic import Number, Signals, arithmetic
 from estimators.memory import CarsMemory
 from estimators.vehicle import VehicleParameters
 from estimators.velocity.fusion_inputs import ConditionedInputs
-from estimators.velocity.lateral_fusion import AxleUpdate, LateralFusion
+from estimators.velocity.lateral_fusion import TIRES, AxleUpdate, LateralFusion
 from estimators.velocity.longitudinal_fusion import LongitudinalFusion
 from estimators.velocity.pull_monitor import PullMonitor
 from estimators.velocity.turn_monitor import TurnMonitor
@@ -52,22 +53,24 @@ class Judged(NamedTuple):
     mu: Signals  # F_x/F_z of the wheels, of a size that a tire can have; shares of a_x where unknown
     blind: Number  # whether neither a_x nor the forces tell
     unknown: Number  # whether nothing tells the yaw rate
+    steered: Number  # whether the steering is believed
     gated: Number  # whether a signal is there, and is not believed
 
 
 class SignalMonitor(CarsMemory):
     """Judges the signals of `count` cars."""
 
-    memory = ("astray", "mu")
+    memory = ("astray", "remaining", "mu")
     parts = ("pull", "turn")
 
     def __init__(
         self, vehicle: VehicleParameters, along: LongitudinalFusion, across: LateralFusion, count: int
     ) -> None:
-        self.settings, self.kit = along.settings, arithmetic((count,))
+        self.settings, self.kit, self.across = along.settings, arithmetic((count,)), across
         self.pull, self.turn = PullMonitor(vehicle, along, count), TurnMonitor(vehicle, along, across, count)
         self._zero = self.kit.full(0.0)
-        self.astray: Number = self._zero  # s for which the steering has been off
+        self.astray: Number = self._zero  # m/s, front less rear axle innovation, low-passed
+        self.remaining: Number = self._zero  # s for which the steering is not believed
         self.mu: Signals = self.kit.stacked([self._zero] * 4)  # F_x/F_z of the wheels at the last sample
 
     def __call__(
@@ -81,7 +84,7 @@ class SignalMonitor(CarsMemory):
         turn = self.turn(elapsed, seen, self.mu, known)
         ahead, road = (self._zero, self._zero) if gravity is None else (gravity[0], gravity[2])
         pull = self.pull(elapsed, seen, given, slope, road)
-        self.mu = pull.mu
+        self.mu, steered = pull.mu, self.remaining == 0.0
         return Judged(
             reading=(pull.reading, *turn.reading),
             noise=(pull.noise, *turn.noise),
@@ -92,17 +95,32 @@ class SignalMonitor(CarsMemory):
             mu=pull.mu,
             blind=pull.blind,
             unknown=turn.unknown,
-            gated=pull.gated | turn.gated,
+            steered=steered,
+            gated=pull.gated | turn.gated | self.kit.no(steered),
         )
 
     def learn(
-        self, elapsed: Number, seen: ConditionedInputs, innovation: Signals, axle: AxleUpdate, usable: Signals
-    ) -> Number:
-        """What the corrections say of a_x (`innovation` of the wheels, m/s) and of the steering; whether that is off."""
+        self,
+        elapsed: Number,
+        seen: ConditionedInputs,
+        innovation: Signals,
+        speed: Number,
+        axle: AxleUpdate,
+        usable: Signals,
+    ) -> None:
+        """What the corrections say of a_x (`innovation` of the wheels, m/s) and of the steering; `speed` V_x."""
+        s, kit, P = self.settings, self.kit, self.across.filter.variance
         self.pull.learn(seen, innovation, self.mu)
-        off = usable[0] & self.kit.no(axle.used[0]) & axle.used[1]
-        self.astray = self.kit.where(off, self.astray + elapsed, 0.0)
-        return self.astray > self.settings.wheel_lag
+        (front, rear), (mu, nu) = axle.innovation, axle.friction
+        kept, magnitude = kit.exp(-elapsed / s.wheel_lag), abs(speed)
+        apart = kit.where(usable[0] & usable[1], front - rear, 0.0)
+        self.astray = kept * self.astray + (1.0 - kept) * apart
+        tires = P(TIRES) * mu * mu + P(TIRES + 2) * nu * nu - 2.0 * P(TIRES, TIRES + 2) * mu * nu
+        share = s.side_floor + s.side_linear * s.side_compliance * kit.maximum(abs(mu), abs(nu))
+        white = s.steering_noise * s.steering_noise * (1.0 - kept) / (1.0 + kept)
+        model = magnitude * magnitude * (tires + 2.0 * share * share + white) + 2.0 * s.slip_speed**2
+        off = (self.astray * self.astray > s.gate**2 * model) & (abs(front) > abs(rear))
+        self.remaining = kit.where(off, s.error_memory, kit.maximum(self.remaining - elapsed, 0.0))
 
     def forget(self, where: Number) -> None:
         """Starts the cars `where` afresh."""

@@ -97,9 +97,8 @@ class TurnMonitor(Judge):
         self.since = kit.stacked(self._nothing)
         self.sloped = kit.maximum(self.sloped - elapsed, 0.0)
         used = known[SIDE], known[YAW_RATE]
-        return Turning(
-            (b, r), (seen.noise[1], seen.noise[2]), used, self._nothing[0], self._never, *off, kit.no(used[0] & used[1])
-        )
+        gated, noises = kit.no(used[0] & used[1]), (seen.noise[1], seen.noise[2])
+        return Turning((b, r), noises, used, self._nothing[0], self._never, *off, gated)
 
     def _outvoted(
         self, elapsed: Number, seen: ConditionedInputs, told: Told, sway: Number, gravity: tuple[Number, Number]
@@ -109,13 +108,8 @@ class TurnMonitor(Judge):
         _, stuck_y, stuck_r = ((run - 1.0) * elapsed > s.slowest_unit for run in seen.run)
         # a car that slides is turned further than its side force carries it, never less
         excess = (level[SIDE] * level[STEERING] < 0.0) | (abs(level[SIDE]) > abs(level[STEERING]))
-        verdicts, agree = vote(
-            kit,
-            TURN,
-            told,
-            (stuck_r, never, stuck_y),
-            tuple(excess if rule.one_sided else self._always for rule in TURN.rules),
-        )
+        plausible = tuple(excess if rule.one_sided else self._always for rule in TURN.rules)
+        verdicts, agree = vote(kit, TURN, told, (stuck_r, never, stuck_y), plausible)
         yaw, roll, side = verdicts
         gap = level[YAW_RATE] - level[SIDE]
         steady = abs(sway) < 0.5 * abs(gap)
@@ -235,9 +229,8 @@ class TurnMonitor(Judge):
         noise_y = choose(used_y, seen.noise[1], doubt_y * grown_y)
         self._differentiate(yaw_rate, switched, elapsed)
         doubt_y = choose(used_y, 0.0, doubt_y)
-        return Turning(
-            (ay, yaw_rate), (noise_y, noise_r), (used_y, used_r), doubt_y, unknown, *self._nothing, no(used_y & used_r)
-        )
+        readings, noises, used = (ay, yaw_rate), (noise_y, noise_r), (used_y, used_r)
+        return Turning(readings, noises, used, doubt_y, unknown, *self._nothing, no(used_y & used_r))
 
     def _differentiate(self, yaw_rate: Number, switched: Number, elapsed: Number) -> None:
         """First-order filter of the slope; where the yaw rate comes from another source than before, that is no slope."""
