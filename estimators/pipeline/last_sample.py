@@ -29,7 +29,7 @@ class LastSample(Memory):
     A reading that the velocity part replaced is replaced everywhere: loads, forces and attitude take its word.
     """
 
-    memory = ("bias", "speed", "used", "inertial", "gravity", "drive", "heavy")
+    memory = ("bias", "speed", "used", "inertial", "gravity", "drive", "heavy", "road")
     unknowns = ("drive",)
 
     def __init__(self, sample_time: float, batch_shape: tuple[int, ...]) -> None:
@@ -41,6 +41,7 @@ class LastSample(Memory):
         self.inertial: list[Number] = [kit.full(0.0)] * 3  # and what they were taken for
         self.gravity: Number = kit.full(0.0)  # in a_x, m/s^2, of what grade the attitude leaves
         self.heavy: Number = kit.full(0.0)  # in a_x, m/s^2, as the attitude says
+        self.road: Number = kit.full(0.0)  # of this, what grade makes
         self.drive: Number = kit.full(math.nan)  # V_x' - r V_y without gravity, m/s^2, where anything tells
 
     def believed(self, *readings: Number) -> list[Number]:
@@ -60,17 +61,18 @@ class LastSample(Memory):
         if (used := getattr(moved, "inertial_used", None)) is not None:
             self.used, self.inertial = kit.rows(used, 3), kit.rows(moved.inertial, 3)
             self.gravity = kit.own(moved.gravity[..., 0])
-        # without torques what the wheels hold V_x to: slower, but no more in a loop with gravity than they are
+        # Without torques, or on a slope, which the forces carry, what the wheels hold V_x to: slower, but no more in a loop with
+        # gravity than they are.
         started = ((kit.own(moved.flags) & int(Flag.RESET)) != 0) | kit.own(moved.standing)
         gained = kit.where(started, math.nan, (vx - before) / self.sample_time - turn * vy)
-        self.drive = kit.where(lost, gained, force)
+        self.drive = kit.where(lost | (abs(self.road) > GRAVITY * _LOADED), gained, force)
 
     def forget(self, here: Number) -> None:
         """Starts the cars `here` afresh."""
         choose = self._kit.where
         for name, start in (("bias", 0.0), ("speed", 0.0), ("used", True)):
             setattr(self, name, [choose(here, start, value) for value in getattr(self, name)])
-        self.gravity, self.heavy = choose(here, 0.0, self.gravity), choose(here, 0.0, self.heavy)
+        self.gravity, self.heavy, self.road = (choose(here, 0.0, v) for v in (self.gravity, self.heavy, self.road))
         self.drive = choose(here, math.nan, self.drive)
 
     def pull(self, ax: Number) -> Number:
@@ -110,7 +112,7 @@ class LastSample(Memory):
             body.append(own_tilt(kit, kit.own(angle), kit.where(abs(felt) < math.inf, felt, 0.0), softest))
             heavy.append(GRAVITY * kit.sin(kit.own(total)))
             road.append(heavy[-1] - GRAVITY * kit.sin(body[-1]))
-        self.heavy = heavy[0]
+        self.heavy, self.road = heavy[0], road[0]
         return Tilt(tilt, body[0], body[1], up, kit.table(((*heavy, *road),), shape))
 
 

@@ -20,9 +20,9 @@ that has lost its gain looks the same.
 **Attitude.** A levelled a_y that the turn contradicts while the one that is not levelled agrees: roll is wrong, and nothing is
 levelled. The contrary is a banked road, and no fault.
 
-**Steering.** What the two axle conditions say of V_y differs by V_x delta - L r - |V_x| (alpha_f - alpha_r), whatever V_y is. Where
-that, low-passed, is more than the model explains and the front axle is the further one from the estimate, its condition is not
-used: a wrong steering angle looks like front tires beyond their grip.
+**Steering.** What the two axle conditions say of V_y differs by V_x delta - L r - |V_x| (alpha_f - alpha_r), whatever V_y is.
+Where that, low-passed, is more than the model explains and the front axle is the further one from the estimate, its condition
+is not used: a wrong steering angle looks like front tires beyond their grip.
 
 **Wheels.** The gate of `longitudinal_fusion`: each innovation is a wheel against the estimate, that the others hold.
 """

@@ -1,10 +1,11 @@
 """a_y, yaw rate and roll: the witnesses of `turn` (`parity`), and what replaces a signal that they outvote.
 
-    yaw rate      V_x r                                                       bias and scale error, as far as they are known
-    a_y           a_y - b - g_bank - V_y',  V_y' = r' (L_r - V_x^2 c_1/g)     bias, bank, and V_y' itself
-    front wheels  V_x (v_fr - v_fl)/(t_f cos delta)                           slips that differ, radii as far as they are known
-    rear wheels   V_x (v_rr - v_rl)/t_r                                       likewise
-    steering      V_x^2 tan(delta)/L                                          half of itself: the tires slip
+    yaw rate      V_x r                                            bias and scale error, as far as they are known
+    a_y           a_y - b - g_bank - V_y'                          bias, bank, and V_y' itself,
+                  V_y' = r' L_r - (V_x r + g_bank)' V_x c_1/g      that the forces make
+    front wheels  V_x (v_fr - v_fl)/(t_f cos delta)                slips that differ, radii as far as they are known
+    rear wheels   V_x (v_rr - v_rl)/t_r                            likewise
+    steering      V_x^2 tan(delta)/L                               half of itself: the tires slip
 
 in m/s^2, each with an allowance for its error, all low-passed alike (`wheel_lag`).
 """
@@ -50,8 +51,8 @@ class Turning(NamedTuple):
 class TurnMonitor(Judge):
     """Remembers the witnesses, and for how long who is not believed."""
 
-    memory = ("level", "remaining", "since", "sloped", "yaw_rate", "yaw_acceleration")
-    unknowns = ("yaw_rate",)
+    memory = ("level", "remaining", "since", "sloped", "yaw_rate", "yaw_acceleration", "lean", "leaning")
+    unknowns = ("yaw_rate", "lean")
 
     def __init__(
         self, vehicle: VehicleParameters, along: LongitudinalFusion, across: LateralFusion, count: int
@@ -68,6 +69,10 @@ class TurnMonitor(Judge):
         self.sloped: Number = zero  # s for which a_y has been off as on a bank
         self.yaw_rate: Number = kit.full(math.nan)  # the last one that was used, rad/s
         self.yaw_acceleration: Number = zero  # filtered, rad/s^2
+        self.lean: Number = kit.full(
+            math.nan
+        )  # m/s^2 of gravity across the road at the last sample, where attitude is known
+        self.leaning: Number = zero  # its filtered derivative, m/s^3
 
     def __call__(
         self, elapsed: Number, seen: ConditionedInputs, mu: Signals, gravity: tuple[Number, Number] | None
@@ -75,9 +80,12 @@ class TurnMonitor(Judge):
         """One sample; `mu` F_x/F_z of the wheels, `gravity` as in `Turning`, which has been taken off a_y."""
         s, kit = self.settings, self.kit
         _, b, r = seen.inertial
-        off = self._nothing if gravity is None else gravity
+        kept, off = kit.exp(-elapsed / s.wheel_lag), self._nothing
+        if gravity is not None:
+            off = gravity
+            change = kit.where(abs(self.lean) < math.inf, off[1] - self.lean, 0.0)
+            self.lean, self.leaning = off[1], kept * self.leaning + (1.0 - kept) * change / elapsed
         now, surface = self._say(seen, None if gravity is None else off[0])
-        kept = kit.exp(-elapsed / s.wheel_lag)
         self.level = kit.stacked([kept * old + (1.0 - kept) * new for old, new in zip(self.level, now, strict=True)])
         *level, sway = self.level
         told = self._judged(seen, level, sway, surface, mu, self._never if gravity is None else self._always)
@@ -145,7 +153,8 @@ class TurnMonitor(Judge):
             R * w * (1.0 + rho) for R, w, rho in zip(along.radius, seen.wheel_speed, x[RADIUS:], strict=True)
         )
         square = speed * speed
-        sway = self.yaw_acceleration * (self._arm - square * y[TIRES + 2] / GRAVITY)
+        sway = self.yaw_acceleration * self._arm
+        sway = sway - speed * y[TIRES + 2] / GRAVITY * (speed * self.yaw_acceleration + self.leaning)
         own = b * (1.0 - y[SCALE]) - y[BIAS] - sway
         front, rear = self._tracks
         levelled = own - y[BANK]
