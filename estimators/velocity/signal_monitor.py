@@ -1,7 +1,7 @@
 """The signal monitor: every signal is predicted from the others with its uncertainty, loses its weight, and comes back.
 
-Which witnesses tell the same number is in `parity`, what they say and by how much each may be off in `witnesses`, and who is
-outvoted in `signal_vote`. Of all signals alike:
+Which witnesses tell the same number is in `parity`, what they say and by how much each may be off in `turn_monitor` and
+`pull_monitor`, and who is outvoted in `signal_vote`. Of all signals alike:
 
     found      outvoted by others that agree; one that repeats itself (frozen, zero, clipped at its limit) by fewer
     replaced   by what the others say that it should read, with their allowance as its noise: an error that stays counts
@@ -14,7 +14,7 @@ slip against their force disprove it without any torque, for `lost_time`. Where 
 do, by +-`unseen_acceleration`.
 
 **a_y, yaw rate.** Until it was found V_y followed it: its variance grows by that. A car that follows its steering while a_y,
-alive, contradicts it for `_PATIENCE` is on a banked road: the variance of the bank grows, and a_y is believed again. An a_y
+alive, contradicts it for 0.5 s is on a banked road: the variance of the bank grows, and a_y is believed again. An a_y
 that has lost its gain looks the same.
 
 **Attitude.** A levelled a_y that the turn contradicts while the one that is not levelled agrees: roll is wrong, and nothing is
@@ -25,6 +25,22 @@ Where that, low-passed, is more than the model explains and the front axle is th
 is not used: a wrong steering angle looks like front tires beyond their grip.
 
 **Wheels.** The gate of `longitudinal_fusion`: each innovation is a wheel against the estimate, that the others hold.
+
+**What can be told apart**, derived from the relations by `isolability`; two faults at once, and what is reported where they
+cannot be told apart, are in the guide (Why: Faults of sensors):
+
+| at fault | looks like | reported, live | reported, repeating |
+|---|---|---|---|
+| yaw_rate | - | yaw_rate | yaw_rate |
+| ay | slide | ay (unless too small) | ay |
+| roll | - | roll | roll |
+| wheel fl | - | wheel fl | wheel fl |
+| wheel fr | - | wheel fr | wheel fr |
+| wheel rl | - | wheel rl | wheel rl |
+| wheel rr | - | wheel rr | wheel rr |
+| steer | front grip | steer | steer |
+| ax | - | ax | ax |
+| torque | - | - | - |
 """
 
 from __future__ import annotations

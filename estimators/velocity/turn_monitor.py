@@ -29,7 +29,7 @@ _FOLLOW = 0.5  # share of itself: the same, and the lag of the car behind its st
 _TOE = 0.02  # 1/m: 3.5 deg of steering over a wheelbase, all that is left of it at walking pace
 _UNDULATION = 0.5  # m/s^2 of side wind, ruts and body roll in a_y
 _UNLIKE = 0.001  # slip of a free-rolling wheel that the other one of its axle does not share
-SHARE = 0.03  # relative: scale errors of the inertial unit and of V_x
+_SHARE = 0.03  # relative: scale errors of the inertial unit and of V_x
 _PATIENCE = 0.5  # s for which a car that follows its steering contradicts its a_y before the road is taken for banked
 _BANK = 0.3  # rad: banked curves of test tracks are up to 0.5
 _AY, _R, _ROLL = range(3)
@@ -176,8 +176,8 @@ class TurnMonitor(Judge):
         s, kit, speed = self.settings, self.kit, self.along.speed
         P, Q, gate = self.across.filter.variance, self.along.filter.variance, s.gate
         magnitude, largest = abs(speed), kit.maximum
-        t_g = magnitude * gate * kit.sqrt(P(YAW_BIAS) + s.yaw_rate_noise**2) + SHARE * abs(level[YAW_RATE])
-        t_p = gate * kit.sqrt(P(BIAS) + P(BANK)) + _UNDULATION + SHARE * abs(level[SIDE]) + abs(sway)
+        t_g = magnitude * gate * kit.sqrt(P(YAW_BIAS) + s.yaw_rate_noise**2) + _SHARE * abs(level[YAW_RATE])
+        t_p = gate * kit.sqrt(P(BIAS) + P(BANK)) + _UNDULATION + _SHARE * abs(level[SIDE]) + abs(sway)
         allowed, known = [t_g, t_p], [seen.good[2], seen.good[1]]
         for axle, track in enumerate(self._tracks):
             i, k = 2 * axle, 2 * axle + 1

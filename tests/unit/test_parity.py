@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimators.velocity import VelocityFusion
+from estimators.velocity import VelocityFusion, signal_monitor
 from estimators.velocity.fusion_inputs import ConditionedInputs
 from estimators.velocity.isolability import SIGNALS, Residual, isolability, signature, table
 from estimators.velocity.parity import PULL, TURN, Rule
@@ -110,6 +110,10 @@ def test_a_wheel_at_fault_is_gated_alone() -> None:
                 wheels[list(bad)] += 5.0
             step = fusion.step(wheels, 0.0, 0.05 * rng.normal(), 0.05 * rng.normal(), 0.002 * rng.normal())
         assert sorted(np.flatnonzero(step.gated | step.high_slip)) == list(bad)
+
+
+def test_the_monitor_says_this_table() -> None:
+    assert table() in (signal_monitor.__doc__ or "")
 
 
 @pytest.mark.skipif(not GUIDE.is_file(), reason="the guide is not beside the tests")
