@@ -128,7 +128,7 @@ class VelocityFusion(Memory):
         self._begin(seen)
         given = None if normalised_force is None else kit.wheels(normalised_force, shape, "normalised_force")
         judged = self.signal_monitor(dt, seen, given, self.inputs.slope, heavy)
-        (a, b, r), noise, used, doubt, taken, road, mu, blind, unknown, steered, gated = judged
+        (a, b, r), noise, used, doubt, taken, road, mu, blind, unknown, steered, gated, contested = judged
         turn, before = across.yaw_rate(r), along.speed
         along.predict(dt, a, noise[0], turn, across.speed, doubt[0] > 0.0)
         across.predict(dt, b, noise[1], r, noise[2], before, used[1] & used[2])
@@ -167,7 +167,7 @@ class VelocityFusion(Memory):
         outcome = Outcome(slipping, wheel, axle, standing, self.zero_velocity.stopped(seen.silent), self._hidden())
         geometry = (sine, course[0], *self._places)
         inertial = (a + taken[0], b + taken[1], r)
-        return fusion_step(kit, shape, along, across, seen, geometry, outcome, flags, inertial, used)
+        return fusion_step(kit, shape, along, across, seen, geometry, outcome, flags, inertial, (*used, contested))
 
     def reset(self, where: npt.ArrayLike | None = None, vx: npt.ArrayLike = np.nan, vy: npt.ArrayLike = 0.0) -> None:
         """Forgets the entries `where` (mask of the batch shape; None: all) and starts them at `vx`, `vy`, m/s.

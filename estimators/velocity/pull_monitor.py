@@ -37,6 +37,7 @@ class Pull(NamedTuple):
     mu: Signals
     blind: Number
     gated: Number
+    contested: Number  # whether it and the forces contradict each other by half of what they may
 
 
 class PullMonitor(Judge):
@@ -71,10 +72,11 @@ class PullMonitor(Judge):
         unit = self._unit(reading + road)
         kept = kit.exp(-elapsed / s.force_gap_memory)
         self.gap = gap = choose(known & seen.alive, kept * self.gap + (1.0 - kept) * (unit - force), 0.0)
-        doubtful = no(seen.alive) | (abs(gap) > 0.5 * t_f) | (before > 0.0)
+        contested = abs(gap) > 0.5 * t_f
+        doubtful = no(seen.alive) | contested | (before > 0.0)
         if not kit.some(doubtful):
             self.since = self._zero
-            return Pull(reading, noise, seen.good[0], self._zero, mu, self._never, self._never)
+            return Pull(reading, noise, seen.good[0], self._zero, mu, self._never, self._never, self._never)
 
         believed = seen.alive & (before == 0.0)
         blind, base = no(believed | known), choose(believed | known, force, 0.0)
@@ -97,7 +99,7 @@ class PullMonitor(Judge):
         self.remaining = left
         used = seen.alive & (left == 0.0)
         with_force = no(used) & known
-        pending = used & (abs(gap) > 0.5 * t_f) & (abs(apart) < abs(apart - gap))
+        pending = used & contested & (abs(apart) < abs(apart - gap))
         explained = force * kit.sign(apart) > GRAVITY * s.unloaded  # wheels slip to the side of their force
         leaves = choose(explained, 0.0, kit.minimum(kit.maximum(abs(apart) - t_f, 0.0), s.unseen_acceleration))
         # forces that were corrected with a_x have a part of its error
@@ -111,7 +113,8 @@ class PullMonitor(Judge):
         grown = kit.maximum(doubt * self.grown(age, elapsed), choose(seen.alive, noise, 0.0))
         gated = seen.good[0] & no(used) & (seen.alive | verdict.contradicted)
         # one that repeats what the others say is no fault
-        return Pull(reading, choose(doubt > 0.0, grown, noise), seen.good[0] & no(gated), doubt, mu, blind, gated)
+        reported = seen.good[0] & no(gated)
+        return Pull(reading, choose(doubt > 0.0, grown, noise), reported, doubt, mu, blind, gated, contested)
 
     def learn(self, seen: ConditionedInputs, innovation: Signals, mu: Signals) -> None:
         """Do all wheels that turn, three at least, slip against their force? No tire does: a_x has led the estimate astray.

@@ -71,6 +71,7 @@ class Judged(NamedTuple):
     unknown: Number  # whether nothing tells the yaw rate
     steered: Number  # whether the steering is believed
     gated: Number  # whether a signal is there, and is not believed
+    contested: Number  # whether a_x and the forces contradict each other by half of what they may
 
 
 class SignalMonitor(CarsMemory):
@@ -113,6 +114,7 @@ class SignalMonitor(CarsMemory):
             unknown=turn.unknown,
             steered=steered,
             gated=pull.gated | turn.gated | self.kit.no(steered),
+            contested=pull.contested,
         )
 
     def learn(
