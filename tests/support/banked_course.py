@@ -31,14 +31,15 @@ class Banked(NamedTuple):
     pitch: FloatArray
 
 
-def banked(cases: FloatArray, seconds: float = 7.0, spin: float = 0.0) -> Banked:
-    """`cases` (cars, 4): speed m/s, bank degrees (left side up), turn rad/s about the vertical, grade degrees (nose up).
+def banked(cases: FloatArray, seconds: float = 5.0) -> Banked:
+    """`cases` (cars, 5): speed m/s, bank degrees (left side up), turn rad/s about the vertical, grade degrees (nose up), and
+    the bias of the gyros for roll and pitch, rad/s.
 
-    From 2 s on, within one; at constant speed, torques as it takes. Gyros for roll and pitch with the bias `spin`, rad/s.
+    From 1.5 s on, within one; at constant speed, torques as it takes.
     """
-    v, bank, turn, grade = cases.T
+    v, bank, turn, grade, spin = cases.T
     time = TIME * np.arange(round(seconds / TIME))
-    rise = np.clip(time - 2.0, 0.0, 1.0)[:, None]
+    rise = np.clip(time - 1.5, 0.0, 1.0)[:, None]
     rise = rise * rise * (3.0 - 2.0 * rise)
     roll, pitch = (np.radians(angle) * rise for angle in (bank, grade))
     heading = TIME * np.cumsum(turn * rise, axis=0)
