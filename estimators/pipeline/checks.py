@@ -59,6 +59,7 @@ class CrossChecks(Memory):
         self.gaps: list[Number] = [self._kit.full(0.0)] * 3
         self._quick = 1.0 - math.exp(-sample_time / HEAVE[1])
         self.heave: Number = self._kit.full(0.0)  # a_z/g - 1, low-passed
+        self._never = self._kit.full(False)
         self.alone: Number = self._kit.full(0.0)  # samples since a wheel last supported V_x
 
     def __call__(
@@ -94,8 +95,9 @@ class CrossChecks(Memory):
         wheels = kit.rows(moved.used, 4)
         supported = wheels[0] | wheels[1] | wheels[2] | wheels[3] | own(moved.standing)
         self.alone = choose(supported, 0.0, kit.minimum(self.alone + 1.0, self._patience + 1.0))
+        contested = getattr(moved, "force_contested", None)  # sooner, where the velocity part watches it
         found = (
-            abs(gaps[0]) > BALANCE,
+            (abs(gaps[0]) > BALANCE) | (self._never if contested is None else own(contested)),
             abs(gaps[1]) > BALANCE,
             (abs(load_gap) > LOAD) | (abs(self.heave) > HEAVE[0]),
             abs(gaps[2]) > VELOCITY[0] + VELOCITY[1] * abs(speed),

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy.typing as npt
 
 from estimators.arguments import entries
 from estimators.arithmetic import Arithmetic, Number, arithmetic
+from estimators.arrays import FloatArray
 from estimators.faults import Flag
-from estimators.forces import AttitudeStep, levelled, without_gravity
+from estimators.forces import AttitudeStep, levelled
 from estimators.memory import Memory
 from estimators.pipeline.parts import AttitudePart
 from estimators.pipeline.signals import VehicleSignals
 from estimators.signals import limits
 from estimators.vehicle import GRAVITY
+
+SOFTEST = (0.07, 0.12)
+"""rad per g: how far the softest body pitches and rolls, 4 and 7 degrees."""
+_LOADED = 0.02  # rad: passengers and load on one side
 
 
 class LastSample(Memory):
@@ -24,8 +29,8 @@ class LastSample(Memory):
     A reading that the velocity part replaced is replaced everywhere: loads, forces and attitude take its word.
     """
 
-    memory = ("bias", "speed", "used", "inertial", "gravity", "drive", "read", "free")
-    unknowns = ("drive", "read", "free")
+    memory = ("bias", "speed", "used", "inertial", "gravity", "drive", "heavy", "road")
+    unknowns = ("drive",)
 
     def __init__(self, sample_time: float, batch_shape: tuple[int, ...]) -> None:
         self.sample_time, self.batch_shape = sample_time, batch_shape
@@ -34,10 +39,10 @@ class LastSample(Memory):
         self.speed: list[Number] = [kit.full(0.0)] * 3  # V_x, V_y, r
         self.used: list[Number] = [kit.full(True)] * 3  # whether a_x, a_y, r were believed
         self.inertial: list[Number] = [kit.full(0.0)] * 3  # and what they were taken for
-        self.gravity: Number = kit.full(0.0)  # in a_x, m/s^2
+        self.gravity: Number = kit.full(0.0)  # in a_x, m/s^2, of what grade the attitude leaves
+        self.heavy: Number = kit.full(0.0)  # in a_x, m/s^2, as the attitude says
+        self.road: Number = kit.full(0.0)  # of this, what grade makes
         self.drive: Number = kit.full(math.nan)  # V_x' - r V_y without gravity, m/s^2, where anything tells
-        self.read: list[Number] = [kit.full(math.nan)] * 2  # a_x, a_y as they came
-        self.free: list[Number] = [kit.full(math.nan)] * 2  # and without gravity
 
     def believed(self, *readings: Number) -> list[Number]:
         """Of a_x, a_y and r, as many as are given: what was not believed, replaced; what is missing stays so."""
@@ -56,28 +61,30 @@ class LastSample(Memory):
         if (used := getattr(moved, "inertial_used", None)) is not None:
             self.used, self.inertial = kit.rows(used, 3), kit.rows(moved.inertial, 3)
             self.gravity = kit.own(moved.gravity[..., 0])
-        # without torques what the wheels hold V_x to: slower, but no more in a loop with gravity than they are
+        # Without torques, or on a slope, which the forces carry, what the wheels hold V_x to: slower, but no more in a loop with
+        # gravity than they are.
         started = ((kit.own(moved.flags) & int(Flag.RESET)) != 0) | kit.own(moved.standing)
         gained = kit.where(started, math.nan, (vx - before) / self.sample_time - turn * vy)
-        self.drive = kit.where(lost, gained, force)
+        self.drive = kit.where(lost | (abs(self.road) > GRAVITY * _LOADED), gained, force)
 
     def forget(self, here: Number) -> None:
         """Starts the cars `here` afresh."""
         choose = self._kit.where
-        for name, start in (("bias", 0.0), ("speed", 0.0), ("used", True), ("read", math.nan), ("free", math.nan)):
+        for name, start in (("bias", 0.0), ("speed", 0.0), ("used", True)):
             setattr(self, name, [choose(here, start, value) for value in getattr(self, name)])
-        self.gravity, self.drive = choose(here, 0.0, self.gravity), choose(here, math.nan, self.drive)
+        self.gravity, self.heavy, self.road = (choose(here, 0.0, v) for v in (self.gravity, self.heavy, self.road))
+        self.drive = choose(here, math.nan, self.drive)
 
     def pull(self, ax: Number) -> Number:
-        """What a_x said last that V_x gains, m/s^2; `ax` the present reading, where nothing was levelled."""
-        return self._kit.where(abs(self.free[0]) < math.inf, self.free[0], ax) - self.bias[0] - self.gravity
+        """What `ax` says that V_x gains, m/s^2."""
+        return ax - self.heavy - self.bias[0] - self.gravity
 
     def tilted(
         self, attitude: AttitudePart | None, signals: VehicleSignals, ax: Number, ay: Number, turn: Number
-    ) -> tuple[AttitudeStep | None, Number, Number, Number, Number]:
-        """The attitude step, a_x and a_y level with the road (forces), and without gravity (velocities), m/s^2."""
+    ) -> Tilt | None:
+        """What the attitude part says, if there is one."""
         if attitude is None:
-            return None, ax, ay, ax, ay
+            return None
         shape, kit = self.batch_shape, self._kit
 
         def read(given: npt.ArrayLike | None, name: str, limit: float) -> Number:
@@ -97,13 +104,43 @@ class LastSample(Memory):
         )
         up = read(signals.az, "az", limits.ACCELERATION)
         up = kit.where(abs(up) < math.inf, up, GRAVITY)
-        own_x, own_y, _ = levelled(ax, ay, up, tilt.pitch, tilt.roll)
-        moved = (kit.own(value) for value in without_gravity(ax, ay, tilt.total_roll, tilt.total_pitch))
-        # a reading that repeats itself is the old one, and so is what is left of it: else a frozen sensor would seem alive
-        pairs = zip((ax, ay), self.read, moved, self.free, strict=True)
-        self.free = [kit.where(new == old, last, value) for new, old, value, last in pairs]
-        self.read = [ax, ay]
-        return tilt, kit.own(own_x), kit.own(own_y), *self.free
+        heavy: list[Number] = []
+        road: list[Number] = []
+        body: list[Number] = []
+        angles = (tilt.pitch, tilt.total_pitch, ax, SOFTEST[0]), (tilt.roll, tilt.total_roll, ay, SOFTEST[1])
+        for angle, total, felt, softest in angles:
+            body.append(own_tilt(kit, kit.own(angle), kit.where(abs(felt) < math.inf, felt, 0.0), softest))
+            heavy.append(GRAVITY * kit.sin(kit.own(total)))
+            road.append(heavy[-1] - GRAVITY * kit.sin(body[-1]))
+        self.heavy, self.road = heavy[0], road[0]
+        return Tilt(tilt, body[0], body[1], up, kit.table(((*heavy, *road),), shape))
+
+
+class Tilt(NamedTuple):
+    """What an attitude part says."""
+
+    step: AttitudeStep
+    pitch: Number  # rad, of the body against the road
+    roll: Number
+    up: Number  # m/s^2, a_z
+    gravity: FloatArray  # (..., 4) m/s^2, as `VelocityFusion.step` takes it
+
+    def level(self, ax: Number, ay: Number) -> tuple[Number, Number]:
+        """a_x and a_y in the plane of the road, m/s^2: what the tires carry."""
+        along, across, _ = levelled(ax, ay, self.up, self.pitch, self.roll)
+        return along, across
+
+
+def own_tilt(kit: Arithmetic, angle: Number, felt: Number, softest: float) -> Number:
+    """What of a tilt, rad, is the body on its springs and not the road, by the acceleration `felt`, m/s^2.
+
+    A body tilts by 0 to `softest` rad per g, +-`_LOADED`. A tilt that is within is its own; the further it is out, the more of it
+    is road, and the less it says of the body.
+    """
+    middle = 0.5 * softest * felt / GRAVITY
+    band = abs(middle) + _LOADED
+    off = (angle - middle) / band
+    return middle + band * off / kit.maximum(1.0, off * off)
 
 
 def possible(kit: Arithmetic, value: Number, limit: float) -> Number:

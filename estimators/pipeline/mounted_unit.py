@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from estimators.arguments import batch, entries, mask, setting
-from estimators.arrays import FloatArray
+from estimators.arrays import BoolArray, FloatArray
 from estimators.faults import Flag
 from estimators.memory import Memory
 from estimators.pipeline.signals import VehicleSignals
@@ -18,6 +18,7 @@ RATE_LAG = 0.02  # s, of the derivative of the angular rate, as for the yaw acce
 USUAL_PULL, USUAL_RATE = (0.0, 0.0, GRAVITY), (0.0, 0.0, 0.0)
 """What is taken of an axis that no sensor measures: m/s^2 and rad/s of the car."""
 _LATE = 0.5  # relative error of the sample time beyond which a difference of rates is no derivative
+_MOSTLY = 0.5  # share of a reading in an axis of the car above which its repetition is that of the axis
 _PULLS, _RATES = ("ax", "ay", "az"), ("roll_rate", "pitch_rate", "yaw_rate")
 
 
@@ -27,8 +28,9 @@ class MountedUnit(Memory):
         a_cg = R a - w' x l - w x (w x l),   w = R w_unit                                   (`estimators.signals.mounting`)
 
     w' is a causal derivative with `lag`, so it comes late by lag + Ts/2. An axis that the car has no sensor for stays None; a
-    missing reading (NaN, or beyond `signals.limits`) makes the axes missing that it has a larger share of. `step` goes before
-    `EstimationPipeline.step`: pipeline.step(unit.step(signals)).
+    missing reading (NaN, or beyond `signals.limits`) makes the axes missing that it has a larger share of. An axis that
+    consists mostly of a reading that repeats its predecessor bit for bit repeats, too: what the others mix into a frozen
+    reading would make it look alive. `step` goes before `EstimationPipeline.step`: pipeline.step(unit.step(signals)).
 
     Args:
         mounting: of the unit that measures a_x to the pitch rate.
@@ -40,7 +42,8 @@ class MountedUnit(Memory):
         EstimatorError: a setting that is not positive.
     """
 
-    memory = ("last",)
+    memory = ("last", "moved")
+    unknowns = ("moved",)
     parts = ("slope",)
 
     def __init__(
@@ -51,6 +54,7 @@ class MountedUnit(Memory):
         self.slope = FilteredDerivative(sample_time, lag, (*self.batch_shape, 3))
         self._start = np.tile([*USUAL_PULL, *USUAL_RATE], (*self.batch_shape, 1))
         self.last: FloatArray = self._start.copy()  # last readings of the unit: a_x, a_y, a_z, p, q, r
+        self.moved: FloatArray = np.full_like(self._start, np.nan)  # what was last made of them
         self._axes: dict[tuple[bool, ...], tuple[UnitAxes, UnitAxes]] = {}
 
     def step(self, signals: VehicleSignals) -> VehicleSignals:
@@ -64,15 +68,20 @@ class MountedUnit(Memory):
         given = {name: getattr(signals, name) for name in (*_PULLS, *_RATES)}
         measured = tuple(value is not None for value in given.values())
         raw = np.stack([self._read(name, value) for name, value in given.items()], axis=-1)
+        repeats = raw == self.last
         self.last = np.where(np.isfinite(raw), raw, self.last)
         pull_axes, rate_axes = self._axes_of(measured)
         pull, rate = pull_axes(raw[..., :3], self.last[..., :3]), rate_axes(raw[..., 3:], self.last[..., 3:])
         if self.mounting.away:
             turning = _turning(self.slope, self._in_time(rate, signals.elapsed))
             pull = pull - lever_acceleration(self.mounting.lever, *turning)
-        found = zip(given, np.moveaxis(pull, -1, 0), strict=False), zip(_RATES, np.moveaxis(rate, -1, 0), strict=True)
-        moved = {name: value for pairs in found for name, value in pairs if given[name] is not None}
-        return signals._replace(**moved)
+        moved = np.concatenate((pull, rate), axis=-1)
+        old = repeating((pull_axes, rate_axes), repeats & measured)
+        if old.any():
+            moved = np.where(old & np.isfinite(moved) & np.isfinite(self.moved), self.moved, moved)
+        self.moved = moved
+        names = (name for name, there in zip(given, measured, strict=True) if there)
+        return signals._replace(**dict(zip(names, np.moveaxis(moved, -1, 0)[list(measured)], strict=True)))
 
     def reset(self, where: npt.ArrayLike | None = None) -> None:
         """Forgets the entries `where` (bool mask of the batch shape; None: all).
@@ -82,6 +91,7 @@ class MountedUnit(Memory):
         """
         chosen = mask(where, self.batch_shape, "where")[..., None]
         self.last = np.where(chosen, self._start, self.last)
+        self.moved = np.where(chosen, np.nan, self.moved)
         self.slope.reset(np.repeat(chosen, 3, axis=-1))
 
     def _read(self, name: str, value: npt.ArrayLike | None) -> FloatArray:
@@ -102,6 +112,12 @@ class MountedUnit(Memory):
             pulls = UnitAxes(self.mounting, measured[:3], USUAL_PULL)
             self._axes[measured] = pulls, UnitAxes(self.mounting, measured[3:], USUAL_RATE)
         return self._axes[measured]
+
+
+def repeating(axes: tuple[UnitAxes, UnitAxes], repeats: BoolArray) -> BoolArray:
+    """Which axes of the car (..., 6) consist mostly of readings (..., 6) that repeat their predecessors: they repeat, too."""
+    parts = (part.touched(repeats[..., k : k + 3], _MOSTLY) for part, k in zip(axes, (0, 3), strict=True))
+    return np.concatenate(list(parts), axis=-1)
 
 
 def held_turning(rate: FloatArray, sample_time: float, lag: float) -> tuple[FloatArray, FloatArray]:

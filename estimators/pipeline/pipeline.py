@@ -21,7 +21,7 @@ from estimators.forces import (
 from estimators.memory import Memory
 from estimators.pipeline.checks import CrossChecks
 from estimators.pipeline.direction import DirectionOfTravel
-from estimators.pipeline.last_sample import LastSample, possible
+from estimators.pipeline.last_sample import LastSample, Tilt, possible
 from estimators.pipeline.parts import (
     CORNER_PARTS,
     AttitudePart,
@@ -122,6 +122,7 @@ class EstimationPipeline(Memory):
         self.parts = tuple(name for name in self._named if hasattr(getattr(self, name), "save"))
         self.parts += ("last", "direction") if unsigned_wheels else ("last",)
         self._lateral_first = bool(getattr(self.velocity, "uses_lateral_force", False))
+        self._takes_gravity = bool(getattr(self.velocity, "uses_gravity", False))
         self._compliant = bool(getattr(corner_observers, "uses_forces", False))
         self._use_across = self._lateral_first or self.corner_observers is not None
         self._total_deviation = vehicle.mass * setting(acceleration_deviation, "acceleration_deviation", "m/s^2")
@@ -147,9 +148,9 @@ class EstimationPipeline(Memory):
         late = self._late(signals.elapsed)
         w, open_way = self._signed(w, signals, read_x)
         fresh = self.readings.step(w)
-        tilt, own_x, own_y, free_x, free_y = last.tilted(self.attitude, signals, read_x, read_y, turned)
-        own_x, own_y, turned = last.believed(own_x, own_y, turned)
-        read_x, read_y = last.believed(read_x, read_y)
+        tilt = last.tilted(self.attitude, signals, read_x, read_y, turned)
+        read_x, read_y, turned = last.believed(read_x, read_y, turned)
+        own_x, own_y = (read_x, read_y) if tilt is None else tilt.level(read_x, read_y)
         bias_x, bias_y = last.bias
         own_x, own_y = own_x - bias_x, own_y - bias_y
         lean, rise = (None, None) if tilt is None else (tilt.roll, tilt.pitch)
@@ -163,14 +164,13 @@ class EstimationPipeline(Memory):
         total = car.mass * own_x + self.front * kit.sin(self.angle)
         agreed = reconcile(wheels.force, wheels.deviation, total, self._total_deviation, loads.load, unknown)
         use = self._normalised(agreed.force, loads.load, unknown)
-        if tilt is None:  # untouched: the velocity part tells the impossible from the missing
-            free_x, free_y = ax, ay
         yaw_acceleration = self.yaw_slope.step(choose(late, math.nan, turned) if delayed else turned).derivative
         yaw_acceleration = choose(abs(turned) < math.inf, kit.own(yaw_acceleration), math.nan)
         lateral = self.lateral_force.step(own_x, own_y, yaw_acceleration, angle, agreed.force, loads.load)
         across = self._normalised(lateral.corner_force, loads.load, None) if self._use_across else None
         more = {"lateral_use": across, "forces": (agreed.force, lateral.corner_force)} if self._lateral_first else {}
-        moved = self.velocity.step(w, steer, free_x, free_y, turn, use, signals.elapsed, **more)
+        ax, ay, heavy = self._with_gravity(ax, ay, tilt)
+        moved = self.velocity.step(w, steer, ax, ay, turn, use, signals.elapsed, **more, **heavy)
         corners = None
         if self.corner_observers is not None and across is not None:
             corners = self.corner_observers.step(
@@ -207,17 +207,17 @@ class EstimationPipeline(Memory):
             force_z=loads.load,
             slip=moved.slip,
             slip_angle=moved.slip_angle,
-            roll=self._level if tilt is None else tilt.roll,
-            pitch=self._level if tilt is None else tilt.pitch,
+            roll=self._level if tilt is None else tilt.step.roll,
+            pitch=self._level if tilt is None else tilt.step.pitch,
             consistency=consistency,
-            flags=self._flags(moved.flags | loads.flags | lateral.flags, tilt, late),
+            flags=self._flags(moved.flags | loads.flags | lateral.flags, None if tilt is None else tilt.step, late),
             wheel_flags=moved.wheel_flags | wheels.flags,
             wheels=wheels,
             reconciled=agreed,
             loads=loads,
             lateral=lateral,
             velocity=moved,
-            attitude=tilt,
+            attitude=None if tilt is None else tilt.step,
             corners=corners,
             sideslip_step=beside,
         )
@@ -245,6 +245,15 @@ class EstimationPipeline(Memory):
         self.last.forget(here)
         if self.direction is not None:
             self.direction.forget(here if self._single else np.ravel(here))
+
+    def _with_gravity(self, ax: Number, ay: Number, tilt: Tilt | None) -> tuple[Number, Number, dict[str, FloatArray]]:
+        """a_x and a_y for the velocity part, and what it takes of gravity besides: nothing, if it has to be taken off before."""
+        if tilt is None:
+            return ax, ay, {}
+        if self._takes_gravity:
+            return ax, ay, {"gravity": tilt.gravity}
+        along, across = (self._kit.own(tilt.gravity[..., k]) for k in (0, 1))
+        return ax - along, ay - across, {}
 
     def _signed(self, w: FloatArray, signals: VehicleSignals, ax: Number) -> tuple[FloatArray, FloatArray | None]:
         """Wheel speeds with a sign, and the deviation of V_x, m/s, where it is open; as they are, and None, if they have one."""

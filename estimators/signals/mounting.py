@@ -111,7 +111,6 @@ class UnitAxes:
         self._turn[np.ix_(known, known)] = np.linalg.inv(inner)
         self._shift = np.where(known, 0.0, self.usual)
         self._shift -= self._turn @ (back @ self._shift)
-        self._needs: BoolArray = np.absolute(self._turn) > LEAST_SHARE
 
     def __call__(self, reading: FloatArray, last: FloatArray) -> FloatArray:
         """(..., 3) in axes of the car, NaN where a reading of a larger share is missing; `last` stands for small ones."""
@@ -120,7 +119,12 @@ class UnitAxes:
             out: FloatArray = reading @ self._turn.T + self._shift
             return out
         whole = np.where(there, reading, last) @ self._turn.T + self._shift
-        return np.where((~there[..., None, :] & self._needs).any(axis=-1), np.nan, whole)
+        return np.where(self.touched(~there, LEAST_SHARE), np.nan, whole)
+
+    def touched(self, readings: BoolArray, share: float) -> BoolArray:
+        """Which axes of the car (..., 3) have a larger `share` of any of the `readings` (..., 3)."""
+        needs: BoolArray = np.absolute(self._turn) > share
+        return np.asarray((readings[..., None, :] & needs).any(axis=-1))
 
 
 def lever_acceleration(lever: FloatArray, rate: FloatArray, slope: FloatArray) -> FloatArray:

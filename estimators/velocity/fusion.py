@@ -15,7 +15,6 @@ from estimators.memory import CarsMemory, Memory
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity import lateral_fusion as lateral
 from estimators.velocity import longitudinal_fusion as longitudinal
-from estimators.velocity.accelerometer_faults import AccelerationSource, SlipDirectionTest
 from estimators.velocity.consistency_reset import LateralReset, LongitudinalReset
 from estimators.velocity.fusion_inputs import ConditionedInputs, FusionInputs
 from estimators.velocity.fusion_settings import FusionSettings
@@ -34,8 +33,8 @@ class VelocityFusion(Memory):
 
     Which wheel to believe is decided at every sample from what its force explains (`longitudinal_fusion`); V_y comes
     from the kinematics and from the side slip that the axle forces demand (`lateral_fusion`). At standstill a zero-velocity
-    update of both speeds and the yaw rate gives the biases (`zero_velocity`). An a_x that is missing, frozen or contradicted
-    by forces and wheels is replaced (`accelerometer_faults`). An estimate that rolling wheels contradict for long is lost,
+    update of both speeds and the yaw rate gives the biases (`zero_velocity`). A signal that the others contradict, that freezes
+    or is missing is replaced by what they say (`signal_monitor`). An estimate that rolling wheels contradict for long is lost,
     and starts again from them (`consistency_reset`). Wheel speeds are signed: backwards is negative.
 
     One car runs on plain numbers, several on arrays, by the same formulas (`arithmetic`).
@@ -52,10 +51,11 @@ class VelocityFusion(Memory):
 
     memory = ("new", "renewed", "start")
     parts = (
-        "inputs", "longitudinal_filter", "lateral_filter", "signal_monitor", "acceleration_source", "slip_direction",
+        "inputs", "longitudinal_filter", "lateral_filter", "signal_monitor",
         "longitudinal_reset", "lateral_reset", "zero_velocity",
     )  # fmt: skip
     unknowns = ("start",)
+    uses_gravity = True  # `step` takes it
 
     def __init__(
         self,
@@ -79,8 +79,6 @@ class VelocityFusion(Memory):
         self.longitudinal_filter, self.lateral_filter = self._along.filter, self._across.filter
         self.inputs = FusionInputs(self._radius, self.settings, count)
         self.signal_monitor = SignalMonitor(vehicle, self._along, self._across, count)
-        self.acceleration_source = AccelerationSource(vehicle, self._along, count)
-        self.slip_direction = SlipDirectionTest(self._along, count)
         self.longitudinal_reset = LongitudinalReset(self.settings, count)
         self.lateral_reset = LateralReset(self.settings, self._across, count)
         self.zero_velocity = ZeroVelocityDetector(self.settings, self._along, self._across, count)
@@ -98,20 +96,20 @@ class VelocityFusion(Memory):
         yaw_rate: npt.ArrayLike,
         normalised_force: npt.ArrayLike | None = None,
         elapsed: npt.ArrayLike | None = None,
+        gravity: npt.ArrayLike | None = None,
     ) -> FusionStep:
         """One sample on.
 
         Args:
-            wheel_speed: (..., 4) rad/s, signed.
-            steer: (..., 4) road-wheel angles, rad.
-            ax: (...) m/s^2, accelerometer at the centre of gravity, level with the road as far as attitude is known.
-            ay: (...) m/s^2, likewise.
-            yaw_rate: (...) rad/s.
-            normalised_force: (..., 4) F_x/F_z of the wheels; NaN (or None) where unknown: then a_x/g.
-            elapsed: (...) s since the last step, if not `sample_time`: jitter, gaps.
+            wheel_speed: (..., 4) rad/s, signed. steer: (..., 4) road-wheel angles, rad. ax: (...) m/s^2, accelerometer at the
+            centre of gravity. ay: (...) m/s^2, likewise. yaw_rate: (...) rad/s. normalised_force: (..., 4) F_x/F_z of the
+            wheels; NaN (or None) where unknown: then a_x/g. elapsed: (...) s since the last step, if not `sample_time`:
+            jitter, gaps. gravity: (..., 4) m/s^2, finite, of attitude where it is known: its share in `ax` and `ay`, and of
+            these what the road
+                is tilted, not the body: the tires carry that. None: a level car, whose tilt counts as bias, grade and bank.
 
-        Whatever is not finite counts as missing and is flagged; the estimates stay finite. A car whose a_x contradicts its
-        forces and wheels carries the flag GATED.
+        Whatever is not finite counts as missing and is flagged; the estimates stay finite. A car of which a signal
+        contradicts the others carries the flag GATED.
 
         Raises:
             EstimatorError: another shape, or not numbers.
@@ -123,18 +121,18 @@ class VelocityFusion(Memory):
         inertial = kit.stacked([kit.car(value, shape, name) for value, name in named])
         dt, odd = self._elapsed(elapsed)
         seen = self.inputs(inertial, wheels, turned, dt)
+        heavy = None if gravity is None else kit.wheels(gravity, shape, "gravity")
+        if heavy is not None:
+            a, b, r = seen.inertial
+            seen = seen._replace(inertial=kit.stacked((a - heavy[0], b - heavy[1], r)))
         self._begin(seen)
-        judged = self.signal_monitor(dt, seen)
-        b, r, noise_b, noise_r, used_b, used_r, unknown, off = judged
         given = None if normalised_force is None else kit.wheels(normalised_force, shape, "normalised_force")
-        disproved = self.slip_direction.remaining > 0.0
-        pull = self.acceleration_source(dt, seen, given, self.inputs.slope, disproved)
-        a, noise, doubt, blind, unbelieved, mu = pull
-        self.signal_monitor.mu = mu
+        judged = self.signal_monitor(dt, seen, given, self.inputs.slope, heavy)
+        (a, b, r), noise, used, doubt, taken, road, mu, blind, unknown, steered, gated, contested = judged
         turn, before = across.yaw_rate(r), along.speed
-        along.predict(dt, a, noise, turn, across.speed, doubt > 0.0)
-        across.predict(dt, b, noise_b, r, noise_r, before, used_b & used_r)
-        yaw_acceleration, left = self.signal_monitor.yaw_acceleration, across.speed
+        along.predict(dt, a, noise[0], turn, across.speed, doubt[0] > 0.0)
+        across.predict(dt, b, noise[1], r, noise[2], before, used[1] & used[2])
+        yaw_acceleration, left, felt = self.signal_monitor.turn.yaw_acceleration, across.speed, b + road[1]
         own = along.acceleration(a) + turn * left
 
         def moves(angle: Number, x: Number, y: Number) -> tuple[Number, ...]:
@@ -142,9 +140,8 @@ class VelocityFusion(Memory):
             return cosine, (left + turn * x) * sine - turn * y * cosine, own - yaw_acceleration * y, sine
 
         *course, sine = kit.each(moves, seen.steer, *self._places)
-        slipping = self.inputs.slipping(course[2], seen.fresh, dt, doubt)
-        wheel = along.correct(dt, seen, slipping, mu, b / GRAVITY, longitudinal.WheelMotion(*course), blind)
-        self.slip_direction(dt, seen, wheel.innovation, mu)
+        slipping = self.inputs.slipping(course[2], seen.fresh, dt, doubt[0])
+        wheel = along.correct(dt, seen, slipping, mu, felt / GRAVITY, longitudinal.WheelMotion(*course), blind)
         standing, lost = self.zero_velocity(seen, a, b, turn, dt)
         lost = lost | self.longitudinal_reset(dt, standing, seen, wheel, slipping, mu, self._radius)
         along.zero_velocity_update(standing)
@@ -154,23 +151,23 @@ class VelocityFusion(Memory):
         # wheels that slide sideways do not turn, and have no slip angle; no road is so slippery that the car feels nothing
         calm, silent = across.friction(b) < self.settings.unloaded, seen.silent
         front_rolls, rear_rolls = (calm | kit.no(silent[i] & silent[i + 1]) for i in (0, 2))
-        usable = kit.stacked((told & seen.steered & front_rolls & kit.no(front), told & rear_rolls & kit.no(rear)))
+        rolling = (told & seen.steered & front_rolls & kit.no(front), told & rear_rolls & kit.no(rear))
+        usable = kit.stacked((rolling[0] & steered, rolling[1]))
         fl, fr, rl, rr = seen.steer
         angles = kit.stacked((0.5 * (fl + fr), 0.5 * (rl + rr)))
-        axle = across.correct(dt, b, r, yaw_acceleration, angles, along.speed, a, usable, off)
+        axle = across.correct(dt, felt, r, yaw_acceleration, angles, along.speed, a + road[0], usable, doubt[1])
+        self.signal_monitor.learn(dt, seen, wheel.innovation, along.speed, axle, rolling)
         restarted = self.lateral_reset(dt, along.speed, axle, usable)
         across.blind(dt, unknown)
         across.zero_velocity_update(standing, r)
-        flags = (
-            seen.flags | kit.where(odd, _MISSING_INPUT, 0) | kit.where(unbelieved | kit.no(used_b & used_r), _GATED, 0)
-        )
+        flags = seen.flags | kit.where(odd, _MISSING_INPUT, 0) | kit.where(gated, _GATED, 0)
         flags = flags | kit.where(self.renewed | restarted, _RESET, 0)
         self.renewed = self._never
         self._guard(seen, lost)
         outcome = Outcome(slipping, wheel, axle, standing, self.zero_velocity.stopped(seen.silent), self._hidden())
         geometry = (sine, course[0], *self._places)
-        inertial, used = (a, b, r), (kit.no(unbelieved) & seen.good[0], used_b, used_r)
-        return fusion_step(kit, shape, along, across, seen, geometry, outcome, flags, inertial, used)
+        inertial = (a + taken[0], b + taken[1], r)
+        return fusion_step(kit, shape, along, across, seen, geometry, outcome, flags, inertial, (*used, contested))
 
     def reset(self, where: npt.ArrayLike | None = None, vx: npt.ArrayLike = np.nan, vy: npt.ArrayLike = 0.0) -> None:
         """Forgets the entries `where` (mask of the batch shape; None: all) and starts them at `vx`, `vy`, m/s.

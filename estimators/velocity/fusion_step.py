@@ -27,6 +27,7 @@ class FusionStep(NamedTuple):
     yaw_rate: FloatArray  # (...) rad/s, without its estimated bias and scale error
     inertial: FloatArray  # (..., 3) a_x, a_y in m/s^2 and r in rad/s as used: the reading, or what it should have been
     inertial_used: BoolArray  # (..., 3) whether it is the reading
+    force_contested: BoolArray  # (...) a_x and the wheels' forces contradict each other by half of what they may
     sensor_bias: FloatArray  # (..., 3) of a_x, a_y in m/s^2 and of r in rad/s
     gravity: FloatArray  # (..., 2) m/s^2 in a_x and a_y, from grade and bank
     radius: FloatArray  # (..., 4) effective radii, m, as learned
@@ -68,7 +69,7 @@ def fusion_step(
     outcome: Outcome,
     flags: Number,
     inertial: tuple[Number, Number, Number],
-    used: tuple[Number, Number, Number],
+    used: tuple[Number, Number, Number, Number],
 ) -> FusionStep:
     """The step in the batch shape; `course` sine and cosine of the steering and x, y of the wheels."""
     choose, x, y = kit.where, along.filter.mean, across.filter.mean
@@ -113,7 +114,8 @@ def fusion_step(
         vy_deviation=real[..., 3],
         yaw_rate=real[..., 4],
         inertial=real[..., 28:],
-        inertial_used=true[..., 15:],
+        inertial_used=true[..., 15:18],
+        force_contested=true[..., 18],
         sensor_bias=real[..., 5:8],
         gravity=real[..., 8:10],
         radius=real[..., 10:14],

@@ -9,7 +9,7 @@ from pydantic import ValidationInfo, model_validator
 
 from estimators.arrays import FloatArray
 from estimators.errors import EstimatorError
-from estimators.pipeline.mounted_unit import RATE_LAG, USUAL_PULL, USUAL_RATE, held_turning
+from estimators.pipeline.mounted_unit import RATE_LAG, USUAL_PULL, USUAL_RATE, held_turning, repeating
 from estimators.signals.mounting import Mounting, UnitAxes, lever_acceleration, lever_velocity
 from studies.drives import quantities as si
 from synthesis.toml_file import StrictTable
@@ -83,7 +83,8 @@ def centred_signals(signals: Mapping[str, FloatArray], place: Place, sample_time
     rate = _turned(mounting, RATES, signals, USUAL_RATE)
     if mounting.away:
         pull -= lever_acceleration(mounting.lever, *held_turning(rate, sample_time, RATE_LAG))
-    both = dict(zip((*PULLS, *RATES), np.concatenate([pull, rate], axis=1).T, strict=True))
+    moved = _repeated(np.concatenate([pull, rate], axis=1), signals, mounting)
+    both = dict(zip((*PULLS, *RATES), moved.T, strict=True))
     return out | {name: value for name, value in both.items() if name in signals}
 
 
@@ -119,6 +120,19 @@ def _turned(
     nothing = np.zeros(len(next(iter(signals.values()))))
     raw = np.stack([signals.get(name, nothing) for name in names], axis=1)
     return _axes(mounting, names, signals, usual)(raw, _last(raw, np.array(usual)))
+
+
+def _repeated(moved: FloatArray, signals: Mapping[str, FloatArray], mounting: Mounting) -> FloatArray:
+    """``moved`` (n, 6), each held at its predecessor where the readings that it consists of repeat theirs."""
+    names = (*PULLS, *RATES)
+    raw = np.stack([signals.get(name, np.zeros(len(moved))) for name in names], axis=1)
+    repeats = np.zeros(raw.shape, dtype=np.bool_)
+    repeats[1:] = raw[1:] == _last(raw, np.full(6, np.nan))[:-1]
+    pulls, rates = _axes(mounting, PULLS, signals, USUAL_PULL), _axes(mounting, RATES, signals, USUAL_RATE)
+    old = repeating((pulls, rates), repeats & np.array([name in signals for name in names])) & np.isfinite(moved)
+    old[1:] &= np.isfinite(moved[:-1])
+    rows = np.maximum.accumulate(np.where(old, 0, np.arange(len(moved))[:, None]), axis=0)
+    return np.take_along_axis(moved, rows, axis=0)
 
 
 def _last(raw: FloatArray, start: FloatArray) -> FloatArray:

@@ -154,17 +154,17 @@ def test_the_acceleration_of_the_forces(ax: float) -> None:
     for k in range(200):
         surface = 30.0 + ax * STEP * k
         fusion.step(surface / CAR.radius, 0.0, ax + 1e-3 * (k % 3), 0.0, 0.0, mu)
-    assert fusion.acceleration_source.gap + fusion.longitudinal_filter.state[0, 1] == pytest.approx(
+    assert fusion.signal_monitor.pull.gap + fusion.longitudinal_filter.state[0, 1] == pytest.approx(
         0.0, abs=0.08 * GRAVITY
     )
-    assert fusion.acceleration_source.since == 0.0
+    assert fusion.signal_monitor.pull.since == 0.0
 
 
 def test_nothing_is_doubted_on_a_plain_drive() -> None:
     fusion = VelocityFusion(CAR, STEP)
     for sample in zip(*sensed(course(phases((1.0, 0.0), (2.0, 4.0), (2.0, -6.0))), bias=0.15), strict=True):
         fusion.step(*sample)
-        assert fusion.acceleration_source.since == 0.0
+        assert fusion.signal_monitor.pull.since == 0.0
 
 
 @pytest.mark.parametrize("grade", [0.1, 0.3])
@@ -192,9 +192,9 @@ def test_saved_while_in_doubt(fault: Fault) -> None:
     signals = told(fault, force=True)
     one, two = VelocityFusion(CAR, STEP), VelocityFusion(CAR, STEP)
     driven(Signals(*(value[: FROM + 30] for value in signals)), one)
-    assert one.acceleration_source.since > 0.0
+    assert one.signal_monitor.pull.since > 0.0
     two.restore(one.save())
     rest = Signals(*(value[FROM + 30 : FROM + 100] for value in signals))
     np.testing.assert_array_equal(driven(rest, one)[1], driven(rest, two)[1])
     one.reset()
-    assert one.acceleration_source.since == one.acceleration_source.gap == one.acceleration_source.apart == 0.0
+    assert one.signal_monitor.pull.since == one.signal_monitor.pull.gap == one.signal_monitor.pull.apart == 0.0

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from estimators.arrays import FloatArray
+from estimators.faults import Flag
 from estimators.velocity import VelocityFusion
 from tests.support.fusion_course import CAR, STEP, Signals, driven
-from tests.support.turning_course import longest, run, there_and_back, turn
+from tests.support.turning_course import Turn, longest, run, there_and_back, turn
 
 FAULT = slice(500, 900)  # 2.5 to 4.5 s: in the turn and out of it
 BACK = FAULT.stop + 400  # 2 s later
@@ -85,7 +86,7 @@ def test_a_slide_is_no_fault_of_the_accelerometer() -> None:
 def test_steering_alone_says_nothing_of_a_live_accelerometer() -> None:
     """Wheels lost: a_y and the yaw rate contradict each other, and nothing says which is right; both are kept."""
     course = turn(8.0, YAW)
-    course.signals.wheel_speed[480:900] = np.nan
+    course.signals.wheel_speed[450:900] = np.nan
     course.signals.yaw_rate[FAULT] *= 2.0
     found = run(course)
     assert found.used[FAULT.start : FAULT.start + 200].all()
@@ -105,3 +106,45 @@ def test_saved_while_a_signal_is_replaced_and_a_batch_is_its_runs() -> None:
     both = Signals(*(np.stack([value[:620]] * 2, axis=1) for value in course.signals))
     together = driven(both, many)[0]
     np.testing.assert_allclose(together[-1].vy, mine[-1].vy, rtol=1e-6, atol=1e-8)
+
+
+def rolled(course: Turn, known: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Errors of V_y, whether it is GATED, and whether a_y is used, where an attitude says `known` m/s^2 of gravity in a_y."""
+    heavy = np.stack([0.0 * known, known, 0.0 * known, known], axis=1)
+    steps, _ = driven(course.signals, gravity=heavy)
+    gated = np.array([bool(step.flags & Flag.GATED) for step in steps])
+    return np.array([step.vy for step in steps]) - course.vy, gated, np.array([step.inertial_used[1] for step in steps])
+
+
+@pytest.mark.parametrize("known", [3.0, -4.0])
+def test_a_roll_angle_at_fault_is_not_taken_off(known: float) -> None:
+    """0.3 to 0.4 rad: what the accelerometer reads agrees with the turn, what is levelled does not."""
+    wrong = np.zeros(YAW.size)
+    wrong[FAULT] = known
+    error, gated, used = rolled(turn(8.0, YAW), wrong)
+    assert np.abs(error).max() < 0.8  # 8 m/s after these 2 s otherwise
+    assert gated[FAULT.start + 40 : FAULT.stop].all()
+    assert not gated[BACK:].any()
+    assert used.all()
+
+
+def test_a_roll_angle_that_is_right_is_no_fault() -> None:
+    """The negative control: a road that leans as much as the attitude says."""
+    bank = there_and_back(8.0, 3.0, 2.5, 4.5)
+    error, gated, used = rolled(turn(8.0, YAW, gravity=bank), bank)
+    assert not gated.any()
+    assert used.all()
+    assert np.abs(error).max() < 0.7  # tires of this course carry nothing of V_y', which the bank changes
+
+
+def test_a_steering_angle_that_freezes_is_not_believed() -> None:
+    """In the turn, and the car leaves it: V_y followed the front axle by 0.7 m/s."""
+    course = turn(8.0, YAW)
+    course.signals.steer[FAULT] = course.signals.steer[FAULT.start]
+    found = run(course)
+    gated = np.array([bool(step.flags & Flag.GATED) for step in found.steps])
+    off = np.flatnonzero(np.abs(turn(8.0, YAW).signals.steer[:, 0] - course.signals.steer[:, 0]) > 0.015)
+    assert gated[off[0] : off[0] + 60].any()
+    assert not gated[: FAULT.start].any()
+    assert not gated[BACK:].any()
+    assert np.abs(found.error_y)[FAULT].max() < 0.4

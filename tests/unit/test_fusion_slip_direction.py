@@ -66,7 +66,7 @@ def test_four_wheels_that_slip_with_their_force_are_no_evidence() -> None:
     true = np.stack([drive.speed for drive in drives], axis=1)
     for k, sample in enumerate(zip(*together, strict=True)):
         step = fusion.step(*sample)
-        assert (fusion.slip_direction.remaining == 0.0).all()
+        assert (fusion.signal_monitor.pull.remaining == 0.0).all()
         assert np.abs(step.vx - true[k]).max() < 0.6
 
 
@@ -75,7 +75,7 @@ def test_saved_and_forgotten() -> None:
     signals = told(drive, drive.ax - 6.0)
     one, two = VelocityFusion(CAR, STEP), VelocityFusion(CAR, STEP)
     k = 0
-    while one.slip_direction.remaining == 0.0:
+    while one.signal_monitor.pull.remaining == 0.0:
         one.step(*(value[k] for value in signals))
         k += 1
     assert FAULT.start < k < FAULT.start + 100
@@ -83,7 +83,7 @@ def test_saved_and_forgotten() -> None:
     rest = Signals(*(value[k : k + 60] for value in signals))
     np.testing.assert_array_equal(driven(rest, one)[1], driven(rest, two)[1])
     one.reset()
-    assert one.slip_direction.remaining == 0.0
+    assert one.signal_monitor.pull.remaining == 0.0
 
 
 def test_three_wheels_are_enough_and_two_are_not() -> None:
@@ -94,7 +94,7 @@ def test_three_wheels_are_enough_and_two_are_not() -> None:
         signals.wheel_speed[150:, :lost] = np.nan
         fusion = VelocityFusion(CAR, STEP)
         driven(Signals(*(value[:270] for value in signals)), fusion)
-        found.append(fusion.slip_direction.remaining > 0.0)
+        found.append(fusion.signal_monitor.pull.remaining > 0.0)
     assert found == [True, False]
 
 

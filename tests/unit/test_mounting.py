@@ -134,6 +134,23 @@ def test_what_is_missing_stays_missing_and_spoils_nothing_else() -> None:
     assert np.abs(found[320:, :2] - pull[320:, :2]).max() < 0.1
 
 
+def test_a_frozen_reading_repeats_in_the_axes_of_the_car() -> None:
+    """Turned by 25 degrees the living a_x would make a frozen a_y look alive; a dead roll gyro must not stop the yaw rate."""
+    unit = Mounting(x=0.5, pitch=0.2, yaw=np.radians(25.0))
+    readings = seen(unit)
+    alive = stepped(MountedUnit(unit, TIME), readings)
+    assert (np.diff(alive, axis=0) != 0.0).all()
+    readings[100:200, 1] = readings[100, 1]  # share of a_y: 0.9 in a_y of the car, 0.4 in a_x
+    readings[:, 3] = 0.0
+    found = stepped(MountedUnit(unit, TIME), readings)
+    assert (found[100:200, 1] == found[100, 1]).all()
+    assert (np.diff(found[:, [0, 2, 5]], axis=0) != 0.0).all()
+    assert (np.diff(found[200:, 1]) != 0.0).all()
+    place = Place.model_validate({"x": "0.5 m", "pitch": "0.2 rad", "yaw": "25 deg"})
+    log = centred_signals(dict(zip(NAMES, readings.T, strict=True)), place, TIME)
+    np.testing.assert_allclose(np.stack([log[name] for name in NAMES], axis=1), found, rtol=1e-12, atol=1e-14)
+
+
 def test_axes_without_a_sensor_are_those_of_a_level_car() -> None:
     """No a_z, no roll and pitch rates: exact for a car that has g upwards and turns about z alone."""
     unit = Mounting(roll=0.2, pitch=-0.1, yaw=0.3)
@@ -150,9 +167,9 @@ def test_axes_without_a_sensor_are_those_of_a_level_car() -> None:
 def test_late_samples_give_no_derivative() -> None:
     unit = MountedUnit(Mounting(x=1.0), TIME)
     for k in range(3):
-        step = unit.step(VehicleSignals(np.zeros(4), 0.0, 0.0, 0.1 * k, elapsed=TIME))
+        step = unit.step(VehicleSignals(np.zeros(4), 0.0, 1e-9 * k, 0.1 * k, elapsed=TIME))
     assert float(np.asarray(step.ay)) == pytest.approx(-20.0)
-    late = unit.step(VehicleSignals(np.zeros(4), 0.0, 0.0, 0.9, elapsed=10 * TIME))
+    late = unit.step(VehicleSignals(np.zeros(4), 0.0, 1e-8, 0.9, elapsed=10 * TIME))
     assert float(np.asarray(late.ay)) == pytest.approx(-20.0)  # 0.7 rad/s in one sample would be -140
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+
 import numpy as np
 import pytest
 
@@ -33,14 +35,15 @@ def test_the_chosen_cells_hold_their_bounds(found: list[Cell]) -> None:
 
 def test_a_fusion_without_its_monitor_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """The negative control: the same matrix, and nobody votes."""
-    from estimators.velocity import signal_monitor
-    from estimators.velocity.signal_vote import Vote
+    from estimators.velocity import turn_monitor
+    from estimators.velocity.parity import TURN
+    from estimators.velocity.signal_vote import Verdict
 
-    def nobody(kit: object, level: np.ndarray, *_: object) -> Vote:
-        never = np.zeros(np.shape(level)[1:], dtype=np.bool_)
-        return Vote((never, never), (never, never), (~never, ~never), never)
+    def nobody(kit: object, relation: object, told: tuple[np.ndarray, ...], *_: object) -> tuple[object, object]:
+        never = np.zeros(np.shape(told[0])[1:], dtype=np.bool_)
+        return (Verdict(never, never, ~never),) * len(TURN.rules), defaultdict(lambda: never)
 
-    monkeypatch.setattr(signal_monitor, "vote", nobody)
+    monkeypatch.setattr(turn_monitor, "vote", nobody)
     cells = matrix(1, [("ay", "zero"), ("yaw_rate", "negated")])
     for cell in cells:
         if cell.drive == "turn":

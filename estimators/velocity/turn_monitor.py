@@ -1,0 +1,250 @@
+"""a_y, yaw rate and roll: the witnesses of `turn` (`parity`), and what replaces a signal that they outvote.
+
+    yaw rate      V_x r                                            bias and scale error, as far as they are known
+    a_y           a_y - b - g_bank - V_y'                          bias, bank, and V_y' itself,
+                  V_y' = r' L_r - (V_x r + g_bank)' V_x c_1/g      that the forces make
+    front wheels  V_x (v_fr - v_fl)/(t_f cos delta)                slips that differ, radii as far as they are known
+    rear wheels   V_x (v_rr - v_rl)/t_r                            likewise
+    steering      V_x^2 tan(delta)/L                               half of itself: the tires slip
+
+in m/s^2, each with an allowance for its error, all low-passed alike (`wheel_lag`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from estimators.arithmetic import Number, Signals, arithmetic
+from estimators.vehicle import GRAVITY, VehicleParameters
+from estimators.velocity.fusion_inputs import ConditionedInputs
+from estimators.velocity.judge import Judge
+from estimators.velocity.lateral_fusion import BANK, BIAS, SCALE, TIRES, YAW_BIAS, LateralFusion
+from estimators.velocity.longitudinal_fusion import RADIUS, LongitudinalFusion
+from estimators.velocity.parity import FRONT, REAR, SIDE, STEERING, TURN, YAW_RATE
+from estimators.velocity.signal_vote import Told, vote
+
+_UNDERSTEER = 1.0  # m/s^2 by which steering may be off where tires slip: 2 deg/g at 25 m/s
+_FOLLOW = 0.5  # share of itself: the same, and the lag of the car behind its steering
+_TOE = 0.02  # 1/m: 3.5 deg of steering over a wheelbase, all that is left of it at walking pace
+_UNDULATION = 0.5  # m/s^2 of side wind, ruts and body roll in a_y
+_UNLIKE = 0.001  # slip of a free-rolling wheel that the other one of its axle does not share
+_SHARE = 0.03  # relative: scale errors of the inertial unit and of V_x
+_PATIENCE = 0.5  # s for which a car that follows its steering contradicts its a_y before the road is taken for banked
+_BANK = 0.3  # rad: banked curves of test tracks are up to 0.5
+_AY, _R, _ROLL = range(3)
+
+
+class Turning(NamedTuple):
+    """What is to be used of a_y and yaw rate, see `Judged`."""
+
+    reading: tuple[Number, Number]
+    noise: tuple[Number, Number]
+    used: tuple[Number, Number]
+    doubt: Number
+    unknown: Number
+    gravity: Number
+    road: Number
+    gated: Number
+
+
+class TurnMonitor(Judge):
+    """Remembers the witnesses, and for how long who is not believed."""
+
+    memory = ("level", "remaining", "since", "sloped", "yaw_rate", "yaw_acceleration", "lean", "leaning")
+    unknowns = ("yaw_rate", "lean")
+
+    def __init__(
+        self, vehicle: VehicleParameters, along: LongitudinalFusion, across: LateralFusion, count: int
+    ) -> None:
+        self.settings, self.along, self.across = along.settings, along, across
+        self.kit = kit = arithmetic((count,))
+        self._length, self._arm = vehicle.wheelbase, vehicle.rear_axle_distance
+        self._tracks = (vehicle.corner_y[0::2] - vehicle.corner_y[1::2]).tolist()
+        zero, self._never, self._always = kit.full(0.0), kit.full(False), kit.full(True)
+        self._nothing = zero, zero
+        self.level: Signals = kit.stacked([zero] * (len(TURN.witnesses) + 1))  # and V_y', low-passed, m/s^2
+        self.remaining: Signals = kit.stacked([zero] * 3)  # s for which a_y, yaw rate, roll are not believed
+        self.since: Signals = kit.stacked([zero] * 2)  # s since a_y, yaw rate have been replaced
+        self.sloped: Number = zero  # s for which a_y has been off as on a bank
+        self.yaw_rate: Number = kit.full(math.nan)  # the last one that was used, rad/s
+        self.yaw_acceleration: Number = zero  # filtered, rad/s^2
+        self.lean: Number = kit.full(
+            math.nan
+        )  # m/s^2 of gravity across the road at the last sample, where attitude is known
+        self.leaning: Number = zero  # its filtered derivative, m/s^3
+
+    def __call__(
+        self, elapsed: Number, seen: ConditionedInputs, mu: Signals, gravity: tuple[Number, Number] | None
+    ) -> Turning:
+        """One sample; `mu` F_x/F_z of the wheels, `gravity` as in `Turning`, which has been taken off a_y."""
+        s, kit = self.settings, self.kit
+        _, b, r = seen.inertial
+        kept, off = kit.exp(-elapsed / s.wheel_lag), self._nothing
+        if gravity is not None:
+            off = gravity
+            change = kit.where(abs(self.lean) < math.inf, off[1] - self.lean, 0.0)
+            self.lean, self.leaning = off[1], kept * self.leaning + (1.0 - kept) * change / elapsed
+        now, surface = self._say(seen, None if gravity is None else off[0])
+        self.level = kit.stacked([kept * old + (1.0 - kept) * new for old, new in zip(self.level, now, strict=True)])
+        *level, sway = self.level
+        told = self._judged(seen, level, sway, surface, mu, self._never if gravity is None else self._always)
+        v_g, v_p, v_f, v_q = level[:4]
+        t_g, t_p, t_f, t_q = told.allowed[:4]
+        known = told.known
+        quiet = known[YAW_RATE] & known[SIDE] & (abs(v_p - v_g) < t_p + t_g)
+        quiet = (
+            quiet
+            & (kit.no(known[FRONT]) | (abs(v_f - v_g) < t_f + t_g))
+            & (kit.no(known[REAR]) | (abs(v_q - v_g) < t_q + t_g))
+        )
+        quiet = quiet & (self.remaining[_AY] + self.remaining[_R] + self.remaining[_ROLL] == 0.0)
+        if kit.some(kit.no(quiet)):
+            return self._outvoted(elapsed, seen, told, sway, off)
+        self._differentiate(r, self.since[_R] > 0.0, elapsed)
+        self.since = kit.stacked(self._nothing)
+        self.sloped = kit.maximum(self.sloped - elapsed, 0.0)
+        used = known[SIDE], known[YAW_RATE]
+        gated, noises = kit.no(used[0] & used[1]), (seen.noise[1], seen.noise[2])
+        return Turning((b, r), noises, used, self._nothing[0], self._never, *off, gated)
+
+    def _outvoted(
+        self, elapsed: Number, seen: ConditionedInputs, told: Told, sway: Number, gravity: tuple[Number, Number]
+    ) -> Turning:
+        s, kit, no, largest = self.settings, self.kit, self.kit.no, self.kit.maximum
+        level, known, never = told.level, told.known, self._never
+        _, stuck_y, stuck_r = ((run - 1.0) * elapsed > s.slowest_unit for run in seen.run)
+        # a car that slides is turned further than its side force carries it, never less
+        excess = (level[SIDE] * level[STEERING] < 0.0) | (abs(level[SIDE]) > abs(level[STEERING]))
+        plausible = tuple(excess if rule.one_sided else self._always for rule in TURN.rules)
+        verdicts, agree = vote(kit, TURN, told, (stuck_r, never, stuck_y), plausible)
+        yaw, roll, side = verdicts
+        gap = level[YAW_RATE] - level[SIDE]
+        steady = abs(sway) < 0.5 * abs(gap)
+        apart = known[SIDE] & steady & (abs(gap) > told.allowed[YAW_RATE] + told.allowed[SIDE] - abs(sway))
+        straight = largest(abs(level[YAW_RATE]), abs(level[STEERING])) < _UNDERSTEER
+        front, rear = (agree[YAW_RATE, i] & agree[i, STEERING] for i in (FRONT, REAR))
+        grip = agree[YAW_RATE, STEERING] & (front | rear)
+        banked = self._banked(elapsed, apart & grip & (no(side.wrong) | straight) & no(stuck_y | roll.wrong), gap)
+        before = self.remaining
+        judged = (side._replace(wrong=side.wrong & no(banked)), yaw, roll)
+        left = [self.left(elapsed, verdict, old) for verdict, old in zip(judged, before, strict=True)]
+        begun_y, begun_r, begun_roll = ((now > 0.0) & (old == 0.0) for now, old in zip(left, before, strict=True))
+        followed = kit.where(begun_r, level[YAW_RATE] - level[REAR], gap) * s.error_memory
+        self.across.filter.widen(begun_y | begun_r | begun_roll, followed * followed)
+        self.remaining = kit.stacked(left)
+        used_y, used_r = known[SIDE] & (left[0] == 0.0), known[YAW_RATE] & (left[1] == 0.0)
+        levelled = left[2] == 0.0
+        off = tuple(kit.where(levelled, value, 0.0) for value in gravity)
+        if kit.some(no(levelled)):
+            a, b, r = seen.inertial
+            seen = seen._replace(inertial=kit.stacked((a, kit.where(levelled, b, b + gravity[0]), r)))
+        found = self._replaced(elapsed, seen, told, used_y, used_r, sway)
+        return found._replace(gravity=off[0], road=off[1], gated=found.gated | no(levelled))
+
+    def _say(self, seen: ConditionedInputs, gravity: Number | None) -> tuple[tuple[Number, ...], Signals]:
+        """The six and V_y', not low-passed; the surface speeds of the wheels. `gravity`: what a levelled a_y had besides."""
+        kit, along, across = self.kit, self.along, self.across
+        x, y, speed = along.filter.mean, across.filter.mean, along.speed
+        _, b, r = seen.inertial
+        fl, fr, rl, rr = seen.steer
+        angle = 0.5 * (fl + fr)
+        surface = tuple(
+            R * w * (1.0 + rho) for R, w, rho in zip(along.radius, seen.wheel_speed, x[RADIUS:], strict=True)
+        )
+        square = speed * speed
+        sway = self.yaw_acceleration * self._arm
+        sway = sway - speed * y[TIRES + 2] / GRAVITY * (speed * self.yaw_acceleration + self.leaning)
+        own = b * (1.0 - y[SCALE]) - y[BIAS] - sway
+        front, rear = self._tracks
+        levelled = own - y[BANK]
+        told = (
+            speed * across.yaw_rate(r),
+            levelled,
+            speed * (surface[1] - surface[0]) / (front * kit.cos(angle)),
+            speed * (surface[3] - surface[2]) / rear,
+            square * kit.tan(angle - 0.5 * (rl + rr)) / self._length,
+            levelled if gravity is None else own + gravity,
+            sway,
+        )
+        return told, surface
+
+    def _judged(
+        self, seen: ConditionedInputs, level: Signals, sway: Number, surface: Signals, mu: Signals, levelled: Number
+    ) -> Told:
+        """The low-passed `level` with allowances; `mu` F_x/F_z of the wheels, `levelled`: an attitude part is there."""
+        s, kit, speed = self.settings, self.kit, self.along.speed
+        P, Q, gate = self.across.filter.variance, self.along.filter.variance, s.gate
+        magnitude, largest = abs(speed), kit.maximum
+        t_g = magnitude * gate * kit.sqrt(P(YAW_BIAS) + s.yaw_rate_noise**2) + _SHARE * abs(level[YAW_RATE])
+        t_p = gate * kit.sqrt(P(BIAS) + P(BANK)) + _UNDULATION + _SHARE * abs(level[SIDE]) + abs(sway)
+        allowed, known = [t_g, t_p], [seen.good[2], seen.good[1]]
+        for axle, track in enumerate(self._tracks):
+            i, k = 2 * axle, 2 * axle + 1
+            a, c = RADIUS + i, RADIUS + k
+            force = largest(abs(mu[i]), abs(mu[k]))
+            share = _UNLIKE + (s.slip_linear + s.slip_cubic * force * force) * force
+            radii = kit.sqrt(largest(Q(a) + Q(c) - 2.0 * Q(a, c), 0.0))
+            allowed.append(magnitude * (magnitude * (share + radii) + s.slip_speed) / track)
+            rolls = abs(0.5 * (surface[i] + surface[k]) - speed) < s.agreement * magnitude + s.dead_speed
+            live = (seen.gap[i] < s.error_memory) & (seen.gap[k] < s.error_memory)
+            known.append(live & rolls & kit.no(seen.silent[i] | seen.silent[k]))
+        allowed.append(kit.minimum(_UNDERSTEER, _TOE * speed * speed) + _FOLLOW * abs(level[STEERING]))
+        return Told(tuple(level), (*allowed, t_p), (*known, seen.steered, seen.good[1] & levelled))
+
+    def _banked(self, elapsed: Number, looks: Number, gap: Number) -> Number:
+        """Cars whose road has looked banked for so long that the filter is to learn its bank."""
+        kit, speed = self.kit, self.across.filter
+        self.sloped = kit.maximum(self.sloped + kit.where(looks, elapsed, -elapsed), 0.0)
+        found = self.sloped > _PATIENCE
+        if kit.some(found):
+            speed.widen(found, (GRAVITY * _BANK) ** 2, BANK)
+            speed.widen(found, (gap * _PATIENCE) ** 2)
+            self.sloped = kit.where(found, 0.0, self.sloped)
+        return found
+
+    def _replaced(
+        self, elapsed: Number, seen: ConditionedInputs, told: Told, used_y: Number, used_r: Number, sway: Number
+    ) -> Turning:
+        """Readings that are not used, from those that are."""
+        s, kit, choose, no = self.settings, self.kit, self.kit.where, self.kit.no
+        _, b, r = seen.inertial
+        (level, allowed, known), y, speed = told, self.across.filter.mean, self.along.speed
+        pace = choose(abs(speed) > 1.0, speed, 1.0)
+        front, rear = known[FRONT], known[REAR]
+        wheels = front | rear
+
+        def best(of: Signals, nothing: Number) -> Number:
+            """From both axles, one, the steering, or a_y."""
+            axles = choose(front & rear, 0.5 * (of[FRONT] + of[REAR]), choose(front, of[FRONT], of[REAR]))
+            return choose(wheels, axles, choose(by_steer, of[STEERING], choose(used_y, of[SIDE], nothing)))
+
+        by_steer = known[STEERING] & (no(used_y) | (allowed[STEERING] < allowed[SIDE]))
+        other, doubt = best(level, 0.0), best(allowed, abs(pace))
+        unknown = no(used_r | wheels | used_y | known[STEERING])
+        turn = choose(used_r, self.across.yaw_rate(r), other / pace)
+        yaw_rate = choose(used_r, r, self.across.reading(turn))
+        switched = (self.since[_R] > 0.0) == used_r
+        ages = [
+            choose(used, 0.0, kit.minimum(age + elapsed, s.error_memory))
+            for used, age in zip((used_y, used_r), self.since, strict=True)
+        ]
+        self.since = kit.stacked(ages)
+        grown_y, grown_r = (self.grown(age, elapsed) for age in ages)
+        noise_r = choose(used_r, seen.noise[2], doubt / (s.gate * abs(pace)) * grown_r)
+        own = choose(used_r, speed * turn, other) + sway + y[BIAS] + y[BANK]
+        ay = choose(used_y, b, own / (1.0 - y[SCALE]))
+        doubt_y = (_UNDULATION + abs(sway) + choose(used_r, allowed[YAW_RATE], doubt)) / s.gate
+        noise_y = choose(used_y, seen.noise[1], doubt_y * grown_y)
+        self._differentiate(yaw_rate, switched, elapsed)
+        doubt_y = choose(used_y, 0.0, doubt_y)
+        readings, noises, used = (ay, yaw_rate), (noise_y, noise_r), (used_y, used_r)
+        return Turning(readings, noises, used, doubt_y, unknown, *self._nothing, no(used_y & used_r))
+
+    def _differentiate(self, yaw_rate: Number, switched: Number, elapsed: Number) -> None:
+        """First-order filter of the slope; where the yaw rate comes from another source than before, that is no slope."""
+        kit, kept = self.kit, self.kit.exp(-elapsed / self.settings.wheel_lag)
+        steady = kit.no(switched) & (abs(self.yaw_rate) < math.inf)
+        slope = kit.where(steady, (yaw_rate - self.yaw_rate) / elapsed, self.yaw_acceleration)
+        self.yaw_acceleration = kept * self.yaw_acceleration + (1.0 - kept) * slope
+        self.yaw_rate = yaw_rate
