@@ -52,8 +52,8 @@ class VelocityFusion(Memory):
 
     memory = ("new", "renewed", "start")
     parts = (
-        "inputs", "longitudinal_filter", "lateral_filter", "signal_monitor", "acceleration_source", "slip_direction",
-        "longitudinal_reset", "lateral_reset", "zero_velocity",
+        "_along", "_across", "inputs", "longitudinal_filter", "lateral_filter", "signal_monitor", "acceleration_source",
+        "slip_direction", "longitudinal_reset", "lateral_reset", "zero_velocity",
     )  # fmt: skip
     unknowns = ("start",)
 
@@ -132,7 +132,8 @@ class VelocityFusion(Memory):
         a, noise, doubt, blind, unbelieved, mu = pull
         self.signal_monitor.mu = mu
         turn, before = across.yaw_rate(r), along.speed
-        along.predict(dt, a, noise, turn, across.speed, doubt > 0.0)
+        unsure = across.filter.variance(lateral.SPEED)
+        along.predict(dt, a, noise, turn, (across.speed, unsure), doubt > 0.0)
         across.predict(dt, b, noise_b, r, noise_r, before, used_b & used_r)
         yaw_acceleration, left = self.signal_monitor.yaw_acceleration, across.speed
         own = along.acceleration(a) + turn * left
@@ -141,9 +142,9 @@ class VelocityFusion(Memory):
             sine, cosine = kit.sin(angle), kit.cos(angle)
             return cosine, (left + turn * x) * sine - turn * y * cosine, own - yaw_acceleration * y, sine
 
-        *course, sine = kit.each(moves, seen.steer, *self._places)
-        slipping = self.inputs.slipping(course[2], seen.fresh, dt, doubt)
-        wheel = along.correct(dt, seen, slipping, mu, b / GRAVITY, longitudinal.WheelMotion(*course), blind)
+        course = longitudinal.WheelMotion(*kit.each(moves, seen.steer, *self._places), bend=across.wheel_bend)
+        slipping = self.inputs.slipping(course.acceleration, seen.fresh, dt, doubt)
+        wheel = along.correct(dt, seen, slipping, mu, b / GRAVITY, unsure, course, blind)
         self.slip_direction(dt, seen, wheel.innovation, mu)
         standing, lost = self.zero_velocity(seen, a, b, turn, dt)
         lost = lost | self.longitudinal_reset(dt, standing, seen, wheel, slipping, mu, self._radius)
@@ -168,7 +169,7 @@ class VelocityFusion(Memory):
         self.renewed = self._never
         self._guard(seen, lost)
         outcome = Outcome(slipping, wheel, axle, standing, self.zero_velocity.stopped(seen.silent), self._hidden())
-        geometry = (sine, course[0], *self._places)
+        geometry = (course.beside, course.along, *self._places)
         inertial, used = (a, b, r), (kit.no(unbelieved) & seen.good[0], used_b, used_r)
         return fusion_step(kit, shape, along, across, seen, geometry, outcome, flags, inertial, used)
 
