@@ -9,7 +9,7 @@ friction coefficient enters. alpha is positive where F_y is (P4, P5), the opposi
 alone, so mu needs no bank.
 
 Every axle on one road: where one is further off than its model explains, neither is believed more than that, for a second
-(`strain`). An axle without side force does not slip sideways on any road, and leads V_y back however far it is.
+(`strain`); an axle without side force is, for it does not slip sideways on any road.
 
 Two scale errors decide how far the kinematics may be believed in a turn, where a and r V_x are large and cancel: s is that
 of a, sensor and leftover body roll; s_t is that of the product r V_x, of the yaw rate sensor and of the speed, whose error
@@ -117,6 +117,7 @@ class LateralFusion(CarsMemory):
             known = sum(gain * x[place] for gain, place in zip(coupling, _MOVING, strict=True))
             coupling = tuple(choose(believed, gain, 0.0) for gain in coupling)
             held = choose(believed, 0.0, known)
+            self.strain = choose(believed, self.strain, 0.0)  # the axles are all there is
         else:
             held = 0.0
         own, turned = elapsed * noise, travel * yaw_noise
@@ -189,9 +190,9 @@ class LateralFusion(CarsMemory):
         ) -> tuple[Number, ...]:
             shows, error = linear * s.side_compliance_spread, white + model
             calm = abs(friction) < sure
-            far = usable & kit.no(calm | (off * off < gate * (explained + error)))
+            far = usable & kit.no(off * off < gate * (explained + error))
             wide = white + (model + kit.where(calm, 0.0, strain)) * held
-            return usable & kit.no(far), wide, shows * shows > error, kit.where(far, abs(off), 0.0)
+            return usable & kit.no(far), wide, shows * shows > error, kit.where(far & kit.no(calm), abs(off), 0.0)
 
         explained = self.filter.expect(_SEEN, values)
         used, variance, excited, beyond = kit.each(judged, explained, innovation, model, white, values[5], mu, usable)

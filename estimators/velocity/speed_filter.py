@@ -137,7 +137,8 @@ class SpeedFilter(Memory):
             places = np.array(columns).T
             known = self._places[id(columns)] = [(place, self._at[place]) for place in places], columns
         shape, W, S = (len(columns), self.count), 0.0, 0.0
-        H = [value if np.shape(value) == shape else np.broadcast_to(np.asarray(value), shape) for value in values]
+        given = (np.asarray(value) for value in values)
+        H = [value if value.shape == shape else np.broadcast_to(value, shape) for value in given]
         for h, (_, rows) in zip(H, known[0], strict=True):
             W = W + h[:, None] * self.spread[rows]
         for h, (place, _) in zip(H, known[0], strict=True):
