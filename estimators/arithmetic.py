@@ -174,7 +174,7 @@ class ManyCars(Arithmetic):
     @staticmethod
     def some(condition: Any) -> bool:
         """Whether it holds for any car."""
-        return np.count_nonzero(condition) > 0
+        return bool(np.count_nonzero(condition))
 
     def full(self, value: float | bool) -> Number:
         """An array."""

@@ -142,7 +142,7 @@ class VelocityFusion(Memory):
             sine, cosine = kit.sin(angle), kit.cos(angle)
             return cosine, (left + turn * x) * sine - turn * y * cosine, own - yaw_acceleration * y, sine
 
-        course = longitudinal.WheelMotion(*kit.each(moves, seen.steer, *self._places), bend=across.wheel_bend)
+        course = longitudinal.WheelMotion._make((*kit.each(moves, seen.steer, *self._places), across.wheel_bend))
         slipping = self.inputs.slipping(course.acceleration, seen.fresh, dt, doubt)
         wheel = along.correct(dt, seen, slipping, mu, b / GRAVITY, unsure, course, blind)
         self.slip_direction(dt, seen, wheel.innovation, mu)

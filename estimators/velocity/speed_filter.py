@@ -136,15 +136,16 @@ class SpeedFilter(Memory):
         if known is None:
             places = np.array(columns).T
             known = self._places[id(columns)] = [(place, self._at[place]) for place in places], columns
-        shape, W, S = (len(columns), self.count), 0.0, 0.0
+        shape = len(columns), self.count
+        W: Number = 0.0
+        S: Number = 0.0
         given = (np.asarray(value) for value in values)
         H = [value if value.shape == shape else np.broadcast_to(value, shape) for value in given]
         for h, (_, rows) in zip(H, known[0], strict=True):
             W = W + h[:, None] * self.spread[rows]
         for h, (place, _) in zip(H, known[0], strict=True):
             S = S + h * W[:, place]
-        self._W: Number = W  # (m, n, b) P h'
-        self._S: Number = S  # (m, m, b) H P H'
+        self._W, self._S = W, S  # (m, n, b) P h', (m, m, b) H P H'
         out: Signals = S.diagonal().T
         return out
 

@@ -30,7 +30,7 @@ def found(driven: list[Errors]) -> list[Consistency]:
     return [one.judged() for one in driven]
 
 
-def test_the_stated_deviations_are_true_within_a_factor_of_two(found: list[Consistency]) -> None:
+def test_the_stated_deviations_are_true_on_what_tires_hold(found: list[Consistency]) -> None:
     assert [one.manoeuvre for one in found] == list(NAMES)
     assert BAND[0] < np.mean([one.nees[2] for one in found]) < BAND[1]
     assert all(one.within(BAND)[2] and max(one.beyond) < 0.05 for one in found)
@@ -40,7 +40,7 @@ def test_a_third_of_sigma_leaves_the_band(driven: list[Errors]) -> None:
     """The negative control: the same estimates, stated three times as sure."""
     sure = [one.judged(shrink=3.0) for one in driven]
     assert np.mean([one.nees[2] for one in sure]) > BAND[1]
-    assert all(max(one.beyond) > 0.05 for one in sure)
+    assert not any(one.within(BAND)[2] for one in sure)
 
 
 def test_radii_of_a_seed_are_its_own_and_as_wide_as_the_fusion_assumes(truth: Truth) -> None:
