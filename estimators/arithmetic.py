@@ -168,11 +168,13 @@ class ManyCars(Arithmetic):
 
     def __init__(self, shape: tuple[int, ...]) -> None:
         self.shape = shape
+        cars = len(shape)  # a moved axis by `np.moveaxis` costs more than small arrays do
+        self._columns, self._back = (cars, *range(cars)), (*range(1, cars + 1), 0)
 
     @staticmethod
     def some(condition: Any) -> bool:
         """Whether it holds for any car."""
-        return bool(condition.any())
+        return bool(np.count_nonzero(condition))
 
     def full(self, value: float | bool) -> Number:
         """An array."""
@@ -196,16 +198,16 @@ class ManyCars(Arithmetic):
 
     def stacked(self, values: Sequence[Number]) -> Signals:
         """(k, ...)."""
-        return np.stack(values)
+        return np.array(values)
 
     def rows(self, value: AnyArray, width: int) -> Signals:
         """Contiguous (width, ...)."""
-        return np.ascontiguousarray(np.moveaxis(value.reshape(*self.shape, width), -1, 0))
+        return np.ascontiguousarray(value.reshape(*self.shape, width).transpose(self._columns))
 
     def table(self, groups: Sequence[Signals], shape: tuple[int, ...]) -> AnyArray:
         """Groups that are lists are stacked first."""
-        arrays = [group if isinstance(group, np.ndarray) else np.stack(group) for group in groups]
-        return np.moveaxis(np.concatenate(arrays), 0, -1).reshape(*shape, -1)
+        arrays = [group if isinstance(group, np.ndarray) else np.array(group) for group in groups]
+        return np.concatenate(arrays).transpose(self._back).reshape(*shape, -1)
 
     def replaced(self, where: Number, new: float, value: Any) -> Any:
         """The cars are the last axis."""

@@ -121,7 +121,8 @@ def _drives(command: Command) -> None:
     checks.add_argument(
         "--guess", action="store_true", help="write a first drive file (to DRIVE.toml) from column names"
     )
-    checks.add_argument("--no-check", action="store_true", help="run although signs, units or sides seem wrong")
+    for group in (checks, identify):
+        group.add_argument("--no-check", action="store_true", help="go on although signs, units or sides seem wrong")
 
 
 def _studies(command: Command) -> None:

@@ -24,7 +24,7 @@ from estimators.vehicle import VehicleParameters
 
 _SURE = 0.5  # m/s: three times what 0.15 m/s^2 of unknown bias make in a second
 _REST = 0.3  # m/s below which a wheel sensor gives no pulses (`FusionSettings.dead_speed`)
-_FASTEST = 12.0  # m/s: reverse gears end there
+FASTEST = 12.0  # m/s: reverse gears end there
 _GAIN = 0.3  # m/s^2 of the wheels below which they gain nothing
 _LAG = 0.05  # s of the filter that differentiates them
 
@@ -86,7 +86,7 @@ class DirectionOfTravel(CarsMemory):
         evidence = kit.maximum(kit.minimum(self.evidence + more, 2.0 * _SURE), -2.0 * _SURE)
         # at rest nothing is known of the next way; a start counts from half a second before the wheels say so
         evidence = choose(rest, 0.99 * evidence, evidence)
-        evidence = choose(surface > _FASTEST, 2.0 * _SURE, evidence)
+        evidence = choose(surface > FASTEST, 2.0 * _SURE, evidence)
         told = (given == 1.0) | (given == -1.0)
         evidence = choose(told, given * 2.0 * _SURE, evidence)
         found = choose(abs(evidence) > 0.1 * _SURE, kit.sign(evidence), choose(first, 1.0, self.way))

@@ -51,7 +51,7 @@ class VelocityFusion(Memory):
 
     memory = ("new", "renewed", "start")
     parts = (
-        "inputs", "longitudinal_filter", "lateral_filter", "signal_monitor",
+        "_along", "_across", "inputs", "longitudinal_filter", "lateral_filter", "signal_monitor",
         "longitudinal_reset", "lateral_reset", "zero_velocity",
     )  # fmt: skip
     unknowns = ("start",)
@@ -130,7 +130,8 @@ class VelocityFusion(Memory):
         judged = self.signal_monitor(dt, seen, given, self.inputs.slope, heavy)
         (a, b, r), noise, used, doubt, taken, road, mu, blind, unknown, steered, gated, contested = judged
         turn, before = across.yaw_rate(r), along.speed
-        along.predict(dt, a, noise[0], turn, across.speed, doubt[0] > 0.0)
+        unsure = 1.0 * across.filter.variance(lateral.SPEED)  # of arrays a copy: prediction writes into the covariance
+        along.predict(dt, a, noise[0], turn, (across.speed, unsure), doubt[0] > 0.0)
         across.predict(dt, b, noise[1], r, noise[2], before, used[1] & used[2])
         yaw_acceleration, left, felt = self.signal_monitor.turn.yaw_acceleration, across.speed, b + road[1]
         own = along.acceleration(a) + turn * left
@@ -139,9 +140,9 @@ class VelocityFusion(Memory):
             sine, cosine = kit.sin(angle), kit.cos(angle)
             return cosine, (left + turn * x) * sine - turn * y * cosine, own - yaw_acceleration * y, sine
 
-        *course, sine = kit.each(moves, seen.steer, *self._places)
-        slipping = self.inputs.slipping(course[2], seen.fresh, dt, doubt[0])
-        wheel = along.correct(dt, seen, slipping, mu, felt / GRAVITY, longitudinal.WheelMotion(*course), blind)
+        course = longitudinal.WheelMotion._make((*kit.each(moves, seen.steer, *self._places), across.wheel_bend))
+        slipping = self.inputs.slipping(course.acceleration, seen.fresh, dt, doubt[0])
+        wheel = along.correct(dt, seen, slipping, mu, felt / GRAVITY, unsure, course, blind)
         standing, lost = self.zero_velocity(seen, a, b, turn, dt)
         lost = lost | self.longitudinal_reset(dt, standing, seen, wheel, slipping, mu, self._radius)
         along.zero_velocity_update(standing)
@@ -165,7 +166,7 @@ class VelocityFusion(Memory):
         self.renewed = self._never
         self._guard(seen, lost)
         outcome = Outcome(slipping, wheel, axle, standing, self.zero_velocity.stopped(seen.silent), self._hidden())
-        geometry = (sine, course[0], *self._places)
+        geometry = (course.beside, course.along, *self._places)
         inertial = (a + taken[0], b + taken[1], r)
         return fusion_step(kit, shape, along, across, seen, geometry, outcome, flags, inertial, (*used, contested))
 

@@ -54,7 +54,8 @@ class FusionSettings:
     slip_compliance: float = 0.03  # slip per unit of F_x/F_z: normalised stiffness 33, of a range from 15 to 80
     slip_compliance_spread: float = 0.02
     slip_memory: float = 90.0  # s: a road surface, one to two km
-    slip_floor: float = 0.003  # slip error of a free-rolling wheel
+    slip_floor: float = 0.001  # slip error of a free-rolling wheel: asphalt, on a recorded drive 0.0008
+    slip_load: float = 0.01  # the same per g sideways: a turn moves load, and a radius gives by 0.5 to 1 mm per kN
     slip_linear: float = 0.03  # slip error per unit of mu
     slip_cubic: float = 0.1  # slip error per unit of mu^3: the curve bends towards its peak
     slip_speed: float = 0.02  # m/s: floor of the slip velocity error

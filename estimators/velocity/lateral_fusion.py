@@ -8,6 +8,9 @@ A single-track car whose side slip follows its forces, with stiffnesses that ada
 friction coefficient enters. alpha is positive where F_y is (P4, P5), the opposite of P1. The accelerometer feels forces
 alone, so mu needs no bank.
 
+Every axle on one road: where one is further off than its model explains, neither is believed more than that, for a second
+(`strain`); an axle without side force is, for it does not slip sideways on any road.
+
 Two scale errors decide how far the kinematics may be believed in a turn, where a and r V_x are large and cancel: s is that
 of a, sensor and leftover body roll; s_t is that of the product r V_x, of the yaw rate sensor and of the speed, whose error
 is that of the radii. Only the sensor's share of s_t is taken off the yaw rate.
@@ -20,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimators.arithmetic import Number, Signals, arithmetic
+from estimators.memory import CarsMemory
 from estimators.signals import limits
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity.fusion_settings import FusionSettings
@@ -27,6 +31,8 @@ from estimators.velocity.speed_filter_few import speed_filter
 
 SPEED, BIAS, YAW_BIAS, SCALE, TURN_SCALE, BANK, TIRES = 0, 1, 2, 3, 4, 5, 6  # TIRES: c_1, c_3 front, c_1, c_3 rear
 SIZE = 10
+_TOLD = 0.15**2  # (F_y/F_z)^2 from which on the side slip tells how the tires bend
+_STEEPEST = 2.0  # rad per F_y/F_z: sliding on ice
 _MOVING = (BIAS, BANK, YAW_BIAS, SCALE, TURN_SCALE)
 _SEEN = tuple((SPEED, BIAS, YAW_BIAS, SCALE, TURN_SCALE, TIRES + 2 * axle, TIRES + 2 * axle + 1) for axle in (0, 1))
 _STILL = ((SPEED, TURN_SCALE), (YAW_BIAS, TURN_SCALE))
@@ -41,8 +47,10 @@ class AxleUpdate(NamedTuple):
     excited: Number  # whether an axle slips enough for its stiffness to show above the error of its condition
 
 
-class LateralFusion:
+class LateralFusion(CarsMemory):
     """V_y filter of `count` cars."""
+
+    memory = ("strain", "bend")
 
     def __init__(self, vehicle: VehicleParameters, settings: FusionSettings, every: int, count: int) -> None:
         s = self.settings = settings
@@ -55,6 +63,8 @@ class LateralFusion:
         rates[BIAS:BANK], rates[TIRES:] = 1.0 / s.sensor_memory, 1.0 / s.side_memory
         spread = np.diag([*body, *np.square(tires)])
         self.filter = speed_filter(mean, spread, rates, (BANK, 1.0 / s.road_length), SIZE, every, count)
+        self.strain: Number = self.kit.full(0.0)  # m/s by which axles have been off of late
+        self.bend: Signals = self.kit.stacked([self.kit.full(0.0)] * 2)  # side slip per F_y/F_z beyond c_1, rad
         self._both = self.kit.signals((1.0, 1.0))
         self._sensor = s.scale**2 / turn_scale  # share of the yaw rate sensor in s_t
         m, L, inertia = vehicle.mass, vehicle.wheelbase, vehicle.yaw_inertia
@@ -107,6 +117,7 @@ class LateralFusion:
             known = sum(gain * x[place] for gain, place in zip(coupling, _MOVING, strict=True))
             coupling = tuple(choose(believed, gain, 0.0) for gain in coupling)
             held = choose(believed, 0.0, known)
+            self.strain = choose(believed, self.strain, 0.0)  # the axles are all there is
         else:
             held = 0.0
         own, turned = elapsed * noise, travel * yaw_noise
@@ -135,6 +146,8 @@ class LateralFusion:
         own = measured * (1.0 - x[SCALE]) - x[BIAS]
         held = largest(1.0, 2.0 * s.side_error_memory / elapsed)
         sensed, one, gate = self._sensor * yaw_rate, kit.full(1.0), s.gate**2
+        kept, sure = kit.exp(-elapsed / s.lost_time), s.unloaded - s.gate * doubt / GRAVITY
+        strain, pace = self.strain * self.strain, largest(magnitude, 1.0)
 
         def predicted(
             angle: Number,
@@ -158,20 +171,42 @@ class LateralFusion:
             white = turn_noise + speed * speed * steering_noise
             values = (one, steep, -arm * one, steep * measured, -arm * sensed, linear, linear * square)
             unknown = steep * doubt
-            return innovation, mu, sigma * sigma + unknown * unknown, white, *values
+            # what the tires slip sideways by the kinematics, beyond the straight line
+            beyond = (abs(innovation + magnitude * side) - sigma) / pace - c1 * abs(mu)
+            excess = smallest(largest(beyond, 0.0) * abs(mu) / largest(square, _TOLD), _STEEPEST)
+            return innovation, mu, sigma * sigma + unknown * unknown, white, excess, *values
 
-        innovation, mu, model, white, *values = kit.each(predicted, steer, x[TIRES::2], x[TIRES + 1 :: 2], *self._axles)
+        tires = x[TIRES::2], x[TIRES + 1 :: 2]
+        innovation, mu, model, white, excess, *values = kit.each(predicted, steer, *tires, *self._axles)
 
         def judged(
-            explained: Number, off: Number, model: Number, white: Number, linear: Number, usable: Number
+            explained: Number,
+            off: Number,
+            model: Number,
+            white: Number,
+            linear: Number,
+            friction: Number,
+            usable: Number,
         ) -> tuple[Number, ...]:
             shows, error = linear * s.side_compliance_spread, white + model
-            return usable & (off * off < gate * (explained + error)), white + model * held, shows * shows > error
+            calm = abs(friction) < sure
+            far = usable & kit.no(off * off < gate * (explained + error))
+            wide = white + (model + kit.where(calm, 0.0, strain)) * held
+            return usable & kit.no(far), wide, shows * shows > error, kit.where(far & kit.no(calm), abs(off), 0.0)
 
         explained = self.filter.expect(_SEEN, values)
-        used, variance, excited = kit.each(judged, explained, innovation, model, white, values[5], usable)
+        used, variance, excited, beyond = kit.each(judged, explained, innovation, model, white, values[5], mu, usable)
+        self.strain = kit.maximum(kept * self.strain, kit.maximum(*beyond))
         self.filter.weigh(innovation, variance, used)
+        bent = kit.exp(-elapsed / s.error_memory)
+        (self.bend,) = kit.each(lambda old, new: (bent * old + (1.0 - bent) * new,), self.bend, excess)
         return AxleUpdate(innovation, used, mu, excited[0] | excited[1])
+
+    @property
+    def wheel_bend(self) -> Signals:
+        """`bend` of the four wheels."""
+        front, rear = self.bend
+        return self.kit.stacked((front, front, rear, rear))
 
     def friction(self, measured: Number) -> Number:
         """|F_y|/F_z of the whole car, from its a_y as measured."""

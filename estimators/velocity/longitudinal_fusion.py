@@ -1,14 +1,19 @@
 """Longitudinal half of the fusion: one speed, the errors of the inertial unit, the radii, and how far to trust a wheel.
 
     dV_x/dt = a (1 - s) - b - g + r V_y                                            P2 (15) with bias, grade and scale
-    R_i w_i = v_xt,i + |V_x| c mu_i - rho_i R_i w_i + error                         a wheel: slip follows the force
+    R_i w_i = v_xt,i + |V_x| (c + e_i) mu_i - rho_i R_i w_i + error                a wheel: slip follows the force
 
-s scale error, b bias, g gravity along the road, c slip compliance, mu_i = F_x/F_z, rho_i relative radius error, v_xt,i
-speed of the wheel centre along the tire. The slip error grows with the friction used; a wheel whose surface leaves the
-car, or whose innovation is larger than its own model can explain, is left out while that lasts (the high-slip
-detection of P2 notes 7 asks the same two questions). The force tells the side to which a wheel slips: towards the
+s scale error, b bias, g gravity along the road, c slip compliance, e_i what side slip adds to it, mu_i = F_x/F_z, rho_i
+relative radius error, v_xt,i speed of the wheel centre along the tire. The slip error grows with the friction used; a wheel
+whose surface leaves the car, or whose innovation is larger than its own model can explain, is left out while that lasts (the
+high-slip detection of P2 notes 7 asks the same two questions). The force tells the side to which a wheel slips: towards the
 other side a wheel is believed twice as far. Radii are learned from wheels that roll freely, where no slip hides them:
 neither one along the tire nor, through the load that a turn moves from side to side, one across it.
+
+Friction opposes slip, so slips along and across are to each other as the forces are (isotropic tire, Pacejka (2006) 3.2.3): a
+tire that slides sideways slips along by far more than c mu. What the side slip is beyond c_1 mu_y, over mu_y, is e_i
+(`LateralFusion.bend`). What V_y may be off enters r V_y and the steered wheels. Where a wheel is hardly used, c is learned with
+low-passed forces: those of the same sample hold the noise of its wheel speeds, and would shrink it.
 """
 
 from __future__ import annotations
@@ -18,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimators.arithmetic import Number, Signals, arithmetic
+from estimators.memory import CarsMemory
 from estimators.vehicle import GRAVITY
 from estimators.velocity.fusion_inputs import ConditionedInputs
 from estimators.velocity.fusion_settings import FusionSettings
@@ -44,14 +50,19 @@ class WheelMotion(NamedTuple):
     along: Signals
     shift: Signals  # m/s
     acceleration: Signals  # m/s^2, of the car at the wheel
+    beside: Signals  # share of V_y in v_xt
+    bend: Signals  # slip per unit of F_x/F_z that side slip adds to the compliance
 
 
-class LongitudinalFusion:
+class LongitudinalFusion(CarsMemory):
     """Speed filter of `count` cars; `radius` of the four wheels, m."""
+
+    memory = ("steady",)
 
     def __init__(self, radius: Signals, settings: FusionSettings, every: int, count: int) -> None:
         s = self.settings = settings
         self.radius, self.kit = radius, arithmetic((count,))
+        self.steady: Signals = self.kit.stacked([self.kit.full(0.0)] * 4)  # F_x/F_z, low-passed
         mean, rates = np.zeros((2, SIZE))
         mean[SLIP] = s.slip_compliance
         deviations = [1.0, s.acceleration_bias, GRAVITY * s.grade, s.scale, s.slip_compliance_spread]
@@ -73,19 +84,27 @@ class LongitudinalFusion:
         return measured * (1.0 - x[SCALE]) - x[BIAS] - x[GRADE]
 
     def predict(
-        self, elapsed: Number, measured: Number, noise: Number, yaw_rate: Number, lateral: Number, doubted: Number
+        self,
+        elapsed: Number,
+        measured: Number,
+        noise: Number,
+        yaw_rate: Number,
+        lateral: tuple[Number, Number],
+        doubted: Number,
     ) -> None:
-        """`measured` a_x with the standard deviation `noise` of its mean over the sample, m/s^2; `lateral` V_y.
+        """`measured` a_x with the standard deviation `noise` of its mean over the sample, m/s^2; `lateral` V_y and its variance.
 
         A reading that is `doubted` teaches nothing about the sensor, nor about the road.
         """
         sigma, teaching, pull = elapsed * noise, elapsed, measured
+        left, unsure = lateral
+        coupled = 2.0 * self.settings.error_memory * elapsed * yaw_rate * yaw_rate * unsure
         if self.kit.some(doubted):
             teaching = self.kit.where(doubted, 0.0, elapsed)
             pull = self.kit.where(doubted, self.acceleration(measured), measured)
-        shift = elapsed * (pull + yaw_rate * lateral)
+        shift = elapsed * (pull + yaw_rate * left)
         coupling = (-teaching, -teaching, -teaching * measured)
-        self.filter.move(elapsed, abs(self.speed), _MOVING, coupling, shift, sigma * sigma)
+        self.filter.move(elapsed, abs(self.speed), _MOVING, coupling, shift, sigma * sigma + coupled)
 
     def correct(
         self,
@@ -94,10 +113,14 @@ class LongitudinalFusion:
         slipping: Signals,
         mu: Signals,
         across: Number,
+        unsure: Number,
         course: WheelMotion,
         blind: Number,
     ) -> WheelUpdate:
-        """`mu` F_x/F_z of the wheels; `across`: friction used sideways; `blind`: mu may be that of any braking car."""
+        """`mu` F_x/F_z of the wheels; `across`: friction used sideways; `unsure`: variance of V_y.
+
+        `blind`: mu may be that of any braking car.
+        """
         s, x, kit = self.settings, self.filter.mean, self.kit
         choose, largest = kit.where, kit.maximum
         speed, compliance = x[SPEED], x[SLIP]
@@ -105,6 +128,8 @@ class LongitudinalFusion:
         per_speed = s.tooth_pitch / largest(magnitude, s.dead_speed)
         held = largest(1.0, 2.0 * s.error_memory / elapsed)
         wrong_way, gate, freely = s.wrong_way_gate**2, s.gate**2, s.free_rolling
+        turned, kept = s.slip_load * abs(across), kit.exp(-elapsed / s.error_memory)
+        (self.steady,) = kit.each(lambda old, new: (kept * old + (1.0 - kept) * new,), self.steady, mu)
         hidden = choose(blind, s.unseen_acceleration / GRAVITY, 0.0)
 
         def predicted(
@@ -114,22 +139,33 @@ class LongitudinalFusion:
             gain: Number,
             shift: Number,
             pull: Number,
+            beside: Number,
+            bend: Number,
             radius: Number,
             error: Number,
+            steady: Number,
         ) -> tuple[Number, ...]:
-            surface, slip, late = radius * w, compliance * force, per_speed * pull
+            surface, late = radius * w, per_speed * pull
+            slip = (compliance + bend) * force
             expected = gain * speed + shift + magnitude * slip
             innovation = surface * (1.0 + error) - expected
             friction = largest(abs(force), hidden)
-            share = s.slip_floor + (s.slip_linear + s.slip_cubic * friction * friction) * friction
-            sigma = magnitude * share + s.slip_speed
-            model = sigma * sigma + late * late  # what slip compliance and pulse ring leave unexplained
+            share = s.slip_linear + 0.5 * bend + s.slip_cubic * friction * friction
+            sigma = magnitude * (s.slip_floor + turned + share * friction) + s.slip_speed
+            # what slip, pulse ring and V_y leave unexplained
+            model = sigma * sigma + late * late + beside * beside * unsure
             model = choose(silent, largest(model, s.dead_speed**2), model)
             # the measured surface speed here would correlate sensitivity and innovation: noise would shrink the radii
-            return innovation, model, gain + way * slip, magnitude * force, -expected / (1.0 + error)
+            return (
+                innovation,
+                model,
+                gain + way * slip,
+                magnitude * choose(abs(force) < s.unloaded, steady, force),
+                -expected / (1.0 + error),
+            )
 
         innovation, model, *values = kit.each(
-            predicted, seen.wheel_speed, seen.silent, mu, *course, self.radius, x[RADIUS:]
+            predicted, seen.wheel_speed, seen.silent, mu, *course, self.radius, x[RADIUS:], self.steady
         )
 
         def judged(

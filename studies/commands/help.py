@@ -108,7 +108,7 @@ gainsmith run LOG.csv --drive DRIVE.toml --out out/run --report out/run.html""",
         "fit tire, radius and wheel inertia to a recorded drive",
         """\
 Fits slip stiffness, relaxation, damping, effective radii and wheel inertia to a log, with confidence intervals. What
-the log does not excite stays at its prior and is named.
+the log does not excite stays at its prior and is named. Signals that contradict one another are refused as by run.
 
 Writes into DIR: identified.toml (a parameter set that a specification takes as it is), identification.json, and pictures of the
 residuals.""",

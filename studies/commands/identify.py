@@ -12,12 +12,14 @@ from studies.identify.identify import identify_drive
 from studies.identify.result import HEADER, content, rows, warnings, write_identification
 
 
-def run_identify(logs: list[Path], drive: Path, out: Path, as_json: bool) -> int:
+def run_identify(logs: list[Path], drive: Path, out: Path, as_json: bool, no_check: bool = False) -> int:
     """Identify the car from the log, write the files, print the table; 0 when done, warnings to standard error."""
     check_folder(out)
     with progress_bar() as progress:
         task = progress.add_task("identifying", total=1.0)
-        found = identify_drive(logs, drive, progress=lambda done: progress.update(task, completed=0.95 * done))
+        found = identify_drive(
+            logs, drive, check=not no_check, progress=lambda done: progress.update(task, completed=0.95 * done)
+        )
         write_identification(found, out)
         progress.update(task, completed=1.0)
     if as_json:

@@ -91,6 +91,7 @@ def pipeline_of(
         corner_observers=corners if velocity is None else None,
         sideslip=_sideslip_of(drive, vehicle),
         speed_of_rear_wheels=chosen.sideslip_speed == "rear-wheels",
+        unsigned_wheels=drive.unsigned_wheels,
     )
     return pipeline, assumptions
 
@@ -126,7 +127,7 @@ def run_chain(
     torque = np.stack([signals.get(f"torque_{corner}", nothing) for corner in CORNERS], axis=-1)
     ax, ay, turn = signals["ax"], signals.get("ay", zero), signals.get("yaw_rate", zero)
     wheel, steer = inputs.wheel_speed, inputs.steer
-    optional = {name: signals[name] for name in ("az", "roll_rate", "pitch_rate") if name in signals}
+    optional = {name: signals[name] for name in ("az", "roll_rate", "pitch_rate", "direction") if name in signals}
     rows: list[tuple[Any, ...]] = []
     for k in range(n):
         extra = {name: value[k] for name, value in optional.items()}

@@ -19,6 +19,7 @@ from estimators.vehicle import VehicleParameters
 from studies.drives import quantities as si
 from studies.drives.columns import Column, LogFile, check_alignment, check_logs
 from studies.drives.compliance import Suspension
+from studies.drives.direction import Gear
 from studies.drives.mounted import Mountings, check_mountings
 from studies.drives.quantities import CORNERS, REFERENCES, SIGNALS
 from synthesis.toml_file import StrictTable, load_toml
@@ -165,6 +166,21 @@ def check_columns(
             raise ValueError(f"{place}.log: {unknown('log', column.log, names)}")
 
 
+def check_direction(gear: Gear | None, unsigned: bool, logs: Sequence[LogFile]) -> None:
+    """A gear belongs to wheel speeds without a sign, and says which log holds it."""
+    if gear is None:
+        return
+    names = [log.name for log in logs]
+    if not unsigned:
+        raise ValueError(
+            "direction: belongs to wheel speeds without a sign; add unsigned_wheels = true, or leave it out"
+        )
+    if gear.log is None and len(names) > 1:
+        raise ValueError(f"direction.log: missing; say which log holds column '{gear.column}': {', '.join(names)}")
+    if gear.log is not None and gear.log not in names:
+        raise ValueError(f"direction.log: {unknown('log', gear.log, names)}")
+
+
 def check_signals(signals: Mapping[str, Column], vehicle: Vehicle) -> None:
     """What the observers cannot do without is there, and the vehicle has what the signals need."""
     for name in (*WHEEL_SPEEDS, "ax"):
@@ -260,6 +276,8 @@ class DriveFile(StrictTable):
     ``schedules`` are for the corner observers: without them the pipeline of the fusion runs alone.
 
     ``mounting``: where the inertial unit and the reference sit, if not at the centre of gravity and along the axes of the car.
+    ``unsigned_wheels``: the wheel speed sensors count teeth and do not tell backward from forward, as in most cars; the gear in
+    ``direction`` does, or the accelerometer. Signed wheel speeds need neither.
     ``check``: compare the signals of the log with one another (:mod:`.frames`) before anything is estimated from them.
     """
 
@@ -271,6 +289,8 @@ class DriveFile(StrictTable):
     mounting: Mountings = Mountings()
     schedules: Schedules | None = None
     check: bool = True
+    unsigned_wheels: bool = False
+    direction: Gear | None = None
     observer: Observer = Observer()
     estimators: Estimators = Estimators()
     log: Annotated[list[LogFile], Field(min_length=1)]
@@ -281,13 +301,14 @@ class DriveFile(StrictTable):
     def _tables_agree(self) -> Self:
         check_logs(self.log)
         check_columns(self.signals, self.reference, self.log, self.vehicle)
+        check_direction(self.direction, self.unsigned_wheels, self.log)
         check_alignment({**self.reference, **self.signals}, self.log)
         check_signals(self.signals, self.vehicle)
         check_mountings(self.mounting, self.signals, self.reference)
         check_estimators(self.estimators, self.signals, self.vehicle, self.schedules)
         return self
 
-    def log_of(self, column: Column) -> str:
+    def log_of(self, column: Column | Gear) -> str:
         """The name of the log that holds a column (the only one, if the file has one)."""
         return column.log if column.log is not None else self.log[0].name
 

@@ -11,6 +11,7 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,9 +19,12 @@ import numpy as np
 from estimators.arrays import FloatArray
 from estimators.display import Display
 from studies.drives.agreement import Comparison, compare, wheels_apart
+from studies.drives.direction import of_known_way
 from studies.drives.drive_file import WHEEL_SPEEDS, DriveFile
+from studies.drives.log import DriveLog, read_log
 from studies.drives.plausible import ACCELERATION_UNITS, ANGLE_UNITS, RATE_UNITS, STANDING, WHEEL_UNITS
 from studies.drives.quantities import CORNERS, SIGNALS, short
+from studies.errors import LogError
 
 UNITS = {
     "ax": ACCELERATION_UNITS[:2], "ay": ACCELERATION_UNITS[:2], "az": ACCELERATION_UNITS[:2],
@@ -78,8 +82,26 @@ class FrameReport(Display):
         return found
 
 
+def read_checked(paths: Sequence[Path], drive: DriveFile, check: bool = True) -> tuple[DriveLog, tuple[str, ...]]:
+    """The log of a drive, and what is assumed of it: nothing once its signals were compared (in its report as "frames").
+
+    Raises LogError: as :func:`.read_log`, and where signals contradict one another, unless ``check`` is False here or in the
+    drive file.
+    """
+    log = read_log(paths, drive)
+    if not (check and drive.check):
+        return log, ("signs, units and sides of the signals are right: not checked (--no-check, or check = false)",)
+    found = check_frames(log.signals, drive, log.files)
+    if found.complaint is not None:
+        raise LogError(found.complaint)
+    log.report["frames"] = found.rows()
+    return log, ()
+
+
 def check_frames(signals: Mapping[str, FloatArray], drive: DriveFile, files: Mapping[str, str]) -> FrameReport:
     """Compare the signals (n,) in SI with one another; ``files`` names the file of each log, for the message."""
+    if drive.unsigned_wheels:
+        signals = of_known_way(signals, drive.vehicle.parameters)
     apart = [one for one in wheels_apart(signals, drive) if one.line is None or abs(one.line.slope) > STANDING]
     wheels = [mistake for corner in CORNERS for mistake in _singles(drive, f"wheel_speed_{corner}")]
     named = _explain(lambda _factor: apart, wheels)
@@ -151,7 +173,7 @@ def _singles(drive: DriveFile, group: str) -> list[Mistake]:
     if not names:
         return []
     flip = _flip(drive, names)
-    reversing = " (or reversed with unsigned wheel speeds)" if group == "wheels" else ""
+    reversing = " (or reversed with unsigned wheel speeds: unsigned_wheels = true)" if group == "wheels" else ""
     found = [Mistake({group: -1.0}, flip + reversing, rare=group == "wheels")]
     if len(units) > 1:
         return found

@@ -198,7 +198,9 @@ def _text(files: list[_Found], missing: Sequence[str]) -> str:
     named = {one.name for file in files for one in file.guesses.values()}
     lines = [
         "# A guess by gainsmith run --guess: read every line, above all those marked CHECK. Frame: x forward, y left, z up.",
-        'schema = "gainsmith.drive/1"', f"name = {_quoted(files[0].path.stem)}", f'sample_time = "{step:.6g} ms"', "",
+        'schema = "gainsmith.drive/1"', f"name = {_quoted(files[0].path.stem)}", f'sample_time = "{step:.6g} ms"',
+        "# unsigned_wheels = true # the wheel speeds have no sign, as in most cars; the gear tells the way, if the log has it:",
+        '# direction = { column = "gear", backward = [-1] } # the readings that mean reverse', "",
         "[vehicle] # CHECK: a usual car, not yours",
         'mass = "1600 kg"', 'front_axle_distance = "1.3 m" # front axle to centre of gravity', 'rear_axle_distance = "1.5 m"',
         'cg_height = "0.55 m"', 'front_track = "1.58 m"', 'rear_track = "1.58 m"',

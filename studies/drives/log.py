@@ -13,6 +13,7 @@ import numpy as np
 from estimators.arrays import FloatArray
 from studies.drives.align import find_offset
 from studies.drives.columns import Column, LogFile
+from studies.drives.direction import signed_wheels
 from studies.drives.drive_file import DriveFile
 from studies.drives.formats import is_bag_folder, read_table
 from studies.drives.mounted import PULLS, RATES, centred_reference, centred_signals
@@ -82,6 +83,12 @@ def read_log(paths: Sequence[Path], drive: DriveFile) -> DriveLog:
         return out
 
     signals, reference = on_grid(drive.signals, "signals"), on_grid(drive.reference, "reference")
+    if (gear := drive.direction) is not None:
+        log = drive.log_of(gear)
+        way = resample(tracks[log].stamped.time + offsets[log], tracks[log].signals["direction"], grid, gaps[log])
+        signals["direction"] = np.where(np.abs(way) == 1.0, way, 0.0)  # between two gears it says nothing
+    if drive.unsigned_wheels:
+        signals |= signed_wheels(signals)
     check_plausible(drive, signals, reference, {name: path.name for name, path in files.items()})
     unit = {name: signals[name] for name in (*PULLS, *RATES) if name in signals}
     signals = centred_signals(signals, drive.mounting.inertial, drive.sample_time)
@@ -135,6 +142,9 @@ def _read_track(path: Path, entry: LogFile, drive: DriveFile) -> tuple[_Track, d
     wanted = {entry.time: f"time of log '{entry.name}'"}
     wanted |= {c.column: f"reference.{name}" for name, c in reference.items()}
     wanted |= {c.column: f"signals.{name}" for name, c in signals.items()}
+    gear = drive.direction if drive.direction and drive.log_of(drive.direction) == entry.name else None
+    if gear is not None:
+        wanted.setdefault(gear.column, "direction")
     table = read_table(path, wanted, entry)
     values = {column: table.values[column] for column in wanted if column != entry.time}
     unit = "s" if entry.time_format == "iso" or table.merged else entry.time_unit
@@ -152,12 +162,14 @@ def _read_track(path: Path, entry: LogFile, drive: DriveFile) -> tuple[_Track, d
         "allowed_gap_s": entry.allowed_gap, "median_rate_hz": float(1.0 / np.median(spacing)),
         "clock_offset_s": entry.clock_offset, "not_finite": table.not_finite,
     }  # fmt: skip
+    measured = {
+        n: _sane(stamped.values[c.column], c.scale(SIGNALS[n], drive.vehicle.radius_for(n))) for n, c in signals.items()
+    }
+    if gear is not None:
+        measured["direction"] = gear.ways(stamped.values[gear.column])
     track = _Track(
         stamped=stamped,
-        signals={
-            n: _sane(stamped.values[c.column], c.scale(SIGNALS[n], drive.vehicle.radius_for(n)))
-            for n, c in signals.items()
-        },
+        signals=measured,
         reference={n: _sane(stamped.values[c.column], c.scale(REFERENCES[n])) for n, c in reference.items()},
     )
     return track, report

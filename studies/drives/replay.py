@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimators.arithmetic import ManyCars, OneCar
+from estimators.arithmetic import ManyCars
 from estimators.arrays import FloatArray, IntArray
 from estimators.pipeline import CornerSample
 from estimators.pipeline.corner_kinds import CornerKind
@@ -36,30 +36,64 @@ class Replay:
 
 
 def replay(inputs: CornerInputs, observer: CornerKind, progress: Progress = lambda _done: None) -> Replay:
-    """Run the four observers; V_x of the last step enters the corner accelerations of the next, P1 notes 6.
-
-    They start at rest relative to the road (z = v_r = 0) with the first sample. Wheel accelerations are backward
-    differences, so step k moves the estimate from sample k - 1 to k with what is known at k: nothing looks ahead.
-    """
+    """Run the four observers over a drive."""
     n = inputs.time.size
-    relative, innovation = np.zeros((n, 4)), np.full((n, 4), np.nan)
-    flags = np.zeros((n, 4), dtype=np.int64)
+    innovation, flags = np.full((n, 4), np.nan), np.zeros((n, 4), dtype=np.int64)
     surface, dw = inputs.surface_speed, inputs.wheel_acceleration
-    wheel_part = inputs.radius * dw - inputs.free
-    gain, shift = centre_map(inputs)
-    vx = float(held(mean_over(surface))[0])
-    for k in range(1, n):
-        u = wheel_part[k] - inputs.per_speed[k] * vx
-        slip = slip_ratio(surface[k - 1], surface[k - 1] - relative[k - 1])
+
+    def observe(k: int, u: FloatArray, last: FloatArray) -> FloatArray:
+        slip = slip_ratio(surface[k - 1], surface[k - 1] - last)
         measured = inputs.normalised_force[k], inputs.wheel_speed[k], dw[k]
         step = observer.step(CornerSample(u, *measured, slip, inputs.ax[k], inputs.ay[k]))
-        relative[k], innovation[k], flags[k] = step.relative_velocity, step.innovation, step.flags
-        seen = cg_velocity(gain[k] * (surface[k] - relative[k]) + shift[k])
-        vx = float(seen) if np.isfinite(seen) else vx
+        innovation[k], flags[k] = step.innovation, step.flags
         if k % max(1, n // PROGRESS_STEPS) == 0:
             progress(k / n)
-    corner = gain * (surface - relative) + shift
-    return Replay(cg_velocity(corner), corner, relative, innovation, flags)
+        return step.relative_velocity
+
+    velocity, relative = march(inputs, observe, np.array(1.0))
+    gain, shift = centre_map(inputs)
+    return Replay(velocity, gain * (surface - relative) + shift, relative, innovation, flags)
+
+
+Observe = Callable[[int, FloatArray, FloatArray], FloatArray]
+"""(sample k, u (..., 4) m/s^2, v_r of sample k - 1) -> v_r (..., 4), m/s."""
+
+
+def march(inputs: CornerInputs, observe: Observe, share: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """V_x (n, ...) and v_r (n, ..., 4) of four observers, or of many sets of them, over a drive.
+
+    ``share`` (...): effective radius of each set over that of the inputs. V_x of the last step enters the corner accelerations
+    of the next, P1 notes 6. They start at rest relative to the road (z = v_r = 0) with the first sample. Wheel accelerations are
+    backward differences, so step k moves the estimate from sample k - 1 to k with what is known at k: nothing looks ahead.
+    """
+    gain, shift = centre_map(inputs)
+    weights = centre_weights(inputs)
+    # V_x = share rolled + offset - slipped v_r
+    rolled = (weights * np.nan_to_num(gain * inputs.surface_speed)).sum(axis=1)
+    offset, slipped = (weights * np.nan_to_num(shift)).sum(axis=1), weights * np.nan_to_num(gain)
+    spin, n = inputs.radius * inputs.wheel_acceleration, inputs.time.size
+    velocity, relative = np.empty((n, *share.shape)), np.zeros((n, *share.shape, 4))
+    seen = share * float(held(mean_over(inputs.surface_speed))[0])
+    for k in range(n):
+        if k:
+            u = share[..., None] * spin[k] - inputs.free[k] - inputs.per_speed[k] * seen[..., None]
+            relative[k] = observe(k, u, relative[k - 1])
+        velocity[k] = share * rolled[k] + offset[k] - (slipped[k] * relative[k]).sum(axis=-1)
+        if k and np.isfinite(rolled[k]):
+            seen = velocity[k]
+    return velocity, relative
+
+
+def centre_weights(inputs: CornerInputs) -> FloatArray:
+    """What every corner counts in V_x (n, 4): missing ones 0, and NaN where none has a speed.
+
+    Axles weigh 0.5 each, wheels of an axle alike.
+    """
+    gain, shift = centre_map(inputs)
+    known = np.isfinite(gain * inputs.surface_speed + shift)
+    units = (np.where(known, unit, np.nan) for unit in np.eye(4))
+    mean = (weighed(ManyCars(known.shape[:1]), corner.T, 0.5)[0] for corner in units)
+    return np.stack([np.asarray(value) for value in mean], axis=-1)
 
 
 def centre_map(inputs: CornerInputs) -> tuple[FloatArray, FloatArray]:
@@ -71,10 +105,3 @@ def centre_map(inputs: CornerInputs) -> tuple[FloatArray, FloatArray]:
     r = inputs.yaw_rate[:, None]
     across = inputs.vy[:, None] + r * inputs.x
     return 1.0 / np.cos(inputs.steer), r * inputs.y - across * np.tan(inputs.steer)
-
-
-def cg_velocity(corner: FloatArray) -> FloatArray:
-    """V_x (...,) from the corners (..., 4): axles weigh 0.5 each, wheels of an axle alike, missing ones left out."""
-    if corner.ndim == 1:
-        return np.asarray(weighed(OneCar(), corner.tolist(), 0.5)[0])
-    return np.asarray(weighed(ManyCars(corner.shape[:-1]), np.moveaxis(corner, -1, 0), 0.5)[0])

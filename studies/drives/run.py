@@ -14,14 +14,13 @@ from estimators.arrays import AnyArray
 from studies.drives.chain import Chain, pipeline_of, run_chain
 from studies.drives.drive_file import read_drive
 from studies.drives.evaluation import DriveData, evaluate
-from studies.drives.frames import FrameReport, check_frames
+from studies.drives.frames import FrameReport, check_frames, read_checked
 from studies.drives.log import read_log
 from studies.drives.plots import figures
 from studies.drives.prepare import corner_inputs_of
 from studies.drives.quantities import CORNERS
 from studies.drives.replay import Progress, replay
 from studies.drives.schedules import corner_observer, load_schedules
-from studies.errors import LogError
 from studies.execution.files import check_folder, only_run, ready_folder, write_csv, write_json
 from studies.plots.save import write_figures
 
@@ -97,19 +96,12 @@ def replay_drive(
         None if schedule is None else corner_observer(description, drive.parent, schedule) for _ in range(2)
     )
     pipeline, assumptions = pipeline_of(description, of_pipeline, lateral)
-    log = read_log(logs, description)
-    if check and description.check:
-        found = check_frames(log.signals, description, log.files)
-        if found.complaint is not None:
-            raise LogError(found.complaint)
-        log.report["frames"] = found.rows()
-    else:
-        assumed += ("signs, units and sides of the signals are right: not checked (--no-check, or check = false)",)
+    log, unchecked = read_checked(logs, description, check)
     progress(0.2)
     inputs = corner_inputs_of(log, description)
     replayed = None if observer is None else replay(inputs, observer, lambda done: progress(0.2 + 0.1 * done))
     chain = run_chain(log, inputs, pipeline, assumptions, lambda done: progress(0.3 + 0.7 * done))
-    return DriveData(description, schedule, log, inputs, replayed, chain, assumed)
+    return DriveData(description, schedule, log, inputs, replayed, chain, assumed + unchecked)
 
 
 def estimate_columns(data: DriveData) -> Columns:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from estimators.display import Display
 from studies.drives.drive_file import DriveFile, read_drive
-from studies.drives.log import DriveLog, read_log
+from studies.drives.frames import read_checked
+from studies.drives.log import DriveLog
 from studies.drives.replay import Progress
 from studies.identify.data import DriveSignals, drive_signals
 from studies.identify.estimate import Estimate
@@ -40,6 +41,7 @@ class Identification(Display):
     wheel_inertia: float
     absent: dict[str, str]
     mounting: MountingFit
+    assumptions: tuple[str, ...] = ()
 
     @property
     def velocity_reference(self) -> str:
@@ -57,16 +59,19 @@ def identify_drive(
     *,
     base: str = BASE,
     settings: IdentifySettings | None = None,
+    check: bool = True,
     progress: Progress = lambda _done: None,
 ) -> Identification:
     """Fit wheel inertia, both tires and the mounting of the inertial unit to the ``logs`` that the ``drive`` file describes.
 
-    Raises SpecError (drive file, base set), LogError (logs), IdentifyError (no reference, standstill, too short), one line.
+    Raises SpecError (drive file, base set), LogError (logs; signals that contradict one another, unless ``check`` is False here
+    or in the drive file), IdentifyError (no reference, standstill, too short), one line.
     """
     description, prior = read_drive(drive), load_parameter_set(base)
-    log = read_log(logs, description)
+    log, assumed = read_checked(logs, description, check)
     names = tuple(str(entry["file"]) for entry in log.report["logs"].values())
-    return identify_log(log, description, prior, names, settings=settings, progress=progress)
+    found = identify_log(log, description, prior, names, settings=settings, progress=progress)
+    return replace(found, assumptions=assumed)
 
 
 def identify_log(

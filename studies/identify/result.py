@@ -100,7 +100,8 @@ def content(found: Identification) -> dict[str, Any]:
 
 def warnings(found: Identification) -> list[str]:
     """One sentence for every parameter that the log does not say, and for a direction without a fit."""
-    lines = [f"{direction}: {why}" for direction, why in found.absent.items()]
+    lines = [f"assumed: {text}" for text in found.assumptions]
+    lines += [f"{direction}: {why}" for direction, why in found.absent.items()]
     for group, entries in all_parameters(found).items():
         for name, entry in entries.items():
             if entry.excited or name in ("sigma2", "saturation") or group in found.absent:

@@ -10,11 +10,11 @@ import numpy as np
 
 from analysis.planar_exponential import planar_phi
 from estimators.arrays import BoolArray, FloatArray
-from studies.drives.corner_inputs import held, mean_over
+from studies.drives.corner_inputs import held
 from studies.drives.drive_file import read_drive
 from studies.drives.log import read_log
 from studies.drives.prepare import CornerInputs, corner_inputs_of
-from studies.drives.replay import centre_map, cg_velocity
+from studies.drives.replay import centre_weights, march
 from studies.sweeps.observer import Batch, Observer
 from studies.sweeps.plant import Grid
 from studies.trials.accuracy import nrms as nrms_of_runs
@@ -34,7 +34,7 @@ class Recorded:
     @property
     def known(self) -> BoolArray:
         """Samples (n,) that count: with a reference, and with a wheel that has a speed."""
-        return np.isfinite(self.reference) & np.isfinite(_weights(self.inputs)).all(axis=1)
+        return np.isfinite(self.reference) & np.isfinite(centre_weights(self.inputs)).all(axis=1)
 
 
 def read_recorded(drive: Path, logs: Sequence[Path]) -> Recorded:
@@ -58,11 +58,11 @@ def nrms(drive: Recorded, batch: Batch) -> FloatArray:
 
 
 def replay_batch(batch: Batch, drive: Recorded, part: slice) -> FloatArray:
-    """V_x (n, samples) of some designs: `studies.drives.replay` with one observer for each design and corner.
+    """V_x (n, samples) of some designs: `march` with one observer for each design and corner.
 
     x+ = F x + g u + h y, the exact update: F = I + S (A - L C), g = S (B - L D), h = S L, S = T phi(T (A - L C)) where y is
     held; F = I + S A - K C, g = S B - K D, h = K, S = T phi(T A) where the gains correct once a sample.
-    A missing u is held at its last value, as at run time. The loop runs over samples alone.
+    A missing u is held at its last value, as at run time.
     """
     inputs = drive.inputs
     columns = {name: column[part] for name, column in batch.columns.items()}
@@ -70,35 +70,19 @@ def replay_batch(batch: Batch, drive: Recorded, part: slice) -> FloatArray:
     nominal, radii = batch.observer.plant.parameters.get("effective_radius"), columns.get("effective_radius")
     share = np.ones(count) if nominal is None or radii is None else radii / nominal.nominal  # over the nominal radius
     F, g, pull = _updates(batch.observer, columns, inputs, count)
-    gain, shift = centre_map(inputs)
-    weights = _weights(inputs)
-    # V_x = share rolled + offset - slipped v_r
-    rolled = (weights * np.nan_to_num(gain * inputs.surface_speed)).sum(axis=1)
-    offset, slipped = (weights * np.nan_to_num(shift)).sum(axis=1), weights * np.nan_to_num(gain)
-    spin = inputs.radius * inputs.wheel_acceleration
-    there = np.isfinite(spin - inputs.free - inputs.per_speed)
-    out = np.empty((count, len(inputs.time)))
-    z, v, u = np.zeros((3, count, 4))
-    seen = share * float(held(mean_over(inputs.surface_speed))[0])
-    for k in range(len(inputs.time)):
-        if k:
-            new = share[:, None] * spin[k] - inputs.free[k] - inputs.per_speed[k] * seen[:, None]
-            u = np.where(there[k], new, u)
-            z, v = (
-                F[0, 0, k] * z + F[0, 1, k] * v + g[0, k] * u + pull[0, k],
-                F[1, 0, k] * z + F[1, 1, k] * v + g[1, k] * u + pull[1, k],
-            )
-        out[:, k] = share * rolled[k] + offset[k] - (slipped[k] * v).sum(axis=1)
-        if k and np.isfinite(rolled[k]):
-            seen = out[:, k]
-    return out
+    there = np.isfinite(inputs.radius * inputs.wheel_acceleration - inputs.free - inputs.per_speed)
+    z, u = np.zeros((2, count, 4))
 
+    def observe(k: int, new: FloatArray, v: FloatArray) -> FloatArray:
+        nonlocal z, u
+        u = np.where(there[k], new, u)
+        z, v = (
+            F[0, 0, k] * z + F[0, 1, k] * v + g[0, k] * u + pull[0, k],
+            F[1, 0, k] * z + F[1, 1, k] * v + g[1, k] * u + pull[1, k],
+        )
+        return v
 
-def _weights(inputs: CornerInputs) -> FloatArray:
-    """What every corner counts in V_x (n, 4), as `cg_velocity` has it: missing ones 0, and NaN where none has a speed."""
-    gain, shift = centre_map(inputs)
-    known = np.isfinite(gain * inputs.surface_speed + shift)
-    return np.stack([cg_velocity(np.where(known, unit, np.nan)) for unit in np.eye(4)], axis=-1)
+    return march(inputs, observe, share)[0].T
 
 
 def _updates(

@@ -189,7 +189,7 @@ def test_with_the_bias_of_a_sensor_it_beats_all_three_on_the_recorded_drive(
         log = read_log(*arguments)
         return replace(log, signals={**log.signals, "ax": log.signals["ax"] + bias})
 
-    monkeypatch.setattr("studies.drives.run.read_log", biased)
+    monkeypatch.setattr("studies.drives.frames.read_log", biased)
     velocity = evaluate(replay_drive([DATA], HERE / "bmw_m8_launch_brake.toml"))["velocity"]
     assert velocity["pipeline"]["rms"] < 0.3
     for other in ("mean_wheel_speed", "corner_observers", "integrated_acceleration", *(f"corner_{c}" for c in CORNERS)):

@@ -98,7 +98,12 @@ CASES: dict[str, tuple[str, Callable[[Table], Table], str, str]] = {
         "yaw_rate",
         'sign = "negative" for signals.yaw_rate and unit = "deg" for signals.steering',
     ),
-    "reversed": (TURNING, scaled(-1.0, *WHEELS), "wheel_speed_fl", "(or reversed with unsigned wheel speeds)"),
+    "reversed": (
+        TURNING,
+        scaled(-1.0, *WHEELS),
+        "wheel_speed_fl",
+        "(or reversed with unsigned wheel speeds: unsigned_wheels = true)",
+    ),
 }
 
 

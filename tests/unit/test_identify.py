@@ -13,7 +13,7 @@ import pytest
 
 from estimators.errors import GainsmithError
 from studies.commands.identify import run_identify
-from studies.errors import IdentifyError
+from studies.errors import IdentifyError, LogError
 from studies.identify.autocorrelation import correlation_time, effective_stretches
 from studies.identify.estimate import Rules, Unknown, estimate
 from studies.identify.identify import identify_drive
@@ -25,6 +25,7 @@ from synthesis.design.deploy import deploy
 from synthesis.design.hinf_observer import design_observer
 from synthesis.models.parameter_set import load_parameter_set
 from tests.support.synthetic_drive import DRIVE, KAPPA, SIGMA0, SLIP, TORQUES, columns, write_drive, write_log
+from tests.support.turning_drive import TURNING, turning, write_table
 
 WITH_TORQUE = DRIVE.replace("[reference]", TORQUES + "\n[reference]")
 
@@ -202,3 +203,14 @@ def test_nothing_to_fit_leaves_the_prior() -> None:
         lambda p: np.ones((5, 1)) * p["gain"], np.zeros((5, 1), dtype=bool), [unknown], Rules(0.95, 1.0, 1, 2.0)
     )
     assert (fit.value("gain"), fit.excited["gain"], fit.samples) == (2.0, False, 0)
+
+
+def test_signals_that_contradict_one_another_are_refused_before_the_fit(tmp_path: Path) -> None:
+    """Negative control: without the check the same log gets as far as the reference that it lacks."""
+    table = turning(8.0)
+    log = write_table(tmp_path / "log.csv", table | {"r": -table["r"]})
+    drive = write_drive(tmp_path, TURNING.split("[reference]")[0])
+    with pytest.raises(LogError, match=r'likely sign = "negative" for signals.yaw_rate'):
+        identify_drive([log], drive)
+    with pytest.raises(IdentifyError, match=r"reference\.vx is missing"):
+        identify_drive([log], drive, check=False)

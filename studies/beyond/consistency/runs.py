@@ -1,0 +1,106 @@
+"""Normalised errors of V_x and V_y of the whole pipeline on the shipped manoeuvres, many seeds side by side.
+
+Each seed has its own sensor errors (`TEST_CAR`) and its own effective radii: rho of all wheels alike and of each wheel, with the
+standard deviations that the fusion assumes. A wheel of the radius R (1 + rho) that is taken for R turns by 1/(1 + rho) less.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from operator import attrgetter
+
+import numpy as np
+
+from estimators.arrays import FloatArray
+from estimators.velocity import FusionSettings
+from studies.trials.estimation import TEST_CAR, run_pipeline
+from studies.truth import Measured, Truth, draw
+
+MOST_VALUES = 2_000_000  # cars times samples in one batch: 25 signals of 8 bytes each, 400 MB
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """One manoeuvre on one kind of tire.
+
+    ``nees`` is the average of e^2/sigma^2 over seeds and time of V_x, of V_y, and of both (half their sum, for the pipeline
+    states no correlation): 1 where sigma is true. ``beyond``: share of samples with |e| > 3 sigma. ``rms``: of the errors, m/s.
+    """
+
+    manoeuvre: str
+    tire: str
+    nees: tuple[float, float, float]
+    beyond: tuple[float, float]
+    rms: tuple[float, float]
+    sigma: tuple[float, float]  # m/s, root of the mean variance that is stated
+
+    def within(self, band: tuple[float, float]) -> tuple[bool, bool, bool]:
+        """Whether V_x, V_y and both are inside."""
+        x, y, both = (band[0] <= value <= band[1] for value in self.nees)
+        return x, y, both
+
+
+def with_own_radii(drawn: Measured) -> Measured:
+    """The same seeds on wheels of other sizes than the estimators believe."""
+    s, wheels = FusionSettings(), drawn.signals["wheel_speed"].copy()
+    for row, seed in enumerate(drawn.seeds):
+        rng = np.random.default_rng(np.random.SeedSequence((seed, 0x7261)))
+        rho = s.radius_common * rng.standard_normal() + s.radius_single * rng.standard_normal(4)
+        wheels[row] /= 1.0 + rho
+    return replace(drawn, signals={**drawn.signals, "wheel_speed": wheels})
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Of one manoeuvre, (2, seeds, n): errors of V_x and V_y, and the deviations that the pipeline states of them, m/s."""
+
+    manoeuvre: str
+    tire: str
+    error: FloatArray
+    sigma: FloatArray
+
+    def judged(self, shrink: float = 1.0) -> Consistency:
+        """``shrink`` divides the stated deviations."""
+        sigma = self.sigma / shrink
+        square = (self.error / sigma) ** 2
+        x, y = square.mean(axis=(1, 2)).tolist()
+        beyond, rms, stated = (
+            tuple(value.tolist())
+            for value in (
+                (square > 9.0).mean(axis=(1, 2)),
+                np.sqrt((self.error**2).mean(axis=(1, 2))),
+                np.sqrt((sigma**2).mean(axis=(1, 2))),
+            )
+        )
+        return Consistency(self.manoeuvre, self.tire, (x, y, 0.5 * (x + y)), beyond, rms, stated)
+
+
+def errors(truth: Truth, seeds: Sequence[int]) -> Iterator[Errors]:
+    """Of every run of the truth, batch by batch of one car."""
+    for rows in _batches(truth, len(seeds)):
+        drawn = with_own_radii(draw(truth.only(rows), TEST_CAR, seeds))
+        got = run_pipeline(drawn, {name: attrgetter(name) for name in ("vx", "vy", "vx_deviation", "vy_deviation")})
+        true = drawn.truth
+        for b, name in enumerate(true.names):
+            counts = true.valid[b]
+            off = np.stack([got[signal][:, b] - true[signal][b] for signal in ("vx", "vy")])
+            sigma = np.stack([got[f"{signal}_deviation"][:, b] for signal in ("vx", "vy")])
+            yield Errors(name, true.tires[b], off[..., counts], sigma[..., counts])
+
+
+def _batches(truth: Truth, seeds: int) -> Iterator[list[int]]:
+    """Rows that one pipeline takes: of one car, similar durations together, no more values than `MOST_VALUES`."""
+    cars = defaultdict(list)
+    for row in np.argsort(truth.duration, kind="stable").tolist():
+        cars[truth.vehicles[row].parameters].append(row)
+    for rows in cars.values():
+        batch: list[int] = []
+        for row in rows:
+            samples = truth.duration[row] / truth.sample_time
+            if batch and (len(batch) + 1) * seeds * samples > MOST_VALUES:
+                yield batch
+                batch = []
+            batch.append(row)
+        yield batch

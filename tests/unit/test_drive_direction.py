@@ -1,0 +1,99 @@
+"""A log of a car that reverses, with wheel speeds that have no sign: the gear tells the way, and the comparisons know it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from studies.drives.direction import Gear
+from studies.drives.drive_file import read_drive
+from studies.drives.frames import check_frames
+from studies.drives.log import read_log
+from studies.drives.run import replay_drive
+from studies.errors import LogError
+from synthesis.errors import SpecError
+from tests.support.schedule_content import EFFECTIVE_RADIUS
+from tests.support.synthetic_drive import TRACK, write_drive
+from tests.support.turning_drive import TURNING, write_table
+
+ALONE = "\n".join(
+    line
+    for line in TURNING.replace('[schedules]\nlongitudinal = "schedule.json"\n', "").splitlines()
+    if not line.startswith(("az =", "steering ="))
+)
+UNSIGNED = "unsigned_wheels = true\n"
+GEAR = 'direction = { column = "gear", backward = [7] }\n'
+WHEELS = ("w_fl", "w_fr", "w_rl", "w_rr")
+
+
+def reversing(seconds: float = 8.0) -> dict[str, Any]:
+    """Out of a parking lot: from rest backward to -5 m/s in bends, and to a stop again; wheels count teeth."""
+    t = np.arange(round(100 * seconds) + 1) / 100
+    v = -2.5 * (1.0 - np.cos(2.0 * np.pi * t / seconds))
+    r = 0.2 * np.sin(2.0 * np.pi * t / 4.0) * np.abs(v) / 5.0
+    side = r * TRACK / 2.0
+    left, right = (np.abs(v - side) / EFFECTIVE_RADIUS, np.abs(v + side) / EFFECTIVE_RADIUS)
+    gear = np.where((t > 0.2) & (t < seconds - 0.2), 7.0, 0.0)
+    table = {"t": t, "v": v, "ax": np.gradient(v, t), "ay": r * v, "r": r, "gear": gear}
+    return table | {name: left if name.endswith("l") else right for name in WHEELS}
+
+
+def looked(folder: Path, text: str) -> str | None:
+    log = write_table(folder / "log.csv", reversing())
+    drive = read_drive(write_drive(folder, text))
+    found = read_log([log], drive)
+    return check_frames(found.signals, drive, found.files).complaint
+
+
+def test_the_gear_gives_the_wheels_their_sign(tmp_path: Path) -> None:
+    log = write_table(tmp_path / "log.csv", reversing())
+    data = replay_drive([log], write_drive(tmp_path, UNSIGNED + GEAR + ALONE))
+    assert data.chain is not None
+    error = data.chain.vx - data.log.reference["vx"]
+    assert np.abs(error).max() < 0.15
+    wheels = data.baselines["mean_wheel_speed"] - data.log.reference["vx"]
+    assert np.abs(wheels[60:-60]).max() < 0.05
+
+
+def test_without_a_gear_the_accelerometer_does(tmp_path: Path) -> None:
+    log = write_table(tmp_path / "log.csv", reversing())
+    data = replay_drive([log], write_drive(tmp_path, UNSIGNED + ALONE))
+    assert data.chain is not None
+    assert np.abs(data.chain.vx - data.log.reference["vx"])[200:].max() < 0.3
+
+
+def test_the_comparisons_know_the_way_or_leave_it_open(tmp_path: Path) -> None:
+    assert looked(tmp_path, UNSIGNED + GEAR + ALONE) is None
+    assert looked(tmp_path, UNSIGNED + ALONE) is None
+
+
+def test_signs_that_are_missing_without_a_word_are_refused_and_so_is_the_wrong_gear(tmp_path: Path) -> None:
+    """Negative controls: the same log taken as signed, and with reverse read as forward."""
+    said = looked(tmp_path, ALONE)
+    assert said is not None and "unsigned_wheels = true" in said
+    forward = UNSIGNED + 'direction = { column = "gear", backward = [-1] }\n'
+    assert looked(tmp_path, forward + ALONE) is not None
+    with pytest.raises(LogError, match="should be 1"):
+        replay_drive([tmp_path / "log.csv"], write_drive(tmp_path, forward + ALONE))
+
+
+def test_readings_of_a_gear() -> None:
+    reading = np.array([-1.0, 0.0, 1.0, 6.0, 14.0, np.nan])
+    np.testing.assert_array_equal(Gear(column="g").ways(reading), [-1, 0, 1, 1, 1, 0])
+    coded = Gear(column="g", backward=[14.0], forward=[1.0, 2.0])
+    np.testing.assert_array_equal(coded.ways(reading), [0, 0, 1, 0, -1, 0])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (GEAR + ALONE, r"direction: belongs to wheel speeds without a sign; add unsigned_wheels = true"),
+        (UNSIGNED + GEAR.replace('"gear"', '"gear", log = "can"') + ALONE, r"direction.log: unknown log 'can'"),
+    ],
+)
+def test_a_gear_that_means_nothing_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(SpecError, match=message):
+        read_drive(write_drive(tmp_path, text))

@@ -1,0 +1,62 @@
+"""V_x of the pipeline is at least as good as the mean wheel speed and as the best corner observer; where tires slide sideways,
+because it knows that they slip along, too."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimators.arrays import FloatArray
+from estimators.forces import AttitudeObserver
+from estimators.pipeline import CornerObservers, EstimationPipeline
+from estimators.schedule import GainSchedule
+from estimators.velocity.lateral_fusion import LateralFusion
+from studies.trials.estimation import TEST_CAR, assumed_car
+from studies.truth import Measured, draw, load_manoeuvre, simulate_manoeuvres
+
+NAMES = ("p2-sharp-turn", "p2-launch-wet-dry")
+SEEDS = range(2)
+
+
+@pytest.fixture(scope="module")
+def drawn() -> Measured:
+    """A turn in which the front axle slides, and a launch over a change of friction."""
+    short = [load_manoeuvre(name).model_copy(update={"duration": 7.5}) for name in NAMES]
+    return draw(simulate_manoeuvres(short), TEST_CAR, SEEDS)
+
+
+def rms(drawn: Measured) -> dict[str, FloatArray]:
+    """RMS error of V_x (manoeuvres,), m/s: mean over seeds."""
+    car, time, shape = assumed_car(drawn), drawn.sample_time, drawn.batch_shape
+    corners = CornerObservers(car, GainSchedule.shipped("corner-estimation-longitudinal"), batch_shape=shape)
+    pipeline = EstimationPipeline(car, time, shape, attitude=AttitudeObserver(time, shape), corner_observers=corners)
+    steps = [pipeline.step(signals) for signals in drawn]
+    speeds = {
+        "pipeline": np.stack([step.vx for step in steps], axis=-1),
+        "wheels": (car.radius * drawn.signals["wheel_speed"]).mean(axis=-1),
+        "corners": np.stack([step.corners.vx for step in steps], axis=-1),
+    }
+    alone = np.stack([step.corners.corner_vx for step in steps], axis=-2)
+    speeds |= {f"corner {k}": alone[..., k] for k in range(4)}
+    found: dict[str, FloatArray] = {}
+    for name, value in speeds.items():
+        found[name] = np.sqrt(((value - drawn.truth["vx"]) ** 2).mean(axis=-1)).mean(axis=0)
+    return found
+
+
+def best_other(found: dict[str, FloatArray]) -> FloatArray:
+    return np.asarray(np.min([value for name, value in found.items() if name != "pipeline"], axis=0))
+
+
+def test_it_is_never_worse_than_wheels_or_corner_observers(drawn: Measured) -> None:
+    found = rms(drawn)
+    assert (found["pipeline"] <= best_other(found)).all(), found
+
+
+def test_a_pipeline_whose_tires_slip_along_by_force_alone_is_found_out(
+    drawn: Measured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Negative control: without what side slip adds, the mean wheel speed is the better estimate in the turn."""
+    monkeypatch.setattr(LateralFusion, "wheel_bend", property(lambda self: np.zeros_like(np.stack([*self.bend] * 2))))
+    found = rms(drawn)
+    assert found["pipeline"][0] > found["wheels"][0]

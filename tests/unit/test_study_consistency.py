@@ -1,0 +1,57 @@
+"""Normalised errors of the whole pipeline: they stay in the band on a few manoeuvres, and a third of sigma is found out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from studies.beyond.consistency.runs import Consistency, Errors, errors, with_own_radii
+from studies.beyond.consistency.study import BAND, STUDY, picture
+from studies.trials.estimation import TEST_CAR
+from studies.truth import Truth, draw, load_manoeuvre, simulate_manoeuvres
+
+NAMES = ("p1-lane-change-dry", "p1-launch-split")
+SEEDS = range(12)
+
+
+@pytest.fixture(scope="module")
+def truth() -> Truth:
+    short = [load_manoeuvre(name).model_copy(update={"duration": 4.0}) for name in NAMES]
+    return simulate_manoeuvres(short)
+
+
+@pytest.fixture(scope="module")
+def driven(truth: Truth) -> list[Errors]:
+    return sorted(errors(truth, SEEDS), key=lambda one: one.manoeuvre)
+
+
+@pytest.fixture(scope="module")
+def found(driven: list[Errors]) -> list[Consistency]:
+    return [one.judged() for one in driven]
+
+
+def test_the_stated_deviations_are_true_on_what_tires_hold(found: list[Consistency]) -> None:
+    assert [one.manoeuvre for one in found] == list(NAMES)
+    assert BAND[0] < np.mean([one.nees[2] for one in found]) < BAND[1]
+    assert all(one.within(BAND)[2] and max(one.beyond) < 0.05 for one in found)
+
+
+def test_a_third_of_sigma_leaves_the_band(driven: list[Errors]) -> None:
+    """The negative control: the same estimates, stated three times as sure."""
+    sure = [one.judged(shrink=3.0) for one in driven]
+    assert np.mean([one.nees[2] for one in sure]) > BAND[1]
+    assert not any(one.within(BAND)[2] for one in sure)
+
+
+def test_radii_of_a_seed_are_its_own_and_as_wide_as_the_fusion_assumes(truth: Truth) -> None:
+    drawn = draw(truth.until(0.1), TEST_CAR, range(400))
+    ratio = drawn.signals["wheel_speed"][:, 1, 0] / with_own_radii(drawn).signals["wheel_speed"][:, 1, 0] - 1.0
+    common, single = ratio.mean(axis=1), ratio - ratio.mean(axis=1, keepdims=True)
+    assert common.std() == pytest.approx(np.hypot(0.015, 0.005 / 2.0), rel=0.1)
+    assert single.std() == pytest.approx(0.005 * np.sqrt(0.75), rel=0.1)
+
+
+def test_the_study_draws_what_it_found(found: list[Consistency]) -> None:
+    assert [part.name for part in STUDY.parts] == ["lugre", "magic-formula"]
+    figure = picture("consistency", "caption", found)
+    assert figure.alternative and len(figure.rows[0]) == 1
