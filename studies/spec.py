@@ -15,6 +15,7 @@ from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.design.law_table import Gains
 from synthesis.design.sampled_observer import design_sampled_observer
+from synthesis.design.sampled_state_feedback import design_sampled_state_feedback
 from synthesis.design.state_feedback import StateFeedbackDesign, design_state_feedback
 from synthesis.errors import SpecError
 from synthesis.exchange.model_file import load_model
@@ -114,6 +115,8 @@ class ScheduleSpec(StrictTable):
     def design(self, model: LpvModel) -> Gains:
         """The gains for the law and the update that the specification names."""
         if self.law is not None:
+            if self.law == "sampled state feedback":
+                return design_sampled_state_feedback(model, self.feedback_design(), self.deploy.sample_time)
             return design_state_feedback(model, self.feedback_design())
         if self.deploy.update == "sampled":
             return design_sampled_observer(model, self.observer_design(), self.deploy.sample_time)

@@ -11,6 +11,7 @@ from .design.hinf_observer import ObserverDesign as ObserverDesign
 from .design.hinf_observer import ObserverGains as ObserverGains
 from .design.hinf_observer import design_observer as design_observer
 from .design.sampled_observer import design_sampled_observer as design_sampled_observer
+from .design.sampled_state_feedback import design_sampled_state_feedback as design_sampled_state_feedback
 from .design.stability import GainBox as GainBox
 from .design.stability import StabilityResult as StabilityResult
 from .design.stability import affine_quadratic_stability as affine_quadratic_stability

@@ -72,10 +72,9 @@ def deploy(
     refuse_undeployable(model)
     observer = gains if isinstance(gains, ObserverGains) else None
     update_section(gains, settings)  # refuses limits of inputs that there are not
-    if observer is not None and observer.update == "sampled" and observer.sample_time != settings.sample_time:
-        raise ProblemError(
-            f"gains designed for a sample time of {observer.sample_time} s are not run at {settings.sample_time} s"
-        )
+    wanted = getattr(gains, "sample_time", None)  # of a sampled design
+    if wanted is not None and wanted != settings.sample_time:
+        raise ProblemError(f"gains designed for a sample time of {wanted} s are not run at {settings.sample_time} s")
     if observer is not None and observer.update == "held" and observer.design.fastest_pole is None:
         posed = well_posedness(model, observer.design)  # nothing bounds the gains but the channels themselves
         if posed.ill_posed:
