@@ -25,6 +25,7 @@ from synthesis.design.state_feedback import (
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.solve import solve
+from synthesis.models.discretise import zero_order_hold
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter
 from tests.support.lmi_cases import parameter, small_model
@@ -256,3 +257,25 @@ def test_sampled_design_where_the_continuous_one_is_too_fast_for_the_samples() -
     assert done.claims[1].level < 1.15 * gains.gamma
     with pytest.raises(ProblemError, match=r"designed for a sample time of 0\.4 s are not run at 0\.1 s"):
         deploy(gains, DeploySettings(sample_time=0.1))
+
+
+def test_sampled_design_pays_for_rates_and_for_decay() -> None:
+    """A spring of moving stiffness: parameters that move cost more than ones that stand, faster decay more than none."""
+
+    def spring(rate: float) -> LpvModel:
+        A = [[0, 1], [-3 - 2 * p, -sp.Rational(1, 5)]]
+        return small_model(A, [[1, 0]], (parameter("p", -1.0, 1.0, rate),), B=[[0], [1]], E=[[0], [1]])
+
+    channel = FeedbackChannel(("d1",), ("x1", "u1"), sizes=(0.3, 1.0))
+    points, period = np.linspace(-1.0, 1.0, 9), 0.1
+    still, moving, decaying = (
+        design_sampled_state_feedback(spring(rate), StateFeedbackDesign((channel,), decay_rate=decay), period)
+        for rate, decay in ((0.0, 0.0), (20.0, 0.0), (0.0, 1.5))
+    )
+    assert moving.gamma > 1.05 * still.gamma and decaying.gamma > 1.02 * still.gamma
+    radii = []
+    for gains in (still, decaying):
+        m = gains.model.on(points)
+        Phi, Gamma = zero_order_hold(m.A, m.B, period)
+        radii.append(np.abs(np.linalg.eigvals(Phi + Gamma @ gains.gain(points))).max())
+    assert radii[1] < np.exp(-1.5 * period) < radii[0]
