@@ -182,6 +182,11 @@ def shipped_examples() -> dict[str, Path]:
     return {name: path for name, path in _examples().items() if not name.endswith((OBSERVER, FEEDBACK))}
 
 
+def example_specs() -> dict[str, Path]:
+    """The specifications of the examples by name: NAME-observer, NAME-feedback."""
+    return {name: path for name, path in _examples().items() if name.endswith((OBSERVER, FEEDBACK))}
+
+
 def _examples() -> dict[str, Path]:
     return shipped_files("studies", "examples")
 
@@ -204,8 +209,7 @@ def load_spec(name: str | Path) -> tuple[ScheduleSpec, Path]:
     >>> spec.deploy.update, spec.plant(folder).model.name
     ('sampled', 'quarter-car')
     """
-    examples = {name: path for name, path in _examples().items() if name.endswith((OBSERVER, FEEDBACK))}
-    path = find_toml(name, {**shipped_specs(), **examples}, "specification")
+    path = find_toml(name, {**shipped_specs(), **example_specs()}, "specification")
     data = read_toml(path, "specification")
     if "matrices" in data:
         raise SpecError(f'{path.name}: is a model file; a specification names it: file = "{path.name}" in [model]')
