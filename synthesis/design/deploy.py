@@ -16,7 +16,15 @@ from synthesis.certificate.verify import Names
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_names
 from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains
-from synthesis.design.law_table import Gains, LawDesign, deployed_loop, extra_digits, table_at, update_section
+from synthesis.design.law_table import (
+    Gains,
+    LawDesign,
+    deployed_loop,
+    extra_digits,
+    refuse_beyond_limits,
+    table_at,
+    update_section,
+)
 from synthesis.design.well_posedness import well_posedness
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import Verdict
@@ -90,6 +98,7 @@ def deploy(
             continue
         claims = _claims(gains, search, channels, settings.settle)
         if claims is not None:
+            refuse_beyond_limits(gains, table)
             return Deployment(gains, settings, points, table, claims, cost)
     raise ProblemError(
         f"model '{model.name}': no table with up to {' x '.join(map(str, segments))} segments keeps the guarantee within "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -255,6 +256,9 @@ def test_sampled_design_where_the_continuous_one_is_too_fast_for_the_samples() -
     done = deploy(gains, DeploySettings(sample_time=period))
     assert [claim.kind for claim in done.claims] == ["sampled error", "sampled gain"]
     assert done.claims[1].level < 1.15 * gains.gamma
+    stricter = replace(gains, design=replace(design, limits=GainLimits({"u1": 2.9}, {"x1": 1.0})))
+    with pytest.raises(ProblemError, match=r"commands up to .* of u1 for states of their sizes, its limit is 2\.9"):
+        deploy(stricter, DeploySettings(sample_time=period))
     with pytest.raises(ProblemError, match=r"designed for a sample time of 0\.4 s are not run at 0\.1 s"):
         deploy(gains, DeploySettings(sample_time=0.1))
 
