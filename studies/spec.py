@@ -113,7 +113,7 @@ class ScheduleSpec(StrictTable):
     def design(self, model: LpvModel) -> Gains:
         """The gains for the law and the update that the specification names."""
         if self.law is not None:
-            return design_feedback(model, self.feedback_design())
+            return design_feedback(model, self.feedback_design(), self.law, self.deploy.sample_time)
         if self.deploy.update == "sampled":
             return design_sampled_observer(model, self.observer_design(), self.deploy.sample_time)
         return design_observer(model, self.observer_design())
@@ -178,6 +178,11 @@ def shipped_examples() -> dict[str, Path]:
     return {name: path for name, path in _examples().items() if not name.endswith((OBSERVER, FEEDBACK))}
 
 
+def example_specs() -> dict[str, Path]:
+    """The specifications of the examples by name: NAME-observer, NAME-feedback."""
+    return {name: path for name, path in _examples().items() if name.endswith((OBSERVER, FEEDBACK))}
+
+
 def _examples() -> dict[str, Path]:
     return shipped_files("studies", "examples")
 
@@ -200,8 +205,7 @@ def load_spec(name: str | Path) -> tuple[ScheduleSpec, Path]:
     >>> spec.deploy.update, spec.plant(folder).model.name
     ('sampled', 'quarter-car')
     """
-    examples = {name: path for name, path in _examples().items() if name.endswith((OBSERVER, FEEDBACK))}
-    path = find_toml(name, {**shipped_specs(), **examples}, "specification")
+    path = find_toml(name, {**shipped_specs(), **example_specs()}, "specification")
     data = read_toml(path, "specification")
     if "matrices" in data:
         raise SpecError(f'{path.name}: is a model file; a specification names it: file = "{path.name}" in [model]')

@@ -6,7 +6,7 @@ import json
 
 from estimators.schedule import SHIPPED
 from studies.registry import MODULES
-from studies.spec import OBSERVER, load_spec, shipped_examples, shipped_specs
+from studies.spec import example_specs, load_spec, shipped_specs
 from synthesis.models.catalogue import CATALOGUE
 from synthesis.models.parameter_set import shipped_parameter_sets
 from synthesis.toml_file import shipped_files
@@ -16,7 +16,7 @@ def run_list(as_json: bool) -> int:
     """What comes with the package."""
     found = {
         "specifications": {name: load_spec(name)[0].description for name in shipped_specs()},
-        "examples": {name: load_spec(f"{name}{OBSERVER}")[0].description for name in shipped_examples()},
+        "examples": {name: load_spec(name)[0].description for name in example_specs()},
         "parameter sets": sorted(shipped_parameter_sets()),
         "models": sorted(CATALOGUE),
         "schedules": sorted(path.stem for path in SHIPPED.glob("*.json")),
