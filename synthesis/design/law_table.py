@@ -68,8 +68,9 @@ Gains = ObserverGains | FeedbackLaw
 
 
 def update_of(gains: Gains) -> Literal["held", "sampled", "feedback"]:
-    """How gains are run."""
-    return gains.update if isinstance(gains, ObserverGains) else "feedback"
+    """How gains are run; those of an observer say it themselves."""
+    update: Literal["held", "sampled", "feedback"] = getattr(gains, "update", "feedback")
+    return update
 
 
 def table_at(gains: Gains, points: FloatArray, sample_time: float) -> FloatArray:
