@@ -7,8 +7,9 @@ U'V + V'U with U = B'P and V = K [C, F] are products. They are
 
 and -D'D is at most D0'D0 - D0'D - D'D0 whatever D0: with D0 taken from the step before, this is a linear inequality in P and K
 together that promises nothing but what holds (an inner approximation, exact where the step before ended), so that the level
-never rises (Dinh, Gumussoy, Michiels, Diehl 2012). What comes out depends on the start and is no optimum over all K. The last
-solve is for P alone, with K as it is: its verdict is that of an analysis of the given loop.
+never rises (Dinh, Gumussoy, Michiels, Diehl 2012). Such steps are short: an analysis tries each further along its own way. What
+comes out depends on the start and is no optimum over all K. The last solve is for P alone, with K as it is: its verdict is that
+of an analysis of the given loop.
 """
 
 from __future__ import annotations
@@ -48,7 +49,6 @@ class StaticFeedback:
     gamma_lower: None = None
     measured: Measured = "outputs"
     order: int = 0
-    rational: int = 0
 
     @property
     def verdict(self) -> Verdict:

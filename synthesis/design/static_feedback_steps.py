@@ -56,27 +56,30 @@ class Steps:
         return problem
 
     def lowered(self, point: Point) -> tuple[Point, list[float]]:
-        """Steps down until they are short."""
+        """Steps down until they are short; each is also tried further along its own way, as far as that goes on paying."""
         best = self._solved(*self._problem(None, False, 0.0, point.K, None))
         if best is None:
             raise ProblemError(
                 f"model '{self.model.name}': the start is stable, but no level of the open channel was found"
             )
-        levels, point = [best[1] * self.frame.unit], best[0]
+        levels, reach = [best[1]], 1.0
         for _ in range(self.design.steps):
-            found = self._solved(*self._problem(None, False, 0.0, self.structure, point))
-            if found is None:
+            before = best
+            near = self._solved(*self._problem(None, False, 0.0, self.structure, before[0]))
+            if near is None:
                 break
-            before, point = levels[-1], found[0]
-            again = self._solved(
-                *self._problem(None, False, 0.0, point.K, None)
-            )  # the best P for this K, a new place to start
-            if again is not None and again[1] <= found[1]:
-                point = again[0]
-            levels.append(min(found[1], again[1] if again is not None else np.inf) * self.frame.unit)
-            if levels[-1] > before * (1.0 - FINE):
+            best, moved = near, near[0].K - before[0].K
+            further = self._solved(*self._problem(None, False, 0.0, near[0].K + moved * reach, None))
+            if further is not None and further[1] < near[1]:
+                best, reach = further, 2.0 * reach
+            else:  # the best P for this K is a new place to start, too
+                reach = max(0.5 * reach, 0.5)
+                again = self._solved(*self._problem(None, False, 0.0, near[0].K, None))
+                best = again if again is not None and again[1] < near[1] else near
+            levels.append(best[1])
+            if levels[-1] > levels[-2] * (1.0 - FINE):
                 break
-        return point, levels
+        return best[0], [level * self.frame.unit for level in levels]
 
     def stable(self, K: MatrixPolynomial) -> Point:
         """A pair at which every channel has some level: the start itself, or what steps of falling growth lead to.

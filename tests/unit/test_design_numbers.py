@@ -12,8 +12,8 @@ from flint import fmpq, fmpq_mat
 from scipy.linalg import expm
 
 from synthesis.certificate.unknowns import in_scaled_states
+from synthesis.design.fitted_update import fitted_update
 from synthesis.design.hinf_observer import Channel, ObserverDesign
-from synthesis.design.sampled_observer import _fitted
 from synthesis.design.stability import affine_quadratic_stability
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import Verdict
@@ -32,17 +32,17 @@ def test_discretised_plants_are_polynomials_close_to_exponentials(parameters: tu
     other = q if len(parameters) == 2 else sp.Integer(1)
     plant = small_model([[-p, 3 + other], [p * other / 2, -1 - p]], [[1, p]], parameters, E=[[1], [2]], F=[[1]])
     scale, period = np.array([2.0, 0.1]), 0.05
-    found, draw = _fitted(plant, scale, period), np.random.default_rng(0)
+    (Phi, _, Gamma), draw = fitted_update(plant, scale, period), np.random.default_rng(0)
     for _ in range(5):
         u = draw.uniform(-1.0, 1.0, len(parameters))
         A = plant.A.subs({a.name: a.middle + a.half_width * t for t, a in zip(u, parameters, strict=True)})
         scaled, forced = np.array(A, float) * scale[:, None] / scale, np.array([[1.0], [2.0]]) * scale[:, None]
         block = expm(period * np.block([[scaled, forced], [np.zeros((1, 3))]]))
-        for name, wanted in (("Phi", block[:2, :2]), ("Gamma", block[:2, 2:])):
-            value = found[name]
+        for value, wanted in ((Phi, block[:2, :2]), (Gamma, block[:2, 2:])):
+            there = value
             for t in u:
-                value = np.tensordot(t ** np.arange(len(value)), value, 1)
-            np.testing.assert_allclose(value, wanted, atol=1e-8)
+                there = np.tensordot(t ** np.arange(len(there)), there, 1)
+            np.testing.assert_allclose(there, wanted, atol=1e-8)
 
 
 def test_the_place_of_an_unstable_pole_is_in_the_words() -> None:

@@ -11,7 +11,9 @@ import pytest
 import sympy as sp
 
 from estimators.arrays import FloatArray
-from synthesis.design.feedback_channel import FeedbackChannel
+from synthesis.certificate.search import Search, Wish
+from synthesis.design.feedback_channel import FeedbackChannel, feedback_names
+from synthesis.design.law_table import deployed_loop
 from synthesis.design.output_feedback import OutputFeedback, OutputFeedbackDesign, design_output_feedback
 from synthesis.design.output_feedback_lmi import Still
 from synthesis.errors import ProblemError
@@ -252,3 +254,23 @@ def test_hidden_modes_are_refused_before_anything_is_solved() -> None:
 def test_bad_designs_are_refused(change: dict[str, Any], words: str) -> None:
     with pytest.raises(ProblemError, match=words):
         design_output_feedback(OSCILLATOR, OutputFeedbackDesign(**change))
+
+
+def test_a_search_whose_multipliers_are_large_is_solved() -> None:
+    """P of degree 3 for a law whose own P is rational: large multipliers leave 1e-6 of the dual equations, which costs nothing.
+
+    Without an eye for that cost the solve ends nowhere, and takes the problem for infeasible.
+    """
+    found = design_output_feedback(OSCILLATOR, OutputFeedbackDesign((NOISY,), still="X"))
+    lines = (np.linspace(-1.0, 1.0, 9),)
+    Ak, Bk, Ck, Dk = found.controller(lines[0])
+    table = np.concatenate([np.concatenate([Ak, Bk], axis=2), np.concatenate([Ck, Dk], axis=2)], axis=1).round(4)
+    loop = replace(deployed_loop(found, lines, table, 0.01), sample_time=None)
+    search = Search(loop, feedback_names(OSCILLATOR), OSCILLATOR.parameters, 3)
+    wish = Wish("gain", None, NOISY.claim)
+    asked = search._asked(wish)
+    assert asked is not None
+    answer = search._solved(asked, wish)
+    assert answer.status == "Solved"
+    level = np.sqrt(answer.decisions[np.flatnonzero(asked.problem.cost)[0]]) * search._unit(wish)
+    assert frozen_gain(found, NOISY, lines[0]) <= level < 1.2 * found.gamma

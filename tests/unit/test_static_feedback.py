@@ -47,9 +47,9 @@ def peak(k: float) -> float:
 def test_one_gain_ends_near_the_best_of_all_gains() -> None:
     """The parameter hardly moves the plant: the best constant gain is known from a search over it."""
     best = minimize_scalar(peak, bounds=(-4.0, 1.0), method="bounded")
-    found = design_static_feedback(third_order(), StaticFeedbackDesign((LEVEL,), degree=0, steps=12))
+    found = design_static_feedback(third_order(), StaticFeedbackDesign((LEVEL,), degree=0))
     assert found.verdict is Verdict.CERTIFIED
-    assert 0.98 * best.fun < found.gamma < 1.08 * best.fun
+    assert 0.98 * best.fun < found.gamma < 1.04 * best.fun
     assert peak(float(found.gain(np.zeros(1))[0, 0, 0])) < 1.06 * best.fun
     assert all(after <= before * (1 + 1e-4) for before, after in zip(found.levels, found.levels[1:], strict=False))
     assert found.levels[0] == pytest.approx(peak(0.0), rel=0.1)  # the start is no feedback at all
@@ -61,7 +61,7 @@ def test_an_unstable_plant_is_brought_to_stability_first() -> None:
     least = design_state_feedback(model, StateFeedbackDesign((LEVEL,))).gamma_lower
     found = design_static_feedback(model, StaticFeedbackDesign((LEVEL,), decay_rate=0.2, steps=8))
     assert found.verdict is Verdict.CERTIFIED and least is not None
-    assert least < found.gamma < 1.3 * least
+    assert least < found.gamma < 1.15 * least
     line = np.linspace(-1.0, 1.0, 5)
     at = model.on(line)
     assert np.linalg.eigvals(at.A + at.B @ found.gain(line) @ at.C).real.max() < -0.2
@@ -74,7 +74,9 @@ def test_a_table_of_pi_gains_is_proved_and_its_mirror_image_refused() -> None:
         E=[[1], [0]],
     )  # fmt: skip
     channel = FeedbackChannel(("d1",), ("x2", "u1"))
-    design = StaticFeedbackDesign((channel,), start=((-1.0, 0.0, -1.0),), uses=(("u1", "y1"), ("u1", "y3")), steps=6)
+    design = StaticFeedbackDesign(
+        (channel,), fastest_pole=20.0, start=((-1.0, 0.0, -1.0),), uses=(("u1", "y1"), ("u1", "y3")), steps=6
+    )
     found = design_static_feedback(model, design)
     gains = found.gain(np.array([0.5, 2.0]))
     assert not gains[..., 1].any() and gains[..., [0, 2]].all()
