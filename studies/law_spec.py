@@ -8,6 +8,7 @@ from studies.spec_tables import DeploySpec, DesignSpec
 from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.design.law_table import FeedbackLaw
 from synthesis.design.output_feedback import OutputFeedbackDesign, design_output_feedback
+from synthesis.design.sampled_state_feedback import design_sampled_state_feedback
 from synthesis.design.state_feedback import GainLimits, StateFeedbackDesign, design_state_feedback
 from synthesis.design.static_feedback import design_static_feedback
 from synthesis.design.static_feedback_design import StaticFeedbackDesign
@@ -17,6 +18,7 @@ from synthesis.models.lpv import LpvModel
 
 KEYS_OF = {  # of [design], beside those that observers have
     "state feedback": ("damping", "input_limits", "state_sizes"),
+    "sampled state feedback": ("damping", "input_limits", "state_sizes"),
     "output feedback": ("feedthrough", "measured"),
     "static output feedback": ("start", "uses"),
 }
@@ -79,12 +81,14 @@ def feedback_design(spec: DesignSpec) -> FeedbackDesign:
     )
 
 
-def design_feedback(model: LpvModel, design: FeedbackDesign) -> FeedbackLaw:
-    """The law of a design."""
+def design_feedback(model: LpvModel, design: FeedbackDesign, law: str, sample_time: float) -> FeedbackLaw:
+    """The law of a design; of both laws of the states, the sampled one is designed for the sample time."""
     if isinstance(design, OutputFeedbackDesign):
         return design_output_feedback(model, design)
     if isinstance(design, StaticFeedbackDesign):
         return design_static_feedback(model, design)
+    if law == "sampled state feedback":
+        return design_sampled_state_feedback(model, design, sample_time)
     return design_state_feedback(model, design)
 
 

@@ -113,7 +113,7 @@ class ScheduleSpec(StrictTable):
     def design(self, model: LpvModel) -> Gains:
         """The gains for the law and the update that the specification names."""
         if self.law is not None:
-            return design_feedback(model, self.feedback_design())
+            return design_feedback(model, self.feedback_design(), self.law, self.deploy.sample_time)
         if self.deploy.update == "sampled":
             return design_sampled_observer(model, self.observer_design(), self.deploy.sample_time)
         return design_observer(model, self.observer_design())

@@ -47,7 +47,7 @@ class ChannelSpec(StrictTable):
 class DesignSpec(StrictTable):
     """What is asked of the gains of an observer (synthesis.design.hinf_observer), or of the feedback law that is named."""
 
-    law: Literal["state feedback", "output feedback", "static output feedback"] | None = None
+    law: Literal["state feedback", "sampled state feedback", "output feedback", "static output feedback"] | None = None
     degree: int = 1
     decay_rate: float = 0.0
     fastest_pole: float | None = None

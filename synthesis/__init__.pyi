@@ -14,6 +14,7 @@ from .design.output_feedback import OutputFeedback as OutputFeedback
 from .design.output_feedback import OutputFeedbackDesign as OutputFeedbackDesign
 from .design.output_feedback import design_output_feedback as design_output_feedback
 from .design.sampled_observer import design_sampled_observer as design_sampled_observer
+from .design.sampled_state_feedback import design_sampled_state_feedback as design_sampled_state_feedback
 from .design.stability import GainBox as GainBox
 from .design.stability import StabilityResult as StabilityResult
 from .design.stability import affine_quadratic_stability as affine_quadratic_stability

@@ -14,9 +14,9 @@ from typing import Any, Literal
 import numpy as np
 from flint import fmpq
 
-from analysis import critical_drop_probability, hinf_norm
+from analysis import controllability_gramian, critical_drop_probability, hinf_norm
 from estimators.arrays import FloatArray
-from synthesis.certificate.claims import ERROR_EQUATION, WITH_CHANNEL, Claim, claim_name, claim_unit, rows_of
+from synthesis.certificate.claims import ERROR_EQUATION, GAINS, WITH_CHANNEL, Claim, claim_name, claim_unit, rows_of
 from synthesis.certificate.content import claims_of, subject_of
 from synthesis.certificate.refute import grid
 from synthesis.loop.loop import Loop
@@ -102,7 +102,21 @@ def _values(claim: Claim, systems: list[System], names: Any, loop: Loop) -> Floa
     Z = Z / np.array(channel.error_sizes)[:, None]
     C = np.array([Z @ _entries(system.C) for system in systems])
     D = np.array([Z @ _entries(system.D[group])[:, where] * np.array(sizes) for system in systems])
+    if claim.kind not in GAINS:
+        return _impulse(A, B, C, D, claim.kind.startswith("sampled"), peak=claim.kind.endswith("peak"))
     return hinf_norm(A, B, C, D, discrete=claim.kind != "gain").norm
+
+
+def _impulse(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, discrete: bool, peak: bool) -> FloatArray:
+    """H2 norms, or with `peak` generalised H2 norms: root of the trace or of the largest eigenvalue of C X C' + D D'."""
+    values = np.linalg.eigvals(A)
+    stable = np.abs(values).max(axis=-1) < 1.0 if discrete else values.real.max(axis=-1) < 0.0
+    out = np.full(len(A), np.inf)
+    X = controllability_gramian(A[stable], B[stable], discrete=discrete)
+    shown = C[stable] @ X @ np.swapaxes(C[stable], 1, 2)
+    shown = shown + (D[stable] @ np.swapaxes(D[stable], 1, 2) if discrete else 0.0)
+    out[stable] = np.sqrt(np.linalg.eigvalsh(shown)[:, -1] if peak else np.trace(shown, axis1=1, axis2=2))
+    return out
 
 
 def _matrix(matrix: PolynomialMatrix, system: System) -> FloatArray:

@@ -16,7 +16,14 @@ from synthesis.certificate.verify import Names
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_names
 from synthesis.design.hinf_observer import Channel, ObserverGains
-from synthesis.design.law_table import Gains, deployed_loop, extra_digits, table_at, update_section
+from synthesis.design.law_table import (
+    Gains,
+    deployed_loop,
+    extra_digits,
+    refuse_beyond_limits,
+    table_at,
+    update_section,
+)
 from synthesis.design.well_posedness import well_posedness
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import Verdict
@@ -72,10 +79,9 @@ def deploy(
     refuse_undeployable(model)
     observer = gains if isinstance(gains, ObserverGains) else None
     update_section(gains, settings)  # refuses limits of inputs that there are not
-    if observer is not None and observer.update == "sampled" and observer.sample_time != settings.sample_time:
-        raise ProblemError(
-            f"gains designed for a sample time of {observer.sample_time} s are not run at {settings.sample_time} s"
-        )
+    wanted = getattr(gains, "sample_time", None)  # of a sampled design
+    if wanted is not None and wanted != settings.sample_time:
+        raise ProblemError(f"gains designed for a sample time of {wanted} s are not run at {settings.sample_time} s")
     if observer is not None and observer.update == "held" and observer.design.fastest_pole is None:
         posed = well_posedness(model, observer.design)  # nothing bounds the gains but the channels themselves
         if posed.ill_posed:
@@ -91,6 +97,7 @@ def deploy(
             continue
         claims = _claims(gains, search, channels, settings.settle)
         if claims is not None:
+            refuse_beyond_limits(gains, table)
             return Deployment(gains, settings, points, table, claims, cost)
     raise ProblemError(
         f"model '{model.name}': no table with up to {' x '.join(map(str, segments))} segments keeps the guarantee within "
@@ -204,7 +211,7 @@ def _tabulated(
 def lyapunov_degree(model: LpvModel, gains: Gains) -> tuple[int, ...]:
     """Degree of P in the claims for each parameter: that of the gains, at least one; none in a parameter that may jump.
 
-    A law whose own P is rational in the parameters says how many degrees more come close to it.
+    A law whose own P is rational in the parameters says by `rational` how many degrees more come close to it.
     """
-    more = 0 if isinstance(gains, ObserverGains) else gains.rational
+    more = int(getattr(gains, "rational", 0))
     return tuple(0 if p.may_jump else max(gains.design.degree, 1) + more for p in model.parameters)

@@ -20,6 +20,7 @@ from estimators.arrays import FloatArray
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_channel_matrices
 from synthesis.design.hinf_observer import Channel, ObserverGains, channel_matrices
+from synthesis.design.state_feedback import GainLimits
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
@@ -59,8 +60,6 @@ class FeedbackLaw(Protocol):
     def measured(self) -> Measured: ...  # noqa: D102
     @property
     def order(self) -> int: ...  # noqa: D102
-    @property
-    def rational(self) -> int: ...  # noqa: D102
     def controller(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Ak (g, nk, nk), Bk (g, nk, nv), Ck (g, nu, nk), Dk (g, nu, nv) in continuous time."""
 
@@ -83,6 +82,21 @@ def table_at(gains: Gains, points: FloatArray, sample_time: float) -> FloatArray
         through = gains.measured == "outputs" and bool(D.any())
         Ak, Bk, Ck, Dk = (_held if through else _trapezoidal)(Ak, Bk, Ck, Dk, sample_time)
     return np.concatenate([np.concatenate([Ak, Bk], axis=2), np.concatenate([Ck, Dk], axis=2)], axis=1)
+
+
+def refuse_beyond_limits(gains: Gains, table: FloatArray) -> None:
+    """Raise ProblemError where a deployed gain breaks a limit of its design: |K_i S|, convex in K, is largest at a breakpoint."""
+    limits = getattr(gains.design, "limits", None)
+    if not isinstance(limits, GainLimits):
+        return
+    sizes = np.array([limits.sizes[s.name] for s in gains.model.states])
+    largest = np.linalg.norm(table.reshape(-1, *table.shape[-2:]) * sizes, axis=-1).max(axis=0)
+    for signal, found in zip(gains.model.inputs, largest, strict=True):
+        if signal.name in limits.inputs and not found <= limits.inputs[signal.name]:
+            raise ProblemError(
+                f"the table commands up to {found:.6g} {signal.unit} of {signal.name} for states of their sizes, its limit is "
+                f"{limits.inputs[signal.name]:g} {signal.unit}; give the design more reserve"
+            )
 
 
 def extra_digits(gains: Gains) -> int:

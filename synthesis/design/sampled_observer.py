@@ -16,11 +16,11 @@ comes out is proved for the exact ones (`synthesis.certificate`).
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 
 from estimators.arrays import FloatArray
+from synthesis.design.fitted_update import fitted_update
 from synthesis.design.hinf_observer import (
     ObserverDesign,
     ObserverGains,
@@ -34,12 +34,9 @@ from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.motion import one_sample_later, rates
-from synthesis.models.discretise import zero_order_hold
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.matrix import MatrixPolynomial, symmetric_block, variable
 
-FIT = 1e-10  # relative
-DEGREES = (4, 8, 12, 16, 24)
 POINTS = 40  # for each parameter; what holds between them is proved for the table that is deployed
 
 
@@ -61,7 +58,9 @@ def design_sampled_observer(model: LpvModel, design: ObserverDesign, sample_time
     settings = replace(design.settings, points=min(design.settings.points, POINTS))
     design = replace(design, settings=settings)
     scale = design_scale(model, design) / np.sqrt(sample_time)  # errors in their size if time is counted in samples
-    fitted = _fitted(model, scale, sample_time)
+    Phi, _, Gamma = fitted_update(model, scale, sample_time)
+    scaled = model.polynomial.with_states_scaled(scale)
+    fitted = {"Phi": Phi, "Gamma": Gamma, "C": scaled.C, "F": scaled.F}
 
     def problem(gamma: float | None, maximise_margin: bool = True, floor: float = 0.0) -> LmiProblem:
         return _problem(model, design, scale, sample_time, fitted, gamma, maximise_margin, floor)
@@ -119,36 +118,3 @@ def _problem(
             ]  # fmt: skip
         problem.require(f"gain {channel.name}", symmetric_block(rows))
     return problem
-
-
-def _fitted(model: LpvModel, scale: FloatArray, period: float) -> dict[str, FloatArray]:
-    """Phi, Gamma, C and F in the scaled states as polynomials in u, coefficients (d_1+1, ..., d_p+1, rows, columns)."""
-    if not model.polynomial.is_polynomial:
-        raise ProblemError(f"model '{model.name}' is rational; a sampled design takes polynomial models")
-    scaled = model.polynomial.with_states_scaled(scale)
-    found: dict[str, FloatArray] = {}
-    for degree in DEGREES:
-        nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
-        count = len(model.parameters)
-        points = np.array(list(product(nodes, repeat=count))).reshape(len(nodes) ** count, count)
-        middle, half = (np.array([getattr(p, key) for p in model.parameters]) for key in ("middle", "half_width"))
-        numeric = model.on(middle + half * points)
-        A, E = numeric.A * scale[:, None] / scale, numeric.E * scale[:, None]
-        values = np.concatenate(zero_order_hold(A, E, period), axis=-1)
-        series = values.reshape(*(len(nodes),) * count, *values.shape[1:])
-        inverse = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, degree))
-        for axis in range(count):
-            series = np.moveaxis(np.tensordot(inverse, series, axes=(1, axis)), 0, axis)
-        size = np.abs(series).max()
-        tail = max((np.abs(np.take(series, -1, axis=axis)).max() for axis in range(count)), default=0.0)
-        if tail <= FIT * size or degree == DEGREES[-1]:
-            powers = np.zeros((degree + 1, degree + 1))
-            for k in range(degree + 1):
-                column = np.polynomial.chebyshev.cheb2poly(np.eye(degree + 1)[k])
-                powers[: len(column), k] = column
-            for axis in range(count):
-                series = np.moveaxis(np.tensordot(powers, series, axes=(1, axis)), 0, axis)
-            n = len(model.states)
-            found = {"Phi": series[..., :n], "Gamma": series[..., n:], "C": scaled.C, "F": scaled.F}
-            break
-    return found

@@ -91,10 +91,11 @@ class StateFeedbackDesign:
 
 @dataclass(frozen=True)
 class StateFeedbackGains:
-    """K(p) = Y(p) Q(p)^-1, u = K x, with the bound that was minimised.
+    """K(p) = Y(p) Q(p)^-1, u = K x (of a sampled design Y(p) G(p)^-1), with the bound that was minimised.
 
     `gamma_lower` is a bound from below for every Q and Y of this degree (weak duality, margins taken out), where there is one;
-    `gamma` the verified level of the continuous-time loop. `result` carries verdict and margins, `optimum` the first solve.
+    `gamma` the verified level, of the continuous-time loop unless the design is sampled. `result` carries verdict and margins,
+    `optimum` the first solve.
     """
 
     design: StateFeedbackDesign
@@ -106,7 +107,7 @@ class StateFeedbackGains:
     scale: FeedbackScale
     measured: Measured = "states"
     order: int = 0
-    rational: int = 0  # degrees more that P has in claims (`synthesis.design.deploy.lyapunov_degree`)
+    sample_time: float | None = None  # s, of a sampled design (synthesis.design.sampled_state_feedback)
 
     @property
     def verdict(self) -> Verdict:
@@ -120,8 +121,10 @@ class StateFeedbackGains:
         middle = np.array([p.middle for p in self.model.parameters])
         half = np.array([p.half_width for p in self.model.parameters])
         scaled = np.hstack([(grid - middle) / half, np.zeros_like(grid)])
-        Q, Y = (self.result.values[key].at(scaled)[..., 0] for key in "QY")
-        K = np.swapaxes(np.linalg.solve(Q, np.swapaxes(Y, -1, -2)), -1, -2)  # Q is symmetric
+        right, Y = (
+            self.result.values[key].at(scaled)[..., 0] for key in ("Q" if self.sample_time is None else "G", "Y")
+        )
+        K = np.swapaxes(np.linalg.solve(np.swapaxes(right, -1, -2), np.swapaxes(Y, -1, -2)), -1, -2)
         return np.asarray(K * self.scale.inputs[:, None] * self.scale.states)
 
     def controller(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -197,10 +200,10 @@ def state_feedback_problem(
         both, across = (M + M.T) * -float(np.sqrt(1.0 - cosine**2)), (M.T - M) * cosine
         problem.require("damping", symmetric_block([[both, across], [None, both]]))
     if design.limits is not None:
-        _limit(problem, model, design, scale, Q, Y)
+        require_limits(problem, model, design.limits, design.reserve, scale, Q, Q, Y)
     for channel in design.channels:
         W, Z = feedback_channel_matrices(model, channel)
-        seen = _seen(problem, Z, known, Q, Y, model, scale) * (1.0 / clock)
+        seen = performance(problem, Z, known, Q, Y, model, scale) * (1.0 / clock)
         force = known["E"] @ problem.constant(W / scale.disturbance)
         through = problem.constant(Z[:, nx : len(Z.T) - nu]) @ known["F"] @ problem.constant(W / scale.disturbance)
         level = channel.bound or gamma
@@ -222,7 +225,7 @@ def state_feedback_problem(
     return problem
 
 
-def _seen(
+def performance(
     problem: LmiProblem,
     Z: FloatArray,
     known: Mapping[str, MatrixPolynomial],
@@ -238,24 +241,26 @@ def _seen(
     return plain.scaled_by(below) + problem.constant(of_y) @ (known["C"] @ Q + known["D"] @ Y)
 
 
-def _limit(
+def require_limits(
     problem: LmiProblem,
     model: LpvModel,
-    design: StateFeedbackDesign,
+    limits: GainLimits,
+    reserve: float,
     scale: FeedbackScale,
     Q: MatrixPolynomial,
+    below: MatrixPolynomial,
     Y: MatrixPolynomial,
 ) -> None:
-    assert design.limits is not None
-    S = scale.states * np.array([design.limits.sizes[s.name] for s in model.states])
+    """The limits of the docstring, for K Q K' < Y below^-1 Y'."""
+    S = scale.states * np.array([limits.sizes[s.name] for s in model.states])
     largest = float(S.max())
     q = problem.scalar("q")  # of the docstring, times the largest size squared
     problem.require("states within their sizes", Q - problem.constant(np.diag((S / largest) ** 2)).scaled_by(q))
     for i, signal in enumerate(model.inputs):
-        if signal.name in design.limits.inputs:
-            most = design.limits.inputs[signal.name] / (1.0 + design.reserve) / scale.inputs[i] / largest
+        if signal.name in limits.inputs:
+            most = limits.inputs[signal.name] / (1.0 + reserve) / scale.inputs[i] / largest
             row = problem.constant(np.eye(len(model.inputs))[i : i + 1] / most) @ Y
-            problem.require(f"limit of {signal.name}", symmetric_block([[q, row], [None, Q]]))
+            problem.require(f"limit of {signal.name}", symmetric_block([[q, row], [None, below]]))
 
 
 def check_limits(model: LpvModel, limits: GainLimits | None) -> None:

@@ -48,7 +48,6 @@ class StaticFeedback:
     gamma_lower: None = None
     measured: Measured = "outputs"
     order: int = 0
-    rational: int = 0
 
     @property
     def verdict(self) -> Verdict:

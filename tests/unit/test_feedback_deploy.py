@@ -5,12 +5,14 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.linalg import solve_discrete_lyapunov
 
 from analysis import hinf_norm
 from estimators import GainSchedule, LpvObserver, ScheduleError
@@ -18,11 +20,14 @@ from estimators.arrays import FloatArray
 from estimators.schedule import check_content
 from studies.report.frozen_levels import frozen_levels
 from studies.report.schedule_figures import gain_figure
+from synthesis.certificate.claims import ClaimChannel
+from synthesis.certificate.levels import best_gain
 from synthesis.certificate.proof import certificate, prove
+from synthesis.certificate.search import Search, Wish
 from synthesis.design.deploy import Deployment, deploy
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.export import export, schedule_content
-from synthesis.design.feedback_channel import FeedbackChannel
+from synthesis.design.feedback_channel import FeedbackChannel, feedback_names
 from synthesis.design.law_table import table_at
 from synthesis.design.state_feedback import StateFeedbackDesign, StateFeedbackGains, design_state_feedback
 from synthesis.errors import ProblemError
@@ -103,6 +108,31 @@ def test_claimed_levels_are_those_of_the_loop_written_out(content: dict[str, Any
         assert best == pytest.approx(decay if level.kind == "sampled error" else norm, rel=1e-3)
 
 
+def test_h2_and_peak_claims_about_a_law(deployment: Deployment) -> None:
+    """Levels from Lyapunov equations at constant parameters; a little above them is proved, below them is not."""
+    loop, model = deployment.loop, mass()
+    search = Search(loop, feedback_names(model), model.parameters)
+    channel = ClaimChannel({"d1": 1.0}, ("x1", "y2", "u1"), (0.5, 4.0, 1.0))
+    claims = [
+        best_gain(search, Wish(kind, None, channel), 0.005) for kind in ("sampled H2 norm", "sampled energy to peak")
+    ]
+    found = [claim for claim in claims if claim is not None]
+    assert len(found) == 2
+    content = schedule_content(replace(deployment, claims=(deployment.claims[0], *found)), "more")
+    assert [proof.proved for proof in prove(content)] == [True, True, True]
+    m, K = model.on(np.array([2.0])), GainSchedule.from_content(content).gain(np.array([2.0]))
+    Phi, Gamma = zero_order_hold(m.A[0], np.hstack([m.B[0], m.E[0]]), PERIOD)
+    A, B = Phi + Gamma[:, :1] @ K[0], Gamma[:, 1:]
+    C = np.vstack([[1.0, 0.0], m.C[0, 1] + m.D[0, 1] @ K[0], K[0]]) / np.array([[0.5], [4.0], [1.0]])
+    D = np.array([[0.0], [0.25], [0.0]])
+    S = C @ solve_discrete_lyapunov(A, B @ B.T) @ C.T + D @ D.T
+    for level, there in zip(frozen_levels(content)[1:], (np.trace(S), np.linalg.eigvalsh(S)[-1]), strict=True):
+        assert level.slack >= 0.0 and level.values[-1] == pytest.approx(np.sqrt(there), rel=1e-6)
+        assert level.level < 1.5 * level.values.max()
+    for claim in found:
+        assert not search.verifier.prove(replace(claim, level=0.7 * claim.level)).proved
+
+
 def test_a_better_claim_and_a_wrong_sign_are_not_proved(content: dict[str, Any]) -> None:
     def better(c: dict[str, Any]) -> None:
         c["claims"][1]["level"] *= 0.5
@@ -113,10 +143,10 @@ def test_a_better_claim_and_a_wrong_sign_are_not_proved(content: dict[str, Any])
     def smaller_size(c: dict[str, Any]) -> None:
         c["claims"][1]["channel"]["errors"]["x1"] = 0.05
 
-    for change in (better, wrong_sign, smaller_size):
+    for change in (better, wrong_sign, smaller_size):  # the first two by the loop itself, at a constant parameter
         proofs = prove(changed(content, change))
         assert not all(proof.proved for proof in proofs)
-        assert any(proof.refuted for proof in proofs)  # by the loop itself, where the parameter stands still
+        assert change is smaller_size or any(proof.refuted for proof in proofs)
 
 
 def _update(**new: Any) -> Callable[[dict[str, Any]], None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,12 @@ import sympy as sp
 
 from analysis import hinf_norm
 from estimators.arrays import FloatArray
+from synthesis.design.deploy import deploy
+from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.design.feedback_scale import feedback_scale
 from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
+from synthesis.design.sampled_state_feedback import design_sampled_state_feedback
 from synthesis.design.state_feedback import (
     GainLimits,
     StateFeedbackDesign,
@@ -22,6 +26,7 @@ from synthesis.design.state_feedback import (
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import Verdict
 from synthesis.lmi.solve import solve
+from synthesis.models.discretise import zero_order_hold
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter
 from tests.support.lmi_cases import parameter, small_model
@@ -202,3 +207,79 @@ def test_a_mode_that_no_input_moves_is_refused_with_its_place() -> None:
         design_state_feedback(model, design)
     with pytest.raises(ProblemError, match="has no input"):
         design_state_feedback(small_model([[p]], [[1]], E=[[1]]), design)
+
+
+def test_sampled_design_is_the_norm_of_the_discretised_loop() -> None:
+    """A double integrator at T = 0.5 s: near the optimum of discrete time, which a Riccati equation of the game finds."""
+    period = 0.5
+    model = small_model(
+        [[0, 1], [0, p - 1]], [[1, 0]], (parameter("p", 0.999, 1.001, 0.0),), B=[[0], [1]], E=[[0], [1]]
+    )
+    channel = FeedbackChannel(("d1",), ("y1", "u1"), weights=(0.5,), sizes=(2.0, 1.0))
+    gains = design_sampled_state_feedback(model, StateFeedbackDesign((channel,)), period)
+    assert gains.verdict is Verdict.CERTIFIED and gains.gamma_lower is not None
+    A, B = np.array([[1.0, period], [0.0, 1.0]]), np.array([[period**2 / 2], [period]])
+    K = gains.gain(np.array([1.0]))[0]
+    norm = float(hinf_norm(A + B @ K, 0.5 * B, np.array([[0.5, 0.0], K[0]]), discrete=True).norm)
+    assert norm <= gains.gamma
+
+    def possible(level: float) -> bool:
+        """The value iteration of the game with u unlimited and d weighed by level^2 stays bounded."""
+        X, both = np.zeros((2, 2)), np.hstack([B, 0.5 * B])
+        for _ in range(3000):
+            weight = np.diag([1.0, -(level**2)]) + both.T @ X @ both
+            if weight[1, 1] >= 0.0:
+                return False
+            last, X = X, np.diag([0.25, 0.0]) + A.T @ (X - X @ both @ np.linalg.solve(weight, both.T @ X)) @ A
+            if np.abs(X - last).max() < 1e-10 * np.abs(X).max():
+                return True
+        return False
+
+    assert possible(gains.gamma) and not possible(0.97 * gains.gamma)
+    with pytest.raises(ProblemError, match="has no fastest_pole"):
+        design_sampled_state_feedback(model, StateFeedbackDesign((channel,), fastest_pole=5.0), period)
+
+
+def test_sampled_design_where_the_continuous_one_is_too_fast_for_the_samples() -> None:
+    """x' = p x + u + d at T = 0.4 s: decay and limit hold for the loop over a sample, with the rates of p."""
+    model, period = scalar(1.0, 2.0, 0.5), 0.4
+    channel = FeedbackChannel(("d1",), ("x1", "u1"))
+    limits = GainLimits({"u1": 3.1}, {"x1": 1.0})
+    design = StateFeedbackDesign((channel,), decay_rate=0.2, limits=limits)
+    points = np.linspace(1.0, 2.0, 11)
+    gains = design_sampled_state_feedback(model, design, period)
+    K = gains.gain(points)[:, 0, 0]
+    update = np.exp(points * period) + (np.exp(points * period) - 1.0) / points * K
+    assert np.abs(update).max() < np.exp(-0.2 * period) and np.abs(K).max() < 3.1
+    fast = design_state_feedback(model, StateFeedbackDesign((channel,))).gain(points)[:, 0, 0]
+    assert np.abs(np.exp(points * period) + (np.exp(points * period) - 1.0) / points * fast).max() > 1.0
+    done = deploy(gains, DeploySettings(sample_time=period))
+    assert [claim.kind for claim in done.claims] == ["sampled error", "sampled gain"]
+    assert done.claims[1].level < 1.15 * gains.gamma
+    stricter = replace(gains, design=replace(design, limits=GainLimits({"u1": 2.9}, {"x1": 1.0})))
+    with pytest.raises(ProblemError, match=r"commands up to .* of u1 for states of their sizes, its limit is 2\.9"):
+        deploy(stricter, DeploySettings(sample_time=period))
+    with pytest.raises(ProblemError, match=r"designed for a sample time of 0\.4 s are not run at 0\.1 s"):
+        deploy(gains, DeploySettings(sample_time=0.1))
+
+
+def test_sampled_design_pays_for_rates_and_for_decay() -> None:
+    """A spring of moving stiffness: parameters that move cost more than ones that stand, faster decay more than none."""
+
+    def spring(rate: float) -> LpvModel:
+        A = [[0, 1], [-3 - 2 * p, -sp.Rational(1, 5)]]
+        return small_model(A, [[1, 0]], (parameter("p", -1.0, 1.0, rate),), B=[[0], [1]], E=[[0], [1]])
+
+    channel = FeedbackChannel(("d1",), ("x1", "u1"), sizes=(0.3, 1.0))
+    points, period = np.linspace(-1.0, 1.0, 9), 0.1
+    still, moving, decaying = (
+        design_sampled_state_feedback(spring(rate), StateFeedbackDesign((channel,), decay_rate=decay), period)
+        for rate, decay in ((0.0, 0.0), (20.0, 0.0), (0.0, 1.5))
+    )
+    assert moving.gamma > 1.05 * still.gamma and decaying.gamma > 1.02 * still.gamma
+    radii = []
+    for gains in (still, decaying):
+        m = gains.model.on(points)
+        Phi, Gamma = zero_order_hold(m.A, m.B, period)
+        radii.append(np.abs(np.linalg.eigvals(Phi + Gamma @ gains.gain(points))).max())
+    assert radii[1] < np.exp(-1.5 * period) < radii[0]

@@ -1,0 +1,130 @@
+r"""H-infinity gain synthesis for LPV state feedback that runs once a sample, in discrete time.
+
+    x+ = (Phi + Gamma K(p)) x + Gamma_E d,    Phi = e^(TA), Gamma = T phi(TA) B, Gamma_E = T phi(TA) E, d held over a sample
+
+With V = x'Q(p)^-1 x, Q+ = Q one sample later, a slack matrix G(p) and Y = K G (de Oliveira, Geromel, Bernussou 2002)
+
+    decay a      [exp(-2 a T) Q+, Phi G + Gamma Y; *, G + G' - Q] > 0                    |x|_P falls by exp(-a T) in every sample
+    channel      [Q+, Phi G + Gamma Y, Gamma_E W, 0; *, G + G' - Q, 0, (Cz G + Dz Y)'; *, *, g I, (Fz W)'; *, *, *, g I] > 0
+    limit        as in `synthesis.design.state_feedback`, with G + G' - Q in the place of Q below Y_i
+
+prove an l2 gain below g. K needs no Q+, which is not known when it is used. Phi and the Gammas are fitted by Chebyshev
+polynomials to 1e-10; what comes out is proved for the exact ones (`synthesis.certificate`). Where samples are long against the
+loop, this is the design to take: the one in continuous time knows nothing of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimators.arrays import FloatArray
+from synthesis.design.feedback_channel import feedback_channel_matrices
+from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
+from synthesis.design.fitted_update import fitted_update
+from synthesis.design.refusals import refuse_unstabilisable
+from synthesis.design.state_feedback import (
+    StateFeedbackDesign,
+    StateFeedbackGains,
+    check_limits,
+    performance,
+    require_limits,
+)
+from synthesis.design.three_solves import three_solves
+from synthesis.errors import ProblemError
+from synthesis.lmi.problem import LmiProblem
+from synthesis.loop.from_model import plant_of
+from synthesis.loop.motion import one_sample_later, rates
+from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.matrix import MatrixPolynomial, symmetric_block, variable
+
+POINTS = 40  # for each parameter; what holds between them is proved for the table that is deployed
+
+
+def design_sampled_state_feedback(
+    model: LpvModel, design: StateFeedbackDesign, sample_time: float
+) -> StateFeedbackGains:
+    """K(p) for the given sample time (s); `gamma` is the l2 gain over samples.
+
+    Raises ProblemError for a rational model, for pole regions (of poles in continuous time), and as `design_state_feedback`.
+    """
+    if not sample_time > 0.0:
+        raise ProblemError(f"sample time {sample_time} s must be positive")
+    given = next((name for name in ("fastest_pole", "damping") if getattr(design, name) is not None), None)
+    if given is not None:
+        raise ProblemError(
+            f"a sampled design has no {given}: leave it out; sizes of inputs in channels bound its gains"
+        )
+    refuse_unstabilisable(model)
+    check_limits(model, design.limits)
+    design = replace(design, settings=replace(design.settings, points=min(design.settings.points, POINTS)))
+    plain = feedback_scale(model, design.channels)
+    # Sums over samples in the place of integrals: what a state costs is divided by the sample time.
+    states = plain.states * np.sqrt(plain.clock / sample_time)
+    scale = replace(plain, states=states, disturbance=plain.disturbance * np.sqrt(plain.clock * sample_time), clock=1.0)
+    fitted = fitted_update(model, states, sample_time)
+
+    def problem(gamma: float | None, maximise_margin: bool = True, floor: float = 0.0) -> LmiProblem:
+        return _problem(model, design, scale, sample_time, fitted, gamma, maximise_margin, floor)
+
+    def level(objective: float) -> float:
+        return scale.disturbance * float(np.sqrt(objective) if len(design.channels) == 1 else objective)
+
+    found = three_solves(model.name, problem, level, design.backoff, design.settings)
+    return StateFeedbackGains(
+        design, model, found.gamma_lower, found.gamma, found.result, found.optimum, scale, sample_time=sample_time
+    )
+
+
+def _problem(
+    model: LpvModel,
+    design: StateFeedbackDesign,
+    scale: FeedbackScale,
+    period: float,
+    fitted: tuple[FloatArray, FloatArray, FloatArray],
+    gamma: float | None,
+    maximise_margin: bool,
+    floor: float,
+) -> LmiProblem:
+    problem = LmiProblem(model.parameters, maximise_margin and gamma is not None, least_norm=floor > 0.0, floor=floor)
+    nx, nu, count = len(model.states), len(model.inputs), len(model.parameters)
+    applied = scale.applied(model.polynomial)
+    known = {key: problem.scaled(getattr(applied, key)) for key in ("C", "D", "F", "denominator")}
+    Phi, Gamma, Gamma_E = (problem.scaled(array) for array in (fitted[0], fitted[1] * scale.inputs, fitted[2]))
+    Q = problem.symmetric("Q", nx, tuple(0 if p.may_jump else design.degree for p in model.parameters) or 0)
+    G, Y = problem.matrix("G", nx, nx, design.degree), problem.matrix("Y", nu, nx, design.degree)
+    one = problem.constant(np.ones((1, 1)))
+    speeds = rates(
+        plant_of(model).axes, Q, one, lambda i: variable(count + i, 2 * count), lambda x: int(x.p) / int(x.q)
+    )
+    later, closed, slack = one_sample_later(Q, speeds, period), Phi @ G + Gamma @ Y, G + G.T - Q
+    problem.require("Q > 0", Q)
+    if design.decay_rate > 0.0:
+        kept = float(np.exp(-2.0 * design.decay_rate * (1.0 + design.reserve) * period))
+        problem.require("decay over a sample", symmetric_block([[later * kept, closed], [None, slack]]))
+    if design.limits is not None:
+        require_limits(problem, model, design.limits, design.reserve, scale, Q, slack, Y)
+    name = "gamma^2" if len(design.channels) == 1 else "gamma"
+    for channel in design.channels:
+        W, Z = feedback_channel_matrices(model, channel)
+        W = W / scale.disturbance
+        seen = performance(problem, Z, known, G, Y, model, scale)
+        through = problem.constant(Z[:, nx : len(Z.T) - nu]) @ known["F"] @ problem.constant(W)
+        level = channel.bound or gamma
+        if level is None:
+            size: MatrixPolynomial = problem.scalar(name)
+            problem.minimise(name)
+        else:
+            ratio = level / scale.disturbance
+            size = problem.constant(np.array([[ratio**2 if name == "gamma^2" else ratio]]))
+        inner, outer = problem.constant(np.eye(W.shape[1])), problem.constant(np.eye(len(Z))).scaled_by(size)
+        inner = inner if name == "gamma^2" else inner.scaled_by(size)
+        rows: list[list[MatrixPolynomial | None]] = [
+            [later, closed, Gamma_E @ problem.constant(W), None],
+            [None, slack, None, seen.T],
+            [None, None, inner, through.T],
+            [None, None, None, outer],
+        ]
+        problem.require(f"gain {channel.name}", symmetric_block(rows))
+    return problem
