@@ -96,15 +96,10 @@ class Amplification:
 def amplification(
     content: Mapping[str, Any], runs: int = 60, samples: int | None = None, seed: int = 0
 ) -> tuple[Amplification, ...]:
-    """Every claim about gain or decay of the update of a schedule file's content, proved again, beside what runs show.
+    """Every claim about gain or decay of a schedule file's content (`read_content`), proved again, beside what runs show.
 
     `samples` of a run; None: five decay times, 200 to 3000. Raises ScheduleError for a content that is no schedule, and
     AnalysisError for counts below one or beyond memory.
-
-    >>> from estimators.schedule import SHIPPED, read_content
-    >>> found = amplification(read_content(SHIPPED / "longitudinal-speed.json"), runs=6, samples=60)
-    >>> all(one.proved and not one.beaten for one in found)
-    True
     """
     if content.get("schema") == FIRST_FORMAT:
         content = upgraded(content, "schedule content")

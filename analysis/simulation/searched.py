@@ -35,7 +35,13 @@ class ScheduleQuestion:
     schedule: GainSchedule
     kind: str
     channel: ClaimChannel
-    order: int = 6  # of the error equation along a line: more than plant and multilinear gains make
+
+    @property
+    def order(self) -> int:
+        """One more than the degree of the error equation along a line in one cell: that of the plant, and of L times C."""
+        degrees = {key: sum(max(n - 1, 0) for n in m.coefficients.shape[:-2]) for key, m in self.schedule.plant.items()}
+        most: int = max(*(degrees[key] for key in "AE"), *(degrees[key] + len(self.axes) for key in "CF"))
+        return 1 + most
 
     @property
     def discrete(self) -> bool:

@@ -58,7 +58,7 @@ car = NonlinearModel(
     inputs=(Signal("wanted_traction", "N"), Signal("climb", "1")),
     f=sp.Matrix([(f - rho * cd * area * v**2 / 2) / m - g * (sp.sin(sp.atan(climb)) + cr), (demand - f) / lag]),
     h=sp.Matrix([v]),
-    constants={name: Constant(x, unit, "Feedback Systems; Rajamani (lag)") for name, (x, unit) in values.items()},
+    constants={name: Constant(x, unit, "Feedback Systems; the lag is ours") for name, (x, unit) in values.items()},
 )
 schedule = GainSchedule.from_content(content)
 time = schedule.sample_time * np.arange(2000)

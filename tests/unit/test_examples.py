@@ -18,7 +18,7 @@ def constants(model: LpvModel) -> dict[str, float]:
 
 
 def test_missile_has_the_rounded_coefficients_of_lim_and_how() -> None:
-    """Their numbers, as in fbianchi/LPVtools, demos/Autopilot_NL, without the cosine: to half of their last digits."""
+    """Their numbers, as in fdbianchi/LPVtools, demos/Autopilot_NL, without the cosine: to half of their last digits."""
     points = np.array([[2.0, 5.0], [3.0, 12.0], [4.0, 20.0]])
     M, a = points.T
     found = any_model("missile").on(points)
