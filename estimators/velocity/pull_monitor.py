@@ -37,7 +37,7 @@ class Pull(NamedTuple):
     mu: Signals
     blind: Number
     gated: Number
-    contested: Number  # whether it and the forces contradict each other by half of what they may
+    contested: Number  # whether it and the forces have contradicted each other by half of what they may, for 0.05 s
 
 
 class PullMonitor(Judge):
@@ -114,7 +114,8 @@ class PullMonitor(Judge):
         gated = seen.good[0] & no(used) & (seen.alive | verdict.contradicted)
         # one that repeats what the others say is no fault
         reported = seen.good[0] & no(gated)
-        return Pull(reading, choose(doubt > 0.0, grown, noise), reported, doubt, mu, blind, gated, contested)
+        lasting = contested & (age > s.slowest_unit)  # a patch of ice brings them apart for a moment
+        return Pull(reading, choose(doubt > 0.0, grown, noise), reported, doubt, mu, blind, gated, lasting)
 
     def learn(self, seen: ConditionedInputs, innovation: Signals, mu: Signals) -> None:
         """Do all wheels that turn, three at least, slip against their force? No tire does: a_x has led the estimate astray.
