@@ -134,7 +134,7 @@ class VelocityFusion(Memory):
         turn, before = across.yaw_rate(r), along.speed
         unsure = 1.0 * across.filter.variance(lateral.SPEED)  # of arrays a copy: prediction writes into the covariance
         along.predict(dt, a, noise, turn, (across.speed, unsure), doubt > 0.0)
-        across.predict(dt, b, noise_b, r, noise_r, before, used_b & used_r)
+        across.predict(dt, b, noise_b, r, noise_r, before, used_b & used_r, seen.present)
         yaw_acceleration, left = self.signal_monitor.yaw_acceleration, across.speed
         own = along.acceleration(a) + turn * left
 
