@@ -132,7 +132,7 @@ class VelocityFusion(Memory):
         turn, before = across.yaw_rate(r), along.speed
         unsure = 1.0 * across.filter.variance(lateral.SPEED)  # of arrays a copy: prediction writes into the covariance
         along.predict(dt, a, noise[0], turn, (across.speed, unsure), doubt[0] > 0.0)
-        across.predict(dt, b, noise[1], r, noise[2], before, used[1] & used[2])
+        across.predict(dt, b, noise[1], r, noise[2], before, used[1] & used[2], seen.present)
         yaw_acceleration, left, felt = self.signal_monitor.turn.yaw_acceleration, across.speed, b + road[1]
         own = along.acceleration(a) + turn * left
 
@@ -146,8 +146,7 @@ class VelocityFusion(Memory):
         standing, lost = self.zero_velocity(seen, a, b, turn, dt)
         lost = lost | self.longitudinal_reset(dt, standing, seen, wheel, slipping, mu, self._radius)
         along.zero_velocity_update(standing)
-        front = slipping[0] | slipping[1] | wheel.gated[0] | wheel.gated[1]
-        rear = slipping[2] | slipping[3] | wheel.gated[2] | wheel.gated[3]
+        front, rear = (slipping[i] | slipping[i + 1] | wheel.gated[i] | wheel.gated[i + 1] for i in (0, 2))
         told = kit.no(unknown)
         # wheels that slide sideways do not turn, and have no slip angle; no road is so slippery that the car feels nothing
         calm, silent = across.friction(b) < self.settings.unloaded, seen.silent

@@ -9,7 +9,7 @@ friction coefficient enters. alpha is positive where F_y is (P4, P5), the opposi
 alone, so mu needs no bank.
 
 Every axle on one road: where one is further off than its model explains, neither is believed more than that, for a second
-(`strain`); an axle without side force is, for it does not slip sideways on any road.
+(`strain`); an axle without side force is, and leads V_y back, for it does not slip sideways on any road.
 
 Two scale errors decide how far the kinematics may be believed in a turn, where a and r V_x are large and cancel: s is that
 of a, sensor and leftover body roll; s_t is that of the product r V_x, of the yaw rate sensor and of the speed, whose error
@@ -105,19 +105,21 @@ class LateralFusion(CarsMemory):
         yaw_noise: Number,
         speed: Number,
         believed: Number,
+        present: Number,
     ) -> None:
         """`measured` a_y and `yaw_rate` as the unit gives them, with their standard deviations; `speed` V_x.
 
-        Readings that are not `believed` teach nothing about the sensors, nor about the road.
+        Readings that are not `believed` teach nothing about the sensors, nor about the road; without those of a sensor (not
+        `present`) the axles are all there is, and believed again.
         """
         travel = elapsed * speed
+        self.strain = self.kit.where(present, self.strain, 0.0)
         coupling = (-elapsed, -elapsed, travel, -elapsed * measured, travel * yaw_rate)
         if self.kit.some(self.kit.no(believed)):
             x, choose = self.filter.mean, self.kit.where
             known = sum(gain * x[place] for gain, place in zip(coupling, _MOVING, strict=True))
             coupling = tuple(choose(believed, gain, 0.0) for gain in coupling)
             held = choose(believed, 0.0, known)
-            self.strain = choose(believed, self.strain, 0.0)  # the axles are all there is
         else:
             held = 0.0
         own, turned = elapsed * noise, travel * yaw_noise
@@ -147,6 +149,7 @@ class LateralFusion(CarsMemory):
         held = largest(1.0, 2.0 * s.side_error_memory / elapsed)
         sensed, one, gate = self._sensor * yaw_rate, kit.full(1.0), s.gate**2
         kept, sure = kit.exp(-elapsed / s.lost_time), s.unloaded - s.gate * doubt / GRAVITY
+        slid = self.strain > s.dead_speed
         strain, pace = self.strain * self.strain, largest(magnitude, 1.0)
 
         def predicted(
@@ -190,7 +193,7 @@ class LateralFusion(CarsMemory):
         ) -> tuple[Number, ...]:
             shows, error = linear * s.side_compliance_spread, white + model
             calm = abs(friction) < sure
-            far = usable & kit.no(off * off < gate * (explained + error))
+            far = usable & kit.no((calm & slid) | (off * off < gate * (explained + error)))
             wide = white + (model + kit.where(calm, 0.0, strain)) * held
             return usable & kit.no(far), wide, shows * shows > error, kit.where(far & kit.no(calm), abs(off), 0.0)
 

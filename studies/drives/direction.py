@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from pydantic import Field
 
 from estimators.arrays import FloatArray
+from estimators.errors import unknown
 from estimators.pipeline.direction import FASTEST
 from estimators.vehicle import VehicleParameters
+from studies.drives.columns import LogFile
 from studies.drives.quantities import CORNERS
 from synthesis.toml_file import StrictTable
 
@@ -31,6 +33,21 @@ class Gear(StrictTable):
         backward = np.isin(reading, self.backward)
         forward = (reading > 0.0 if self.forward is None else np.isin(reading, self.forward)) & ~backward
         return forward.astype(np.float64) - backward
+
+
+def check_direction(gear: Gear | None, unsigned: bool, logs: Sequence[LogFile]) -> None:
+    """A gear belongs to wheel speeds without a sign, and says which log holds it."""
+    if gear is None:
+        return
+    names = [log.name for log in logs]
+    if not unsigned:
+        raise ValueError(
+            "direction: belongs to wheel speeds without a sign; add unsigned_wheels = true, or leave it out"
+        )
+    if gear.log is None and len(names) > 1:
+        raise ValueError(f"direction.log: missing; say which log holds column '{gear.column}': {', '.join(names)}")
+    if gear.log is not None and gear.log not in names:
+        raise ValueError(f"direction.log: {unknown('log', gear.log, names)}")
 
 
 def signed_wheels(signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:

@@ -1,8 +1,7 @@
 """The drive file: which columns of which logs are what, and the vehicle they were recorded on.
 
-A drive file (TOML, ``gainsmith.drive/1``) maps log columns with units and signs to the signals of
-:mod:`studies.drives.quantities`, several log files with their own clocks to one clock, and names the schedule that
-the observers run with. Every quantity carries its unit; nothing is guessed from a column name.
+A drive file (TOML, ``gainsmith.drive/1``) maps log columns with units and signs to the signals of :mod:`.quantities`, several
+log files with their own clocks to one clock, and names the schedules. Every quantity carries its unit; nothing is guessed.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from estimators.vehicle import VehicleParameters
 from studies.drives import quantities as si
 from studies.drives.columns import Column, LogFile, check_alignment, check_logs
 from studies.drives.compliance import Suspension
-from studies.drives.direction import Gear
+from studies.drives.direction import Gear, check_direction
 from studies.drives.mounted import Mountings, check_mountings
 from studies.drives.quantities import CORNERS, REFERENCES, SIGNALS
 from synthesis.toml_file import StrictTable, load_toml
@@ -166,21 +165,6 @@ def check_columns(
             raise ValueError(f"{place}.log: {unknown('log', column.log, names)}")
 
 
-def check_direction(gear: Gear | None, unsigned: bool, logs: Sequence[LogFile]) -> None:
-    """A gear belongs to wheel speeds without a sign, and says which log holds it."""
-    if gear is None:
-        return
-    names = [log.name for log in logs]
-    if not unsigned:
-        raise ValueError(
-            "direction: belongs to wheel speeds without a sign; add unsigned_wheels = true, or leave it out"
-        )
-    if gear.log is None and len(names) > 1:
-        raise ValueError(f"direction.log: missing; say which log holds column '{gear.column}': {', '.join(names)}")
-    if gear.log is not None and gear.log not in names:
-        raise ValueError(f"direction.log: {unknown('log', gear.log, names)}")
-
-
 def check_signals(signals: Mapping[str, Column], vehicle: Vehicle) -> None:
     """What the observers cannot do without is there, and the vehicle has what the signals need."""
     for name in (*WHEEL_SPEEDS, "ax"):
@@ -274,10 +258,8 @@ class DriveFile(StrictTable):
     """A drive file that was read, checked and converted to SI.
 
     ``schedules`` are for the corner observers: without them the pipeline of the fusion runs alone.
-
     ``mounting``: where the inertial unit and the reference sit, if not at the centre of gravity and along the axes of the car.
-    ``unsigned_wheels``: the wheel speed sensors count teeth and do not tell backward from forward, as in most cars; the gear in
-    ``direction`` does, or the accelerometer. Signed wheel speeds need neither.
+    ``unsigned_wheels``: the wheel speeds do not tell backward from forward; the gear in ``direction`` does, or the accelerometer.
     ``check``: compare the signals of the log with one another (:mod:`.frames`) before anything is estimated from them.
     """
 
