@@ -54,7 +54,7 @@ def read_toml(path: Path, what: str) -> dict[str, typing.Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise SpecError(f"{path.name}: cannot be read ({error.strerror}); give the path of a {what} file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:  # no TOML, no UTF-8, or a number of more digits than Python reads
         raise SpecError(f"{path.name}: not a TOML file: {error}") from error
     except RecursionError as error:
         raise SpecError(f"{path.name}: is nested too deeply for a {what} file; write plain tables") from error

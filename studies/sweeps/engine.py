@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from studies.execution.files import json_bytes, write_bytes
 from studies.execution.processes import Executor, Processes, Serial, available_cores
 from studies.sweeps.reports import markdown
 from studies.sweeps.store import SUMMARY, SweepFolder, locked_folder
-from studies.sweeps.summary import Summary, summarise
+from studies.sweeps.summary import Summary, read_summary, summarise
 from studies.sweeps.sweep import Chunk, Sweep
 from studies.sweeps.tables import compute
 from synthesis.errors import SpecError
@@ -52,8 +51,7 @@ def run_sweep(
             summary = summarise(folder)
             write_bytes(out / "summary.md", markdown(summary).encode(), sync=True)
             write_bytes(summary_file, json_bytes(summary.content()), sync=True)
-        summary = Summary.of_content(json.loads(summary_file.read_text(encoding="utf-8")))
-        return SweepResult(sweep, folder, summary, computed, seconds, reason)
+        return SweepResult(sweep, folder, read_summary(summary_file), computed, seconds, reason)
 
 
 def default_executor(workers: int | None = None) -> Executor:
