@@ -40,6 +40,10 @@ class PerturbedModel:
     """An LpvModel compiled over all its symbols, so that thousands of perturbed copies cost one array expression.
 
     `names` lists scheduling parameters first, then constants; `nominal` holds the values of the constants.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> list(PerturbedModel(model).nominal)
+    ['sigma0', 'sigma1', 'sigma2', 'kappa', 'effective_radius']
     """
 
     model: LpvModel

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-from estimators.errors import GainsmithError
+from estimators.errors import GainsmithError, printable
 from estimators.schedule import read_content
-from estimators.schedule.checker import printable
 from estimators.schedule.files import place_of
 from synthesis.certificate.claims import written
 from synthesis.certificate.proof import Proof, certificate

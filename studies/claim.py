@@ -24,7 +24,11 @@ def paper_rank(paper: str) -> int:
 
 
 class ClaimVerdict(StrEnum):
-    """What became of a published claim."""
+    """What became of a published claim.
+
+    >>> print(ClaimVerdict.REPRODUCED, "/", ClaimVerdict.NOT_REPRODUCED)
+    reproduced / not reproduced
+    """
 
     REPRODUCED = "reproduced"
     PARTLY = "partly reproduced"
@@ -56,7 +60,11 @@ class Published:
 
 @dataclass(frozen=True)
 class Finding:
-    """Our half: the value computed now, the verdict that follows from it, and the reading under which it holds."""
+    """Our half: the value computed now, the verdict that follows from it, and the reading under which it holds.
+
+    >>> Finding(0.8, ClaimVerdict.REPRODUCED, "as printed").computed
+    0.8
+    """
 
     computed: JsonValue
     verdict: ClaimVerdict
@@ -65,7 +73,13 @@ class Finding:
 
 @dataclass(frozen=True)
 class Claim:
-    """A published claim beside our finding."""
+    """A published claim beside our finding.
+
+    >>> from studies.claim import Published
+    >>> printed = Published("two", "P1", "page 1", "Two and two is four", 4, "none")
+    >>> Claim(printed, Finding(2 + 2, ClaimVerdict.REPRODUCED, "added")).row()["verdict"]
+    'reproduced'
+    """
 
     published: Published
     finding: Finding

@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from estimators.errors import unknown
+from estimators.errors import LONGEST_WORD, printable, unknown
 from synthesis.errors import SpecError
 from synthesis.toml_places import Places
 
@@ -68,7 +68,7 @@ def load_toml(path: Path, model: type[_Table], what: str) -> _Table:
 def read_table(model: type[_Table], data: object, where: str, places: Places | None = None) -> _Table:
     """One table. Raises SpecError, one line, that starts with ``where`` it stands: with line and column if `places` are given."""
     if not isinstance(data, dict):
-        raise SpecError(f"{where}: is {data!r}; give a table")
+        raise SpecError(f"{where}: is {printable(repr(data), LONGEST_WORD)}; give a table")
     try:
         return model.model_validate(data)
     except ValidationError as error:
@@ -162,7 +162,8 @@ def _expected(complaint: ErrorDetails, example: object) -> str | None:
 def _dotted(place: Sequence[_Step], empty: str = "") -> str:
     text = ""
     for step in place:
-        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+        name = f"[{step}]" if isinstance(step, int) else printable(step, LONGEST_WORD)
+        text += f".{name}" if text and isinstance(step, str) else name
     return text or empty
 
 

@@ -29,6 +29,9 @@ class Cluster:
     """Workers of a Dask scheduler; they need the same gainsmith installed, and no shared folder.
 
     A worker that is lost gives its tasks to the others. Raises SpecError for an address that does not answer or has no workers.
+
+    >>> Cluster("tcp://127.0.0.1:8786").address  # asked only when a sweep runs
+    'tcp://127.0.0.1:8786'
     """
 
     def __init__(self, address: str) -> None:

@@ -61,6 +61,9 @@ def identify_drive(
     """Fit wheel inertia, both tires and the mounting of the inertial unit to the ``logs`` that the ``drive`` file describes.
 
     Raises SpecError (drive file, base set), LogError (logs), IdentifyError (no reference, standstill, too short), one line.
+
+    >>> found = identify_drive([Path("log.csv")], Path("drive.toml"))  # doctest: +SKIP
+    >>> found.wheel_inertia, sorted(found.fits)  # doctest: +SKIP
     """
     description, prior = read_drive(drive), load_parameter_set(base)
     log = read_log(logs, description)

@@ -30,7 +30,11 @@ class Axis:
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes; a text in the place of an axis is its label. ``legend`` says where it stands inside ("upper left")."""
+    """One pair of axes; a text in the place of an axis is its label. ``legend`` says where it stands inside ("upper left").
+
+    >>> Panel([], x="time (s)", y="speed (m/s)").x
+    'time (s)'
+    """
 
     marks: Sequence[Mark]
     x: Axis | str = ""
@@ -49,6 +53,9 @@ class Figure:
 
     ``size`` in inches. The legend "below" collects the labels of all panels under them. Axes are shared along "row", "col"
     or "all". None is an empty place.
+
+    >>> Figure("speed", "Speed", "A rising line", [[Panel([], x="time (s)", y="speed (m/s)")]]).name
+    'speed'
     """
 
     name: str

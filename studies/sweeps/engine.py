@@ -42,6 +42,13 @@ def run_sweep(
     """Compute what is missing, then the statistics.
 
     Raises SpecError for a folder in use or of another sweep, OSError if the disk is full.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     result = run_sweep(load_sweep("gain-box", quick=True), Path(folder) / "out", Serial())
+    ...     print(result.count("invalid designs"))
+    0
     """
     with locked_folder(out, sweep) as folder:
         folder.begin(resume)

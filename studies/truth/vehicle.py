@@ -95,6 +95,9 @@ def load_vehicle(name: str | Path, folder: Path = Path()) -> TruthVehicle:
     """The truth vehicle of a parameter set: shipped with the models or with the truth by name, or a TOML file in ``folder``.
 
     Raises SpecError: no such set, or values that no car has.
+
+    >>> load_vehicle("peugeot-307").parameters.mass  # kg
+    1447.0
     """
     own = shipped_vehicles()
     values = load_parameter_set(own.get(str(name), name), folder)

@@ -33,7 +33,11 @@ TABLE_DIGITS = 4  # of the largest gain of each entry; more would be digits of t
 
 @dataclass(frozen=True)
 class DeploySettings:
-    """How gains become a table."""
+    """How gains become a table.
+
+    >>> DeploySettings(sample_time=0.01, dtype="float32").dtype
+    'float32'
+    """
 
     sample_time: float = 0.005  # s
     dtype: Literal["float32", "float64"] = "float64"
