@@ -78,11 +78,10 @@ def read_part(folder: Path, fingerprint: str) -> StoredPart | None:
     """The stored part, or None when there is none, when it is damaged, or when it has another fingerprint."""
     try:
         content = json.loads((folder / FILE).read_text(encoding="utf-8"))
+        whole = isinstance(content, dict) and content.pop(SEAL, None) == _digest(content)
     except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
         return None
-    if not isinstance(content, dict) or content.get("fingerprint") != fingerprint:
-        return None
-    if content.pop(SEAL, None) != _digest(content):
+    if not whole or content.get("fingerprint") != fingerprint:
         return None
     stored = StoredPart(folder=folder, **content)
     names = [f"{figure['name']}.{kind}" for figure in stored.figures for kind in ("svg", "png")]
