@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: schedules test lint docs docs-check bench mutants studies sweep clean
+.PHONY: schedules test lint docs docs-check wheels bench mutants studies sweep clean
 
 schedules: $(STAMP)
 	$(BIN)/gainsmith schedules --out estimators/schedules
@@ -19,10 +19,13 @@ lint: $(STAMP)
 
 docs: $(STAMP)
 	$(BIN)/python -m pip install -qq --editable '.[docs]'
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --config-file docs/mkdocs.yml
+	$(BIN)/python -m docs.tools.check --site
 
 docs-check: $(STAMP)
 	$(BIN)/python -m docs.tools.check
+
+wheels: # sdist and wheel in clean environments of every Python found, lowest and newest versions; some minutes
+	PYTHON=$(PYTHON) .ci/wheels
 
 studies: $(STAMP)
 	$(BIN)/gainsmith study --all --out out/studies

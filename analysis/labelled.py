@@ -38,6 +38,13 @@ class LabelledArray(Display):
 
     Values may be NaN (not known), and are stored as float64. Raises AnalysisError if an axis is repeated or does not have as many
     labels as the array has places, and for complex or masked values, which would lose a part.
+
+    >>> import numpy as np
+    >>> from analysis.labelled import Axis
+    >>> from analysis.labelled import Axis
+    >>> margin = LabelledArray("margin", np.array([1.0, 2.0]), (Axis("speed", np.array([0.0, 10.0]), "m/s"),), "1/s")
+    >>> margin.at(speed=10.0).item()
+    2.0
     """
 
     name: str
@@ -115,7 +122,15 @@ class LabelledArray(Display):
 
 
 def load_labelled(path: str | Path) -> LabelledArray:
-    """Read what `save` wrote. Raises AnalysisError for files that are missing, edited, torn or of another schema."""
+    """Read what `save` wrote. Raises AnalysisError for files that are missing, edited, torn or of another schema.
+
+    >>> from analysis.labelled import Axis
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = LabelledArray("margin", [1.0, 2.0], (Axis("speed", [0.0, 10.0], "m/s"),), "1/s").save(f"{folder}/margin")
+    ...     print(load_labelled(f"{folder}/margin").unit)
+    1/s
+    """
     array_file, head_file = _pair(path)
     try:
         head = json.loads(head_file.read_text(encoding="utf-8"))

@@ -57,6 +57,10 @@ def vertical_loads(
     As printed, including two doubtful points of the source: the signs in (14), (16) double gravity on a slope instead of
     removing it unless the angles are taken opposite to (11), and h_rc stands where the roll arm h - h_rc is meant.
     Raises AnalysisError for a missing vehicle constant and values not finite.
+
+    >>> loads = vertical_loads(load_parameter_set("corner-estimation"), longitudinal=3.0, lateral=0.0)
+    >>> bool(loads.front < loads.rear)  # the car squats
+    True
     """
     missing = [name for name in NEEDED if name not in vehicle.vehicle]
     if missing:

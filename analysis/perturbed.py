@@ -41,6 +41,10 @@ class PerturbedModel(Display):
     """An LpvModel compiled over all its symbols, so that thousands of perturbed copies cost one array expression.
 
     `names` lists scheduling parameters first, then constants; `nominal` holds the values of the constants.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> list(PerturbedModel(model).nominal)
+    ['sigma0', 'sigma1', 'sigma2', 'kappa', 'effective_radius']
     """
 
     model: LpvModel
@@ -113,6 +117,13 @@ def error_measure(
     """A measure for `analysis.sensitivity`: perturbed constants -> measure(A_e, B_e) of the observer with this gain.
 
     `fixed` values (wheel_speed = 141 numbers, say) become trailing axes of the result; samples are the leading axis.
+
+    >>> import numpy as np
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> family = PerturbedModel(model)
+    >>> slowest = error_measure(family, [[0.68], [183.1]], lambda A, B: stability_margin(A), wheel_speed=[10.0, 100.0])
+    >>> slowest({"sigma0": np.array([150.0, 180.0, 210.0])}).shape  # three copies at two speeds
+    (3, 2)
     """
     L = checked_gain(family.model, gain)
     held = {name: as_stack(name, value, ndim=0) for name, value in fixed.items()}

@@ -11,6 +11,10 @@ class Flag(IntFlag):
     """One bit a reason; a step returns them summed in an integer array, 0 where nothing is wrong.
 
     `Flag(int(step.flags[2]))` names the reasons of one entry.
+
+    >>> step_flags = int(Flag.MISSING_INPUT | Flag.GATED)
+    >>> Flag.GATED in Flag(step_flags)
+    True
     """
 
     NONE = 0

@@ -105,7 +105,11 @@ class RigidBody(Display):
 
 @dataclass(frozen=True, repr=False)
 class SingleTrack(RigidBody):
-    """With the cornering stiffness of each axle (both wheels): P5."""
+    """With the cornering stiffness of each axle (both wheels): P5.
+
+    >>> SingleTrack(1400.0, 2400.0, 1.1, 1.6, 80000.0, 90000.0).front_stiffness
+    80000.0
+    """
 
     front_stiffness: float  # N/rad
     rear_stiffness: float  # N/rad
@@ -113,7 +117,11 @@ class SingleTrack(RigidBody):
 
 @dataclass(frozen=True, repr=False)
 class FourWheel(RigidBody):
-    """With the stiffness of one tire, the relaxation lengths of the tires and the friction of the road: P4."""
+    """With the stiffness of one tire, the relaxation lengths of the tires and the friction of the road: P4.
+
+    >>> FourWheel(1500.0, 2500.0, 1.2, 1.4, 1.5, 50000.0, 50000.0, 0.4, 0.4, friction=0.8).friction
+    0.8
+    """
 
     track: float  # m, both axles
     front_stiffness: float  # N/rad

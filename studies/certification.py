@@ -8,9 +8,8 @@ from time import perf_counter
 from typing import ClassVar
 
 from estimators.display import Display
-from estimators.errors import GainsmithError
+from estimators.errors import GainsmithError, printable
 from estimators.schedule import read_content
-from estimators.schedule.checker import printable
 from estimators.schedule.files import place_of
 from synthesis.certificate.claims import written
 from synthesis.certificate.proof import Proof, certificate

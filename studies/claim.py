@@ -25,7 +25,11 @@ def paper_rank(paper: str) -> int:
 
 
 class ClaimVerdict(StrEnum):
-    """What became of a published claim."""
+    """What became of a published claim.
+
+    >>> print(ClaimVerdict.REPRODUCED, "/", ClaimVerdict.NOT_REPRODUCED)
+    reproduced / not reproduced
+    """
 
     REPRODUCED = "reproduced"
     PARTLY = "partly reproduced"
@@ -57,7 +61,11 @@ class Published:
 
 @dataclass(frozen=True, repr=False)
 class Finding(Display):
-    """Our half: the value computed now, the verdict that follows from it, and the reading under which it holds."""
+    """Our half: the value computed now, the verdict that follows from it, and the reading under which it holds.
+
+    >>> Finding(0.8, ClaimVerdict.REPRODUCED, "as printed").computed
+    0.8
+    """
 
     computed: JsonValue
     verdict: ClaimVerdict
@@ -66,7 +74,13 @@ class Finding(Display):
 
 @dataclass(frozen=True, repr=False)
 class Claim(Display):
-    """A published claim beside our finding."""
+    """A published claim beside our finding.
+
+    >>> from studies.claim import Published
+    >>> printed = Published("two", "P1", "page 1", "Two and two is four", 4, "none")
+    >>> Claim(printed, Finding(2 + 2, ClaimVerdict.REPRODUCED, "added")).row()["verdict"]
+    'reproduced'
+    """
 
     published: Published
     finding: Finding

@@ -28,7 +28,11 @@ MODULES = {
 
 @dataclass(frozen=True, repr=False)
 class Registry(Display):
-    """Studies by id, each the name of a module with ``STUDY``, or ``module:NAME``."""
+    """Studies by id, each the name of a module with ``STUDY``, or ``module:NAME``.
+
+    >>> list(Registry({"my-study": "my_study.study"}).modules)
+    ['my-study']
+    """
 
     modules: Mapping[str, str]
 
@@ -60,5 +64,9 @@ SHIPPED = Registry(MODULES)
 
 
 def load_study(study_id: str) -> Study:
-    """The shipped study named ``study_id``. Raises SpecError that offers the nearest names."""
+    """The shipped study named ``study_id``. Raises SpecError that offers the nearest names.
+
+    >>> load_study("friction-floor").parts[0].name
+    'theory'
+    """
     return SHIPPED.load(study_id)

@@ -71,6 +71,12 @@ def run_studies(
     Parts with the fingerprint of ``sources`` (default: the packages) and ``scope`` are not computed again. The report
     also shows studies of earlier runs into ``out`` whose fingerprint is the same. Raises SpecError for unknown
     studies and for a folder in use or that cannot be, OSError when nothing more can be written.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     print(run_studies([], Path(folder), Scope(quick=True), 1, Registry({})).failures)
+    []
     """
     studies = {name: registry.load(name) for name in ids}
     check_parts(list(studies.values()))

@@ -66,6 +66,11 @@ def regenerate(
     """Run the specifications on as many processes as there are cores; order as given.
 
     The work is under way when this returns.
+
+    >>> from estimators.schedule import SHIPPED
+    >>> (done,) = regenerate(["longitudinal-speed"], SHIPPED, check=True)
+    >>> done.state in ("same", "kept")
+    True
     """
     return in_order(_run, [(name, out, check, variant) for name in names], available_cores())
 

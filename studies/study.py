@@ -18,6 +18,9 @@ class Scope:
     """How much is computed: ``seeds`` Monte Carlo runs, coarse grids when ``quick``.
 
     ``prepared``: the folder with what the preparations of a run left; None outside of a run.
+
+    >>> Scope(quick=True, seeds=12).seeds
+    12
     """
 
     quick: bool = False
@@ -30,7 +33,11 @@ QUICK = Scope(quick=True, seeds=12)
 
 @dataclass(frozen=True, repr=False)
 class Table(Display):
-    """A table with a caption that stands on its own; units belong into the column names: ``speed [m/s]``."""
+    """A table with a caption that stands on its own; units belong into the column names: ``speed [m/s]``.
+
+    >>> Table("sums", "Sums of numbers", ["a [1]", "b [1]", "sum [1]"], [[2, 2, 4]]).rows
+    [[2, 2, 4]]
+    """
 
     name: str
     caption: str
@@ -40,7 +47,11 @@ class Table(Display):
 
 @dataclass(frozen=True, repr=False)
 class PartResult(Display):
-    """What one part found; ``notes`` are paragraphs of the report, ``measures`` single numbers for machines."""
+    """What one part found; ``notes`` are paragraphs of the report, ``measures`` single numbers for machines.
+
+    >>> PartResult(notes=["2 + 2 = 4"], measures={"sum": 4.0}).measures
+    {'sum': 4.0}
+    """
 
     claims: Sequence[Claim] = ()
     tables: Sequence[Table] = ()
@@ -69,6 +80,9 @@ class Part(Display):
     """A named piece of a study; ``cost`` in rough seconds of one core lets the runner start the longest first.
 
     ``quick`` is False for a part that a quick run leaves out, because another one shows the same on fewer drives.
+
+    >>> Part("sum", "Sum", lambda scope: PartResult(notes=["2 + 2 = 4"])).run(Scope(quick=True)).notes
+    ['2 + 2 = 4']
     """
 
     name: str
@@ -82,7 +96,11 @@ class Part(Display):
 @displayed({})
 @dataclass(frozen=True, repr=False)
 class Study:
-    """A study as users select it by ``id``; ``paper`` is P1..P5, or empty for studies beyond the papers."""
+    """A study as users select it by ``id``; ``paper`` is P1..P5, or empty for studies beyond the papers.
+
+    >>> Study("sums", "Sums", "", "What is two and two?", (Part("sum", "Sum", lambda scope: PartResult()),)).id
+    'sums'
+    """
 
     id: str
     title: str

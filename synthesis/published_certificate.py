@@ -49,6 +49,15 @@ def check_certificate(
     (primal) or A_e M + M A_e' - q M' < 0 (dual), with q at both rate bounds. The end points of the intervals are roots of
     leading principal minors, isolated by certified enclosures. `search` may extend the model's range.
     Raises ProblemError for a model with several parameters or a rational one.
+
+    >>> import sympy as sp
+    >>> model = LpvModel(
+    ...     name="lag", source="example", states=(Signal("x", "1"),), outputs=(Signal("y", "1"),),
+    ...     parameters=(SchedulingParameter("p", "1/s", 1.0, 2.0, -1.0, 1.0),),
+    ...     A=sp.Matrix([[-sp.Symbol("p")]]), C=sp.Matrix([[1]]),
+    ... )
+    >>> check_certificate(model, gains=[[0.0]], lyapunov=[[[1.0]]]).everywhere
+    True
     """
     if len(model.parameters) != 1 or not model.polynomial.is_polynomial:
         raise ProblemError(f"model '{model.name}': only polynomial models of one parameter can be checked exactly")

@@ -18,7 +18,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from estimators.display import displayed
-from estimators.errors import unknown
+from estimators.errors import LONGEST_WORD, printable, unknown
 from synthesis.errors import SpecError
 from synthesis.toml_places import Places
 
@@ -56,7 +56,7 @@ def read_toml(path: Path, what: str) -> dict[str, typing.Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise SpecError(f"{path.name}: cannot be read ({error.strerror}); give the path of a {what} file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:  # no TOML, no UTF-8, or a number of more digits than Python reads
         raise SpecError(f"{path.name}: not a TOML file: {error}") from error
     except RecursionError as error:
         raise SpecError(f"{path.name}: is nested too deeply for a {what} file; write plain tables") from error
@@ -70,7 +70,7 @@ def load_toml(path: Path, model: type[_Table], what: str) -> _Table:
 def read_table(model: type[_Table], data: object, where: str, places: Places | None = None) -> _Table:
     """One table. Raises SpecError, one line, that starts with ``where`` it stands: with line and column if `places` are given."""
     if not isinstance(data, dict):
-        raise SpecError(f"{where}: is {data!r}; give a table")
+        raise SpecError(f"{where}: is {printable(repr(data), LONGEST_WORD)}; give a table")
     try:
         return model.model_validate(data)
     except ValidationError as error:
@@ -164,7 +164,8 @@ def _expected(complaint: ErrorDetails, example: object) -> str | None:
 def _dotted(place: Sequence[_Step], empty: str = "") -> str:
     text = ""
     for step in place:
-        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+        name = f"[{step}]" if isinstance(step, int) else printable(step, LONGEST_WORD)
+        text += f".{name}" if text and isinstance(step, str) else name
     return text or empty
 
 

@@ -46,7 +46,11 @@ def wheel_error_matrix(eta1: float, eta2: float, wheel_inertia: float, radius: f
 
 
 def wheel_error_is_hurwitz(eta1: float, eta2: float, wheel_inertia: float, radius: float) -> bool:
-    """Whether K of P1 (7) is Hurwitz, by Routh-Hurwitz: trace below zero and determinant above it, no tolerance."""
+    """Whether K of P1 (7) is Hurwitz, by Routh-Hurwitz: trace below zero and determinant above it, no tolerance.
+
+    >>> wheel_error_is_hurwitz(50.0, 300.0, wheel_inertia=1.7, radius=0.33)
+    True
+    """
     K = wheel_error_matrix(eta1, eta2, wheel_inertia, radius)
     return bool(K[1, 1] < 0.0 and K[1, 0] < 0.0)
 
@@ -56,6 +60,9 @@ def force_observer_bound(eta3: float, disturbance_rate: float, initial_error: fl
 
     e_F' = -eta3 e_F + Omega_f' (P1 (8)); eta3 in 1/s, `disturbance_rate` = sup|Omega_f'| in N/s. Attained: a ramp of that
     slope leads to exactly the ultimate value. Raises AnalysisError unless eta3 > 0.
+
+    >>> force_observer_bound(20.0, disturbance_rate=4000.0).ultimate  # N
+    200.0
     """
     rate = positive("eta3 [1/s]", eta3)
     return ExponentialBound(
@@ -70,6 +77,9 @@ def unknown_input_bound(
 
     e' = -K e - B, |B| <= b; `gain` K = K_p / I_w in 1/s, `disturbance` b in (rad/s)/s, `split` xi. xi = 1/2 gives the smallest
     ultimate value, b / K, which a constant B attains. The best xi at a given time: `best_split`.
+
+    >>> float(unknown_input_bound(5.0, disturbance=2.0).ultimate)  # b / K
+    0.4
     """
     rate = positive("gain [1/s]", gain)
     if not 0.0 < split < 1.0:
@@ -83,7 +93,11 @@ def unknown_input_bound(
 
 
 def best_split(gain: float, disturbance: float, initial_error: float = 0.0, time: float = np.inf) -> float:
-    """The xi with the smallest bound of Theorem 1 at a time: 1/2 in the limit, smaller while the start still counts."""
+    """The xi with the smallest bound of Theorem 1 at a time: 1/2 in the limit, smaller while the start still counts.
+
+    >>> best_split(5.0, 2.0)  # in the limit
+    0.5
+    """
     if np.isnan(time) or time < 0.0:
         raise AnalysisError(f"time = {time} s must be >= 0 (inf for the ultimate bound)")
     if np.isinf(time) or not initial_error or not time:

@@ -21,7 +21,11 @@ OUTPUTS: tuple[Output, ...] = ("yaw_rate", "lateral_acceleration", "longitudinal
 
 @dataclass(frozen=True, repr=False)
 class SlidingModeGains(Display):
-    """Omega_1 .. Omega_12 of P5 (6): rows x_1 .. x_4, columns sign(y_1), sign(y_2), sign(y_3); rad/s^2 and N/s."""
+    """Omega_1 .. Omega_12 of P5 (6): rows x_1 .. x_4, columns sign(y_1), sign(y_2), sign(y_3); rad/s^2 and N/s.
+
+    >>> SlidingModeGains.of(omega1=10, omega4=40000)[4]
+    40000.0
+    """
 
     matrix: FloatArray
 
@@ -122,6 +126,11 @@ def sliding_mode_convergence(
 
     `force_rates` are bounds on |F_y1'|, |F_yw2'|, |F_x1'| [N/s]; the paper assumes constant forces, but they add to the
     disturbance that each sign term must overcome, and leave a split error of sup|L_1 F_y1' - L_2 F_yw2'| / decay.
+
+    >>> from analysis.bounds.sliding_mode import PUBLISHED, Vehicle
+    >>> car = Vehicle(mass=1400.0, yaw_inertia=2400.0, front_axle_distance=1.1, rear_axle_distance=1.6)
+    >>> sliding_mode_convergence(PUBLISHED, car, yaw_moment_error=1000.0).holds
+    True
     """
     rates = [abs(float(rate)) for rate in force_rates]
     if len(rates) != 3 or not np.isfinite([*rates, yaw_moment_error]).all():
@@ -207,7 +216,13 @@ def sampled_radius(matrix: FloatArray, sample_time: float) -> float:
 
 
 def smallest_zone_widths(gains: SlidingModeGains, vehicle: Vehicle, sample_time: float) -> dict[Output, float]:
-    """Width below which each loop alone overshoots by more than it corrects: gain times T / 2 (radius 1 of I + T A)."""
+    """Width below which each loop alone overshoots by more than it corrects: gain times T / 2 (radius 1 of I + T A).
+
+    >>> from analysis.bounds.sliding_mode import PUBLISHED, Vehicle
+    >>> car = Vehicle(mass=1400.0, yaw_inertia=2400.0, front_axle_distance=1.1, rear_axle_distance=1.6)
+    >>> round(smallest_zone_widths(PUBLISHED, car, sample_time=0.001)["yaw_rate"], 6)  # rad/s
+    0.005
+    """
     half = 0.5 * positive("sample_time [s]", sample_time)
     return {
         "yaw_rate": gains[1] * half,

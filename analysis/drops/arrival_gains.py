@@ -35,6 +35,9 @@ def static_gain_radius(A: ArrayLike, C: ArrayLike | None, gain: ArrayLike, arriv
     """Radius of a S(A - K C) + (1 - a) S(A) for A (..., n, n), C (..., k, n), K (..., n, k) and a (...).
 
     Raises AnalysisError for arrays that do not fit or rates outside [0, 1].
+
+    >>> float(static_gain_radius([[1.25]], [[1.0]], [[1.25]], 0.5))  # half of the samples leave 1.25^2
+    0.78125
     """
     plant, output = checked_plant(A, C, ndim=None)
     K, a = as_stack("gain", gain), probability("arrival", arrival)[..., None, None]

@@ -69,6 +69,10 @@ def drop_regions(open_loop: ArrayLike, closed_loop: ArrayLike, relative: float =
     """All drop probabilities of one pair (n, n), sorted into stable, unstable and undecided for every pair within `relative`.
 
     Raises AnalysisError for stacks, matrices that do not fit, or a `relative` outside [0, 0.01].
+
+    >>> found = drop_regions([[1.2]], [[0.5]], relative=1e-3)
+    >>> len(found.stable), len(found.undecided), len(found.unstable)
+    (1, 1, 1)
     """
     A0, A1 = _one_pair(open_loop, closed_loop)
     share = _share(relative)
@@ -99,6 +103,10 @@ def critical_drop_interval(open_loop: ArrayLike, closed_loop: ArrayLike, relativ
 def recovery_regions(open_loop: ArrayLike, closed_loop: ArrayLike, failure: float, relative: float = DATA) -> Regions:
     """All recovery probabilities of one pair (n, n) at one failure probability, sorted as by `drop_regions`; raises as it
     does.
+
+    >>> found = recovery_regions([[1.2]], [[0.5]], failure=0.1, relative=1e-3)
+    >>> len(found.unstable), len(found.undecided), len(found.stable)
+    (1, 1, 1)
     """
     family = _bursts(open_loop, closed_loop, failure, relative)
     found = regions(family.first, family.last, family.first_error, family.last_error)
@@ -113,6 +121,10 @@ def critical_recovery_interval(
 ) -> CriticalInterval:
     """Where `critical_recovery_probability` of every pair within `relative` lies; an upper end of inf if r = 1 may be
     unstable.
+
+    >>> found = critical_recovery_interval([[1.2]], [[0.5]], failure=0.1, relative=1e-3)
+    >>> found.lower < float(critical_recovery_probability([[1.2]], [[0.5]], 0.1)) < found.upper
+    True
     """
     family = _bursts(open_loop, closed_loop, failure, relative)
     found = regions(family.first, family.last, family.first_error, family.last_error)

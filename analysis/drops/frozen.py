@@ -46,6 +46,9 @@ def drop_radius(open_loop: ArrayLike, closed_loop: ArrayLike, probabilities: Arr
     """Spectral radius of M(p), P3 Fig. 8; all arguments broadcast over leading axes.
 
     Raises AnalysisError for matrices that do not fit or probabilities outside [0, 1].
+
+    >>> drop_radius([[1.2]], [[0.5]], [0.0, 1.0]).round(4).tolist()  # 0.5^2 and 1.2^2
+    [0.25, 1.44]
     """
     A0, A1 = pair(open_loop, closed_loop)
     p = probability("probabilities", probabilities)[..., None, None]
@@ -97,6 +100,9 @@ def mean_square_stable_intervals(open_loop: ArrayLike, closed_loop: ArrayLike) -
 
     The ends are 0, 1 or eigenvalue crossings; between neighbouring crossings the radius cannot pass 1, so one value decides.
     Raises AnalysisError as `critical_drop_probability`, and for stacks.
+
+    >>> [[round(end, 4) for end in interval] for interval in mean_square_stable_intervals([[1.2]], [[0.5]])]
+    [[0.0, 0.6303]]
     """
     A0, A1 = pair(open_loop, closed_loop)
     if A0.ndim != 2 or A1.ndim != 2:

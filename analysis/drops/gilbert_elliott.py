@@ -63,6 +63,9 @@ def stability_region(
     """Second-moment radius (f, r) over a grid of failure (f,) and recovery (r,) probabilities, for one pair (n, n).
 
     Below 1 is mean-square stable. Raises AnalysisError as `gilbert_elliott`.
+
+    >>> (stability_region([[1.2]], [[0.5]], [0.1], [0.1, 0.9]) < 1.0).tolist()
+    [[False, True]]
     """
     f, r = np.atleast_1d(probability("failure", failure)), np.atleast_1d(probability("recovery", recovery))
     return gilbert_elliott(open_loop, closed_loop, f[:, None], r[None, :]).second_moment_radius()
@@ -77,6 +80,9 @@ def critical_recovery_probability(open_loop: ArrayLike, closed_loop: ArrayLike, 
     `critical_recovery_interval` then says how far the rounding of the entries moves it.
 
     Raises AnalysisError for arguments that do not fit, probabilities outside [0, 1], or an ill-posed pair of more than 5 states.
+
+    >>> round(float(critical_recovery_probability([[1.2]], [[0.5]], 0.1)), 4)
+    0.3157
     """
     A0, A1 = balanced(*pair(open_loop, closed_loop))
     f = probability("failure", failure)
@@ -116,6 +122,9 @@ def stable_recovery_intervals(
 
     The region need not reach r = 1: losing exactly one sample at a time can be worse than losing some in a row.
     Raises AnalysisError as `gilbert_elliott`.
+
+    >>> [[round(end, 4) for end in interval] for interval in stable_recovery_intervals([[1.2]], [[0.5]], 0.1)]
+    [[0.3157, 1.0]]
     """
     A0, A1 = balanced(*pair(open_loop, closed_loop))
     never, always = (gilbert_elliott(A0, A1, failure, r) for r in (0.0, 1.0))

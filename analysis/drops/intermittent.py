@@ -130,6 +130,9 @@ def static_critical_arrival(
 
     0 for a stable A. Raises AnalysisError for matrices that do not fit, or a pair that no gain stabilises even if every
     measurement arrives (undetectable).
+
+    >>> round(static_critical_arrival([[1.25]], [[1.0]]).upper, 6)  # 1 - 1/1.25^2
+    0.36
     """
     plant, output = checked_plant(A, C)
     if not 0.0 < tolerance < 1.0:
@@ -177,6 +180,10 @@ def kalman_critical_arrival(
 
     Raises AnalysisError as `static_critical_arrival`. Noise covariances do not enter, as long as process noise reaches every
     unstable direction.
+
+    >>> found = kalman_critical_arrival([[1.25]], [[1.0]])
+    >>> round(found.upper, 6)  # 1 - 1/1.25^2
+    0.36
     """
     plant, output = checked_plant(A, C)
     static = static_critical_arrival(plant, output, tolerance, method, settings)

@@ -66,6 +66,9 @@ def mean_square_schedule(
     """Check one drop probability; `frozen` may be passed in if it is known already.
 
     Raises AnalysisError for a probability outside [0, 1].
+
+    >>> print(mean_square_schedule(GainSchedule.shipped("longitudinal-speed"), 0.01).verdict)
+    certified
     """
     p = float(probability("drop_probability", drop_probability))
     frozen = frozen or frozen_critical_probability(schedule)
@@ -89,6 +92,11 @@ def certified_drop_probability(
     """The largest drop probability found with a certificate, and the upper end of the bracket (frozen, or not certified).
 
     Raises AnalysisError for a tolerance that is not positive.
+
+    >>> schedule = GainSchedule.shipped("longitudinal-speed")
+    >>> found, upper = certified_drop_probability(schedule, tolerance=0.05)
+    >>> 0.0 <= found.drop_probability <= upper <= 1.0
+    True
     """
     if not tolerance > 0.0:
         raise AnalysisError(f"tolerance = {tolerance} must be positive")

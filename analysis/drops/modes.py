@@ -65,6 +65,10 @@ def runtime_drop_modes(
 
     Raises AnalysisError for arrays that do not fit or are not finite, a sample time that is not positive, an unknown policy or
     update.
+
+    >>> modes = runtime_drop_modes([[-1.0]], [[1.0]], [[4.0]], 0.1)
+    >>> modes.received.round(4).tolist(), modes.dropped.round(4).tolist()  # e^-0.5 and e^-0.1
+    ([[0.6065]], [[0.9048]])
     """
     if policy not in get_args(DropPolicy):
         raise AnalysisError(unknown("drop policy", str(policy), get_args(DropPolicy)))
@@ -109,6 +113,10 @@ def schedule_drop_modes(schedule: GainSchedule, parameter: ArrayLike, policy: Dr
     """Both modes of a schedule with its stored table and its own update, at parameters (...).
 
     Raises RangeError outside the certified range; AnalysisError for an unknown policy.
+
+    >>> modes = schedule_drop_modes(GainSchedule.shipped("longitudinal-speed"), 50.0)
+    >>> modes.received.shape, modes.dropped.shape
+    ((2, 2), (2, 2))
     """
     plant = schedule.plant_at(np.asarray(parameter, float))
     return runtime_drop_modes(

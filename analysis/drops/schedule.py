@@ -44,6 +44,10 @@ def frozen_critical_probability(
     """Sample range and breakpoints, then search the two cells beside the lowest sample.
 
     Raises AnalysisError for fewer than 2 points or an unknown policy.
+
+    >>> found = frozen_critical_probability(GainSchedule.shipped("longitudinal-speed"), points=21)
+    >>> 0.0 < found.smallest < 1.0
+    True
     """
     if points < 2:
         raise AnalysisError(f"points = {points} must be at least 2")

@@ -48,6 +48,16 @@ def lpv_l2_gain(
     or one degree for each (0 for a parameter that jumps in continuous time). A system that is not stable has the gain inf.
     Raises AnalysisError for unknown names and degrees that do not fit. Sources: Wu, Yang, Packard, Becker 1996 (upper bound);
     Peni, Seiler 2016 (lower bound).
+
+    >>> import sympy as sp
+    >>> model = LpvModel(
+    ...     name="lag", source="example", states=(Signal("x", "1"),), inputs=(Signal("u", "1"),), outputs=(Signal("y", "1"),),
+    ...     parameters=(SchedulingParameter("p", "1/s", 1.0, 2.0, -1.0, 1.0),),
+    ...     A=sp.Matrix([[-sp.Symbol("p")]]), B=sp.Matrix([[1]]), C=sp.Matrix([[1]]),
+    ... )
+    >>> found = lpv_l2_gain(model)
+    >>> round(found.lower, 1), round(found.upper, 1)  # at p = 1
+    (1.0, 1.0)
     """
     question = _question(model, inputs, outputs, degree, discrete)
     place, gain, frequency = largest_gain(question)
@@ -76,6 +86,16 @@ def lpv_decay_rate(model: LpvModel, degree: Degree = 2, discrete: bool = False) 
     `lower` is proved by x'P(p)x with P of the given degree; along `witness` (a frozen place, or a periodic trajectory with its
     monodromy matrix) the state falls no faster than `upper`, which is 0 for a trajectory that is not stable. Rates and
     `discrete` as in `lpv_l2_gain`. Raises AnalysisError for degrees that do not fit.
+
+    >>> import sympy as sp
+    >>> model = LpvModel(
+    ...     name="lag", source="example", states=(Signal("x", "1"),), inputs=(Signal("u", "1"),), outputs=(Signal("y", "1"),),
+    ...     parameters=(SchedulingParameter("p", "1/s", 1.0, 2.0, -1.0, 1.0),),
+    ...     A=sp.Matrix([[-sp.Symbol("p")]]), B=sp.Matrix([[1]]), C=sp.Matrix([[1]]),
+    ... )
+    >>> found = lpv_decay_rate(model)
+    >>> round(found.lower, 1), round(found.upper, 1)  # 1/s: the slowest is p = 1
+    (1.0, 1.0)
     """
     question = _question(model, (), None, degree, discrete)
     kind = "sampled error" if discrete else "decay rate"
@@ -109,6 +129,16 @@ def lpv_h2_norm(
     The standard deviation of z under white noise of unit intensity is no larger. `generalised`: the largest |z(t)| (Euclidean)
     per energy of w, sup |z|_inf/|w|_2 (Rotea 1993). Arguments as in `lpv_l2_gain`; `lower` comes from trajectories, or in exact
     rationals. Raises AnalysisError, too, for D other than zero in continuous time, where the norm is infinite.
+
+    >>> import sympy as sp
+    >>> model = LpvModel(
+    ...     name="lag", source="example", states=(Signal("x", "1"),), inputs=(Signal("u", "1"),), outputs=(Signal("y", "1"),),
+    ...     parameters=(SchedulingParameter("p", "1/s", 1.0, 2.0, -1.0, 1.0),),
+    ...     A=sp.Matrix([[-sp.Symbol("p")]]), B=sp.Matrix([[1]]), C=sp.Matrix([[1]]),
+    ... )
+    >>> found = lpv_h2_norm(model)
+    >>> found.lower <= found.upper
+    True
     """
     question = _question(model, inputs, outputs, degree, discrete)
     kind = ("sampled " if discrete else "") + ("energy to peak" if generalised else "H2 norm")

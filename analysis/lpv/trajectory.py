@@ -20,6 +20,10 @@ class Trajectory(Display):
 
     Durations are seconds, or whole samples in discrete time, where a parameter has the values at the beginning of each. A
     parameter that may jump has start = end. `frequency` (rad/s or rad/sample) is that of the worst input's carrier.
+
+    >>> import numpy as np
+    >>> Trajectory(("p",), np.array([1.0]), np.array([[1.0]]), np.array([[2.0]])).period  # s
+    1.0
     """
 
     parameters: tuple[str, ...]

@@ -76,6 +76,9 @@ def stationary_distribution(transition: ArrayLike) -> FloatArray:
 
     Raises AnalysisError for a matrix that is not stochastic, and if the chain has several closed classes (several absorbing
     modes): where it ends depends on where it starts, and no single answer exists.
+
+    >>> stationary_distribution([[0.9, 0.1], [0.3, 0.7]]).round(6).tolist()
+    [0.75, 0.25]
     """
     transition = stochastic("transition", transition)
     reach, home = reachable(transition), recurrent(transition)
@@ -117,6 +120,10 @@ def sample_paths(
     """Modes (steps + 1, runs) of independent runs of one chain (m, m); `start` (m,) is the distribution of the first one.
 
     Raises AnalysisError for a batch of chains, and for numbers that are no probabilities or no counts.
+
+    >>> import numpy as np
+    >>> sample_paths([[0.0, 1.0], [1.0, 0.0]], [1.0, 0.0], 3, 1, np.random.default_rng(1))[:, 0].tolist()
+    [0, 1, 0, 1]
     """
     transition = stochastic("transition", transition)
     start = distribution("start", start, transition.shape[-1])

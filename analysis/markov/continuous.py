@@ -38,6 +38,10 @@ class MarkovJumpProcess(Display):
 
     Raises:
         AnalysisError: matrices that do not fit, negative rates, or rows that do not sum to 0.
+
+    >>> process = MarkovJumpProcess([[[-1.0]], [[0.2]]], [[-1.0, 1.0], [9.0, -9.0]])  # seldom in the unstable mode
+    >>> print(process.verdict())
+    certified
     """
 
     def __init__(self, modes: ArrayLike, generator: ArrayLike) -> None:

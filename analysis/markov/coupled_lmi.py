@@ -41,6 +41,10 @@ def mean_square_lmi(system: MarkovJumpSystem, settings: LmiSettings | None = Non
     """Search P_1..P_m, maximising the margin, and judge them outside the solver.
 
     Raises AnalysisError for a batch of systems; ProblemError as `solve`.
+
+    >>> system = MarkovJumpSystem([[[0.5]], [[1.1]]], [[0.9, 0.1], [0.8, 0.2]])
+    >>> print(mean_square_lmi(system).verdict)
+    certified
     """
     A, P_ij = single(system)
     scale = state_scale(np.abs(A).sum(axis=0))

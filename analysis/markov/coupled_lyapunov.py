@@ -28,6 +28,10 @@ def solve_coupled_lyapunov(system: MarkovJumpSystem, weights: ArrayLike) -> Floa
 
     Raises AnalysisError for weights that do not fit or are not positive semidefinite, and for a system that is not
     mean-square stable: its equation may have a solution, but that is not the (infinite) cost.
+
+    >>> system = MarkovJumpSystem([[[0.5]]], [[1.0]])
+    >>> solve_coupled_lyapunov(system, [[[1.0]]]).round(6).tolist()  # 1/(1 - 1/4)
+    [[[1.333333]]]
     """
     W = _per_mode(system, "weights", weights)
     _require_stable(system, "the cost is infinite")
@@ -38,6 +42,10 @@ def stationary_second_moment(system: MarkovJumpSystem, noise: ArrayLike) -> Floa
     """X_j of x+ = A_i x + w, E[w w' | mode i] = N_i >= 0 white, shapes (..., m, n, n); sum over j for E[x x'].
 
     Raises AnalysisError as `solve_coupled_lyapunov`, or if the stationary distribution is not unique.
+
+    >>> system = MarkovJumpSystem([[[0.5]]], [[1.0]])
+    >>> stationary_second_moment(system, [[[1.0]]]).round(6).tolist()  # 1/(1 - 1/4)
+    [[[1.333333]]]
     """
     N = _per_mode(system, "noise", noise)
     _require_stable(system, "the second moment grows without bound")
@@ -52,6 +60,10 @@ def expected_cost(
     """sum over k >= 0 of E[x(k)' W_mode x(k)] for E[x(0) x(0)'] = second_moment (..., n, n); inf where it diverges.
 
     Raises AnalysisError for arguments that do not fit.
+
+    >>> system = MarkovJumpSystem([[[0.5]]], [[1.0]])
+    >>> round(float(expected_cost(system, [[[1.0]]], [[1.0]], [1.0])), 6)  # 1 / (1 - 0.5^2)
+    1.333333
     """
     W = _per_mode(system, "weights", weights)
     X = system.initial_second_moment(second_moment, mode_distribution)

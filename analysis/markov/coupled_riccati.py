@@ -59,6 +59,10 @@ def jump_regulator(
     Raises:
         AnalysisError: shapes that do not fit, weights of the wrong sign, or a system that no mode-dependent feedback
             stabilises in the mean square (or whose unstable part no weight sees).
+
+    >>> system = MarkovJumpSystem([[[1.0]]], [[1.0]])
+    >>> jump_regulator(system, [[1.0]], [[1.0]], [[1.0]]).gains.round(4).tolist()  # the golden ratio less one
+    [[[-0.618]]]
     """
     A, P = single(system)
     m, n = A.shape[:2]

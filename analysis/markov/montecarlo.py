@@ -56,6 +56,11 @@ def check_second_moment(
     """Simulate `runs` paths from one state (n,) and compare the mean of |x|^2 with its exact value.
 
     Raises AnalysisError for a batch of systems, fewer than 100 runs, or a confidence outside (0, 1).
+
+    >>> import numpy as np
+    >>> system = MarkovJumpSystem([[[0.5]], [[1.1]]], [[0.9, 0.1], [0.8, 0.2]])
+    >>> check_second_moment(system, [1.0], [1.0, 0.0], 5, 400, np.random.default_rng(1)).agrees
+    True
     """
     steps = whole("steps", steps)
     if whole("runs", runs) < 100 or not 0.0 < confidence < 1.0:

@@ -213,7 +213,11 @@ def second_moment_operator(modes: FloatArray, weights: FloatArray) -> FloatArray
 
 
 def independent(modes: ArrayLike, probabilities: ArrayLike) -> MarkovJumpSystem:
-    """Modes drawn independently at every step: every row of the transition matrix is the distribution (P3 (25))."""
+    """Modes drawn independently at every step: every row of the transition matrix is the distribution (P3 (25)).
+
+    >>> independent([[[0.5]], [[1.2]]], [0.9, 0.1]).transition.tolist()
+    [[0.9, 0.1], [0.9, 0.1]]
+    """
     stack = square("modes", state_matrices(modes, discrete=True)[0], ndim=3)
     pi = distribution("probabilities", probabilities, stack.shape[-3])
     return MarkovJumpSystem(stack, np.repeat(pi[..., None, :], stack.shape[-3], axis=-2))

@@ -48,6 +48,9 @@ def controllability_gramian(A: Any, B: ArrayLike | None = None, discrete: bool |
     object.
 
     Raises AnalysisError for systems that are not certainly stable, and where the equation is not satisfied when recomputed.
+
+    >>> controllability_gramian([[-2.0]], [[1.0]]).round(12).tolist()  # 1/(2 * 2)
+    [[0.25]]
     """
     A, B, discrete = given_pair(A, B, discrete, "B")
     return _gramian(square("A", A), as_stack("B", B), discrete)
@@ -58,6 +61,9 @@ def observability_gramian(A: Any, C: ArrayLike | None = None, discrete: bool | N
     object.
 
     Raises AnalysisError for systems that are not certainly stable, and where the equation is not satisfied when recomputed.
+
+    >>> observability_gramian([[-2.0]], [[1.0]]).round(12).tolist()  # 1/(2 * 2)
+    [[0.25]]
     """
     A, C, discrete = given_pair(A, C, discrete, "C")
     return _gramian(np.swapaxes(square("A", A), -1, -2), np.swapaxes(as_stack("C", C), -1, -2), discrete)
@@ -74,6 +80,9 @@ def hankel_singular_values(
     matter.
 
     Stacks or a system object as in `hinf_norm`. Raises AnalysisError for systems that are not certainly stable.
+
+    >>> hankel_singular_values([[-2.0]], [[1.0]], [[1.0]]).round(12).tolist()  # half of the gain at zero frequency
+    [0.25]
     """
     shape, systems = read_systems(A, B, C, D, discrete)
     require_stable(systems.A, systems.discrete)
@@ -91,6 +100,10 @@ def balanced_realization(
     The result keeps the sample time of an object; arrays of a discrete system give dt = True. Raises AnalysisError for
     stacks, for systems that are not certainly stable, for systems that are not minimal (give `order`), and where the
     recomputed gramians are not balanced.
+
+    >>> found = balanced_realization([[-1.0, 0.0], [0.0, -2.0]], [[1.0], [1.0]], [[1.0, 1.0]])
+    >>> found.singular_values.round(4).tolist()  # Hankel singular values
+    [0.731, 0.019]
     """
     shape, systems = read_systems(A, B, C, D, discrete)
     if shape:

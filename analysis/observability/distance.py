@@ -43,6 +43,10 @@ def distance_to_unobservability(
 
     Lower bounds by subdivision (sigma_min is Lipschitz with constant 1) and by gains that keep a loop stable (`witness_gain`).
     Raises AnalysisError for several pairs at once, shapes that do not fit, and a gap outside (0, 1).
+
+    >>> found = distance_to_unobservability([[1.0, 0.0], [0.0, -2.0]], [[1.0, 0.01]])
+    >>> found.lower <= found.upper <= 0.01
+    True
     """
     A, C, _ = observed_pair(A, C, False if getattr(A, "dt", 0) is None else None)
     return bracket(A, C, Region.PLANE, gap, evaluations)
@@ -51,7 +55,12 @@ def distance_to_unobservability(
 def distance_to_undetectability(
     A: Any, C: ArrayLike | None = None, discrete: bool | None = None, gap: float = GAP, evaluations: int = EVALUATIONS
 ) -> HiddenModeDistance:
-    """Over the modes that do not decay: Re z >= 0, or |z| >= 1 in discrete time."""
+    """Over the modes that do not decay: Re z >= 0, or |z| >= 1 in discrete time.
+
+    >>> found = distance_to_undetectability([[1.0, 0.0], [0.0, -2.0]], [[0.01, 1.0]])
+    >>> 0.0 < found.lower <= found.upper <= 0.01  # the unstable state is hardly seen
+    True
+    """
     A, C, time = observed_pair(A, C, discrete)
     return bracket(A, C, Region.OUTSIDE if time else Region.RIGHT, gap, evaluations)
 
@@ -59,7 +68,12 @@ def distance_to_undetectability(
 def distance_to_uncontrollability(
     A: Any, B: ArrayLike | None = None, gap: float = GAP, evaluations: int = EVALUATIONS
 ) -> HiddenModeDistance:
-    """min over all z of sigma_min [A - z I, B], for A (n, n), B (n, m) or a system object."""
+    """min over all z of sigma_min [A - z I, B], for A (n, n), B (n, m) or a system object.
+
+    >>> found = distance_to_uncontrollability([[1.0, 0.0], [0.0, -2.0]], [[1.0], [0.01]])
+    >>> 0.0 < found.lower <= found.upper <= 0.01
+    True
+    """
     A, B, _ = driven_pair(A, B, False if getattr(A, "dt", 0) is None else None)
     return bracket(A, B, Region.PLANE, gap, evaluations)
 
@@ -67,7 +81,12 @@ def distance_to_uncontrollability(
 def distance_to_unstabilizability(
     A: Any, B: ArrayLike | None = None, discrete: bool | None = None, gap: float = GAP, evaluations: int = EVALUATIONS
 ) -> HiddenModeDistance:
-    """The same over the modes that do not decay."""
+    """The same over the modes that do not decay.
+
+    >>> found = distance_to_unstabilizability([[1.0, 0.0], [0.0, -2.0]], [[0.01], [1.0]])
+    >>> 0.0 < found.lower <= found.upper <= 0.01
+    True
+    """
     A, B, time = driven_pair(A, B, discrete)
     return bracket(A, B, Region.OUTSIDE if time else Region.RIGHT, gap, evaluations)
 

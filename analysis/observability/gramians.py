@@ -75,6 +75,10 @@ def sampled_sequence(model: LpvModel, trajectory: ArrayLike, sample_time: float)
 
     `trajectory` is (K, p), or (K,) for one parameter. Raises ModelError for values outside the model's range and
     AnalysisError for a sample time that is not positive.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> sampled_sequence(model, [10.0, 20.0, 30.0], 0.005).A.shape
+    (3, 2, 2)
     """
     step = positive("sample_time [s]", sample_time)
     numeric = model.on(as_stack("trajectory", trajectory, ndim=1))
@@ -87,6 +91,10 @@ def sequence_observability(A: ArrayLike, C: ArrayLike, state_scale: ArrayLike | 
     r"""V(k1, k2) = sum_{k=k1}^{k2} phi_{k,k1}' C_k' C_k phi_{k,k1} over the whole sequence (P2 (A1)).
 
     A (..., K, n, n) and C (..., K, m, n), K = k2 - k1 + 1. Raises AnalysisError for shapes that do not fit.
+
+    >>> import numpy as np
+    >>> sequence_observability(np.full((2, 1, 1), 0.5), np.ones((2, 1, 1))).gramian.round(9).tolist()  # 1 + 1/4
+    [[1.25]]
     """
     A, _ = _sequence(A, C)
     found = sliding_observability(A, C, A.shape[-3], state_scale)
@@ -94,7 +102,12 @@ def sequence_observability(A: ArrayLike, C: ArrayLike, state_scale: ArrayLike | 
 
 
 def sliding_observability(A: ArrayLike, C: ArrayLike, window: int, state_scale: ArrayLike | None = None) -> Gramians:
-    """V(k, k + window - 1) for every start: (..., K - window + 1, n, n), by doubling (log2(window) batched steps)."""
+    """V(k, k + window - 1) for every start: (..., K - window + 1, n, n), by doubling (log2(window) batched steps).
+
+    >>> import numpy as np
+    >>> sliding_observability(np.full((4, 1, 1), 0.5), np.ones((4, 1, 1)), window=2).gramian[:, 0, 0].round(9).tolist()
+    [1.25, 1.25, 1.25]
+    """
     A, C = _scaled(*_sequence(A, C), state_scale)
     count = A.shape[-3]
     if not 1 <= window <= count:
@@ -117,7 +130,13 @@ def sliding_observability(A: ArrayLike, C: ArrayLike, window: int, state_scale: 
 
 
 def growing_observability(A: ArrayLike, C: ArrayLike, state_scale: ArrayLike | None = None) -> Gramians:
-    """V(0, k) for every k (P2 Fig. 1): (..., K, n, n), by a prefix scan of log2(K) batched steps."""
+    """V(0, k) for every k (P2 Fig. 1): (..., K, n, n), by a prefix scan of log2(K) batched steps.
+
+    >>> import numpy as np
+    >>> A, C = np.full((3, 1, 1), 0.5), np.ones((3, 1, 1))
+    >>> growing_observability(A, C).gramian[:, 0, 0].round(9).tolist()  # 1, 1 + 1/4, 1 + 1/4 + 1/16
+    [1.0, 1.25, 1.3125]
+    """
     out = _elements(*_scaled(*_sequence(A, C), state_scale))
     count, distance = out.factor.shape[-3], 1
     while distance < count:
@@ -135,12 +154,21 @@ def sequence_controllability(A: ArrayLike, G: ArrayLike, state_scale: ArrayLike 
 
     For a filter G_k is the factor of the process noise, Q_k = G_k G_k' (P2 prints B_k, which is the input).
     `transition` is phi_{k2,k1}'.
+
+    >>> import numpy as np
+    >>> sequence_controllability(np.full((2, 1, 1), 0.5), np.ones((2, 1, 1))).gramian.round(9).tolist()  # 1 + 1/4
+    [[1.25]]
     """
     return sequence_observability(*_dual(A, G), _inverse(state_scale))
 
 
 def sliding_controllability(A: ArrayLike, G: ArrayLike, window: int, state_scale: ArrayLike | None = None) -> Gramians:
-    """W(k, k + window - 1) for every start, (..., K - window + 1, n, n); `transition` is transposed."""
+    """W(k, k + window - 1) for every start, (..., K - window + 1, n, n); `transition` is transposed.
+
+    >>> import numpy as np
+    >>> sliding_controllability(np.full((4, 1, 1), 0.5), np.ones((4, 1, 1)), window=2).gramian[:, 0, 0].round(9).tolist()
+    [1.25, 1.25, 1.25]
+    """
     out = sliding_observability(*_dual(A, G), window, _inverse(state_scale))
     return Gramians(out.factor[..., ::-1, :, :], out.transition[..., ::-1, :, :])
 

@@ -45,6 +45,10 @@ def undetectable_mode(model: LpvModel) -> HiddenMode | None:
 
     The place is found exactly on a grid and wherever the observability matrix loses rank at a rational value
     (`synthesis.certificate.refute.undetectable_place`); the mode by the Popov-Belevitch-Hautus test there.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> print(undetectable_mode(model))
+    None
     """
     return _hidden(model, plant_of(model), dual=False)
 
@@ -53,6 +57,10 @@ def unstabilisable_mode(model: LpvModel) -> HiddenMode | None:
     """A mode that does not decay and that no input moves: the undetectable mode of the dual pair (A', B').
 
     Without inputs every mode that does not decay is one.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> print(unstabilisable_mode(model))
+    None
     """
     return _hidden(model, plant_of(model).dual, dual=True)
 

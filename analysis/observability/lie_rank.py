@@ -55,6 +55,15 @@ class LieRankTest(Display):
 
     `order` Lie derivatives, 2 nx - 1 if None: nx - 1 reach the generic rank, but at a special point (a state at zero) more may
     be needed, and no order is enough for every model.
+
+    >>> import sympy as sp
+    >>> x, y = sp.symbols("x y")
+    >>> model = NonlinearModel(
+    ...     "pair", "example", (Signal("x", "1"), Signal("y", "1")), (Signal("z", "1"),),
+    ...     f=sp.Matrix([y, -x]), h=sp.Matrix([x**2]),
+    ... )
+    >>> LieRankTest(model).at({"x": 1.0, "y": 0.5}).by_order
+    (1, 2, 2, 2)
     """
 
     def __init__(self, model: NonlinearModel, order: int | None = None) -> None:

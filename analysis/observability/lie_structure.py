@@ -68,6 +68,15 @@ def generic_rank(
     `moving_inputs` draws the derivatives of every input up to the order of the test as well (per second, within its half-width);
     otherwise inputs are held. A range (v, v) fixes a value, and its derivatives at zero. Raises AnalysisError for
     missing or reversed ranges.
+
+    >>> import sympy as sp
+    >>> x, y = sp.symbols("x y")
+    >>> model = NonlinearModel(
+    ...     "pair", "example", (Signal("x", "1"), Signal("y", "1")), (Signal("z", "1"),),
+    ...     f=sp.Matrix([y, -x]), h=sp.Matrix([x**2]),
+    ... )
+    >>> generic_rank(model, {"x": (0.5, 1.0), "y": (0.5, 1.0)}).rank
+    2
     """
     test = LieRankTest(model, order)
     for name in (*test.names, *test.input_names):

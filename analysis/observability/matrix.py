@@ -124,6 +124,10 @@ def observability_matrix(
 
     The time derivative of a parameter p is the symbol `p_rate` (then `p_rate2`, ...), or the parameter that `motion`
     names for it: {"wheel_speed": "wheel_acceleration"}. Raises AnalysisError for unknown names and blocks < 1.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> observability_matrix(model).matrix.shape
+    (2, 2)
     """
     names = [p.name for p in model.parameters]
     for key, value in (motion or {}).items():
@@ -140,6 +144,10 @@ def controllability_matrix(model: LpvModel, blocks: int | None = None) -> Observ
 
     It is the observability matrix of x' = -A' x, y = B' x (Silverman & Meadows 1967), so its rows are those of the transpose up
     to sign, and where it loses rank some direction of the state cannot be reached. Raises AnalysisError without inputs.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> controllability_matrix(model).matrix.shape
+    (2, 2)
     """
     if not model.inputs:
         raise AnalysisError(f"model '{model.name}' has no inputs: nothing of it can be controlled")
@@ -164,7 +172,12 @@ def _steps(names: list[str], rows: int, motion: Mapping[str, str]) -> dict[sp.Sy
 
 
 def frozen_observability_matrix(model: LpvModel, blocks: int | None = None) -> ObservabilityMatrix:
-    """[C; C A; ...] with the parameters held: a frozen rank, NOT observability while the parameters move."""
+    """[C; C A; ...] with the parameters held: a frozen rank, NOT observability while the parameters move.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> frozen_observability_matrix(model).frozen
+    True
+    """
     out = observability_of(model.A, model.C, {}, blocks or len(model.states), [s.name for s in model.states])
     return _of_model(model, out, frozen=True)
 
@@ -179,6 +192,13 @@ def observability_of(
     r"""The matrix of any symbolic pair A (nx, nx), C (ny, nx); `motion` maps a symbol to its time derivative.
 
     With an empty `motion` the result is marked frozen. Raises AnalysisError for shapes that do not fit and blocks < 1.
+
+    >>> import sympy as sp
+    >>> c = sp.Symbol("c")
+    >>> observability_of(sp.Matrix([[0, 1], [0, 0]]), sp.Matrix([[c, 0]]), {}, blocks=2).matrix
+    Matrix([
+    [c, 0],
+    [0, c]])
     """
     A, C = exact("A", A), exact("C", C)
     motion = (

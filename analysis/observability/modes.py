@@ -80,6 +80,9 @@ def hautus_test(
     units decide nothing. The eigenvalues of a k-fold defective mode err by (rounding)^(1/k); the unobservable subspace is found
     without them, and its own eigenvalues do not mix with the others. For one pair with three verdicts ask `detectable`.
     Raises AnalysisError for shapes that do not fit and values not finite.
+
+    >>> hautus_test([[1.0, 0.0], [0.0, -2.0]], [[0.0, 1.0]]).hidden.tolist()
+    [False, True]
     """
     A, C, time = observed_pair(A, C, discrete)
     if not tolerance > 0.0:
@@ -167,6 +170,10 @@ def frozen_modes(A: sp.Matrix, C: sp.Matrix) -> tuple[FrozenMode, ...]:
 
     More eigenvectors to one eigenvalue than outputs: one combination is always hidden. With more outputs than vectors `hidden_if`
     is the greatest common divisor of the maximal minors.
+
+    >>> import sympy as sp
+    >>> [str(mode.hidden_if) for mode in frozen_modes(sp.diag(1, -2), sp.Matrix([[1, sp.Symbol("c")]]))]
+    ['c', '1']
     """
     A, C = sp.Matrix(exact("A", A)), sp.Matrix(exact("C", C))
     if A.rows != A.cols or C.cols != A.rows:

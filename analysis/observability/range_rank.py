@@ -51,7 +51,12 @@ def observability_over_range(model: LpvModel) -> RangeRank:
 
 
 def controllability_over_range(model: LpvModel) -> RangeRank:
-    """With as few derivatives of the inputs as decide it; "never" without inputs."""
+    """With as few derivatives of the inputs as decide it; "never" without inputs.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> print(controllability_over_range(model).verdict)
+    full
+    """
     if not model.inputs:
         return RangeRank("never", 0, None)
     return _over_range(model, len(model.inputs), lambda blocks: controllability_matrix(model, blocks))

@@ -127,7 +127,12 @@ class RankLoss(Display):
 
 
 def rank_loss(matrix: ObservabilityMatrix, values: Mapping[str, object] | None = None) -> RankLoss:
-    """Solve for the set where the matrix has less than full column rank; `values` fixes parameters or rates first."""
+    """Solve for the set where the matrix has less than full column rank; `values` fixes parameters or rates first.
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> print(rank_loss(observability_matrix(model)).always)
+    False
+    """
     minors = matrix.minors(values)
     if not minors:
         return RankLoss(sp.Integer(0), (), True, matrix.frozen, matrix)

@@ -25,6 +25,11 @@ class RankLossSpeeds(Display):
     Rank is lost at p if c(p, p') = 0 for some rate p' in its bounds. c is linear in p', so that is where c has two signs, or
     none, at the two ends of the rate: the set begins at the lower end of the range or at a root of c at one of the rate's ends.
     Raises AnalysisError for models whose condition is of another form.
+
+    >>> import numpy as np
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> RankLossSpeeds(model).lowest({"sigma0": np.array([150.0, 180.0, 210.0])}).shape  # rad/s, one a copy of the model
+    (3,)
     """
 
     model: LpvModel

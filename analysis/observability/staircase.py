@@ -62,13 +62,20 @@ def observability_staircase(A: Any, C: ArrayLike | None = None, tolerance: float
     times |A| (|C| in the first step); default 8 n eps, which suits data that is exact but for rounding: give the relative
     error of measured data. The decisions depend on units; `detectable` balances them first [Paige1981].
     Raises AnalysisError for shapes that do not fit, values not finite, several pairs at once and a tolerance outside [0, 1).
+
+    >>> observability_staircase([[1.0, 0.0], [0.0, -2.0]], [[0.0, 1.0]]).hidden_modes.tolist()
+    [(1+0j)]
     """
     A, C, _ = observed_pair(A, C, False if _is_open(A) else None)
     return _single(A, C, tolerance)
 
 
 def controllability_staircase(A: Any, B: ArrayLike | None = None, tolerance: float | None = None) -> Staircase:
-    """The same of A (n, n), B (n, m): the controllable part first (SLICOT AB01ND; MATLAB ctrbf with the parts exchanged)."""
+    """The same of A (n, n), B (n, m): the controllable part first (SLICOT AB01ND; MATLAB ctrbf with the parts exchanged).
+
+    >>> controllability_staircase([[1.0, 0.0], [0.0, -2.0]], [[1.0], [0.0]]).hidden_modes.tolist()
+    [(-2+0j)]
+    """
     A, B, _ = driven_pair(A, B, False if _is_open(A) else None)
     found = _single(A, B, tolerance)
     return Staircase(found.A.T, found.outer.T, found.transform, found.stages, found.residual, found.tolerance)

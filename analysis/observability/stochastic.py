@@ -84,6 +84,11 @@ def stochastic_observability(
     """Both tests along A (K, n, n), C (K, m, n), with Q (n, n) or (K, n, n) >= 0 and R (m, m) or (K, m, m) > 0.
 
     Raises AnalysisError for shapes that do not fit, values that are not finite, a negative Q and a singular R.
+
+    >>> import numpy as np
+    >>> one = np.ones((3, 1, 1))
+    >>> stochastic_observability(0.5 * one, one, [[1.0]], [[1.0]]).samples_needed
+    1
     """
     A, C = square("A", A, 3), as_stack("C", C, 3)
     if A.ndim != 3 or C.ndim != 3 or len(A) != len(C) or C.shape[-1] != A.shape[-1] or not len(A):
@@ -125,7 +130,13 @@ def stochastic_observability_along(
     R: ArrayLike,
     rank_tolerance: float = RANK_TOLERANCE,
 ) -> StochasticObservability:
-    """Both tests along parameter values (K, p), each held over one sample (P2 (20)); parameters in the model's order."""
+    """Both tests along parameter values (K, p), each held over one sample (P2 (20)); parameters in the model's order.
+
+    >>> import numpy as np
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> stochastic_observability_along(model, np.linspace(10.0, 60.0, 20), 0.005, 1e-4 * np.eye(2), [[1e-2]]).samples_needed
+    2
+    """
     sequence = sampled_sequence(model, trajectory, sample_time)
     return stochastic_observability(sequence.A, sequence.C, Q, R, rank_tolerance)
 

@@ -71,6 +71,10 @@ def uniform_detectability(
     `horizon` is q of the definition (default: the window), `contraction` c_1 in (0, 1); directions that shrink by more
     need not be seen. The largest c_2 is exact by the S-lemma: max over tau >= 0 of lambda_min(V - tau (phi'phi - c_1^2 I)).
     Raises AnalysisError for constants outside their ranges and windows longer than the record.
+
+    >>> import numpy as np
+    >>> print(uniform_detectability(np.full((6, 1, 1), 1.1), np.ones((6, 1, 1)), window=2).verdict)
+    certified
     """
     steps = _checked(window, horizon, contraction)
     seen = sliding_observability(A, C, window, state_scale)
@@ -87,7 +91,12 @@ def uniform_stabilisability(
     required: float = 0.0,
     state_scale: ArrayLike | None = None,
 ) -> WindowTest:
-    """The dual statement with W of (A2) and G_k, Q_k = G_k G_k' (P2 Proposition 1), G (..., K, n, m)."""
+    """The dual statement with W of (A2) and G_k, Q_k = G_k G_k' (P2 Proposition 1), G (..., K, n, m).
+
+    >>> import numpy as np
+    >>> print(uniform_stabilisability(np.full((6, 1, 1), 1.1), np.ones((6, 1, 1)), window=2).verdict)
+    certified
+    """
     steps = _checked(window, horizon, contraction)
     reached = sliding_controllability(A, G, window, state_scale)
     lasting = sliding_controllability(A, G, steps, state_scale)

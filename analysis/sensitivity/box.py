@@ -18,7 +18,13 @@ Ranges: TypeAlias = Mapping[str, Sequence[float]]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Box(Display):
-    """Names of d parameters, with `low`, `high` and `nominal` values (d,)."""
+    """Names of d parameters, with `low`, `high` and `nominal` values (d,).
+
+    >>> import numpy as np
+    >>> box = Box.of(around({"mass": 10.0, "damping": 2.0}, 0.2))
+    >>> box.scaled(np.array([[0.0, 0.5]])).round(9).tolist()  # from shares of the ranges
+    [[8.0, 2.0]]
+    """
 
     names: tuple[str, ...]
     low: FloatArray

@@ -59,7 +59,13 @@ class Nominal(Design):
 
 
 class OneAtATimeDesign(Design):
-    """Each parameter over `levels` values of its range, the others nominal (P3 Figs 3-5)."""
+    """Each parameter over `levels` values of its range, the others nominal (P3 Figs 3-5).
+
+    >>> import numpy as np
+    >>> box = Box.of(around({"mass": 10.0, "damping": 2.0}, 0.2))
+    >>> OneAtATimeDesign(levels=3).points(np.arange(4), box).shape  # four designs of two parameters
+    (4, 2)
+    """
 
     kind: Literal["one at a time"] = "one at a time"
     levels: int = Field(default=2, ge=2)
@@ -77,7 +83,11 @@ class OneAtATimeDesign(Design):
 
 
 class FullGrid(Design):
-    """Every combination of `levels` values of each parameter: one number, or one for each by name."""
+    """Every combination of `levels` values of each parameter: one number, or one for each by name.
+
+    >>> FullGrid(levels=3).count(Box.of(around({"mass": 10.0, "damping": 2.0}, 0.2)))
+    9
+    """
 
     kind: Literal["grid"] = "grid"
     levels: int | dict[str, int]
@@ -112,7 +122,13 @@ class FullGrid(Design):
 
 
 class Corners(Design):
-    """All 2^d corners of the box."""
+    """All 2^d corners of the box.
+
+    >>> import numpy as np
+    >>> box = Box.of(around({"mass": 10.0, "damping": 2.0}, 0.2))
+    >>> Corners().points(np.arange(4), box).shape  # four designs of two parameters
+    (4, 2)
+    """
 
     kind: Literal["corners"] = "corners"
 
@@ -142,7 +158,13 @@ class _Samples(Design):
 
 
 class LatinHypercube(_Samples):
-    """`samples` points, one in each of as many slices of every parameter (McKay, Beckman, Conover 1979)."""
+    """`samples` points, one in each of as many slices of every parameter (McKay, Beckman, Conover 1979).
+
+    >>> import numpy as np
+    >>> box = Box.of(around({"mass": 10.0, "damping": 2.0}, 0.2))
+    >>> LatinHypercube(samples=5).points(np.arange(4), box).shape  # four designs of two parameters
+    (4, 2)
+    """
 
     kind: Literal["latin hypercube"] = "latin hypercube"
 
@@ -152,7 +174,13 @@ class LatinHypercube(_Samples):
 
 
 class Sobol(_Samples):
-    """`samples` scrambled Sobol points (Owen 1998), a power of two, on which their balance rests."""
+    """`samples` scrambled Sobol points (Owen 1998), a power of two, on which their balance rests.
+
+    >>> import numpy as np
+    >>> box = Box.of(around({"mass": 10.0, "damping": 2.0}, 0.2))
+    >>> Sobol(samples=8).points(np.arange(4), box).shape  # four designs of two parameters
+    (4, 2)
+    """
 
     kind: Literal["sobol"] = "sobol"
 
@@ -166,7 +194,11 @@ class Sobol(_Samples):
 
 
 class Saltelli(Design):
-    """`blocks` times d + 2 points A, B and A with one column of B, from Sobol points: gives Sobol indices as well."""
+    """`blocks` times d + 2 points A, B and A with one column of B, from Sobol points: gives Sobol indices as well.
+
+    >>> Saltelli(blocks=8).count(Box.of(around({"mass": 10.0, "damping": 2.0}, 0.2)))  # 8 (2 + 2)
+    32
+    """
 
     kind: Literal["saltelli"] = "saltelli"
     blocks: int = Field(ge=2)

@@ -44,6 +44,10 @@ def evaluate(measure: Measure, columns: Mapping[str, FloatArray]) -> FloatArray:
     """measure(columns) as an array (N, ...). Infinite values are answers (an unstable model); NaN is not.
 
     Raises AnalysisError if the measure does not return one value for each sample, or returns NaN.
+
+    >>> import numpy as np
+    >>> evaluate(lambda at: at["a"] ** 2, {"a": np.array([1.0, 3.0])}).tolist()
+    [1.0, 9.0]
     """
     count = len(next(iter(columns.values())))
     out = np.asarray(measure(columns), float)
@@ -60,7 +64,12 @@ def evaluate(measure: Measure, columns: Mapping[str, FloatArray]) -> FloatArray:
 
 
 def one_by_one(function: Callable[[dict[str, float]], ArrayLike]) -> Measure:
-    """A measure from a function of one sample; as slow as its loop."""
+    """A measure from a function of one sample; as slow as its loop.
+
+    >>> import numpy as np
+    >>> one_by_one(lambda at: at["a"] ** 2)({"a": np.array([1.0, 3.0])}).tolist()
+    [1.0, 9.0]
+    """
 
     def measure(columns: Mapping[str, FloatArray]) -> FloatArray:
         count = len(next(iter(columns.values())))
@@ -114,6 +123,9 @@ def sample(
     """The measure over a design in the box of `ranges`, along an axis `sample`.
 
     The samples are in the notes, column by column, so that a saved result can be read alone.
+
+    >>> sample(lambda at: at["a"], LatinHypercube(samples=4), {"a": (0.0, 1.0)}).values.shape
+    (4,)
     """
     box = Box.of(ranges)
     columns = box.columns(design.everywhere(box))
@@ -130,7 +142,11 @@ def sample_grid(
     name: str = "measure",
     unit: str = "1",
 ) -> LabelledArray:
-    """The measure at every combination of the given levels, with an axis for each parameter."""
+    """The measure at every combination of the given levels, with an axis for each parameter.
+
+    >>> sample_grid(lambda at: at["a"] * at["b"], {"a": [1.0, 2.0], "b": [10.0]}).values.tolist()
+    [[10.0], [20.0]]
+    """
     if not levels:
         raise AnalysisError("no parameter to vary; give at least one name with its levels")
     lines = [as_stack(f"levels of {key}", given, ndim=1).ravel() for key, given in levels.items()]

@@ -55,6 +55,9 @@ def common_quadratic_lyapunov(modes: ArrayLike, discrete: bool | None = None) ->
     together with growing weights), so decoupled states are taken one block at a time. Raises AnalysisError for modes that
     are not finite square matrices of one size. A common one proves stability under arbitrary switching; none proves
     nothing about it (see `joint_spectral_radius`).
+
+    >>> print(common_quadratic_lyapunov([[[-1.0, 1.0], [0.0, -1.0]], [[-1.0, 0.0], [1.0, -1.0]]]).verdict)
+    certified
     """
     matrices, discrete = state_matrices(modes, discrete)
     A = square("modes", matrices, ndim=3)

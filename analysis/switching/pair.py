@@ -24,6 +24,9 @@ def pair_margin(first: ArrayLike, second: ArrayLike, discrete: bool | None = Non
 
     Stacks (..., 2, 2) whose leading axes broadcast; an unstable mode gives -inf. In floating point:
     use `exact_pair_test` where the value is at rounding level. Raises AnalysisError for modes that are not 2 x 2.
+
+    >>> bool(pair_margin([[-1.0, 1.0], [0.0, -1.0]], [[-1.0, 0.0], [9.0, -1.0]]) > 0.0)
+    False
     """
     A1, A2, discrete = _two_by_two(first, second, discrete)
     shape = leading({"first": A1, "second": A2})
@@ -49,6 +52,9 @@ def exact_pair_test(first: ArrayLike, second: ArrayLike, discrete: bool | None =
     """CERTIFIED: a common quadratic Lyapunov function exists; REFUTED: none does. In exact rational arithmetic.
 
     One pair of 2 x 2 modes, read bit for bit; the boundary itself is REFUTED, as the inequalities are strict.
+
+    >>> print(exact_pair_test([[-1.0, 1.0], [0.0, -1.0]], [[-1.0, 0.0], [9.0, -1.0]]))
+    refuted
     """
     A1, A2, discrete = _two_by_two(first, second, discrete)
     if A1.ndim != 2 or A2.ndim != 2:

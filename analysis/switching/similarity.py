@@ -70,6 +70,9 @@ def symmetric_growth(A: ArrayLike, T: ArrayLike | None = None) -> FloatArray:
     """lambda_max of the symmetric part of T A T^-1 for a stack A (..., n, n): the growth rate of |T e| in 1/s.
 
     A may be a continuous-time object with A and dt, or a list of such, here and below.
+
+    >>> float(symmetric_growth([[-1.0, 4.0], [0.0, -1.0]]))  # the norm grows at first, although the system is stable
+    1.0
     """
     moved = _matrices("A", A)
     if T is not None:
@@ -85,6 +88,10 @@ def similarity_bound(
     eta1 = 2 (lambda_max(A_s) + eps/2), eta2 = lambda_max(B_bar'B_bar) disturbance^2 / (2 eps). Without `epsilon` it is
     |lambda_max(A_s)|, which makes the final bound -eta2/eta1 on V least. Raises AnalysisError for a singular T, matrices
     that do not fit, and a negative disturbance.
+
+    >>> import numpy as np
+    >>> similarity_bound([[-1.0, 0.0], [0.0, -2.0]], [[1.0], [0.0]], np.eye(2), disturbance=0.5).bounded
+    True
     """
     a, b = _some("A", _matrices("A", A)), _some("B", as_stack("B", B))
     t = _transform(T, a.shape[-1])
@@ -104,6 +111,9 @@ def best_diagonal_transform(A: ArrayLike) -> DiagonalTransform:
     The off-diagonal entry of the symmetric part is (gamma b + c/gamma)/2. For b c > 0 gamma* = sqrt(c/b) makes T A T^-1
     symmetric, so the growth is the largest eigenvalue of A itself, and no quadratic form does better. For b c < 0
     gamma* = sqrt(-c/b) removes the entry: max(a, d). For b c = 0 that is the infimum, attained only if b = c = 0.
+
+    >>> round(float(best_diagonal_transform([[-1.0, 4.0], [1.0, -3.0]]).growth), 6)  # an eigenvalue of A
+    0.236068
     """
     array = _matrices("A", A)
     if array.shape[-1] != 2:
@@ -121,6 +131,10 @@ def diagonal_window(A: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
     |gamma b + c/gamma| < 2 sqrt(a d) with a, d < 0, so with s = sqrt(a d) and q = sqrt(a d - b c) it is
     (|s - q|/|b|, (s + q)/|b|). Matrices share a diagonal T if and only if their windows meet.
+
+    >>> lower, upper = diagonal_window([[-1.0, 4.0], [0.0, -1.0]])
+    >>> float(lower), float(upper)
+    (0.0, 0.5)
     """
     array = _matrices("A", A)
     if array.shape[-1] != 2:
@@ -138,6 +152,10 @@ def common_growth(modes: ArrayLike, T: ArrayLike) -> float:
     """lambda_bar of (20): the largest 2 lambda_max(sym(T A T^-1)) over all modes and parameter values (..., n, n), in 1/s.
 
     Negative proves stability under arbitrary switching; positive proves nothing except that this T does not.
+
+    >>> import numpy as np
+    >>> common_growth([[[-1.0, 0.0], [0.0, -2.0]], [[-3.0, 0.0], [0.0, -1.0]]], np.eye(2))
+    -2.0
     """
     return 2.0 * float(symmetric_growth(_some("modes", _matrices("modes", modes)), T).max())
 

@@ -48,6 +48,10 @@ def delay_margin(A: ArrayLike, C: ArrayLike, K: ArrayLike, sample_time: float, m
 
     A (n, n), C (p, n), K (n, p), `sample_time` in s; delays up to `most_samples` samples are looked at. Both bounds are 0 for
     an observer that is certainly not stable without delay. Raises AnalysisError for matrices that do not fit or are not finite.
+
+    >>> found = delay_margin([[0.0, 1.0], [0.0, -1.0]], [[1.0, 0.0]], [[0.2], [0.1]], sample_time=0.1)
+    >>> 0.0 < found.lower <= found.upper
+    True
     """
     a, c, k = observer_matrices(A, C, K)
     period = rational(positive("sample_time", sample_time))

@@ -64,6 +64,10 @@ def sample_time_jitter(A: ArrayLike, C: ArrayLike, K: ArrayLike, sample_time: fl
 
     A (n, n), C (p, n), K (n, p), `sample_time` in s. `degree` of P in the sample time. Raises AnalysisError for matrices that
     do not fit or are not finite, and if the observer is not stable at its nominal sample time.
+
+    >>> found = sample_time_jitter([[0.0, 1.0], [0.0, -1.0]], [[1.0, 0.0]], [[0.4], [0.2]], 0.1)
+    >>> 0.0 <= found.lower <= found.upper
+    True
     """
     a, c, k = observer_matrices(A, C, K)
     period = positive("sample_time", sample_time)
@@ -129,7 +133,11 @@ def _loop_and_names(observer: ObserverLoop, shortest: float, longest: float) -> 
 
 
 def judge_sample_times(A: ArrayLike, C: ArrayLike, K: ArrayLike, sample_times: Sequence[float]) -> Verdict:
-    """Whether the sequence, repeated for ever, is stable: exact signs on enclosed exponentials."""
+    """Whether the sequence, repeated for ever, is stable: exact signs on enclosed exponentials.
+
+    >>> print(judge_sample_times([[0.0]], [[1.0]], [[0.5]], [0.01, 0.02]))
+    certified
+    """
     a, c, k = observer_matrices(A, C, K)
     product = arb_mat(len(a), len(a), [int(i == j) for i in range(len(a)) for j in range(len(a))])
     for length in sample_times:

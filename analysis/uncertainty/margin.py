@@ -66,6 +66,16 @@ def robust_stability_margin(
     stable there has this number as lower bound and inf as upper. Raises AnalysisError if the middle is not stable, for no
     parameters, and for numbers that are not positive. Sources: de Gaston, Safonov 1988 (the margin); Zettler, Garloff 1998
     (Bernstein expansion of Hurwitz determinants).
+
+    >>> import sympy as sp
+    >>> model = LpvModel(
+    ...     name="lag", source="example", states=(Signal("x", "1"),), inputs=(Signal("u", "1"),), outputs=(Signal("y", "1"),),
+    ...     parameters=(SchedulingParameter("p", "1/s", 1.0, 2.0, -1.0, 1.0),),
+    ...     A=sp.Matrix([[-sp.Symbol("p")]]), B=sp.Matrix([[1]]), C=sp.Matrix([[1]]),
+    ... )
+    >>> found = robust_stability_margin(model)
+    >>> found.lower <= 3.0 <= found.upper * 1.001  # p = 1.5 + 3 * 0.5 * (-1) = 0
+    True
     """
     question = ask(model, (), None, discrete)
     tolerance, farthest = positive("tolerance", tolerance), min(positive("farthest", farthest), FARTHEST)

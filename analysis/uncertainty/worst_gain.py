@@ -65,6 +65,16 @@ def worst_case_gain(
     Inputs and outputs as in `lpv_l2_gain`; rate bounds play no part. `tolerance` is the relative gap that is aimed at. A family
     with a member that is not stable has the gain inf. `upper` is inf where no proof was found. Raises AnalysisError for unknown
     names and for a tolerance that is not positive.
+
+    >>> import sympy as sp
+    >>> model = LpvModel(
+    ...     name="lag", source="example", states=(Signal("x", "1"),), inputs=(Signal("u", "1"),), outputs=(Signal("y", "1"),),
+    ...     parameters=(SchedulingParameter("p", "1/s", 1.0, 2.0, -1.0, 1.0),),
+    ...     A=sp.Matrix([[-sp.Symbol("p")]]), B=sp.Matrix([[1]]), C=sp.Matrix([[1]]),
+    ... )
+    >>> found = worst_case_gain(model)
+    >>> round(found.lower, 2), round(found.upper, 2)  # at p = 1
+    (1.0, 1.0)
     """
     question = ask(model, inputs, outputs)
     require_channel(question)

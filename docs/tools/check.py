@@ -1,4 +1,7 @@
-"""`make docs-check`: every block runs, every link leads somewhere, every public name is described. No network, no MkDocs."""
+"""`make docs-check`: every block runs, every link leads somewhere, every public name is described. No network, no MkDocs.
+
+With `--site` (`make docs`) the site is built from the same run of the pages.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from docs.tools.links import broken_links
 from docs.tools.pages import PAGES, PICTURES, ROOT, page_texts
 from docs.tools.reference import reference_pages, undescribed
 from docs.tools.running import run_pages
+from docs.tools.site import build_site
 
 
 def stored_files() -> set[str]:
@@ -55,6 +59,8 @@ def main() -> int:
     wrong += broken_links(every, {place: run.pictures for place, run in runs.items()}, stored_files())
     wrong += [f"{name} has no docstring" for name in undescribed()]
     wrong += unknown_commands(written) + outside_navigation(set(every))
+    if "--site" in sys.argv[1:]:
+        wrong += build_site()
     for place, run in sorted(runs.items(), key=lambda item: -item[1].seconds):
         if run.seconds > 0.05:
             print(f"{run.seconds:6.1f} s  {place}")

@@ -13,6 +13,7 @@ import traceback
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -35,7 +36,13 @@ class PageRun:
 
 
 def run_pages(texts: dict[str, str]) -> dict[str, PageRun]:
-    """Run every page that has something to run, two at a time."""
+    """Run every page that has something to run, two at a time; the same pages are not run twice."""
+    return _run_pages(frozenset(texts.items()))
+
+
+@cache
+def _run_pages(pages: frozenset[tuple[str, str]]) -> dict[str, PageRun]:
+    texts = dict(sorted(pages))
     jobs = {place: text for place, text in texts.items() if any(b.language in RUN for b in blocks(text))}
     done = {place: PageRun([""] * len(blocks(text))) for place, text in texts.items()}
     if ROOT not in sys.path:  # MkDocs takes back what its hook added; the workers import this module by its name

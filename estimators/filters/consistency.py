@@ -86,6 +86,11 @@ def consistency(
 
     Raises:
         EstimatorError: values not finite or not (runs, steps).
+
+    >>> import numpy as np
+    >>> values = np.random.default_rng(1).chisquare(2, (50, 20))  # NEES of two states, 50 runs of 20 steps
+    >>> bool(consistency(values, freedom=2).consistent)
+    True
     """
     table = numbers(values, "values")
     if table.ndim != 2 or not table.size:

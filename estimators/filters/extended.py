@@ -14,7 +14,13 @@ StateFunction = Callable[[FloatArray], FloatArray]
 
 
 class ExtendedKalmanFilter(CovarianceFilter):
-    """x+ = f(x) + w, y = h(x) + v; f, h and their Jacobians take the states (..., n) of the whole batch."""
+    """x+ = f(x) + w, y = h(x) + v; f, h and their Jacobians take the states (..., n) of the whole batch.
+
+    >>> kalman = ExtendedKalmanFilter([1.0], [[1.0]])
+    >>> step = kalman.correct([4.0], lambda x: x**2, lambda x: 2.0 * x[..., None], [[0.1]])
+    >>> round(float(kalman.state[0]), 3)  # on the way to 2
+    2.463
+    """
 
     @quiet
     def predict(self, transition: StateFunction, jacobian: StateFunction, Q: npt.ArrayLike) -> BoolArray:

@@ -16,6 +16,12 @@ class KalmanFilter(CovarianceFilter):
 
     Matrices have any leading axes that broadcast against the batch. Source: Kalman (1960); correction in the form of
     Bucy, Joseph (1968), which keeps P symmetric and positive definite.
+
+    >>> kalman = KalmanFilter(state=[0.0], covariance=[[1.0]])
+    >>> _ = kalman.predict([[1.0]], [[0.0]])
+    >>> step = kalman.correct([1.0], [[1.0]], [[1.0]])
+    >>> float(kalman.state[0])  # half way: measurement and estimate are worth the same
+    0.5
     """
 
     @quiet

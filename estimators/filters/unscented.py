@@ -55,6 +55,11 @@ class UnscentedKalmanFilter(GaussianFilter):
 
     Raises:
         EstimatorError: as `GaussianFilter`; a spread that is not positive.
+
+    >>> kalman = UnscentedKalmanFilter([1.0], [[1.0]])
+    >>> step = kalman.correct([4.0], lambda x: x**2, [[0.1]])
+    >>> bool(1.0 < kalman.state[0] < 3.0)
+    True
     """
 
     def __init__(

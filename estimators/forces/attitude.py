@@ -63,6 +63,11 @@ class AttitudeObserver(Renewable):
 
     Raises:
         EstimatorError: a setting that is not positive.
+
+    >>> observer = AttitudeObserver(sample_time=0.005)
+    >>> step = observer.step(rate_x=0.0, rate_y=0.0, ax=0.0, ay=0.0)
+    >>> round(float(step.roll), 3), round(float(step.pitch), 3)  # rad, on a level road
+    (0.0, 0.0)
     """
 
     memory = ("angle", "lagged", "yaw_rate", "road", "renewed")

@@ -71,6 +71,12 @@ class LateralForceEstimator(Renewable):
 
     Raises:
         EstimatorError: a setting that is not positive, an unknown method.
+
+    >>> import numpy as np
+    >>> estimator = LateralForceEstimator(VehicleParameters.published_suv(), sample_time=0.005)
+    >>> step = estimator.step(0.0, 2.0, 0.0, 0.02, np.zeros(4))
+    >>> step.axle_force.shape  # front and rear, N
+    (2,)
     """
 
     parts = ("filter", "steer", "force_x", "load")

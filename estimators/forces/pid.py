@@ -44,6 +44,12 @@ class PidForceObserver(Memory):
 
     Raises:
         EstimatorError: a shape without corners, gains that are not positive, eta_3 Ts of 2 or more (unstable).
+
+    >>> import numpy as np
+    >>> observer = PidForceObserver(VehicleParameters.published_suv(), sample_time=0.005)
+    >>> step = observer.step(wheel_speed=np.full(4, 60.0), wheel_acceleration=np.zeros(4), torque=np.full(4, 200.0))
+    >>> step.force.shape  # N, one a wheel
+    (4,)
     """
 
     memory = ("force", "integral", "speed", "speed_integral", "before", "starts", "flowing")

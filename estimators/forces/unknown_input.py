@@ -39,6 +39,12 @@ class UnknownInputForceObserver(IntervalObserver):
 
     Raises:
         EstimatorError: a shape without corners, a setting that is not positive (lag, f_0: not finite).
+
+    >>> import numpy as np
+    >>> observer = UnknownInputForceObserver(VehicleParameters.published_suv(), sample_time=0.005)
+    >>> step = observer.step(wheel_speed=np.full(4, 60.0), torque=np.full(4, 200.0))
+    >>> step.force.shape  # N, one a wheel
+    (4,)
     """
 
     memory = ("force", "before", "deviation")

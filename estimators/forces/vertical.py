@@ -116,6 +116,11 @@ class VerticalLoads(Renewable):
 
     Raises:
         EstimatorError: a setting that is not positive.
+
+    >>> loads = VerticalLoads(VehicleParameters.published_suv(), sample_time=0.005, dynamic=False)
+    >>> step = loads.step(ax=3.0, ay=0.0)
+    >>> bool(step.load[:2].sum() < step.load[2:].sum())  # the car squats
+    True
     """
 
     memory = ("felt", "angles", "renewed")

@@ -46,6 +46,12 @@ class WheelForceFilter(IntervalObserver):
 
     Raises:
         EstimatorError: a shape without corners, a setting that is not positive, an unknown method.
+
+    >>> import numpy as np
+    >>> observer = WheelForceFilter(VehicleParameters.published_suv(), sample_time=0.005)
+    >>> step = observer.step(wheel_speed=np.full(4, 60.0), torque=np.full(4, 200.0))
+    >>> step.force.shape  # N, one a wheel
+    (4,)
     """
 
     memory = ("before",)

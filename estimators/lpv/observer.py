@@ -51,6 +51,11 @@ class LpvObserver(Renewable):
     Raises:
         EstimatorError: an option that means nothing.
         ScheduleError: gains or a model whose error grows beyond all bounds within one sample.
+
+    >>> observer = LpvObserver(GainSchedule.shipped("longitudinal-speed"))
+    >>> step = observer.step(held_input=0.0, measurement=0.1, parameter=50.0)
+    >>> bool(step.used), Flag(int(step.flags)) == Flag(0)
+    (True, True)
     """
 
     memory = ("_state", "samples", "renewed")

@@ -65,6 +65,13 @@ class CornerObservers(Memory):
 
     Raises:
         EstimatorError: observers for different sample times or for another batch, or as `ScheduledCorners`.
+
+    >>> import numpy as np
+    >>> schedule = GainSchedule.shipped("corner-estimation-longitudinal")
+    >>> corners = CornerObservers(VehicleParameters.published_suv(), longitudinal=schedule)
+    >>> step = corners.step(np.full(4, 60.0), 0.0, 0.0, 0.0, 0.0, np.ones(4), np.ones(4))
+    >>> bool(15.0 < step.vx < 25.0)  # m/s
+    True
     """
 
     memory = ("vx", "vy", "slip", "angle")

@@ -40,6 +40,12 @@ class MountedUnit(Memory):
 
     Raises:
         EstimatorError: a setting that is not positive.
+
+    >>> import numpy as np
+    >>> unit = MountedUnit(Mounting(roll=0.01), sample_time=0.005)
+    >>> turned = unit.step(VehicleSignals(wheel_speed=np.full(4, 60.0), ax=1.0, az=9.81))
+    >>> round(float(turned.ax), 3)
+    1.0
     """
 
     memory = ("last", "moved")

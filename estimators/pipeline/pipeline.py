@@ -77,6 +77,13 @@ class EstimationPipeline(Memory):
 
     Raises:
         EstimatorError: a setting that is not positive, a part for another batch or sample time.
+
+    >>> import numpy as np
+    >>> pipeline = EstimationPipeline(VehicleParameters.published_suv(), sample_time=0.005)
+    >>> for _ in range(20):
+    ...     step = pipeline.step(VehicleSignals(wheel_speed=np.full(4, 60.0), ax=0.0))
+    >>> bool(15.0 < step.vx < 25.0)  # m/s
+    True
     """
 
     memory = ("front", "angle")

@@ -22,6 +22,11 @@ class VehicleSignals(NamedTuple):
     """Arrays of the batch shape `...`, or one number for all; NaN (or infinite) where missing. ISO frame, SI units.
 
     None says that the car has no such sensor: nothing is flagged then.
+
+    >>> import numpy as np
+    >>> signals = VehicleSignals(wheel_speed=np.full(4, 60.0), ax=0.5)  # rad/s and m/s^2; what is not given is not measured
+    >>> signals.az is None
+    True
     """
 
     wheel_speed: npt.ArrayLike  # (..., 4) rad/s, signed: backwards is negative

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NoReturn
 
-from estimators.errors import ScheduleError
+from estimators.errors import ScheduleError, printable
 
 LARGEST = 1e100
 LONGEST_TEXT = 2000
@@ -18,12 +18,6 @@ _LEAVES = {float, int, str, bool, type(None)}
 _MANY = 100_000
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 _UNIT = re.compile(r"[A-Za-z0-9_%°µ*/^(). +-]+\Z")
-
-
-def printable(text: str, most: int = 10**6) -> str:
-    """Text for a message: no control characters, on one line, cut to a length."""
-    clean = "".join(c if c.isprintable() else "?" for c in text[: most + 1])
-    return clean if len(clean) <= most else clean[: most - 3] + "..."
 
 
 def shown(value: Any, most: int = 60) -> str:

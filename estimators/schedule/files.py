@@ -10,9 +10,9 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, NoReturn
 
-from estimators.errors import ScheduleError
+from estimators.errors import ScheduleError, printable
 from estimators.schedule.check import SCHEMA, SEALS, SECTIONS, check_content, check_depth
-from estimators.schedule.checker import printable, quoted, shown
+from estimators.schedule.checker import quoted, shown
 from estimators.schedule.upgrade import FIRST_FORMAT, upgraded
 from estimators.whole_files import write_bytes
 

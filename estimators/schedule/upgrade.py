@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from estimators.errors import ScheduleError
+from estimators.errors import ScheduleError, printable
 from estimators.schedule.check import (
     HIGHEST_ORDER,
     MOST,
@@ -22,7 +22,7 @@ from estimators.schedule.check import (
     check_content,
     check_depth,
 )
-from estimators.schedule.checker import Checker, printable, quoted
+from estimators.schedule.checker import Checker, quoted
 
 FIRST_FORMAT = "gainsmith.schedule/1"
 FIRST_SECTIONS = (

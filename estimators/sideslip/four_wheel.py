@@ -74,6 +74,12 @@ class FourWheelObserver(Renewable):
 
     Raises:
         EstimatorError: an option that means nothing.
+
+    >>> import numpy as np
+    >>> car = FourWheel(1500.0, 2500.0, 1.2, 1.4, 1.5, 50000.0, 50000.0, 0.4, 0.4)
+    >>> step = FourWheelObserver(car, sample_time=0.005).step(0.0, np.full(4, 3700.0), [0.0, 20.0, 0.0, 0.0])
+    >>> step.state.shape
+    (8,)
     """
 
     parts = ("steering", "loads", "filters")

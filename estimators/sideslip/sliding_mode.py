@@ -64,6 +64,10 @@ class SlidingModeObserver(Renewable):
 
     Raises:
         EstimatorError: parameters without meaning; an unstable linear zone.
+
+    >>> observer = SlidingModeObserver(SingleTrack(1400.0, 2400.0, 1.1, 1.6, 80000.0, 90000.0), sample_time=0.001)
+    >>> observer.step([0.1, 1.0, 0.0]).state.shape
+    (4,)
     """
 
     memory = ("_state", "renewed")

@@ -69,6 +69,12 @@ class AdaptiveStiffnessObserver(Renewable):
 
     Raises:
         EstimatorError: an option that means nothing; a standstill speed at which Euler steps are unstable.
+
+    >>> car = SingleTrack(1400.0, 2400.0, 1.1, 1.6, 80000.0, 90000.0)
+    >>> observer = AdaptiveStiffnessObserver(car)
+    >>> step = observer.step(steering=0.0, yaw_rate=0.0, speed=20.0, drive_force=0.0, measurement=[0.0, 0.0, 0.0])
+    >>> float(step.sideslip)  # rad, straight ahead
+    0.0
     """
 
     parts = ("filter", "inputs")
@@ -209,6 +215,12 @@ class FixedStiffnessObserver(AdaptiveStiffnessObserver):
     Its only state is the sideslip, its measurement noise that of zones 5 and 6 everywhere; `excited` is reported and
     not used. Right stiffnesses give good estimates, wrong ones do not: too small ones overestimate the sideslip, too
     large ones underestimate it (the paper says overestimate twice).
+
+    >>> car = SingleTrack(1400.0, 2400.0, 1.1, 1.6, 80000.0, 90000.0)
+    >>> observer = FixedStiffnessObserver(car)
+    >>> step = observer.step(steering=0.0, yaw_rate=0.0, speed=20.0, drive_force=0.0, measurement=[0.0, 0.0, 0.0])
+    >>> float(step.sideslip)  # rad, straight ahead
+    0.0
     """
 
     _states = 1

@@ -32,6 +32,9 @@ class Mounting:
 
     Raises:
         EstimatorError: a value that is not finite, beyond 20 m, or beyond pi (pitch: pi/2).
+
+    >>> Mounting(x=0.3, roll=0.01).x  # m ahead of the centre of gravity
+    0.3
     """
 
     x: float = 0.0

@@ -47,6 +47,12 @@ class VelocityFusion(Memory):
 
     Raises:
         EstimatorError: a sample time outside (0, 1] s, a batch without entries.
+
+    >>> import numpy as np
+    >>> fusion = VelocityFusion(VehicleParameters.published_suv(), sample_time=0.005)
+    >>> step = fusion.step(np.full(4, 60.0), steer=0.0, ax=0.0, ay=0.0, yaw_rate=0.0)
+    >>> bool(step.vx > 15.0)  # m/s
+    True
     """
 
     memory = ("new", "renewed", "start")

@@ -47,6 +47,11 @@ class KinematicKalman(Renewable):
 
     Raises:
         EstimatorError: a value that is not above zero.
+
+    >>> observer = KinematicKalman(sample_time=0.01)
+    >>> step = observer.step(ax=0.0, ay=0.0, yaw_rate=0.0, velocity=[20.0, 0.0])
+    >>> step.velocity.shape
+    (2,)
     """
 
     memory = ("seen", "renewed")

@@ -56,6 +56,13 @@ class LtvKalmanObserver(Renewable):
 
     Raises:
         EstimatorError: a value that is not above zero, another number of states, another process.
+
+    >>> import numpy as np
+    >>> from estimators.velocity.ltv_model import BristleTire
+    >>> observer = LtvKalmanObserver(BristleTire(), sample_time=0.005)
+    >>> step = observer.step(np.zeros(4), np.zeros(4), np.full(4, 60.0))
+    >>> len(step.flags)  # four wheels
+    4
     """
 
     memory = ("seen", "renewed")

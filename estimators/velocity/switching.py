@@ -89,6 +89,11 @@ class SwitchedVelocityObserver(TwoStateObserver):
     Raises:
         EstimatorError: schedules of another size or for different sample times, settings as in `SlipSwitch`.
         ScheduleError: gains whose error grows beyond all bounds within a sample.
+
+    >>> import numpy as np
+    >>> observer = SwitchedVelocityObserver(GainSchedule.shipped("resilient-velocity-longitudinal"))
+    >>> observer.step(np.zeros(4), np.zeros(4), np.full(4, 60.0), slip=np.zeros(4)).estimate.shape  # two states a wheel
+    (4, 2)
     """
 
     parts = ("switch", "monitor")

@@ -6,8 +6,8 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
+from estimators.errors import printable
 from estimators.schedule import SHIPPED
-from estimators.schedule.checker import printable
 from studies.certification import certify
 from synthesis.certificate.claims import written
 

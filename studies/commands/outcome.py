@@ -9,6 +9,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from types import FrameType
 
 from studies.errors import escaped
@@ -83,7 +84,10 @@ def one_line(text: str, most: int = LONGEST) -> str:
 
 
 def speak_safely() -> None:
-    """A terminal without Unicode shows an escape instead of stopping the program."""
+    """A terminal without Unicode shows an escape instead of stopping the program; a closed output (`>&-`) is no output."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115 - for as long as the program runs
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError, ValueError):  # a stream that is no file
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]

@@ -296,5 +296,8 @@ class DriveFile(StrictTable):
 
 
 def read_drive(path: Path) -> DriveFile:
-    """Read and check a drive file. Raises SpecError, one line: file, key, what is wrong, what would be right."""
+    """Read and check a drive file. Raises SpecError, one line: file, key, what is wrong, what would be right.
+
+    >>> read_drive(Path("drive.toml")).name  # doctest: +SKIP
+    """
     return load_toml(path, DriveFile, "drive")

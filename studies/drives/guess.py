@@ -52,6 +52,16 @@ def write_guess(logs: Sequence[Path], drive: Path | None) -> tuple[Path, Guessed
     """Write a drive file for the ``logs``: to ``drive``, else beside the first log; an existing file is never replaced.
 
     Raises SpecError for a file that is there or cannot be written, LogError for a log that cannot be read or has no clock.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from studies.truth.export import write_drive
+    >>> truth = simulate_manoeuvres([load_manoeuvre("p2-step-steer-dry").model_copy(update={"duration": 2.0})])
+    >>> with TemporaryDirectory() as folder:
+    ...     log, drive = write_drive(Path(folder), draw(truth, Sensors(), seeds=[0]))
+    ...     path, guessed = write_guess([log], Path(folder) / "guessed.toml")
+    ...     print(path.name, guessed.found["yaw_rate"])
+    guessed.toml yaw_rate
     """
     target = drive or logs[0].with_suffix(".toml")
     if target.exists():

@@ -50,6 +50,9 @@ def run_drive(
     is called with the fraction done. Raises SpecError (drive file, schedule, another run into ``out``) or LogError (logs,
     ``out``), one line each, before anything is written; so it does where signals contradict one another, unless ``check`` is
     False here or in the drive file.
+
+    >>> result = run_drive([Path("log.csv")], Path("drive.toml"), Path("out"))  # doctest: +SKIP
+    >>> [path.name for path in result.paths]  # doctest: +SKIP
     """
     check_folder(out)
     data = replay_drive(logs, drive, check=check, progress=lambda done: progress(0.4 * done))
@@ -80,6 +83,15 @@ def check_drive(logs: Sequence[Path], drive: Path) -> FrameReport:
     """Read the ``logs`` as :func:`run_drive` does and compare their signals with one another; nothing is estimated.
 
     Raises SpecError (drive file) or LogError (logs), one line; what contradicts is in the report.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from studies.truth.export import write_drive
+    >>> truth = simulate_manoeuvres([load_manoeuvre("p2-step-steer-dry").model_copy(update={"duration": 2.0})])
+    >>> with TemporaryDirectory() as folder:
+    ...     log, drive = write_drive(Path(folder), draw(truth, Sensors(), seeds=[0]))
+    ...     print(check_drive([log], drive).complaint)
+    None
     """
     description = read_drive(drive)
     log = read_log(logs, description)
@@ -89,7 +101,17 @@ def check_drive(logs: Sequence[Path], drive: Path) -> FrameReport:
 def replay_drive(
     logs: Sequence[Path], drive: Path, *, check: bool = True, progress: Progress = lambda _done: None
 ) -> DriveData:
-    """As :func:`run_drive`, but the arrays are returned and nothing is written."""
+    """As :func:`run_drive`, but the arrays are returned and nothing is written.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from studies.truth.export import write_drive
+    >>> truth = simulate_manoeuvres([load_manoeuvre("p2-step-steer-dry").model_copy(update={"duration": 2.0})])
+    >>> with TemporaryDirectory() as folder:
+    ...     log, drive = write_drive(Path(folder), draw(truth, Sensors(), seeds=[0]))
+    ...     print(replay_drive([log], drive).log.time.shape)
+    (401,)
+    """
     description = read_drive(drive)
     schedule, lateral, assumed = load_schedules(description, drive.parent)
     observer, of_pipeline = (

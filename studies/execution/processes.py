@@ -47,7 +47,11 @@ class Executor(Protocol):
 
 
 class Serial(Display):
-    """In this process."""
+    """In this process.
+
+    >>> [done.value for done in Serial().run(lambda shared, task: shared + task, 10, [1, 2])]
+    [11, 12]
+    """
 
     def run(self, function: Function, shared: Any, tasks: Iterable[Any]) -> Generator[Finished, None, None]:
         """In order."""
@@ -60,6 +64,11 @@ class Processes(Display):
     A worker has up to ``ahead`` tasks at once, so that it need not wait; results are never held in numbers. With ``once``
     every task has a process of its own, so that a crash or its memory stays with it. ``watch`` is shown the tasks under way
     several times a second.
+
+    >>> def double(shared, task):
+    ...     return 2 * task
+    >>> sorted(done.value for done in Processes(2).run(double, None, [1, 2]))
+    [2, 4]
     """
 
     def __init__(

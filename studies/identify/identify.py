@@ -66,6 +66,9 @@ def identify_drive(
 
     Raises SpecError (drive file, base set), LogError (logs; signals that contradict one another, unless ``check`` is False here
     or in the drive file), IdentifyError (no reference, standstill, too short), one line.
+
+    >>> found = identify_drive([Path("log.csv")], Path("drive.toml"))  # doctest: +SKIP
+    >>> found.wheel_inertia, sorted(found.fits)  # doctest: +SKIP
     """
     description, prior = read_drive(drive), load_parameter_set(base)
     log, assumed = read_checked(logs, description, check)

@@ -71,7 +71,7 @@ def read_result(folder: Path) -> dict[str, Any] | None:
     """``result.json`` of a study's folder, or None where there is none."""
     try:
         content = json.loads((folder / RESULT).read_text(encoding="utf-8"))
-    except (FileNotFoundError, NotADirectoryError, ValueError):
+    except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
         return None
     return content if isinstance(content, dict) and content.get("schema") == SCHEMA else None
 

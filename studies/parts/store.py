@@ -7,6 +7,7 @@ import re
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from studies.study import PartResult, Preparation, Scope
 
 FOLDER = ".parts"
 FILE = "part.json"
+SEAL = "sha256"  # of the rest: the report reads its parts without doubting each entry
 PREPARED = ".prepared"  # no study can have this name
 MARK = "fingerprint"
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
@@ -46,7 +48,7 @@ def write_part(folder: Path, result: PartResult, fingerprint: str) -> None:
     with whole_folder(folder) as beside:
         for figure in result.figures:
             save_figure(figure, beside)
-        (beside / FILE).write_bytes(json_bytes(content))
+        (beside / FILE).write_bytes(json_bytes(content | {SEAL: _digest(content)}))
 
 
 def content_of(result: PartResult, fingerprint: str) -> dict[str, Any]:
@@ -76,13 +78,18 @@ def read_part(folder: Path, fingerprint: str) -> StoredPart | None:
     """The stored part, or None when there is none, when it is damaged, or when it has another fingerprint."""
     try:
         content = json.loads((folder / FILE).read_text(encoding="utf-8"))
-    except (FileNotFoundError, NotADirectoryError, ValueError):
+        whole = isinstance(content, dict) and content.pop(SEAL, None) == _digest(content)
+    except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
         return None
-    if not isinstance(content, dict) or content.get("fingerprint") != fingerprint:
+    if not whole or content.get("fingerprint") != fingerprint:
         return None
     stored = StoredPart(folder=folder, **content)
     names = [f"{figure['name']}.{kind}" for figure in stored.figures for kind in ("svg", "png")]
     return stored if all((folder / name).is_file() for name in names) else None
+
+
+def _digest(content: dict[str, Any]) -> str:
+    return sha256(json_bytes(content)).hexdigest()
 
 
 def prepared_root(out: Path) -> Path:

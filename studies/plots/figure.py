@@ -34,6 +34,9 @@ class Panel(Display):
     """One pair of axes; a text in the place of an axis is its label. ``legend`` says where it stands inside ("upper left").
 
     A ``bare`` panel has words alone: no axes, no grid.
+
+    >>> Panel([], x="time (s)", y="speed (m/s)").x
+    'time (s)'
     """
 
     marks: Sequence[Mark]
@@ -54,6 +57,9 @@ class Figure(Display):
 
     ``size`` in inches. The legend "below" collects the labels of all panels under them. Axes are shared along "row", "col"
     or "all". None is an empty place.
+
+    >>> Figure("speed", "Speed", "A rising line", [[Panel([], x="time (s)", y="speed (m/s)")]]).name
+    'speed'
     """
 
     name: str

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from studies.execution.files import json_bytes, write_bytes
 from studies.execution.processes import Executor, Processes, Serial, available_cores
 from studies.sweeps.reports import markdown
 from studies.sweeps.store import SUMMARY, SweepFolder, locked_folder
-from studies.sweeps.summary import Summary, summarise
+from studies.sweeps.summary import Summary, read_summary, summarise
 from studies.sweeps.sweep import Chunk, Sweep
 from studies.sweeps.tables import compute
 from synthesis.errors import SpecError
@@ -45,6 +44,13 @@ def run_sweep(
     """Compute what is missing, then the statistics.
 
     Raises SpecError for a folder in use or of another sweep, OSError if the disk is full.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     result = run_sweep(load_sweep("gain-box", quick=True), Path(folder) / "out", Serial())
+    ...     print(result.count("invalid designs"))
+    0
     """
     with locked_folder(out, sweep) as folder:
         folder.begin(resume)
@@ -54,8 +60,7 @@ def run_sweep(
             summary = summarise(folder)
             write_bytes(out / "summary.md", markdown(summary).encode(), sync=True)
             write_bytes(summary_file, json_bytes(summary.content()), sync=True)
-        summary = Summary.of_content(json.loads(summary_file.read_text(encoding="utf-8")))
-        return SweepResult(sweep, folder, summary, computed, seconds, reason)
+        return SweepResult(sweep, folder, read_summary(summary_file), computed, seconds, reason)
 
 
 def default_executor(workers: int | None = None) -> Executor:

@@ -39,6 +39,9 @@ class Measure(Display):
     same; `check` refuses an observer that the measure does not fit (SpecError). `prepare` makes what all chunks share, once,
     before workers are started.
     A function that must travel to other processes is one that a module defines, or a `functools.partial` of one.
+
+    >>> Measure("double", "1", "larger", lambda batch: 2.0).name
+    'double'
     """
 
     name: str

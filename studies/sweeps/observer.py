@@ -209,7 +209,13 @@ def model_observer(
     breakpoints: FloatArray | None = None,
     specification: ScheduleSpec | None = None,
 ) -> Observer:
-    """An observer of any LpvModel: a constant gain (nx, ny), or a table (b, nx, ny) over `breakpoints` of its one parameter."""
+    """An observer of any LpvModel: a constant gain (nx, ny), or a table (b, nx, ny) over `breakpoints` of its one parameter.
+
+    >>> import numpy as np
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> model_observer("printed gains", model, np.array([[0.68], [183.1]]), sample_time=0.005).name
+    'printed gains'
+    """
     table, where = checked_gain(model, gain), f"subject '{name}'"
     places = np.empty(0) if breakpoints is None else np.asarray(breakpoints, float)
     if table.shape[0] != len(places) if table.ndim == 3 else len(places):

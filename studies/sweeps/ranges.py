@@ -21,7 +21,11 @@ ALL = "constants"  # the name that stands for every parameter of the plant
 
 
 class RangeSpec(StrictTable):
-    """`relative` to the nominal value, or a `range` in the parameter's own unit, which `unit` may state to be checked."""
+    """`relative` to the nominal value, or a `range` in the parameter's own unit, which `unit` may state to be checked.
+
+    >>> RangeSpec(relative=0.2).relative
+    0.2
+    """
 
     relative: float | None = Field(default=None, gt=0)
     range: tuple[float, float] | None = Field(default=None, strict=False)

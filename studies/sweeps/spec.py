@@ -173,13 +173,21 @@ class SweepSpec(StrictTable):
 
 
 def shipped_sweeps() -> dict[str, Path]:
-    """The sweeps that come with the package, by name."""
+    """The sweeps that come with the package, by name.
+
+    >>> sorted(shipped_sweeps())
+    ['drop-tolerance', 'gain-box', 'tire-vehicle']
+    """
     folder = Path(str(resources.files("studies") / "sweeps" / "specs"))
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
 def load_sweep(name: str | Path, quick: bool = False) -> Sweep:
-    """A shipped sweep by name or one of your own by path. Raises SpecError, one line: file, place, what would be right."""
+    """A shipped sweep by name or one of your own by path. Raises SpecError, one line: file, place, what would be right.
+
+    >>> [observer.name for observer in load_sweep("gain-box", quick=True).observers]
+    ['longitudinal', 'lateral']
+    """
     path = Path(name)
     if path.suffix != ".toml":
         known = shipped_sweeps()

@@ -48,9 +48,9 @@ class SweepFolder:
         if not resume:
             raise SpecError(f"{self.path}: holds a sweep already; continue it with --resume or give another --out")
         try:
-            old = json.loads(file.read_text(encoding="utf-8"))
-        except ValueError:
-            raise SpecError(f"{file}: is not JSON; give another --out") from None
+            old = dict(json.loads(file.read_bytes()))
+        except (ValueError, TypeError, RecursionError):
+            raise SpecError(f"{file}: is no manifest of a sweep; give another --out") from None
         for part, remedy in (
             ("definition", "the sweep was changed"), ("nominal", "constants or gains were changed"),
             ("versions", "it was made with other code"),

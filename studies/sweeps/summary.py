@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +17,7 @@ from analysis.sensitivity.quantiles import PASSES, RadixSearch, rank_of
 from studies.execution.files import plain
 from studies.sweeps.measures import Measure
 from studies.sweeps.store import Rows, SweepFolder
+from synthesis.errors import SpecError
 
 UNPROVED = "constants outside the certificate"  # today's constants that are not those the schedule was proved for
 Kind = Literal["value", "index", "count"]
@@ -75,6 +78,14 @@ class Summary:
             others = {key: value for key, value in row.items() if key != "subject"}
             found.append(Statistic(row["subject"], **{**others, "value": float(row["value"])}))
         return cls(content["sweep"], content["form"], tuple(found), tuple(content["notes"]))
+
+
+def read_summary(path: Path) -> Summary:
+    """What a sweep left. Raises SpecError for a file that no sweep wrote."""
+    try:
+        return Summary.of_content(json.loads(path.read_bytes()))
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        raise SpecError(f"{path}: is no summary of a sweep; remove it, and --resume writes it again") from None
 
 
 def number(value: float, digits: int = 6) -> str:

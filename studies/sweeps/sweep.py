@@ -42,6 +42,9 @@ class Sweep(Display):
 
     `vary` is one table for all observers, or a table for each by observer name. `points` of every scheduling parameter make the
     grid, over the whole range or over `bounds`. `chunk` designs are computed and stored at once.
+
+    >>> load_sweep("gain-box", quick=True).form
+    'quick'
     """
 
     name: str

@@ -47,6 +47,9 @@ class Manoeuvre(StrictTable):
     driver follows. Pedals: ``torque`` (sum at the driven wheels) and ``throttle`` (share of what there is, negative for
     reverse), ``brake_torque`` (sum) and ``brake`` (share of the greatest); or ``target_speed``, which the driver holds,
     with the pedals added, and which he lets go of after ``free_after``.
+
+    >>> load_manoeuvre("p2-step-steer-dry").paper
+    'P2'
     """
 
     schema_: Literal["gainsmith.manoeuvre/1"] = Field(alias="schema")
@@ -154,6 +157,10 @@ def simulate_manoeuvres(
     """Simulate every manoeuvre of the batch, with its own vehicle or `vehicles[b]`, in ``workers`` processes; see `simulate`.
 
     ``progress`` is called by the only process; with several it is not called.
+
+    >>> truth = simulate_manoeuvres([load_manoeuvre("p2-step-steer-dry").model_copy(update={"duration": 0.5})])
+    >>> truth.signals["vx"].shape, truth.signals["wheel_speed"].shape  # runs, samples (of 5 ms), wheels
+    ((1, 101), (1, 101, 4))
     """
     courses = {id(m): m.course() for m in manoeuvres}
     if vehicles is None:

@@ -105,10 +105,10 @@ def to_si(text: object, unit: str) -> float:
     if unit != "share":
         return quantities.to_si(text, unit)
     if not isinstance(text, str) or not _SHARE.fullmatch(text):
-        raise ValueError(f'\'{text}\' is no share; write it like "0.5" or "50 %"')
+        raise ValueError(f'\'{quantities.short(str(text))}\' is no share; write it like "0.5" or "50 %"')
     value = float(text.rstrip(" %")) / (100.0 if text.endswith("%") else 1.0)
     if not -1.0 <= value <= 1.0:
-        raise ValueError(f"'{text}' is out of range; a share is between -1 and 1")
+        raise ValueError(f"'{quantities.short(text)}' is out of range; a share is between -1 and 1")
     return value
 
 

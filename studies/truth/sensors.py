@@ -157,7 +157,12 @@ class Ticks:
 
 @dataclass(frozen=True, repr=False)
 class Sensors(Display):
-    """The sensors of a car; the defaults are those of a good production car at 200 Hz."""
+    """The sensors of a car; the defaults are those of a good production car at 200 Hz.
+
+    >>> from dataclasses import replace
+    >>> replace(Sensors(), acceleration=replace(Sensors().acceleration, bias=0.0)).acceleration.bias
+    0.0
+    """
 
     wheel_speed: Channel = Channel(noise=0.05)  # rad/s
     acceleration: Channel = Channel(noise=0.05, bias=0.05, scale=0.002)  # m/s^2: ax, ay, az
@@ -205,6 +210,10 @@ def draw(truth: Truth, sensors: Sensors, seeds: Sequence[int], sample_time: floa
     `numpy.random.SeedSequence` over the three. Of equal manoeuvres in one batch each has errors of its own.
 
     Raises SpecError: no seeds, a sample time that is no multiple of the truth's, a signal that was not recorded.
+
+    >>> truth = simulate_manoeuvres([load_manoeuvre("p2-step-steer-dry").model_copy(update={"duration": 0.5})])
+    >>> draw(truth, Sensors(), seeds=[0, 1]).signals["yaw_rate"].shape  # seeds, runs, samples
+    (2, 1, 101)
     """
     every = round(sample_time / truth.sample_time)
     if every < 1 or abs(every * truth.sample_time - sample_time) > 1e-9:

@@ -21,6 +21,13 @@ from synthesis.errors import SpecError
 from synthesis.models.parameter_set import ParameterSet, load_parameter_set
 from synthesis.toml_file import shipped_files
 
+SUSPENSION = {
+    "suspension_stiffness_longitudinal",
+    "suspension_stiffness_lateral",
+    "suspension_damping",
+    "unsprung_mass",
+}
+
 
 @dataclass(frozen=True)
 class Chassis:
@@ -96,12 +103,17 @@ def load_vehicle(name: str | Path, folder: Path = Path()) -> TruthVehicle:
     """The truth vehicle of a parameter set: shipped with the models or with the truth by name, or a TOML file in ``folder``.
 
     Raises SpecError: no such set, or values that no car has.
+
+    >>> load_vehicle("peugeot-307").parameters.mass  # kg
+    1447.0
     """
     own = shipped_vehicles()
     values = load_parameter_set(own.get(str(name), name), folder)
     given = {key: entry.value for key, entry in values.vehicle.items()}
     suspension = SuspensionParameters()
     if "suspension_stiffness_longitudinal" in given:
+        if missing := sorted(SUSPENSION - given.keys()):
+            raise SpecError(f"parameter set '{values.id}': its suspension needs {', '.join(missing)}; add to [vehicle]")
         suspension = SuspensionParameters(
             stiffness_x=given["suspension_stiffness_longitudinal"], stiffness_y=given["suspension_stiffness_lateral"],
             damping_x=given["suspension_damping"], damping_y=given["suspension_damping"],

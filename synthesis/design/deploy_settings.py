@@ -13,15 +13,18 @@ from synthesis.errors import ProblemError
 
 @dataclass(frozen=True)
 class DeploySettings:
-    """How gains become a table."""
+    """How gains become a table.
+
+    >>> DeploySettings(sample_time=0.01, dtype="float32").dtype
+    'float32'
+    """
 
     sample_time: float = 0.005  # s
     dtype: Literal["float32", "float64"] = "float64"
     interpolation_cost: float = 0.01  # largest loss of any gain against a table four times as fine
     settle: float = 0.005  # certified bounds are this much above their infimum, which buys margin for the proof
-    limits: Mapping[str, tuple[float, float]] = field(
-        default_factory=dict
-    )  # of inputs of a feedback law: least and largest
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Of inputs of a feedback law: least and largest."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.sample_time < 1.0:

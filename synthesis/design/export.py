@@ -29,7 +29,14 @@ from synthesis.polynomials.enclosure import PolynomialMatrix
 def schedule_content(
     deployment: Deployment, name: str, description: str = "", spec: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
-    """The unsealed content of a `gainsmith.schedule/2` file (`estimators.schedule.check`)."""
+    """The unsealed content of a `gainsmith.schedule/2` file (`estimators.schedule.check`).
+
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> channels = (Channel(("friction",), ("relative_velocity",), bound=1.05), Channel(("force_noise",), ("relative_velocity",)))
+    >>> gains = design_observer(model, ObserverDesign(channels, degree=0, decay_rate=80.0, fastest_pole=600.0))
+    >>> schedule_content(deploy(gains), "my-schedule")["schema"]
+    'gainsmith.schedule/2'
+    """
     model, gain = deployment.gains.model, deployment.table
     return {
         "schema": SCHEMA,
@@ -51,7 +58,18 @@ def schedule_content(
 
 
 def export(path: Path, content: Mapping[str, Any]) -> list[Proof]:
-    """Prove the content and write it; raises ProblemError naming the claim and the place if one is not proved."""
+    """Prove the content and write it; raises ProblemError naming the claim and the place if one is not proved.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
+    >>> channels = (Channel(("friction",), ("relative_velocity",), bound=1.05), Channel(("force_noise",), ("relative_velocity",)))
+    >>> gains = design_observer(model, ObserverDesign(channels, degree=0, decay_rate=80.0, fastest_pole=600.0))
+    >>> with TemporaryDirectory() as folder:
+    ...     proofs = export(Path(folder) / "my-schedule.json", schedule_content(deploy(gains), "my-schedule"))
+    >>> all(proof.proved for proof in proofs)
+    True
+    """
     try:
         check_content(content, str(path))
         proofs = prove(content, str(path))

@@ -12,6 +12,8 @@ def check_units(model: LpvModel) -> None:
 
     Raises ModelError naming the entry, the unit that was found and the one that is needed. A model in which everything has the
     unit 1 is a normalised one and passes.
+
+    >>> check_units(corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal"))  # silent where all fit
     """
     kinds = sorted({kind for above, beside, _ in PLACES.values() for kind in (above, beside)})
     content = {

@@ -48,6 +48,12 @@ class LmiProblem(Display):
     With `least_norm` the decisions with the least sum of squares are sought under M > floor I, those that belong to powers of a
     parameter counted CURVED times: a strictly convex problem, whose one answer moves little when the data or the processor
     change. (Maximal margins and least gammas are attained on flat sets.) Of all answers it takes one that varies little.
+
+    >>> problem = LmiProblem((SchedulingParameter("speed", "m/s", 10.0, 40.0, -5.0, 5.0),))
+    >>> P = problem.symmetric("P", 2, degree=1)
+    >>> problem.require("P > 0", P)
+    >>> len(problem.inequalities)
+    1
     """
 
     parameters: tuple[SchedulingParameter, ...]

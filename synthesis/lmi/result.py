@@ -11,7 +11,11 @@ from synthesis.polynomials.matrix import MatrixPolynomial
 
 
 class Verdict(StrEnum):
-    """CERTIFIED: proved on the whole box. REFUTED: shown to be false. INCONCLUSIVE: neither."""
+    """CERTIFIED: proved on the whole box. REFUTED: shown to be false. INCONCLUSIVE: neither.
+
+    >>> print(Verdict.CERTIFIED, Verdict.REFUTED, Verdict.INCONCLUSIVE)
+    certified refuted inconclusive
+    """
 
     CERTIFIED = "certified"
     REFUTED = "refuted"

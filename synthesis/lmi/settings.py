@@ -13,7 +13,11 @@ Relaxation = Literal["auto", "grid", "vertex", "exact", "bernstein", "exchange"]
 
 @dataclass(frozen=True)
 class LmiSettings:
-    """How an LMI problem is relaxed, solved and re-checked."""
+    """How an LMI problem is relaxed, solved and re-checked.
+
+    >>> LmiSettings(relaxation="exact").relaxation
+    'exact'
+    """
 
     relaxation: Relaxation = (
         "auto"  # auto: exact or grid where one parameter and few states make them cheap, else exchange

@@ -34,6 +34,13 @@ def solve(problem: LmiProblem, settings: LmiSettings | None = None, memory: Memo
 
     With `memory` an exchange starts with the places that decided in the problem before, and leaves its own there.
     Raises ProblemError if the relaxation does not fit the problem or the solver is unknown.
+
+    >>> import numpy as np
+    >>> problem = LmiProblem((SchedulingParameter("speed", "m/s", 10.0, 40.0, -5.0, 5.0),))
+    >>> P = problem.symmetric("P", 1)
+    >>> problem.require("P > 1", P - problem.constant(np.eye(1)))
+    >>> print(solve(problem).verdict)
+    certified
     """
     settings = settings or LmiSettings()
     if not problem.inequalities:

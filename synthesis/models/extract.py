@@ -127,9 +127,13 @@ def extract(
 
 
 def in_floats(exact: ExactModel) -> PolynomialModel:
-    """The coefficients correctly rounded."""
-    arrays = {key: _array(matrix) for key, matrix in exact.matrices.items()}
-    return PolynomialModel(denominator=_array(exact.denominator), **arrays)
+    """The coefficients correctly rounded. Raises ModelError for one beyond the range of numbers."""
+    try:
+        arrays = {key: _array(matrix) for key, matrix in exact.matrices.items()}
+        return PolynomialModel(denominator=_array(exact.denominator), **arrays)
+    except OverflowError:
+        beyond = "a coefficient is beyond 1e308; choose other units, or smaller ranges and constants"
+        raise ModelError(f"the model's matrices over its ranges: {beyond}") from None
 
 
 def decimal_pair(parameter: SchedulingParameter) -> tuple[int, int]:

@@ -21,6 +21,15 @@ class NonlinearModel(Display):
     r"""x' = f(x, u), y = h(x, u); f (nx, 1) and h (ny, 1) use the names of states, inputs and constants as symbols.
 
     Raises ModelError for a stray symbol, a shape that does not fit, a repeated name or a missing source.
+
+    >>> import sympy as sp
+    >>> x, y = sp.symbols("x y")
+    >>> model = NonlinearModel(
+    ...     "pair", "example", (Signal("x", "1"), Signal("y", "1")), (Signal("z", "1"),),
+    ...     f=sp.Matrix([y, -x]), h=sp.Matrix([x**2]),
+    ... )
+    >>> model.state_symbols
+    (x, y)
     """
 
     name: str

@@ -51,7 +51,11 @@ class Tire(StrictTable):
 
 
 class ParameterSet(StrictTable):
-    """One vehicle with its tires, as published or as identified."""
+    """One vehicle with its tires, as published or as identified.
+
+    >>> load_parameter_set("corner-estimation").tire["longitudinal"].sigma0.unit
+    '1/m'
+    """
 
     id: str
     citation: str

@@ -91,6 +91,12 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
     assert (ended.returncode, ended.stderr, ended.stdout) == (0, "", "specifications:\n")
 
 
+def test_a_closed_output_is_no_output() -> None:
+    command = f"{sys.executable} -m studies.cli --version >&-"
+    ended = subprocess.run(["bash", "-c", command], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
 def test_a_full_output_is_one_line() -> None:
     with Path("/dev/full").open("w") as full:

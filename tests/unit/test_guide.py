@@ -16,6 +16,7 @@ from docs.tools.links import broken_links
 from docs.tools.pages import PAGES, as_page, page_texts
 from docs.tools.reference import as_html, reference_pages, undescribed
 from docs.tools.running import run_pages
+from docs.tools.site import loaded_from_outside
 from studies.drives.drive_file import Estimators
 
 ROOT = Path(__file__).parents[2]
@@ -111,3 +112,11 @@ def test_pages_run_where_the_project_is_not_on_the_path(tmp_path: Path) -> None:
     )
     ended = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stdout) == (0, "['42\\n']\n"), ended.stderr
+
+
+def test_what_a_page_would_fetch_from_elsewhere_is_seen(tmp_path: Path) -> None:
+    (tmp_path / "a.html").write_text(
+        '<link rel="canonical" href="https://x.test/a"><a href="https://x.test">x</a><script src="a.js"></script>'
+        '<link rel="stylesheet" href="https://x.test/a.css"><img src=http://x.test/a.png>'
+    )
+    assert loaded_from_outside(tmp_path) == ["a.html: loads https://x.test/a.css", "a.html: loads http://x.test/a.png"]

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -43,7 +43,7 @@ def whole() -> Sweep:
 
 @pytest.fixture
 def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """Address of a scheduler and its two workers, one thread each."""
+    """Address of a scheduler, and the processes: it and its two workers, one thread each."""
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     address = f"tcp://127.0.0.1:{port}"
@@ -62,7 +62,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]
     )
     workers = [start("distributed.cli.dask_worker", address, *options) for _ in range(2)]
     try:
-        yield address, workers
+        yield address, [scheduler, *workers]
     finally:
         for process in (*workers, scheduler):
             process.kill()
@@ -83,26 +83,52 @@ def wait_for_workers(address: str, count: int) -> None:
 
 
 @pytest.mark.filterwarnings("ignore")  # lost connections are what this is about
-def test_a_worker_killed_in_the_middle_loses_nothing_and_counts_nothing_twice(
-    cluster: tuple[str, list[subprocess.Popen[bytes]]], whole: Sweep, tmp_path: Path
+def test_what_dies_in_the_middle_loses_nothing_and_counts_nothing_twice(
+    cluster: tuple[str, list[subprocess.Popen[bytes]]],
+    whole: Sweep,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
-    address, workers = cluster
+    address, (scheduler, first, second) = cluster
     wait_for_workers(address, 2)
     killed: list[int] = []
 
-    def report(done: int, total: int) -> None:
-        if done == 10:
-            workers[0].send_signal(signal.SIGKILL)
-            killed.append(workers[0].wait())
+    def killing(process: subprocess.Popen[bytes]) -> Callable[[int, int], None]:
+        def report(done: int, total: int) -> None:
+            if done == 10:
+                process.send_signal(signal.SIGKILL)
+                killed.append(process.wait())
 
-    result = run_sweep(whole, tmp_path / "cluster", Cluster(address), progress=report)
-    assert killed == [-signal.SIGKILL] and workers[1].poll() is None
+        return report
+
+    # a worker: the other one goes on
+    result = run_sweep(whole, tmp_path / "cluster", Cluster(address), progress=killing(first))
+    assert killed == [-signal.SIGKILL] and second.poll() is None
     assert result.computed == whole.chunk_count()
     files = sorted((tmp_path / "cluster").glob("rows/*/*/*.parquet"))
     designs = [d for file in files for d in pq.read_table(file).column("design").to_pylist()]
     assert designs == list(range(whole.designs(whole.observers[0])))
     run_sweep(whole, tmp_path / "here", Serial())
     assert contents(tmp_path / "cluster") == contents(tmp_path / "here")
+
+    # all workers, for longer than one waits
+    with monkeypatch.context() as patch:
+        patch.setattr(cluster_module, "LOOK", 1e-6)
+        patch.setattr(Cluster, "_workers", lambda *_: False)
+        with pytest.raises(SpecError, match=f"{address}: no worker for .*--resume"):
+            run_sweep(whole, tmp_path / "nobody", Cluster(address))
+
+    # the scheduler: one line that says how to go on, nothing of Dask's own, and one goes on
+    capfd.readouterr()
+    with pytest.raises(
+        SpecError, match=f"{address}: the scheduler was lost; finished chunks are kept, .*--resume"
+    ) as lost:
+        run_sweep(whole, tmp_path / "lost", Cluster(address), progress=killing(scheduler))
+    assert "\n" not in str(lost.value) and capfd.readouterr() == ("", "")
+    resumed = run_sweep(whole, tmp_path / "lost", Serial(), resume=True)
+    assert 0 < resumed.computed <= whole.chunk_count() - 10
+    assert contents(tmp_path / "lost") == contents(tmp_path / "here")
 
 
 @pytest.mark.parametrize(("listens", "patience"), [(False, 0.5), (True, None)])
