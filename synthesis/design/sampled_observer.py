@@ -123,10 +123,8 @@ def _problem(
 
 def _fitted(model: LpvModel, scale: FloatArray, period: float) -> dict[str, FloatArray]:
     """Phi, Gamma, C and F in the scaled states as polynomials in u, coefficients (d_1+1, ..., d_p+1, rows, columns)."""
-    if not model.polynomial.is_polynomial:
-        raise ProblemError(f"model '{model.name}' is rational; a sampled design takes polynomial models")
-    scaled = model.polynomial.with_states_scaled(scale)
     found: dict[str, FloatArray] = {}
+    scaled, rational = model.polynomial.with_states_scaled(scale), not model.polynomial.is_polynomial
     for degree in DEGREES:
         nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
         count = len(model.parameters)
@@ -135,6 +133,8 @@ def _fitted(model: LpvModel, scale: FloatArray, period: float) -> dict[str, Floa
         numeric = model.on(middle + half * points)
         A, E = numeric.A * scale[:, None] / scale, numeric.E * scale[:, None]
         values = np.concatenate(zero_order_hold(A, E, period), axis=-1)
+        if rational:  # no polynomials either
+            values = np.concatenate([values, np.concatenate([numeric.C / scale, numeric.F], axis=-1)], axis=-2)
         series = values.reshape(*(len(nodes),) * count, *values.shape[1:])
         inverse = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, degree))
         for axis in range(count):
@@ -149,6 +149,7 @@ def _fitted(model: LpvModel, scale: FloatArray, period: float) -> dict[str, Floa
             for axis in range(count):
                 series = np.moveaxis(np.tensordot(powers, series, axes=(1, axis)), 0, axis)
             n = len(model.states)
-            found = {"Phi": series[..., :n], "Gamma": series[..., n:], "C": scaled.C, "F": scaled.F}
+            C, F = (series[..., n:, :n], series[..., n:, n:]) if rational else (scaled.C, scaled.F)
+            found = {"Phi": series[..., :n, :n], "Gamma": series[..., :n, n:], "C": C, "F": F}
             break
     return found
