@@ -12,7 +12,7 @@ from estimators.errors import ScheduleError
 from estimators.schedule.plant import PlantPolynomial, PlantPolynomials, chebyshev
 
 _MOST_PARTS = 100_000  # of the range, before the denominator counts as zero somewhere
-_HALF = 0.5  # of its value in the middle of a part a denominator keeps on all of it
+_KEPT = 0.8  # of its value in the middle of a part a denominator keeps on all of it
 
 
 class PlantQuotient(NamedTuple):
@@ -66,7 +66,8 @@ def quotients(
         flat, sizes = _flat(numerator)
         values = np.abs(chebyshev(centres, sizes) @ flat) + halves @ _steepest(flat, sizes)
         # A bound for sizes alone: what is rounded here is far below its slack.
-        bound = (values / lower[:, None]).max(axis=0, initial=0.0) * (1.0 + 1e-9)
+        bound = np.minimum((values / lower[:, None]).max(axis=0, initial=0.0), numerator.largest.ravel() / lower.min())
+        bound *= 1.0 + 1e-9
         found[key] = PlantQuotient(numerator, denominator, bound.reshape(numerator.coefficients.shape[-2:]))
     return found
 
@@ -76,7 +77,7 @@ def _parts(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Boxes of u that cover the range: centres and half widths (g, parameters), lower bounds (g,) of the denominator.
 
-    |dT_k/du| <= k^2 bounds its slopes; a box on which it may fall below half its value in the middle is cut in two.
+    |dT_k/du| <= k^2 bounds its slopes; a box on which it may fall far below its value in the middle is cut in two.
     """
     flat, sizes = _flat(denominator)
     slopes, count = _steepest(flat, sizes)[:, 0], len(sizes)
@@ -92,7 +93,7 @@ def _parts(
             worst = np.asarray(denominator.middle) + np.asarray(denominator.half) * centres[int(np.argmin(values))]
             at = ", ".join(f"{name} = {x:g}" for name, x in zip(names, np.atleast_1d(worst), strict=True))
             raise ScheduleError(f"{where}: plant.denominator: is not positive on the whole range, near {at}")
-        good = lower >= _HALF * values
+        good = lower >= _KEPT * values
         done.append((centres[good], halves[good], lower[good]))
         centres, halves = centres[~good], halves[~good]
         axis = np.argmax(halves * slopes, axis=1)[:, None] == np.arange(count)

@@ -16,11 +16,12 @@ from synthesis.loop.plant import Axis, Plant
 from synthesis.models.formula import parse, read, used
 from synthesis.polynomials.chebyshev import to_chebyshev
 from synthesis.polynomials.enclosure import PolynomialMatrix, constant
-from synthesis.polynomials.quotient import Least, least
+from synthesis.polynomials.quotient import least
 from synthesis.polynomials.rational import decimal, rational
 
 LAST_DIGIT = fmpq(1, 2**51)  # of the sum of an entry's coefficients: what rounding them to float64 can change
 MOST_TEXT = 100_000  # characters of all formulas together
+HALVINGS = 40  # towards the zero of a denominator, for the message
 
 
 def rebuilt_plant(content: Mapping[str, Any], axes: tuple[Axis, ...], where: str, tied: bool) -> Plant:
@@ -66,15 +67,25 @@ def _refuse_poles(entries: Mapping[tuple[str, int, int], ExactFraction], axes: t
         place = f"{where}: model.matrices.{key}[{i}][{j}]"
         below = _scalar(entry.below, place)
         middle = below.at((fmpq(0),) * len(axes))[0, 0]
-        found = least(below * (1 / middle)) if middle != 0 else Least(None, (fmpq(0),) * len(axes))
+        below = below * (1 / middle) if middle != 0 else below
+        found = least(below)
         if found.bound is None:
             values = (
                 f"{axis.name} = {_float(axis.middle + axis.half * u):.6g} {axis.unit}"
-                for axis, u in zip(axes, found.place, strict=True)
+                for axis, u in zip(axes, _zero(below, found.place), strict=True)
             )
             raise ModelError(
                 f"{place}: divides by zero inside the range, at or near {', '.join(values)}; shrink the range"
             )
+
+
+def _zero(below: PolynomialMatrix, place: tuple[fmpq, ...]) -> list[fmpq]:
+    """From the middle of the range, where it is positive, towards a place where it is not: where it vanishes in between."""
+    low, high = fmpq(0), fmpq(1)
+    for _ in range(HALVINGS if below.at(place)[0, 0] < 0 else 0):
+        share = (low + high) / 2
+        low, high = (share, high) if below.at([share * u for u in place])[0, 0] > 0 else (low, share)
+    return [high * u for u in place]
 
 
 def check_stored_plant(stored: Mapping[str, Any], plant: Plant, where: str) -> None:

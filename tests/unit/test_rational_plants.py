@@ -1,0 +1,312 @@
+"""Rational plants from formula to runtime: single-track lateral dynamics over speed, and a plant that is secretly polynomial."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from flint import fmpq, fmpq_mat
+from scipy.linalg import expm
+
+from analysis.simulation.amplification import amplification
+from estimators import GainSchedule, LpvController, LpvObserver, ScheduleError
+from synthesis.certificate.claims import Claim, ClaimChannel
+from synthesis.certificate.content import subject_of
+from synthesis.certificate.inside_sample import inside_sample
+from synthesis.certificate.proof import certificate
+from synthesis.certificate.verify import Names, Verifier
+from synthesis.design.deploy import deploy
+from synthesis.design.deploy_settings import DeploySettings
+from synthesis.design.export import export, schedule_content
+from synthesis.design.feedback_channel import FeedbackChannel
+from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
+from synthesis.design.sampled_observer import design_sampled_observer
+from synthesis.design.state_feedback import StateFeedbackDesign, design_state_feedback
+from synthesis.loop.feedback import FeedbackLoop
+from synthesis.loop.from_model import plant_of
+from synthesis.loop.observer import ObserverLoop
+from synthesis.loop.plant import Plant
+from synthesis.loop.system import Region
+from synthesis.models.catalogue.single_track import PEUGEOT_307
+from synthesis.models.lpv import LpvModel
+from synthesis.models.param import SchedulingParameter, Signal
+from synthesis.polynomials.enclosure import PolynomialMatrix
+from tests.support.lmi_cases import parameter, small_model
+
+PERIOD, LOW, HIGH = 0.01, 5.0, 40.0
+UPDATES = ("held", "sampled", "feedback")
+
+
+def single_track() -> LpvModel:
+    """v_y and yaw rate of a Peugeot 307 over speed (Rajamani 2012, (2.31) without sideslip): entries with V and 1/V."""
+    names = "mass yaw_inertia front_axle_distance rear_axle_distance front_stiffness rear_stiffness"
+    m, inertia, a, b, front, rear = sp.symbols(names)
+    V, turn = sp.Symbol("speed"), a * front - b * rear
+    return LpvModel(
+        name="single-track",
+        source="Rajamani 2012; P5 Table B.1",
+        parameters=(SchedulingParameter("speed", "m/s", LOW, HIGH, -8.0, 8.0),),
+        states=(Signal("side_velocity", "m/s"), Signal("yaw_rate", "rad/s")),
+        inputs=(Signal("steering", "rad"),),
+        outputs=(Signal("gyro", "rad/s"), Signal("accelerometer", "m/s^2")),
+        disturbances=(Signal("wind", "m/s^2"), Signal("gyro_noise", "rad/s"), Signal("noise", "m/s^2")),
+        constants=dict(PEUGEOT_307),
+        A=sp.Matrix(
+            [
+                [-(front + rear) / (m * V), -V - turn / (m * V)],
+                [-turn / (inertia * V), -(a**2 * front + b**2 * rear) / (inertia * V)],
+            ]
+        ),
+        B=sp.Matrix([[front / m], [a * front / inertia]]),
+        C=sp.Matrix([[0, 1], [-(front + rear) / (m * V), -turn / (m * V)]]),
+        D=sp.Matrix([[0], [front / m]]),
+        E=sp.Matrix([[1, 0, 0], [0, 0, 0]]),
+        F=sp.Matrix([[0, 1, 0], [1, 0, 1]]),
+    )
+
+
+def numbers(V: float) -> tuple[np.ndarray, ...]:
+    """The same plant in plain floats."""
+    m, J, a, b, front, rear = (
+        PEUGEOT_307[key].value
+        for key in (
+            *("mass", "yaw_inertia", "front_axle_distance", "rear_axle_distance", "front_stiffness", "rear_stiffness"),
+        )
+    )
+    turn = a * front - b * rear
+    A = np.array(
+        [[-(front + rear) / (m * V), -V - turn / (m * V)], [-turn / (J * V), -(a**2 * front + b**2 * rear) / (J * V)]]
+    )
+    B, D = np.array([[front / m], [a * front / J]]), np.array([[0.0], [front / m]])
+    return A, B, np.array([[0.0, 1.0], [A[0, 0], A[0, 1] + V]]), D
+
+
+def observer_design(update: str) -> ObserverDesign:
+    channel = Channel(("wind", "gyro_noise", "noise"), ("side_velocity",), weights=(1.0, 0.01, 0.3))
+    return ObserverDesign((channel,), decay_rate=1.0, fastest_pole=80.0 if update == "held" else None)
+
+
+@pytest.fixture(scope="module")
+def contents() -> dict[str, dict[str, Any]]:
+    model, settings = single_track(), DeploySettings(sample_time=PERIOD)
+    state = FeedbackChannel(("wind",), ("side_velocity", "yaw_rate", "steering"), sizes=(1.0, 0.2, 0.05))
+    gains = {
+        "held": design_observer(model, observer_design("held")),
+        "sampled": design_sampled_observer(model, observer_design("sampled"), PERIOD),
+        "feedback": design_state_feedback(model, StateFeedbackDesign((state,), decay_rate=1.0, fastest_pole=60.0)),
+    }
+    return {
+        update: schedule_content(deploy(found, settings), f"single-track-{update}") for update, found in gains.items()
+    }
+
+
+def changed(content: dict[str, Any], change: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
+    other = copy.deepcopy(content)
+    change(other)
+    return other
+
+
+@pytest.mark.parametrize("update", UPDATES)
+def test_the_file_alone_proves_its_claims(update: str, contents: dict[str, dict[str, Any]], tmp_path: Path) -> None:
+    content = contents[update]
+    assert content["plant"]["denominator"] == {"orders": [[0], [1]], "coefficients": [[[1.0]], [[17.5 / 22.5]]]}
+    export(tmp_path / "file.json", content)
+    found = certificate(json.loads((tmp_path / "file.json").read_text()))
+    assert found.proofs and all(proof.proved for proof in found.proofs) and found.inside_sample
+
+
+@pytest.mark.parametrize("update", UPDATES)
+def test_runs_stay_below_the_levels_and_near_them(update: str, contents: dict[str, dict[str, Any]]) -> None:
+    """Frozen places and moving trajectories, run by plant and runtime: bounds from below that know nothing of the proof."""
+    found = amplification(contents[update], runs=2, samples=80)
+    assert all(one.proved and not one.beaten for one in found)
+    assert max(one.share for one in found if not one.is_decay) > 0.5
+    assert min(one.worst / one.level for one in found if one.is_decay) < 1.05
+
+
+@pytest.mark.parametrize("update", ["held", "sampled"])
+def test_the_runtime_performs_the_exact_update(update: str, contents: dict[str, dict[str, Any]]) -> None:
+    schedule = GainSchedule.from_content(contents[update])
+    rng, observer = np.random.default_rng(3), LpvObserver(schedule, (5,))
+    x, u, y = rng.normal(size=(5, 2)), rng.normal(size=(5, 1)), rng.normal(size=(5, 2))
+    V = np.array([LOW, 6.3, 17.0, 31.4, HIGH])
+    observer.reset(state=x)
+    found = observer.step(u, y, V[:, None]).estimate
+    for k, speed in enumerate(V):
+        A, B, C, D = numbers(speed)
+        for key, matrix in zip("ABCD", (A, B, C, D), strict=True):
+            np.testing.assert_allclose(schedule.plant[key].at(np.array(speed)), matrix, rtol=1e-13, atol=1e-13)
+            assert (np.abs(matrix) <= schedule.plant[key].largest).all()
+        L, innovation = schedule.gain(speed), y[k] - C @ x[k] - D @ u[k]
+        whole = np.zeros((3, 3))
+        whole[:2, :2] = A if update == "sampled" else A - L @ C
+        whole[:2, 2] = B @ u[k] + (0.0 if update == "sampled" else L @ (y[k] - D @ u[k]))
+        after = (expm(PERIOD * whole) @ [*x[k], 1.0])[:2] + (L @ innovation if update == "sampled" else 0.0)
+        np.testing.assert_allclose(found[k], after, rtol=1e-12, atol=1e-13)
+
+
+def test_the_law_runs(contents: dict[str, dict[str, Any]]) -> None:
+    schedule = GainSchedule.from_content(contents["feedback"])
+    step = LpvController(schedule).step(np.array([0.5, -0.2]), 12.0)
+    np.testing.assert_allclose(step.command, schedule.gain(12.0) @ [0.5, -0.2], rtol=1e-14)
+
+
+@pytest.mark.parametrize("update", UPDATES)
+def test_a_level_that_is_too_good_is_refuted(update: str, contents: dict[str, dict[str, Any]]) -> None:
+    content = contents[update]
+    gain, decay = (
+        next(i for i, claim in enumerate(content["claims"]) if claim["kind"] in kinds)
+        for kinds in (("sampled gain",), ("internal update", "sampled error"))
+    )
+    bad = copy.deepcopy(content)
+    bad["claims"] = [bad["claims"][gain] | {"level": 0.5 * bad["claims"][gain]["level"]},
+                     bad["claims"][decay] | {"level": 1.2 * bad["claims"][decay]["level"]}]  # fmt: skip
+    proofs = certificate(bad).proofs
+    assert [proof.proved or not proof.refuted for proof in proofs] == [False, False]
+    assert all("speed = " in proof.place for proof in proofs)
+
+
+def _formulas(data: dict[str, Any], old: str, new: str) -> None:
+    for rows in data["model"]["matrices"].values():
+        for row in rows:
+            row[:] = [text.replace(old, new) for text in row]
+
+
+def _scaled(data: dict[str, Any]) -> None:
+    for stored in data["plant"].values():
+        stored["coefficients"] = [[[2.0 * x for x in row] for row in m] for m in stored["coefficients"]]
+
+
+EDITS: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
+    "a coefficient": (
+        lambda d: d["plant"]["denominator"]["coefficients"].__setitem__(1, [[0.7777777]]),
+        r"plant\.denominator: entry \[0\]\[0\] of order \[1\] is 0\.7777777",
+    ),
+    "left out": (lambda d: d["plant"].pop("denominator"), r"plant\.denominator: is missing"),
+    "all over two": (_scaled, r"plant\.A: entry"),
+    "another shape": (lambda d: d["plant"]["denominator"].update(coefficients=[[[1.0, 0.0]]] * 2), r"plant\.denominator"),
+    "an unknown key": (lambda d: d["plant"]["denominator"].update(power=2), r"plant\.denominator.*power"),
+    "a zero in the range": (
+        lambda d: _formulas(d, "*speed)", "*(speed - 20))"),
+        r"model\.matrices\.A\[0\]\[0\]: divides by zero inside the range, at or near speed = 2",
+    ),
+    "a double zero": (
+        lambda d: _formulas(d, "*speed)", "*(speed - 20)**2)"),
+        r"model\.matrices\.A\[0\]\[0\]: divides by zero inside the range, at or near speed = (20|19\.9|20\.0)",
+    ),
+    "a zero at the end": (
+        lambda d: _formulas(d, "*speed)", "*(speed - 5))"),
+        r"model\.matrices\.A\[0\]\[0\]: divides by zero inside the range, at or near speed = 5 m/s",
+    ),
+    "a high power": (
+        lambda d: _formulas(d, "*speed)", "*speed**9*speed**9)"), r"model\.matrices\.A\[0\]\[1\]: has a power above 16",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_edited_files_are_refused(name: str, contents: dict[str, dict[str, Any]]) -> None:
+    change, words = EDITS[name]
+    with pytest.raises(ScheduleError, match=words):
+        certificate(changed(contents["held"], change))
+
+
+def test_formulas_whose_quotient_is_a_polynomial_need_no_denominator(contents: dict[str, dict[str, Any]]) -> None:
+    """(mass) (speed^2 - 1)/((speed - 1) (speed + 1)): common factors go, and one that is stored nevertheless is refused."""
+    data = copy.deepcopy(contents["feedback"])
+    data["model"]["matrices"] = {
+        "A": [["-2", "(speed**2 - 9)/(speed + 3)"], ["0/speed", "-1/(speed/speed)"]], "B": [["1"], ["1"]],
+        "C": [["1", "0"]] * 2, "D": [["0"]] * 2, "E": [["1", "0", "0"]] * 2, "F": [["0", "0", "0"]] * 2,
+    }  # fmt: skip
+    for signals in (
+        *(data["model"][kind] for kind in ("states", "inputs", "outputs", "disturbances")),
+        data["scheduling"],
+    ):
+        for signal in signals:
+            signal["unit"] = "1"
+    data["model"]["constants"] = {}
+    stored = {key: {"orders": [[0]], "coefficients": [[[float(x) if "s" not in x else 0.0 for x in row] for row in rows]]}
+              for key, rows in data["model"]["matrices"].items()}  # fmt: skip
+    stored["A"] = {"orders": [[0], [1]], "coefficients": [[[-2.0, 19.5], [0.0, -1.0]], [[0.0, 17.5], [0.0, 0.0]]]}
+    data["plant"] = stored
+    assert subject_of(data, "file").loop.plant.is_polynomial
+    data["plant"]["denominator"] = {"orders": [[0]], "coefficients": [[[1.0]]]}
+    with pytest.raises(ScheduleError, match=r"plant\.denominator: the formulas divide by no scheduling parameter"):
+        subject_of(data, "file")
+
+
+def test_a_runtime_refuses_a_denominator_with_a_zero(contents: dict[str, dict[str, Any]]) -> None:
+    """It reads files without proving them: what would divide by zero is not loaded."""
+    bad = changed(contents["held"], lambda d: d["plant"]["denominator"]["coefficients"].__setitem__(1, [[1.25]]))
+    with pytest.raises(ScheduleError, match=r"plant\.denominator: is not positive .* near speed = "):
+        GainSchedule.from_content(bad)
+    schedule = GainSchedule.from_content(contents["held"])
+    with pytest.raises(ScheduleError, match="takes polynomials; take LpvObserver"):
+        _ = schedule.polynomials
+
+
+def test_what_a_moving_speed_adds_inside_a_sample(contents: dict[str, dict[str, Any]]) -> None:
+    """Against N = q T^2/2 X |A'| X at single speeds in floats: never below, and not far above where the speed is lowest."""
+    found = inside_sample(subject_of(contents["held"], "file").loop)
+    assert found is not None
+    bound, worst = np.array(found.of_states), np.zeros((2, 2))
+    for V in np.linspace(LOW, HIGH, 50):
+        slope = np.abs(numbers(V + 1e-4)[0] - numbers(V - 1e-4)[0]) / 2e-4
+        A = numbers(V)[0]
+        M = np.abs(A)
+        np.fill_diagonal(M, np.maximum(np.diag(A), 0.0))
+        X = expm(PERIOD * M)
+        worst = np.maximum(worst, 8.0 * PERIOD**2 / 2 * X @ slope @ X)
+    assert (bound >= worst * (1 - 1e-6)).all() and (bound[0] <= 6.0 * worst[0]).all()
+
+
+def _disguised(plant: Plant) -> Plant:
+    """N d over d."""
+    d = PolynomialMatrix({(0,): fmpq_mat([[1]]), (1,): fmpq_mat([[fmpq(2, 5)]])}, (1, 1), 1)
+    return Plant(plant.axes, {key: matrix.scaled_by(d) for key, matrix in plant.matrices.items()}, d)
+
+
+@pytest.mark.parametrize("update", UPDATES)
+def test_a_plant_that_is_secretly_polynomial_has_the_same_claims(update: str) -> None:
+    """The least level that one P proves, by bisection: the same with and without a common factor, by both roads."""
+    p = sp.Symbol("p")
+    model = small_model(
+        [[0, 1], [-2 - p, -1]], [[1, 0]], (parameter("p", 0.0, 2.0, 3.0),), B=[[0], [1]], E=[[0, 0], [1, 0]], F=[[0, 1]]
+    )
+    plant = plant_of(model)
+    ends = (fmpq(0), fmpq(1), fmpq(2))
+    if update == "feedback":
+        gain = fmpq_mat([[fmpq(-1, 2), -1]])
+        loops: list[Any] = [FeedbackLoop(one, (ends,), {(k,): gain for k in range(3)}, sample_time=fmpq(1, 20))
+                            for one in (plant, _disguised(plant))]  # fmt: skip
+    else:
+        gain = fmpq_mat([[fmpq(1)], [fmpq(1, 2)]]) * (fmpq(1, 20) if update == "sampled" else 1)
+        loops = [ObserverLoop(one, (ends,), {(k,): gain for k in range(3)}, update, fmpq(1, 20))  # type: ignore[arg-type]
+                 for one in (plant, _disguised(plant))]  # fmt: skip
+    P = PolynomialMatrix({(0,): fmpq_mat([[560, 64], [64, 160]])}, (2, 2), 1)
+    region = Region.between((fmpq(-1),), (fmpq(0),))
+    first, second = (loop.system(region, "discrete") for loop in loops)
+    for a, b in ((first.A, second.A), (first.B["disturbances"], second.B["disturbances"])):
+        for t in (fmpq(-1), fmpq(1, 3), fmpq(1)):
+            difference = (a - b).at((t, fmpq(0))).entries()
+            assert all(x.contains(0) and float(x.abs_upper()) < 1e-12 for x in difference)
+    outputs = ("x1", "x2", "y1", "u1") if update == "feedback" else ()
+    names = Names(("x1", "x2"), ("d1", "d2"), outputs)
+
+    def proved(loop: Any, level: float, quick: bool) -> bool:
+        claim = Claim("sampled gain", level, P, ClaimChannel({"d1": 1.0, "d2": 1.0}, ("x2",)))
+        return Verifier(loop, names, boxes={} if quick else {"discrete": None}).prove(claim).proved
+
+    low, high = 0.1, 50.0
+    while high / low > 1.0 + 1e-5:
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if proved(loops[0], middle, True) else (middle, high)
+    assert high < 10.0
+    for quick in (True, False):
+        assert proved(loops[1], high * (1.0 + 1e-4), quick) and not proved(loops[1], high * (1.0 - 1e-4), quick)
