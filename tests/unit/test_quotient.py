@@ -74,7 +74,7 @@ def test_both_rings_hold_the_exact_quotient(count: int) -> None:
         assert alone is not None and radius(alone["A"]) < (1e-6 if count == 1 else 1e-3)
         for _ in range(4):
             point = tuple(fmpq(int(k), 8) for k in RNG.integers(-8, 9, count))
-            u = region.point((*point, *(0,) * count))[:count]  # type: ignore[arg-type]
+            u = region.point((*point, *(0,) * count))[:count]
             exact = N.at(u) * (1 / d.at(u)[0, 0])
             values = alone["A"].at((*point, *(fmpq(0),) * count))
             assert all(ball.contains(arb(x)) for ball, x in zip(values.entries(), exact.entries(), strict=True))
