@@ -11,7 +11,11 @@ from estimators.arrays import FloatArray
 from estimators.errors import ScheduleError
 from estimators.schedule.plant import PlantPolynomial, PlantPolynomials, chebyshev
 
-_MOST_PARTS = 100_000  # of the range, before the denominator counts as zero somewhere
+_MOST_PARTS, _MOST_NUMBERS = (
+    50_000,
+    100_000_000,
+)  # of the range, before the denominator counts as zero somewhere; of all terms
+_CHUNK = 1_000_000  # numbers at once
 _KEPT = 0.8  # of its value in the middle of a part a denominator keeps on all of it
 
 
@@ -64,7 +68,7 @@ def quotients(
     found = {}
     for key, numerator in numerators.items():
         flat, sizes = _flat(numerator)
-        values = np.abs(chebyshev(centres, sizes) @ flat) + halves @ _steepest(flat, sizes)
+        values = np.abs(_values(centres, flat, sizes)) + halves @ _steepest(flat, sizes)
         # A bound for sizes alone: what is rounded here is far below its slack.
         bound = np.minimum((values / lower[:, None]).max(axis=0, initial=0.0), numerator.largest.ravel() / lower.min())
         bound *= 1.0 + 1e-9
@@ -84,15 +88,15 @@ def _parts(
     rounding = 1e-13 * float(np.abs(flat).sum())
     centres, halves = np.zeros((1, count)), np.ones((1, count))
     done: list[tuple[FloatArray, FloatArray, FloatArray]] = []
-    total = 0
+    total, most = 0, min(_MOST_PARTS, _MOST_NUMBERS // len(flat))
     while len(centres):
-        values = (chebyshev(centres, sizes) @ flat)[:, 0] - rounding
+        values = _values(centres, flat, sizes)[:, 0] - rounding
         lower = values - halves @ slopes
         total += len(centres)
-        if not (values > 0.0).all() or total > _MOST_PARTS:
+        if not (values > 0.0).all() or total > most:
             worst = np.asarray(denominator.middle) + np.asarray(denominator.half) * centres[int(np.argmin(values))]
             at = ", ".join(f"{name} = {x:g}" for name, x in zip(names, np.atleast_1d(worst), strict=True))
-            raise ScheduleError(f"{where}: plant.denominator: is not positive on the whole range, near {at}")
+            raise ScheduleError(f"{where}: plant.denominator: is not clearly positive on the whole range, near {at}")
         good = lower >= _KEPT * values
         done.append((centres[good], halves[good], lower[good]))
         centres, halves = centres[~good], halves[~good]
@@ -111,6 +115,12 @@ def _flat(polynomial: PlantPolynomial | PlantPolynomials) -> tuple[FloatArray, t
     full = np.zeros((*sizes, rows, columns))
     full[tuple(slice(size) for size in polynomial.coefficients.shape[:-2])] = polynomial.coefficients
     return full.reshape(-1, rows * columns), sizes
+
+
+def _values(points: FloatArray, flat: FloatArray, sizes: tuple[int, ...]) -> FloatArray:
+    """At u (g, parameters): (g, entries)."""
+    step = max(1, _CHUNK // len(flat))
+    return np.concatenate([chebyshev(points[k : k + step], sizes) @ flat for k in range(0, len(points), step)])
 
 
 def _steepest(flat: FloatArray, sizes: tuple[int, ...]) -> FloatArray:

@@ -172,6 +172,7 @@ def test_examples_are_complete() -> None:
         "pmsm",
         "quarter-car",
         "satellite",
+        "single-track",
         "vehicle-speed",
         "wind-turbine",
     }

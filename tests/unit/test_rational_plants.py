@@ -260,7 +260,7 @@ def test_formulas_whose_quotient_is_a_polynomial_need_no_denominator(contents: d
 def test_a_runtime_refuses_a_denominator_with_a_zero(contents: dict[str, dict[str, Any]]) -> None:
     """It reads files without proving them: what would divide by zero is not loaded."""
     bad = changed(contents["held"], lambda d: d["plant"]["denominator"]["coefficients"].__setitem__(1, [[1.25]]))
-    with pytest.raises(ScheduleError, match=r"plant\.denominator: is not positive .* near speed = "):
+    with pytest.raises(ScheduleError, match=r"plant\.denominator: is not clearly positive .* near speed = "):
         GainSchedule.from_content(bad)
     schedule = GainSchedule.from_content(contents["held"])
     with pytest.raises(ScheduleError, match="takes polynomials; take LpvObserver"):
