@@ -1,4 +1,4 @@
-"""Rational plants from formula to runtime: single-track lateral dynamics over speed, and a plant that is secretly polynomial."""
+"""Rational plants from formula to runtime: files, proofs, runs and refusals of single-track lateral dynamics over speed."""
 
 from __future__ import annotations
 
@@ -10,19 +10,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-import sympy as sp
-from flint import fmpq, fmpq_mat
 from scipy.linalg import expm
 
 from analysis.simulation.amplification import amplification
 from estimators import GainSchedule, LpvController, LpvObserver, ScheduleError
 from estimators.schedule import PlantPolynomial
 from estimators.schedule.quotient import quotients
-from synthesis.certificate.claims import Claim, ClaimChannel
 from synthesis.certificate.content import subject_of
 from synthesis.certificate.inside_sample import inside_sample
 from synthesis.certificate.proof import certificate
-from synthesis.certificate.verify import Names, Verifier
 from synthesis.design.deploy import deploy
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.export import export, schedule_content
@@ -31,63 +27,10 @@ from synthesis.design.hinf_observer import Channel, ObserverDesign, design_obser
 from synthesis.design.law_table import Gains
 from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.design.state_feedback import StateFeedbackDesign, design_state_feedback
-from synthesis.loop.feedback import FeedbackLoop
-from synthesis.loop.from_model import plant_of
-from synthesis.loop.observer import ObserverLoop
-from synthesis.loop.plant import Plant
-from synthesis.loop.system import Region
-from synthesis.models.catalogue.single_track import PEUGEOT_307
-from synthesis.models.lpv import LpvModel
-from synthesis.models.param import SchedulingParameter, Signal
-from synthesis.polynomials.enclosure import PolynomialMatrix
-from tests.support.lmi_cases import parameter, small_model
+from tests.support.single_track import HIGH, LOW, numbers, single_track
 
-PERIOD, LOW, HIGH = 0.01, 5.0, 40.0
+PERIOD = 0.01
 UPDATES = ("held", "sampled", "feedback")
-
-
-def single_track() -> LpvModel:
-    """v_y and yaw rate of a Peugeot 307 over speed (Rajamani 2012, (2.31) without sideslip): entries with V and 1/V."""
-    names = "mass yaw_inertia front_axle_distance rear_axle_distance front_stiffness rear_stiffness"
-    m, inertia, a, b, front, rear = sp.symbols(names)
-    V, turn = sp.Symbol("speed"), a * front - b * rear
-    return LpvModel(
-        name="single-track",
-        source="Rajamani 2012; P5 Table B.1",
-        parameters=(SchedulingParameter("speed", "m/s", LOW, HIGH, -8.0, 8.0),),
-        states=(Signal("side_velocity", "m/s"), Signal("yaw_rate", "rad/s")),
-        inputs=(Signal("steering", "rad"),),
-        outputs=(Signal("gyro", "rad/s"), Signal("accelerometer", "m/s^2")),
-        disturbances=(Signal("wind", "m/s^2"), Signal("gyro_noise", "rad/s"), Signal("noise", "m/s^2")),
-        constants=dict(PEUGEOT_307),
-        A=sp.Matrix(
-            [
-                [-(front + rear) / (m * V), -V - turn / (m * V)],
-                [-turn / (inertia * V), -(a**2 * front + b**2 * rear) / (inertia * V)],
-            ]
-        ),
-        B=sp.Matrix([[front / m], [a * front / inertia]]),
-        C=sp.Matrix([[0, 1], [-(front + rear) / (m * V), -turn / (m * V)]]),
-        D=sp.Matrix([[0], [front / m]]),
-        E=sp.Matrix([[1, 0, 0], [0, 0, 0]]),
-        F=sp.Matrix([[0, 1, 0], [1, 0, 1]]),
-    )
-
-
-def numbers(V: float) -> tuple[np.ndarray, ...]:
-    """The same plant in plain floats."""
-    m, J, a, b, front, rear = (
-        PEUGEOT_307[key].value
-        for key in (
-            *("mass", "yaw_inertia", "front_axle_distance", "rear_axle_distance", "front_stiffness", "rear_stiffness"),
-        )
-    )
-    turn = a * front - b * rear
-    A = np.array(
-        [[-(front + rear) / (m * V), -V - turn / (m * V)], [-turn / (J * V), -(a**2 * front + b**2 * rear) / (J * V)]]
-    )
-    B, D = np.array([[front / m], [a * front / J]]), np.array([[0.0], [front / m]])
-    return A, B, np.array([[0.0, 1.0], [A[0, 0], A[0, 1] + V]]), D
 
 
 def observer_design(update: str) -> ObserverDesign:
@@ -280,49 +223,3 @@ def test_what_a_moving_speed_adds_inside_a_sample(contents: dict[str, dict[str, 
         X = expm(PERIOD * M)
         worst = np.maximum(worst, 8.0 * PERIOD**2 / 2 * X @ slope @ X)
     assert (bound >= worst * (1 - 1e-6)).all() and (bound[0] <= 6.0 * worst[0]).all()
-
-
-def _disguised(plant: Plant) -> Plant:
-    """N d over d."""
-    d = PolynomialMatrix({(0,): fmpq_mat([[1]]), (1,): fmpq_mat([[fmpq(2, 5)]])}, (1, 1), 1)
-    return Plant(plant.axes, {key: matrix.scaled_by(d) for key, matrix in plant.matrices.items()}, d)
-
-
-@pytest.mark.parametrize("update", UPDATES)
-def test_a_plant_that_is_secretly_polynomial_has_the_same_claims(update: str) -> None:
-    """The least level that one P proves, by bisection: the same with and without a common factor, by both roads."""
-    p = sp.Symbol("p")
-    model = small_model(
-        [[0, 1], [-2 - p, -1]], [[1, 0]], (parameter("p", 0.0, 2.0, 3.0),), B=[[0], [1]], E=[[0, 0], [1, 0]], F=[[0, 1]]
-    )
-    plant = plant_of(model)
-    ends = (fmpq(0), fmpq(1), fmpq(2))
-    if update == "feedback":
-        gain = fmpq_mat([[fmpq(-1, 2), -1]])
-        loops: list[Any] = [FeedbackLoop(one, (ends,), {(k,): gain for k in range(3)}, sample_time=fmpq(1, 20))
-                            for one in (plant, _disguised(plant))]  # fmt: skip
-    else:
-        gain = fmpq_mat([[fmpq(1)], [fmpq(1, 2)]]) * (fmpq(1, 20) if update == "sampled" else 1)
-        loops = [ObserverLoop(one, (ends,), {(k,): gain for k in range(3)}, update, fmpq(1, 20))  # type: ignore[arg-type]
-                 for one in (plant, _disguised(plant))]  # fmt: skip
-    P = PolynomialMatrix({(0,): fmpq_mat([[560, 64], [64, 160]])}, (2, 2), 1)
-    region = Region.between((fmpq(-1),), (fmpq(0),))
-    first, second = (loop.system(region, "discrete") for loop in loops)
-    for a, b in ((first.A, second.A), (first.B["disturbances"], second.B["disturbances"])):
-        for t in (fmpq(-1), fmpq(1, 3), fmpq(1)):
-            difference = (a - b).at((t, fmpq(0))).entries()
-            assert all(x.contains(0) and float(x.abs_upper()) < 1e-12 for x in difference)
-    outputs = ("x1", "x2", "y1", "u1") if update == "feedback" else ()
-    names = Names(("x1", "x2"), ("d1", "d2"), outputs)
-
-    def proved(loop: Any, level: float, quick: bool) -> bool:
-        claim = Claim("sampled gain", level, P, ClaimChannel({"d1": 1.0, "d2": 1.0}, ("x2",)))
-        return Verifier(loop, names, boxes={} if quick else {"discrete": None}).prove(claim).proved
-
-    low, high = 0.1, 50.0
-    while high / low > 1.0 + 1e-5:
-        middle = float(np.sqrt(low * high))
-        low, high = (low, middle) if proved(loops[0], middle, True) else (middle, high)
-    assert high < 10.0
-    for quick in (True, False):
-        assert proved(loops[1], high * (1.0 + 1e-4), quick) and not proved(loops[1], high * (1.0 - 1e-4), quick)
