@@ -43,6 +43,35 @@ def test_one_wide_cell_is_proved_on_its_parts() -> None:
     assert search.prove(Wish("sampled error", 1.001 * slowest))[0] is None
 
 
+@pytest.mark.parametrize("V", [5.0, 8.25, 40.0])
+def test_a_law_with_a_state_on_the_measured_outputs(V: float) -> None:
+    """[x; xk]+ by matrix exponentials and plain products; C and D are over the speed, too."""
+    Ak, Bk, Ck, Dk = np.array([[0.75]]), np.array([[0.5, -0.125]]), np.array([[0.25]]), np.array([[-0.125, 0.0]])
+    rows = np.block([[Ak, Bk], [Ck, Dk]])
+    gain = fmpq_mat([[fmpq(*float(x).as_integer_ratio()) for x in row] for row in rows])
+    ends = ((fmpq(5), fmpq(40)),)
+    loop = FeedbackLoop(plant_of(single_track()), ends, {(0,): gain, (1,): gain}, "outputs", 1, fmpq(1, 100))
+    u = (fmpq(*V.as_integer_ratio()) - fmpq(45, 2)) / fmpq(35, 2)
+    system = loop.system(Region((u, fmpq(0)), (fmpq(0), fmpq(0))), "discrete")
+    assert system is not None and system.denominator is None
+    A, B, C, D = numbers(V)
+    E, F = np.array([[1.0, 0.0, 0.0], [0.0] * 3]), np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 1.0]])
+    whole = expm(PERIOD * np.block([[A, B, E], [np.zeros((4, 6))]]))
+    free, moved, driven = whole[:2, :2], whole[:2, 2:3], whole[:2, 3:]
+    K, seen = np.hstack([Dk @ C, Ck]), np.hstack([C, np.zeros((2, 1))])
+    apart = np.block([[free, np.zeros((2, 1))], [np.zeros((1, 2)), Ak]])
+    wanted = {
+        "A": apart + np.vstack([moved @ K, Bk @ (seen + D @ K)]),
+        "B": np.vstack([driven + moved @ Dk @ F, Bk @ (F + D @ Dk @ F)]),
+        "C": np.vstack([np.eye(2, 3), seen + D @ K, K]),
+        "D": np.vstack([np.zeros((2, 3)), F + D @ Dk @ F, Dk @ F]),
+    }  # fmt: skip
+    found = {"A": system.A, "B": system.B["disturbances"], "C": system.C, "D": system.D["disturbances"]}
+    for key, matrix in wanted.items():
+        values = [float(x.mid()) for x in found[key].at((fmpq(0), fmpq(0))).entries()]
+        np.testing.assert_allclose(np.reshape(values, matrix.shape), matrix, rtol=1e-12, atol=1e-12)
+
+
 def _disguised(plant: Plant) -> Plant:
     """N d over d."""
     d = PolynomialMatrix({(0,): fmpq_mat([[1]]), (1,): fmpq_mat([[fmpq(2, 5)]])}, (1, 1), 1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,9 @@ import pytest
 from scipy.linalg import expm
 
 from analysis.simulation.amplification import amplification
-from estimators import GainSchedule, LpvController, LpvObserver, ScheduleError
+from estimators import GainSchedule, LpvController, LpvObserver, LpvVelocityObserver, ScheduleError
 from estimators.schedule import PlantPolynomial
-from estimators.schedule.quotient import quotients
+from estimators.schedule.quotient import PlantQuotient, quotients
 from synthesis.certificate.content import subject_of
 from synthesis.certificate.inside_sample import inside_sample
 from synthesis.certificate.proof import certificate
@@ -27,6 +28,7 @@ from synthesis.design.hinf_observer import Channel, ObserverDesign, design_obser
 from synthesis.design.law_table import Gains
 from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.design.state_feedback import StateFeedbackDesign, design_state_feedback
+from tests.support.any_size import any_schedule, signals
 from tests.support.single_track import HIGH, LOW, numbers, single_track
 
 PERIOD = 0.01
@@ -183,11 +185,11 @@ def test_formulas_whose_quotient_is_a_polynomial_need_no_denominator(contents: d
         "A": [["-2", "(speed**2 - 9)/(speed + 3)"], ["0/speed", "-1/(speed/speed)"]], "B": [["1"], ["1"]],
         "C": [["1", "0"]] * 2, "D": [["0"]] * 2, "E": [["1", "0", "0"]] * 2, "F": [["0", "0", "0"]] * 2,
     }  # fmt: skip
-    for signals in (
+    for listed in (
         *(data["model"][kind] for kind in ("states", "inputs", "outputs", "disturbances")),
         data["scheduling"],
     ):
-        for signal in signals:
+        for signal in listed:
             signal["unit"] = "1"
     data["model"]["constants"] = {}
     stored = {key: {"orders": [[0]], "coefficients": [[[float(x) if "s" not in x else 0.0 for x in row] for row in rows]]}
@@ -208,6 +210,42 @@ def test_a_runtime_refuses_a_denominator_with_a_zero(contents: dict[str, dict[st
     schedule = GainSchedule.from_content(contents["held"])
     with pytest.raises(ScheduleError, match="takes polynomials; take LpvObserver"):
         _ = schedule.polynomials
+
+
+def over_a_polynomial(schedule: GainSchedule) -> GainSchedule:
+    """The same numerators over 1 + 0.6 u_1 (+ 0.2 u_1 u_2)."""
+    first, count = schedule.plant["A"], len(schedule.parameters)
+    series = np.array([1.0, 0.6]) if count == 1 else np.array([[1.0, 0.0], [0.6, 0.2]])
+    assert not isinstance(first, PlantQuotient)
+    below = first._replace(coefficients=series[..., None, None])
+    return replace(schedule, plant=quotients(schedule.plant, below, ["p0", "p1"][:count], "file"))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("update", ["held", "sampled"])
+def test_the_runtime_divides_over_two_parameters(update: str) -> None:
+    schedule = over_a_polynomial(any_schedule((3, 2, 2), 2, update=update))
+    rng, observer = np.random.default_rng(4), LpvObserver(schedule, (6,))
+    x, (u, y, p) = rng.normal(size=(6, 3)), signals(schedule, rng, (6,))
+    observer.reset(state=x)
+    found = observer.step(u, y, p).estimate
+    for k in range(6):
+        w = p[k] - [1.0, 2.0]
+        d = 1.0 + 0.6 * w[0] + 0.2 * w[0] * w[1]
+        A, B, C, D = (schedule.plant[key].numerator.at(p[k]) / d for key in "ABCD")  # type: ignore[union-attr]
+        L, held = schedule.gain(p[k]), update == "held"
+        whole = np.zeros((4, 4))
+        whole[:3, :3] = A - L @ C if held else A
+        whole[:3, 3] = B @ u[k] + (L @ (y[k] - D @ u[k]) if held else 0.0)
+        after = (expm(PERIOD * whole) @ [*x[k], 1.0])[:3]
+        after += 0.0 if held else L @ (y[k] - C @ x[k] - D @ u[k])
+        np.testing.assert_allclose(found[k], after, rtol=1e-11, atol=1e-12)
+
+
+def test_the_velocity_observer_refuses_what_it_cannot_unroll() -> None:
+    plain = any_schedule((2, 1, 1), 1)
+    LpvVelocityObserver(plain)
+    with pytest.raises(ScheduleError, match="takes polynomials; take LpvObserver"):
+        LpvVelocityObserver(over_a_polynomial(plain))
 
 
 def test_what_a_moving_speed_adds_inside_a_sample(contents: dict[str, dict[str, Any]]) -> None:
