@@ -5,8 +5,8 @@ r"""The update of an observer of any size over one sample with u, y and p held, 
 
 with phi(M) = int_0^1 e^(Ms) ds and innovation = y - C xhat - D u at the start of the sample. phi(M) v is all that is needed:
 with v_k = M v_(k-1)/(k+1) it is the sum of the v_k, in `pieces` equal parts of the sample where M is large. |M| <= nu on the
-whole range, in the largest row sum of diag(w) |M| diag(w)^-1 (bounds of |A| and |C| are the sums of their Chebyshev
-coefficients, that of |L| is the largest entry of the table). With z = nu/pieces the terms from k = K on sum to less than z^K
+whole range, in the largest row sum of diag(w) |M| diag(w)^-1 (bounds of |A| and |C| are those of `largest` of their
+polynomials, that of |L| is the largest entry of the table). With z = nu/pieces the terms from k = K on sum to less than z^K
 / (K+1)! / (1 - z/(K+2)), whatever the parameters are; K is the least with a sum below 2^-53 of the first term.
 """
 
@@ -22,6 +22,7 @@ from estimators.errors import ScheduleError
 from estimators.interpolate import Multilinear
 from estimators.schedule import GainSchedule
 from estimators.schedule.plant import chebyshev
+from estimators.schedule.quotient import PlantQuotient
 
 _ENOUGH = 2.0**-53
 _STIFFEST = 2000.0  # of nu: more would take 500 pieces of a sample
@@ -66,12 +67,19 @@ class ExactStep:
         nx, nu, ny = self.sizes
         period = schedule.sample_time
         stored: dict[str, FloatArray] = {}
+        sizes: dict[str, FloatArray] = {}
         count = len(schedule.parameters)
+        self.divided = False
         for key, scale in (("A", period), ("B", period), ("C", 1.0), ("D", 1.0)):
-            stored[key] = scale * schedule.plant[key].coefficients
+            matrix = schedule.plant[key]
+            sizes[key] = scale * matrix.largest
+            if isinstance(matrix, PlantQuotient):
+                stored["denominator"], matrix, self.divided = matrix.denominator.coefficients, matrix.numerator, True
+            stored[key] = scale * matrix.coefficients
         self.orders = [max(1, *(part.shape[axis] for part in stored.values())) for axis in range(count)]
         flat = []
-        for key, shape in (("A", (nx, nx)), ("B", (nx, nu)), ("C", (ny, nx)), ("D", (ny, nu))):
+        shapes = {"A": (nx, nx), "B": (nx, nu), "C": (ny, nx), "D": (ny, nu)}
+        for key, shape in (shapes | ({"denominator": (1, 1)} if self.divided else {})).items():
             full = np.zeros((*self.orders, *shape))
             full[tuple(slice(n) for n in stored[key].shape[:count])] = stored[key]
             flat.append(full.reshape(math.prod(self.orders), shape[0] * shape[1]))
@@ -83,7 +91,6 @@ class ExactStep:
         self.sampled = schedule.observer_update == "sampled"
         table = schedule.table if self.sampled else period * schedule.table
         self.gains = Multilinear(schedule.grid, table)
-        sizes = {key: np.abs(part).sum(axis=tuple(range(count))) for key, part in stored.items()}
         gain = np.abs(table).max(axis=tuple(range(count)))
         products = float((gain @ np.hstack([sizes["C"], sizes["D"]])).sum())
         if not max(float(sizes["A"].sum() + sizes["B"].sum()), products) <= _LARGEST_STEP:
@@ -123,7 +130,10 @@ class ExactStep:
         """T A, T B, C and D at parameters (n, p)."""
         nx, nu, ny = self.sizes
         basis = chebyshev((parameters - self.middle) / self.half, self.orders)
-        A, B, C, D = np.split(basis @ self.coefficients, self.ends, axis=1)
+        values = basis @ self.coefficients
+        if self.divided:  # by the last column
+            values = values / values[:, -1:]
+        A, B, C, D = np.split(values, self.ends, axis=1)[:4]
         n = len(parameters)
         return A.reshape(n, nx, nx), B.reshape(n, nx, nu), C.reshape(n, ny, nx), D.reshape(n, ny, nu)
 

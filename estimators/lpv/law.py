@@ -40,8 +40,8 @@ class Law:
             self.gains = PiecewiseLinear(schedule.breakpoints, table.reshape(len(table), -1))
         self.shape = table.shape[-2:]
         through = schedule.plant["D"]
-        self.through = None if self.states or not self.order or not through.coefficients.any() else through
-        if not max(np.abs(table).max(initial=0.0), np.abs(through.coefficients).sum(initial=0.0)) <= _LARGEST:
+        self.through = None if self.states or not self.order or not through.largest.any() else through
+        if not max(np.abs(table).max(initial=0.0), through.largest.sum(initial=0.0)) <= _LARGEST:
             raise ScheduleError(
                 f"schedule '{schedule.name}': gains or D beyond {_LARGEST:g} overflow float64; check units"
             )

@@ -35,7 +35,8 @@ _PARAMETER_KEYS = ("name", "unit", "min", "max", "rate_min", "rate_max", "absolu
 def check_content(content: Mapping[str, Any], where: str) -> None:
     """Checks the form of everything; digests are checked when a file is read.
 
-    The plant is xdot = A x + B u + E d, y = C x + D u + F d, its matrices polynomials in u = (p - middle)/half of each parameter;
+    The plant is xdot = A x + B u + E d, y = C x + D u + F d, its matrices polynomials in u = (p - middle)/half of each parameter,
+    over `plant.denominator` where there is one (a positive polynomial; absent: one);
     `gain.table` has the shape (breakpoints of each parameter, rows, columns): an observer's states by outputs, or what
     `gain_signals` names. Rates are numbers, or both null: the parameter may jump, and no P depends on it. `provenance` says where
     a file came from and is free (no control characters, no numbers that other readers would read otherwise); nothing in it is
@@ -54,10 +55,12 @@ def check_content(content: Mapping[str, Any], where: str) -> None:
     sizes = _model(check, content["model"])
     counts = _scheduling(check, content["scheduling"])
     loop = check_update(check, content["update"], sizes)
-    check.keys(content["plant"], "plant", tuple(SHAPES))
+    check.keys(content["plant"], "plant", tuple(SHAPES), ("denominator",))
     for key, kinds in SHAPES.items():
         shape = (sizes[kinds[0]], sizes[kinds[1]])
         check.polynomial(content["plant"][key], f"plant.{key}", len(counts), shape, HIGHEST_ORDER)
+    if "denominator" in content["plant"]:
+        check.polynomial(content["plant"]["denominator"], "plant.denominator", len(counts), (1, 1), HIGHEST_ORDER)
     check_gain(check, content["gain"], (*counts, loop.rows, loop.columns))
     for index, claim in enumerate(check.items(content["claims"], "claims", most=MOST_CLAIMS)):
         _claim(check, claim, f"claims[{index}]", len(counts), loop)

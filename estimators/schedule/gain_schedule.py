@@ -20,6 +20,7 @@ from estimators.schedule.checker import shown
 from estimators.schedule.files import check_seal, read_content, sealed
 from estimators.schedule.gain_signals import gain_signals, per_second, quotient
 from estimators.schedule.plant import PlantPolynomial, PlantPolynomials, plant_of
+from estimators.schedule.quotient import PlantQuotient, quotients
 from estimators.schedule.upgrade import FIRST_FORMAT, upgraded
 
 SHIPPED = Path(__file__).parents[1] / "schedules"
@@ -80,7 +81,7 @@ class GainSchedule(Display):
     table: FloatArray
     sample_time: float
     update: Kind
-    plant: Mapping[str, PlantPolynomial | PlantPolynomials]
+    plant: Mapping[str, PlantPolynomial | PlantPolynomials | PlantQuotient]
     states: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
@@ -145,7 +146,7 @@ class GainSchedule(Display):
         if isinstance(content, Mapping) and content.get("schema") == FIRST_FORMAT:
             content = upgraded(content, where)
         check_content(content, where)
-        return _build(content if "sha256" in content else sealed(content))
+        return _build(content if "sha256" in content else sealed(content), where)
 
     @property
     def parameter(self) -> SchedulingParameter:
@@ -172,9 +173,11 @@ class GainSchedule(Display):
         """The plant as polynomials of the only parameter.
 
         Raises:
-            ScheduleError: there are several.
+            ScheduleError: there are several, or the plant is divided by one.
         """
         self._only_one()
+        if isinstance(self.plant["A"], PlantQuotient):
+            _ = self.plant["A"].coefficients  # refuses
         return {key: matrix for key, matrix in self.plant.items() if isinstance(matrix, PlantPolynomial)}
 
     def _only_one(self) -> None:
@@ -278,7 +281,7 @@ def _frozen(value: Any, shape: tuple[int, ...]) -> FloatArray:
     return array
 
 
-def _build(content: Mapping[str, Any]) -> GainSchedule:
+def _build(content: Mapping[str, Any], where: str) -> GainSchedule:
     """From checked and sealed content."""
     model = content["model"]
     parameters, grid = [], []
@@ -294,10 +297,14 @@ def _build(content: Mapping[str, Any]) -> GainSchedule:
     }
     sizes = {kind: len(found) for kind, found in signals.items()}
     ranges = [(parameter.min, parameter.max) for parameter in parameters]
-    plant = {
+    numerators = {
         key: plant_of(content["plant"][key], ranges, (sizes[rows], sizes[columns]))
         for key, (rows, columns) in SHAPES.items()
     }
+    plant: Mapping[str, PlantPolynomial | PlantPolynomials | PlantQuotient] = numerators
+    if "denominator" in content["plant"]:
+        below = plant_of(content["plant"]["denominator"], ranges, (1, 1))
+        plant = quotients(numerators, below, [parameter.name for parameter in parameters], where)
     return GainSchedule(
         name=content["name"],
         parameters=tuple(parameters),

@@ -27,6 +27,11 @@ class PlantPolynomial(NamedTuple):
         first = self.coefficients[0] if len(self.coefficients) else 0.0
         return np.asarray(first + u * here - later)
 
+    @property
+    def largest(self) -> FloatArray:
+        """Bounds (rows, columns) of |M(p)| on the whole range, entry by entry."""
+        return np.asarray(np.abs(self.coefficients).sum(axis=0))
+
 
 class PlantPolynomials(NamedTuple):
     """M(p) = sum over (i, j, ..) of coefficients[i, j, ..] T_i(u_1) T_j(u_2) .., u = (p - middle) / half of every parameter."""
@@ -42,6 +47,11 @@ class PlantPolynomials(NamedTuple):
         basis = chebyshev(u.reshape(-1, u.shape[-1]), self.coefficients.shape[:-2])
         flat = self.coefficients.reshape(basis.shape[1], shape[0] * shape[1])
         return np.asarray((basis @ flat).reshape(*lead, *shape))
+
+    @property
+    def largest(self) -> FloatArray:
+        """Bounds (rows, columns) of |M(p)| on the whole range, entry by entry."""
+        return np.asarray(np.abs(self.coefficients).sum(axis=tuple(range(self.coefficients.ndim - 2))))
 
 
 def chebyshev(u: FloatArray, sizes: Sequence[int]) -> FloatArray:

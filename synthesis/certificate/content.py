@@ -8,35 +8,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from math import prod
 from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpq_mpoly_ctx
+from flint import fmpq_mat
 
 from estimators.errors import ScheduleError
-from estimators.schedule.check import HIGHEST_ORDER, SHAPES, SIGNALS
+from estimators.schedule.check import SIGNALS
 from estimators.schedule.gain_signals import gain_signals
 from estimators.schedule.upgrade import UNTIED
 from synthesis.certificate.claims import KINDS, KINDS_OF, UPDATE_OF, WITH_CHANNEL, Claim, ClaimChannel
+from synthesis.certificate.rebuilt import check_stored_plant, rebuilt_plant
 from synthesis.certificate.units import check_dimensions
 from synthesis.certificate.verify import Names
 from synthesis.errors import ModelError, ProblemError
 from synthesis.loop.feedback import FeedbackLoop
 from synthesis.loop.observer import ObserverLoop
-from synthesis.loop.plant import Axis, Plant
-from synthesis.models.formula import parse, read, used
+from synthesis.loop.plant import Axis
 from synthesis.models.param import check_unit
-from synthesis.polynomials.chebyshev import from_chebyshev, to_chebyshev
-from synthesis.polynomials.enclosure import PolynomialMatrix, identity
-from synthesis.polynomials.rational import decimal, rational
+from synthesis.polynomials.chebyshev import from_chebyshev
+from synthesis.polynomials.enclosure import PolynomialMatrix
+from synthesis.polynomials.rational import decimal
 
-LAST_DIGIT = fmpq(1, 2**51)  # of the sum of an entry's coefficients: what rounding them to float64 can change
-MOST_TERMS, MOST_BITS, MOST_DEGREE = 2000, 20_000, 2 * HIGHEST_ORDER  # of what a formula multiplies out to on its way
 MOST_PARAMETERS = 3  # of a proof: polynomials of order 8 in more of them have too many terms
 MOST_DENSE = 1100  # terms of P one sample later, in parameters and rates, if none is left out
-MOST_WORK = 400_000  # products of terms, those of many digits counted by their length, in all formulas together
-MOST_TEXT = 100_000  # characters of all formulas together
 
 
 @dataclass(frozen=True)
@@ -71,7 +66,7 @@ def subject_of(content: Mapping[str, Any], where: str) -> Subject:
         )
     tied = not model["source"].startswith(UNTIED)
     try:
-        plant = Plant(axes, _rebuilt(content, axes, where, tied), identity(1, len(axes)))
+        plant = rebuilt_plant(content, axes, where, tied)
         if tied:
             check_dimensions(model, content["scheduling"], where)
         else:  # words only, but still units: they are printed
@@ -79,8 +74,7 @@ def subject_of(content: Mapping[str, Any], where: str) -> Subject:
                 check_unit(named["unit"], f"{where}: unit of {named['name']}")
     except ModelError as error:
         raise ScheduleError(str(error)) from None
-    for key, matrix in plant.matrices.items():
-        _check_stored(content["plant"][key], matrix, f"{where}: plant.{key}")
+    check_stored_plant(content["plant"], plant, where)
     table = {}
     counts = [len(p["breakpoints"]) for p in content["scheduling"]]
     shape = tuple(len(signals) for signals in gain_signals(content))
@@ -168,128 +162,3 @@ def _indices(counts: Sequence[int]) -> list[tuple[int, ...]]:
     for count in counts:
         found = [(*index, i) for index in found for i in range(count)]
     return found
-
-
-def _rebuilt(content: Mapping[str, Any], axes: tuple[Axis, ...], where: str, tied: bool) -> dict[str, PolynomialMatrix]:
-    """The matrices from formulas and constants, exactly, in powers of u."""
-    model = content["model"]
-    context = fmpq_mpoly_ctx.get(tuple(f"u{i}" for i in range(len(axes))), "lex")
-    if sum(len(text) for rows in model["matrices"].values() for row in rows for text in row) > MOST_TEXT:
-        raise ScheduleError(f"{where}: model.matrices: formulas of more than {MOST_TEXT} characters together")
-    work = Work(MOST_WORK)
-    values = {
-        axis.name: ExactPolynomial(context.gens()[i] * axis.half + axis.middle, work) for i, axis in enumerate(axes)
-    }
-    for name, constant in model["constants"].items():
-        if name in values:
-            raise ScheduleError(f"{where}: model.constants.{name}: is the name of a scheduling parameter, too")
-        values[name] = ExactPolynomial(context.constant(decimal(constant["value"])), work)
-    mentioned: set[str] = set()
-    matrices = {}
-    for key, rows in model["matrices"].items():
-        shape = _shape(content, key)
-        cells: dict[tuple[int, ...], list[fmpq]] = {}
-        for i, row in enumerate(rows):
-            for j, text in enumerate(row):
-                place = f"{where}: model.matrices.{key}[{i}][{j}]"
-                tree = parse(text, place)
-                mentioned |= used(tree)
-                number = lambda x: ExactPolynomial(context.constant(fmpq(x.numerator, x.denominator)), work)  # noqa: E731
-                try:
-                    entry = read(tree, text.strip(), values, number, place)
-                except ModelError as error:
-                    words = str(error)
-                    raise ModelError(words if words.startswith(where) else f"{place}: {words}") from None
-                for powers, coefficient in entry.value.to_dict().items():
-                    if max(powers, default=0) > HIGHEST_ORDER:
-                        raise ModelError(f"{place}: has a power above {HIGHEST_ORDER} of a scheduling parameter")
-                    cells.setdefault(powers, [fmpq(0)] * (shape[0] * shape[1]))[i * shape[1] + j] = coefficient
-        terms = {powers: fmpq_mat(*shape, entries) for powers, entries in cells.items()}
-        matrices[key] = PolynomialMatrix(terms, shape, len(axes))
-    idle = sorted(set(model["constants"]) - mentioned)
-    if idle and tied:
-        raise ScheduleError(
-            f"{where}: model.constants.{idle[0]}: appears in no formula; what it says is tied to nothing"
-        )
-    return matrices
-
-
-def _shape(content: Mapping[str, Any], key: str) -> tuple[int, int]:
-    above, beside = SHAPES[key]
-    return len(content["model"][above]), len(content["model"][beside])
-
-
-@dataclass
-class Work:
-    """What is left to be worked out for one file."""
-
-    left: int
-
-    def spend(self, amount: int) -> None:
-        """Refuse what would take too long."""
-        self.left -= amount
-        if self.left < 0:
-            raise ModelError("the formulas up to here multiply out to too much work")
-
-
-@dataclass(frozen=True)
-class ExactPolynomial:
-    """A polynomial with rational coefficients that refuses to grow without bound while a formula is read."""
-
-    value: Any  # fmpq_mpoly
-    work: Work
-
-    def __add__(self, other: ExactPolynomial) -> ExactPolynomial:
-        return self._small(self.value + other.value)
-
-    def __sub__(self, other: ExactPolynomial) -> ExactPolynomial:
-        return self._small(self.value - other.value)
-
-    def __mul__(self, other: ExactPolynomial) -> ExactPolynomial:
-        products = len(self.value) * len(other.value)
-        self.work.spend(products)
-        found = self.value * other.value
-        self.work.spend(products * (_bits(found) // 1000))
-        return self._small(found)
-
-    def __truediv__(self, other: ExactPolynomial) -> ExactPolynomial:
-        if not other.value.is_constant():
-            raise ModelError("divides by a scheduling parameter; schedule files hold polynomial plants")
-        below = other.value.leading_coefficient() if len(other.value) else fmpq(0)
-        if below == 0:
-            raise ZeroDivisionError
-        return self._small(self.value * (1 / below))
-
-    def _small(self, value: Any) -> ExactPolynomial:
-        self.work.spend(1 + len(value))
-        if len(value) > MOST_TERMS or _bits(value) > MOST_BITS or max(value.degrees(), default=0) > MOST_DEGREE:
-            raise ModelError("the formula multiplies out to too many terms or digits")
-        return ExactPolynomial(value, self.work)
-
-
-def _bits(value: Any) -> int:
-    return max((c.numer().bit_length() + c.denom().bit_length() for c in value.coeffs()), default=0)
-
-
-def _check_stored(stored: Mapping[str, Any], exact: PolynomialMatrix, place: str) -> None:
-    """The stored float64 coefficients are the exact ones, rounded."""
-    wanted = to_chebyshev(exact)
-    given = {
-        tuple(orders): fmpq_mat(*exact.shape, [rational(number) for row in matrix for number in row])
-        for orders, matrix in zip(stored["orders"], stored["coefficients"], strict=True)
-    }
-    zero = fmpq_mat(*exact.shape, [fmpq(0)] * (exact.shape[0] * exact.shape[1]))
-    for i in range(exact.shape[0]):
-        for j in range(exact.shape[1]):
-            size = sum((abs(m[i, j]) for m in wanted.terms.values()), fmpq(0))
-            for orders in {*wanted.terms, *given}:
-                target, is_ = wanted.terms.get(orders, zero)[i, j], given.get(orders, zero)[i, j]
-                if abs(is_ - target) > size * LAST_DIGIT:
-                    raise ScheduleError(
-                        f"{place}: entry [{i}][{j}] of order {list(orders)} is {_float(is_):.17g}, "
-                        f"the formula and the constants give {_float(target):.17g}"
-                    )
-
-
-def _float(number: fmpq) -> float:
-    return float(Fraction(int(number.p), int(number.q)))

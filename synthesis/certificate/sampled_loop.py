@@ -19,6 +19,7 @@ from synthesis.loop.system import Region, System, Time
 from synthesis.polynomials.boxes import Boxes, orders
 
 MOST_PLACES = 4000  # of the parameters; larger tables are looked at in the corners of their cells only
+MOST_STANDING = 600  # places of a rational plant that are looked at one by one
 MATRICES = ("A", "C", "coasting", "denominator")
 GROUPS = ("B", "D")
 
@@ -41,7 +42,10 @@ class SampledLoop:
         parts = self.points - 1 if self.points is not None else 4 if count == 1 else 2
         line = np.linspace(-1.0, 1.0, (parts if len(cells) * (parts + 1) ** count <= MOST_PLACES else 1) + 1)
         local = np.array(list(product(line, repeat=count))).reshape(len(line) ** count, count)
-        if not self._fill_at_once(cells, local):
+        if not self.loop.plant.is_polynomial and self.time == "discrete" and len(cells) * len(local) <= MOST_STANDING:
+            if not self._fill_standing(cells, local):
+                return None
+        elif not self._fill_at_once(cells, local):
             for region in cells:
                 if not self._fill(region, local):
                     return None
@@ -81,6 +85,15 @@ class SampledLoop:
         zeros = (fmpq(0),) * len(key)
         return Region((*(fmpq(*value.as_integer_ratio()) for value in key), *zeros), (*zeros, *zeros))
 
+    def _fill_standing(self, cells: list[Region], local: FloatArray) -> bool:
+        """Place by place: where cells are few and wide, the middle of an enclosed quotient is no good guess of it."""
+        for offset, factor in zip(*_places(cells, local.shape[1]), strict=True):
+            for place in offset + factor * local:
+                key = _key(place)
+                if key not in self._rows and not self._fill(self._standing(key), np.zeros((1, len(key)))):
+                    return False
+        return True
+
     def _fill_at_once(self, cells: list[Region], local: FloatArray) -> bool:
         """All cells from the middles of their enclosures, where the loop has them."""
         if self.time not in self.on_boxes:
@@ -110,10 +123,7 @@ class SampledLoop:
         for group in system.B:
             keep(("B", group), system.B[group], left)
             keep(("D", group), system.D[group], np.ones(1))
-        offset, factor = (
-            np.array([[int(x.p) / int(x.q) for x in side[:count]] for side in sides])[:, None]
-            for sides in ([cell.offset for cell in cells], [cell.factor for cell in cells])
-        )
+        offset, factor = _places(cells, count)
         places = np.round((offset + factor * local).reshape(-1, count), 12)
         _, first = np.unique(places, axis=0, return_index=True)
         for index in np.sort(first):
@@ -140,6 +150,15 @@ class SampledLoop:
         for index, place in enumerate(offset + factor * local):
             self._rows.setdefault(_key(place), {name: values[index] for name, values in found.items()})
         return True
+
+
+def _places(cells: list[Region], count: int) -> tuple[FloatArray, FloatArray]:
+    """Middles and half widths (g, 1, count) of the cells."""
+    offset, factor = (
+        np.array([[int(x.p) / int(x.q) for x in side[:count]] for side in sides])[:, None]
+        for sides in ([cell.offset for cell in cells], [cell.factor for cell in cells])
+    )
+    return offset, factor
 
 
 def _key(place: FloatArray) -> tuple[float, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from estimators.display import Display, counted
+from estimators.schedule.check import HIGHEST_ORDER
 from synthesis.certificate.claims import Claim, ClaimChannel
 from synthesis.certificate.levels import feedback_claims, held_claims, sampled_claims
 from synthesis.certificate.rounding import significant
@@ -131,8 +132,12 @@ def refuse_undeployable(model: LpvModel) -> None:
         raise ProblemError(
             f"model '{model.name}' has {count} scheduling parameters; a table that is deployed has 1 to {MOST_PARAMETERS}"
         )
-    if not model.polynomial.is_polynomial:
-        raise ProblemError(f"model '{model.name}' is rational; schedule files store polynomial plants")
+    highest = max(max(m.degrees) for m in (*model.exact.matrices.values(), model.exact.denominator))
+    if highest > HIGHEST_ORDER:
+        raise ProblemError(
+            f"model '{model.name}' has a power {highest} of a scheduling parameter over its common denominator; schedule files "
+            f"store powers up to {HIGHEST_ORDER}"
+        )
 
 
 def _candidates(gains: Gains, settings: DeploySettings) -> Iterator[tuple[int, ...]]:

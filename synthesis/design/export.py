@@ -50,7 +50,7 @@ def schedule_content(
             for p, line in zip(model.parameters, deployment.breakpoints, strict=True)
         ],
         "update": update_section(deployment.gains, deployment.settings),
-        "plant": {key: stored(model.exact.matrices[key]) for key in SHAPES},
+        "plant": _plant(model),
         "gain": {"dtype": deployment.settings.dtype, "interpolation": "linear", "table": gain.tolist()},
         "claims": [_claim(claim) for claim in deployment.claims],
         "provenance": _provenance(deployment, spec or {}),
@@ -117,9 +117,11 @@ def formula(entry: sp.Expr, model: LpvModel) -> str:
         return str(plain)
     values = {sp.Symbol(name): sp.Rational(str(c.value)) for name, c in model.constants.items()}
     parameters = symbols[: len(model.parameters)]
-    polynomial = sp.Poly(sp.cancel(sp.together(plain.subs(values))), *parameters)
-    terms = {powers: sp.Rational(str(sp.N(c, 17))) for powers, c in polynomial.terms()}
-    return str(sp.Poly(terms, *parameters).as_expr())
+    parts = []
+    for part in sp.fraction(sp.cancel(sp.together(plain.subs(values)))):
+        terms = {powers: sp.Rational(str(sp.N(c, 17))) for powers, c in sp.Poly(part, *parameters).terms()}
+        parts.append(sp.Poly(terms, *parameters).as_expr())
+    return str(parts[0] / parts[1])
 
 
 def _model(model: LpvModel) -> dict[str, Any]:
@@ -131,6 +133,13 @@ def _model(model: LpvModel) -> dict[str, Any]:
         key: [[formula(entry, model) for entry in row] for row in getattr(model, key).tolist()] for key in SHAPES
     }
     return {"id": model.name, "source": model.source, **signals, "constants": constants, "matrices": matrices}
+
+
+def _plant(model: LpvModel) -> dict[str, Any]:
+    """Matrices over a common denominator, which is left out where it is one."""
+    exact = model.exact
+    below = {"denominator": stored(exact.denominator)} if any(exact.denominator.degrees) else {}
+    return {key: stored(exact.matrices[key]) for key in SHAPES} | below
 
 
 def _claim(claim: Claim) -> dict[str, Any]:

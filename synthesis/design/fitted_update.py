@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 
 import numpy as np
 
 from estimators.arrays import FloatArray
-from synthesis.errors import ProblemError
 from synthesis.models.discretise import zero_order_hold
 from synthesis.models.lpv import LpvModel
+from synthesis.models.numeric import NumericModel
 
 FIT = 1e-10  # relative
 DEGREES = (4, 8, 12, 16, 24)
@@ -18,23 +19,36 @@ DEGREES = (4, 8, 12, 16, 24)
 def fitted_update(model: LpvModel, scale: FloatArray, period: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """e^(TA), T phi(TA) B and T phi(TA) E in the states diag(scale) x, as polynomials in u, fitted to 1e-10.
 
-    Coefficients (d_1+1, ..., d_p+1, rows, columns). What comes out of a design is proved for the exact matrices. Raises
-    ProblemError for a rational model.
+    Coefficients (d_1+1, ..., d_p+1, rows, columns). What comes out of a design is proved for the exact matrices.
     """
-    if not model.polynomial.is_polynomial:
-        raise ProblemError(f"model '{model.name}' is rational; a sampled design takes polynomial models")
     n, inputs = len(model.states), len(model.inputs)
+
+    def update(at: NumericModel) -> FloatArray:
+        driven = np.concatenate([at.B, at.E], axis=-1) * scale[:, None]
+        return np.concatenate(zero_order_hold(at.A * scale[:, None] / scale, driven, period), axis=-1)
+
+    series = _fitted(model, update)
+    return series[..., :n], series[..., n : n + inputs], series[..., n + inputs :]
+
+
+def fitted_outputs(model: LpvModel, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """C and F for the states diag(scale) x: those of a polynomial model as they are, those of a rational one fitted."""
+    if model.polynomial.is_polynomial:
+        scaled = model.polynomial.with_states_scaled(scale)
+        return scaled.C, scaled.F
+    series = _fitted(model, lambda at: np.concatenate([at.C / scale, at.F], axis=-1))
+    return series[..., : len(model.states)], series[..., len(model.states) :]
+
+
+def _fitted(model: LpvModel, values: Callable[[NumericModel], FloatArray]) -> FloatArray:
+    """Monomial coefficients of the Chebyshev series of least degree that leaves no more than `FIT`."""
     for degree in DEGREES:
         nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
         count = len(model.parameters)
         points = np.array(list(product(nodes, repeat=count))).reshape(len(nodes) ** count, count)
         middle, half = (np.array([getattr(p, key) for p in model.parameters]) for key in ("middle", "half_width"))
-        numeric = model.on(middle + half * points)
-        driven = np.concatenate([numeric.B, numeric.E], axis=-1)
-        values = np.concatenate(
-            zero_order_hold(numeric.A * scale[:, None] / scale, driven * scale[:, None], period), axis=-1
-        )
-        series = values.reshape(*(len(nodes),) * count, *values.shape[1:])
+        found = values(model.on(middle + half * points))
+        series = found.reshape(*(len(nodes),) * count, *found.shape[1:])
         inverse = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, degree))
         for axis in range(count):
             series = np.moveaxis(np.tensordot(inverse, series, axes=(1, axis)), 0, axis)
@@ -48,4 +62,4 @@ def fitted_update(model: LpvModel, scale: FloatArray, period: float) -> tuple[Fl
         powers[: len(column), k] = column
     for axis in range(count):
         series = np.moveaxis(np.tensordot(powers, series, axes=(1, axis)), 0, axis)
-    return series[..., :n], series[..., n : n + inputs], series[..., n + inputs :]
+    return np.asarray(series)

@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimators.arrays import FloatArray
-from synthesis.design.fitted_update import fitted_update
+from synthesis.design.fitted_update import fitted_outputs, fitted_update
 from synthesis.design.hinf_observer import (
     ObserverDesign,
     ObserverGains,
@@ -43,7 +43,7 @@ POINTS = 40  # for each parameter; what holds between them is proved for the tab
 def design_sampled_observer(model: LpvModel, design: ObserverDesign, sample_time: float) -> ObserverGains:
     """K(p) for the given sample time; `gain` of the result gives K in the units state/output.
 
-    Raises ProblemError for a rational model, a bound on the fastest pole (an update has none), and as `design_observer`.
+    Raises ProblemError for a bound on the fastest pole (an update has none), and as `design_observer`.
 
     >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
     >>> wanted = Channel(("friction", "force_noise"), ("relative_velocity",), weights=(1.0, 0.1))
@@ -59,8 +59,8 @@ def design_sampled_observer(model: LpvModel, design: ObserverDesign, sample_time
     design = replace(design, settings=settings)
     scale = design_scale(model, design) / np.sqrt(sample_time)  # errors in their size if time is counted in samples
     Phi, _, Gamma = fitted_update(model, scale, sample_time)
-    scaled = model.polynomial.with_states_scaled(scale)
-    fitted = {"Phi": Phi, "Gamma": Gamma, "C": scaled.C, "F": scaled.F}
+    C, F = fitted_outputs(model, scale)
+    fitted = {"Phi": Phi, "Gamma": Gamma, "C": C, "F": F}
 
     def problem(gamma: float | None, maximise_margin: bool = True, floor: float = 0.0) -> LmiProblem:
         return _problem(model, design, scale, sample_time, fitted, gamma, maximise_margin, floor)

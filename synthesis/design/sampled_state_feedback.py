@@ -57,6 +57,8 @@ def design_sampled_state_feedback(
             f"a sampled design has no {given}: leave it out; sizes of inputs in channels bound its gains"
         )
     refuse_unstabilisable(model)
+    if not model.polynomial.is_polynomial:
+        raise ProblemError(f"model '{model.name}' is rational; a sampled state feedback takes polynomial models")
     check_limits(model, design.limits)
     design = replace(design, settings=replace(design.settings, points=min(design.settings.points, POINTS)))
     plain = feedback_scale(model, design.channels)

@@ -46,7 +46,7 @@ class FeedbackLoop(Tabulated):
 
     `sample_time` None: the continuous-time loop is meant. With `rounded` the gains are balls that hold what the runtime
     interpolates of them in float64; without it they are exact. Raises ProblemError for a table of another shape, an algebraic
-    loop, and a rational plant unless its states are measured in continuous time.
+    loop, and a rational plant in continuous time unless its states are measured.
     """
 
     plant: Plant
@@ -63,8 +63,8 @@ class FeedbackLoop(Tabulated):
         wanted = self.order + self.inputs, self.order + (self.plant.states if self.by_states else m["C"].shape[0])
         if self._gain_shape != wanted:
             raise ProblemError(f"the gains have the shape {self._gain_shape}; this plant and law need {wanted}")
-        if not self.plant.is_polynomial and not (self.by_states and self.sample_time is None):
-            raise ProblemError("a rational plant is closed by state feedback in continuous time only")
+        if not self.plant.is_polynomial and not self.by_states and self.sample_time is None:
+            raise ProblemError("in continuous time a rational plant is closed by state feedback only")
         if not self.by_states:
             self._refuse_algebraic_loop()
 
@@ -100,25 +100,27 @@ class FeedbackLoop(Tabulated):
     def system(self, region: Region, time: Time) -> System | None:
         """The closed loop on a region (of one cell of the table); None where the exponential is too large to be enclosed.
 
-        Raises ProblemError for the other time.
+        None, too, where a denominator is not certainly positive. Raises ProblemError for the other time.
         """
         self._refuse_other(time)
         box = (region.offset[: region.parameters], region.factor[: region.parameters])
         if box not in self._systems:
-            plant = {key: region.local(matrix) for key, matrix in self._plant.items()}
-            below = None if self.plant.is_polynomial else region.local(self.plant.denominator)
+            plant = self._on(region, "ABCDEF", self.sample_time is not None)
+            below = None if self.sample_time is not None or self._below is None else region.local(self._below)
             eyes = [identity(size, 2 * region.parameters) for size in (self.plant.states, self.order)]
-            self._systems[box] = self._closed(plant, self.gain(region), eyes, below, exponentials)
+            self._systems[box] = (
+                None if plant is None else self._closed(plant, self.gain(region), eyes, below, exponentials)
+            )
         return self._systems[box]
 
     def on_boxes(self, time: Time, cells: Sequence[Region]) -> System | None:
         """`system` on many regions at once, every matrix `Boxes`; None where they are too many or too large for that."""
         self._refuse_other(time)
-        found = self._at_once(cells, "ABCDEF")
+        found = self._at_once(cells, "ABCDEF", self.sample_time is not None)
         if found is None:
             return None
         plant, gain = found
-        below = None if self.plant.is_polynomial else local(self.plant.denominator, cells)
+        below = None if self.sample_time is not None or self._below is None else local(self._below, cells)
         eyes = [unit(size, self.plant.axes) for size in (self.plant.states, self.order)]
         return self._closed(plant, gain, eyes, below, box_exponential)
 

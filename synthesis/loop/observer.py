@@ -14,7 +14,8 @@ e = x - xhat of either, with d held as well and x' the plant's own motion at the
 What float64 rounds when the runtime evaluates plant and gains is inside the balls of these matrices; that it then computes phi
 and adds up in float64 leaves an error of about 1e-15 of the states, which no claim speaks of. While no measurement comes in,
 both are e+ = e^(TA) e + T phi(TA) E d. Between samples the error of `held` obeys, if nothing is held, the error equation
-e' = (A - L C) e + (E - L F) d.
+e' = (A - L C) e + (E - L F) d. A rational plant keeps its denominator there; an update takes its matrices divided by it
+(`synthesis.polynomials.quotient`).
 """
 
 from __future__ import annotations
@@ -76,8 +77,8 @@ class ObserverLoop(Tabulated):
     def system(self, region: Region, time: Literal["continuous", "discrete"]) -> System | None:
         """The error on a region (of one cell of the table): the error equation, or its update over a sample.
 
-        None where the matrix exponential is too large to be enclosed. Raises ProblemError for a discrete system without a
-        sample time, or of a rational plant.
+        None where the matrix exponential is too large to be enclosed, or a denominator not certainly positive. Raises
+        ProblemError for a discrete system without a sample time.
         """
         box = (region.offset[: region.parameters], region.factor[: region.parameters], time)
         if box not in self._systems:
@@ -86,22 +87,24 @@ class ObserverLoop(Tabulated):
 
     def on_boxes(self, time: Time, cells: Sequence[Region]) -> System | None:
         """`system` on many regions at once, every matrix `Boxes`; None where they are too many or too large for that."""
-        found = self._at_once(cells, "ACEF")
+        found = self._at_once(cells, "ACEF", time == "discrete")
         if found is None:
             return None
         (plant, gain), axes = found, self.plant.axes
         if time == "discrete":
             return self._updated(plant, gain, unit(self.plant.states, axes), box_exponential)
-        below = None if self.plant.is_polynomial else local(self.plant.denominator, cells)
+        below = None if self._below is None else local(self._below, cells)
         return self._equation(plant, gain, unit(self.plant.states, axes), below)
 
     def _error_equation(self, region: Region) -> System:
         plant = {key: region.local(self._plant[key]) for key in "ACEF"}
-        below = None if self.plant.is_polynomial else region.local(self.plant.denominator)
+        below = None if self._below is None else region.local(self._below)
         return self._equation(plant, self.gain(region), identity(self.plant.states, 2 * region.parameters), below)
 
     def _error_update(self, region: Region) -> System | None:
-        plant = {key: region.local(self._plant[key]) for key in "ACEF"}
+        plant = self._on(region, "ACEF", True)
+        if plant is None:
+            return None
         return self._updated(plant, self.gain(region), identity(self.plant.states, 2 * region.parameters), exponentials)
 
     def _equation(self, plant: dict[str, Any], gain: Any, eye: Any, below: Any) -> System:
@@ -117,8 +120,8 @@ class ObserverLoop(Tabulated):
 
     def _updated(self, plant: dict[str, Any], gain: Any, eye: Any, ring: Any) -> System | None:
         """The update over a sample; `ring` knows phi and the exponential of its matrices."""
-        if self.sample_time is None or not self.plant.is_polynomial:
-            raise ProblemError("an update over a sample needs a sample time and a polynomial plant")
+        if self.sample_time is None:
+            raise ProblemError("an update over a sample needs a sample time")
         period = self.sample_time
         TA = plant["A"] * period
         coast = ring.phi(TA)

@@ -13,6 +13,7 @@ from flint import arb, fmpq, fmpq_mat
 from synthesis.loop.on_boxes import HIGHEST, MOST_BOXES, gains, local, rounding_of
 from synthesis.loop.plant import Plant
 from synthesis.loop.system import Region
+from synthesis.polynomials import box_quotient, quotient
 from synthesis.polynomials.boxes import Boxes
 from synthesis.polynomials.enclosure import PolynomialMatrix, Powers
 
@@ -60,15 +61,22 @@ class Tabulated:
         found = PolynomialMatrix(terms, self._gain_shape, 2 * count).balls()
         return found.blurred(lambda i, j: self._gain_rounding[i, j].abs_upper()) if self.rounded else found
 
-    def _at_once(self, cells: Sequence[Region], letters: str) -> tuple[dict[str, Boxes], Boxes] | None:
-        """Plant matrices and gain on many regions; None where they are too many or too large for that."""
+    def _on(self, region: Region, letters: str, divided: bool) -> dict[str, PolynomialMatrix] | None:
+        """Plant matrices on a region: numerators, or `divided` by the denominator; None if that is not positive there."""
+        plant = {key: region.local(self._plant[key]) for key in letters}
+        return quotient.quotients(plant, region.local(self._below)) if divided and self._below is not None else plant
+
+    def _at_once(self, cells: Sequence[Region], letters: str, divided: bool) -> tuple[dict[str, Boxes], Boxes] | None:
+        """`_on` and the gain on many regions; None where they are too many or too large for that."""
         axes = self.plant.axes
         if not 1 <= len(axes) <= max(HIGHEST) or len(cells) > MOST_BOXES:
             return None
         shape = self._gain_shape
         rounding = rounding_of(self._gain_rounding, shape) if self.rounded else np.zeros(shape)
-        plant = {key: local(self._plant[key], cells) for key in letters}
-        return plant, gains(self.table, self.breakpoints, axes, cells, rounding)
+        plant: dict[str, Boxes] | None = {key: local(self._plant[key], cells) for key in letters}
+        if plant is not None and divided and self._below is not None:
+            plant = box_quotient.quotients(plant, local(self._below, cells))
+        return None if plant is None else (plant, gains(self.table, self.breakpoints, axes, cells, rounding))
 
     @cached_property
     def _gain_shape(self) -> tuple[int, int]:
@@ -88,22 +96,26 @@ class Tabulated:
 
     @cached_property
     def _plant(self) -> dict[str, PolynomialMatrix]:
-        """Plant matrices in u, as balls; uncertain by what the runtime's evaluation in float64 may be off."""
-        matrices = {key: matrix.balls() for key, matrix in self.plant.matrices.items()}
+        """Plant matrices (numerators) in u, as balls; uncertain by what the runtime's evaluation in float64 may be off."""
+        return {key: self._evaluated(matrix) for key, matrix in self.plant.matrices.items()}
+
+    @cached_property
+    def _below(self) -> PolynomialMatrix | None:
+        """The denominator likewise; None where it is one."""
+        return None if self.plant.is_polynomial else self._evaluated(self.plant.denominator)
+
+    def _evaluated(self, matrix: PolynomialMatrix) -> PolynomialMatrix:
         if not self.rounded:
-            return matrices
+            return matrix.balls()
         # u = (p - middle) / half of a float64 p: the rounding of `middle` is felt in units of `half`.
         axes = self.plant.axes
         argument = [ROUNDING * (1 + max(abs(axis.low), abs(axis.high)) / axis.half) for axis in axes]
-        return {
-            key: matrices[key].blurred(_evaluation_error(matrix, argument))
-            for key, matrix in self.plant.matrices.items()
-        }
+        return matrix.balls().blurred(_evaluation_error(matrix, argument, 0 if self.plant.is_polynomial else 1))
 
 
-def _evaluation_error(matrix: PolynomialMatrix, argument: Sequence[fmpq]) -> Any:
-    """Bound, entry by entry, of coefficients, powers and argument in float64 for |u| <= 1."""
-    count = (sum(matrix.degrees) + 1) ** 2
+def _evaluation_error(matrix: PolynomialMatrix, argument: Sequence[fmpq], more: int) -> Any:
+    """Bound, entry by entry, of coefficients, powers and argument in float64 for |u| <= 1; and of `more` roundings."""
+    count = (sum(matrix.degrees) + 1) ** 2 + more
 
     def radius(i: int, j: int) -> Any:
         total = fmpq(0)

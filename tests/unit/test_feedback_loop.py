@@ -243,8 +243,8 @@ def test_what_makes_no_loop_is_refused() -> None:
     with pytest.raises(ProblemError, match="makes no claims about continuous time"):
         loop.system(next(iter(loop.cells())), "continuous")
     rational_model = small_model([[-1 - 1 / p]], [[1]], (SchedulingParameter("p", "1", 1.0, 2.0, -1.0, 1.0),), B=[[1]])
-    with pytest.raises(ProblemError, match="rational"):
-        FeedbackLoop.constant_gain(plant_of(rational_model), exact(np.ones((1, 1))), sample_time=sampled)
+    with pytest.raises(ProblemError, match="in continuous time a rational plant is closed by state feedback only"):
+        FeedbackLoop.constant_gain(plant_of(rational_model), exact(np.ones((1, 1))), "outputs")
 
 
 def test_rational_plant_by_state_feedback() -> None:
@@ -259,6 +259,19 @@ def test_rational_plant_by_state_feedback() -> None:
         channel = ClaimChannel({"d1": 1.0}, (name,))
         assert search.prove(Wish("gain", gain * 1.01, channel))[0] is not None
         assert search.prove(Wish("gain", gain * 0.99, channel))[0] is None
+    # Once a sample x+ = e^(T/p) x + p (e^(T/p) - 1) (u + d); at frequency zero it is the same loop.
+    sampled = search_of(
+        FeedbackLoop.constant_gain(plant_of(model), fmpq_mat([[fmpq(-3, 2)]]), "outputs", decimal(PERIOD)), model
+    )
+    at = np.linspace(1.0, 2.0, 101)
+    kept = np.exp(PERIOD / at) - 1.5 * at * (np.exp(PERIOD / at) - 1.0)
+    slowest = -np.log(np.abs(kept).max()) / PERIOD
+    assert sampled.prove(Wish("sampled error", 0.999 * slowest))[0] is not None
+    assert sampled.prove(Wish("sampled error", 1.001 * slowest))[0] is None
+    for name, gain in (("x1", 2.0), ("u1", 3.0)):
+        channel = ClaimChannel({"d1": 1.0}, (name,))
+        assert sampled.prove(Wish("sampled gain", gain * 1.01, channel))[0] is not None
+        assert sampled.prove(Wish("sampled gain", gain * 0.99, channel))[0] is None
 
 
 def test_care_gain_of_a_continuous_loop() -> None:

@@ -174,6 +174,7 @@ def test_examples_are_complete() -> None:
         "pmsm-pi",
         "quarter-car",
         "satellite",
+        "single-track",
         "turbine-pitch",
         "vehicle-speed",
         "wind-turbine",

@@ -1,0 +1,185 @@
+"""The plant of a schedule file from its formulas and constants, exactly; what is stored must be that, rounded to float64."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly_ctx
+
+from estimators.errors import ScheduleError
+from estimators.schedule.check import HIGHEST_ORDER, SHAPES
+from synthesis.certificate.exact_fraction import MOST_WORK, ExactFraction, Work, common_denominator, numerator
+from synthesis.errors import ModelError
+from synthesis.loop.plant import Axis, Plant
+from synthesis.models.formula import parse, read, used
+from synthesis.polynomials.chebyshev import to_chebyshev
+from synthesis.polynomials.enclosure import PolynomialMatrix, constant
+from synthesis.polynomials.quotient import least
+from synthesis.polynomials.rational import decimal, rational
+
+LAST_DIGIT = fmpq(1, 2**51)  # of the sum of an entry's coefficients: what rounding them to float64 can change
+MOST_TEXT = 100_000  # characters of all formulas together
+HALVINGS = 40  # towards the zero of a denominator, for the message
+
+
+def rebuilt_plant(content: Mapping[str, Any], axes: tuple[Axis, ...], where: str, tied: bool) -> Plant:
+    """The plant of formulas and constants in powers of u, over one common denominator that is positive on the range.
+
+    The denominator is the least one, and one in the middle of the range. Raises ScheduleError or ModelError where formulas cannot
+    be read, where the denominator is not positive, and (if `tied`) for constants in no formula.
+    """
+    entries = _entries(content, axes, where, tied)
+    _refuse_poles(entries, axes, where)
+    try:
+        common = common_denominator(list(entries.values()))
+    except ModelError as error:
+        raise ModelError(f"{where}: model.matrices: {error}") from None
+    cells: dict[str, dict[tuple[int, ...], list[fmpq]]] = {key: {} for key in SHAPES}
+    shapes = {key: _shape(content, key) for key in SHAPES}
+    for (key, i, j), entry in entries.items():
+        place, (rows, columns) = f"{where}: model.matrices.{key}[{i}][{j}]", shapes[key]
+        try:
+            above = numerator(entry, common)
+        except ModelError as error:
+            raise ModelError(f"{place}: {error}") from None
+        for powers, coefficient in _powers(above, place).items():
+            cells[key].setdefault(powers, [fmpq(0)] * (rows * columns))[i * columns + j] = coefficient
+    matrices = {
+        key: PolynomialMatrix({powers: fmpq_mat(*shapes[key], entries) for powers, entries in found.items()},
+                              shapes[key], len(axes))
+        for key, found in cells.items()
+    }  # fmt: skip
+    one = constant(fmpq_mat([[1]]), len(axes))
+    if common is None:
+        return Plant(axes, matrices, one)
+    return Plant(axes, matrices, _scalar(common, f"{where}: model.matrices: denominator"))
+
+
+def _refuse_poles(entries: Mapping[tuple[str, int, int], ExactFraction], axes: tuple[Axis, ...], where: str) -> None:
+    """Raise ModelError for an entry whose denominator is not shown to keep its sign on the whole range."""
+    known: list[Any] = []
+    for (key, i, j), entry in entries.items():
+        if entry.below is None or entry.below in known:
+            continue
+        known.append(entry.below)
+        place = f"{where}: model.matrices.{key}[{i}][{j}]"
+        below = _scalar(entry.below, place)
+        middle = below.at((fmpq(0),) * len(axes))[0, 0]
+        below = below * (1 / middle) if middle != 0 else below
+        found = least(below)
+        if found.bound is None:
+            values = (
+                f"{axis.name} = {_float(axis.middle + axis.half * u):.6g} {axis.unit}"
+                for axis, u in zip(axes, _zero(below, found.place), strict=True)
+            )
+            raise ModelError(
+                f"{place}: divides by zero inside the range, at or near {', '.join(values)}; shrink the range"
+            )
+
+
+def _zero(below: PolynomialMatrix, place: tuple[fmpq, ...]) -> list[fmpq]:
+    """From the middle of the range, where it is positive, towards a place where it is not: where it vanishes in between."""
+    low, high = fmpq(0), fmpq(1)
+    for _ in range(HALVINGS if below.at(place)[0, 0] < 0 else 0):
+        share = (low + high) / 2
+        low, high = (share, high) if below.at([share * u for u in place])[0, 0] > 0 else (low, share)
+    return [high * u for u in place]
+
+
+def check_stored_plant(stored: Mapping[str, Any], plant: Plant, where: str) -> None:
+    """The stored float64 coefficients are the exact ones, rounded. Raises ScheduleError naming the entry."""
+    for key, matrix in plant.matrices.items():
+        _check_stored(stored[key], matrix, f"{where}: plant.{key}")
+    place = f"{where}: plant.denominator"
+    if plant.is_polynomial:
+        if "denominator" in stored:
+            raise ScheduleError(f"{place}: the formulas divide by no scheduling parameter; leave it out")
+        return
+    if "denominator" not in stored:
+        raise ScheduleError(f"{place}: is missing; the formulas divide by a scheduling parameter")
+    _check_stored(stored["denominator"], plant.denominator, place)
+
+
+def _entries(
+    content: Mapping[str, Any], axes: tuple[Axis, ...], where: str, tied: bool
+) -> dict[tuple[str, int, int], ExactFraction]:
+    """Every entry of every matrix, reduced."""
+    model = content["model"]
+    context = fmpq_mpoly_ctx.get(tuple(f"u{i}" for i in range(len(axes))), "lex")
+    if sum(len(text) for rows in model["matrices"].values() for row in rows for text in row) > MOST_TEXT:
+        raise ScheduleError(f"{where}: model.matrices: formulas of more than {MOST_TEXT} characters together")
+    work = Work(MOST_WORK)
+    values = {
+        axis.name: ExactFraction(context.gens()[i] * axis.half + axis.middle, work) for i, axis in enumerate(axes)
+    }
+    for name, entry in model["constants"].items():
+        if name in values:
+            raise ScheduleError(f"{where}: model.constants.{name}: is the name of a scheduling parameter, too")
+        values[name] = ExactFraction(context.constant(decimal(entry["value"])), work)
+    mentioned: set[str] = set()
+    found = {}
+    for key, rows in model["matrices"].items():
+        for i, row in enumerate(rows):
+            for j, text in enumerate(row):
+                place = f"{where}: model.matrices.{key}[{i}][{j}]"
+                tree = parse(text, place)
+                mentioned |= used(tree)
+                number = lambda x: ExactFraction(context.constant(fmpq(x.numerator, x.denominator)), work)  # noqa: E731
+                try:
+                    found[key, i, j] = read(tree, text.strip(), values, number, place).reduced
+                except ModelError as error:
+                    words = str(error)
+                    raise ModelError(words if words.startswith(where) else f"{place}: {words}") from None
+                _powers(found[key, i, j].above, place)
+    idle = sorted(set(model["constants"]) - mentioned)
+    if idle and tied:
+        raise ScheduleError(
+            f"{where}: model.constants.{idle[0]}: appears in no formula; what it says is tied to nothing"
+        )
+    return found
+
+
+def _scalar(polynomial: Any, place: str) -> PolynomialMatrix:
+    """A polynomial as a 1 x 1 matrix."""
+    terms = {powers: fmpq_mat([[c]]) for powers, c in _powers(polynomial, place).items()}
+    count = len(polynomial.context().gens())
+    return PolynomialMatrix(terms, (1, 1), count)
+
+
+def _powers(polynomial: Any, place: str) -> dict[tuple[int, ...], fmpq]:
+    """Coefficients by their powers of u."""
+    found: dict[tuple[int, ...], fmpq] = polynomial.to_dict()
+    if any(max(powers, default=0) > HIGHEST_ORDER for powers in found):
+        raise ModelError(f"{place}: has a power above {HIGHEST_ORDER} of a scheduling parameter")
+    return found
+
+
+def _shape(content: Mapping[str, Any], key: str) -> tuple[int, int]:
+    above, beside = SHAPES[key]
+    return len(content["model"][above]), len(content["model"][beside])
+
+
+def _check_stored(stored: Mapping[str, Any], exact: PolynomialMatrix, place: str) -> None:
+    """The stored float64 coefficients are the exact ones, rounded."""
+    wanted = to_chebyshev(exact)
+    given = {
+        tuple(orders): fmpq_mat(*exact.shape, [rational(number) for row in matrix for number in row])
+        for orders, matrix in zip(stored["orders"], stored["coefficients"], strict=True)
+    }
+    zero = fmpq_mat(*exact.shape, [fmpq(0)] * (exact.shape[0] * exact.shape[1]))
+    for i in range(exact.shape[0]):
+        for j in range(exact.shape[1]):
+            size = sum((abs(m[i, j]) for m in wanted.terms.values()), fmpq(0))
+            for orders in {*wanted.terms, *given}:
+                target, is_ = wanted.terms.get(orders, zero)[i, j], given.get(orders, zero)[i, j]
+                if abs(is_ - target) > size * LAST_DIGIT:
+                    raise ScheduleError(
+                        f"{place}: entry [{i}][{j}] of order {list(orders)} is {_float(is_):.17g}, "
+                        f"the formula and the constants give {_float(target):.17g}"
+                    )
+
+
+def _float(number: fmpq) -> float:
+    return float(Fraction(int(number.p), int(number.q)))
