@@ -12,6 +12,7 @@ from estimators.schedule.gain_schedule import (
     outside_range,
 )
 from estimators.schedule.plant import PlantPolynomial, PlantPolynomials
+from estimators.schedule.quotient import PlantQuotient
 from estimators.schedule.upgrade import FIRST_FORMAT, upgraded
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "PlantMatrices",
     "PlantPolynomial",
     "PlantPolynomials",
+    "PlantQuotient",
     "SchedulingParameter",
     "Signal",
     "Update",
