@@ -29,6 +29,7 @@ from analysis.simulation.simulation import Simulation
 from analysis.simulation.trajectories import random_trajectories
 from analysis.simulation.worst_input import worst_inputs
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.schedule import FIRST_FORMAT, GainSchedule, upgraded
 from synthesis.certificate.claims import (
     ERROR_EQUATION,
@@ -53,8 +54,8 @@ ROUGH, ROUNDS = 6, 20  # of the worst input, while searching and in the end
 ROUNDING, QUADRATURE = 1e-9, 1e-4  # relative, of samples and of continuous time: a level is not beaten by less
 
 
-@dataclass(frozen=True)
-class Amplification:
+@dataclass(frozen=True, repr=False)
+class Amplification(Display):
     """One claim: `level` in `unit`, and what runs show of it.
 
     `mean` and `largest` over the random trajectories (NaN for decay and for the error equation), `worst` along `trajectory`

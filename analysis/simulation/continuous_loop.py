@@ -10,12 +10,13 @@ from analysis.errors import AnalysisError
 from analysis.simulation.flow import held, moving
 from analysis.simulation.plants import matrices_of, times
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.schedule import GainSchedule
 
 ESTIMATE = "_estimate"  # ends the name of what the law thinks of a state
 
 
-class ContinuousLoop:
+class ContinuousLoop(Display):
     """xhat' = A xhat + B u + L(p) (y - C xhat - D u) beside x' = A x + B u + E d, one plant of the states (x, xhat).
 
     States of the law are called NAME_estimate. u and d are held over a sample, y is not; `between` as in `simulate`. The table of

@@ -9,6 +9,7 @@ import sympy as sp
 
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.errors import unknown
 from synthesis.models.nonlinear import NonlinearModel
 from synthesis.models.symbols import plain
@@ -16,7 +17,7 @@ from synthesis.models.symbols import plain
 NOISE = "_noise"  # ends the name of what is added to an output
 
 
-class NonlinearPlant:
+class NonlinearPlant(Display):
     """A `NonlinearModel` whose scheduling parameters are formulas of its own states and inputs.
 
     Args:

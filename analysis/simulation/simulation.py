@@ -8,11 +8,12 @@ import numpy as np
 
 from analysis.errors import AnalysisError
 from estimators.arrays import FlagArray, FloatArray
+from estimators.display import Display
 from estimators.errors import unknown
 
 
-@dataclass(frozen=True, eq=False)
-class Simulation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation(Display):
     """N samples of R runs. `time` (N+1,) in s; `state`, `estimate`, `parameter` (R, N+1, ..); held over each sample:
     `input`, `disturbance`, `measurement` (R, N, ..), `flags` (R, N).
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from estimators.arguments import LIMIT, batch, finite, mask, numbers, quiet
 from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.display import displayed
 from estimators.errors import EstimatorError, ScheduleError
 from estimators.lpv.inputs import SignalMonitor
 from estimators.lpv.law import Law
@@ -18,6 +19,7 @@ from estimators.memory import Renewable, Saved
 from estimators.schedule import GainSchedule
 
 
+@displayed({})
 class LpvControllerStep(NamedTuple):
     """What one step returns, ready for a log; leading axes are those of the batch."""
 

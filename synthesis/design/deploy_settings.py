@@ -8,11 +8,12 @@ from typing import Literal
 
 import numpy as np
 
+from estimators.display import Display
 from synthesis.errors import ProblemError
 
 
-@dataclass(frozen=True)
-class DeploySettings:
+@dataclass(frozen=True, repr=False)
+class DeploySettings(Display):
     """How gains become a table.
 
     >>> DeploySettings(sample_time=0.01, dtype="float32").dtype

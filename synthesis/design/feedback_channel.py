@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.errors import unknown
 from synthesis.certificate.claims import ClaimChannel
 from synthesis.certificate.verify import Names
@@ -14,8 +15,8 @@ from synthesis.errors import ProblemError
 from synthesis.models.lpv import LpvModel
 
 
-@dataclass(frozen=True)
-class FeedbackChannel:
+@dataclass(frozen=True, repr=False)
+class FeedbackChannel(Display):
     """The L2 gain from some disturbances to some performance signals: bounded by `bound`, or minimised if None.
 
     `performance` are names of states, outputs or inputs of the model. `weights` are the sizes of the disturbances that count as

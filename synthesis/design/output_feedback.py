@@ -10,10 +10,12 @@ what is claimed of it is proved of that table, whatever the inequalities here ha
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.design.feedback_channel import FeedbackChannel, check_channels
 from synthesis.design.generalised_plant import Frame, GeneralisedPlant, frame_of, generalised_plant, measured_rows
 from synthesis.design.output_feedback_lmi import Still, Wanted, build
@@ -32,14 +34,16 @@ from synthesis.models.numeric import values
 RATIONAL = 2  # degrees of P that come close to an inverse
 
 
-@dataclass(frozen=True)
-class OutputFeedbackDesign:
+@dataclass(frozen=True, repr=False)
+class OutputFeedbackDesign(Display):
     """What is asked of the controller.
 
     >>> gain = FeedbackChannel(("gust",), ("roll",), bound=2.0)
     >>> OutputFeedbackDesign((gain, FeedbackChannel(("noise",), ("aileron",))), decay_rate=0.5).minimised.name
     'noise -> aileron'
     """
+
+    shown_units: ClassVar = {"decay_rate": "1/s", "fastest_pole": "1/s"}
 
     channels: tuple[FeedbackChannel, ...]
     degree: int = 1  # of all unknowns in the parameters
@@ -73,8 +77,8 @@ class OutputFeedbackDesign:
         return next(channel for channel in self.channels if channel.bound is None)
 
 
-@dataclass(frozen=True)
-class OutputFeedback:
+@dataclass(frozen=True, repr=False)
+class OutputFeedback(Display):
     """A controller with the bound that was minimised.
 
     `gamma` is the level that the inequalities prove, `gamma_lower` a bound from below for every X and Y of these degrees in one

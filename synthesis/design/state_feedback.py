@@ -18,10 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from estimators.errors import unknown
 from synthesis.design.feedback_channel import FeedbackChannel, check_channels, feedback_channel_matrices
 from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
@@ -36,8 +38,8 @@ from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.matrix import MatrixPolynomial, symmetric_block
 
 
-@dataclass(frozen=True)
-class GainLimits:
+@dataclass(frozen=True, repr=False)
+class GainLimits(Display):
     """The largest |u_i| of some inputs for every state in the ellipsoid sum over j of (x_j / sizes_j)^2 <= 1.
 
     >>> GainLimits({"force": 3000.0}, {"deflection": 0.05, "speed": 0.5}).inputs["force"]
@@ -48,14 +50,16 @@ class GainLimits:
     sizes: Mapping[str, float]
 
 
-@dataclass(frozen=True)
-class StateFeedbackDesign:
+@dataclass(frozen=True, repr=False)
+class StateFeedbackDesign(Display):
     """What is asked of the gains.
 
     >>> road = FeedbackChannel(("road",), ("acceleration", "force"), sizes=(1.0, 500.0))
     >>> StateFeedbackDesign((road,), decay_rate=2.0, fastest_pole=400.0).minimised.name
     'road -> acceleration+force'
     """
+
+    shown_units: ClassVar = {"decay_rate": "1/s", "fastest_pole": "1/s"}
 
     channels: tuple[FeedbackChannel, ...]
     degree: int = 1  # of Q and Y in the parameters
@@ -89,8 +93,8 @@ class StateFeedbackDesign:
         return next(channel for channel in self.channels if channel.bound is None)
 
 
-@dataclass(frozen=True)
-class StateFeedbackGains:
+@dataclass(frozen=True, repr=False)
+class StateFeedbackGains(Display):
     """K(p) = Y(p) Q(p)^-1, u = K x (of a sampled design Y(p) G(p)^-1), with the bound that was minimised.
 
     `gamma_lower` is a bound from below for every Q and Y of this degree (weak duality, margins taken out), where there is one;

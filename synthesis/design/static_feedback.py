@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimators.arrays import FloatArray
+from estimators.display import Display
 from synthesis.design.generalised_plant import Frame, frame_of, generalised_plant
 from synthesis.design.refusals import refuse_undetectable, refuse_unstabilisable
 from synthesis.design.static_feedback_design import StaticFeedbackDesign
@@ -31,8 +32,8 @@ from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.matrix import MatrixPolynomial
 
 
-@dataclass(frozen=True)
-class StaticFeedback:
+@dataclass(frozen=True, repr=False)
+class StaticFeedback(Display):
     """K(p) with the level that its own analysis certifies; `levels` are those of the steps, in their order.
 
     `result` is the last solve, for P alone, `optimum` the one before it without back-off. There is no bound from below for all K.

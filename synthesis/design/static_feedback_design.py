@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
+from estimators.display import Display
 from synthesis.design.feedback_channel import FeedbackChannel, check_channels
 from synthesis.errors import ProblemError
 from synthesis.lmi.settings import LmiSettings
 
 
-@dataclass(frozen=True)
-class StaticFeedbackDesign:
+@dataclass(frozen=True, repr=False)
+class StaticFeedbackDesign(Display):
     """What is asked of the gains.
 
     `start` (nu, ny) are constant gains in physical units to begin with (None: zero). `uses` names pairs (input, output) that K
@@ -21,6 +23,8 @@ class StaticFeedbackDesign:
     >>> StaticFeedbackDesign((FeedbackChannel(("gust",), ("roll",)),), uses=(("aileron", "roll"),)).degree
     1
     """
+
+    shown_units: ClassVar = {"decay_rate": "1/s", "fastest_pole": "1/s"}
 
     channels: tuple[FeedbackChannel, ...]
     degree: int = 1  # of K and P in the parameters

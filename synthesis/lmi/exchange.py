@@ -26,6 +26,7 @@ from synthesis.lmi.settings import LmiSettings
 ROUNDS = 20
 MORE = 6  # places that one inequality gains in a round
 SHARE = 0.1  # of the worst violation; what is broken by less waits
+AT_ONCE = 50_000  # places whose inequality is worked out together: 16 x 16 of them are 100 MB
 EDGE = 1e-7  # every inequality is solved for with this margin, and half of it may be missing where it is only looked at
 KEPT, NEARLY = 12, 1e-4
 """Places of an inequality that the next problem starts with: the tightest ones, relative to its size."""
@@ -59,10 +60,14 @@ class Family:
         self.active.append(len(self.places) - 1)
         return True
 
+    def least(self, decisions: FloatArray) -> FloatArray:
+        """The least eigenvalue at every place (g,), worked out for AT_ONCE of them at a time: there may be millions."""
+        parts = np.split(self.places, range(AT_ONCE, len(self.places), AT_ONCE))
+        return np.concatenate([np.linalg.eigvalsh(self.known(decisions, part))[:, 0] for part in parts])
+
     def worst(self, decisions: FloatArray, slack: float) -> list[int]:
         """Indices of places that fall short by more than `slack`, worst first, no two of them neighbours."""
-        values = self.known(decisions, self.places)
-        least = np.linalg.eigvalsh(values)[:, 0]
+        least = self.least(decisions)
         least[self.active] = np.inf
         short = np.flatnonzero(least < -slack)
         chosen: list[int] = []

@@ -9,6 +9,7 @@ import pytest
 import sympy as sp
 
 from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer, observer_problem, timed_scale
+from synthesis.lmi import exchange as exchanges
 from synthesis.lmi.clarabel_backend import solve_with_clarabel
 from synthesis.lmi.conic import assemble
 from synthesis.lmi.exchange import exchange, families_of
@@ -161,3 +162,15 @@ def test_rates_decide_with_two_parameters_as_with_one() -> None:
     assert jumping.gamma <= constant.gamma * (1.0 + 1e-4)
     assert jumping.result.values["P"].degrees == (0, 0, 0, 0)
     assert max(jumping.result.values["X"].degrees) == 1
+
+
+def test_places_are_looked_at_in_pieces_of_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = two_parameters()
+    scale, clock = timed_scale(model, DESIGN)
+    families = families_of(problem := observer_problem(model, DESIGN, scale, clock=clock))
+    decisions = np.random.default_rng(0).standard_normal(problem.decisions)
+    at_once = [family.least(decisions) for family in families]
+    monkeypatch.setattr(exchanges, "AT_ONCE", 3)
+    assert max(len(family.places) for family in families) > 3
+    for family, wanted in zip(families, at_once, strict=True):
+        np.testing.assert_allclose(family.least(decisions), wanted, rtol=1e-12, atol=1e-12 * np.abs(wanted).max())
