@@ -101,6 +101,11 @@ def amplification(
 
     `samples` of a run; None: five decay times, 200 to 3000. Raises ScheduleError for a content that is no schedule, and
     AnalysisError for counts below one or beyond memory.
+
+    >>> from estimators.schedule import SHIPPED, read_content
+    >>> found = amplification(read_content(SHIPPED / "longitudinal-speed.json"), runs=2, samples=60)
+    >>> any(one.beaten for one in found)
+    False
     """
     if content.get("schema") == FIRST_FORMAT:
         content = upgraded(content, "schedule content")

@@ -22,6 +22,9 @@ class ContinuousLoop(Display):
     States of the law are called NAME_estimate. u and d are held over a sample, y is not; `between` as in `simulate`. The table of
     gains is multilinear: steps across a breakpoint are of a lower order. Raises AnalysisError for a schedule whose gains correct
     once a sample: they are no L.
+
+    >>> ContinuousLoop(GainSchedule.shipped("longitudinal-speed")).states[2:]
+    ('bristle_deflection_estimate', 'relative_velocity_estimate')
     """
 
     def __init__(self, schedule: GainSchedule, between: Literal["held", "moving"] = "moving", parts: int = 2) -> None:

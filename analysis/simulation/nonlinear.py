@@ -28,6 +28,16 @@ class NonlinearPlant(Display):
         parts: steps of the classical Runge-Kutta method over a sample, inputs and disturbances held.
 
     Raises AnalysisError for names that the model does not have.
+
+    >>> import sympy as sp
+    >>> angle, rate, torque = sp.symbols("angle rate torque")
+    >>> pendulum = NonlinearModel(
+    ...     "pendulum", "example", (Signal("angle", "rad"), Signal("rate", "rad/s")), (Signal("seen", "rad"),),
+    ...     inputs=(Signal("torque", "1/s^2"),), f=sp.Matrix([rate, torque - 9.81 * sp.sin(angle)]), h=sp.Matrix([angle]),
+    ... )
+    >>> plant = NonlinearPlant(pendulum, {"cosine": sp.cos(angle)}, disturbances=("torque",))
+    >>> plant.disturbances
+    ('torque', 'seen_noise')
     """
 
     def __init__(

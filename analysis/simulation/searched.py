@@ -16,7 +16,8 @@ from analysis.simulation.box import box_of
 from analysis.simulation.channel import channel_of
 from analysis.simulation.linear import Linear
 from estimators.arrays import FloatArray
-from estimators.schedule import GainSchedule
+from estimators.schedule import GainSchedule, PlantQuotient
+from estimators.schedule.plant import PlantPolynomial, PlantPolynomials
 from synthesis.certificate.claims import ERROR_EQUATION, ClaimChannel
 from synthesis.loop.plant import Axis
 from synthesis.polynomials.rational import decimal
@@ -25,6 +26,7 @@ EVALUATIONS = 40  # of the search for slow decay
 GENERATIONS, BEST, CHILDREN, CHANGE = 2, 4, 8, 0.4  # of the search for large gains
 PARTS = 16  # intervals of every piece of a path of the error equation
 SHORT = 400  # samples of a run while searching
+CLOSE = 2  # degrees by which a polynomial exceeds those of a quotient that it stands for
 Measure = Callable[[Linear], FloatArray]  # of systems along trajectories (R, N+1, ..): how bad each is (R,)
 
 
@@ -38,8 +40,11 @@ class ScheduleQuestion:
 
     @property
     def order(self) -> int:
-        """One more than the degree of the error equation along a line in one cell: that of the plant, and of L times C."""
-        degrees = {key: sum(max(n - 1, 0) for n in m.coefficients.shape[:-2]) for key, m in self.schedule.plant.items()}
+        """One more than the degree of the error equation along a line in one cell: that of the plant, and of L times C.
+
+        A rational plant counts as a polynomial that comes close to it over the short pieces of a trajectory.
+        """
+        degrees = {key: _degree(matrix) for key, matrix in self.schedule.plant.items()}
         most: int = max(*(degrees[key] for key in "AE"), *(degrees[key] + len(self.axes) for key in "CF"))
         return 1 + most
 
@@ -144,3 +149,9 @@ def largest_continuous_gain(question: ScheduleQuestion, count: int) -> tuple[flo
     if along > gain:
         return along, question.repeated(path, count)
     return gain, np.broadcast_to(question.physical(place[None]), (count, len(place)))
+
+
+def _degree(matrix: PlantPolynomial | PlantPolynomials | PlantQuotient) -> int:
+    if isinstance(matrix, PlantQuotient):
+        return _degree(matrix.numerator) + 2 * _degree(matrix.denominator) + CLOSE
+    return sum(max(n - 1, 0) for n in matrix.coefficients.shape[:-2])

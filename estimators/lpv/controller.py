@@ -54,6 +54,17 @@ class LpvController(Renewable):
     Raises:
         EstimatorError: an option that means nothing.
         ScheduleError: the schedule of an observer, or gains beyond what float64 can multiply.
+
+    >>> import sympy as sp
+    >>> one = {key: (Signal(name, "1"),) for key, name in zip(("states", "inputs", "outputs", "disturbances"), "xuyw")}
+    >>> A, B = sp.Matrix([[sp.Symbol("p")]]), sp.Matrix([[1]])
+    >>> p = SchedulingParameter("p", "1", 1.0, 2.0, -1.0, 1.0)
+    >>> plant = LpvModel(name="unstable", source="example", parameters=(p,), A=A, B=B, C=B, E=B, **one)
+    >>> asked = StateFeedbackDesign((FeedbackChannel(("w",), ("x", "u")),), backoff=0.3)
+    >>> deployment = deploy(design_sampled_state_feedback(plant, asked, 0.05), DeploySettings(sample_time=0.05))
+    >>> controller = LpvController(GainSchedule.from_content(schedule_content(deployment, "unstable")))
+    >>> float(controller.step(0.1, 1.5).command[0]) < 0.0  # pushes back
+    True
     """
 
     memory = ("_state", "_command", "waiting", "samples", "renewed")

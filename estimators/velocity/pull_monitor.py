@@ -95,7 +95,9 @@ class PullMonitor(Judge):
             (seen.good[0], known, near),
         )
         (verdict,), _ = vote(kit, PULL, told, (no(seen.alive),), (self._always,))
-        left = self.left(elapsed, verdict, before)
+        # one that repeats what the others say, as at rest, has done nothing wrong: it is believed as soon as it lives
+        blameless = no(seen.alive) & verdict.supported & no(verdict.contradicted)
+        left = self.left(elapsed, verdict._replace(wrong=verdict.wrong & no(blameless)), before)
         self.remaining = left
         used = seen.alive & (left == 0.0)
         with_force = no(used) & known

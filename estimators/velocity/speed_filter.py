@@ -73,7 +73,7 @@ class SpeedFilter(Memory):
         self._kept = int(packed[self.learned, self.learned]) if self.learned < n else rows.size
         self._packed = self.prior[rows, columns][:, None]
         self.mean: Number = np.repeat(self.prior_mean[:, None], self.count, axis=1)
-        self._places: dict[int, tuple[list[tuple[IntArray, IntArray]], Columns]] = {}
+        self._places: dict[Columns, list[tuple[IntArray, IntArray]]] = {}  # of the columns that are asked for
         self.spread: Number = np.repeat(self._packed, self.count, axis=1)
         self.waiting: Number = np.zeros((2, self.count))  # s and m since the parameters last forgot
 
@@ -132,18 +132,17 @@ class SpeedFilter(Memory):
 
     def expect(self, columns: Columns, values: Values) -> Signals:
         """h P h' of each channel; `weigh` takes the channels from here."""
-        known = self._places.get(id(columns))  # kept below, so no other object gets its number
+        known = self._places.get(columns)
         if known is None:
-            places = np.array(columns).T
-            known = self._places[id(columns)] = [(place, self._at[place]) for place in places], columns
+            known = self._places[columns] = [(place, self._at[place]) for place in np.array(columns).T]
         shape = len(columns), self.count
         W: Number = 0.0
         S: Number = 0.0
         given = (np.asarray(value) for value in values)
         H = [value if value.shape == shape else np.broadcast_to(value, shape) for value in given]
-        for h, (_, rows) in zip(H, known[0], strict=True):
+        for h, (_, rows) in zip(H, known, strict=True):
             W = W + h[:, None] * self.spread[rows]
-        for h, (place, _) in zip(H, known[0], strict=True):
+        for h, (place, _) in zip(H, known, strict=True):
             S = S + h * W[:, place]
         self._W, self._S = W, S  # (m, n, b) P h', (m, m, b) H P H'
         out: Signals = S.diagonal().T

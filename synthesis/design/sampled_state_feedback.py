@@ -48,6 +48,15 @@ def design_sampled_state_feedback(
     """K(p) for the given sample time (s); `gamma` is the l2 gain over samples.
 
     Raises ProblemError for a rational model, for pole regions (of poles in continuous time), and as `design_state_feedback`.
+
+    >>> import sympy as sp
+    >>> one = {key: (Signal(name, "1"),) for key, name in zip(("states", "inputs", "outputs", "disturbances"), "xuyw")}
+    >>> A, B = sp.Matrix([[sp.Symbol("p")]]), sp.Matrix([[1]])
+    >>> p = SchedulingParameter("p", "1", 1.0, 2.0, -1.0, 1.0)
+    >>> plant = LpvModel(name="unstable", source="example", parameters=(p,), A=A, B=B, C=B, E=B, **one)
+    >>> asked = StateFeedbackDesign((FeedbackChannel(("w",), ("x", "u")),), backoff=0.3)
+    >>> print(design_sampled_state_feedback(plant, asked, sample_time=0.05).verdict)
+    certified
     """
     if not sample_time > 0.0:
         raise ProblemError(f"sample time {sample_time} s must be positive")

@@ -76,6 +76,16 @@ def design_static_feedback(model: LpvModel, design: StaticFeedbackDesign) -> Sta
 
     Raises ProblemError for a plant that is rational, hides an unstable mode or has outputs that the inputs act on at once, for
     names that are unknown, and if no step leads to a stable loop: another start may.
+
+    >>> import sympy as sp
+    >>> one = {key: (Signal(name, "1"),) for key, name in zip(("states", "inputs", "outputs", "disturbances"), "xuyw")}
+    >>> A, B = sp.Matrix([[sp.Symbol("p")]]), sp.Matrix([[1]])
+    >>> p = SchedulingParameter("p", "1", 1.0, 2.0, -1.0, 1.0)
+    >>> plant = LpvModel(name="unstable", source="example", parameters=(p,), A=A, B=B, C=B, E=B, **one)
+    >>> asked = StaticFeedbackDesign((FeedbackChannel(("w",), ("x", "u")),), backoff=0.3)
+    >>> found = design_static_feedback(plant, asked)
+    >>> print(found.verdict, found.gain([1.0, 2.0]).shape)
+    certified (2, 1, 1)
     """
     refuse_unstabilisable(model)
     refuse_undetectable(model)
