@@ -117,31 +117,35 @@ def to_si(text: object, target: str) -> float:
     return float(match[1]) * factor_to(match[2], target)
 
 
-def _quantity(target: str, lowest: float, *, inclusive: bool) -> Callable[[object], float]:
+def _quantity(target: str, lowest: float, highest: float, *, inclusive: bool) -> Callable[[object], float]:
+    """Reads a number with its unit; what no car, log or manoeuvre can have is refused, not computed with."""
+    bound = f"{'at least' if inclusive else 'above'} {lowest:g} {target}, at most {highest:g}"
+    if lowest < 0.0:
+        bound = f"between {lowest:g} and {highest:g} {target}"
+
     def read(text: object) -> float:
         value = to_si(text, target)
-        if not math.isfinite(value) or value < lowest or (value == lowest and not inclusive):
-            bound = "at least" if inclusive else "above"
-            raise ValueError(f"'{text}' is out of range; it must be finite and {bound} {lowest:g} {target}")
+        if not lowest <= value <= highest or (value == lowest and not inclusive):
+            raise ValueError(f"'{text}' is out of range; it must be finite and {bound}")
         return value
 
     return read
 
 
-Mass = Annotated[float, BeforeValidator(_quantity("kg", 0.0, inclusive=False))]
-Length = Annotated[float, BeforeValidator(_quantity("m", 0.0, inclusive=False))]
-Inertia = Annotated[float, BeforeValidator(_quantity("kg*m^2", 0.0, inclusive=False))]
-Duration = Annotated[float, BeforeValidator(_quantity("s", 0.0, inclusive=False))]
-Stiffness = Annotated[float, BeforeValidator(_quantity("N/rad", 0.0, inclusive=False))]
-Lag = Annotated[float, BeforeValidator(_quantity("s", 0.0, inclusive=True))]
-Offset = Annotated[float, BeforeValidator(_quantity("s", -math.inf, inclusive=False))]
-Spring = Annotated[float, BeforeValidator(_quantity("N/m", 0.0, inclusive=False))]
-Damper = Annotated[float, BeforeValidator(_quantity("N*s/m", 0.0, inclusive=True))]
-Damping = Annotated[float, BeforeValidator(_quantity("N*m*s/rad", 0.0, inclusive=True))]
-Place = Annotated[float, BeforeValidator(_quantity("m", -math.inf, inclusive=False))]
-Angle = Annotated[float, BeforeValidator(_quantity("rad", -math.inf, inclusive=False))]
-Velocity = Annotated[float, BeforeValidator(_quantity("m/s", -math.inf, inclusive=False))]
-Torque = Annotated[float, BeforeValidator(_quantity("N*m", 0.0, inclusive=False))]
-Power = Annotated[float, BeforeValidator(_quantity("W", 0.0, inclusive=False))]
-Rate = Annotated[float, BeforeValidator(_quantity("Hz", 0.0, inclusive=False))]
-AngularSpeed = Annotated[float, BeforeValidator(_quantity("rad/s", 0.0, inclusive=True))]
+Mass = Annotated[float, BeforeValidator(_quantity("kg", 0.0, 1e6, inclusive=False))]
+Length = Annotated[float, BeforeValidator(_quantity("m", 0.0, 1e6, inclusive=False))]
+Inertia = Annotated[float, BeforeValidator(_quantity("kg*m^2", 0.0, 1e9, inclusive=False))]
+Duration = Annotated[float, BeforeValidator(_quantity("s", 0.0, 1e7, inclusive=False))]
+Stiffness = Annotated[float, BeforeValidator(_quantity("N/rad", 0.0, 1e9, inclusive=False))]
+Lag = Annotated[float, BeforeValidator(_quantity("s", 0.0, 10.0, inclusive=True))]
+Offset = Annotated[float, BeforeValidator(_quantity("s", -1e11, 1e11, inclusive=True))]
+Spring = Annotated[float, BeforeValidator(_quantity("N/m", 0.0, 1e12, inclusive=False))]
+Damper = Annotated[float, BeforeValidator(_quantity("N*s/m", 0.0, 1e9, inclusive=True))]
+Damping = Annotated[float, BeforeValidator(_quantity("N*m*s/rad", 0.0, 1e9, inclusive=True))]
+Place = Annotated[float, BeforeValidator(_quantity("m", -1e4, 1e4, inclusive=True))]
+Angle = Annotated[float, BeforeValidator(_quantity("rad", -1e3, 1e3, inclusive=True))]
+Velocity = Annotated[float, BeforeValidator(_quantity("m/s", -1e3, 1e3, inclusive=True))]
+Torque = Annotated[float, BeforeValidator(_quantity("N*m", 0.0, 1e8, inclusive=False))]
+Power = Annotated[float, BeforeValidator(_quantity("W", 0.0, 1e10, inclusive=False))]
+Rate = Annotated[float, BeforeValidator(_quantity("Hz", 0.0, 1e7, inclusive=False))]
+AngularSpeed = Annotated[float, BeforeValidator(_quantity("rad/s", 0.0, 1e5, inclusive=True))]
