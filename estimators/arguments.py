@@ -43,6 +43,18 @@ def broadcast(value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> FloatA
         raise EstimatorError(f"{what} has shape {array.shape}, expected {shape} or what broadcasts to it") from error
 
 
+def vectors(value: npt.ArrayLike, shape: tuple[int, ...], size: int, what: str) -> FloatArray:
+    """`value` of (*shape, size) as (entries, size); the last axis may be left out where it is one long.
+
+    Raises:
+        EstimatorError: not numbers, or another shape.
+    """
+    array, wanted = numbers(value, what), (*shape, size)
+    if array.shape != wanted and not (size == 1 and array.shape == shape):
+        raise EstimatorError(f"{what} has shape {array.shape}, expected {wanted}")
+    return array.reshape(math.prod(shape), size)
+
+
 def entries(value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> FloatArray:
     """`value` as float64 of `shape`; one number stands for all entries.
 

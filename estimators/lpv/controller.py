@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arguments import LIMIT, batch, finite, mask, numbers, quiet
-from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.arguments import LIMIT, batch, finite, mask, quiet, vectors
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.display import displayed
 from estimators.errors import EstimatorError, ScheduleError
 from estimators.lpv.inputs import SignalMonitor
 from estimators.lpv.law import Law
-from estimators.memory import Renewable, Saved
 from estimators.schedule import GainSchedule
+from estimators.schedule.runtime import SavedWithSchedule, check_options
 
 
 @displayed({})
@@ -30,7 +29,7 @@ class LpvControllerStep(NamedTuple):
     parameter: FloatArray  # (..., parameters) that were used
 
 
-class LpvController(Renewable):
+class LpvController(SavedWithSchedule):
     """u = Ck(p) xk + Dk(p) v, xk+ = Ak(p) xk + Bk(p) v once a sample, v the plant's states or outputs; static where it has no xk.
 
     The gains are the table that was proved (`gainsmith certify`); proofs are about commands within the limits.
@@ -80,10 +79,7 @@ class LpvController(Renewable):
     ) -> None:
         if schedule.update != "feedback":
             raise ScheduleError(f"schedule '{schedule.name}' is that of an observer; take LpvObserver")
-        if outside not in ("flag", "refuse"):
-            raise EstimatorError(f"outside = {outside!r} is not known; use 'flag' or 'refuse'")
-        if stale_after is not None and stale_after < 1:
-            raise EstimatorError(f"stale_after = {stale_after} samples must be at least 1, or None")
+        check_options(outside, stale_after)
         if hold < 0:
             raise EstimatorError(f"hold = {hold} samples must not be negative")
         super().__init__(batch(batch_shape))
@@ -112,8 +108,8 @@ class LpvController(Renewable):
             RangeError: outside the certified box, if the controller refuses that; nothing is changed then.
         """
         shape = self.batch_shape
-        v = self._signals(measurement, self.law.measured, "measurement")
-        p = self._signals(parameter, len(self.schedule.parameters), "parameter")
+        v = vectors(measurement, self.batch_shape, self.law.measured, "measurement")
+        p = vectors(parameter, self.batch_shape, len(self.schedule.parameters), "parameter")
         seen = self.monitor(np.zeros((len(v), 0)), v, p, self.samples, shape)
         found = self.law.advance(self._state, self._command, seen.measurement, seen.parameter)
         state, command, limited = found
@@ -144,12 +140,6 @@ class LpvController(Renewable):
             flags,
             seen.parameter.reshape(*shape, len(self.schedule.parameters)),
         )
-
-    def _signals(self, value: npt.ArrayLike, size: int, what: str) -> FloatArray:
-        array, wanted = numbers(value, what), (*self.batch_shape, size)
-        if array.shape != wanted and not (size == 1 and array.shape == self.batch_shape):
-            raise EstimatorError(f"{what} has shape {array.shape}, expected {wanted}")
-        return array.reshape(math.prod(self.batch_shape), size)
 
     def reset(self, where: npt.ArrayLike | None = None) -> None:
         """Sets the entries `where` (mask of the batch shape; None: all) to rest: state zero, the command nearest to zero.
@@ -186,7 +176,8 @@ class LpvController(Renewable):
             (parameter, count, "parameter"),
         )
         u, v, p = (
-            finite(self._signals(value, size, what), (len(flat), size), what)[flat] for value, size, what in sizes
+            finite(vectors(value, self.batch_shape, size, what), (len(flat), size), what)[flat]
+            for value, size, what in sizes
         )
         within = self.schedule.certified(p if count > 1 else p[:, 0]).reshape(len(u), count)
         self._forget(chosen)
@@ -198,12 +189,3 @@ class LpvController(Renewable):
         self._state[flat], self._command[flat], self.waiting[flat] = 0.0, self.law.rest, 0
         self.monitor.forget(flat)
         self._renew(chosen)
-
-    def save(self) -> Saved:
-        """Everything needed to continue later, and the digest of the schedule, as plain arrays."""
-        return super().save() | {"schedule_sha256": np.array(self.schedule.sha256)}
-
-    def _check(self, saved: Mapping[str, AnyArray]) -> None:
-        if "schedule_sha256" in saved and str(saved["schedule_sha256"]) != self.schedule.sha256:
-            raise EstimatorError(f"saved with another schedule than '{self.schedule.name}' {self.schedule.sha256[:12]}")
-        super()._check(saved)

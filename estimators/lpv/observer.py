@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arguments import LIMIT, batch, finite, mask, numbers, quiet
-from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.arguments import LIMIT, batch, finite, mask, quiet, vectors
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.display import displayed
-from estimators.errors import EstimatorError
 from estimators.lpv.exact_step import ExactStep
 from estimators.lpv.inputs import SignalMonitor
-from estimators.memory import Renewable, Saved
 from estimators.schedule import GainSchedule
+from estimators.schedule.runtime import SavedWithSchedule, check_options
 
 _CHUNK = 4096  # entries worked on at once: what lies between the operations stays in the cache
 
@@ -32,7 +30,7 @@ class LpvObserverStep(NamedTuple):
     parameter: FloatArray  # (..., parameters) that were used
 
 
-class LpvObserver(Renewable):
+class LpvObserver(SavedWithSchedule):
     """xhat' = A(p) xhat + B(p) u + L(p) (y - C(p) xhat - D(p) u), updated exactly with u, y and p held over a sample.
 
     A schedule whose update is "sampled" instead predicts exactly with u and p held and adds K(p) (y - C(p) xhat - D(p) u) once a
@@ -68,10 +66,7 @@ class LpvObserver(Renewable):
         outside: Literal["flag", "refuse"] = "flag",
         stale_after: int | None = None,
     ) -> None:
-        if outside not in ("flag", "refuse"):
-            raise EstimatorError(f"outside = {outside!r} is not known; use 'flag' or 'refuse'")
-        if stale_after is not None and stale_after < 1:
-            raise EstimatorError(f"stale_after = {stale_after} samples must be at least 1, or None")
+        check_options(outside, stale_after)
         super().__init__(batch(batch_shape))
         self.schedule, count = schedule, math.prod(self.batch_shape)
         self.exact = ExactStep(schedule)
@@ -97,9 +92,9 @@ class LpvObserver(Renewable):
             RangeError: outside the certified box, if the observer refuses that; the state is then unchanged.
         """
         shape = self.batch_shape
-        u = self._signals(held_input, self.sizes[1], "input")
-        y = self._signals(measurement, self.sizes[2], "measurement")
-        p = self._signals(parameter, len(self.schedule.parameters), "parameter")
+        u = vectors(held_input, self.batch_shape, self.sizes[1], "input")
+        y = vectors(measurement, self.batch_shape, self.sizes[2], "measurement")
+        p = vectors(parameter, self.batch_shape, len(self.schedule.parameters), "parameter")
         seen = self.monitor(u, y, p, self.samples, shape)
         used = None if seen.coast is None else ~seen.coast
         innovation = np.empty_like(y)
@@ -129,12 +124,6 @@ class LpvObserver(Renewable):
             seen.parameter.reshape(*shape, len(self.schedule.parameters)),
         )
 
-    def _signals(self, value: npt.ArrayLike, size: int, what: str) -> FloatArray:
-        array, wanted = numbers(value, what), (*self.batch_shape, size)
-        if array.shape != wanted and not (size == 1 and array.shape == self.batch_shape):
-            raise EstimatorError(f"{what} has shape {array.shape}, expected {wanted}")
-        return array.reshape(math.prod(self.batch_shape), size)
-
     def reset(self, where: npt.ArrayLike | None = None, state: npt.ArrayLike = 0.0) -> None:
         """Sets the entries `where` (mask of the batch shape; None: all) to `state` and forgets what they have seen.
 
@@ -148,12 +137,3 @@ class LpvObserver(Renewable):
         self._state[flat] = full.reshape(-1, self.sizes[0])[flat]
         self.monitor.forget(flat)
         self._renew(chosen)
-
-    def save(self) -> Saved:
-        """Everything needed to continue later, and the digest of the schedule, as plain arrays."""
-        return super().save() | {"schedule_sha256": np.array(self.schedule.sha256)}
-
-    def _check(self, saved: Mapping[str, AnyArray]) -> None:
-        if "schedule_sha256" in saved and str(saved["schedule_sha256"]) != self.schedule.sha256:
-            raise EstimatorError(f"saved with another schedule than '{self.schedule.name}' {self.schedule.sha256[:12]}")
-        super()._check(saved)

@@ -11,10 +11,8 @@ from estimators.arrays import FloatArray
 from estimators.errors import ScheduleError
 from estimators.schedule.plant import PlantPolynomial, PlantPolynomials, chebyshev
 
-_MOST_PARTS, _MOST_NUMBERS = (
-    50_000,
-    100_000_000,
-)  # of the range, before the denominator counts as zero somewhere; of all terms
+_MOST_PARTS = 50_000  # of the range, before the denominator counts as zero somewhere
+_MOST_NUMBERS = 100_000_000  # of all terms
 _CHUNK = 1_000_000  # numbers at once
 _KEPT = 0.8  # of its value in the middle of a part a denominator keeps on all of it
 

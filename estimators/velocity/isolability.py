@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from estimators.arithmetic import arithmetic
 from estimators.velocity.parity import CONDITIONS, RELATIONS, SIDE, TURN, UNLEVELLED, Relation, Witness
-from estimators.velocity.signal_vote import Told, vote
+from estimators.velocity.signal_vote import Readings, vote
 
 Residual = tuple[str, str, str]
 """The relation, and its two witnesses."""
@@ -92,7 +92,9 @@ def _reported(group: tuple[str, ...], levelled: bool, repeating: bool, large: bo
         blank = [0.0] * (len(relation.witnesses) - len(level))
         stuck = tuple(repeating and rule.signal in group for rule in relation.rules)
         plausible = tuple(large or not rule.one_sided for rule in relation.rules)
-        told = Told((*level, *blank), (0.1,) * len(relation.witnesses), (True,) * len(level) + (False,) * len(blank))
-        verdicts, _ = vote(arithmetic(()), relation, told, stuck, plausible)
+        readings = Readings(
+            (*level, *blank), (0.1,) * len(relation.witnesses), (True,) * len(level) + (False,) * len(blank)
+        )
+        verdicts, _ = vote(arithmetic(()), relation, readings, stuck, plausible)
         found += [rule.signal for rule, verdict in zip(relation.rules, verdicts, strict=True) if verdict.wrong]
     return tuple(found)

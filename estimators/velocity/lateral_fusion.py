@@ -9,7 +9,7 @@ friction coefficient enters. alpha is positive where F_y is (P4, P5), the opposi
 alone, so mu needs no bank.
 
 Every axle on one road: where one is further off than its model explains, neither is believed more than that, for a second
-(`strain`); an axle without side force is, and leads V_y back, for it does not slip sideways on any road.
+(`axle_error`); an axle without side force is, and leads V_y back, for it does not slip sideways on any road.
 
 Two scale errors decide how far the kinematics may be believed in a turn, where a and r V_x are large and cancel: s is that
 of a, sensor and leftover body roll; s_t is that of the product r V_x, of the yaw rate sensor and of the speed, whose error
@@ -50,7 +50,7 @@ class AxleUpdate(NamedTuple):
 class LateralFusion(CarsMemory):
     """V_y filter of `count` cars."""
 
-    memory = ("strain", "bend")
+    memory = ("axle_error", "bend")
 
     def __init__(self, vehicle: VehicleParameters, settings: FusionSettings, every: int, count: int) -> None:
         s = self.settings = settings
@@ -63,7 +63,7 @@ class LateralFusion(CarsMemory):
         rates[BIAS:BANK], rates[TIRES:] = 1.0 / s.sensor_memory, 1.0 / s.side_memory
         spread = np.diag([*body, *np.square(tires)])
         self.filter = speed_filter(mean, spread, rates, (BANK, 1.0 / s.road_length), SIZE, every, count)
-        self.strain: Number = self.kit.full(0.0)  # m/s by which axles have been off of late
+        self.axle_error: Number = self.kit.full(0.0)  # m/s by which axles have been off of late
         self.bend: Signals = self.kit.stacked([self.kit.full(0.0)] * 2)  # side slip per F_y/F_z beyond c_1, rad
         self._both = self.kit.signals((1.0, 1.0))
         self._sensor = s.scale**2 / turn_scale  # share of the yaw rate sensor in s_t
@@ -113,7 +113,7 @@ class LateralFusion(CarsMemory):
         `present`) the axles are all there is, and believed again.
         """
         travel = elapsed * speed
-        self.strain = self.kit.where(present, self.strain, 0.0)
+        self.axle_error = self.kit.where(present, self.axle_error, 0.0)
         coupling = (-elapsed, -elapsed, travel, -elapsed * measured, travel * yaw_rate)
         if self.kit.some(self.kit.no(believed)):
             x, choose = self.filter.mean, self.kit.where
@@ -149,8 +149,8 @@ class LateralFusion(CarsMemory):
         held = largest(1.0, 2.0 * s.side_error_memory / elapsed)
         sensed, one, gate = self._sensor * yaw_rate, kit.full(1.0), s.gate**2
         kept, sure = kit.exp(-elapsed / s.lost_time), s.unloaded - s.gate * doubt / GRAVITY
-        slid = self.strain > s.dead_speed
-        strain, pace = self.strain * self.strain, largest(magnitude, 1.0)
+        slid = self.axle_error > s.dead_speed
+        axle_error, rolling = self.axle_error * self.axle_error, largest(magnitude, 1.0)
 
         def predicted(
             angle: Number,
@@ -175,7 +175,7 @@ class LateralFusion(CarsMemory):
             values = (one, steep, -arm * one, steep * measured, -arm * sensed, linear, linear * square)
             unknown = steep * doubt
             # what the tires slip sideways by the kinematics, beyond the straight line
-            beyond = (abs(innovation + magnitude * side) - sigma) / pace - c1 * abs(mu)
+            beyond = (abs(innovation + magnitude * side) - sigma) / rolling - c1 * abs(mu)
             excess = smallest(largest(beyond, 0.0) * abs(mu) / largest(square, _TOLD), _STEEPEST)
             return innovation, mu, sigma * sigma + unknown * unknown, white, excess, *values
 
@@ -194,12 +194,12 @@ class LateralFusion(CarsMemory):
             shows, error = linear * s.side_compliance_spread, white + model
             calm = abs(friction) < sure
             far = usable & kit.no((calm & slid) | (off * off < gate * (explained + error)))
-            wide = white + (model + kit.where(calm, 0.0, strain)) * held
+            wide = white + (model + kit.where(calm, 0.0, axle_error)) * held
             return usable & kit.no(far), wide, shows * shows > error, kit.where(far & kit.no(calm), abs(off), 0.0)
 
         explained = self.filter.expect(_SEEN, values)
         used, variance, excited, beyond = kit.each(judged, explained, innovation, model, white, values[5], mu, usable)
-        self.strain = kit.maximum(kept * self.strain, kit.maximum(*beyond))
+        self.axle_error = kit.maximum(kept * self.axle_error, kit.maximum(*beyond))
         self.filter.weigh(innovation, variance, used)
         bent = kit.exp(-elapsed / s.error_memory)
         (self.bend,) = kit.each(lambda old, new: (bent * old + (1.0 - bent) * new,), self.bend, excess)

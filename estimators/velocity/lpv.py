@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from estimators.arguments import LIMIT, batch, entries, finite, mask, quiet
-from estimators.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.display import displayed
 from estimators.errors import EstimatorError
-from estimators.memory import Renewable, Saved
+from estimators.memory import Renewable
 from estimators.schedule import GainSchedule
+from estimators.schedule.runtime import SavedWithSchedule, check_options
 from estimators.velocity.exact_update import ExactUpdate, refuse_explosive
 from estimators.velocity.input_monitor import FEW, InputMonitor, MonitoredInputs
 
@@ -64,10 +64,7 @@ class TwoStateObserver(Renewable):
                     "this observer is for 2, 1 and 1"
                 )
             refuse_explosive(schedule)
-        if outside not in ("flag", "refuse"):
-            raise EstimatorError(f"outside = {outside!r} is not known; use 'flag' or 'refuse'")
-        if stale_after is not None and stale_after < 1:
-            raise EstimatorError(f"stale_after = {stale_after} samples must be at least 1, or None")
+        check_options(outside, stale_after)
         super().__init__(batch(batch_shape))
         self.schedule, count = schedules[0], math.prod(self.batch_shape)
         self._updates = tuple(ExactUpdate(schedule) for schedule in schedules)
@@ -155,7 +152,7 @@ class TwoStateObserver(Renewable):
         self._renew(chosen)
 
 
-class LpvVelocityObserver(TwoStateObserver):
+class LpvVelocityObserver(SavedWithSchedule, TwoStateObserver):
     """xhat' = A(p) xhat + B u + L(p) (y - C(p) xhat - D u), P1 (24), (38) and P3 (7), (12), updated exactly.
 
     Over one sample u, y and p are held and the closed loop is integrated exactly (P1 notes 9); a schedule whose update is
@@ -199,12 +196,3 @@ class LpvVelocityObserver(TwoStateObserver):
             RangeError: outside the certified box, if the observer refuses that; the state is then unchanged.
         """
         return self._step(held_input, measurement, parameter)
-
-    def save(self) -> Saved:
-        """Everything needed to continue later, and the digest of the schedule, as plain arrays."""
-        return super().save() | {"schedule_sha256": np.array(self.schedule.sha256)}
-
-    def _check(self, saved: Mapping[str, AnyArray]) -> None:
-        if "schedule_sha256" in saved and str(saved["schedule_sha256"]) != self.schedule.sha256:
-            raise EstimatorError(f"saved with another schedule than '{self.schedule.name}' {self.schedule.sha256[:12]}")
-        super()._check(saved)

@@ -17,11 +17,11 @@ from typing import NamedTuple
 from estimators.arithmetic import Number, Signals, arithmetic
 from estimators.signals import limits
 from estimators.vehicle import GRAVITY, VehicleParameters
+from estimators.velocity.exclusion import Exclusion
 from estimators.velocity.fusion_inputs import ConditionedInputs
-from estimators.velocity.judge import Judge
 from estimators.velocity.longitudinal_fusion import BIAS, GRADE, SCALE, SLIP, SPEED, LongitudinalFusion
 from estimators.velocity.parity import PULL
-from estimators.velocity.signal_vote import Told, vote
+from estimators.velocity.signal_vote import Readings, vote
 
 _FAR = 1e9  # m/s
 LARGEST_ACCELERATION = limits.FRICTION * GRAVITY  # m/s^2 of a car on its tires
@@ -40,7 +40,7 @@ class Pull(NamedTuple):
     contested: Number  # whether it and the forces have contradicted each other by half of what they may, for 0.05 s
 
 
-class PullMonitor(Judge):
+class PullMonitor(Exclusion):
     """Remembers how far a_x, forces and wheels are apart, and for how long a_x is not believed."""
 
     memory = ("gap", "apart", "remaining", "since")
@@ -89,12 +89,12 @@ class PullMonitor(Judge):
         age = choose(doubtful, kit.minimum(self.since + elapsed, s.error_memory), 0.0)
         self.since = age
 
-        told = Told(
+        readings = Readings(
             (choose(known, gap, unit), self._zero, apart),
             (self._zero, t_f, kit.maximum(0.5 * abs(gap), s.rolling)),
             (seen.good[0], known, near),
         )
-        (verdict,), _ = vote(kit, PULL, told, (no(seen.alive),), (self._always,))
+        (verdict,), _ = vote(kit, PULL, readings, (no(seen.alive),), (self._always,))
         # one that repeats what the others say, as at rest, has done nothing wrong: it is believed as soon as it lives
         blameless = no(seen.alive) & verdict.supported & no(verdict.contradicted)
         left = self.left(elapsed, verdict._replace(wrong=verdict.wrong & no(blameless)), before)

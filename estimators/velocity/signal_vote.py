@@ -16,7 +16,7 @@ from estimators.velocity.parity import Groups, Relation
 Pairs = dict[tuple[int, int], Number]
 
 
-class Told(NamedTuple):
+class Readings(NamedTuple):
     """By the witnesses of a relation, in its order."""
 
     level: tuple[Number, ...]
@@ -35,7 +35,7 @@ class Verdict(NamedTuple):
 def vote(
     kit: Arithmetic,
     relation: Relation,
-    told: Told,
+    readings: Readings,
     stuck: tuple[Number, ...],
     plausible: tuple[Number, ...],
 ) -> tuple[tuple[Verdict, ...], Pairs]:
@@ -44,7 +44,7 @@ def vote(
     Of each rule `stuck`: its signal repeats itself, `plausible`: its live reading may be doubted at all.
     """
     no, never = kit.no, kit.full(False)
-    against, agree, beyond = _pairs(kit, relation, told)
+    against, agree, beyond = _pairs(kit, relation, readings)
     wrong: list[Number] = []
     out: dict[int, Number] = {}  # witnesses for which a signal is already found: no fault of another, and no voters
 
@@ -65,7 +65,7 @@ def vote(
         for friend in rule.backers:
             backed = backed | agree[me, friend]
         found = outvoted(me, rule.live, True, rule.second) & open_ & no(backed)
-        found = told.known[me] & (found | (repeats & outvoted(me, rule.repeating, False)))
+        found = readings.known[me] & (found | (repeats & outvoted(me, rule.repeating, False)))
         wrong.append(found)
         out[me] = out.get(me, never) | found
     verdicts = []
@@ -78,9 +78,9 @@ def vote(
     return tuple(verdicts), agree
 
 
-def _pairs(kit: Arithmetic, relation: Relation, told: Told) -> tuple[Pairs, Pairs, Pairs]:
+def _pairs(kit: Arithmetic, relation: Relation, readings: Readings) -> tuple[Pairs, Pairs, Pairs]:
     """Which two contradict each other, agree, and are further apart than a slide can bring them."""
-    (level, allowed, known), (floor, share) = told, relation.slide
+    (level, allowed, known), (floor, share) = readings, relation.slide
     found: tuple[Pairs, Pairs, Pairs] = ({}, {}, {})
     for i in range(len(relation.witnesses)):
         for k in range(i):

@@ -17,12 +17,12 @@ from typing import NamedTuple
 
 from estimators.arithmetic import Number, Signals, arithmetic
 from estimators.vehicle import GRAVITY, VehicleParameters
+from estimators.velocity.exclusion import Exclusion
 from estimators.velocity.fusion_inputs import ConditionedInputs
-from estimators.velocity.judge import Judge
 from estimators.velocity.lateral_fusion import BANK, BIAS, SCALE, TIRES, YAW_BIAS, LateralFusion
 from estimators.velocity.longitudinal_fusion import RADIUS, LongitudinalFusion
 from estimators.velocity.parity import FRONT, REAR, SIDE, STEERING, TURN, YAW_RATE
-from estimators.velocity.signal_vote import Told, vote
+from estimators.velocity.signal_vote import Readings, vote
 
 _UNDERSTEER = 1.0  # m/s^2 by which steering may be off where tires slip: 2 deg/g at 25 m/s
 _FOLLOW = 0.5  # share of itself: the same, and the lag of the car behind its steering
@@ -48,7 +48,7 @@ class Turning(NamedTuple):
     gated: Number
 
 
-class TurnMonitor(Judge):
+class TurnMonitor(Exclusion):
     """Remembers the witnesses, and for how long who is not believed."""
 
     memory = ("level", "remaining", "since", "sloped", "yaw_rate", "yaw_acceleration", "lean", "leaning")
@@ -88,10 +88,10 @@ class TurnMonitor(Judge):
         now, surface = self._say(seen, None if gravity is None else off[0])
         self.level = kit.stacked([kept * old + (1.0 - kept) * new for old, new in zip(self.level, now, strict=True)])
         *level, sway = self.level
-        told = self._judged(seen, level, sway, surface, mu, self._never if gravity is None else self._always)
+        readings = self._judged(seen, level, sway, surface, mu, self._never if gravity is None else self._always)
         v_g, v_p, v_f, v_q = level[:4]
-        t_g, t_p, t_f, t_q = told.allowed[:4]
-        known = told.known
+        t_g, t_p, t_f, t_q = readings.allowed[:4]
+        known = readings.known
         quiet = known[YAW_RATE] & known[SIDE] & (abs(v_p - v_g) < t_p + t_g)
         quiet = (
             quiet
@@ -100,7 +100,7 @@ class TurnMonitor(Judge):
         )
         quiet = quiet & (self.remaining[_AY] + self.remaining[_R] + self.remaining[_ROLL] == 0.0)
         if kit.some(kit.no(quiet)):
-            return self._outvoted(elapsed, seen, told, sway, off)
+            return self._outvoted(elapsed, seen, readings, sway, off)
         self._differentiate(r, self.since[_R] > 0.0, elapsed)
         self.since = kit.stacked(self._nothing)
         self.sloped = kit.maximum(self.sloped - elapsed, 0.0)
@@ -109,19 +109,19 @@ class TurnMonitor(Judge):
         return Turning((b, r), noises, used, self._nothing[0], self._never, *off, gated)
 
     def _outvoted(
-        self, elapsed: Number, seen: ConditionedInputs, told: Told, sway: Number, gravity: tuple[Number, Number]
+        self, elapsed: Number, seen: ConditionedInputs, readings: Readings, sway: Number, gravity: tuple[Number, Number]
     ) -> Turning:
         s, kit, no, largest = self.settings, self.kit, self.kit.no, self.kit.maximum
-        level, known, never = told.level, told.known, self._never
+        level, known, never = readings.level, readings.known, self._never
         _, stuck_y, stuck_r = ((run - 1.0) * elapsed > s.slowest_unit for run in seen.run)
         # a car that slides is turned further than its side force carries it, never less
         excess = (level[SIDE] * level[STEERING] < 0.0) | (abs(level[SIDE]) > abs(level[STEERING]))
         plausible = tuple(excess if rule.one_sided else self._always for rule in TURN.rules)
-        verdicts, agree = vote(kit, TURN, told, (stuck_r, never, stuck_y), plausible)
+        verdicts, agree = vote(kit, TURN, readings, (stuck_r, never, stuck_y), plausible)
         yaw, roll, side = verdicts
         gap = level[YAW_RATE] - level[SIDE]
         steady = abs(sway) < 0.5 * abs(gap)
-        apart = known[SIDE] & steady & (abs(gap) > told.allowed[YAW_RATE] + told.allowed[SIDE] - abs(sway))
+        apart = known[SIDE] & steady & (abs(gap) > readings.allowed[YAW_RATE] + readings.allowed[SIDE] - abs(sway))
         straight = largest(abs(level[YAW_RATE]), abs(level[STEERING])) < _UNDERSTEER
         front, rear = (agree[YAW_RATE, i] & agree[i, STEERING] for i in (FRONT, REAR))
         grip = agree[YAW_RATE, STEERING] & (front | rear)
@@ -139,7 +139,7 @@ class TurnMonitor(Judge):
         if kit.some(no(levelled)):
             a, b, r = seen.inertial
             seen = seen._replace(inertial=kit.stacked((a, kit.where(levelled, b, b + gravity[0]), r)))
-        found = self._replaced(elapsed, seen, told, used_y, used_r, sway)
+        found = self._replaced(elapsed, seen, readings, used_y, used_r, sway)
         return found._replace(gravity=off[0], road=off[1], gated=found.gated | no(levelled))
 
     def _say(self, seen: ConditionedInputs, gravity: Number | None) -> tuple[tuple[Number, ...], Signals]:
@@ -158,7 +158,7 @@ class TurnMonitor(Judge):
         own = b * (1.0 - y[SCALE]) - y[BIAS] - sway
         front, rear = self._tracks
         levelled = own - y[BANK]
-        told = (
+        levels = (
             speed * across.yaw_rate(r),
             levelled,
             speed * (surface[1] - surface[0]) / (front * kit.cos(angle)),
@@ -167,11 +167,11 @@ class TurnMonitor(Judge):
             levelled if gravity is None else own + gravity,
             sway,
         )
-        return told, surface
+        return levels, surface
 
     def _judged(
         self, seen: ConditionedInputs, level: Signals, sway: Number, surface: Signals, mu: Signals, levelled: Number
-    ) -> Told:
+    ) -> Readings:
         """The low-passed `level` with allowances; `mu` F_x/F_z of the wheels, `levelled`: an attitude part is there."""
         s, kit, speed = self.settings, self.kit, self.along.speed
         P, Q, gate = self.across.filter.variance, self.along.filter.variance, s.gate
@@ -190,7 +190,7 @@ class TurnMonitor(Judge):
             live = (seen.gap[i] < s.error_memory) & (seen.gap[k] < s.error_memory)
             known.append(live & rolls & kit.no(seen.silent[i] | seen.silent[k]))
         allowed.append(kit.minimum(_UNDERSTEER, _TOE * speed * speed) + _FOLLOW * abs(level[STEERING]))
-        return Told(tuple(level), (*allowed, t_p), (*known, seen.steered, seen.good[1] & levelled))
+        return Readings(tuple(level), (*allowed, t_p), (*known, seen.steered, seen.good[1] & levelled))
 
     def _banked(self, elapsed: Number, looks: Number, gap: Number) -> Number:
         """Cars whose road has looked banked for so long that the filter is to learn its bank."""
@@ -204,13 +204,13 @@ class TurnMonitor(Judge):
         return found
 
     def _replaced(
-        self, elapsed: Number, seen: ConditionedInputs, told: Told, used_y: Number, used_r: Number, sway: Number
+        self, elapsed: Number, seen: ConditionedInputs, readings: Readings, used_y: Number, used_r: Number, sway: Number
     ) -> Turning:
         """Readings that are not used, from those that are."""
         s, kit, choose, no = self.settings, self.kit, self.kit.where, self.kit.no
         _, b, r = seen.inertial
-        (level, allowed, known), y, speed = told, self.across.filter.mean, self.along.speed
-        pace = choose(abs(speed) > 1.0, speed, 1.0)
+        (level, allowed, known), y, speed = readings, self.across.filter.mean, self.along.speed
+        speed_at_least = choose(abs(speed) > 1.0, speed, 1.0)
         front, rear = known[FRONT], known[REAR]
         wheels = front | rear
 
@@ -220,9 +220,9 @@ class TurnMonitor(Judge):
             return choose(wheels, axles, choose(by_steer, of[STEERING], choose(used_y, of[SIDE], nothing)))
 
         by_steer = known[STEERING] & (no(used_y) | (allowed[STEERING] < allowed[SIDE]))
-        other, doubt = best(level, 0.0), best(allowed, abs(pace))
+        other, doubt = best(level, 0.0), best(allowed, abs(speed_at_least))
         unknown = no(used_r | wheels | used_y | known[STEERING])
-        turn = choose(used_r, self.across.yaw_rate(r), other / pace)
+        turn = choose(used_r, self.across.yaw_rate(r), other / speed_at_least)
         yaw_rate = choose(used_r, r, self.across.reading(turn))
         switched = (self.since[_R] > 0.0) == used_r
         ages = [
@@ -231,15 +231,15 @@ class TurnMonitor(Judge):
         ]
         self.since = kit.stacked(ages)
         grown_y, grown_r = (self.grown(age, elapsed) for age in ages)
-        noise_r = choose(used_r, seen.noise[2], doubt / (s.gate * abs(pace)) * grown_r)
+        noise_r = choose(used_r, seen.noise[2], doubt / (s.gate * abs(speed_at_least)) * grown_r)
         own = choose(used_r, speed * turn, other) + sway + y[BIAS] + y[BANK]
         ay = choose(used_y, b, own / (1.0 - y[SCALE]))
         doubt_y = (_UNDULATION + abs(sway) + choose(used_r, allowed[YAW_RATE], doubt)) / s.gate
         noise_y = choose(used_y, seen.noise[1], doubt_y * grown_y)
         self._differentiate(yaw_rate, switched, elapsed)
         doubt_y = choose(used_y, 0.0, doubt_y)
-        readings, noises, used = (ay, yaw_rate), (noise_y, noise_r), (used_y, used_r)
-        return Turning(readings, noises, used, doubt_y, unknown, *self._nothing, no(used_y & used_r))
+        reading, noises, used = (ay, yaw_rate), (noise_y, noise_r), (used_y, used_r)
+        return Turning(reading, noises, used, doubt_y, unknown, *self._nothing, no(used_y & used_r))
 
     def _differentiate(self, yaw_rate: Number, switched: Number, elapsed: Number) -> None:
         """First-order filter of the slope; where the yaw rate comes from another source than before, that is no slope."""

@@ -16,6 +16,7 @@ from studies.drives.guess_names import Guess, guess_column
 from studies.drives.quantities import SIGNALS, factor_to, short
 from studies.drives.sniff import sniff
 from studies.errors import LogError
+from studies.execution.files import write_bytes
 from synthesis.errors import SpecError
 
 NEEDED = (*(f"wheel_speed_{corner}" for corner in ("fl", "fr", "rl", "rr")), "ax")
@@ -68,8 +69,7 @@ def write_guess(logs: Sequence[Path], drive: Path | None) -> tuple[Path, Guessed
         raise SpecError(f"{target.name}: is there already, and a guess never replaces it; give another --drive")
     guessed = guess(logs)
     try:
-        with target.open("x", encoding="utf-8") as file:
-            file.write(guessed.text)
+        write_bytes(target, guessed.text.encode())
     except OSError as error:
         raise SpecError(f"{target.name}: cannot be written ({error.strerror}); give another --drive") from error
     return target, guessed

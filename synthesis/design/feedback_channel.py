@@ -11,6 +11,7 @@ from estimators.display import Display
 from estimators.errors import unknown
 from synthesis.certificate.claims import ClaimChannel
 from synthesis.certificate.verify import Names
+from synthesis.design.asked import check_channels
 from synthesis.errors import ProblemError
 from synthesis.models.lpv import LpvModel
 
@@ -79,12 +80,6 @@ def feedback_channel_matrices(model: LpvModel, channel: FeedbackChannel) -> tupl
     return np.asarray(W), np.asarray(Z)
 
 
-def check_channels(channels: tuple[FeedbackChannel, ...]) -> None:
-    """Exactly one channel is minimised, the others have positive bounds. Raises ProblemError."""
-    if sum(channel.bound is None for channel in channels) != 1:
-        raise ProblemError("exactly one channel must have no bound: it is the one that is minimised")
-    for channel in channels:
-        if channel.bound is not None and not channel.bound > 0.0:
-            raise ProblemError(f"channel '{channel.name}' has the bound {channel.bound}; give a positive number")
-        if not channel.disturbances or not channel.performance:
-            raise ProblemError(f"channel '{channel.name}' needs at least one disturbance and one performance signal")
+def check_feedback_channels(channels: tuple[FeedbackChannel, ...]) -> None:
+    """As `synthesis.design.asked.check_channels`."""
+    check_channels(channels, [channel.performance for channel in channels], "performance signal")

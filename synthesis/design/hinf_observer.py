@@ -23,6 +23,7 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from estimators.display import Display
+from synthesis.design.asked import check_channels, check_degree_and_poles, check_shares, minimised_channel
 from synthesis.design.gains_summary import gains_summary
 from synthesis.design.refusals import refuse_undetectable
 from synthesis.design.three_solves import Problem, three_solves
@@ -78,27 +79,14 @@ class ObserverDesign(Display):
     settings: LmiSettings = field(default_factory=LmiSettings)
 
     def __post_init__(self) -> None:
-        if not 0 <= self.degree <= 8:
-            raise ProblemError(f"degree {self.degree} of the gains must lie between 0 and 8")
-        if sum(channel.bound is None for channel in self.channels) != 1:
-            raise ProblemError("exactly one channel must have no bound: it is the one that is minimised")
-        for channel in self.channels:
-            if channel.bound is not None and not channel.bound > 0.0:
-                raise ProblemError(f"channel '{channel.name}' has the bound {channel.bound}; give a positive number")
-            if not channel.disturbances or not channel.errors:
-                raise ProblemError(f"channel '{channel.name}' needs at least one disturbance and one error")
-        if not 0.0 <= self.decay_rate < np.inf:
-            raise ProblemError(f"decay rate {self.decay_rate} 1/s must be a number and must not be negative")
-        if self.fastest_pole is not None and not self.decay_rate < self.fastest_pole < np.inf:
-            raise ProblemError(f"fastest pole {self.fastest_pole} 1/s must exceed the decay rate {self.decay_rate} 1/s")
-        for name in ("backoff", "reserve"):
-            if not 0.0 <= getattr(self, name) < 1.0:
-                raise ProblemError(f"{name} {getattr(self, name)} must lie in [0, 1)")
+        check_channels(self.channels, [channel.errors for channel in self.channels], "error")
+        check_degree_and_poles(self.degree, self.decay_rate, self.fastest_pole)
+        check_shares(self.backoff, self.reserve)
 
     @property
     def minimised(self) -> Channel:
         """The channel without a bound."""
-        return next(channel for channel in self.channels if channel.bound is None)
+        return minimised_channel(self.channels)
 
 
 @dataclass(frozen=True, repr=False)
@@ -131,13 +119,10 @@ class ObserverGains(Display):
 
     def gain(self, points: FloatArray) -> FloatArray:
         """L at parameter values (g,) or (g, p): array (g, nx, ny)."""
-        count, grid = len(self.model.parameters), np.asarray(points, float)
-        grid = grid.reshape(-1, count) if count else grid.reshape(len(grid), 0)
-        middle = np.array([p.middle for p in self.model.parameters])
-        half = np.array([p.half_width for p in self.model.parameters])
-        scaled = np.hstack([(grid - middle) / half, np.zeros_like(grid)])
-        left = self.result.values["G" if self.update == "sampled" else "P"].at(scaled)[..., 0]
-        X = self.result.values["X"].at(scaled)[..., 0]
+        u = self.model.scaled(points)
+        still = np.hstack([u, np.zeros_like(u)])
+        left = self.result.values["G" if self.update == "sampled" else "P"].at(still)[..., 0]
+        X = self.result.values["X"].at(still)[..., 0]
         return np.asarray(np.linalg.solve(left, X) / self.scale[:, None])
 
 

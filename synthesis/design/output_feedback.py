@@ -16,7 +16,8 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from estimators.display import Display
-from synthesis.design.feedback_channel import FeedbackChannel, check_channels
+from synthesis.design.asked import check_degree_and_poles, check_shares, minimised_channel
+from synthesis.design.feedback_channel import FeedbackChannel, check_feedback_channels
 from synthesis.design.generalised_plant import Frame, GeneralisedPlant, frame_of, generalised_plant, measured_rows
 from synthesis.design.output_feedback_lmi import Still, Wanted, build
 from synthesis.design.reconstruct import reconstructed
@@ -57,24 +58,16 @@ class OutputFeedbackDesign(Display):
     settings: LmiSettings = field(default_factory=LmiSettings)
 
     def __post_init__(self) -> None:
-        if not 0 <= self.degree <= 8:
-            raise ProblemError(f"degree {self.degree} of the controller must lie between 0 and 8")
-        check_channels(self.channels)
-        if not 0.0 <= self.decay_rate < np.inf:
-            raise ProblemError(f"decay rate {self.decay_rate} 1/s must be a number and must not be negative")
-        if self.fastest_pole is not None and not self.decay_rate < self.fastest_pole < np.inf:
-            raise ProblemError(f"fastest pole {self.fastest_pole} 1/s must exceed the decay rate {self.decay_rate} 1/s")
-        if not 0.0 < self.backoff < 1.0:
-            raise ProblemError(
-                f"backoff {self.backoff} must lie between 0 and 1: gains grow without end at the optimum"
-            )
-        if not 0.0 <= self.reserve < 1.0:
-            raise ProblemError(f"reserve {self.reserve} must lie in [0, 1)")
+        check_feedback_channels(self.channels)
+        check_degree_and_poles(self.degree, self.decay_rate, self.fastest_pole)
+        check_shares(self.backoff, self.reserve)
+        if self.backoff == 0.0:
+            raise ProblemError("backoff 0 must be more: gains grow without end at the optimum")
 
     @property
     def minimised(self) -> FeedbackChannel:
         """The channel without a bound."""
-        return next(channel for channel in self.channels if channel.bound is None)
+        return minimised_channel(self.channels)
 
 
 @dataclass(frozen=True, repr=False)
@@ -116,16 +109,14 @@ class OutputFeedback(Display):
 
         The states are an estimate of those of the plant, in their units. Columns of outputs that are not measured are zero.
         """
-        count, grid = len(self.model.parameters), np.asarray(points, float)
-        grid = grid.reshape(-1, count) if count else grid.reshape(len(grid), 0)
-        middle, half = (np.array([getattr(p, key) for p in self.model.parameters]) for key in ("middle", "half_width"))
+        place = self.model.scaled(points)
         given = generalised_plant(self.model, self.design.channels, self.design.measured)
-        found = reconstructed(given.scaled(self.frame), self.result, self.wanted, (grid - middle) / half, self.level)
+        found = reconstructed(given.scaled(self.frame), self.result, self.wanted, place, self.level)
         Ak, Bk, Ck, Dk = found
         T, u, y, clock = self.frame.states, self.frame.inputs[:, None], self.frame.outputs, self.frame.clock
         back = np.linalg.inv(T) * clock
         Ak, Bk, Ck, Dk = back @ Ak @ T, back @ Bk / y, u * Ck @ T, u * Dk / y
-        D = values(given.D, (grid - middle) / half) / values(given.denominator, (grid - middle) / half)
+        D = values(given.D, place) / values(given.denominator, place)
         seen = np.eye(len(self.model.outputs))[measured_rows(self.model, self.design.measured)]
         return Ak - Bk @ D @ Ck, Bk @ seen, Ck, Dk @ seen  # designed for y - D u, and Dk D = 0
 

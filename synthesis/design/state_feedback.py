@@ -25,7 +25,8 @@ import numpy as np
 from estimators.arrays import FloatArray
 from estimators.display import Display
 from estimators.errors import unknown
-from synthesis.design.feedback_channel import FeedbackChannel, check_channels, feedback_channel_matrices
+from synthesis.design.asked import check_degree_and_poles, check_shares, minimised_channel
+from synthesis.design.feedback_channel import FeedbackChannel, check_feedback_channels, feedback_channel_matrices
 from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
 from synthesis.design.refusals import refuse_unstabilisable
 from synthesis.design.three_solves import three_solves
@@ -68,29 +69,20 @@ class StateFeedbackDesign(Display):
     damping: float | None = None  # least damping ratio of every frozen pole; None: no bound
     limits: GainLimits | None = None
     backoff: float = 0.01  # the minimised gain may be this fraction worse; what it buys is margin
-    reserve: float = (
-        0.01  # regions and limits are designed this much tighter than they are asked for, for the table's sake
-    )
+    reserve: float = 0.01  # regions and limits are designed this much tighter than they are asked for
     settings: LmiSettings = field(default_factory=LmiSettings)
 
     def __post_init__(self) -> None:
-        check_channels(self.channels)
-        if not 0 <= self.degree <= 8:
-            raise ProblemError(f"degree {self.degree} of the gains must lie between 0 and 8")
-        if not 0.0 <= self.decay_rate < np.inf:
-            raise ProblemError(f"decay rate {self.decay_rate} 1/s must be a number and must not be negative")
-        if self.fastest_pole is not None and not self.decay_rate < self.fastest_pole < np.inf:
-            raise ProblemError(f"fastest pole {self.fastest_pole} 1/s must exceed the decay rate {self.decay_rate} 1/s")
+        check_feedback_channels(self.channels)
+        check_degree_and_poles(self.degree, self.decay_rate, self.fastest_pole)
         if self.damping is not None and not 0.0 < self.damping < 1.0:
             raise ProblemError(f"damping {self.damping} must be a damping ratio between 0 and 1")
-        for name in ("backoff", "reserve"):
-            if not 0.0 <= getattr(self, name) < 1.0:
-                raise ProblemError(f"{name} {getattr(self, name)} must lie in [0, 1)")
+        check_shares(self.backoff, self.reserve)
 
     @property
     def minimised(self) -> FeedbackChannel:
         """The channel without a bound."""
-        return next(channel for channel in self.channels if channel.bound is None)
+        return minimised_channel(self.channels)
 
 
 @dataclass(frozen=True, repr=False)
@@ -120,13 +112,10 @@ class StateFeedbackGains(Display):
 
     def gain(self, points: FloatArray) -> FloatArray:
         """K at parameter values (g,) or (g, p): array (g, nu, nx)."""
-        count, grid = len(self.model.parameters), np.asarray(points, float)
-        grid = grid.reshape(-1, count) if count else grid.reshape(len(grid), 0)
-        middle = np.array([p.middle for p in self.model.parameters])
-        half = np.array([p.half_width for p in self.model.parameters])
-        scaled = np.hstack([(grid - middle) / half, np.zeros_like(grid)])
+        u = self.model.scaled(points)
+        still = np.hstack([u, np.zeros_like(u)])
         right, Y = (
-            self.result.values[key].at(scaled)[..., 0] for key in ("Q" if self.sample_time is None else "G", "Y")
+            self.result.values[key].at(still)[..., 0] for key in ("Q" if self.sample_time is None else "G", "Y")
         )
         K = np.swapaxes(np.linalg.solve(np.swapaxes(right, -1, -2), np.swapaxes(Y, -1, -2)), -1, -2)
         return np.asarray(K * self.scale.inputs[:, None] * self.scale.states)

@@ -58,11 +58,9 @@ class StaticFeedback(Display):
 
     def gain(self, points: FloatArray) -> FloatArray:
         """K at parameter values (g,) or (g, p): array (g, nu, ny)."""
-        count, grid = len(self.model.parameters), np.asarray(points, float)
-        grid = grid.reshape(-1, count) if count else grid.reshape(len(grid), 0)
-        middle, half = (np.array([getattr(p, key) for p in self.model.parameters]) for key in ("middle", "half_width"))
-        scaled = np.hstack([(grid - middle) / half, np.zeros_like(grid)])
-        return np.asarray(self.K.at(scaled)[..., 0] * self.frame.inputs[:, None] / self.frame.outputs)
+        u = self.model.scaled(points)
+        still = np.hstack([u, np.zeros_like(u)])
+        return np.asarray(self.K.at(still)[..., 0] * self.frame.inputs[:, None] / self.frame.outputs)
 
     def controller(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Ak (g, 0, 0), Bk (g, 0, ny), Ck (g, nu, 0), Dk = K (g, nu, ny): a law without states of its own."""

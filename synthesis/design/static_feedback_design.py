@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-import numpy as np
-
 from estimators.display import Display
-from synthesis.design.feedback_channel import FeedbackChannel, check_channels
+from synthesis.design.asked import check_degree_and_poles, check_shares
+from synthesis.design.feedback_channel import FeedbackChannel, check_feedback_channels
 from synthesis.errors import ProblemError
 from synthesis.lmi.settings import LmiSettings
 
@@ -38,14 +37,10 @@ class StaticFeedbackDesign(Display):
     settings: LmiSettings = field(default_factory=LmiSettings)
 
     def __post_init__(self) -> None:
-        check_channels(self.channels)
-        if not 0 <= self.degree <= 8:
-            raise ProblemError(f"degree {self.degree} of the gains must lie between 0 and 8")
-        if not 0.0 <= self.decay_rate < np.inf:
-            raise ProblemError(f"decay rate {self.decay_rate} 1/s must be a number and must not be negative")
-        if self.fastest_pole is not None and not self.decay_rate < self.fastest_pole < np.inf:
-            raise ProblemError(f"fastest pole {self.fastest_pole} 1/s must exceed the decay rate {self.decay_rate} 1/s")
+        check_feedback_channels(self.channels)
+        check_degree_and_poles(self.degree, self.decay_rate, self.fastest_pole)
         if self.steps < 1:
             raise ProblemError(f"{self.steps} steps are none; give one at least")
-        if not (0.0 < self.backoff < 1.0 and 0.0 <= self.reserve < 1.0):
-            raise ProblemError(f"backoff {self.backoff} and reserve {self.reserve} must lie between 0 and 1")
+        check_shares(self.backoff, self.reserve)
+        if self.backoff == 0.0:
+            raise ProblemError("backoff 0 leaves the last solve no room; give more")

@@ -156,6 +156,13 @@ class LpvModel(Display):
         self._check_range(points)
         return evaluate(self.polynomial, self.parameters, points)
 
+    def scaled(self, points: FloatArray) -> FloatArray:
+        """u = (p - middle)/half_width (g, p) of parameter values (g,) or (g, p), also beyond the range."""
+        count, grid = len(self.parameters), np.asarray(points, float)
+        grid = grid.reshape(-1, count) if count else grid.reshape(len(grid), 0)
+        middle, half = (np.array([getattr(p, key) for p in self.parameters]) for key in ("middle", "half_width"))
+        return np.asarray((grid - middle) / half)
+
     def _check_range(self, points: FloatArray) -> None:
         for column, p in zip(points.T, self.parameters, strict=True):
             slack = 1e-12 * (p.maximum - p.minimum)

@@ -100,7 +100,7 @@ def test_no_other_script_runs(page: Page, report: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("width", "dark"), [(390, True), (1280, False)])
-def test_the_page_of_a_schedule_wears_the_same_dress(page: Page, tmp_path: Path, width: int, dark: bool) -> None:
+def test_the_page_of_a_schedule_looks_like_the_report(page: Page, tmp_path: Path, width: int, dark: bool) -> None:
     content = read_content(SHIPPED / "resilient-velocity-lateral.json")
     proofs = tuple(Proof(level.claim, level.kind, level.level, level.unit, True) for level in frozen_levels(content))
     path = tmp_path / "schedules.html"

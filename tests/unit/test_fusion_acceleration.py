@@ -198,3 +198,16 @@ def test_saved_while_in_doubt(fault: Fault) -> None:
     np.testing.assert_array_equal(driven(rest, one)[1], driven(rest, two)[1])
     one.reset()
     assert one.signal_monitor.pull.since == one.signal_monitor.pull.gap == one.signal_monitor.pull.apart == 0.0
+
+
+def test_an_accelerometer_that_repeated_at_rest_is_believed_from_the_start_of_a_launch() -> None:
+    """Without noise a_x is one and the same number for a second; the wheels' low-passed slope comes late, and is no evidence."""
+    launch = course(np.concatenate([np.zeros(240), np.linspace(0.0, 3.5, 100), np.full(60, 3.5)]))
+    still = np.zeros(launch.speed.size)
+    signals = Signals(
+        launch.wheel_speed, np.zeros((still.size, 4)), launch.ax, still, still, np.full_like(launch.force, np.nan)
+    )
+    steps, speed = driven(signals)
+    used = np.array([bool(step.inertial_used[0]) for step in steps])
+    assert used[242:].all()
+    assert np.abs(speed - launch.speed)[240:].max() < 0.1

@@ -59,6 +59,6 @@ def report_page(records: Sequence[StudyRecord], claims: Sequence[dict[str, JsonV
 
 
 def filled(template: str, **values: Any) -> str:
-    """A page in the dress of the report."""
+    """A page that looks like the report."""
     text, digest = script()
     return environment().get_template(template).render(values, script=text, digest=digest)

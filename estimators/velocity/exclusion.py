@@ -1,4 +1,4 @@
-"""Half a monitor: how long a signal is not believed, and by how much an error that stays counts more."""
+"""Fault exclusion: how long a signal is not believed, and by how much an error that stays counts more."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.signal_vote import Verdict
 
 
-class Judge(CarsMemory):
+class Exclusion(CarsMemory):
     """What a_x on one side, a_y and yaw rate on the other have in common."""
 
     settings: FusionSettings
