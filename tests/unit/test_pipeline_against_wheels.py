@@ -1,5 +1,7 @@
-"""V_x of the pipeline is at least as good as the mean wheel speed and as the best corner observer; where tires slide sideways,
-because it knows that they slip along, too."""
+"""V_x of the pipeline beside the mean wheel speed and the corner observers on two drives that combined slip decides.
+
+This is not said of every drive: where tires hardly slip, the best corner observer, picked afterwards, can be nearer.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +50,7 @@ def best_other(found: dict[str, FloatArray]) -> FloatArray:
     return np.asarray(np.min([value for name, value in found.items() if name != "pipeline"], axis=0))
 
 
-def test_it_is_never_worse_than_wheels_or_corner_observers(drawn: Measured) -> None:
+def test_where_tires_slide_it_is_at_least_as_good_as_wheels_and_corner_observers(drawn: Measured) -> None:
     found = rms(drawn)
     assert (found["pipeline"] <= best_other(found)).all(), found
 
