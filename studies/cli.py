@@ -62,7 +62,8 @@ def parser() -> argparse.ArgumentParser:
 def _models(command: Command) -> None:
     """From a model to proved gains."""
     new = command("new", "new.run_new")
-    new.add_argument("name", metavar="NAME", help="of the model: letters, digits and hyphens")
+    new.add_argument("name", metavar="NAME", help="of the files: letters, digits and hyphens")
+    new.add_argument("--drive", action="store_true", help="a drive file and a simulated log instead")
     new.add_argument("--out", type=Path, metavar="DIR", help="where they go (default: here)")
 
     model = command("model", "model.run_model")

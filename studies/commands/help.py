@@ -28,14 +28,18 @@ class Help(NamedTuple):
 
 HELP = {
     "new": Help(
-        "write a commented model file and its specification, to start from",
+        "write commented files to start from: a model and its specification, or a drive file",
         """\
 Writes DIR/NAME.toml, a model (signals, parameters with range and rate, constants with units, matrices as formulas), and
-DIR/NAME-observer.toml, a specification of its observer. Both run as they are, and say in comments what to change.""",
+DIR/NAME-observer.toml, a specification of its observer. With --drive: DIR/NAME-drive.toml, a drive file (columns, units
+and signs of a log, and the car), and DIR/NAME-log.csv, a log of a simulated car. All run as they are, and say in comments
+what to change. Files that are there are never replaced.""",
         """\
 gainsmith new my-plant
 gainsmith model my-plant.toml --out out/model
-gainsmith schedules my-plant-observer.toml --out out/schedules""",
+gainsmith schedules my-plant-observer.toml --out out/schedules
+gainsmith new my-car --drive
+gainsmith run my-car-log.csv --drive my-car-drive.toml --out out/run""",
     ),
     "model": Help(
         "show a model file: poles, observability, controllability over its range",

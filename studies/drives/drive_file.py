@@ -33,6 +33,7 @@ class Vehicle(StrictTable):
     front_axle_distance: si.Length = Field(examples=["1.4 m"])
     rear_axle_distance: si.Length = Field(examples=["1.5 m"])
     cg_height: si.Length = Field(examples=["0.55 m"])
+    roll_center_height: si.Place = 0.0  # of the roll axis below the centre of gravity
     front_track: si.Length = Field(examples=["1.6 m"])
     rear_track: si.Length = Field(examples=["1.6 m"])
     effective_radius_front: si.Length = Field(examples=["0.34 m"])
@@ -57,7 +58,8 @@ class Vehicle(StrictTable):
             wheel_inertia=self.wheel_inertia or WHEEL_INERTIA, front_axle_distance=self.front_axle_distance,
             rear_axle_distance=self.rear_axle_distance, cg_height=self.cg_height, front_track=self.front_track,
             rear_track=self.rear_track, effective_radius=(self.effective_radius_front, self.effective_radius_rear),
-            rolling_resistance=self.rolling_resistance, bearing_friction=self.bearing_friction,
+            roll_center_height=self.roll_center_height, rolling_resistance=self.rolling_resistance,
+            bearing_friction=self.bearing_friction,
         )  # fmt: skip
 
     @model_validator(mode="after")

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from estimators.arrays import FloatArray
+from estimators.arrays import BoolArray, FloatArray
+from estimators.errors import unknown
 from estimators.vehicle import CORNERS, VehicleParameters
+from studies.drives.drive_file import DriveFile, read_drive
 from studies.drives.quantities import REFERENCES, SIGNALS
 from studies.execution.files import ready_folder, whole_file, write_csv
 from studies.truth.sensors import Measured
@@ -32,32 +34,13 @@ def write_drive(
     """Write ``<manoeuvre>.csv`` and ``<manoeuvre>.toml`` to ``folder``, made if needed; returns both paths (log, drive).
 
     ``measured`` is from `draw`, lost samples become empty cells; ``seed`` and ``run`` are places in its batch; ``longitudinal``
-    and ``lateral`` are the gain schedules that the drive file names, ``vehicle`` is what the estimators are told of the car
-    (None: the truth). Raises SpecError for a place outside the batch, or a folder that cannot be written.
+    and ``lateral`` are the gain schedules that the drive file names, ``vehicle`` is the car as the estimators know
+    it (None: the truth). Raises SpecError for a place outside the batch, or a folder that cannot be written.
     """
-    seeds, runs = measured.batch_shape
-    if not (0 <= seed < seeds and 0 <= run < runs):
-        raise SpecError(f"seed {seed}, run {run}: the measurements have {seeds} seeds and {runs} runs")
     truth, name = measured.truth, measured.truth.names[run]
-    keep = truth.time <= truth.duration[run] + 1e-9
-    columns: dict[str, FloatArray] = {"t": truth.time[keep]}
-    signals, references = [], []
-    for signal in _NAMES:
-        value = measured.signals[signal][seed, run][keep]
-        for label, row in _columns(signal, value):
-            columns[label] = row
-            signals.append(f'{label} = {{ column = "{label}", unit = "{SIGNALS[label]}" }}')
-    for k, corner in enumerate(CORNERS[:2]):
-        columns[f"steer_{corner}"] = measured.signals["steer"][seed, run][keep, k]
-        signals.append(f'steer_{corner} = {{ column = "steer_{corner}", unit = "rad" }}')
-    for reference, source in _REFERENCES.items():
-        if source in truth.signals:
-            for label, row in _columns(reference, truth[source][run][keep]):
-                columns[f"true_{label}"] = row
-                references.append(f'{label} = {{ column = "true_{label}", unit = "{REFERENCES[label]}" }}')
+    signals, references = _rows(measured, seed, run)
     ready_folder(folder)
     log, drive = folder / f"{name}.csv", folder / f"{name}.toml"
-    write_csv(log, columns)
     text = [
         'schema = "gainsmith.drive/1"',
         f"name = {json.dumps(name)}",
@@ -68,11 +51,56 @@ def write_drive(
         *([] if lateral is None else [f"lateral = {json.dumps(lateral)}"]),
         f'\n[[log]]\nname = "truth"\nfile = {json.dumps(log.name)}\ntime = "t"',
         f'rate = "{1.0 / measured.sample_time:.9g} Hz"\n',
-        "[signals]", *signals, "\n[reference]", *references,
+        "[signals]", *(f'{label} = {{ column = "{label}", unit = "{SIGNALS[label]}" }}' for label in signals),
+        "\n[reference]",
+        *(f'{label} = {{ column = "true_{label}", unit = "{REFERENCES[label]}" }}' for label in references),
     ]  # fmt: skip
     with whole_file(drive) as beside:
         beside.write_text("\n".join(text) + "\n", encoding="utf-8")
+    write_log(log, read_drive(drive), measured, seed=seed, run=run)
     return log, drive
+
+
+def write_log(path: Path, drive: DriveFile, measured: Measured, *, seed: int = 0, run: int = 0) -> None:
+    """Write the one log that ``drive`` describes from ``measured``: its clock and columns, in its units and signs.
+
+    Raises SpecError for a place outside the batch, a signal that the simulation does not have, or a folder that cannot be
+    written.
+    """
+    (log,) = drive.log
+    keep = _kept(measured, run)
+    columns = {log.time: measured.truth.time[keep]}
+    tables = ((drive.signals, SIGNALS), (drive.reference, REFERENCES))
+    for (wanted, units), rows in zip(tables, _rows(measured, seed, run), strict=True):
+        for name, column in wanted.items():
+            if name not in rows:
+                raise SpecError(unknown("simulated signal", name, rows))
+            columns[column.column] = rows[name] / column.scale(units[name], drive.vehicle.radius_for(name))
+    ready_folder(path.parent)
+    write_csv(path, columns)
+
+
+def _kept(measured: Measured, run: int) -> BoolArray:
+    kept: BoolArray = measured.truth.time <= measured.truth.duration[run] + 1e-9
+    return kept
+
+
+def _rows(measured: Measured, seed: int, run: int) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Measured signals and true references of one place in the batch, by their names in a drive file, SI."""
+    seeds, runs = measured.batch_shape
+    if not (0 <= seed < seeds and 0 <= run < runs):
+        raise SpecError(f"seed {seed}, run {run}: the measurements have {seeds} seeds and {runs} runs")
+    keep, truth = _kept(measured, run), measured.truth
+    signals = {label: row for name in _NAMES for label, row in _columns(name, measured.signals[name][seed, run][keep])}
+    steer = measured.signals["steer"][seed, run][keep]
+    signals |= {f"steer_{corner}": steer[:, k] for k, corner in enumerate(CORNERS[:2])}
+    references = {
+        label: row
+        for name, source in _REFERENCES.items()
+        if source in truth.signals
+        for label, row in _columns(name, truth[source][run][keep])
+    }
+    return signals, references
 
 
 def _columns(name: str, value: FloatArray) -> list[tuple[str, FloatArray]]:
@@ -80,7 +108,14 @@ def _columns(name: str, value: FloatArray) -> list[tuple[str, FloatArray]]:
 
 
 def _vehicle(car: VehicleParameters) -> list[str]:
-    lengths = ("front_axle_distance", "rear_axle_distance", "cg_height", "front_track", "rear_track")
+    lengths = (
+        "front_axle_distance",
+        "rear_axle_distance",
+        "cg_height",
+        "roll_center_height",
+        "front_track",
+        "rear_track",
+    )
     quantities = {
         "mass": (car.mass, "kg"), **{name: (getattr(car, name), "m") for name in lengths},
         "effective_radius_front": (car.radii[0], "m"), "effective_radius_rear": (car.radii[2], "m"),
