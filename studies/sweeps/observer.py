@@ -21,6 +21,7 @@ from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from estimators.interpolate import PiecewiseLinear
 from estimators.schedule import Update
+from estimators.schedule.gain_signals import quotient
 from studies.spec import ScheduleSpec
 from studies.sweeps.plant import Grid, Parameter, Plant, model_plant
 from synthesis.errors import SpecError
@@ -85,7 +86,7 @@ class Observer:
         found = dict(self.plant.parameters)
         for i, j, state, output, suffix in self._gain_entries():
             if self.gains.constant:
-                unit = f"({state.unit}{'/s' if self.update == 'held' else ''})/({output.unit})"
+                unit = quotient(state.unit, self.update == "held", output.unit)
                 found[f"gain_{suffix}"] = Parameter(f"gain_{suffix}", unit, float(self.gains.table[0, i, j]), "gain")
             found[f"gain_factor_{suffix}"] = Parameter(f"gain_factor_{suffix}", "1", 1.0, "gain factor")
         return found

@@ -35,8 +35,9 @@ def check_unit(unit: str, where: str) -> str:
     words = "write for example 'rad/s', 'm/s^2' or '1'"
     if len(unit) > LONGEST_UNIT or not _UNIT.fullmatch(unit):
         raise ModelError(f"{where}: '{shown(unit)}' is not a unit; {words}")
+    known = registry()  # a pint that does not start is not the unit's fault
     try:
-        powers = registry().parse_units(unit)._units.values()  # type: ignore[attr-defined]
+        powers = known.parse_units(unit)._units.values()  # type: ignore[attr-defined]
     except Exception as error:  # pint raises tokenizer, attribute and value errors alike
         raise ModelError(f"{where}: '{shown(unit)}' is not a unit ({shown(str(error), 100)}); {words}") from None
     if any(abs(power) > LARGEST_POWER for power in powers):

@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[2]
 SHIPPED = sorted((ROOT / "estimators" / "schedules").glob("*.json"))
 DATA = ROOT / "tests" / "unit" / "data"
 BASES = [*SHIPPED, DATA / "sampled-longitudinal.json", DATA / "heated-spring.json", DATA / "heated-spring.json"]
-COUNT = int(os.environ.get("GAINSMITH_MUTATIONS", "120"))
+COUNT = int(os.environ.get("GAINSMITH_MUTATIONS", "80"))
 FIRST = int(os.environ.get("GAINSMITH_FIRST_MUTATION", "0"))
 SEED = 20_261_122
 

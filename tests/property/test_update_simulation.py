@@ -1,6 +1,6 @@
 """Plant and runtime simulated together must never beat a certificate; what is 2 % better must be refused, and be beaten.
 
-1,000 plants by hand: `python -m tests.support.update_campaign 1000`. Here 32 of them, in parts.
+1,000 plants by hand: `python -m tests.support.update_campaign 1000`. Here 24 of them, in parts.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tests.support.update_campaign import UPDATE_KIND, Case, campaign, random_ca
 from tests.support.update_judge import Judge, Tally
 from tests.support.update_run import Paths, probed, simulate
 
-PLANTS, PARTS = 32, 2
+PLANTS, PARTS = 24, 2
 CONTROLS = (1, 2, 6, 10, 11, 13)
 UNSTABLE = (1, 6, 10, 13)  # plants that do not stand the loss of every measurement
 
@@ -38,7 +38,7 @@ def test_no_run_beats_a_certificate(part: int) -> None:
     assert set(report.tally.checks) >= kinds | {"sum over a run", "converged"}
 
 
-@pytest.mark.parametrize("seeds", [range(100, 112), range(112, 124)])
+@pytest.mark.parametrize("seeds", [range(100, 108), range(112, 120)])
 def test_the_verifier_decides_random_lyapunov_functions_within_two_percent(seeds: range) -> None:
     """For a random P the best level is known from the runtime's own matrices on a grid: a bit worse is proved, better refused."""
     decided: Counter[str] = Counter()
@@ -56,7 +56,7 @@ def test_the_verifier_decides_random_lyapunov_functions_within_two_percent(seeds
             assert verifier.prove(found.better(-0.02)).proved, (seed, found.claim)
             assert not verifier.prove(found.better(0.02)).proved, (seed, found.claim)
             decided[found.claim.kind] += 1
-    assert sum(decided.values()) >= 12
+    assert sum(decided.values()) >= 8
     assert set(decided) >= {"internal update", "sampled error", "sampled gain", "drop probability"}
 
 

@@ -18,7 +18,7 @@ import pytest
 
 from estimators.schedule import read_content, write_content
 from studies.cli import main
-from studies.schedules import run_spec
+from studies.schedules import ScheduleRun, compare, run_spec
 from studies.spec import shipped_specs
 from synthesis.lmi.clarabel_backend import RawAnswer, solve_with_clarabel
 from synthesis.lmi.conic import ConicData
@@ -50,14 +50,17 @@ def test_certify_exit_codes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert "absent.json" in capsys.readouterr().out
 
 
-def test_schedules_write_check_and_drift(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_schedules_write_check_and_drift(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     name = "longitudinal-speed"
+    monkeypatch.setattr("studies.report.schedules.schedules_page", lambda runs: f"a page of {runs[0].name}")
     out = ["--out", str(tmp_path)]
     assert main(["schedules", name, *out, "--check"]) == 1
     assert "does not exist" in capsys.readouterr().err
     report = ["--report", str(tmp_path / "pages" / "report.html")]
     assert main(["schedules", name, *out, "--json", "--figures", str(tmp_path / "figures"), *report]) == 0
-    assert "All 10 claims are proved" in (tmp_path / "pages" / "report.html").read_text()
+    assert (tmp_path / "pages" / "report.html").read_text() == f"a page of {name}"
     row = json.loads(capsys.readouterr().out)[0]
     assert row["state"] == "written" and all(proof["proved"] for proof in row["proofs"])
     assert (tmp_path / "figures" / f"{name}.svg").stat().st_size > 1000
@@ -76,6 +79,12 @@ def test_schedules_write_check_and_drift(tmp_path: Path, capsys: pytest.CaptureF
     assert row["gains_moved"] == pytest.approx(0.0625 / max(gain[1][0] for gain in content["gain"]["table"]), rel=0.01)
 
 
+@pytest.fixture(scope="module")
+def fresh(tmp_path_factory: pytest.TempPathFactory) -> ScheduleRun:
+    """What the specification gives now."""
+    return run_spec("longitudinal-speed", tmp_path_factory.mktemp("fresh"))
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -91,13 +100,23 @@ def test_schedules_write_check_and_drift(tmp_path: Path, capsys: pytest.CaptureF
     ],
     ids=["weaker level", "claim removed", "overstated", "flipped gain", "other specification", "other constant"],
 )
-def test_a_worse_file_is_drift(tmp_path: Path, capsys: pytest.CaptureFixture[str], change: Any, words: str) -> None:
+def test_a_worse_file_is_drift(tmp_path: Path, fresh: ScheduleRun, change: Any, words: str) -> None:
+    stored, path = read_content(FOLDER / "longitudinal-speed.json"), tmp_path / "longitudinal-speed.json"
+    write_content(path, stored)
+    assert compare(path, fresh.content, fresh.proofs)[0] == "same"
+    change(stored)
+    write_content(path, stored)
+    state, message, *_ = compare(path, fresh.content, fresh.proofs)
+    assert state == "drift" and words in message
+
+
+def test_drift_is_an_exit_code_and_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     content = read_content(FOLDER / "longitudinal-speed.json")
-    change(content)
+    content["claims"][0]["level"] = 70.0
     write_content(tmp_path / "longitudinal-speed.json", content)
     assert main(["schedules", "longitudinal-speed", "--out", str(tmp_path), "--check"]) == 1
     captured = capsys.readouterr()
-    assert "drift" in captured.out and words in captured.err
+    assert "drift" in captured.out and "can be had at 80" in captured.err
 
 
 @pytest.mark.parametrize("seed", range(3))
