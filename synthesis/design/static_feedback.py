@@ -72,7 +72,7 @@ class StaticFeedback(Display):
 def design_static_feedback(model: LpvModel, design: StaticFeedbackDesign) -> StaticFeedback:
     """First to stability, where the start is not stable already, then down with the open channel, step by step.
 
-    Raises ProblemError for a plant that is rational, hides an unstable mode or has outputs that the inputs act on at once, for
+    Raises ProblemError for a plant that hides an unstable mode or has outputs that the inputs act on at once, for
     names that are unknown, and if no step leads to a stable loop: another start may.
 
     >>> import sympy as sp
@@ -87,10 +87,6 @@ def design_static_feedback(model: LpvModel, design: StaticFeedbackDesign) -> Sta
     """
     refuse_unstabilisable(model)
     refuse_undetectable(model)
-    if not model.polynomial.is_polynomial:
-        raise ProblemError(
-            f"model '{model.name}' is rational; static output feedback is designed for polynomial models"
-        )
     if model.polynomial.D.any():
         raise ProblemError(
             f"model '{model.name}': inputs act on outputs at once (D), a static law would close an algebraic loop; leave such "

@@ -176,7 +176,9 @@ class Steps:
         return np.array(points).reshape(len(points), 2 * count)
 
     def _closed(self, K: MatrixPolynomial, places: FloatArray) -> FloatArray:
-        A, B, C = (values(getattr(self.plant, key), places[:, : places.shape[1] // 2]) for key in "ABC")
+        still = places[:, : places.shape[1] // 2]
+        below = values(self.plant.denominator, still)
+        A, B, C = (values(getattr(self.plant, key), still) / below for key in "ABC")
         return np.asarray(A + B @ K.at(places)[..., 0] @ C)
 
 

@@ -94,7 +94,6 @@ def test_a_table_of_pi_gains_is_proved_and_its_mirror_image_refused() -> None:
     ("model", "design", "words"),
     [
         (third_order(D=[[1]]), {}, "algebraic loop"),
-        (third_order(1 / (2 + p)), {}, "rational"),
         (third_order(), {"start": ((1.0, 2.0),)}, "shape"),
         (third_order(), {"uses": (("u1", "y2"),)}, "y2"),
         (third_order(), {"uses": (("d1", "y1"),)}, "d1"),
