@@ -104,7 +104,7 @@ class FeedbackLoop(Tabulated):
         self._refuse_other(time)
         box = (region.offset[: region.parameters], region.factor[: region.parameters])
         if box not in self._systems:
-            plant = self._on(region, "ABCDEF", self.sample_time is not None)
+            plant = self.plant_on(region, "ABCDEF", self.sample_time is not None)
             below = None if self.sample_time is not None or self._below is None else region.local(self._below)
             eyes = [identity(size, 2 * region.parameters) for size in (self.plant.states, self.order)]
             self._systems[box] = (
