@@ -98,11 +98,13 @@ def jitter_claim(
     """A proof that the error decays for all sequences of sample times in [shortest, longest] s, or None.
 
     `observer` has the update `sampled` (a deployed table, or `observer_of` matrices), `parameters` are its scheduling
-    parameters; P is a polynomial in them and in the sample time. Raises AnalysisError for another update, a rational plant, or
-    an interval that is none.
+    parameters; P is a polynomial in them and in the sample time. Raises AnalysisError for another update, or an interval that is
+    none.
     """
-    if observer.update != "sampled" or not observer.plant.is_polynomial:
-        raise AnalysisError("jitter is judged for the update 'sampled' of a polynomial plant")
+    if observer.update != "sampled":
+        raise AnalysisError(
+            f"jitter is judged for the update 'sampled', this observer is '{observer.update}'; design it with its sample time"
+        )
     if not 0.0 < shortest < longest:
         raise AnalysisError(
             f"sample times from {shortest:g} to {longest:g} s are no interval; give 0 < shortest < longest"

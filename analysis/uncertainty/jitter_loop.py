@@ -74,7 +74,7 @@ class JitterLoop:
             )
 
     def system(self, region: Region, time: Time) -> System | None:
-        """The update on a region; None where the exponential is too large."""
+        """The update on a region; None where the exponential is too large, or a denominator not certainly positive."""
         count = region.parameters
         box = (region.offset[:count], region.factor[:count])
         if box not in self._systems:
@@ -87,13 +87,11 @@ class JitterLoop:
         axis = self.plant.axes[-1]
         length = constant(fmpq_mat([[axis.middle + axis.half * region.offset[inner]]]), 2 * count)
         length = (length + variable(inner, 2 * count) * (axis.half * region.factor[inner])).balls()
+        plant = self.observer.plant_on(observers, "AC", divided=True)
+        if plant is None:
+            return None
         A, C, gain = (
-            _with_sample_time(matrix, inner)
-            for matrix in (
-                observers.local(self.observer.plant.matrices["A"]),
-                observers.local(self.observer.plant.matrices["C"]),
-                self.observer.gain(observers),
-            )
+            _with_sample_time(matrix, inner) for matrix in (plant["A"], plant["C"], self.observer.gain(observers))
         )
         TA = A.scaled_by(length)
         integral = phi(TA)

@@ -21,11 +21,11 @@ from analysis.errors import AnalysisError
 from analysis.lpv.frozen import unstable
 from analysis.lpv.question import Question, ask
 from analysis.uncertainty.polynomials import Family
-from analysis.uncertainty.signs import all_positive
 from estimators.arrays import FloatArray
 from estimators.display import Display
 from synthesis.lmi.result import Verdict
 from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.box_decision import all_positive
 from synthesis.polynomials.rational import rational
 
 FARTHEST = 1000.0  # times the ranges: no witness is looked for beyond

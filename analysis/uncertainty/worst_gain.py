@@ -22,12 +22,12 @@ from analysis.lpv.norms import proved_frozen_gain
 from analysis.lpv.question import Inputs, Question, ask, require_channel
 from analysis.norms.hinf import hinf_norm
 from analysis.uncertainty.polynomials import Family, over_frequencies
-from analysis.uncertainty.signs import Decision, all_positive
 from estimators.arrays import FloatArray
 from estimators.display import Display
 from synthesis.certificate.rounding import round_up
 from synthesis.lmi.result import Verdict
 from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.box_decision import Decision, all_positive
 from synthesis.polynomials.rational import rational
 
 ROOM = (1.0, 5.0, 25.0, 100.0, 1000.0)  # times the tolerance above the lower bound, until a proof holds

@@ -1,4 +1,4 @@
-"""The plant of a sweep as arrays over (designs, grid): from a symbolic model, or from the polynomials of a schedule file."""
+"""The plant of a sweep as arrays over (designs, grid): from a symbolic model, or from what a schedule file holds of it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from analysis.perturbed import Matrices, PerturbedModel
 from estimators.arrays import FloatArray
-from estimators.schedule import GainSchedule, PlantPolynomial
+from estimators.schedule import GainSchedule, PlantPolynomial, PlantQuotient
 from synthesis.models.extract import MATRICES
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
@@ -55,7 +55,7 @@ class Plant:
     outputs: tuple[Signal, ...]
     disturbances: tuple[Signal, ...]
     model: LpvModel | None = None
-    polynomials: Mapping[str, PlantPolynomial] | None = None
+    polynomials: Mapping[str, PlantPolynomial | PlantQuotient] | None = None
 
     def __getstate__(self) -> dict[str, Any]:  # compiled functions are made anew where they are needed
         return {name: value for name, value in vars(self).items() if name != "_family"}
@@ -93,16 +93,16 @@ def polynomial_plant(schedule: GainSchedule) -> Plant:
 
     `A_2_1` multiplies the entry in row 2, column 1 of A, at every value of the scheduling parameter.
     """
-    entries = {}
+    entries, p = {}, schedule.parameter
+    found = {key: m for key, m in schedule.plant.items() if isinstance(m, PlantPolynomial | PlantQuotient)}
     for key in "ACEF":
-        present = np.abs(schedule.plant[key].coefficients).max(axis=0, initial=0.0) > 0.0
+        present = found[key].largest > 0.0
         for row, column in np.argwhere(present):
             name = f"{key}_{row + 1}_{column + 1}"
             entries[name] = Parameter(name, "1", 1.0, "entry")
-    p = schedule.parameter
     states, outputs, disturbances = (
-        tuple(Signal(s.name, s.unit) for s in found)
-        for found in (schedule.states, schedule.outputs, schedule.disturbances)
+        tuple(Signal(s.name, s.unit) for s in signals)
+        for signals in (schedule.states, schedule.outputs, schedule.disturbances)
     )
     box = (SchedulingParameter(p.name, p.unit, p.min, p.max, p.rate_min, p.rate_max),)
-    return Plant(entries, box, states, outputs, disturbances, polynomials=schedule.polynomials)
+    return Plant(entries, box, states, outputs, disturbances, polynomials=found)

@@ -39,6 +39,7 @@ RATES = ("decay rate", "fastest pole", "internal update", "sampled error")  # cl
 MOST_PARAMETERS = 3  # of a proof: polynomials of order 8 in more of them have too many terms
 MOST_ENTRIES, FINEST = 4000, 64  # breakpoints of a table with several parameters, and segments along one of them
 REFINEMENT = 4  # a table is compared with one of so many times its segments
+OF_RATIONAL = (0, 1)  # degrees of P more that are tried for a feedback law of a rational plant
 TABLE_DIGITS = 4  # of the largest gain of each entry; more would be digits of the solver and not of the guarantee
 
 
@@ -110,15 +111,21 @@ def deploy(
     channels = [claim_channel(channel) for channel in design.channels]
     for segments in _candidates(gains, settings):
         progress(f"{' x '.join(map(str, segments))} segments")
-        search, points, table = _tabulated(gains, segments, settings, settings.dtype)
-        finer, _, _ = _tabulated(gains, tuple(REFINEMENT * number for number in segments), settings, "float64")
-        cost = max(table_cost(search, finer, Wish(kind, None, channel)) for channel in channels)
-        if not cost < settings.interpolation_cost:
-            continue
-        claims = _claims(gains, search, channels, settings.settle)
-        if claims is not None:
-            refuse_beyond_limits(gains, table)
-            return Deployment(gains, settings, points, table, claims, cost)
+        found: list[Deployment] = []
+        for degree in lyapunov_degrees(model, gains):
+            search, points, table = _tabulated(gains, segments, settings, settings.dtype, degree)
+            fine = tuple(REFINEMENT * number for number in segments)
+            finer, _, _ = _tabulated(gains, fine, settings, "float64", degree)
+            cost = max(table_cost(search, finer, Wish(kind, None, channel)) for channel in channels)
+            if not cost < settings.interpolation_cost:
+                continue
+            claims = _claims(gains, search, channels, settings.settle)
+            if claims is not None:
+                found.append(Deployment(gains, settings, points, table, claims, cost))
+        if found:
+            refuse_beyond_limits(gains, found[0].table)
+            least = min(_claimed(one) for one in found)
+            return next(one for one in found if _claimed(one) <= least * (1.0 + settings.interpolation_cost))
     raise ProblemError(
         f"model '{model.name}': no table with up to {' x '.join(map(str, segments))} segments keeps the guarantee within "
         f"{100 * settings.interpolation_cost:g} %; give the design more back-off or a lower degree"
@@ -219,23 +226,34 @@ def names_of(model: LpvModel) -> Names:
 
 
 def _tabulated(
-    gains: Gains, segments: tuple[int, ...], settings: DeploySettings, dtype: str
+    gains: Gains, segments: tuple[int, ...], settings: DeploySettings, dtype: str, degree: tuple[int, ...]
 ) -> tuple[Search, tuple[FloatArray, ...], FloatArray]:
     model, design = gains.model, gains.design
     points, table = tabulate(gains, segments, dtype, settings.sample_time)
     names = names_of(model) if isinstance(gains, ObserverGains) else feedback_names(model)
     loop = deployed_loop(gains, points, table, settings.sample_time)
     return (
-        Search(loop, names, model.parameters, lyapunov_degree(model, gains), design.settings),
+        Search(loop, names, model.parameters, degree, design.settings),
         points,
         table,
     )
 
 
-def lyapunov_degree(model: LpvModel, gains: Gains) -> tuple[int, ...]:
-    """Degree of P in the claims for each parameter: that of the gains, at least one; none in a parameter that may jump.
+def lyapunov_degrees(model: LpvModel, gains: Gains) -> list[tuple[int, ...]]:
+    """Degrees of P in the claims for each parameter: those of the gains, at least one; none in a parameter that may jump.
 
-    A law whose own P is rational in the parameters says by `rational` how many degrees more come close to it.
+    A law whose own P is rational in the parameters says by `rational` how many degrees more come close to it. What is best for
+    a law of a rational plant is tried: its P hardly moves, or follows a quotient.
     """
-    more = int(getattr(gains, "rational", 0))
-    return tuple(0 if p.may_jump else max(gains.design.degree, 1) + more for p in model.parameters)
+    own = int(getattr(gains, "rational", 0))
+    quotient = not isinstance(gains, ObserverGains) and not model.polynomial.is_polynomial
+    tried = (
+        tuple(0 if p.may_jump else max(gains.design.degree, 1) + more for p in model.parameters)
+        for more in (OF_RATIONAL if quotient else (own,))
+    )
+    return list(dict.fromkeys(tried))
+
+
+def _claimed(deployment: Deployment) -> float:
+    """The product of the gains that are claimed."""
+    return float(np.prod([claim.level for claim in deployment.claims if "gain" in claim.kind]))

@@ -8,18 +8,21 @@ from itertools import product
 import numpy as np
 
 from estimators.arrays import FloatArray
+from synthesis.errors import ProblemError
 from synthesis.models.discretise import zero_order_hold
 from synthesis.models.lpv import LpvModel
 from synthesis.models.numeric import NumericModel
 
 FIT = 1e-10  # relative
+LOOSE = 1e-4  # beyond it a fit is none: what comes out is proved anyway, but was designed for another plant
 DEGREES = (4, 8, 12, 16, 24)
 
 
 def fitted_update(model: LpvModel, scale: FloatArray, period: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """e^(TA), T phi(TA) B and T phi(TA) E in the states diag(scale) x, as polynomials in u, fitted to 1e-10.
+    """e^(TA), T phi(TA) B and T phi(TA) E in the states diag(scale) x, as polynomials in u, fitted to 1e-10 if degree 24 does.
 
-    Coefficients (d_1+1, ..., d_p+1, rows, columns). What comes out of a design is proved for the exact matrices.
+    Coefficients (d_1+1, ..., d_p+1, rows, columns). What comes out of a design is proved for the exact matrices. Raises
+    ProblemError for a fit that is worse than 1e-4.
     """
     n, inputs = len(model.states), len(model.inputs)
 
@@ -56,6 +59,11 @@ def _fitted(model: LpvModel, values: Callable[[NumericModel], FloatArray]) -> Fl
         tail = max((np.abs(np.take(series, -1, axis=axis)).max() for axis in range(count)), default=0.0)
         if tail <= FIT * size:
             break
+    if tail > LOOSE * size:
+        raise ProblemError(
+            f"model '{model.name}': no polynomial of degree {DEGREES[-1]} comes close to it over its range "
+            f"(off by {tail / size:.1g}); shrink the range"
+        )
     powers = np.zeros((degree + 1, degree + 1))
     for k in range(degree + 1):
         column = np.polynomial.chebyshev.cheb2poly(np.eye(degree + 1)[k])

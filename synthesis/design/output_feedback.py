@@ -130,7 +130,7 @@ def design_output_feedback(model: LpvModel, design: OutputFeedbackDesign) -> Out
     """Minimise the open channel in both forms, then give back `backoff` of it and take the better form's answer of least norm.
 
     Raises ProblemError for a plant that is not stabilisable or not detectable at some place (the mode and the place), for a
-    feedthrough that closes an algebraic loop or meets a rational plant, and if nothing is found.
+    feedthrough that closes an algebraic loop, and if nothing is found.
 
     >>> import sympy as sp
     >>> from synthesis import SchedulingParameter, Signal
@@ -193,12 +193,10 @@ def _forms(model: LpvModel, design: OutputFeedbackDesign) -> tuple[Still, ...]:
 
 def _feedthrough(model: LpvModel, design: OutputFeedbackDesign, plant: GeneralisedPlant) -> bool:
     """Whether Dk is an unknown. Raises ProblemError where it is asked for and cannot be."""
-    loops, rational = bool(plant.D.any()), not model.polynomial.is_polynomial
-    if design.feedthrough and (loops or rational):
-        why = (
-            "the inputs act on a measured output at once (D), which would close an algebraic loop"
-            if loops
-            else "it is rational, and its product with a feedthrough is not linear over one denominator"
+    loops = bool(plant.D.any())
+    if design.feedthrough and loops:
+        raise ProblemError(
+            f"model '{model.name}' takes no feedthrough: the inputs act on a measured output at once (D), which would close an "
+            "algebraic loop; leave `feedthrough` out"
         )
-        raise ProblemError(f"model '{model.name}' takes no feedthrough: {why}; leave `feedthrough` out")
-    return not (loops or rational) if design.feedthrough is None else design.feedthrough
+    return not loops if design.feedthrough is None else design.feedthrough

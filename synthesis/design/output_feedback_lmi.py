@@ -93,13 +93,17 @@ def _level(problem: LmiProblem, level: float | None) -> MatrixPolynomial:
 
 
 class _Loop:
-    """The closed loop after the congruence, affine in the unknowns, over the denominator."""
+    """The closed loop after the congruence, affine in the unknowns, over `below`.
+
+    That is the denominator of the plant, and its square where B Dh C is a product of two quotients.
+    """
 
     def __init__(self, problem: LmiProblem, plant: GeneralisedPlant, wanted: Wanted) -> None:
         self.problem, self.clock = problem, wanted.clock
-        self.A, self.B, self.C, self.below = (
-            problem.scaled(getattr(plant, key)) for key in ("A", "B", "C", "denominator")
-        )
+        denominator = problem.scaled(plant.denominator)
+        self.lift = denominator if wanted.feedthrough and any(denominator.degrees) else None
+        self.A, self.B, self.C = (problem.scaled(getattr(plant, key)) for key in ("A", "B", "C"))  # numerators
+        self.below = self._over(denominator)
         n, m, k = self.A.shape[0], self.B.shape[1], self.C.shape[0]
         degree = {"X": _degrees(problem, wanted, "X"), "Y": _degrees(problem, wanted, "Y")}
         self.unknown = {name: problem.symmetric(name, n, degree[name]) for name in ("X", "Y")}
@@ -107,7 +111,9 @@ class _Loop:
         self.Ch = problem.matrix("Ch", m, n, wanted.degree)
         self.Dh = problem.matrix("Dh", m, k, wanted.degree) if wanted.feedthrough else None
         # What stands in the upper right of A_c + A_c': Ah' and the known part that would only have to be cancelled.
-        self.cross = None if wanted.eliminated(len(plant.channels)) else problem.matrix("cross", n, n, wanted.degree)
+        self.cross = (
+            None if wanted.eliminated(len(plant.channels)) else self._over(problem.matrix("cross", n, n, wanted.degree))
+        )
 
     @property
     def coupling(self) -> MatrixPolynomial:
@@ -118,8 +124,8 @@ class _Loop:
     def closed(self, half: str) -> MatrixPolynomial:
         """A Y + B Ch or X A + Bh C."""
         if half == "Y":
-            return self.A @ self.unknown["Y"] + self.B @ self.Ch
-        return self.unknown["X"] @ self.A + self.Bh @ self.C
+            return self._over(self.A) @ self.unknown["Y"] + self._over(self.B) @ self.Ch
+        return self.unknown["X"] @ self._over(self.A) + self.Bh @ self._over(self.C)
 
     def rate(self, half: str) -> MatrixPolynomial:
         """One diagonal block of A_c + A_c' + dP/dt."""
@@ -136,12 +142,16 @@ class _Loop:
     def input(self, part: ChannelPlant, half: str) -> MatrixPolynomial:
         """E + B Dh F or X E + Bh F."""
         E, F = self.problem.scaled(part.E), self.problem.scaled(part.F)
-        return self._with_feedthrough(E, self.B, F) if half == "Y" else self.unknown["X"] @ E + self.Bh @ F
+        if half == "Y":
+            return self._with_feedthrough(E, self.B, F)
+        return self.unknown["X"] @ self._over(E) + self.Bh @ self._over(F)
 
     def output(self, part: ChannelPlant, half: str) -> MatrixPolynomial:
         """Cz Y + Dzu Ch or Cz + Dzu Dh C."""
         Cz, Dzu = self.problem.scaled(part.Cz), self.problem.scaled(part.Dzu)
-        return Cz @ self.unknown["Y"] + Dzu @ self.Ch if half == "Y" else self._with_feedthrough(Cz, Dzu, self.C)
+        if half == "X":
+            return self._with_feedthrough(Cz, Dzu, self.C)
+        return self._over(Cz) @ self.unknown["Y"] + self._over(Dzu) @ self.Ch
 
     def gain(
         self, part: ChannelPlant, level: MatrixPolynomial, rate: MatrixPolynomial, inputs: MatrixPolynomial,
@@ -156,7 +166,11 @@ class _Loop:
     def _with_feedthrough(
         self, own: MatrixPolynomial, left: MatrixPolynomial, right: MatrixPolynomial
     ) -> MatrixPolynomial:
-        return own if self.Dh is None else own + left @ self.Dh @ right
+        """own + left Dh right of three numerators."""
+        return own if self.Dh is None else self._over(own) + left @ self.Dh @ right
+
+    def _over(self, numerator: MatrixPolynomial) -> MatrixPolynomial:
+        return numerator if self.lift is None else numerator.scaled_by(self.lift)
 
 
 def _degrees(problem: LmiProblem, wanted: Wanted, name: str) -> tuple[int, ...]:

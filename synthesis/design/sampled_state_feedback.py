@@ -9,8 +9,9 @@ With V = x'Q(p)^-1 x, Q+ = Q one sample later, a slack matrix G(p) and Y = K G (
     limit        as in `synthesis.design.state_feedback`, with G + G' - Q in the place of Q below Y_i
 
 prove an l2 gain below g. K needs no Q+, which is not known when it is used. Phi and the Gammas are fitted by Chebyshev
-polynomials to 1e-10; what comes out is proved for the exact ones (`synthesis.certificate`). Where samples are long against the
-loop, this is the design to take: the one in continuous time knows nothing of them.
+polynomials to 1e-10, those of a rational model as well as degree 24 does; what comes out is proved for the exact ones
+(`synthesis.certificate`). Cz, Dz and Fz of a rational model are numerators, and g I in the last row takes its denominator twice.
+Where samples are long against the loop, this is the design to take: the one in continuous time knows nothing of them.
 """
 
 from __future__ import annotations
@@ -47,7 +48,8 @@ def design_sampled_state_feedback(
 ) -> StateFeedbackGains:
     """K(p) for the given sample time (s); `gamma` is the l2 gain over samples.
 
-    Raises ProblemError for a rational model, for pole regions (of poles in continuous time), and as `design_state_feedback`.
+    Raises ProblemError for pole regions (of poles in continuous time), for a model whose update over a sample no polynomial fits,
+    and as `design_state_feedback`.
 
     >>> import sympy as sp
     >>> one = {key: (Signal(name, "1"),) for key, name in zip(("states", "inputs", "outputs", "disturbances"), "xuyw")}
@@ -66,8 +68,6 @@ def design_sampled_state_feedback(
             f"a sampled design has no {given}: leave it out; sizes of inputs in channels bound its gains"
         )
     refuse_unstabilisable(model)
-    if not model.polynomial.is_polynomial:
-        raise ProblemError(f"model '{model.name}' is rational; a sampled state feedback takes polynomial models")
     check_limits(model, design.limits)
     design = replace(design, settings=replace(design.settings, points=min(design.settings.points, POINTS)))
     plain = feedback_scale(model, design.channels)
@@ -130,6 +130,9 @@ def _problem(
             ratio = level / scale.disturbance
             size = problem.constant(np.array([[ratio**2 if name == "gamma^2" else ratio]]))
         inner, outer = problem.constant(np.eye(W.shape[1])), problem.constant(np.eye(len(Z))).scaled_by(size)
+        outer = outer.scaled_by(known["denominator"]).scaled_by(
+            known["denominator"]
+        )  # `seen` and `through` are over it
         inner = inner if name == "gamma^2" else inner.scaled_by(size)
         rows: list[list[MatrixPolynomial | None]] = [
             [later, closed, Gamma_E @ problem.constant(W), None],

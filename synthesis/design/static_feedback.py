@@ -23,7 +23,7 @@ from estimators.display import Display
 from synthesis.design.generalised_plant import Frame, frame_of, generalised_plant
 from synthesis.design.refusals import refuse_undetectable, refuse_unstabilisable
 from synthesis.design.static_feedback_design import StaticFeedbackDesign
-from synthesis.design.static_feedback_steps import Steps
+from synthesis.design.static_feedback_steps import Steps, structure
 from synthesis.design.three_solves import three_solves
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import LmiResult, Verdict
@@ -72,7 +72,7 @@ class StaticFeedback(Display):
 def design_static_feedback(model: LpvModel, design: StaticFeedbackDesign) -> StaticFeedback:
     """First to stability, where the start is not stable already, then down with the open channel, step by step.
 
-    Raises ProblemError for a plant that is rational, hides an unstable mode or has outputs that the inputs act on at once, for
+    Raises ProblemError for a plant that hides an unstable mode, for outputs in use that the inputs act on at once, for
     names that are unknown, and if no step leads to a stable loop: another start may.
 
     >>> import sympy as sp
@@ -87,14 +87,11 @@ def design_static_feedback(model: LpvModel, design: StaticFeedbackDesign) -> Sta
     """
     refuse_unstabilisable(model)
     refuse_undetectable(model)
-    if not model.polynomial.is_polynomial:
-        raise ProblemError(
-            f"model '{model.name}' is rational; static output feedback is designed for polynomial models"
-        )
-    if model.polynomial.D.any():
+    seen = structure(model, design.uses).any(axis=0)
+    if model.polynomial.D[..., seen, :].any():
         raise ProblemError(
             f"model '{model.name}': inputs act on outputs at once (D), a static law would close an algebraic loop; leave such "
-            "outputs out of the model, or design a law with states"
+            "outputs out by `uses`, or design a law with states"
         )
     plant = generalised_plant(model, design.channels)
     frame = frame_of(plant)

@@ -36,7 +36,10 @@ class Structure:
 
 
 class StaticLoop:
-    """A problem in P, with K given (`at` None) or unknown near the pair `at`; time in units of 1/clock s."""
+    """A problem in P, with K given (`at` None) or unknown near the pair `at`; time in units of 1/clock s.
+
+    Of a rational plant B K C is over the square of its denominator, and so is every inequality.
+    """
 
     def __init__(
         self,
@@ -48,20 +51,24 @@ class StaticLoop:
         at: Point | None = None,
     ) -> None:
         self.problem, self.at = problem, at
-        self.A, self.B, self.C = (problem.scaled(getattr(plant, key)) for key in "ABC")
+        self.A, self.B, self.C = (problem.scaled(getattr(plant, key)) for key in "ABC")  # numerators
+        denominator = problem.scaled(plant.denominator)
+        self.below = denominator if any(denominator.degrees) else None
         degrees = tuple(0 if p.may_jump else degree for p in problem.parameters)
         self.P = problem.symmetric("P", self.A.shape[0], degrees)
         self.K = self._unknown(gain) if isinstance(gain, Structure) else gain
-        product = self.P @ self.A
-        self.rate = product + product.T + problem.time_derivative(self.P) * (1.0 / clock)
+        product = self.P @ self._over(self.A)
+        self.rate = product + product.T + self._over(problem.time_derivative(self.P), 2) * (1.0 / clock)
         problem.require("P > 0", self.P)
 
     def require_gain(self, part: ChannelPlant, level: MatrixPolynomial) -> None:
         """The L2 gain of a channel."""
         E, F, Cz, Dzd, Dzu = (self.problem.scaled(getattr(part, key)) for key in ("E", "F", "Cz", "Dzd", "Dzu"))
-        outputs, direct = Cz + Dzu @ self.K @ self.C, Dzd + Dzu @ self.K @ F
+        outputs, direct = self._over(Cz) + Dzu @ self.K @ self.C, self._over(Dzd) + Dzu @ self.K @ F
+        level = self._over(level, 2)
         w, z = (self.problem.constant(np.eye(size)).scaled_by(level) for size in (E.shape[1], Cz.shape[0]))
-        own = symmetric_block([[self.rate, self.P @ E, outputs.T], [None, -w, direct.T], [None, None, -z]])
+        force = self.P @ self._over(E)
+        own = symmetric_block([[self.rate, force, outputs.T], [None, -w, direct.T], [None, None, -z]])
         n, seen = own.shape[0], across(self.C, F)
         self._require(
             f"gain {part.channel.name}",
@@ -71,18 +78,26 @@ class StaticLoop:
 
     def require_decay(self, rate: float) -> None:
         """|x|_P falls at least like exp(-rate t)."""
-        own = self.rate + self.P * (2.0 * rate)
+        own = self.rate + self._over(self.P, 2) * (2.0 * rate)
         self._require("decay rate", own, lambda P, K: (self.B.T @ P, K @ self.C))
 
     def require_disc(self, radius: float) -> None:
         """Every frozen pole lies within the disc about zero: [r P, P A; *, r P] > 0 of the closed loop."""
-        disc, n = self.P * -radius, self.A.shape[0]
-        own = symmetric_block([[disc, -(self.P @ self.A)], [None, disc]])
+        disc, n = self._over(self.P, 2) * -radius, self.A.shape[0]
+        own = symmetric_block([[disc, -(self.P @ self._over(self.A))], [None, disc]])
         self._require(
             "fastest pole",
             own,
             lambda P, K: (self._within(-(self.B.T @ P), 0, 2 * n), self._within(K @ self.C, n, 2 * n)),
         )
+
+    def _over(self, matrix: MatrixPolynomial, times: int = 1) -> MatrixPolynomial:
+        """The matrix times a power of the denominator."""
+        if self.below is None:
+            return matrix
+        for _ in range(times):
+            matrix = matrix.scaled_by(self.below)
+        return matrix
 
     def _within(self, matrix: MatrixPolynomial, start: int, width: int) -> MatrixPolynomial:
         """[0, matrix, 0] of the given width."""

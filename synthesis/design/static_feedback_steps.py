@@ -34,7 +34,7 @@ class Steps:
         if self.settings.relaxation == "auto":
             self.settings = replace(self.settings, relaxation="exchange")
         self.decay = design.decay_rate * (1.0 + design.reserve) / frame.clock
-        self.structure = Structure(_entries(model, design.uses), design.degree)
+        self.structure = Structure(structure(model, design.uses), design.degree)
 
     def start(self) -> MatrixPolynomial:
         """The gains that the design starts with, in the frame. Raises ProblemError for a wrong shape or a stray entry."""
@@ -176,11 +176,13 @@ class Steps:
         return np.array(points).reshape(len(points), 2 * count)
 
     def _closed(self, K: MatrixPolynomial, places: FloatArray) -> FloatArray:
-        A, B, C = (values(getattr(self.plant, key), places[:, : places.shape[1] // 2]) for key in "ABC")
+        still = places[:, : places.shape[1] // 2]
+        below = values(self.plant.denominator, still)
+        A, B, C = (values(getattr(self.plant, key), still) / below for key in "ABC")
         return np.asarray(A + B @ K.at(places)[..., 0] @ C)
 
 
-def _entries(model: LpvModel, uses: tuple[tuple[str, str], ...] | None) -> FloatArray:
+def structure(model: LpvModel, uses: tuple[tuple[str, str], ...] | None) -> FloatArray:
     """One where K may join an output to an input (nu, ny). Raises ProblemError for unknown names."""
     inputs, outputs = ([s.name for s in group] for group in (model.inputs, model.outputs))
     if uses is None:

@@ -11,8 +11,8 @@ from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import Inequality, LmiProblem
 from synthesis.lmi.settings import LmiSettings
+from synthesis.polynomials.bernstein import to_bernstein
 from synthesis.polynomials.matrix import MatrixPolynomial, padded
-from synthesis.polynomials.positivity import to_bernstein
 
 MOST_WORK = 100_000  # of `cheaper`: beyond it a few places that are exchanged cost less (six states, degree 1)
 

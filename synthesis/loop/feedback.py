@@ -9,6 +9,7 @@ The plant x' = A x + B u + E d with d held, too, and p at its value of the sampl
     [x; xk]+ = [Phi x + T phi(TA) (B u + E d); Ak xk + Bk v],    phi(M) = int_0^1 e^(M s) ds
 
 In continuous time (`sample_time` None) xk' stands for xk+, and x' = A x + B u + E d for the first line: the law without sampling.
+Of a rational plant this loop is over its denominator where states are measured, over its square where outputs are: B Dk C.
 Performance outputs are all states of the plant, then its outputs y = C x + D u + F d, then its inputs u.
 
 Where the input acts on an output at once (D), Dk must not use that output: u would depend on itself. Such an output is meant with
@@ -45,8 +46,8 @@ class FeedbackLoop(Tabulated):
     """Plant, table of K (nk + nu, nk + nv) by grid indices, what is measured, and the order nk of the law.
 
     `sample_time` None: the continuous-time loop is meant. With `rounded` the gains are balls that hold what the runtime
-    interpolates of them in float64; without it they are exact. Raises ProblemError for a table of another shape, an algebraic
-    loop, and a rational plant in continuous time unless its states are measured.
+    interpolates of them in float64; without it they are exact. Raises ProblemError for a table of another shape, and an algebraic
+    loop.
     """
 
     plant: Plant
@@ -63,8 +64,6 @@ class FeedbackLoop(Tabulated):
         wanted = self.order + self.inputs, self.order + (self.plant.states if self.by_states else m["C"].shape[0])
         if self._gain_shape != wanted:
             raise ProblemError(f"the gains have the shape {self._gain_shape}; this plant and law need {wanted}")
-        if not self.plant.is_polynomial and not self.by_states and self.sample_time is None:
-            raise ProblemError("in continuous time a rational plant is closed by state feedback only")
         if not self.by_states:
             self._refuse_algebraic_loop()
 
@@ -105,7 +104,7 @@ class FeedbackLoop(Tabulated):
         self._refuse_other(time)
         box = (region.offset[: region.parameters], region.factor[: region.parameters])
         if box not in self._systems:
-            plant = self._on(region, "ABCDEF", self.sample_time is not None)
+            plant = self.plant_on(region, "ABCDEF", self.sample_time is not None)
             below = None if self.sample_time is not None or self._below is None else region.local(self._below)
             eyes = [identity(size, 2 * region.parameters) for size in (self.plant.states, self.order)]
             self._systems[box] = (
@@ -137,17 +136,25 @@ class FeedbackLoop(Tabulated):
             free = ring.exponential(TA, integral)
             forced = {key: (integral @ plant[key]).truncated(ORDER) * self.sample_time for key in "BE"}
         wide, nv, (eye, memory) = (n, nk), n if self.by_states else ny, eyes
+
+        def over(matrix: Any) -> Any:
+            return matrix if below is None else matrix.scaled_by(below)
+
+        def once(matrix: Any) -> Any:  # outputs, and u from them, are over the denominator
+            return matrix if self.by_states else over(matrix)
+
         seen, noise = (eye, plant["E"] * 0) if self.by_states else (plant["C"], plant["F"])
         # What the law measures, but for the inputs of this sample: Dk uses no output that they act on.
-        measured = stacked([[None, memory], [seen, None]], (nk, nv), wide)
+        measured = stacked([[None, once(memory)], [seen, None]], (nk, nv), wide)
         disturbed = stacked([[None], [noise]], (nk, nv), (nd,))
         acting = rows(gain, nk, nk + nu)
         u, of_d = (acting @ measured).truncated(ORDER), (acting @ disturbed).truncated(ORDER)
-        y = stacked([[plant["C"], None]], (ny,), wide) + (plant["D"] @ u).truncated(ORDER)
-        y_of_d = plant["F"] + (plant["D"] @ of_d).truncated(ORDER)
-        moved = stacked([[free, None]], (n,), wide) + (forced["B"] @ u).truncated(ORDER)
-        driven = forced["E"] + (forced["B"] @ of_d).truncated(ORDER)
+        y = once(stacked([[plant["C"], None]], (ny,), wide)) + (plant["D"] @ u).truncated(ORDER)
+        y_of_d = once(plant["F"]) + (plant["D"] @ of_d).truncated(ORDER)
+        moved = once(stacked([[free, None]], (n,), wide)) + (forced["B"] @ u).truncated(ORDER)
+        driven = once(forced["E"]) + (forced["B"] @ of_d).truncated(ORDER)
         if nk:
+            measured, disturbed = over(measured), over(disturbed)
             if not self.by_states:
                 measured = stacked([[rows(measured, 0, nk)], [y]], (nk, nv), (n + nk,))
                 disturbed = stacked([[None], [y_of_d]], (nk, nv), (nd,))
@@ -155,8 +162,8 @@ class FeedbackLoop(Tabulated):
             moved = stacked([[moved], [(kept @ measured).truncated(ORDER)]], (n, nk), (n + nk,))
             driven = stacked([[driven], [(kept @ disturbed).truncated(ORDER)]], (n, nk), (nd,))
         x = stacked([[eye, None]], (n,), wide)
-        if below is not None:  # y is over the denominator as x' is, x and u are not
-            x, u, of_d = (matrix.scaled_by(below) for matrix in (x, u, of_d))
+        x, u, of_d = once(over(x)), over(u), over(of_d)  # y is there already, as x' is
+        below = None if below is None else once(below)
         heights = (n, ny, nu)
         C = stacked([[x], [y], [u]], heights, (n + nk,))
         D = stacked([[None], [y_of_d], [of_d]], heights, (nd,))

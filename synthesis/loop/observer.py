@@ -102,7 +102,7 @@ class ObserverLoop(Tabulated):
         return self._equation(plant, self.gain(region), identity(self.plant.states, 2 * region.parameters), below)
 
     def _error_update(self, region: Region) -> System | None:
-        plant = self._on(region, "ACEF", True)
+        plant = self.plant_on(region, "ACEF", True)
         if plant is None:
             return None
         return self._updated(plant, self.gain(region), identity(self.plant.states, 2 * region.parameters), exponentials)

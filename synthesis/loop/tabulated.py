@@ -61,13 +61,13 @@ class Tabulated:
         found = PolynomialMatrix(terms, self._gain_shape, 2 * count).balls()
         return found.blurred(lambda i, j: self._gain_rounding[i, j].abs_upper()) if self.rounded else found
 
-    def _on(self, region: Region, letters: str, divided: bool) -> dict[str, PolynomialMatrix] | None:
+    def plant_on(self, region: Region, letters: str, divided: bool) -> dict[str, PolynomialMatrix] | None:
         """Plant matrices on a region: numerators, or `divided` by the denominator; None if that is not positive there."""
         plant = {key: region.local(self._plant[key]) for key in letters}
         return quotient.quotients(plant, region.local(self._below)) if divided and self._below is not None else plant
 
     def _at_once(self, cells: Sequence[Region], letters: str, divided: bool) -> tuple[dict[str, Boxes], Boxes] | None:
-        """`_on` and the gain on many regions; None where they are too many or too large for that."""
+        """`plant_on` and the gain on many regions; None where they are too many or too large for that."""
         axes = self.plant.axes
         if not 1 <= len(axes) <= max(HIGHEST) or len(cells) > MOST_BOXES:
             return None

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
+from synthesis.polynomials.bernstein import in_bernstein
 from synthesis.polynomials.boxes import EPS, INFLATE, Boxes, orders
-from synthesis.polynomials.positivity import to_bernstein
 
 
 def positive(matrix: Boxes) -> BoolArray:
@@ -37,8 +37,7 @@ def _positive(matrix: Boxes) -> BoolArray:
         if all(a <= d for a, d in zip(k, degrees, strict=True)):
             place: Any = (slice(None), *k)
             tensor[place] = matrix.middle[:, number]
-    for axis, degree in enumerate(degrees):
-        tensor = np.moveaxis(np.tensordot(to_bernstein(degree), tensor, axes=(1, axis + 1)), 0, axis + 1)
+    tensor = in_bernstein(tensor, range(1, len(degrees) + 1))
     radius = matrix.radius + EPS * (2 * sum(degrees) + 8) * np.abs(matrix.middle).sum(axis=1)
     values = tensor.reshape(len(tensor), -1, n, n)
     return np.asarray(_definite(values, INFLATE * radius[:, None]).all(axis=1))

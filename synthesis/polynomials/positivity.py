@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
-from functools import cache
-from math import comb
 
 import numpy as np
 
 from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
+from synthesis.polynomials.bernstein import halved, in_bernstein
 from synthesis.polynomials.matrix import MatrixPolynomial
 
 
@@ -39,8 +37,7 @@ def prove_positive(matrix: MatrixPolynomial, depth: int = 16, magnitude: float =
     if not np.isfinite(local).all():
         raise ProblemError("a matrix polynomial with coefficients that are not finite has no sign")
     size = max(float(np.abs(local).sum(axis=tuple(range(v))).sum(axis=-1).max()), magnitude)
-    for axis in range(v):
-        local = np.moveaxis(np.tensordot(to_bernstein(local.shape[axis] - 1), local, axes=(1, axis)), 0, axis)
+    local = in_bernstein(local, range(v))
     boxes, lower, width = local[None], np.zeros((1, v)), np.ones((1, v))
     scale = float(np.abs(np.linalg.eigvalsh(local)).max()) or 1.0
     guard = 4 * np.finfo(float).eps * size * (local.shape[-1] + sum(local.shape[:v]))
@@ -66,37 +63,16 @@ def prove_positive(matrix: MatrixPolynomial, depth: int = 16, magnitude: float =
     return Positivity(False, smallest < -guard, smallest, place, scale)
 
 
-@cache
-def to_bernstein(degree: int) -> FloatArray:
-    """Matrix from monomial to Bernstein coefficients on [-1, 1]; exact, and no entry is larger than one.
-
-    Entry (i, k) is the blossom of u^k with i arguments +1 and degree - i arguments -1.
-    """
-
-    def entry(i: int, k: int) -> float:
-        chosen = range(max(0, k - degree + i), min(i, k) + 1)
-        total = sum(comb(i, j) * comb(degree - i, k - j) * (-1) ** (k - j) for j in chosen)
-        return float(Fraction(total, comb(degree, k)))
-
-    return np.array([[entry(i, k) for k in range(degree + 1)] for i in range(degree + 1)])
-
-
 def _halve(
     boxes: FloatArray, lower: FloatArray, width: FloatArray, axis: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """De Casteljau at one half along one axis, for all boxes at once."""
-    levels = np.moveaxis(boxes, axis + 1, 0)
-    left, right = [levels[0]], [levels[-1]]
-    while len(levels) > 1:
-        levels = 0.5 * (levels[:-1] + levels[1:])
-        left.append(levels[0])
-        right.append(levels[-1])
-    halves = np.concatenate([np.stack(left), np.stack(right[::-1])], axis=1)
+    """Cut in the middle of one axis, all boxes at once."""
+    halves = halved(boxes, axis + 1)
     width = width.copy()
     width[:, axis] *= 0.5
     shifted = lower.copy()
     shifted[:, axis] += width[:, axis]
-    return np.moveaxis(halves, 0, axis + 1), np.concatenate([lower, shifted]), np.concatenate([width, width])
+    return np.concatenate(halves), np.concatenate([lower, shifted]), np.concatenate([width, width])
 
 
 def _refine(matrix: MatrixPolynomial, place: FloatArray, smallest: float) -> tuple[float, FloatArray]:

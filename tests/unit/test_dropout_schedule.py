@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from analysis.drops.cells import Cells, cell_updates, curvature
+from analysis.drops.cells import Cells, CellUpdates, _sizes, cell_updates, curvature, ends
 from analysis.drops.frozen import critical_drop_probability
 from analysis.drops.mean_square import certified_drop_probability, check_mean_square, design, mean_square_schedule
 from analysis.drops.modes import schedule_drop_modes
 from analysis.drops.schedule import frozen_critical_probability
 from analysis.errors import AnalysisError
 from estimators import GainSchedule
+from estimators.schedule import PlantPolynomial
+from estimators.schedule.quotient import quotients
 from synthesis.lmi.result import Verdict
 from tests.support.schedule_content import schedule_content, with_matrix
 
@@ -115,6 +117,68 @@ def test_updates_on_a_cell_are_those_of_the_schedule(update: str) -> None:
         np.testing.assert_allclose(exponent, scale @ np.array(expected) @ np.linalg.inv(scale), rtol=1e-11, atol=1e-13)
         jump = scale @ -correction @ np.linalg.inv(scale) if update == "sampled" else np.zeros_like(correction)
         np.testing.assert_allclose(added, [np.zeros_like(jump), jump], rtol=1e-11, atol=1e-13)
+
+
+def divided(schedule: GainSchedule, disguised: bool = False) -> GainSchedule:
+    """The plant over 1 + 0.6 u, u its parameter from -1 to 1; `disguised`: numerators times that, too."""
+
+    def numerator(matrix: PlantPolynomial) -> PlantPolynomial:
+        c = matrix.coefficients  # u T_0 = T_1, u T_k = (T_(k+1) + T_(k-1)) / 2
+        wide, moved = np.pad(c, [(0, 1), (0, 0), (0, 0)]), np.pad(c, [(1, 0), (0, 0), (0, 0)]) / 2
+        moved[1] *= 2
+        moved[: len(c) - 1] += c[1:] / 2
+        return matrix._replace(coefficients=wide + 0.6 * moved) if disguised else matrix
+
+    given = schedule.polynomials
+    below = given["A"]._replace(coefficients=np.array([1.0, 0.6])[:, None, None])
+    plant = quotients({key: numerator(matrix) for key, matrix in given.items()}, below, ["w"], "file")
+    return replace(schedule, plant=dict(plant))
+
+
+@pytest.mark.parametrize("update", ["held", "sampled"])
+def test_bounds_on_cells_of_a_rational_plant(update: str) -> None:
+    """Updates at the ends, and the error of interpolation between them, with exponentials written out; bounds not idle."""
+    schedule, scale = divided(cubic(update)), np.array([[3.0, 1.0], [0.5, 2.0]])
+    cells = Cells(np.array([0.0, 31.0, 80.0]), np.array([2.0, 34.0, 84.0]))
+    updates = cell_updates(schedule, cells, scale)
+    phi, bound = ends(updates), curvature(updates)
+    for c in range(3):
+        modes = schedule_drop_modes(schedule, np.linspace(cells.low[c], cells.high[c], 101))
+        t = np.linspace(0.0, 1.0, 101)[:, None, None]
+        for k, update_of in enumerate((modes.dropped, modes.received)):
+            values = scale @ update_of @ np.linalg.inv(scale)
+            np.testing.assert_allclose(phi[k, :, c], values[[0, -1]], rtol=1e-11, atol=1e-13)
+            turned = np.swapaxes(values, 1, 2) @ values
+            seen = np.abs(np.linalg.eigvalsh(turned - turned[:1] - t * (turned[-1:] - turned[:1]))).max()
+            assert seen <= bound[k, c] < 30.0 * seen
+
+
+@pytest.mark.parametrize("b", [0.0, 2.0, -3.0])
+def test_bounds_of_a_quotient_in_closed_form(b: float) -> None:
+    """(1 + b t)/(1 - t/2): changes by |b + 1/2| 2, slope |b + 1/2| 4, curvature |b + 1/2| 8, all at t = 1; 7/7 is one."""
+    above, below = np.array([1.0, b]).reshape(1, 1, 2, 1, 1), np.array([[1.0, -0.5]])
+    found = np.array(_sizes(above, below))[:, 0, 0]
+    np.testing.assert_allclose(found, abs(b + 0.5) * np.array([2.0, 4.0, 8.0]), rtol=1e-12)
+    np.testing.assert_allclose(np.array(_sizes(7.0 * above, 7.0 * below))[:, 0, 0], found, rtol=1e-12)
+    one = cell_updates(divided(cubic("held")), Cells(np.array([31.0]), np.array([36.0])), np.eye(2))
+    seven = CellUpdates(7.0 * one.exponent, 7.0 * one.added, 7.0 * one.below)
+    np.testing.assert_allclose(curvature(seven), curvature(one), rtol=1e-12)
+    vanishing = CellUpdates(one.exponent, one.added, np.array([[1.0, -1.0]]))
+    assert (curvature(vanishing) == 1e100).all()  # proves nothing
+
+
+def test_a_common_factor_changes_no_verdict_about_drops() -> None:
+    """The same plant as polynomials and as quotients: the same P; and too many drops are refuted."""
+    frozen = frozen_critical_probability(SAMPLED, points=21)
+    twin = divided(SAMPLED, disguised=True)
+    for share, verdict in ((0.9, Verdict.CERTIFIED), (1.02, Verdict.REFUTED)):
+        first, second = (mean_square_schedule(one, share * frozen.smallest, frozen) for one in (SAMPLED, twin))
+        assert first.verdict is second.verdict is verdict
+        np.testing.assert_allclose(second.lyapunov, first.lyapunov, rtol=1e-5)
+    other = mean_square_schedule(
+        divided(SAMPLED), 0.5 * frozen_critical_probability(divided(SAMPLED), points=21).smallest
+    )
+    assert other.verdict is Verdict.CERTIFIED
 
 
 @pytest.mark.parametrize("update", ["held", "sampled"])

@@ -242,9 +242,6 @@ def test_what_makes_no_loop_is_refused() -> None:
     loop = FeedbackLoop.constant_gain(plant, exact(np.ones((1, 2))), sample_time=sampled)
     with pytest.raises(ProblemError, match="makes no claims about continuous time"):
         loop.system(next(iter(loop.cells())), "continuous")
-    rational_model = small_model([[-1 - 1 / p]], [[1]], (SchedulingParameter("p", "1", 1.0, 2.0, -1.0, 1.0),), B=[[1]])
-    with pytest.raises(ProblemError, match="in continuous time a rational plant is closed by state feedback only"):
-        FeedbackLoop.constant_gain(plant_of(rational_model), exact(np.ones((1, 1))), "outputs")
 
 
 def test_rational_plant_by_state_feedback() -> None:

@@ -76,6 +76,22 @@ def test_a_scheduled_observer_with_jitter() -> None:
         jitter_claim(held, model.parameters, 0.05, 0.4)
 
 
+def test_a_scheduled_observer_of_a_rational_plant() -> None:
+    """x' = (1/(1 + p) - 1) x, p from 1/4 to 1: e^(-T/2) is least at T = 0.4, so that K holds up to 1.8187."""
+    p = sp.Symbol("p")
+    model = small_model([[1 / (1 + p) - 1]], [[1]], [parameter("p", 0.25, 1.0, 1.0)])
+    plant, ends = plant_of(model), ((decimal(0.25), decimal(0.6), decimal(1.0)),)
+    assert not plant.is_polynomial
+
+    def observer(K: float) -> ObserverLoop:
+        return ObserverLoop(plant, ends, {(i,): fmpq_mat([[decimal(K)]]) for i in range(3)}, "sampled", decimal(0.1))
+
+    claim = jitter_claim(observer(1.81), model.parameters, 0.05, 0.4, degree=0)
+    assert claim is not None and holds(observer(1.81), 0.05, 0.4, claim)
+    assert not holds(observer(1.82), 0.05, 0.4, claim)
+    assert jitter_claim(observer(1.82), model.parameters, 0.05, 0.4, degree=0) is None
+
+
 def test_delays_by_whole_samples() -> None:
     """e+ = e - K e_(k-s) of an integrator is stable while K < 2 sin(pi/(2 (2 s + 1))) (Levin, May 1976)."""
     for s in range(4):

@@ -94,7 +94,6 @@ def test_a_table_of_pi_gains_is_proved_and_its_mirror_image_refused() -> None:
     ("model", "design", "words"),
     [
         (third_order(D=[[1]]), {}, "algebraic loop"),
-        (third_order(1 / (2 + p)), {}, "rational"),
         (third_order(), {"start": ((1.0, 2.0),)}, "shape"),
         (third_order(), {"uses": (("u1", "y2"),)}, "y2"),
         (third_order(), {"uses": (("d1", "y1"),)}, "d1"),
@@ -105,6 +104,21 @@ def test_a_table_of_pi_gains_is_proved_and_its_mirror_image_refused() -> None:
 def test_what_cannot_work_is_refused(model: LpvModel, design: dict[str, Any], words: str) -> None:
     with pytest.raises(ProblemError, match=words):
         design_static_feedback(model, StaticFeedbackDesign((LEVEL,), **design))
+
+
+def test_an_output_that_the_input_acts_on_may_stay_unused() -> None:
+    """The same law as for the model without it; used, it would close an algebraic loop."""
+    model = small_model(
+        [[0, 1], [1 + p / 2, -1]], [[1, 0], [1, 1]], [parameter(rate=0.2)], B=[[0], [1]], D=[[0], [1]], E=[[0], [1]]
+    )
+    alone = replace(model, outputs=model.outputs[:1], C=model.C[:1, :], D=model.D[:1, :], F=model.F[:1, :])
+    used = StaticFeedbackDesign((LEVEL,), degree=0, start=((-3.0, 0.0),), uses=(("u1", "y1"),), steps=2)
+    first = design_static_feedback(model, used)
+    second = design_static_feedback(alone, replace(used, start=((-3.0,),)))
+    assert first.verdict is Verdict.CERTIFIED and first.gamma == pytest.approx(second.gamma, rel=1e-3)
+    np.testing.assert_allclose(first.gain(np.zeros(1))[..., :1], second.gain(np.zeros(1)), rtol=1e-2)
+    with pytest.raises(ProblemError, match="algebraic loop"):
+        design_static_feedback(model, replace(used, uses=None))
 
 
 def test_a_plant_that_no_static_law_stabilises() -> None:

@@ -19,9 +19,11 @@ from analysis.observability.rank_loss_speeds import RankLossSpeeds
 from analysis.sensitivity.designs import Sobol
 from estimators import GainSchedule, LpvVelocityObserver
 from estimators.schedule import SHIPPED, read_content, write_content
+from estimators.schedule.quotient import quotients
 from studies.sweeps.evaluate import INVALID, NOT_A_NUMBER, VALID, evaluate
 from studies.sweeps.measures import Measure
-from studies.sweeps.observer import Batch, Observer, model_observer
+from studies.sweeps.observer import Batch, Gains, Observer, model_observer
+from studies.sweeps.plant import polynomial_plant
 from studies.sweeps.ranges import RangeSpec
 from studies.sweeps.spec import MEASURES, ObserverSpec, designed_from
 from studies.sweeps.sweep import Sweep
@@ -194,9 +196,6 @@ def test_rank_loss_speed_of_an_observer(observer: Observer) -> None:
 
 def test_schedule_of_an_unknown_model_is_swept_by_its_polynomials() -> None:
     """Without a catalogue model the entries of the plant are what can be varied; the nominal design is the same."""
-    from studies.sweeps.observer import Gains
-    from studies.sweeps.plant import polynomial_plant
-
     plain = Observer("x", polynomial_plant(SCHEDULE), Gains(SCHEDULE.table, SCHEDULE.breakpoints), SCHEDULE.sample_time)
     grid = plain.grid(4)
     A_e = plain.at({"A_1_1": np.array([1.0, 1.2])}, grid).error[0]
@@ -204,6 +203,20 @@ def test_schedule_of_an_unknown_model_is_swept_by_its_polynomials() -> None:
     np.testing.assert_allclose(A_e[0], model.error_dynamics(SCHEDULE.gain(grid.points[:, 0]))[0], rtol=1e-12)
     np.testing.assert_allclose((A_e[1] - A_e[0])[:, 0, 0], 0.2 * model.A[:, 0, 0], rtol=1e-9, atol=1e-12)
     assert set(plain.plant.parameters) >= {"A_1_1", "C_1_1", "C_1_2"} and "A_2_2" not in plain.plant.parameters
+
+
+def test_a_schedule_of_a_rational_plant_is_swept_by_its_quotients() -> None:
+    """The same numerators over 1 + 0.6 u: every matrix is divided by it, and a factor acts on the quotient."""
+    given = SCHEDULE.polynomials
+    below = given["A"]._replace(coefficients=np.array([1.0, 0.6])[:, None, None])
+    rational = replace(SCHEDULE, plant=dict(quotients(given, below, ["wheel_speed"], "file")))
+    plain, divided = (polynomial_plant(schedule) for schedule in (SCHEDULE, rational))
+    grid = Observer("x", plain, Gains(SCHEDULE.table, SCHEDULE.breakpoints), SCHEDULE.sample_time).grid(5)
+    assert set(plain.parameters) == set(divided.parameters)
+    first, second = (one.at({"A_1_1": np.array([1.0, 1.2])}, grid) for one in (plain, divided))
+    d = below.at(grid.points[:, 0])
+    for key in "ACEF":
+        np.testing.assert_allclose(getattr(second, key) * d, getattr(first, key), rtol=1e-12, atol=1e-15)
 
 
 MASS = LpvModel(

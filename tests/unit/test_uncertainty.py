@@ -14,10 +14,10 @@ from analysis.lpv.question import ask
 from analysis.norms.hinf import hinf_norm
 from analysis.uncertainty.margin import robust_stability_margin
 from analysis.uncertainty.polynomials import Family
-from analysis.uncertainty.signs import all_positive
 from analysis.uncertainty.worst_gain import _decide, worst_case_gain
 from synthesis.lmi.result import Verdict
 from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.box_decision import all_positive
 from synthesis.polynomials.enclosure import PolynomialMatrix
 from tests.support.lmi_cases import parameter, small_model
 

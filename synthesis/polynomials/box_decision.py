@@ -13,7 +13,8 @@ import numpy as np
 from flint import fmpq
 
 from estimators.arrays import FloatArray
-from synthesis.polynomials.definite import sign_on_box, to_bernstein
+from synthesis.polynomials.bernstein import halved, in_bernstein
+from synthesis.polynomials.definite import sign_on_box
 from synthesis.polynomials.enclosure import PolynomialMatrix
 from synthesis.polynomials.rational import rational
 
@@ -62,11 +63,7 @@ def _in_floats(polynomial: PolynomialMatrix) -> Decision | list[Box]:
     whole = ((fmpq(0),) * v, (fmpq(1),) * v)
     if not np.isfinite(guard):
         return [whole]
-    boxes = coefficients
-    for axis, degree in enumerate(degrees):
-        weights = np.array([[int(x.p) / int(x.q) for x in row] for row in to_bernstein(degree)])
-        boxes = np.moveaxis(np.tensordot(weights, boxes, axes=(1, axis)), 0, axis)
-    boxes, centre, half = boxes[None], np.zeros((1, v)), np.ones((1, v))
+    boxes, centre, half = in_bernstein(coefficients, range(v))[None], np.zeros((1, v)), np.ones((1, v))
     left: list[Box] = []
     for _ in range(LEVELS * max(v, 1)):
         lowest, highest = (f(boxes.reshape(len(boxes), -1), axis=1) for f in (np.min, np.max))
@@ -100,7 +97,7 @@ def _negative_corner(
 
 
 def _halved(boxes: FloatArray, centre: FloatArray, half: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Every box cut along the axis in which its coefficients vary most (de Casteljau)."""
+    """Every box cut along the axis in which its coefficients vary most."""
     v = centre.shape[1]
     variation = np.stack([
         np.abs(np.diff(boxes, axis=1 + i)).reshape(len(boxes), -1).max(axis=1, initial=0.0) * (boxes.shape[1 + i] - 1)
@@ -110,18 +107,13 @@ def _halved(boxes: FloatArray, centre: FloatArray, half: FloatArray) -> tuple[Fl
     parts: list[tuple[FloatArray, FloatArray, FloatArray]] = []
     for axis in np.unique(axes):
         chosen = axes == axis
-        levels = np.moveaxis(boxes[chosen], 1 + axis, 0)
-        low, high = [levels[0]], [levels[-1]]
-        while len(levels) > 1:
-            levels = 0.5 * (levels[:-1] + levels[1:])
-            low.append(levels[0])
-            high.append(levels[-1])
+        low, high = halved(boxes[chosen], 1 + axis)
         narrow = half[chosen].copy()
         narrow[:, axis] *= 0.5
-        for sign, side in ((-1.0, low), (1.0, high[::-1])):
+        for sign, side in ((-1.0, low), (1.0, high)):
             moved = centre[chosen].copy()
             moved[:, axis] += sign * narrow[:, axis]
-            parts.append((np.moveaxis(np.stack(side), 0, 1 + axis), moved, narrow))
+            parts.append((side, moved, narrow))
     first, second, third = zip(*parts, strict=True)
     return np.concatenate(first), np.concatenate(second), np.concatenate(third)
 
