@@ -22,6 +22,7 @@ from synthesis.loop.plant import Axis
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.enclosure import PolynomialMatrix, constant, zero
 from synthesis.polynomials.exponential import balance
+from synthesis.polynomials.half_spaces import HalfSpaces
 from synthesis.polynomials.rational import decimal
 
 Inputs = Sequence[str] | Mapping[str, float]
@@ -38,6 +39,11 @@ class Searched(Protocol):
     @property
     def axes(self) -> tuple[Axis, ...]:
         """The parameters as axes u in [-1, 1]; rates per unit of time."""
+        ...
+
+    @property
+    def half_spaces(self) -> HalfSpaces:
+        """Inequalities between the scaled parameters beside."""
         ...
 
     @property
@@ -76,6 +82,11 @@ class Question:
     def axes(self) -> tuple[Axis, ...]:
         """The parameters as axes u in [-1, 1]."""
         return self.loop.plant.axes
+
+    @property
+    def half_spaces(self) -> HalfSpaces:
+        """Inequalities between the scaled parameters beside."""
+        return self.loop.plant.half_spaces
 
     @property
     def rational(self) -> bool:

@@ -49,7 +49,7 @@ def schedule_content(
              "absolute": p.absolute, "breakpoints": line.tolist()}
             for p, line in zip(model.parameters, deployment.breakpoints, strict=True)
         ],
-        **_constraints(model),
+        **constraints_of(model),
         "update": update_section(deployment.gains, deployment.settings),
         "plant": _plant(model),
         "gain": {"dtype": deployment.settings.dtype, "interpolation": "linear", "table": gain.tolist()},
@@ -136,8 +136,8 @@ def _model(model: LpvModel) -> dict[str, Any]:
     return {"id": model.name, "source": model.source, **signals, "constants": constants, "matrices": matrices}
 
 
-def _constraints(model: LpvModel) -> dict[str, Any]:
-    """The set of the parameters where it is no box, with a place well inside."""
+def constraints_of(model: LpvModel) -> dict[str, Any]:
+    """The section `constraints` of a schedule file where the set of the parameters is no box, with a place well inside."""
     if not model.constraints:
         return {}
     centre = model.centre[0]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import combinations, product
 
 import numpy as np
@@ -105,6 +106,7 @@ class Faces:
     corners: FloatArray
 
     @classmethod
+    @lru_cache(maxsize=64)
     def of(cls, half_spaces: HalfSpaces) -> Faces:
         """Of the range [-1, 1]^p and these inequalities."""
         count = len(half_spaces[0].normal)
@@ -132,13 +134,21 @@ class Faces:
         return np.asarray((least > self.bounds + self.slack).any(axis=-1))
 
     def drawn_in(self, points: FloatArray) -> FloatArray:
-        """Places (.., p) outside moved straight towards the middle of the set, up to its border."""
+        """Places (.., p) outside moved straight towards the middle of the set, up to its border (and within by rounding)."""
         centre = self.corners.mean(axis=0)
         step = points - centre
-        reach, room = step @ self.normals.T, self.bounds - self.normals @ centre
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(reach > room, room / reach, 1.0).min(axis=-1)
-        return np.asarray(centre + share[..., None] * step)
+        return np.asarray(centre + self._shares(step, centre).min(axis=-1)[..., None] * step)
+
+    def _shares(self, step: FloatArray, centre: FloatArray) -> FloatArray:
+        """The part (.., m) of every way from the centre that each inequality leaves, one at most."""
+        reach, room = step @ self.normals.T, (self.bounds - self.normals @ centre) * (1.0 - NEAR)
+        return np.asarray(np.where(reach > room, room / np.where(reach > room, reach, 1.0), 1.0))
+
+    def together(self, points: FloatArray) -> FloatArray:
+        """Places (g, p), all moved towards the middle of the set by the same part of their way, until none is outside."""
+        centre = self.corners.mean(axis=0)
+        step = points - centre
+        return np.asarray(centre + self._shares(step, centre).min() * step)
 
     def on_lines(self, lines: Sequence[FloatArray]) -> FloatArray:
         """Places (g, p) of a rectilinear grid that are in the set, where its lines leave the set, and the corners of the set."""
