@@ -165,6 +165,16 @@ def ask(
     return Question(model, ClaimChannel(sizes, chosen), bool(flag("discrete", discrete)))
 
 
+def require_box(question: Question) -> None:
+    """Raise AnalysisError where constraints between the parameters cut the box: what is asked is about all of it."""
+    if question.model.constraints:
+        words = ", ".join(constraint.words for constraint in question.model.constraints)
+        raise AnalysisError(
+            f"model '{question.model.name}' has constraints between its parameters ({words}), this analysis is about boxes; "
+            "lpv_l2_gain and lpv_decay_rate keep to the set, or shrink the ranges"
+        )
+
+
 def require_channel(question: Question) -> None:
     """Raise AnalysisError if there is no input: a gain needs one."""
     if not question.channel.inputs:

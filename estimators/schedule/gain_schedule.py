@@ -263,8 +263,7 @@ class GainSchedule(Display):
         if self.constraints is not None and (outside := self.constraints.outside(values)).any():
             first = np.argwhere(np.atleast_1d(outside))[0]
             place = "" if raw.ndim == 1 else f" (sample {first[0] if raw.ndim == 2 else tuple(map(int, first))})"
-            names = [entry.name for entry in self.parameters]
-            raise RangeError(self.constraints.refusal(names, values[outside][0], place))
+            raise RangeError(self.constraints.refusal([p.name for p in self.parameters], values[outside][0], place))
         return values
 
 

@@ -207,11 +207,11 @@ def corners(places: FloatArray, count: int) -> list[int]:
         key = tuple(places[index, :count])
         if key not in found or agree[index] > agree[found[key]]:
             found[key] = int(index)
-    moving = np.flatnonzero(np.ptp(places[:, :count], axis=0) > 0.0) if len(places) else []
+    moving = [i for i in range(count) if len(places) and np.ptp(places[:, i]) > 0.0]
     chosen = list(found.values())
     for signs in product((-1.0, 1.0), repeat=len(moving)) if len(chosen) < 2 ** len(moving) else ():
         far = places[:, moving] @ np.array(signs)
-        index = int(np.lexsort((agree, np.round(far, 9)))[-1])
-        if index not in chosen:
-            chosen.append(index)
+        furthest = int(np.lexsort((agree, np.round(far, 9)))[-1])
+        if furthest not in chosen:
+            chosen.append(furthest)
     return chosen

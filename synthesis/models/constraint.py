@@ -99,7 +99,7 @@ def _check_set(half_spaces: HalfSpaces, constraints: Sequence[ParameterConstrain
 
 
 def _inside(half_space: HalfSpace, point: tuple[fmpq, ...]) -> bool:
-    return sum((a * u for a, u in zip(half_space.normal, point, strict=True)), fmpq(0)) < half_space.bound
+    return bool(sum((a * u for a, u in zip(half_space.normal, point, strict=True)), fmpq(0)) < half_space.bound)
 
 
 def scaled_set(

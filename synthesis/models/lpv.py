@@ -172,9 +172,17 @@ class LpvModel(Display):
     @property
     def centre(self) -> FloatArray:
         """A parameter value (1, p) in the middle: of the ranges, or of the corners of the set where that is no box."""
-        middle, half = (np.array([[getattr(p, key) for p in self.parameters]]) for key in ("middle", "half_width"))
-        shift = Faces.of(self.half_spaces).corners.mean(axis=0) if self.half_spaces else 0.0
-        return np.asarray(middle + half * shift).reshape(1, len(self.parameters))
+        count = len(self.parameters)
+        scaled = Faces.of(self.half_spaces).corners.mean(axis=0) if self.half_spaces else np.zeros(count)
+        return self.physical(scaled.reshape(1, count))
+
+    def physical(self, u: FloatArray) -> FloatArray:
+        """Parameter values (g, p) of scaled ones in the ranges; rounding takes none beyond their ends."""
+        low, high, middle, half = (
+            np.array([getattr(p, key) for p in self.parameters])
+            for key in ("minimum", "maximum", "middle", "half_width")
+        )
+        return np.asarray(np.clip(middle + half * u, low, high)).reshape(len(u), len(self.parameters))
 
     def scaled(self, points: FloatArray) -> FloatArray:
         """u = (p - middle)/half_width (g, p) of parameter values (g,) or (g, p), also beyond the range."""

@@ -30,21 +30,21 @@ class HalfSpace:
 
     def holds(self, point: Sequence[fmpq]) -> bool:
         """At a place; further coordinates (rates) are not looked at."""
-        return sum((a * u for a, u in zip(self.normal, point, strict=False)), fmpq(0)) <= self.bound
+        return bool(sum((a * u for a, u in zip(self.normal, point, strict=False)), fmpq(0)) <= self.bound)
 
     def misses(self, offset: Sequence[fmpq], factor: Sequence[fmpq]) -> bool:
         """Whether a box lies wholly beyond, slack included."""
         least = fmpq(0)
         for a, middle, half in zip(self.normal, offset, factor, strict=False):
             least += a * middle - abs(a) * half
-        return least > self.bound + self.slack
+        return bool(least > self.bound + self.slack)
 
     def contains(self, offset: Sequence[fmpq], factor: Sequence[fmpq]) -> bool:
         """Whether a whole box is inside."""
         most = fmpq(0)
         for a, middle, half in zip(self.normal, offset, factor, strict=False):
             most += a * middle + abs(a) * half
-        return most <= self.bound
+        return bool(most <= self.bound)
 
     @property
     def widened(self) -> HalfSpace:
@@ -142,7 +142,7 @@ class Faces:
     def _shares(self, step: FloatArray, centre: FloatArray) -> FloatArray:
         """The part (.., m) of every way from the centre that each inequality leaves, one at most."""
         reach, room = step @ self.normals.T, (self.bounds - self.normals @ centre) * (1.0 - NEAR)
-        return np.asarray(np.where(reach > room, room / np.where(reach > room, reach, 1.0), 1.0))
+        return np.asarray(np.where(reach > room, room / np.where(reach > room, reach, 1.0), 1.0), np.float64)
 
     def together(self, points: FloatArray) -> FloatArray:
         """Places (g, p), all moved towards the middle of the set by the same part of their way, until none is outside."""

@@ -7,6 +7,7 @@ from fractions import Fraction
 from functools import cache
 from itertools import product
 from math import comb
+from typing import Any
 
 import numpy as np
 
@@ -46,7 +47,7 @@ def prove_positive(
     if not np.isfinite(local).all():
         raise ProblemError("a matrix polynomial with coefficients that are not finite has no sign")
     size = max(float(np.abs(local).sum(axis=tuple(range(v))).sum(axis=-1).max()), magnitude)
-    bounded = [] if faces is None else list(np.flatnonzero(faces.normals.any(axis=0)))
+    bounded = [] if faces is None else [int(axis) for axis in np.flatnonzero(faces.normals.any(axis=0))]
     for axis in bounded:  # a box must have its ends where it may be cut
         wide = [(0, int(k == axis and n == 1)) for k, n in enumerate(local.shape)]
         local = np.pad(local, wide)
@@ -117,9 +118,9 @@ def _halve(
     return np.moveaxis(halves, 0, axis + 1), np.concatenate([lower, shifted]), np.concatenate([width, width])
 
 
-def _within(faces: Faces | None, points: FloatArray, values: FloatArray) -> FloatArray:
+def _within(faces: Faces | None, points: FloatArray, values: Any) -> FloatArray:
     """Values at places, infinite outside the set."""
-    return values if faces is None else np.where(faces.inside(points), values, np.inf)
+    return np.asarray(values if faces is None else np.where(faces.inside(points), values, np.inf), np.float64)
 
 
 def _at_corners(matrix: MatrixPolynomial, faces: Faces) -> tuple[float, FloatArray]:
