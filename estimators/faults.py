@@ -22,7 +22,7 @@ class Flag(IntFlag):
     STALE_MEASUREMENT = 2  # repeated for too long: the entry coasts
     MISSING_INPUT = 4  # not finite: held at the last finite one
     MISSING_PARAMETER = 8  # not finite: held at the last finite one
-    PARAMETER_OUT_OF_RANGE = 16  # outside the certified range: clipped to it
+    PARAMETER_OUT_OF_RANGE = 16  # outside the certified range or set: moved to its border
     RATE_OUT_OF_RANGE = 32  # faster than the certified rates: used, without the guarantee
     RESET = 64  # the state was set anew: by `reset`, because it was lost, or had left the representable range
     WHEEL_STOPPED = 128  # a wheel does not turn though the car moves: locked, or its sensor is dead

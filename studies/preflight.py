@@ -25,6 +25,7 @@ from synthesis.design.refusals import refuse_undetectable
 from synthesis.design.state_feedback import StateFeedbackDesign, check_limits
 from synthesis.errors import ProblemError
 from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.half_spaces import Faces
 
 RANK = 1e-9  # of the largest singular value: less is no noise at all
 
@@ -141,6 +142,10 @@ def _check_effect(model: LpvModel, channels: Sequence[Channel | FeedbackChannel]
 def _check_noise(model: LpvModel, forces: list[FloatArray], rows: Sequence[int] | None = None) -> None:
     """Without noise on some combination of outputs, gains grow without bound while the level falls: a singular problem."""
     corners = np.stack(np.meshgrid(*[[p.minimum, p.middle, p.maximum] for p in model.parameters], indexing="ij"), -1)
+    if model.half_spaces:
+        corners = model.physical(
+            Faces.of(model.half_spaces).on_lines([np.linspace(-1.0, 1.0, 3)] * len(model.parameters))
+        )
     places = range(len(model.outputs)) if rows is None else rows
     F = model.on(corners.reshape(-1, len(model.parameters))).F[:, list(places)] @ np.hstack(forces)
     size = np.linalg.norm(F, axis=-1, keepdims=True)

@@ -40,6 +40,7 @@ from .lmi.result import Verdict as Verdict
 from .lmi.settings import LmiSettings as LmiSettings
 from .lmi.solve import solve as solve
 from .models.catalogue import corner_velocity_model as corner_velocity_model
+from .models.constraint import ParameterConstraint as ParameterConstraint
 from .models.lpv import LpvModel as LpvModel
 from .models.nonlinear import NonlinearModel as NonlinearModel
 from .models.param import Constant as Constant

@@ -11,6 +11,7 @@ from flint import fmpq_mat
 from analysis.lpv.question import Question, Searched
 from analysis.norms.hinf import hinf_norm, stability_margin
 from estimators.arrays import FloatArray
+from synthesis.polynomials.half_spaces import Faces
 from synthesis.polynomials.rational import rational
 from synthesis.polynomials.stable import is_hurwitz, is_schur
 
@@ -23,6 +24,9 @@ def climb(question: Searched, value: Callable[[FloatArray], FloatArray]) -> tupl
     count = len(question.axes)
     line = np.linspace(-1.0, 1.0, POINTS.get(count, FEWEST))
     grid = np.array(list(product(line, repeat=count)), float).reshape(-1, count)
+    faces = Faces.of(question.half_spaces) if question.half_spaces else None
+    if faces is not None:
+        grid = faces.drawn_in(faces.on_lines([line] * count))
     found = value(grid)
     best, most = grid[0], -np.inf
     for index in np.argsort(-found, kind="stable")[:CLIMBS]:
@@ -30,6 +34,7 @@ def climb(question: Searched, value: Callable[[FloatArray], FloatArray]) -> tupl
         for _ in range(HALVINGS):
             moves = np.concatenate([np.eye(count), -np.eye(count)]) * step
             tried = np.clip(place + moves, -1.0, 1.0)
+            tried = tried if faces is None else faces.drawn_in(tried)
             heights = value(tried) if count else np.array([-np.inf])
             if heights.max() > height:
                 place, height = tried[int(heights.argmax())], float(heights.max())

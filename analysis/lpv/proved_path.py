@@ -39,7 +39,7 @@ class ProvedPath:
     @cached_property
     def intervals(self) -> list[Interval] | None:
         """One after another; None where they cannot be enclosed. Raises AnalysisError for a path that is not admissible."""
-        check_admissible(self.path, self.question.axes)
+        check_admissible(self.path, self.question.axes, self.question.loop.plant.half_spaces)
         if self.question.discrete:
             return [line.sample() for line in self._lines(1, fmpq(1))]
         start, change = intervals(self.path, self.parts)

@@ -22,6 +22,7 @@ from synthesis.loop.plant import Axis
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.enclosure import PolynomialMatrix, constant, zero
 from synthesis.polynomials.exponential import balance
+from synthesis.polynomials.half_spaces import HalfSpaces
 from synthesis.polynomials.rational import decimal
 
 Inputs = Sequence[str] | Mapping[str, float]
@@ -38,6 +39,11 @@ class Searched(Protocol):
     @property
     def axes(self) -> tuple[Axis, ...]:
         """The parameters as axes u in [-1, 1]; rates per unit of time."""
+        ...
+
+    @property
+    def half_spaces(self) -> HalfSpaces:
+        """Inequalities between the scaled parameters beside."""
         ...
 
     @property
@@ -76,6 +82,11 @@ class Question:
     def axes(self) -> tuple[Axis, ...]:
         """The parameters as axes u in [-1, 1]."""
         return self.loop.plant.axes
+
+    @property
+    def half_spaces(self) -> HalfSpaces:
+        """Inequalities between the scaled parameters beside."""
+        return self.loop.plant.half_spaces
 
     @property
     def rational(self) -> bool:
@@ -152,6 +163,16 @@ def ask(
             raise AnalysisError(f"input '{name}' has the size {size}; give a positive finite number")
     sizes = {name: float(size) for name, size in given.items()}
     return Question(model, ClaimChannel(sizes, chosen), bool(flag("discrete", discrete)))
+
+
+def require_box(question: Question) -> None:
+    """Raise AnalysisError where constraints between the parameters cut the box: what is asked is about all of it."""
+    if question.model.constraints:
+        words = ", ".join(constraint.words for constraint in question.model.constraints)
+        raise AnalysisError(
+            f"model '{question.model.name}' has constraints between its parameters ({words}), this analysis is about boxes; "
+            "lpv_l2_gain and lpv_decay_rate keep to the set, or shrink the ranges"
+        )
 
 
 def require_channel(question: Question) -> None:

@@ -11,6 +11,7 @@ from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
 from estimators.display import Display
 from synthesis.loop.plant import Axis
+from synthesis.polynomials.half_spaces import Faces, HalfSpaces
 from synthesis.polynomials.rational import rational
 
 
@@ -73,8 +74,11 @@ class Path:
         return Trajectory(names, self.durations, middle + half * self.start, middle + half * self.end, frequency)
 
 
-def admissible(knots: FloatArray, durations: FloatArray, axes: tuple[Axis, ...]) -> Path:
-    """The nearest path of this kind: inside the range, and drawn together about its mean until every rate is kept."""
+def admissible(knots: FloatArray, durations: FloatArray, axes: tuple[Axis, ...], half_spaces: HalfSpaces = ()) -> Path:
+    """The nearest path of this kind: inside the range, and drawn together about its mean until every rate is kept.
+
+    Where half spaces cut the range, it is drawn together about the middle of what they leave, until every knot is in them.
+    """
     knots = np.clip(knots, -1.0, 1.0)
     jumps = tuple(axis.may_jump for axis in axes)
     for i, axis in enumerate(axes):
@@ -87,10 +91,12 @@ def admissible(knots: FloatArray, durations: FloatArray, axes: tuple[Axis, ...])
         if share > 1.0:  # a little less than allowed, so that rounding breaks no bound
             mean = knots[:, i].mean()
             knots[:, i] = mean + (knots[:, i] - mean) * ((1.0 - 1e-9) / share)
+    if half_spaces:
+        knots = Faces.of(half_spaces).together(knots)
     return Path(knots, durations, jumps)
 
 
-def check_admissible(path: Path, axes: tuple[Axis, ...]) -> None:
+def check_admissible(path: Path, axes: tuple[Axis, ...], half_spaces: HalfSpaces = ()) -> None:
     """Range and rate bounds in rationals. Raises AnalysisError: a path that breaks them bounds nothing."""
     for i, axis in enumerate(axes):
         for first, last, duration in zip(path.start[:, i], path.end[:, i], path.durations, strict=True):
@@ -100,6 +106,10 @@ def check_admissible(path: Path, axes: tuple[Axis, ...]) -> None:
                 raise AnalysisError(f"the trajectory leaves the range of '{axis.name}'")
             if not axis.may_jump and not (axis.rate_low <= rate <= axis.rate_high):
                 raise AnalysisError(f"the trajectory breaks a rate bound of '{axis.name}'")
+    for half_space in half_spaces:
+        for u in (*path.start, *path.end):
+            if not half_space.holds([rational(float(x)) for x in u]):
+                raise AnalysisError("the trajectory leaves the set of the parameters")
 
 
 def float_of(number: fmpq) -> float:

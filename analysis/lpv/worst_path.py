@@ -86,7 +86,7 @@ def simple_paths(question: Searched, place: FloatArray) -> Iterator[Path]:
         shapes.append(alone)
     for shape in shapes:
         for period in periods(question):
-            yield admissible(shape, np.full(KNOTS, period / KNOTS), axes)
+            yield admissible(shape, np.full(KNOTS, period / KNOTS), axes, question.half_spaces)
 
 
 def _triangle(phase: FloatArray) -> FloatArray:
@@ -130,7 +130,9 @@ def _refined(
         durations = path.durations
         if not question.discrete:
             durations = durations * np.exp(np.clip(x[0], -1.5, 1.5)) * (1.0 + 0.9 * np.tanh(x[1]) * half)
-        return admissible(x[3:].reshape(shape), durations, axes), carrier + float(x[2]) / path.period
+        return admissible(x[3:].reshape(shape), durations, axes, question.half_spaces), carrier + float(
+            x[2]
+        ) / path.period
 
     def cost(x: FloatArray) -> float:
         value = score(*path_of(x))

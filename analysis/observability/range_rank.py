@@ -15,7 +15,6 @@ from analysis.observability.matrix import ObservabilityMatrix, controllability_m
 from analysis.observability.rank_loss import RankLoss, rank_loss
 from estimators.display import Display
 from synthesis.models.lpv import LpvModel
-from synthesis.models.param import SchedulingParameter
 from synthesis.polynomials.definite import sign_on_box
 from synthesis.polynomials.enclosure import PolynomialMatrix
 from synthesis.polynomials.rational import decimal
@@ -30,8 +29,8 @@ class RangeRank(Display):
     r"""The rank over the box of parameters and rates.
 
     `verdict`: "full": everywhere, proved by the sign of a minor's common factor in ball arithmetic; "lost": on the set
-    `loss.condition` = 0, which passes through the box, shown by two exact signs; "never": for no value; "open": not decided
-    (a rate without bound, a second derivative, or a matrix too large for symbols; then `loss` is None).
+    `loss.condition` = 0, which passes through the box (and what constraints leave of it), shown by two exact signs; "never": for
+    no value; "open": not decided (a rate without bound, a second derivative, or a matrix too large for symbols; then `loss` is None).
     `blocks` is how many outputs with their derivatives were used.
     """
 
@@ -69,14 +68,15 @@ def _over_range(model: LpvModel, each: int, matrix: Callable[[int], Observabilit
         if comb(blocks * each, n) > MOST_MINORS:
             break
         loss = rank_loss(matrix(blocks))
-        found = RangeRank("never" if loss.always else _verdict(loss, model.parameters), blocks, loss)
+        found = RangeRank("never" if loss.always else _verdict(loss, model), blocks, loss)
         if found.verdict == "full":
             break
     complete = found.blocks == n
     return found if complete or found.verdict == "full" else RangeRank("open", found.blocks, found.loss)
 
 
-def _verdict(loss: RankLoss, parameters: tuple[SchedulingParameter, ...]) -> Verdict:
+def _verdict(loss: RankLoss, model: LpvModel) -> Verdict:
+    parameters = model.parameters
     symbols = sorted(loss.condition.free_symbols, key=str)
     if not symbols:
         return "full" if not loss.leftover else "open"
@@ -85,18 +85,42 @@ def _verdict(loss: RankLoss, parameters: tuple[SchedulingParameter, ...]) -> Ver
     box = [known.get(symbol, (0.0, float("inf"))) for symbol in symbols]
     if not all(isfinite(low) and isfinite(high) for low, high in box) or not loss.condition.is_polynomial(*symbols):
         return "open"
-    verdicts = [_sign(factor, symbols, box) for factor in loss.factors]
+    verdicts = [_sign(factor, symbols, box, _admitting(model, symbols)) for factor in loss.factors]
     if "lost" in verdicts:
         return "lost"
     return "full" if all(verdict == "full" for verdict in verdicts) and not loss.leftover else "open"
 
 
-def _sign(factor: sp.Expr, symbols: list[sp.Symbol], box: list[tuple[float, float]]) -> Verdict:
+def _admitting(model: LpvModel, symbols: list[sp.Symbol]) -> Callable[[tuple[fmpq, ...]], bool]:
+    """Whether scaled values of the symbols are certainly those of a place in the set, for some values of all other parameters."""
+    places = {str(symbol): k for k, symbol in enumerate(symbols)}
+
+    def admitted(point: tuple[fmpq, ...]) -> bool:
+        for half_space in model.half_spaces:
+            least, alone = fmpq(0), len(model.half_spaces) == 1  # of several, what suits one may break another
+            for p, a in zip(model.parameters, half_space.normal, strict=True):
+                if p.name in places:
+                    least += a * point[places[p.name]]
+                elif a != 0:
+                    least -= abs(a) if alone else -abs(a)
+            if least > half_space.bound:
+                return False
+        return True
+
+    return admitted
+
+
+def _sign(
+    factor: sp.Expr,
+    symbols: list[sp.Symbol],
+    box: list[tuple[float, float]],
+    admitted: Callable[[tuple[fmpq, ...]], bool],
+) -> Verdict:
     polynomial = _polynomial(factor, symbols, box)
     if any(sign_on_box((polynomial * sign).balls()).positive for sign in (1, -1)):
         return "full"
     lines = [[fmpq(2 * k - PARTS, PARTS) for k in range(PARTS + 1)]] * len(symbols)
-    values = {_signum(polynomial.at(point)[0, 0]) for point in product(*lines)}
+    values = {_signum(polynomial.at(point)[0, 0]) for point in product(*lines) if admitted(point)}
     return "lost" if 0 in values or len(values) == 2 else "open"
 
 

@@ -20,6 +20,8 @@ from estimators.schedule import GainSchedule, PlantQuotient
 from estimators.schedule.plant import PlantPolynomial, PlantPolynomials
 from synthesis.certificate.claims import ERROR_EQUATION, ClaimChannel
 from synthesis.loop.plant import Axis
+from synthesis.models.constraint import ParameterConstraint, half_spaces_of
+from synthesis.polynomials.half_spaces import HalfSpaces
 from synthesis.polynomials.rational import decimal
 
 EVALUATIONS = 40  # of the search for slow decay
@@ -57,7 +59,7 @@ class ScheduleQuestion:
     def axes(self) -> tuple[Axis, ...]:
         """Ranges, and rates per sample or per second."""
         box, period = box_of(self.schedule), decimal(self.schedule.sample_time if self.discrete else 1.0)
-        rows = zip(*box, strict=True)
+        rows = zip(*box[:6], strict=True)
         return tuple(
             Axis(
                 name,
@@ -68,6 +70,20 @@ class ScheduleQuestion:
             )
             for name, unit, low, high, *rates in rows
         )
+
+    @cached_property
+    def half_spaces(self) -> HalfSpaces:
+        """Constraints between the parameters, scaled."""
+        constraints = self.schedule.constraints
+        if constraints is None:
+            return ()
+        given = [
+            ParameterConstraint(
+                dict(zip((axis.name for axis in self.axes), map(float, row), strict=True)), float(bound)
+            )
+            for row, bound in zip(constraints.normals, constraints.bounds, strict=True)
+        ]
+        return half_spaces_of([(a.name, a.low, a.high) for a in self.axes], given, f"schedule '{self.schedule.name}'")
 
     def frozen(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """A, B, C, D at scaled parameters (g, p)."""
@@ -108,15 +124,17 @@ def bad_trajectories(question: ScheduleQuestion, measure: Measure, count: int, s
         known += zip((float(value) for value in measure(system)), paths, strict=True)
         known = sorted(known, key=lambda entry: -entry[0])[:BEST]
         if generation < GENERATIONS:
-            paths = [_changed(path, question.axes, rng) for _, path in known for _ in range(CHILDREN)]
+            paths = [
+                _changed(path, question.axes, rng, question.half_spaces) for _, path in known for _ in range(CHILDREN)
+            ]
     standing = np.broadcast_to(question.physical(place[None]), (count, len(place)))
     return np.stack([standing, *(question.repeated(path, count) for _, path in known)])
 
 
-def _changed(path: Path, axes: tuple[Axis, ...], rng: np.random.Generator) -> Path:
+def _changed(path: Path, axes: tuple[Axis, ...], rng: np.random.Generator, half_spaces: HalfSpaces = ()) -> Path:
     """A path nearby; durations stay whole samples."""
     durations = np.maximum(1.0, np.round(path.durations * np.exp(CHANGE * rng.standard_normal(len(path.durations)))))
-    return admissible(path.knots + CHANGE * rng.standard_normal(path.knots.shape), durations, axes)
+    return admissible(path.knots + CHANGE * rng.standard_normal(path.knots.shape), durations, axes, half_spaces)
 
 
 def _between(path: Path, time: FloatArray) -> FloatArray:

@@ -64,6 +64,10 @@ def followed(system: GainSchedule | LpvModel, given: npt.ArrayLike) -> FloatArra
         raise AnalysisError(
             f"parameters have the shape {array.shape}; '{system.name}' needs (runs, samples + 1, {len(box.names)})"
         )
+    if box.constraints is not None and (broken := box.constraints.outside(array)).any():
+        run, sample = (int(i) for i in np.argwhere(broken)[0])
+        words = box.constraints.refusal(box.names, array[run, sample], f" (run {run}, sample {sample})")
+        raise AnalysisError(f"parameters of '{system.name}': {words}")
     outside = (array < box.low) | (array > box.high)
     if outside.any():
         run, sample, axis = (int(i) for i in np.argwhere(outside)[0])

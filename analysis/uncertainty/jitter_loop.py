@@ -47,7 +47,10 @@ class JitterLoop:
             for axis in self.observer.plant.axes
         )
         sample = Axis(NAME, "s", self.shortest, self.longest, None, None)
-        return Plant((*axes, sample), self.observer.plant.matrices, self.observer.plant.denominator)
+        plant = self.observer.plant
+        return replace(
+            plant, axes=(*axes, sample), half_spaces=tuple(h.among(len(axes) + 1) for h in plant.half_spaces)
+        )
 
     @property
     def states(self) -> int:

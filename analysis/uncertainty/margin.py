@@ -19,7 +19,7 @@ from flint import fmpq
 from analysis.checks import positive
 from analysis.errors import AnalysisError
 from analysis.lpv.frozen import unstable
-from analysis.lpv.question import Question, ask
+from analysis.lpv.question import Question, ask, require_box
 from analysis.uncertainty.polynomials import Family
 from estimators.arrays import FloatArray
 from estimators.display import Display
@@ -78,6 +78,7 @@ def robust_stability_margin(
     True
     """
     question = ask(model, (), None, discrete)
+    require_box(question)
     tolerance, farthest = positive("tolerance", tolerance), min(positive("farthest", farthest), FARTHEST)
     count = len(question.axes)
     if not count:

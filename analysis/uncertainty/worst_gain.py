@@ -19,7 +19,7 @@ from analysis.errors import AnalysisError
 from analysis.exact import is_positive
 from analysis.lpv.frozen import largest_gain, unstable
 from analysis.lpv.norms import proved_frozen_gain
-from analysis.lpv.question import Inputs, Question, ask, require_channel
+from analysis.lpv.question import Inputs, Question, ask, require_box, require_channel
 from analysis.norms.hinf import hinf_norm
 from analysis.uncertainty.polynomials import Family, over_frequencies
 from estimators.arrays import FloatArray
@@ -78,6 +78,7 @@ def worst_case_gain(
     """
     question = ask(model, inputs, outputs)
     require_channel(question)
+    require_box(question)
     tolerance = positive("tolerance", tolerance)
     count = len(question.axes)
     place, _, frequency = largest_gain(question)

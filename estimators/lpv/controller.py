@@ -41,7 +41,8 @@ class LpvController(SavedWithSchedule):
     Measurements that are missing (one of them not finite) or stale are not used: the law waits, and the command before is held
     for `hold` samples, then halved with every sample towards the value within its limits that is nearest to zero. Nothing is
     proved of such samples. A missing parameter is held at its last finite value; one outside its certified range is clipped to
-    it. All of this is flagged, and commands are finite always.
+    it, and those that break a constraint between them are drawn to the border of their set. All of this is flagged, and commands
+    are finite always.
 
     Args:
         schedule: of a feedback law, of any size.
@@ -86,8 +87,9 @@ class LpvController(SavedWithSchedule):
         self.schedule, self.hold, count = schedule, int(hold), math.prod(self.batch_shape)
         self.law = Law(schedule)
         self.monitor = SignalMonitor(
-            schedule.parameters, (0, self.law.measured), schedule.sample_time, count, outside == "refuse", stale_after
-        )
+            schedule.parameters, (0, self.law.measured), schedule.sample_time, count, outside == "refuse", stale_after,
+            schedule.constraints,
+        )  # fmt: skip
         self._state: FloatArray = np.zeros((count, self.law.order))
         self._command: FloatArray = np.tile(self.law.rest, (count, 1))
         self.waiting = np.zeros(count, dtype=np.int64)  # samples without measurements

@@ -8,10 +8,12 @@ import numpy as np
 
 from estimators.arguments import LIMIT, quiet
 from estimators.arrays import BoolArray, FlagArray, FloatArray
+from estimators.errors import RangeError
 from estimators.faults import Flag, raise_flag
-from estimators.memory import Memory
+from estimators.memory import Memory, Saved
 from estimators.schedule import SchedulingParameter
-from estimators.velocity.input_monitor import InputMonitor
+from estimators.schedule.constraints import ParameterSet
+from estimators.velocity.input_monitor import InputMonitor, place_of
 
 
 class CheckedSignals(NamedTuple):
@@ -43,7 +45,9 @@ class SignalMonitor(Memory):
         count: int,
         refuse: bool,
         stale_after: int | None,
+        constraints: ParameterSet | None = None,
     ) -> None:
+        self.constraints = constraints
         self.parameters = [InputMonitor(entry, sample_time, count, refuse, None) for entry in parameters]
         self.stale_after, self.nothing = stale_after, np.zeros(count)
         self.input: FloatArray = np.zeros((count, sizes[0]))
@@ -66,7 +70,7 @@ class SignalMonitor(Memory):
         Raises:
             RangeError: a parameter or rate outside the certified box, if the observer refuses these; nothing is remembered then.
         """
-        before = [monitor.save() for monitor in self.parameters[:-1]] if self.parameters[0].refuse else []
+        before = [monitor.save() for monitor in self.parameters] if self.parameters[0].refuse else []
         values, raised = np.empty_like(p), []
         for axis, monitor in enumerate(self.parameters):
             try:
@@ -77,6 +81,7 @@ class SignalMonitor(Memory):
                 raise
             values[:, axis] = seen.parameter
             raised += [] if seen.flags is None else [seen.flags]
+        raised += self._constrained(values, p, before, sample, shape)
         calm = not raised and quiet(u.reshape(-1)) and quiet(y.reshape(-1))
         if calm and self.stale_after is None:
             self.input[:] = u
@@ -100,6 +105,24 @@ class SignalMonitor(Memory):
             missing if missing.any() else None,
             flags if flags.any() else None,
         )
+
+    def _constrained(
+        self, values: FloatArray, raw: FloatArray, before: list[Saved], sample: int, shape: tuple[int, ...]
+    ) -> list[FlagArray]:
+        """Draws values, in place, that break an inequality between the parameters into the set; flags or refuses them."""
+        if self.constraints is None or not (outside := self.constraints.outside(values)).any():
+            return []
+        seen = outside & (np.absolute(raw) <= LIMIT).all(axis=1)
+        if before and seen.any():
+            for monitor, saved in zip(self.parameters, before, strict=True):
+                monitor.restore(saved)
+            entry = int(np.argmax(seen))
+            names = [monitor.box.name for monitor in self.parameters]
+            raise RangeError(self.constraints.refusal(names, values[entry], place_of(sample, entry, shape)))
+        values[outside] = self.constraints.drawn_in(values[outside])
+        flags: FlagArray = np.zeros(len(values), dtype=np.int32)
+        raise_flag(flags, seen, Flag.PARAMETER_OUT_OF_RANGE)
+        return [flags]
 
     def _stale(self, y: FloatArray, absent: BoolArray, flags: FlagArray) -> BoolArray:
         """Entries whose measurements all repeat for more than `stale_after` samples; missing ones do not count."""

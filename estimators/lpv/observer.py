@@ -37,8 +37,9 @@ class LpvObserver(SavedWithSchedule):
     sample. Plant and gains are the polynomial and the table that were proved (`gainsmith certify`).
 
     Measurements that are missing (one of them not finite) or stale are not used: the entry coasts with L = 0. A missing input
-    or parameter is held at its last finite value; a parameter outside its certified range is clipped to it. All of this is
-    flagged, and estimates are finite always. `LpvVelocityObserver` is the faster form for two states, one input and one output.
+    or parameter is held at its last finite value; a parameter outside its certified range is clipped to it, parameters that
+    break a constraint between them are drawn to the border of their set. All of this is flagged,
+    and estimates are finite always. `LpvVelocityObserver` is the faster form for two states, one input and one output.
 
     Args:
         schedule: of any size.
@@ -72,8 +73,9 @@ class LpvObserver(SavedWithSchedule):
         self.exact = ExactStep(schedule)
         self.sizes = self.exact.sizes
         self.monitor = SignalMonitor(
-            schedule.parameters, self.sizes[1:], schedule.sample_time, count, outside == "refuse", stale_after
-        )
+            schedule.parameters, self.sizes[1:], schedule.sample_time, count, outside == "refuse", stale_after,
+            schedule.constraints,
+        )  # fmt: skip
         self._state: FloatArray = np.zeros((count, self.sizes[0]))
         self.samples = 0
 

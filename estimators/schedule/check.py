@@ -11,12 +11,14 @@ from typing import Any
 
 from estimators.schedule.check_update import LoopSizes, check_gain, check_update
 from estimators.schedule.checker import DEEPEST, LONGEST_NAME, Checker, quoted, shown, too_deep
+from estimators.schedule.constraints import check_constraints
 
 SCHEMA = "gainsmith.schedule/2"
 SEALS = ("section_sha256", "sha256")
 SECTIONS = (
     *("schema", "name", "description", "model", "scheduling", "update", "plant", "gain", "claims", "provenance"),
 )
+OPTIONAL = ("constraints",)  # where the set of the parameters is no box
 SIGNALS = ("states", "inputs", "outputs", "disturbances")
 SHAPES = {  # rows and columns of the plant's matrices, by kinds of signals
     "A": ("states", "states"), "B": ("states", "inputs"), "C": ("outputs", "states"),
@@ -38,7 +40,8 @@ def check_content(content: Mapping[str, Any], where: str) -> None:
     The plant is xdot = A x + B u + E d, y = C x + D u + F d, its matrices polynomials in u = (p - middle)/half of each parameter,
     over `plant.denominator` where there is one (a positive polynomial; absent: one);
     `gain.table` has the shape (breakpoints of each parameter, rows, columns): an observer's states by outputs, or what
-    `gain_signals` names. Rates are numbers, or both null: the parameter may jump, and no P depends on it. `provenance` says where
+    `gain_signals` names. Rates are numbers, or both null: the parameter may jump, and no P depends on it. `constraints`, which
+    may be left out, are linear inequalities between the parameters (`estimators.schedule.constraints`). `provenance` says where
     a file came from and is free (no control characters, no numbers that other readers would read otherwise); nothing in it is
     believed.
 
@@ -47,13 +50,15 @@ def check_content(content: Mapping[str, Any], where: str) -> None:
     """
     check = Checker(where)
     check_depth(content, where)
-    check.keys(content, "", SECTIONS, SEALS)
+    check.keys(content, "", SECTIONS, (*OPTIONAL, *SEALS))
     if content["schema"] != SCHEMA:
         check.fail("schema", f"{quoted(content['schema'])} is not understood; this version reads '{SCHEMA}'")
     check.text(content["name"], "name", most=2 * LONGEST_NAME)
     check.text(content["description"], "description", empty=True)
     sizes = _model(check, content["model"])
     counts = _scheduling(check, content["scheduling"])
+    if "constraints" in content:
+        check_constraints(check, content["constraints"], content["scheduling"])
     loop = check_update(check, content["update"], sizes)
     check.keys(content["plant"], "plant", tuple(SHAPES), ("denominator",))
     for key, kinds in SHAPES.items():

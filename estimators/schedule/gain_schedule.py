@@ -17,6 +17,7 @@ from estimators.errors import EstimatorError, RangeError, ScheduleError
 from estimators.interpolate import Multilinear, PiecewiseLinear
 from estimators.schedule.check import SHAPES, SIGNALS, check_content, check_depth
 from estimators.schedule.checker import shown
+from estimators.schedule.constraints import ParameterSet, parameter_set
 from estimators.schedule.files import check_seal, read_content, sealed
 from estimators.schedule.gain_signals import gain_signals, per_second, quotient
 from estimators.schedule.plant import PlantPolynomial, PlantPolynomials, plant_of
@@ -90,6 +91,7 @@ class GainSchedule(Display):
     measured: Literal["states", "outputs"] = "outputs"
     order: int = 0
     limits: tuple[Limit, ...] = ()
+    constraints: ParameterSet | None = None  # between the parameters, beside their ranges
 
     def summary(self) -> tuple[str, ...]:
         """Scheduling with range and rates, gains with their units, how it is run."""
@@ -107,6 +109,7 @@ class GainSchedule(Display):
         return (
             f"GainSchedule '{self.name}'",
             f"scheduling: {'; '.join(scheduling) or 'none'}",
+            *([] if self.constraints is None else [f"constraints: {', '.join(self.constraints.words)}"]),
             f"gains: {'; '.join(gains)}",
             f"update: {self.update}, every {1e3 * self.sample_time:g} ms",
             f"sha256: {self.sha256[:16]}",
@@ -246,7 +249,7 @@ class GainSchedule(Display):
         return PlantMatrices(*(self.plant[key].at(values) for key in "ABCD"))
 
     def certified(self, parameter: npt.ArrayLike) -> FloatArray:
-        """The parameter as gains and plant depend on it (its magnitude if so declared), refused outside the range."""
+        """The parameter as gains and plant depend on it (its magnitude if so declared), refused outside range and set."""
         names = ", ".join(entry.name for entry in self.parameters)
         try:
             raw = np.asarray(parameter, dtype=np.float64)
@@ -256,7 +259,12 @@ class GainSchedule(Display):
             return _certified(self.parameter, raw)
         if raw.ndim == 0 or raw.shape[-1] != len(self.parameters):
             raise EstimatorError(f"parameters of shape {raw.shape}; the last axis must hold {names}")
-        return np.stack([_certified(entry, raw[..., i]) for i, entry in enumerate(self.parameters)], axis=-1)
+        values = np.stack([_certified(entry, raw[..., i]) for i, entry in enumerate(self.parameters)], axis=-1)
+        if self.constraints is not None and (outside := self.constraints.outside(values)).any():
+            first = np.argwhere(np.atleast_1d(outside))[0]
+            place = "" if raw.ndim == 1 else f" (sample {first[0] if raw.ndim == 2 else tuple(map(int, first))})"
+            raise RangeError(self.constraints.refusal([p.name for p in self.parameters], values[outside][0], place))
+        return values
 
 
 def _certified(parameter: SchedulingParameter, raw: FloatArray) -> FloatArray:
@@ -314,6 +322,7 @@ def _build(content: Mapping[str, Any], where: str) -> GainSchedule:
         update=content["update"]["kind"],
         plant=plant,
         sha256=content["sha256"],
+        constraints=parameter_set(content.get("constraints"), [parameter.name for parameter in parameters]),
         **signals,
         **_law(content["update"]),
     )

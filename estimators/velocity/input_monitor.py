@@ -160,7 +160,7 @@ class InputMonitor(Memory):
         outside = ((value < self.box.min) | (value > self.box.max)) & ~np.isnan(raw)
         if self.refuse and outside.any():
             entry = int(np.argmax(outside))
-            raise RangeError(outside_range(self.box, float(raw[entry]), _place(sample, entry, shape)))
+            raise RangeError(outside_range(self.box, float(raw[entry]), place_of(sample, entry, shape)))
         raise_flag(flags, outside, Flag.PARAMETER_OUT_OF_RANGE)
         return np.clip(value, self.box.min, self.box.max)
 
@@ -186,7 +186,7 @@ class InputMonitor(Memory):
             rates = f"[{box.rate_min:g}, {box.rate_max:g}] {box.unit}/s"
             raise RangeError(
                 f"{box.name} changes at {worst / elapsed[entry]:.6g} {box.unit}/s, outside the certified rates {rates}"
-                f"{_place(sample, entry, shape)}"
+                f"{place_of(sample, entry, shape)}"
             )
         raise_flag(flags, fast, Flag.RATE_OUT_OF_RANGE)
 
@@ -202,7 +202,7 @@ class InputMonitor(Memory):
         return stale
 
 
-def _place(sample: int, entry: int, shape: tuple[int, ...]) -> str:
+def place_of(sample: int, entry: int, shape: tuple[int, ...]) -> str:
     """` (sample 812)`, with the entry of a batch: ` (sample 812, entry 2)`."""
     if not shape:
         return f" (sample {sample})"

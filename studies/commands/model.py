@@ -53,6 +53,8 @@ def _lines(model: LpvModel) -> Iterator[str]:
             yield f"{kind:<14}" + ", ".join(f"{s.name} [{s.unit}]" for s in signals)
     for parameter in model.parameters:
         yield f"{'parameter':<14}{_parameter(parameter)}"
+    for constraint in model.constraints:
+        yield f"{'constraint':<14}{constraint.words}"
     for name, constant in model.constants.items():
         yield f"{'constant':<14}{name} = {constant.value:g} {constant.unit} ({constant.source})"
     for key in MATRICES:

@@ -16,6 +16,7 @@ from estimators.arrays import ComplexArray, FloatArray
 from estimators.schedule.check import SHAPES
 from synthesis.design.export import formula
 from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.half_spaces import Faces
 
 ALONG = 201  # points of the first parameter, the others in their middle
 DIGITS = 5  # of printed conditions
@@ -98,6 +99,9 @@ class Overview:
                 {"name": p.name, "unit": p.unit, "min": p.minimum, "max": p.maximum,
                  "rate": None if p.may_jump else [p.rate_minimum, p.rate_maximum]} for p in model.parameters
             ],
+            "constraints": [
+                {"coefficients": dict(c.coefficients), "max": c.maximum, "unit": c.unit} for c in model.constraints
+            ],
             "constants": {name: {"value": c.value, "unit": c.unit, "source": c.source} for name, c in model.constants.items()},
             "matrices": {key: [[formula(e, model) for e in row] for row in getattr(model, key).tolist()] for key in SHAPES},
             "poles": [
@@ -113,14 +117,19 @@ class Overview:
 def overview(model: LpvModel) -> Overview:
     """All of it; symbolic ranks take a second or two for four states."""
     ends = [(p.minimum, p.maximum) for p in model.parameters]
-    middle = [p.middle for p in model.parameters]
+    middle = model.centre[0]
     if len(ends) == 1:
         points = np.linspace(*ends[0], 5)[:, None]
     else:
-        points = np.array([*list(product(*ends))[: MOST_ROWS - 1], middle]).reshape(-1, len(ends))
+        corners = (
+            model.physical(Faces.of(model.half_spaces).corners) if model.half_spaces else np.array(list(product(*ends)))
+        )
+        points = np.array([*corners[: MOST_ROWS - 1], middle]).reshape(-1, len(ends))
     line = np.repeat(np.array([middle]).reshape(1, len(ends)), ALONG if ends else 1, axis=0)
     if ends:
         line[:, 0] = np.linspace(*ends[0], ALONG)
+        if model.half_spaces:
+            line = line[Faces.of(model.half_spaces).inside(model.scaled(line))]
     return Overview(
         model, points, _poles(model, points), line, _poles(model, line),
         Side(observability_over_range(model), undetectable_mode(model)),

@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from estimators.schedule.constraints import constraint_words
 from estimators.schedule.gain_signals import gain_signals
 from studies.plots import Figure
 from studies.plots.save import save_figure
@@ -105,6 +106,11 @@ def _box(content: Any) -> str:
         )
         for p in content["scheduling"]
     ]
+    if "constraints" in content:
+        ranges += [
+            constraint_words(entry["coefficients"], entry["max"], entry["unit"])
+            for entry in content["constraints"]["inequalities"]
+        ]
     return ", ".join(ranges) or "time"
 
 

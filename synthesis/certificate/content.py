@@ -7,7 +7,7 @@ float64 can hold; units must fit; every constant must matter. Then loop and clai
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import prod
 from typing import Any
 
@@ -25,9 +25,11 @@ from synthesis.errors import ModelError, ProblemError
 from synthesis.loop.feedback import FeedbackLoop
 from synthesis.loop.observer import ObserverLoop
 from synthesis.loop.plant import Axis
+from synthesis.models.constraint import ParameterConstraint, half_spaces_of
 from synthesis.models.param import check_unit
 from synthesis.polynomials.chebyshev import from_chebyshev
 from synthesis.polynomials.enclosure import PolynomialMatrix
+from synthesis.polynomials.half_spaces import HalfSpaces
 from synthesis.polynomials.rational import decimal
 
 MOST_PARAMETERS = 3  # of a proof: polynomials of order 8 in more of them have too many terms
@@ -75,6 +77,7 @@ def subject_of(content: Mapping[str, Any], where: str) -> Subject:
     except ModelError as error:
         raise ScheduleError(str(error)) from None
     check_stored_plant(content["plant"], plant, where)
+    plant = replace(plant, half_spaces=_half_spaces(content, axes, where))
     table = {}
     counts = [len(p["breakpoints"]) for p in content["scheduling"]]
     shape = tuple(len(signals) for signals in gain_signals(content))
@@ -97,6 +100,17 @@ def subject_of(content: Mapping[str, Any], where: str) -> Subject:
         raise ScheduleError(f"{where}: gain.table: {error}") from None
     shown = signals["states"] + signals["outputs"] + signals["inputs"]
     return Subject(law, Names(signals["states"], signals["disturbances"], shown), units, tied)
+
+
+def _half_spaces(content: Mapping[str, Any], axes: tuple[Axis, ...], where: str) -> HalfSpaces:
+    """The constraints between the parameters. Raises ScheduleError for a set without interior, or that is the box."""
+    entries = content["constraints"]["inequalities"] if "constraints" in content else ()
+    try:
+        constraints = [ParameterConstraint(e["coefficients"], e["max"], e["unit"]) for e in entries]
+        return half_spaces_of([(a.name, a.low, a.high) for a in axes], constraints, f"{where}: constraints")
+    except ModelError as error:
+        words = str(error)
+        raise ScheduleError(words if words.startswith(where) else f"{where}: constraints: {words}") from None
 
 
 def claims_of(content: Mapping[str, Any], subject: Subject, where: str) -> list[Claim]:

@@ -21,9 +21,11 @@ from synthesis.loop.system import Region, System, Time
 from synthesis.polynomials.box_sign import positive
 from synthesis.polynomials.boxes import BoxArithmetic, Boxes
 from synthesis.polynomials.enclosure import PolynomialMatrix
+from synthesis.polynomials.multiplier import borders, lessened
 
 MOST_VERTICES = 8
 DEPTH, MOST_PIECES = 3, 300  # halvings along every parameter, and pieces that are tried at once
+CUT_DEPTH, MOST_CUT = 5, 1200  # where the set of the parameters is no box: pieces outside are left out
 
 
 def quickly_proved(
@@ -34,43 +36,55 @@ def quickly_proved(
     speeds: Sequence[PolynomialMatrix | None],
     dual: bool,
     known: dict[str, System | None],
-) -> BoolArray:
+) -> tuple[BoolArray, dict[int, list[Region]]]:
     """For every cell whether all inequalities are proved there, cut in pieces where that helps.
 
-    `known` keeps the loop's systems from claim to claim.
+    With it, where the set of the parameters is no box, the pieces that are left of a cell by its number. `known` keeps the
+    loop's systems from claim to claim.
     """
     cells, axes = list(loop.cells()), loop.plant.axes
     nothing: BoolArray = np.zeros(len(cells), dtype=np.bool_)
     if not hasattr(loop, "on_boxes") or not 1 <= len(axes) <= max(HIGHEST):
-        return nothing
+        return nothing, {}
     count = len(axes)
     own = PolynomialMatrix({k[:count]: m for k, m in P.terms.items()}, P.shape, count)
     if time == "discrete" and any(d > 1 for d in own.degrees):
-        return nothing
+        return nothing, {}
     if any(speed is not None and any(speed.degrees[:count]) for speed in speeds):
-        return nothing  # a parameter that jumps to a place of its own: not the same motion everywhere
+        return nothing, {}  # a parameter that jumps to a place of its own: not the same motion everywhere
     if time not in known:
         known[time] = loop.on_boxes(time, cells)
     system = known[time]
     if system is None:
-        return nothing
+        return nothing, {}
     form = _Form(loop, question, time, own, speeds, dual)
     proved = form.holds(system, cells)
     parents, pieces = np.flatnonzero(~proved), [cell for cell, good in zip(cells, proved, strict=True) if not good]
     good = proved.copy()
     good[parents] = True  # until one of its pieces fails
-    for depth in range(DEPTH * count):
-        if not 0 < len(pieces) <= MOST_PIECES:
+    plant = loop.plant
+    halvings, most = (CUT_DEPTH, MOST_CUT) if plant.half_spaces else (DEPTH, MOST_PIECES)
+    helped = False
+    for depth in range(halvings * count):
+        if not 0 < len(pieces) <= most:
             break
         halves = [cell.halves(depth % count) for cell in pieces]
         pieces, parents = [half for pair in halves for half in pair], np.repeat(parents, 2)
+        kept = np.array([not plant.misses(half.offset, half.factor) for half in pieces])
+        pieces, parents = [half for half, keep in zip(pieces, kept, strict=True) if keep], parents[kept]
+        if not pieces:
+            break
         smaller = loop.on_boxes(time, pieces)
         done = np.zeros(len(pieces), dtype=np.bool_) if smaller is None else form.holds(smaller, pieces)
-        if depth >= count and not done.any():
+        helped |= bool(done.any())
+        if depth >= count and not (helped if plant.half_spaces else done.any()):
             break
         pieces, parents = [half for half, ok in zip(pieces, done, strict=True) if not ok], parents[~done]
     good[parents] = False
-    return good
+    left: dict[int, list[Region]] = {}
+    for parent, piece in zip(parents if plant.half_spaces and helped else (), pieces, strict=False):
+        left.setdefault(int(parent), []).append(piece)
+    return good, left
 
 
 @dataclass(frozen=True)
@@ -106,8 +120,20 @@ class _Form:
             named = inequalities(self.question, acting, local(self.own, cells).tiled(times), stacked, BoxArithmetic())
             good = np.ones(times * len(cells), dtype=np.bool_)
             for _, matrix in named:
-                good &= positive(matrix)
+                good &= self._positive(matrix, cells, times)
         return np.asarray(good.reshape(times, len(cells)).all(axis=0))
+
+    def _positive(self, matrix: Boxes, cells: Sequence[Region], times: int) -> BoolArray:
+        """Also where only the part of a cell in the set of the parameters is certain to be so."""
+        good, half_spaces = positive(matrix), self.loop.plant.half_spaces
+        if not half_spaces or good.all() or len(matrix.middle) != times * len(cells):
+            return good
+        cut, start, slopes = borders(half_spaces, [c.offset for c in cells], [c.factor for c in cells])
+        left = np.flatnonzero(~good & np.tile(cut, times))
+        if len(left):
+            part = replace(matrix, middle=matrix.middle[left], radius=matrix.radius[left])
+            good[left] = positive(lessened(part, np.tile(start, times)[left], np.tile(slopes, (times, 1))[left]))
+        return good
 
     def _later(self, speeds: Sequence[Any]) -> PolynomialMatrix:
         """dP/dt, or P one sample later, at these speeds du/dt: exact, products of motions included."""

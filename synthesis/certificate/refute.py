@@ -19,6 +19,7 @@ from synthesis.loop.plant import Plant
 from synthesis.loop.system import Region, System, Time
 from synthesis.polynomials.definite import is_positive_definite
 from synthesis.polynomials.enclosure import Entries, PolynomialMatrix
+from synthesis.polynomials.half_spaces import corners_of
 from synthesis.polynomials.rational import Matrix, decimal, multiply, transpose
 from synthesis.polynomials.stable import is_hurwitz, is_schur
 
@@ -30,12 +31,15 @@ MOST_STATES = 4  # for the second moment, whose matrix has the square of the siz
 
 
 def refuting_place(verifier: Verifier, claim: Claim, first: Iterable[Point] = ()) -> Point | None:
-    """Scaled parameters u at which the frozen loop certainly breaks the claim; `first` are tried before a grid."""
+    """Scaled parameters u of the set at which the frozen loop certainly breaks the claim; `first` are tried before a grid."""
     time: Time = "continuous" if claim.kind in ERROR_EQUATION else "discrete"
     count = len(verifier.loop.plant.axes)
+    plant = verifier.loop.plant
     for number, point in enumerate([*(place[:count] for place in first), *grid(verifier.loop)]):
         if number > MOST_POINTS:
             break
+        if not plant.admits(point):
+            continue
         system = verifier.loop.system(_standing(point), time)
         if system is not None and _breaks(verifier, claim, system):
             return point
@@ -46,7 +50,7 @@ def unstable_place(loop: Loop, decay_rate: fmpq, first: Iterable[Point] = ()) ->
     """Where the frozen error equation has a pole that is not left of -decay_rate, exactly; None if nowhere looked at."""
     ranked = sorted(dict.fromkeys(grid(loop)), key=lambda point: -_slowest(loop, point))
     climbed = (_climbed(loop, point) for point in ranked[:CLIMBS])
-    for point in chain(first, ranked[:8], climbed):
+    for point in filter(loop.plant.admits, chain(first, ranked[:8], climbed)):
         system = loop.system(_standing(point), "continuous")
         if system is not None and is_hurwitz(_shifted(_frozen(system), decay_rate)) is False:
             return point
@@ -60,7 +64,7 @@ def _climbed(loop: Loop, point: Point) -> Point:
         for axis, sign in product(range(len(point)), (-1, 1)):
             moved = min(max(point[axis] + sign * step, fmpq(-1)), fmpq(1))
             there = (*point[:axis], moved, *point[axis + 1 :])
-            if (higher := _slowest(loop, there)) > height:
+            if loop.plant.admits(there) and (higher := _slowest(loop, there)) > height:
                 point, height = there, higher
         step = step / 2
     return point
@@ -72,9 +76,11 @@ def undetectable_place(plant: Plant, parts: int = 8) -> Point | None:
     Looked for on a grid and, with one parameter, wherever in the range the observability matrix loses rank at a rational number.
     """
     lines = [[fmpq(2 * k - parts, parts) for k in range(parts + 1)]] * len(plant.axes)
-    for number, point in enumerate(chain(product(*lines), _hiding(plant))):
+    for number, point in enumerate(chain(_corners(plant), product(*lines), _hiding(plant))):
         if number > MOST_POINTS:
             break
+        if not plant.admits(point):
+            continue
         A, C = (plant.matrices[key].at(point) for key in "AC")
         below = plant.denominator.at(point)[0, 0]
         hidden = _hidden(A * (1 / below), C)
@@ -116,14 +122,23 @@ def _determinant(matrix: Matrix) -> fmpq_poly:
 
 
 def grid(loop: Loop) -> Iterator[Point]:
-    """Points of every cell, its corners among them."""
+    """Points of every cell that are in the set, the corners of cells and set among them."""
+    yield from _corners(loop.plant)
     cells = list(loop.cells())
     count = len(loop.plant.axes)
     parts = next((n for n in (PARTS, 4, 2) if len(cells) * n**count <= 2 * MOST_POINTS), 1) if count > 1 else PARTS
     for cell in cells:
         steps = [[fmpq(2 * k - parts, parts) for k in range(parts + 1)]] * count
         for local in product(*steps):
-            yield cell.point((*local, *(0,) * count))[:count]
+            point = cell.point((*local, *(0,) * count))[:count]
+            if loop.plant.admits(point):
+                yield point
+
+
+def _corners(plant: Plant) -> list[Point]:
+    """Those that inequalities between the parameters make."""
+    count = len(plant.axes)
+    return corners_of((fmpq(0),) * count, (fmpq(1),) * count, plant.half_spaces) if plant.half_spaces else []
 
 
 def _standing(point: Point) -> Region:

@@ -17,6 +17,7 @@ from synthesis.lmi.samples import Samples
 from synthesis.loop.loop import Loop
 from synthesis.loop.system import Region, System, Time
 from synthesis.polynomials.boxes import Boxes, orders
+from synthesis.polynomials.half_spaces import Faces
 
 MOST_PLACES = 4000  # of the parameters; larger tables are looked at in the corners of their cells only
 MOST_STANDING = 600  # places of a rational plant that are looked at one by one
@@ -37,7 +38,10 @@ class SampledLoop:
 
     @cached_property
     def grid(self) -> FloatArray | None:
-        """Corners of the cells and places between them; None where a cell cannot be enclosed."""
+        """Corners of the cells and places between them that are in the set, and where its border crosses the lines between.
+
+        None where a cell cannot be enclosed.
+        """
         count, cells = len(self.loop.plant.axes), list(self.loop.cells())
         parts = self.points - 1 if self.points is not None else 4 if count == 1 else 2
         line = np.linspace(-1.0, 1.0, (parts if len(cells) * (parts + 1) ** count <= MOST_PLACES else 1) + 1)
@@ -49,7 +53,12 @@ class SampledLoop:
             for region in cells:
                 if not self._fill(region, local):
                     return None
-        return np.array(list(self._rows)).reshape(len(self._rows), count)
+        found = np.array(list(self._rows)).reshape(len(self._rows), count)
+        if not self.loop.plant.half_spaces:
+            return found
+        faces = Faces.of(self.loop.plant.half_spaces)
+        lines = [np.unique(column) for column in found.T]
+        return np.unique(np.concatenate([found[faces.inside(found)], faces.on_lines(lines)]), axis=0)
 
     def at(self, places: FloatArray) -> System:
         """The system at scaled parameters (g, p), every matrix `Samples`."""

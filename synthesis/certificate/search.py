@@ -160,7 +160,7 @@ class Search:
         sampled = self._sampled(time)
         if sampled.grid is None:
             return None
-        problem = LmiProblem(self.parameters, maximise_margin=wish.level is not None)
+        problem = LmiProblem(self.parameters, wish.level is not None, half_spaces=self.loop.plant.half_spaces)
         size, count = self.loop.states, len(self.parameters)
         discrete = time == "discrete"
         P = problem.symmetric("P", size, self._degrees(discrete) or 0)

@@ -3,9 +3,11 @@ r"""Prove claims about a loop without a solver: the inequalities of `synthesis.c
 Read this together with `synthesis.polynomials.enclosure` and `.definite`. On every cell of the table the closed loop is a
 polynomial (with an enclosed remainder where it holds a matrix exponential), so every inequality is a symmetric matrix polynomial
 M(t, r), t the place in the cell, r the place of the rates between their bounds. All its Bernstein coefficients positive definite
-proves M > 0 on the cell. A cell that decides nothing is halved. Every number is a ball of 128 bits around the exact one: a sign
-counts only if it is certain, whatever processor computed it. Cells with room to spare are proved before, all at once, in float64
-with a bound of everything that it rounds (`synthesis.certificate.quick`).
+proves M > 0 on the cell. A cell that decides nothing is halved. Where inequalities between the
+parameters cut a cell, it is proved whole or by pieces, those outside the set left out, or on the part inside
+(`synthesis.polynomials.multiplier`). Every number is a ball of 128 bits around the
+exact one: a sign counts only if it is certain, whatever processor computed it. Cells with room to spare are proved before, all
+at once, in float64 with a bound of everything that it rounds (`synthesis.certificate.quick`).
 
 A failed proof says only that this P does not do. What the loop itself does is asked separately (`synthesis.certificate.refute`).
 """
@@ -20,6 +22,7 @@ from typing import Any
 from flint import arb, arb_mat, fmpq, fmpq_mat
 
 from synthesis.certificate.claims import ERROR_EQUATION, WITH_CHANNEL, Claim, rows_of
+from synthesis.certificate.cut_cell import positive_inside
 from synthesis.certificate.inequalities import Question, inequalities
 from synthesis.certificate.quick import quickly_proved
 from synthesis.loop.loop import Loop
@@ -27,10 +30,13 @@ from synthesis.loop.motion import one_sample_later, rates, time_derivative
 from synthesis.loop.system import Region, System, Time
 from synthesis.polynomials.definite import sign_on_box
 from synthesis.polynomials.enclosure import PolynomialMatrix, block, constant, identity, variable
+from synthesis.polynomials.half_spaces import corners_of
 from synthesis.polynomials.rational import decimal
 
 DEPTH = 14  # halvings of a cell before a proof gives up
 MOST_REGIONS = 400  # open or done, for one claim on one cell
+FEW = 8  # pieces that float64 left: more of them say that it is tight, and balls would take long
+LESS = 8  # times fewer on a cell that the border of the set cuts: it takes more of each
 ORDER = 8  # total degree of the inequalities that is kept; products of exponentials have twice that, of no weight
 
 
@@ -86,6 +92,17 @@ class Balls:
 
 
 @dataclass(frozen=True)
+class _Task:
+    """One claim as it is proved: `later` is dP/dt or P one sample later, in (u, r)."""
+
+    question: Question
+    time: Time
+    P: PolynomialMatrix
+    later: PolynomialMatrix
+    dual: bool
+
+
+@dataclass(frozen=True)
 class Verifier:
     """Proves claims about one loop; what the loop is on a cell is worked out once and shared by all claims."""
 
@@ -101,7 +118,8 @@ class Verifier:
         In the dual form V = e'P^-1 e, and A P + P A' - dP/dt takes the place of A'P + P A + dP/dt.
         """
         time: Time = "continuous" if claim.kind in ERROR_EQUATION else "discrete"
-        axes, count = self.loop.plant.axes, len(self.loop.plant.axes)
+        plant = self.loop.plant
+        axes, count = plant.axes, len(plant.axes)
         P = claim.P.in_variables(2 * count)
         one = constant(fmpq_mat([[1]]), 2 * count)
         period = self.loop.sample_time if time == "discrete" else None
@@ -112,55 +130,83 @@ class Verifier:
         if dual:
             later = -later
         question = self.question(claim)
-        done_at_once = quickly_proved(self.loop, question, time, P, speeds, dual, self.boxes)
+        done_at_once, left = quickly_proved(self.loop, question, time, P, speeds, dual, self.boxes)
+        task = _Task(question, time, P, later, dual)
         for number, cell in enumerate(self.loop.cells()):
-            if done_at_once[number]:
-                continue
-            broken = self._fails_in_a_corner(cell, question, time, P, later, dual) if count > 1 else None
+            broken = None if done_at_once[number] else self._broken(cell, task, left.get(number, []))
             if broken is not None:
                 return broken
-            waiting, done = [(cell, 0)], 0
-            while waiting:
-                region, depth = waiting.pop()
-                done += 1
-                system = self.loop.system(region, time)
-                failed, undecided = ("matrix exponential", None), None
-                if system is not None:
-                    here = [m.affine(region.offset, region.factor).balls() for m in (P, later)]
-                    acting = replace(system, A=system.A.T) if dual else system
-                    named = inequalities(question, acting, here[0], here[1], self.balls)
-                    failed, undecided = _judge(named)
-                    if failed is not None and failed[1] is not None:
-                        return Outcome(False, failed[0], region.point(failed[1]))
-                    if undecided is None:
-                        continue
-                if depth == DEPTH * count or done > self.most_regions:
-                    return Outcome(False, undecided or "matrix exponential", region.offset)
-                waiting += [
-                    (half, depth + 1)
-                    for half in reversed(region.halves(_axis(depth, P, count if time == "discrete" else 0)))
-                ]
         return Outcome(True)
 
-    def _fails_in_a_corner(
-        self, cell: Region, question: Question, time: Time, P: PolynomialMatrix, later: PolynomialMatrix, dual: bool
-    ) -> Outcome | None:
-        """The corner of the cell, and of the rates, where the claim certainly fails: numbers are quicker than polynomials."""
-        count = cell.parameters
-        moving = [i for i in range(count) if later.degrees[count + i]]
-        for signs in product((-1, 1), repeat=count + len(moving)):
-            local = [*signs[:count], *(0,) * count]
-            for i, sign in zip(moving, signs[count:], strict=True):
-                local[count + i] = sign
-            point = Region(cell.point(tuple(local)), (fmpq(0),) * (2 * count))
-            system = self.loop.system(Region((*point.offset[:count], *(fmpq(0),) * count), point.factor), time)
-            if system is None:
-                return None
-            here = [m.affine(point.offset, point.factor).balls() for m in (P, later)]
-            acting = replace(system, A=system.A.T) if dual else system
-            failed, _ = _judge(inequalities(question, acting, here[0], here[1], self.balls))
-            if failed is not None and failed[1] is not None:
-                return Outcome(False, failed[0], point.offset)
+    def _broken(self, cell: Region, task: _Task, pieces: list[Region]) -> Outcome | None:
+        """Where the claim fails on a cell, or where its proof gives up; None if it is proved there.
+
+        `pieces` are what float64 left of the cell, where it is known: they are taken if the whole cell decides nothing.
+        """
+        plant, P = self.loop.plant, task.P
+        count, discrete = cell.parameters, task.time == "discrete"
+        broken = self._fails_in_a_corner([cell], task) if count > 1 else None
+        if broken is not None:
+            return broken
+        waiting, done = [(cell, 0)], 0
+        cut = any(not h.contains(cell.offset, cell.factor) for h in plant.half_spaces)
+        most = self.most_regions // LESS if cut else self.most_regions
+        while waiting:
+            region, depth = waiting.pop()
+            if cut and plant.misses(region.offset, region.factor):
+                continue
+            done += 1
+            named = self._named(region, task)
+            failed, undecided = (None, "matrix exponential") if named is None else _judge(named)
+            if failed is not None and failed[1] is not None and plant.admits(region.point(failed[1])):
+                return Outcome(False, failed[0], region.point(failed[1]))
+            if undecided is None or (cut and named and positive_inside(named, region, plant.half_spaces, ORDER)):
+                continue
+            if depth == DEPTH * count or done > most:
+                place = plant.place_in(region.offset, region.factor)
+                if place is None:
+                    continue  # outside, though of no single inequality
+                return Outcome(False, undecided, (*place, *region.offset[count:]))
+            if pieces:
+                broken = self._fails_in_a_corner(pieces, task)
+                if broken is not None or len(pieces) > FEW:
+                    place = plant.place_in(pieces[0].offset, pieces[0].factor) or pieces[0].offset[:count]
+                    return broken or Outcome(False, undecided, (*place, *pieces[0].offset[count:]))
+                waiting, pieces = [(piece, 0) for piece in pieces], []
+                continue
+            axis = _axis(depth, P, count if discrete else 0)
+            waiting += [(half, depth + 1) for half in reversed(region.halves(axis))]
+        return None
+
+    def _named(self, region: Region, task: _Task) -> list[tuple[str, PolynomialMatrix]] | None:
+        """All inequalities on a region; None where its system cannot be enclosed."""
+        system = self.loop.system(region, task.time)
+        if system is None:
+            return None
+        here = [m.affine(region.offset, region.factor).balls() for m in (task.P, task.later)]
+        acting = replace(system, A=system.A.T) if task.dual else system
+        return inequalities(task.question, acting, here[0], here[1], self.balls)
+
+    def _fails_in_a_corner(self, cells: Sequence[Region], task: _Task) -> Outcome | None:
+        """The corner of a cell (of its part in the set), and of the rates, where the claim certainly fails.
+
+        Numbers are quicker than polynomials.
+        """
+        count = cells[0].parameters
+        moving = [i for i in range(count) if task.later.degrees[count + i]]
+        for cell in cells:
+            corners = corners_of(cell.offset[:count], cell.factor[:count], self.loop.plant.half_spaces)
+            for corner, signs in product(corners, product((-1, 1), repeat=len(moving))):
+                rest = list(cell.offset[count:])
+                for i, sign in zip(moving, signs, strict=True):
+                    rest[i] += sign * cell.factor[count + i]
+                point = Region((*corner, *rest), (fmpq(0),) * (2 * count))
+                named = self._named(point, task)
+                if named is None:
+                    return None
+                failed, _ = _judge(named)
+                if failed is not None and failed[1] is not None:
+                    return Outcome(False, failed[0], point.offset)
         return None
 
     def question(self, claim: Claim) -> Question:

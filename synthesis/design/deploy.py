@@ -15,6 +15,7 @@ from synthesis.certificate.levels import feedback_claims, held_claims, sampled_c
 from synthesis.certificate.rounding import significant
 from synthesis.certificate.search import Search, Wish
 from synthesis.certificate.verify import Names
+from synthesis.design.cut_table import faces_of, tabulated_places
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_names
 from synthesis.design.hinf_observer import Channel, ObserverGains
@@ -166,17 +167,22 @@ def _candidates(gains: Gains, settings: DeploySettings) -> Iterator[tuple[int, .
 def _along(gains: Gains, axis: int, settings: DeploySettings) -> int:
     """The least number of segments, a power of two, that interpolates well along one parameter, the others at both ends."""
     parameters = gains.model.parameters
-    others = [np.array([p.minimum, p.maximum]) for p in parameters]
+    others, faces = [np.array([p.minimum, p.maximum]) for p in parameters], faces_of(gains.model)
     others[axis] = np.linspace(parameters[axis].minimum, parameters[axis].maximum, FINEST + 1)
     grid = np.stack(np.meshgrid(*others, indexing="ij"), axis=-1)
     found, share = table_at(gains, grid.reshape(-1, len(parameters)), settings.sample_time), settings.interpolation_cost
     values = np.moveaxis(found.reshape(*grid.shape[:-1], -1), axis, 0).reshape(FINEST + 1, -1, found[0].size)
-    size = np.abs(values).max(axis=(0, 1)) + np.finfo(float).tiny
+    seen = np.ones(values.shape[:2], dtype=np.bool_)
+    if faces is not None:  # what interpolation makes of gains outside the set is of no interest
+        seen = faces.inside(gains.model.scaled(grid.reshape(-1, len(parameters)))).reshape(grid.shape[:-1])
+        seen = np.moveaxis(seen, axis, 0).reshape(values.shape[:2])
+    size = np.abs(values).max(axis=(0, 1), where=seen[..., None], initial=0.0) + np.finfo(float).tiny
     for segments in (1, 2, 4, 8, 16, 32):
         weights = np.linspace(0.0, segments, FINEST + 1)
         low = np.minimum(weights.astype(int), segments - 1)
         knots, rest = values[:: FINEST // segments], (weights - low)[:, None, None]
-        if (np.abs(knots[low] * (1 - rest) + knots[low + 1] * rest - values).max(axis=(0, 1)) <= share * size).all():
+        off = np.abs(knots[low] * (1 - rest) + knots[low + 1] * rest - values)
+        if (off.max(axis=(0, 1), where=seen[..., None], initial=0.0) <= share * size).all():
             return segments
     return FINEST
 
@@ -211,7 +217,7 @@ def tabulate(
     parameters = gains.model.parameters
     numbers = (segments,) * len(parameters) if isinstance(segments, int) else segments
     lines = tuple(np.linspace(p.minimum, p.maximum, n + 1) for p, n in zip(parameters, numbers, strict=True))
-    points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(lines))
+    points = tabulated_places(gains.model, lines)
     table, digits = table_at(gains, points, sample_time), TABLE_DIGITS + extra_digits(gains)
     largest = np.abs(table).max(axis=0)
     rounded = np.empty_like(table)

@@ -49,6 +49,7 @@ def schedule_content(
              "absolute": p.absolute, "breakpoints": line.tolist()}
             for p, line in zip(model.parameters, deployment.breakpoints, strict=True)
         ],
+        **constraints_of(model),
         "update": update_section(deployment.gains, deployment.settings),
         "plant": _plant(model),
         "gain": {"dtype": deployment.settings.dtype, "interpolation": "linear", "table": gain.tolist()},
@@ -133,6 +134,23 @@ def _model(model: LpvModel) -> dict[str, Any]:
         key: [[formula(entry, model) for entry in row] for row in getattr(model, key).tolist()] for key in SHAPES
     }
     return {"id": model.name, "source": model.source, **signals, "constants": constants, "matrices": matrices}
+
+
+def constraints_of(model: LpvModel) -> dict[str, Any]:
+    """The section `constraints` of a schedule file where the set of the parameters is no box, with a place well inside."""
+    if not model.constraints:
+        return {}
+    centre = model.centre[0]
+    return {
+        "constraints": {
+            "centre": {p.name: float(value) for p, value in zip(model.parameters, centre, strict=True)},
+            "inequalities": [
+                {"coefficients": {name: float(c) for name, c in constraint.coefficients.items() if c},
+                 "max": float(constraint.maximum), "unit": constraint.unit}
+                for constraint in model.constraints
+            ],
+        }
+    }  # fmt: skip
 
 
 def _plant(model: LpvModel) -> dict[str, Any]:

@@ -224,7 +224,13 @@ def observer_problem(
     common margin of all inequalities is maximised. With a `floor` every inequality keeps that margin, and the decisions of
     least norm are sought.
     """
-    problem = LmiProblem(model.parameters, maximise_margin and gamma is not None, least_norm=floor > 0.0, floor=floor)
+    problem = LmiProblem(
+        model.parameters,
+        maximise_margin and gamma is not None,
+        least_norm=floor > 0.0,
+        floor=floor,
+        half_spaces=model.half_spaces,
+    )
     unit = error_unit(model, design, scale)
     scaled = model.polynomial.with_states_scaled(scale)
     known = {key: problem.scaled(getattr(scaled, key)) for key in ("A", "C", "E", "F", "denominator")}

@@ -164,7 +164,9 @@ def design_output_feedback(model: LpvModel, design: OutputFeedbackDesign) -> Out
         ) -> LmiProblem:
             bounds = {c: gamma if c.bound is None else c.bound for c in design.channels}
             levels = {c: None if bound is None else bound / frame.unit for c, bound in bounds.items()}
-            return build(scaled, model.parameters, wanted, levels, margin and gamma is not None, floor)
+            return build(
+                scaled, model.parameters, wanted, levels, margin and gamma is not None, floor, model.half_spaces
+            )
 
         memory = starting_places(problem(None))
         tried.append((least(problem, design.backoff, settings, memory), wanted, problem, memory))

@@ -31,6 +31,7 @@ from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.design.generalised_plant import ChannelPlant, GeneralisedPlant
 from synthesis.lmi.problem import LmiProblem
 from synthesis.models.param import SchedulingParameter
+from synthesis.polynomials.half_spaces import HalfSpaces
 from synthesis.polynomials.matrix import MatrixPolynomial, across, over, symmetric_block
 
 Still = Literal["X", "Y"]  # which of both does not move
@@ -59,9 +60,10 @@ def build(
     levels: dict[FeedbackChannel, float | None],
     maximise_margin: bool = False,
     floor: float = 0.0,
+    half_spaces: HalfSpaces = (),
 ) -> LmiProblem:
     """The problem in the plant's coordinates; a level of None is the unknown `gamma` that is minimised."""
-    problem = LmiProblem(parameters, maximise_margin, least_norm=floor > 0.0, floor=floor)
+    problem = LmiProblem(parameters, maximise_margin, least_norm=floor > 0.0, floor=floor, half_spaces=half_spaces)
     loop = _Loop(problem, plant, wanted)
     problem.require("coupling", loop.coupling)
     parts = [(part, _level(problem, levels[part.channel])) for part in plant.channels]

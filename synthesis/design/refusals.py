@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from flint import fmpq, fmpq_mat
@@ -11,7 +12,6 @@ from estimators.arrays import FloatArray
 from synthesis.certificate.refute import undetectable_place
 from synthesis.errors import ProblemError
 from synthesis.loop.from_model import plant_of
-from synthesis.loop.plant import Plant
 from synthesis.models.lpv import LpvModel
 from synthesis.models.numeric import NumericModel
 from synthesis.polynomials.enclosure import PolynomialMatrix
@@ -27,7 +27,7 @@ def refuse_undetectable(model: LpvModel, measured: Sequence[int] | None = None) 
             for powers, entries in C.terms.items()
         }
         seen = PolynomialMatrix(chosen, (len(rows), C.shape[1]), C.variables)
-        plant = Plant(plant.axes, {**plant.matrices, "C": seen}, plant.denominator)
+        plant = replace(plant, matrices={**plant.matrices, "C": seen})
     place = undetectable_place(plant)
     if place is not None:
         here = _here(model, place)

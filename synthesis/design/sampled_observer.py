@@ -78,7 +78,13 @@ def _problem(
     maximise_margin: bool,
     floor: float,
 ) -> LmiProblem:
-    problem = LmiProblem(model.parameters, maximise_margin and gamma is not None, least_norm=floor > 0.0, floor=floor)
+    problem = LmiProblem(
+        model.parameters,
+        maximise_margin and gamma is not None,
+        least_norm=floor > 0.0,
+        floor=floor,
+        half_spaces=model.half_spaces,
+    )
     known = {key: problem.scaled(array) for key, array in fitted.items()}
     nx, ny, count = len(model.states), len(model.outputs), len(model.parameters)
     degree = tuple(0 if p.may_jump else design.degree for p in model.parameters)

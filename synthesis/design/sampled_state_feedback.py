@@ -98,7 +98,13 @@ def _problem(
     maximise_margin: bool,
     floor: float,
 ) -> LmiProblem:
-    problem = LmiProblem(model.parameters, maximise_margin and gamma is not None, least_norm=floor > 0.0, floor=floor)
+    problem = LmiProblem(
+        model.parameters,
+        maximise_margin and gamma is not None,
+        least_norm=floor > 0.0,
+        floor=floor,
+        half_spaces=model.half_spaces,
+    )
     nx, nu, count = len(model.states), len(model.inputs), len(model.parameters)
     applied = scale.applied(model.polynomial)
     known = {key: problem.scaled(getattr(applied, key)) for key in ("C", "D", "F", "denominator")}

@@ -111,7 +111,7 @@ def affine_quadratic_stability(
     if vertices.shape[1:] != shape:
         raise ProblemError(f"model '{model.name}': gains of shape {vertices.shape[1:]} do not fit {shape}")
     scale = _scale(model, box)
-    problem = LmiProblem(model.parameters, maximise_margin=True)
+    problem = LmiProblem(model.parameters, maximise_margin=True, half_spaces=model.half_spaces)
     scaled = model.polynomial.with_states_scaled(scale)
     A, C, below = (problem.scaled(getattr(scaled, key)) for key in ("A", "C", "denominator"))
     P = problem.symmetric("P", shape[0], degree)

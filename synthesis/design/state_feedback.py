@@ -169,7 +169,13 @@ def state_feedback_problem(
     common margin of all inequalities is maximised. With a `floor` every inequality keeps that margin, and the decisions of
     least norm are sought. Of a single channel Q stands for g Q, and gamma^2 is minimised.
     """
-    problem = LmiProblem(model.parameters, maximise_margin and gamma is not None, least_norm=floor > 0.0, floor=floor)
+    problem = LmiProblem(
+        model.parameters,
+        maximise_margin and gamma is not None,
+        least_norm=floor > 0.0,
+        floor=floor,
+        half_spaces=model.half_spaces,
+    )
     scaled, clock = scale.applied(model.polynomial), scale.clock
     known = {key: problem.scaled(getattr(scaled, key)) for key in ("A", "B", "C", "D", "E", "F", "denominator")}
     below, nx, nu = known["denominator"], len(model.states), len(model.inputs)

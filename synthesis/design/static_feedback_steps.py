@@ -114,7 +114,9 @@ class Steps:
     def _problem(
         self, gamma: float | None, margin: bool, floor: float, gain: MatrixPolynomial | Structure, at: Point | None
     ) -> tuple[LmiProblem, StaticLoop]:
-        problem = LmiProblem(self.model.parameters, margin, least_norm=floor > 0.0, floor=floor)
+        problem = LmiProblem(
+            self.model.parameters, margin, least_norm=floor > 0.0, floor=floor, half_spaces=self.model.half_spaces
+        )
         loop = StaticLoop(problem, self.plant, self.frame.clock, self.design.degree, gain, at)
         if self.decay:
             loop.require_decay(self.decay)
@@ -134,7 +136,7 @@ class Steps:
         self, gain: MatrixPolynomial | Structure, at: Point | None, growth: float
     ) -> tuple[LmiProblem, StaticLoop]:
         """The largest margin of decay with (growth) taken off A, P < 1."""
-        problem = LmiProblem(self.model.parameters, maximise_margin=True)
+        problem = LmiProblem(self.model.parameters, maximise_margin=True, half_spaces=self.model.half_spaces)
         loop = StaticLoop(problem, self.plant, self.frame.clock, self.design.degree, gain, at)
         loop.require_decay(-growth)
         unit = problem.constant(np.eye(loop.P.shape[0]))
@@ -172,8 +174,9 @@ class Steps:
         """Scaled places with the ends of all rates (g, 2 p)."""
         count = len(self.model.parameters)
         line = np.linspace(-1.0, 1.0, 9 if count == 1 else 5)
-        points = list(product(*[line] * count, *[(-1.0, 1.0)] * count))
-        return np.array(points).reshape(len(points), 2 * count)
+        own = LmiProblem(self.model.parameters, half_spaces=self.model.half_spaces).places_on([line] * count)
+        rates = np.array(list(product((-1.0, 1.0), repeat=count))).reshape(2**count, count)
+        return np.hstack([np.repeat(own, len(rates), axis=0), np.tile(rates, (len(own), 1))])
 
     def _closed(self, K: MatrixPolynomial, places: FloatArray) -> FloatArray:
         still = places[:, : places.shape[1] // 2]

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 
@@ -64,10 +63,7 @@ def starting_places(problem: LmiProblem) -> Memory:
         degrees = entry.matrix.degrees[:count]
         numbers = [max(START.get(count, 2), degree + 1 if count == 1 else 0) if degree else 1 for degree in degrees]
         lines = [np.cos(np.linspace(np.pi, 0.0, n)) if n > 1 else np.zeros(1) for n in numbers]
-        points, vertices = (
-            list(product(*lines)),
-            rate_vertices(entry.matrix, count),
-        )  # one empty point without parameters
+        points, vertices = problem.places_on(lines), rate_vertices(entry.matrix, count)
         own, rates = (np.array(rows).reshape(len(rows), count) for rows in (points, vertices))
         out[entry.name] = np.hstack([np.repeat(own, len(rates), axis=0), np.tile(rates, (len(own), 1))])
     return out

@@ -58,6 +58,37 @@ class Formulas:
             self._placed(path, text, lambda: check_entry(text, self.units, wanted, place))
         return expression
 
+    def linear(self, i: int) -> tuple[dict[str, float], float]:
+        """Of constraint i: the coefficients of the parameters, and what is left of its max.
+
+        Raises ModelError for units that do not fit, and for a formula that is not linear in the parameters.
+        """
+        table, path, place = self.table.constraints[i], ("constraints", i, "formula"), f"constraints[{i}]"
+        text = table.formula or ""
+        tree = self._placed(path, text, lambda: parse(text, place))
+        self.mentioned |= used(tree)
+        self._extent(tree, text, path, place)
+        expression = self._expression(tree, text, path, place)
+        if self.with_units:
+            found, wanted = (
+                self._unit(tree, text, path, place),
+                self._placed(path, "", lambda: dimension(table.unit, place)),
+            )
+            if not found.same(wanted):
+                words = f"'{shown(text)}' has the unit {found.words}, its max is in {wanted.words}"
+                raise ModelError(f"{self.file}:{self.places.at(path)}: {place}: {words}")
+        values = {sp.Symbol(name): sp.Rational(str(c.value)) for name, c in self.table.constants.items()}
+        names = [p.name for p in self.table.parameters]
+        symbols = [sp.Symbol(name) for name in names]
+        plain = sp.expand(expression.subs(values))
+        if not names or not plain.is_polynomial(*symbols) or sp.Poly(plain, *symbols).total_degree() > 1:
+            words = f"'{shown(text)}' is not linear in the parameters {', '.join(names)}"
+            raise ModelError(f"{self.file}:{self.places.at(path)}: {place}: {words}")
+        polynomial = sp.Poly(plain, *symbols)
+        slopes = {name: float(polynomial.coeff_monomial(symbol)) for name, symbol in zip(names, symbols, strict=True)}
+        rest = sp.Rational(str(table.max)) - polynomial.coeff_monomial(1)
+        return {name: slope for name, slope in slopes.items() if slope}, float(rest)
+
     def refuse_unused(self) -> None:
         """Raise ModelError for a definition or constant that no matrix needs: it is tied to nothing."""
         waiting, needed = list(self.mentioned), set()
@@ -70,7 +101,10 @@ class Formulas:
             for name in getattr(self.table, kind):
                 if name not in needed:
                     where = f"{self.file}:{self.places.at((kind, name))}"
-                    raise ModelError(f"{where}: {kind}.{name}: is used in no matrix; use it or remove it")
+                    raise ModelError(
+                        f"{where}: {kind}.{name}: is used in no matrix{' and no constraint' if self.table.constraints else ''}; "
+                        "use it or remove it"
+                    )
 
     def _define(self) -> None:
         trees = {}

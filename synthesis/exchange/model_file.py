@@ -16,6 +16,7 @@ from synthesis.certificate.units import PLACES
 from synthesis.errors import ModelError, SpecError
 from synthesis.exchange.formulas import Formulas
 from synthesis.exchange.model_table import ModelFile, ParameterTable, Rows, SignalTable
+from synthesis.models.constraint import ParameterConstraint, scaled_set
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Constant, SchedulingParameter, Signal
 from synthesis.toml_file import read_table, read_toml
@@ -73,9 +74,20 @@ class _Reader:
                     for i in range(len(top))
                 ]
                 matrices[key] = sp.Matrix(len(top), len(bottom), [entry for row in entries for entry in row])
+        constraints = self._constraints(formulas, parameters)
         formulas.refuse_unused()
+        seen = {str(symbol) for matrix in matrices.values() for symbol in matrix.free_symbols}
+        constants = {name: c for name, c in constants.items() if name in seen}  # numbers of constraints are worked out
         try:
-            return LpvModel(table.name, table.source, parameters=parameters, constants=constants, **signals, **matrices)
+            return LpvModel(
+                table.name,
+                table.source,
+                parameters=parameters,
+                constants=constants,
+                constraints=constraints,
+                **signals,
+                **matrices,
+            )
         except ModelError as error:
             raise ModelError(f"{self.file}: {error}") from None
 
@@ -91,6 +103,20 @@ class _Reader:
         return self._made(
             place, SchedulingParameter, table.name, table.unit, table.min, table.max, *rates, table.absolute
         )
+
+    def _constraints(
+        self, formulas: Formulas, parameters: tuple[SchedulingParameter, ...]
+    ) -> tuple[ParameterConstraint, ...]:
+        """In order, each checked against those before it: a set that is empty is refused where it becomes so."""
+        found: list[ParameterConstraint] = []
+        for i, table in enumerate(self.table.constraints):
+            coefficients, largest = table.coefficients or {}, table.max
+            if table.formula is not None:
+                coefficients, largest = formulas.linear(i)
+            place = ("constraints", i)
+            found.append(self._made(place, ParameterConstraint, coefficients, largest, table.unit))
+            self._made(place, scaled_set, parameters, tuple(found), f"constraints[{i}]")
+        return tuple(found)
 
     def _made(self, place: Path, kind: Callable[..., Made], *values: object) -> Made:
         try:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from synthesis.toml_file import StrictTable
 
@@ -49,6 +49,21 @@ class ConstantTable(StrictTable):
     source: str = Field(min_length=1, examples=["data sheet"])
 
 
+class ConstraintTable(StrictTable):
+    """One inequality between parameters: a formula that is linear in them, or their coefficients, up to `max` in `unit`."""
+
+    formula: Entry | None = Field(default=None, examples=["load + gain*speed"])
+    coefficients: dict[str, float] | None = None
+    max: float = Field(examples=[3.0])
+    unit: str = Field(default="1", examples=["kg"])
+
+    @model_validator(mode="after")
+    def _one_or_the_other(self) -> Self:
+        if (self.formula is None) == (self.coefficients is None):
+            raise ValueError('needs either formula, such as "load + 2*speed", or coefficients, such as { load = 1.0 }')
+        return self
+
+
 class MatrixTables(StrictTable):
     """x' = A x + B u + E d,  y = C x + D u + F d; those left out are zero."""
 
@@ -72,4 +87,5 @@ class ModelFile(StrictTable):
     parameters: list[ParameterTable] = Field(default_factory=list)
     constants: dict[str, ConstantTable] = Field(default_factory=dict)
     definitions: dict[str, Entry] = Field(default_factory=dict)
+    constraints: list[ConstraintTable] = Field(default_factory=list)
     matrices: MatrixTables

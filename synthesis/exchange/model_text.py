@@ -40,6 +40,10 @@ def model_text(model: LpvModel) -> str:
             lines += [f"{kind} = [", *(f"  {entry}," for entry in entries), "]"]
     for parameter in model.parameters:
         lines += _parameter(parameter)
+    for constraint in model.constraints:
+        factors = ", ".join(f"{name} = {_number(c)}" for name, c in constraint.coefficients.items() if c)
+        lines += ["", "[[constraints]]", f"coefficients = {{ {factors} }}", f"max = {_number(constraint.maximum)}"]
+        lines += [f"unit = {_text(constraint.unit)}"]
     if model.constants:
         lines += ["", "[constants]"]
         lines += [

@@ -180,7 +180,7 @@ def _family(problem: LmiProblem, entry: Inequality) -> Family:
     degrees = entry.matrix.degrees[:count]
     fine = LOOKED_AT.get(count, 5)
     lines = [np.linspace(-1.0, 1.0, 2 if d == 1 and count > 1 else fine) if d else np.zeros(1) for d in degrees]
-    found, points = rate_samples(entry.matrix, count), list(product(*lines))  # one empty point without parameters
+    found, points = rate_samples(entry.matrix, count), problem.places_on(lines)
     grid, rates = (np.array(line, float).reshape(len(line), count) for line in (points, found))
     places = np.hstack([np.repeat(grid, len(rates), axis=0), np.tile(rates, (len(grid), 1))])
 
@@ -194,7 +194,10 @@ def _family(problem: LmiProblem, entry: Inequality) -> Family:
 
 
 def corners(places: FloatArray, count: int) -> list[int]:
-    """Indices to start with: every corner of the parameters with one of its rates, opposite ones with opposite rates."""
+    """Indices to start with: every corner of the parameters with one of its rates, opposite ones with opposite rates.
+
+    Where a corner of the ranges is cut off, the place that is furthest in its direction.
+    """
     spread = np.abs(places[:, :count]).max(axis=0, initial=0.0)
     at_corner = (np.abs(places[:, :count]) >= spread - 1e-12).all(axis=1)
     sign = np.where(places[:, :count] >= 0.0, 1.0, -1.0)
@@ -204,4 +207,11 @@ def corners(places: FloatArray, count: int) -> list[int]:
         key = tuple(places[index, :count])
         if key not in found or agree[index] > agree[found[key]]:
             found[key] = int(index)
-    return list(found.values())
+    moving = [i for i in range(count) if len(places) and np.ptp(places[:, i]) > 0.0]
+    chosen = list(found.values())
+    for signs in product((-1.0, 1.0), repeat=len(moving)) if len(chosen) < 2 ** len(moving) else ():
+        far = places[:, moving] @ np.array(signs)
+        furthest = int(np.lexsort((agree, np.round(far, 9)))[-1])
+        if furthest not in chosen:
+            chosen.append(furthest)
+    return chosen

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -11,6 +14,7 @@ from estimators.display import Display, counted
 from synthesis.errors import ProblemError
 from synthesis.lmi.basis import chebyshev_basis
 from synthesis.models.param import SchedulingParameter
+from synthesis.polynomials.half_spaces import Faces, HalfSpaces
 from synthesis.polynomials.matrix import MatrixPolynomial, constant, variable
 
 MARGIN = "margin"
@@ -49,6 +53,8 @@ class LmiProblem(Display):
     parameter counted CURVED times: a strictly convex problem, whose one answer moves little when the data or the processor
     change. (Maximal margins and least gammas are attained on flat sets.) Of all answers it takes one that varies little.
 
+    With `half_spaces` every inequality is asked for where these hold, too: the parameters' set is no box.
+
     >>> problem = LmiProblem((SchedulingParameter("speed", "m/s", 10.0, 40.0, -5.0, 5.0),))
     >>> P = problem.symmetric("P", 2, degree=1)
     >>> problem.require("P > 0", P)
@@ -66,6 +72,7 @@ class LmiProblem(Display):
     inequalities: list[Inequality] = field(default_factory=list)
     objective: str | None = None
     sense: float = 1.0
+    half_spaces: HalfSpaces = ()
 
     def __post_init__(self) -> None:
         if self.maximise_margin:
@@ -83,6 +90,21 @@ class LmiProblem(Display):
             f"parameters: {', '.join(box) or 'none'}",
             f"objective: {'least norm' if self.least_norm else aim}",
         )
+
+    @cached_property
+    def faces(self) -> Faces | None:
+        """The set of the parameters in floats; None for a box."""
+        return Faces.of(self.half_spaces) if self.half_spaces else None
+
+    def places_on(self, lines: Sequence[FloatArray]) -> FloatArray:
+        """The places (g, p) of a rectilinear grid of scaled parameters; where the set is no box, those of it and its border.
+
+        A line of one place, of a parameter that does not matter, then is one from end to end: there may be nothing in its middle.
+        """
+        if self.faces is None:
+            points = list(product(*lines))  # one empty point for an LMI without parameters
+            return np.array(points, float).reshape(len(points), len(self.parameters))
+        return self.faces.on_lines([line if len(line) > 1 else np.array([-1.0, 1.0]) for line in lines])
 
     @property
     def variables(self) -> int:

@@ -131,7 +131,7 @@ def _sample(problem: LmiProblem, entry: Inequality, axes: list[FloatArray], marg
     """Points of the parameters it depends on, times the vertices of the rates it depends on."""
     count = len(problem.parameters)
     used = [axis if degree else np.zeros(1) for axis, degree in zip(axes, entry.matrix.degrees[:count], strict=True)]
-    points = list(product(*used))  # one empty point for an LMI without parameters
+    points = problem.places_on(used)
     grid = np.array(points, float).reshape(len(points), count)
     rates = np.array(rate_samples(entry.matrix, count))
     places = np.hstack([np.tile(grid, (len(rates), 1)), np.repeat(rates, len(grid), axis=0)])
@@ -150,6 +150,8 @@ def _coefficients(problem: LmiProblem, entry: Inequality, settings: LmiSettings)
     for low in product(*(range(len(line) - 1) for line in edges)):
         ends = [(line[k], line[k + 1]) for line, k in zip(edges, low, strict=True)] + [(-1.0, 1.0)] * count
         offset, factor = (np.array([(b + sign * a) / 2 for a, b in ends]) for sign in (1.0, -1.0))
+        if problem.faces is not None and problem.faces.misses(offset[None], factor[None])[0]:
+            continue
         local = matrix.affine(offset, factor).coefficients
         for axis, degree in enumerate(matrix.degrees):
             local = np.moveaxis(np.tensordot(to_bernstein(degree), local, axes=(1, axis)), 0, axis)
@@ -166,6 +168,10 @@ def _vertices(problem: LmiProblem, entry: Inequality, margin: float) -> list[Sam
     M > 0 is concave along every axis then, so its minimum over the box sits at a vertex (Gahinet, Apkarian, Chilali).
     """
     count = len(problem.parameters)
+    if problem.half_spaces:
+        raise ProblemError(
+            "the vertex relaxation is for boxes, this problem has constraints between parameters; use grid or exchange"
+        )
     corners = [np.array([-1.0, 1.0])] * count
     out = [_sample(problem, entry, corners, margin)]
     rate_vertices(entry.matrix, count)  # refuses what its vertices do not decide

@@ -142,7 +142,7 @@ def _margins(problem: LmiProblem, decisions: FloatArray, depth: int) -> tuple[tu
         matrix, size = entry.matrix.substitute(decisions), entry.matrix.magnitude(decisions)
         if entry.floor:
             matrix = matrix + constant(entry.floor * np.eye(matrix.shape[0]), matrix.variables)
-        found = prove_positive(matrix, depth, size)
+        found = prove_positive(matrix, depth, size, None if entry.offset.any() else problem.faces)
         place = problem.place(entry, found.place)
         out.append(Margin(entry.name, found.smallest / found.scale, place, found.proved))
         places.append(np.asarray(found.place))

@@ -17,4 +17,4 @@ def plant_of(model: LpvModel) -> Plant:
         ))
         for p in model.parameters
     )  # fmt: skip
-    return Plant(axes, model.exact.matrices, model.exact.denominator)
+    return Plant(axes, model.exact.matrices, model.exact.denominator, model.half_spaces)

@@ -35,7 +35,7 @@ class Loop(Protocol):
         """The time in which its states are balanced for the solver."""
 
     def cells(self) -> Iterator[Region]:
-        """The boxes between neighbouring breakpoints."""
+        """The boxes between neighbouring breakpoints that are not wholly outside the set of the parameters."""
 
     def system(self, region: Region, time: Time) -> System | None:
         """The loop on a region of one cell; None where a matrix exponential is too large to be enclosed."""

@@ -29,13 +29,15 @@ class Tabulated:
     rounded: bool
 
     def cells(self) -> Iterator[Region]:
-        """The boxes between neighbouring breakpoints."""
+        """The boxes between neighbouring breakpoints, without those wholly outside the set of the parameters."""
         edges = [
             [(axis.scaled(low), axis.scaled(high)) for low, high in pairwise(points)]
             for axis, points in zip(self.plant.axes, self.breakpoints, strict=True)
         ]
         for cell in product(*edges):
-            yield Region.between(tuple(low for low, _ in cell), tuple(high for _, high in cell))
+            region = Region.between(tuple(low for low, _ in cell), tuple(high for _, high in cell))
+            if not self.plant.misses(region.offset, region.factor):
+                yield region
 
     def gain(self, region: Region) -> PolynomialMatrix:
         """The multilinear gain on a region that lies in one cell."""

@@ -14,6 +14,7 @@ from estimators.arrays import FloatArray
 from estimators.display import Display, counted
 from estimators.errors import unknown
 from synthesis.errors import ModelError
+from synthesis.models.constraint import ParameterConstraint, scaled_set, still_cutting
 from synthesis.models.extract import MATRICES, ExactModel, PolynomialModel, extract, in_floats
 from synthesis.models.from_grid import Fit, from_systems, grid_fields, with_noise
 from synthesis.models.from_jacobian import jacobian_fields
@@ -21,6 +22,7 @@ from synthesis.models.nonlinear import NonlinearModel
 from synthesis.models.numeric import NumericModel, evaluate
 from synthesis.models.param import Constant, SchedulingParameter, Signal
 from synthesis.models.symbols import plain
+from synthesis.polynomials.half_spaces import Faces, HalfSpaces
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -29,6 +31,9 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, eq=False, repr=False)
 class LpvModel(Display):
     r"""x' = A(p) x + B(p) u + E(p) d,  y = C(p) x + D(p) u + F(p) d, with p(t) in a box and dp/dt in another.
+
+    `constraints` are linear inequalities between the parameters that cut corners off their box; the matrices are defined on
+    all of it. Rate bounds hold as far as the set allows.
 
     Matrices are sympy matrices whose symbols are the names of `parameters` and `constants`, polynomial or rational in
     the parameters. A disturbance whose column of E is zero is measurement noise. B, D, E and F default to zero.
@@ -62,6 +67,7 @@ class LpvModel(Display):
     E: sp.Matrix | None = None
     F: sp.Matrix | None = None
     constants: Mapping[str, Constant] = field(default_factory=dict)
+    constraints: tuple[ParameterConstraint, ...] = ()
 
     def __post_init__(self) -> None:
         nx, ny, nu, nd = len(self.states), len(self.outputs), len(self.inputs), len(self.disturbances)
@@ -80,6 +86,7 @@ class LpvModel(Display):
                 )
             object.__setattr__(self, key, matrix)
         self._check_symbols()
+        self.half_spaces  # noqa: B018  a set that is empty must not exist
         self.polynomial  # noqa: B018  a model that is not rational, or divides by zero, must not exist
 
     def summary(self) -> tuple[str, ...]:
@@ -95,6 +102,7 @@ class LpvModel(Display):
             f"inputs; outputs: {listed(self.inputs)}; {listed(self.outputs)}",
             f"disturbances: {listed(self.disturbances)}",
             f"{counted(len(moving), 'parameter')}: {', '.join(moving) or 'none'}",
+            *([f"constraints: {', '.join(c.words for c in self.constraints)}"] if self.constraints else ()),
         )
 
     def _check_names(self) -> None:
@@ -131,8 +139,13 @@ class LpvModel(Display):
         return extract(f"model '{self.name}'", matrices, self.parameters, self.constants)
 
     def __getstate__(self) -> dict[str, object]:
-        """Without the exact coefficients, which cannot be pickled and are worked out again where they are needed."""
-        return {key: value for key, value in self.__dict__.items() if key != "exact"}
+        """Without exact numbers, which cannot be pickled and are worked out again where they are needed."""
+        return {key: value for key, value in self.__dict__.items() if key not in ("exact", "half_spaces")}
+
+    @cached_property
+    def half_spaces(self) -> HalfSpaces:
+        """The constraints in the scaled parameters u, exact."""
+        return scaled_set(self.parameters, self.constraints, f"model '{self.name}'")
 
     @cached_property
     def polynomial(self) -> PolynomialModel:
@@ -155,6 +168,21 @@ class LpvModel(Display):
             raise ModelError(f"model '{self.name}': a grid of shape {points.shape} does not fit {count} parameters")
         self._check_range(points)
         return evaluate(self.polynomial, self.parameters, points)
+
+    @property
+    def centre(self) -> FloatArray:
+        """A parameter value (1, p) in the middle: of the ranges, or of the corners of the set where that is no box."""
+        count = len(self.parameters)
+        scaled = Faces.of(self.half_spaces).corners.mean(axis=0) if self.half_spaces else np.zeros(count)
+        return self.physical(scaled.reshape(1, count))
+
+    def physical(self, u: FloatArray) -> FloatArray:
+        """Parameter values (g, p) of scaled ones in the ranges; rounding takes none beyond their ends."""
+        low, high, middle, half = (
+            np.array([getattr(p, key) for p in self.parameters])
+            for key in ("minimum", "maximum", "middle", "half_width")
+        )
+        return np.asarray(np.clip(middle + half * u, low, high)).reshape(len(u), len(self.parameters))
 
     def scaled(self, points: FloatArray) -> FloatArray:
         """u = (p - middle)/half_width (g, p) of parameter values (g,) or (g, p), also beyond the range."""
@@ -304,8 +332,8 @@ class LpvModel(Display):
         )
 
     def with_range(self, name: str, minimum: float, maximum: float) -> LpvModel:
-        """The same model with another range of one parameter."""
+        """The same model with another range of one parameter; constraints that then cut nothing off are dropped."""
         if name not in {p.name for p in self.parameters}:
             raise ModelError(unknown("parameter", name, (p.name for p in self.parameters)))
         changed = tuple(replace(p, minimum=minimum, maximum=maximum) if p.name == name else p for p in self.parameters)
-        return replace(self, parameters=changed)
+        return replace(self, parameters=changed, constraints=still_cutting(changed, self.constraints))

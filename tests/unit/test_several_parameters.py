@@ -118,7 +118,7 @@ def test_most_cells_are_proved_on_the_quick_road(deployment: Deployment) -> None
         patch.setattr("synthesis.certificate.verify.quickly_proved", counted)
         for claim in deployment.claims:
             verifier.prove(claim)
-    assert np.mean(np.concatenate(seen)) > 0.8
+    assert np.mean(np.concatenate([done for done, _ in seen])) > 0.8
 
 
 def test_the_runtime_follows_the_plant_within_the_proved_gain(content: dict) -> None:  # type: ignore[type-arg]
