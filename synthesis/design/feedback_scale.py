@@ -9,11 +9,9 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_channel_matrices
-from synthesis.lmi.scaling import error_scale, regular_riccati
+from synthesis.lmi.scaling import HEAVY, error_scale, regular_riccati
 from synthesis.models.extract import PolynomialModel
 from synthesis.models.lpv import LpvModel
-
-HEAVY = 10.0  # so much more than Q weigh gains in the choice of least norm
 
 
 @dataclass(frozen=True)

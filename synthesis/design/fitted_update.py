@@ -34,17 +34,21 @@ def fitted_update(model: LpvModel, scale: FloatArray, period: float) -> tuple[Fl
     return series[..., :n], series[..., n : n + inputs], series[..., n + inputs :]
 
 
-def fitted_outputs(model: LpvModel, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """C and F for the states diag(scale) x: those of a polynomial model as they are, those of a rational one fitted."""
+def fitted_outputs(model: LpvModel, scale: FloatArray, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """C and F for the states diag(scale) x and outputs over their sizes: of a polynomial model as they are, else fitted."""
+    below = sizes[:, None]
     if model.polynomial.is_polynomial:
         scaled = model.polynomial.with_states_scaled(scale)
-        return scaled.C, scaled.F
-    series = _fitted(model, lambda at: np.concatenate([at.C / scale, at.F], axis=-1))
+        return scaled.C / below, scaled.F / below
+    series = _fitted(model, lambda at: np.concatenate([at.C / scale, at.F], axis=-1) / below)
     return series[..., : len(model.states)], series[..., len(model.states) :]
 
 
 def _fitted(model: LpvModel, values: Callable[[NumericModel], FloatArray]) -> FloatArray:
-    """Monomial coefficients of the Chebyshev series of least degree that leaves no more than `FIT`."""
+    """Monomial coefficients of the Chebyshev series of least degree that leaves no more than `FIT` of any column.
+
+    Of any column, as each has a unit of its own: the size of an input or a disturbance must not decide how well another is met.
+    """
     for degree in DEGREES:
         nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
         count = len(model.parameters)
@@ -55,9 +59,9 @@ def _fitted(model: LpvModel, values: Callable[[NumericModel], FloatArray]) -> Fl
         inverse = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, degree))
         for axis in range(count):
             series = np.moveaxis(np.tensordot(inverse, series, axes=(1, axis)), 0, axis)
-        size = np.abs(series).max()
-        tail = max((np.abs(np.take(series, -1, axis=axis)).max() for axis in range(count)), default=0.0)
-        if tail <= FIT * size:
+        size = np.abs(series).max(axis=tuple(range(count + 1)))
+        tails = [np.abs(np.take(series, -1, axis=axis)).max(axis=tuple(range(count))) for axis in range(count)]
+        if all((tail <= FIT * size).all() for tail in tails):
             break
     if tail > LOOSE * size:
         raise ProblemError(

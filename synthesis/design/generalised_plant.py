@@ -19,11 +19,11 @@ from estimators.arrays import FloatArray
 from estimators.errors import unknown
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_channel_matrices
 from synthesis.errors import ProblemError
-from synthesis.lmi.scaling import error_scale
+from synthesis.lmi.scaling import output_sizes, signal_scale
 from synthesis.models.lpv import LpvModel
 
 SHAKE = 1e-6  # of the mean variance, on every state: what nothing excites, or nothing weighs, has no size of its own
-REGULAR = (0.0, 1e-6, 1e-3, 1.0)  # of the mean variance of the measurements, where some have none
+REGULAR = (0.0, 1e-6, 1e-3, 1.0)  # of the size of every measurement, where some have no noise
 
 
 @dataclass(frozen=True)
@@ -145,13 +145,14 @@ def frame_of(plant: GeneralisedPlant) -> Frame:
     """
     A, B, C = (_middle(getattr(plant, key), plant.denominator) for key in ("A", "B", "C"))
     E, F, Cz, Dzu = (_gathered(plant, key) for key in ("E", "F", "Cz", "Dzu"))
-    balanced = error_scale(A)
+    seen = C / output_sizes(C * np.linalg.norm(E, axis=1), F)[:, None]
+    moved = B / output_sizes(B.T * np.linalg.norm(Cz, axis=0), Dzu.T)
+    balanced = signal_scale(A, np.hstack([E, moved]), np.vstack([Cz, seen]))
     A, B, E = A * balanced[:, None] / balanced, B * balanced[:, None], E * balanced[:, None]
     C, Cz = C / balanced, Cz / balanced
     S, R = _variance(A, C, E, F), _variance(A.T, B.T, Cz.T, Dzu.T)
-    even = (
-        np.diag(R) / np.diag(S)
-    ) ** 0.25  # so that units of states do not choose the axes along which T is symmetric
+    # So that units of states do not choose the axes along which T is symmetric.
+    even = (np.diag(R) / np.diag(S)) ** 0.25
     S, R = even[:, None] * S * even, R / even[:, None] / even
     A, B, C, balanced = even[:, None] * A / even, even[:, None] * B, C / even, balanced * even
     half = _power(S, 0.5)
@@ -162,14 +163,15 @@ def frame_of(plant: GeneralisedPlant) -> Frame:
     clock = speed if 0.0 < speed < np.inf else 1.0
     T = T * np.sqrt(clock)  # in that time errors vary by S / clock, and states cost clock R
     root = np.sqrt(unit)
-    inputs = 1.0 / _norms(Dzu / root, T @ B / clock)
-    outputs = _norms(F.T / root, np.asarray(np.linalg.solve(T, C.T), float))
+    inputs = 1.0 / output_sizes((T @ B).T / clock, Dzu.T / root)  # what they cost; for free, what they move
+    outputs = output_sizes(np.linalg.solve(T, C.T).T, F / root)
     return Frame(T * balanced, inputs, outputs, unit, clock)
 
 
 def _variance(A: FloatArray, C: FloatArray, E: FloatArray, F: FloatArray) -> FloatArray:
     """Error covariance of a constant plant's filter where all states are excited a little; the unit matrix if there is none."""
-    n = len(A)
+    n, sizes = len(A), output_sizes(C, F)
+    C, F = C / sizes[:, None], F / sizes[:, None]
     process, cross, sensor = E @ E.T, E @ F.T, F @ F.T
     size = float(np.trace(process)) / n or 1.0
     for regular in REGULAR:
@@ -204,10 +206,3 @@ def _gathered(plant: GeneralisedPlant, key: str) -> FloatArray:
     """Of all channels in the middle of the range: inputs side by side, performance signals one below the other."""
     parts = [_middle(getattr(part, key), plant.denominator) for part in plant.channels]
     return np.concatenate(parts, axis=1 if key in ("E", "F") else 0)
-
-
-def _norms(own: FloatArray, other: FloatArray) -> FloatArray:
-    """Of the columns of a feedthrough; where one vanishes, of the columns of the dynamics."""
-    first, second = np.linalg.norm(own, axis=0), np.linalg.norm(other, axis=0)
-    norms = np.where(first > 0.0, first, second)
-    return np.asarray(np.where(norms > 0.0, norms, 1.0))

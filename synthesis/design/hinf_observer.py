@@ -30,7 +30,7 @@ from synthesis.design.three_solves import Problem, three_solves
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
-from synthesis.lmi.scaling import observer_scale
+from synthesis.lmi.scaling import HEAVY, observer_scale, output_sizes, regular_riccati
 from synthesis.lmi.settings import LmiSettings
 from synthesis.loop.observer import Update
 from synthesis.models.lpv import LpvModel
@@ -122,7 +122,7 @@ class ObserverGains(Display):
         u = self.model.scaled(points)
         still = np.hstack([u, np.zeros_like(u)])
         left = self.result.values["G" if self.update == "sampled" else "P"].at(still)[..., 0]
-        X = self.result.values["X"].at(still)[..., 0]
+        X = self.result.values["X"].at(still)[..., 0] / outputs_of(self.model, self.design, self.scale)
         return np.asarray(np.linalg.solve(left, X) / self.scale[:, None])
 
 
@@ -194,6 +194,21 @@ def _sizes(model: LpvModel, design: ObserverDesign) -> FloatArray:
     return sizes
 
 
+def outputs_of(model: LpvModel, design: ObserverDesign, scale: FloatArray) -> FloatArray:
+    """Sizes (ny,) by which outputs are divided: the dual of those of inputs (`synthesis.design.feedback_scale`).
+
+    With them the mid-range Kalman filter corrects scaled states by `HEAVY`. Without one, or where it leaves an output aside, the
+    noise counts.
+    """
+    middle = model.on(np.array([[p.middle for p in model.parameters]]).reshape(1, len(model.parameters)))
+    A, C, E, F = (getattr(middle, key)[0] for key in "ACEF")
+    sizes = _sizes(model, design)
+    found = regular_riccati(A, C, E * sizes, F * sizes)
+    gain = np.zeros(len(C)) if found is None else np.linalg.norm(found[1] * scale[:, None], axis=0)
+    noise = output_sizes(C / scale, F * sizes)
+    return np.asarray(np.where(gain > 0.0, HEAVY / np.where(gain > 0.0, gain, 1.0), noise))
+
+
 def error_unit(model: LpvModel, design: ObserverDesign, scale: FloatArray) -> float:
     """The largest error of any channel when the scaled states are one: what unit disturbances make of it, roughly."""
     return max(float(np.abs(channel_matrices(model, channel)[1] / scale).max()) for channel in design.channels)
@@ -218,7 +233,7 @@ def observer_problem(
     floor: float = 0.0,
     clock: float = 1.0,
 ) -> LmiProblem:
-    """The LMIs of the module docstring in the states diag(scale) x, time counted in units of 1/clock s.
+    """The LMIs of the module docstring in the states diag(scale) x and outputs of size one, time counted in units of 1/clock s.
 
     Without `gamma` the open channel is minimised; with it that channel is bounded by gamma and, unless told otherwise, a
     common margin of all inequalities is maximised. With a `floor` every inequality keeps that margin, and the decisions of
@@ -235,6 +250,8 @@ def observer_problem(
     scaled = model.polynomial.with_states_scaled(scale)
     known = {key: problem.scaled(getattr(scaled, key)) for key in ("A", "C", "E", "F", "denominator")}
     below, nx, ny = known["denominator"], len(model.states), len(model.outputs)
+    outputs = problem.constant(np.diag(1.0 / outputs_of(model, design, scale)))
+    known["C"], known["F"] = outputs @ known["C"], outputs @ known["F"]
     # A parameter that jumps may move the gains, but not the Lyapunov function.
     jumps = any(p.may_jump for p in model.parameters)
     P = problem.symmetric(

@@ -29,6 +29,7 @@ from synthesis.design.hinf_observer import (
     error_unit,
     minimised,
     objective_name,
+    outputs_of,
 )
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
@@ -59,7 +60,7 @@ def design_sampled_observer(model: LpvModel, design: ObserverDesign, sample_time
     design = replace(design, settings=settings)
     scale = design_scale(model, design) / np.sqrt(sample_time)  # errors in their size if time is counted in samples
     Phi, _, Gamma = fitted_update(model, scale, sample_time)
-    C, F = fitted_outputs(model, scale)
+    C, F = fitted_outputs(model, scale, outputs_of(model, design, scale))
     fitted = {"Phi": Phi, "Gamma": Gamma, "C": C, "F": F}
 
     def problem(gamma: float | None, maximise_margin: bool = True, floor: float = 0.0) -> LmiProblem:

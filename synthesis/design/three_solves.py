@@ -99,7 +99,7 @@ def three_solves(
         if optimum.verdict is Verdict.CERTIFIED and named:
             gamma, result = level(optimum.objective or 0.0), optimum
         else:
-            gamma, result = _least_certified(name, problem, level, optimum, settings)
+            gamma, result = _least_certified(name, problem, level, optimum, settings, memory)
     if backoff > 0.0:
         if not bounding:
             gamma = round_up(gamma * (1.0 + backoff))
@@ -114,21 +114,21 @@ def three_solves(
 
 
 def _least_certified(
-    name: str, problem: Problem, level: Level, optimum: LmiResult, settings: LmiSettings
+    name: str, problem: Problem, level: Level, optimum: LmiResult, settings: LmiSettings, memory: Memory
 ) -> tuple[float, LmiResult]:
     """A solve that stalled names some level, below or above the least one where a largest margin is certified: bracket that."""
     named = level(optimum.objective if optimum.objective is not None and optimum.objective > 0.0 else 1.0)
     low, found, high = named, None, named
     for step in STEPS:
         high = named * step
-        found = solve(problem(high), settings)
+        found = solve(problem(high), settings, memory)
         if found.verdict is Verdict.CERTIFIED:
             break
     if found is None or found.verdict is not Verdict.CERTIFIED:
         raise ProblemError(f"model '{name}': {optimum.message}; loosen a bound, the decay rate or the fastest pole")
     for step in STEPS[1:] if high == named * STEPS[0] else ():  # the level that was named holds: what about lower ones?
         low = named / step
-        tried = solve(problem(low), settings)
+        tried = solve(problem(low), settings, memory)
         if tried.verdict is not Verdict.CERTIFIED:
             break
         found, high = tried, low
@@ -136,7 +136,7 @@ def _least_certified(
         if high <= low * 1.0005:
             break
         middle = float(np.sqrt(low * high))
-        tried = solve(problem(middle), settings)
+        tried = solve(problem(middle), settings, memory)
         if tried.verdict is Verdict.CERTIFIED:
             found, high = tried, middle
         else:

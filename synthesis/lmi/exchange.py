@@ -1,10 +1,11 @@
 r"""Exchange: solve on a few places, look where the answer fails, add those places, solve again.
 
 Of the many places of a grid (20 x 20 parameter values with 4 rate vertices are 1600) only a handful ever decide. Places that
-are not solved for are only looked at: for known decisions that is one evaluation and the least eigenvalue. What holds on the
-places that were looked at is then proved on the continuum, and a place where that proof fails joins them (cutting planes of
-semi-infinite programming; Hettich and Kortanek 1993). Every problem that is solved on the way is a part of the whole one, so
-its lower bound and its certificate of infeasibility are those of the whole.
+are not solved for are only looked at: for known decisions that is one evaluation and the least eigenvalue. Where it is locally
+least it is followed to its minimum between the places of the grid: with all local minima solved for, exchange converges like
+Newton's method (Hettich and Kortanek 1993); with places of a grid alone it stalls in the valleys between them. What then holds
+is proved on the continuum, and a place where that proof fails joins the others. Every problem that is solved on the way is a
+part of the whole one, so its lower bound and its certificate of infeasibility are those of the whole.
 """
 
 from __future__ import annotations
@@ -19,9 +20,11 @@ from estimators.arrays import FloatArray
 from synthesis.lmi.clarabel_backend import RawAnswer, solve_with_clarabel
 from synthesis.lmi.conic import assemble, structural_zeros
 from synthesis.lmi.interior import solve_with_interior
+from synthesis.lmi.local_minima import STARTS, followed, grid_minima
 from synthesis.lmi.problem import Inequality, LmiProblem
 from synthesis.lmi.relaxation import RelaxedProblem, SampledInequality, rate_samples, widened
 from synthesis.lmi.settings import LmiSettings
+from synthesis.polynomials.matrix import MatrixPolynomial
 
 ROUNDS = 20
 MORE = 6  # places that one inequality gains in a round
@@ -41,7 +44,8 @@ class Family:
     """One inequality at the places where it is looked at.
 
     `rows(places)` gives its values with unknowns (g, k, k, 1+N), `known(decisions, places)` those of known decisions (g, k, k).
-    `active` are the indices of the places that are solved for.
+    `active` are the indices of the places that are solved for. Where the first places are a grid, `shape` and `spacing` are
+    those of `synthesis.lmi.local_minima`; without them only the places themselves are looked at.
     """
 
     name: str
@@ -50,6 +54,8 @@ class Family:
     known: Callable[[FloatArray, FloatArray], FloatArray]
     active: list[int]
     strict: bool = True
+    shape: tuple[int, ...] = ()
+    spacing: FloatArray | None = None
 
     def add(self, place: FloatArray) -> bool:
         """Look there, and solve for it; False if it is solved for already."""
@@ -60,13 +66,16 @@ class Family:
         self.active.append(len(self.places) - 1)
         return True
 
-    def least(self, decisions: FloatArray) -> FloatArray:
+    def least(self, decisions: FloatArray, places: FloatArray | None = None) -> FloatArray:
         """The least eigenvalue at every place (g,), worked out for AT_ONCE of them at a time: there may be millions."""
-        parts = np.split(self.places, range(AT_ONCE, len(self.places), AT_ONCE))
+        places = self.places if places is None else places
+        parts = np.split(places, range(AT_ONCE, len(places), AT_ONCE))
         return np.concatenate([np.linalg.eigvalsh(self.known(decisions, part))[:, 0] for part in parts])
 
-    def worst(self, decisions: FloatArray, slack: float) -> list[int]:
-        """Indices of places that fall short by more than `slack`, worst first, no two of them neighbours."""
+    def worst(self, decisions: FloatArray, slack: float) -> FloatArray:
+        """Places (g, v) that fall short by more than `slack`, worst first, no two of them neighbours."""
+        if self.spacing is not None:
+            return self._minima(decisions, slack)
         least = self.least(decisions)
         least[self.active] = np.inf
         short = np.flatnonzero(least < -slack)
@@ -79,7 +88,19 @@ class Family:
                 chosen.append(int(index))
             if len(chosen) == MORE:
                 break
-        return chosen
+        return self.places[chosen]
+
+    def _minima(self, decisions: FloatArray, slack: float) -> FloatArray:
+        """The least of the local minima that fall short."""
+        size = int(np.prod(self.shape))
+        starts = grid_minima(self.least(decisions, self.places[:size]), self.shape, -slack)[:STARTS]
+        places, values = self.around(decisions, self.places[starts])
+        return places[values < -slack][:MORE]
+
+    def around(self, decisions: FloatArray, places: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The local minima that places (g, v) lead to, and their values."""
+        spacing = np.zeros(places.shape[1]) if self.spacing is None else self.spacing
+        return followed(lambda chosen: self.least(decisions, chosen), places, spacing)
 
     def tightest(self, decisions: FloatArray) -> FloatArray:
         """Places (g, v) that decide at these decisions: what a problem of the same kind does well to start with."""
@@ -141,18 +162,21 @@ def exchange(
         value = float(problem.cost @ answer.decisions)
         if not settings.verify and index is None and abs(value - before) <= STEADY * abs(value):
             break
-        if index is not None and not answer.decisions[index] > 0.0 and not settings.verify:
+        if index is not None and hopeless(problem, answer):
             break  # even these places leave no margin
         before = value
         slack = 0.0 if index is None else SLACK * abs(float(answer.decisions[index]))
         slack = max(slack, SLACK * problem.floor, EDGE / 2)
         more = [family.worst(answer.decisions, slack) for family in families]
-        if not any(more):
+        if not sum(family.add(place) for family, places in zip(families, more, strict=True) for place in places):
             break
-        for family, indices in zip(families, more, strict=True):
-            family.active += indices
     assert answer is not None
     return replace(answer, iterations=iterations, seconds=seconds)
+
+
+def hopeless(problem: LmiProblem, answer: RawAnswer) -> bool:
+    """Whether the largest common margin at the places that were solved for is negative: more places only lower it."""
+    return problem.maximise_margin and answer.dual_bound > 0.0
 
 
 def families_of(problem: LmiProblem, memory: Memory | None = None) -> list[Family]:
@@ -187,10 +211,18 @@ def _family(problem: LmiProblem, entry: Inequality) -> Family:
     def rows(chosen: FloatArray) -> FloatArray:
         return entry.matrix.at(chosen)
 
-    def known(decisions: FloatArray, chosen: FloatArray) -> FloatArray:
-        return np.asarray(entry.matrix.substitute(decisions).at(chosen)[..., 0])
+    last: dict[bytes, MatrixPolynomial] = {}  # the same decisions are asked about many times
 
-    return Family(entry.name, places, rows, known, corners(places, count), entry.strict)
+    def known(decisions: FloatArray, chosen: FloatArray) -> FloatArray:
+        key = decisions.tobytes()
+        if key not in last:
+            last.clear()
+            last[key] = entry.matrix.substitute(decisions)
+        return np.asarray(last[key].at(chosen)[..., 0])
+
+    spacing = np.array([2.0 / (len(line) - 1) if len(line) > 2 else 0.0 for line in lines] + [0.0] * count)
+    shape = (*(len(line) for line in lines), len(rates))
+    return Family(entry.name, places, rows, known, corners(places, count), entry.strict, shape, spacing)
 
 
 def corners(places: FloatArray, count: int) -> list[int]:

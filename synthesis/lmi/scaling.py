@@ -10,6 +10,9 @@ from synthesis.models.extract import PolynomialModel
 from synthesis.models.numeric import evaluate
 from synthesis.models.param import SchedulingParameter
 
+HEAVY = 10.0  # so much more than P or Q weigh gains in the choice of least norm
+SWEEPS, BALANCED = 300, 1e-12  # over all states, and the relative change that ends them
+
 
 def observer_scale(model: PolynomialModel, parameters: tuple[SchedulingParameter, ...]) -> FloatArray:
     """1/sqrt of the error variances of the mid-range Kalman filter driven by the model's own disturbances.
@@ -31,8 +34,10 @@ def regular_riccati(A: FloatArray, C: FloatArray, E: FloatArray, F: FloatArray) 
     """The stabilising X of A X + X A' + E E' = (X C' + E F') (F F')^-1 (C X + F E'), and the gain (X C' + E F') (F F')^-1.
 
     Variances and gain of a Kalman filter; with A', B', Cz', Dz' the cost of states under the best feedback, and minus its gain,
-    transposed. Noise is added where there is too little; None if no amount of it helps.
+    transposed. Noise is added where there is too little, in proportion to `output_sizes`; None if no amount of it helps.
     """
+    sizes = output_sizes(C * np.linalg.norm(E, axis=1), F)
+    C, F = C / sizes[:, None], F / sizes[:, None]
     process, cross = E @ E.T, E @ F.T
     sensor = F @ F.T
     for regular in (0.0, 1e-6, 1e-3, 1.0):
@@ -45,8 +50,15 @@ def regular_riccati(A: FloatArray, C: FloatArray, E: FloatArray, F: FloatArray) 
             continue
         size = np.diag(variance)
         if np.isfinite(size).all() and (size > 0.0).all():
-            return variance, gain
+            return variance, gain / sizes
     return None
+
+
+def output_sizes(C: FloatArray, F: FloatArray) -> FloatArray:
+    """The noise of every output (ny,); of one without noise what states of size one show in it. One where there is neither."""
+    noise, shown = np.linalg.norm(F, axis=1), np.linalg.norm(C, axis=1)
+    sizes = np.where(noise > 0.0, noise, shown)
+    return np.asarray(np.where(sizes > 0.0, sizes, 1.0))
 
 
 def error_scale(A: FloatArray) -> FloatArray:
@@ -56,3 +68,23 @@ def error_scale(A: FloatArray) -> FloatArray:
     """
     _, (scaling, _) = matrix_balance(A, permute=False, separate=True)
     return np.asarray(1.0 / scaling)
+
+
+def signal_scale(A: FloatArray, E: FloatArray, C: FloatArray) -> FloatArray:
+    """Diagonal balancing of x' = A x + E d, z = C x: what comes into every state is as large as what leaves it (Osborne 1960).
+
+    Signals d and z of size one tie the scale to something: it follows the units of the states, where balancing A alone would
+    keep those of states that act on each other one way. A state that nothing reaches, or that reaches nothing, is left alone.
+    """
+    inside = A - np.diag(np.diag(A))
+    scale = np.ones(len(A))
+    for _ in range(SWEEPS):
+        before = scale.copy()
+        for i in range(len(A)):
+            come = np.hypot(np.linalg.norm(inside[i] / scale), np.linalg.norm(E[i])) * scale[i]
+            leave = np.hypot(np.linalg.norm(inside[:, i] * scale), np.linalg.norm(C[:, i])) / scale[i]
+            if come > 0.0 and leave > 0.0:
+                scale[i] *= np.sqrt(leave / come)
+        if np.abs(np.log(scale / before)).max() < BALANCED:
+            break
+    return scale

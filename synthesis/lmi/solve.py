@@ -11,7 +11,7 @@ from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
 from synthesis.lmi.clarabel_backend import RawAnswer, solve_with_clarabel
 from synthesis.lmi.conic import assemble
-from synthesis.lmi.exchange import Memory, exchange, families_of, remember, solve_sampled
+from synthesis.lmi.exchange import Memory, exchange, families_of, hopeless, remember, solve_sampled
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.relaxation import relax, relaxation_of
 from synthesis.lmi.result import LmiResult, Margin, SolverReport, Verdict
@@ -103,7 +103,9 @@ def _exchanged(problem: LmiProblem, settings: LmiSettings, memory: Memory | None
         decisions, margins, places = _verified(problem, answer.decisions, settings)
         verification += perf_counter() - began
         failed = [(strict[i], places[i]) for i, margin in enumerate(margins) if not margin.proved]
-        if not sum(family.add(place) for family, place in failed) or iterations > MOST_ITERATIONS:
+        worst = [(family, family.around(answer.decisions, place[None])[0]) for family, place in failed]
+        added = sum(family.add(place) for family, found in worst for place in found)
+        if not added or iterations > MOST_ITERATIONS or hopeless(problem, answer):
             break
     if memory is not None and not answer.infeasible and np.isfinite(decisions).all():
         remember(families, answer.decisions, memory)
