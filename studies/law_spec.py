@@ -24,7 +24,8 @@ KEYS_OF = {  # of [design], beside those that observers have
 }
 OF_LAWS = tuple(dict.fromkeys(key for keys in KEYS_OF.values() for key in keys))
 FeedbackDesign = StateFeedbackDesign | OutputFeedbackDesign | StaticFeedbackDesign
-OF_CHANNELS = ("errors", "performance", "sizes")  # one of the first two is there
+OF_CHANNELS = ("errors", "performance", "sizes", "norm")  # one of the first two is there
+OTHER_NORMS = (None, "state feedback", "sampled state feedback")  # laws that take more than L2 gains
 
 
 def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
@@ -40,6 +41,10 @@ def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
             raise ValueError(f"{place}: {wanted} is missing; {who} needs it")
         if channel.sizes is not None and not feedback:
             raise ValueError(f"{place}: sizes are not for an observer; remove them")
+        if channel.norm not in (None, "H-infinity") and design.law not in OTHER_NORMS:
+            raise ValueError(
+                f'{place}: norm = "{channel.norm}" is not for {who}, whose channels are L2 gains; remove it'
+            )
     if feedback and "update" in deploy.model_fields_set:
         raise ValueError(f"deploy.update is not for {who}, which runs once a sample; remove it")
     if feedback and (design.input_limits is None) != (design.state_sizes is None):
@@ -57,7 +62,12 @@ def feedback_design(spec: DesignSpec) -> FeedbackDesign:
     """As the synthesis takes it."""
     channels = tuple(
         FeedbackChannel(
-            tuple(c.disturbances), tuple(c.performance or ()), c.bound, _numbers(c.weights), _numbers(c.sizes)
+            tuple(c.disturbances),
+            tuple(c.performance or ()),
+            c.bound,
+            _numbers(c.weights),
+            _numbers(c.sizes),
+            c.norm or "H-infinity",
         )
         for c in spec.channels
     )

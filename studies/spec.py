@@ -98,8 +98,11 @@ class ScheduleSpec(StrictTable):
         """As the synthesis takes it."""
         spec = self.gains
         channels = tuple(
-            Channel(tuple(c.disturbances), tuple(c.errors or ()), c.bound, tuple(c.weights) if c.weights else None)
+            Channel(
+                tuple(c.disturbances), tuple(c.errors or ()), c.bound, tuple(c.weights) if c.weights else None, norm
+            )
             for c in spec.channels
+            for norm in (c.norm or "H-infinity",)
         )
         settings = LmiSettings(relaxation=spec.relaxation, points=spec.points, solver=spec.solver)
         return ObserverDesign(

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from synthesis.design.norms import Norm
 from synthesis.toml_file import StrictTable
 
 
@@ -33,7 +34,8 @@ class ModelSpec(StrictTable):
 class ChannelSpec(StrictTable):
     """One channel of the design; without `bound` it is the one that is minimised.
 
-    An observer has `errors`, a feedback law `performance` signals with `sizes`.
+    An observer has `errors`, a feedback law `performance` signals with `sizes`. `norm` of an observer and of state feedback: what
+    is bounded, the L2 gain if it is left out (synthesis.design.norms).
     """
 
     disturbances: list[str] = Field(min_length=1)
@@ -42,6 +44,7 @@ class ChannelSpec(StrictTable):
     bound: float | None = Field(default=None, gt=0)
     weights: list[float] | None = None
     sizes: list[float] | None = None
+    norm: Norm | None = None
 
 
 class DesignSpec(StrictTable):

@@ -103,7 +103,9 @@ def _values(claim: Claim, systems: list[System], names: Any, loop: Loop) -> Floa
     C = np.array([Z @ _entries(system.C) for system in systems])
     D = np.array([Z @ _entries(system.D[group])[:, where] * np.array(sizes) for system in systems])
     if claim.kind not in GAINS:
-        return _impulse(A, B, C, D, claim.kind.startswith("sampled"), peak=claim.kind.endswith("peak"))
+        discrete = claim.kind.startswith("sampled")
+        period = _number(loop.sample_time) if discrete and loop.sample_time is not None else 1.0
+        return np.asarray(_impulse(A, B, C, D, discrete, peak=claim.kind.endswith("peak")) / np.sqrt(period))
     return hinf_norm(A, B, C, D, discrete=claim.kind != "gain").norm
 
 

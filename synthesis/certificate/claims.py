@@ -27,12 +27,16 @@ KINDS_OF = {  # which kinds say something true about which update (synthesis.loo
         "decay rate",
         "fastest pole",
         "gain",
+        "H2 norm",
+        "energy to peak",
         "internal update",
         "sampled gain",
+        "sampled H2 norm",
+        "sampled energy to peak",
         "motion gain",
         "drop probability",
     ),
-    "sampled": ("sampled error", "sampled gain", "drop probability"),
+    "sampled": ("sampled error", "sampled gain", "sampled H2 norm", "sampled energy to peak", "drop probability"),
     "feedback": (
         "sampled error",
         "sampled gain",
@@ -51,8 +55,8 @@ WORDS = {
     "sampled gain": "update: gain",
     "motion gain": "update: gain of motion",
     "drop probability": "update: drop probability",
-    "H2 norm": "H2 norm",
-    "energy to peak": "generalised H2 norm",
+    "H2 norm": "error equation: H2 norm",
+    "energy to peak": "error equation: generalised H2 norm",
     "sampled H2 norm": "update: H2 norm",
     "sampled energy to peak": "update: generalised H2 norm",
 }
@@ -107,18 +111,22 @@ def claim_unit(kind: str, channel: ClaimChannel | None, units: Mapping[str, str]
     """The unit of a claim's level.
 
     A gain from one input of size one has the unit error/input. With sizes the inputs are numbers of their sizes, and the gain has
-    the unit of the errors ('mixed' if they differ, 1 if they have sizes, too).
+    the unit of the errors ('mixed' if they differ, 1 if they have sizes, too). An H2 norm has the root of a time in it: an energy
+    is an integral.
     """
     if channel is None:
         return "1" if kind == "drop probability" else "1/s"
     above = {"1" if channel.sizes else units[name] for name in channel.errors}
-    top = above.pop() if len(above) == 1 else "mixed"
+    top, root = above.pop() if len(above) == 1 else "mixed", "" if kind in GAINS else "s^0.5"
     if not plain_unit(channel):
-        return top
+        return quotient(top, root or "1")
     (name,) = channel.inputs
     if WITH_CHANNEL[kind] == "motion" and units[name] == top:
         return "s"
-    return quotient(top, _unit(units[name], "/s" if WITH_CHANNEL[kind] == "motion" else ""))
+    below = _unit(units[name], "/s" if WITH_CHANNEL[kind] == "motion" else "")
+    if root:
+        return f"{enclosed(top)}/({root if below == '1' else f'{enclosed(below)}*{root}'})"
+    return quotient(top, below)
 
 
 def written(number: float) -> str:

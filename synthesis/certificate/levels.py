@@ -7,6 +7,7 @@ was proved, with the digits that are written.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,43 +21,51 @@ MOST_PAIRS = 4  # of a state that moves and an error, each with a claim of its o
 SETTLE = (1.0, 2.0, 5.0, 20.0)  # times the wanted distance from the least gain
 
 
+def sampled(wish: Wish) -> Wish:
+    """The same wish, of the update over a sample in the place of the error equation."""
+    return replace(wish, kind=f"sampled {wish.kind}")
+
+
 def held_claims(
-    search: Search, channels: Sequence[ClaimChannel], decay_rate: float, fastest_pole: float | None, settle: float
+    search: Search, levels: Sequence[Wish], decay_rate: float, fastest_pole: float | None, settle: float
 ) -> tuple[Claim, ...] | None:
-    """Claims of the error equation and of its update with held measurements; None if a wanted one cannot be had."""
+    """Claims of the error equation and of its update with held measurements; None if a wanted one cannot be had.
+
+    `levels` are wishes of the error equation without a level, one for each channel of the design: its gain or another norm.
+    """
     wanted = [Wish("decay rate", decay_rate)] if decay_rate else []
     wanted += [] if fastest_pole is None else [Wish("fastest pole", fastest_pole)]
     found = [search.prove(wish)[0] for wish in wanted]
-    found += [best_gain(search, Wish("gain", None, channel), settle) for channel in channels]
-    return _with_update(search, channels, found, settle)
+    found += [best_gain(search, wish, settle) for wish in levels]
+    return _with_update(search, levels, found, settle)
 
 
-def sampled_claims(search: Search, channels: Sequence[ClaimChannel], settle: float) -> tuple[Claim, ...] | None:
+def sampled_claims(search: Search, levels: Sequence[Wish], settle: float) -> tuple[Claim, ...] | None:
     """Claims of the update that corrects once a sample."""
-    return _with_update(search, channels, [], settle)
+    return _with_update(search, levels, [], settle)
 
 
-def feedback_claims(search: Search, channels: Sequence[ClaimChannel], settle: float) -> tuple[Claim, ...] | None:
-    """Claims of a feedback law that runs once a sample: decay and the gain of every channel; None if one cannot be had."""
+def feedback_claims(search: Search, levels: Sequence[Wish], settle: float) -> tuple[Claim, ...] | None:
+    """Claims of a feedback law that runs once a sample: decay and the level of every channel; None if one cannot be had."""
     found = [largest(search, UPDATE_OF["feedback"], slowest_decay(search.loop))]
-    found += [best_gain(search, Wish("sampled gain", None, channel), settle) for channel in channels]
+    found += [best_gain(search, sampled(wish), settle) for wish in levels]
     return None if any(claim is None for claim in found) else tuple(claim for claim in found if claim is not None)
 
 
 def _with_update(
-    search: Search, channels: Sequence[ClaimChannel], found: list[Claim | None], settle: float
+    search: Search, levels: Sequence[Wish], found: list[Claim | None], settle: float
 ) -> tuple[Claim, ...] | None:
     """What the runtime's update gets beside: only the claims about drops and motion may be missing."""
     update = "held" if search.loop.time == "continuous" else "sampled"
     found += [largest(search, UPDATE_OF[update], slowest_decay(search.loop))]
-    found += [best_gain(search, Wish("sampled gain", None, channel), settle) for channel in channels]
+    found += [best_gain(search, sampled(wish), settle) for wish in levels]
     if any(claim is None for claim in found):
         return None
     extra: list[Claim | None] = []
     if update == "held":
         extra += [
             best_gain(search, Wish("motion gain", None, channel), settle)
-            for channel in motion_channels(search, channels)
+            for channel in motion_channels(search, [wish.channel for wish in levels if wish.channel is not None])
         ]
     extra += [largest(search, "drop probability", critical_probability(search.loop))]
     return tuple(claim for claim in (*found, *extra) if claim is not None)

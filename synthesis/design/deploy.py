@@ -11,7 +11,7 @@ from estimators.arrays import FloatArray
 from estimators.display import Display, counted
 from estimators.schedule.check import HIGHEST_ORDER
 from synthesis.certificate.claims import Claim, ClaimChannel
-from synthesis.certificate.levels import feedback_claims, held_claims, sampled_claims
+from synthesis.certificate.levels import feedback_claims, held_claims, sampled, sampled_claims
 from synthesis.certificate.rounding import significant
 from synthesis.certificate.search import Search, Wish
 from synthesis.certificate.verify import Names
@@ -27,6 +27,7 @@ from synthesis.design.law_table import (
     update_of,
     update_section,
 )
+from synthesis.design.norms import CLAIMED
 from synthesis.design.well_posedness import well_posedness
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import Verdict
@@ -106,16 +107,16 @@ def deploy(
         posed = well_posedness(model, observer.design)  # nothing bounds the gains but the channels themselves
         if posed.ill_posed:
             raise ProblemError(f"model '{model.name}' is not deployed: {posed.message}")
-    kind = "gain" if observer is not None and observer.update == "held" else "sampled gain"
-    channels = [claim_channel(channel) for channel in design.channels]
+    wishes = [Wish(CLAIMED[channel.norm], None, claim_channel(channel)) for channel in design.channels]
+    compared = wishes if observer is not None and observer.update == "held" else [sampled(wish) for wish in wishes]
     for segments in _candidates(gains, settings):
         progress(f"{' x '.join(map(str, segments))} segments")
         search, points, table = _tabulated(gains, segments, settings, settings.dtype)
         finer, _, _ = _tabulated(gains, tuple(REFINEMENT * number for number in segments), settings, "float64")
-        cost = max(table_cost(search, finer, Wish(kind, None, channel)) for channel in channels)
+        cost = max(table_cost(search, finer, wish) for wish in compared)
         if not cost < settings.interpolation_cost:
             continue
-        claims = _claims(gains, search, channels, settings.settle)
+        claims = _claims(gains, search, wishes, settings.settle)
         if claims is not None:
             refuse_beyond_limits(gains, table)
             return Deployment(gains, settings, points, table, claims, cost)
@@ -180,13 +181,13 @@ def table_cost(coarse: Search, fine: Search, wish: Wish) -> float:
     return least / best - 1.0 if np.isfinite(least) and np.isfinite(best) else np.inf
 
 
-def _claims(gains: Gains, search: Search, channels: Sequence[ClaimChannel], settle: float) -> tuple[Claim, ...] | None:
+def _claims(gains: Gains, search: Search, wishes: Sequence[Wish], settle: float) -> tuple[Claim, ...] | None:
     """What is claimed of a table, by how it is run; None if something of it cannot be proved."""
     if not isinstance(gains, ObserverGains):
-        return feedback_claims(search, channels, settle)
+        return feedback_claims(search, wishes, settle)
     if gains.update == "held":
-        return held_claims(search, channels, gains.design.decay_rate, gains.design.fastest_pole, settle)
-    return sampled_claims(search, channels, settle)
+        return held_claims(search, wishes, gains.design.decay_rate, gains.design.fastest_pole, settle)
+    return sampled_claims(search, wishes, settle)
 
 
 def claim_channel(channel: Channel | FeedbackChannel) -> ClaimChannel:
