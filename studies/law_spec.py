@@ -8,6 +8,7 @@ from studies.spec_tables import DeploySpec, DesignSpec
 from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.design.law_table import FeedbackLaw
 from synthesis.design.output_feedback import OutputFeedbackDesign, design_output_feedback
+from synthesis.design.pole_regions import PoleRegions
 from synthesis.design.sampled_state_feedback import design_sampled_state_feedback
 from synthesis.design.state_feedback import GainLimits, StateFeedbackDesign, design_state_feedback
 from synthesis.design.static_feedback import design_static_feedback
@@ -54,6 +55,12 @@ def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
     if given is not None:
         other = next(law for law, keys in KEYS_OF.items() if given in keys)
         raise ValueError(f'design.{given} is not for {who}; remove it, or name another law: law = "{other}"')
+    if design.regions is not None and design.law not in (None, "state feedback"):
+        raise ValueError(f"design.regions are not for {who}; remove them, or give a decay rate")
+    if design.regions is not None and not feedback and deploy.update == "sampled":
+        raise ValueError(
+            'design.regions are not for an observer with update = "sampled"; remove them, or give a decay rate'
+        )
     if not feedback and deploy.limits is not None:
         raise ValueError("deploy.limits are not for an observer, which commands nothing; remove them")
 
@@ -87,8 +94,9 @@ def feedback_design(spec: DesignSpec) -> FeedbackDesign:
         )  # fmt: skip
     limits = None if spec.input_limits is None else GainLimits(spec.input_limits, spec.state_sizes or {})
     return StateFeedbackDesign(
-        channels, spec.degree, spec.decay_rate, spec.fastest_pole, spec.damping, limits, spec.backoff, settings=settings
-    )
+        channels, spec.degree, spec.decay_rate, spec.fastest_pole, spec.damping, limits, spec.backoff, settings=settings,
+        regions=regions_of(spec),
+    )  # fmt: skip
 
 
 def design_feedback(model: LpvModel, design: FeedbackDesign, law: str, sample_time: float) -> FeedbackLaw:
@@ -112,6 +120,8 @@ def form_of(model: LpvModel, design: FeedbackDesign) -> tuple[Measured, int]:
 def without_other_laws(resolved: dict[str, Any]) -> dict[str, Any]:
     """A dumped specification without the keys that its law does not have: digests of observers stay what they were."""
     design, deploy = dict(resolved["design"]), dict(resolved["deploy"])
+    if design["regions"] is None:
+        design.pop("regions")
     if design["law"] is None:
         design = {key: value for key, value in design.items() if key not in ("law", *OF_LAWS)}
         deploy.pop("limits")
@@ -121,6 +131,15 @@ def without_other_laws(resolved: dict[str, Any]) -> dict[str, Any]:
         deploy.pop("update")
     dropped = [{k: v for k, v in c.items() if v is not None or k not in OF_CHANNELS} for c in design["channels"]]
     return {**resolved, "design": {**design, "channels": dropped}, "deploy": deploy}
+
+
+def regions_of(spec: DesignSpec) -> PoleRegions:
+    """As the synthesis takes them."""
+    if spec.regions is None:
+        return PoleRegions()
+    strip = spec.regions.vertical_strip
+    pair = None if strip is None else (strip[0], strip[1])
+    return PoleRegions(spec.regions.disc, spec.regions.damping, pair, spec.regions.horizontal_strip)
 
 
 def _numbers(values: list[float] | None) -> tuple[float, ...] | None:

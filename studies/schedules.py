@@ -22,6 +22,7 @@ from estimators.schedule import read_content
 from studies.execution.processes import available_cores, in_order
 from studies.preflight import check_before_design
 from studies.spec import Variant, load_spec
+from synthesis.certificate.claims import LARGER_IS_BETTER
 from synthesis.certificate.frozen import frozen_level
 from synthesis.certificate.proof import Proof, prove
 from synthesis.design.deploy import deploy, refuse_undeployable
@@ -32,7 +33,6 @@ from synthesis.design.norms import CLAIMED
 # A stored claim may be worse than a fresh one by this share: levels are searched in steps, and solvers differ.
 WORSE = 0.02
 AS_IT_IS = Variant()
-LARGER_IS_BETTER = ("decay rate", "internal update", "sampled error", "drop probability")
 
 
 @dataclass(frozen=True, repr=False)

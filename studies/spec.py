@@ -9,7 +9,14 @@ from typing import Any, Self
 from pydantic import Field, model_validator
 
 from estimators.errors import unknown
-from studies.law_spec import FeedbackDesign, check_keys, design_feedback, feedback_design, without_other_laws
+from studies.law_spec import (
+    FeedbackDesign,
+    check_keys,
+    design_feedback,
+    feedback_design,
+    regions_of,
+    without_other_laws,
+)
 from studies.spec_tables import DeploySpec, DesignSpec, ModelSpec
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
@@ -106,8 +113,9 @@ class ScheduleSpec(StrictTable):
         )
         settings = LmiSettings(relaxation=spec.relaxation, points=spec.points, solver=spec.solver)
         return ObserverDesign(
-            channels, spec.degree, spec.decay_rate, spec.fastest_pole, backoff=spec.backoff, settings=settings
-        )
+            channels, spec.degree, spec.decay_rate, spec.fastest_pole, backoff=spec.backoff, settings=settings,
+            regions=regions_of(spec),
+        )  # fmt: skip
 
     def feedback_design(self) -> FeedbackDesign:
         """As the synthesis takes it, of a feedback law."""

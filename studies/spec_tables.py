@@ -47,6 +47,15 @@ class ChannelSpec(StrictTable):
     norm: Norm | None = None
 
 
+class RegionsSpec(StrictTable):
+    """Where every frozen pole s is to lie (synthesis.design.pole_regions): 1/s, a ratio, 1/s twice, rad/s."""
+
+    disc: float | None = Field(default=None, gt=0)
+    damping: float | None = Field(default=None, gt=0, lt=1)
+    vertical_strip: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    horizontal_strip: float | None = Field(default=None, gt=0)
+
+
 class DesignSpec(StrictTable):
     """What is asked of the gains of an observer (synthesis.design.hinf_observer), or of the feedback law that is named."""
 
@@ -54,6 +63,7 @@ class DesignSpec(StrictTable):
     degree: int = 1
     decay_rate: float = 0.0
     fastest_pole: float | None = None
+    regions: RegionsSpec | None = Field(default=None, examples=["{ vertical_strip = [2.0, 80.0] }"])
     damping: float | None = None
     input_limits: dict[str, float] | None = None
     state_sizes: dict[str, float] | None = None

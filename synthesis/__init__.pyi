@@ -13,6 +13,7 @@ from .design.hinf_observer import design_observer as design_observer
 from .design.output_feedback import OutputFeedback as OutputFeedback
 from .design.output_feedback import OutputFeedbackDesign as OutputFeedbackDesign
 from .design.output_feedback import design_output_feedback as design_output_feedback
+from .design.pole_regions import PoleRegions as PoleRegions
 from .design.sampled_observer import design_sampled_observer as design_sampled_observer
 from .design.sampled_state_feedback import design_sampled_state_feedback as design_sampled_state_feedback
 from .design.stability import GainBox as GainBox

@@ -16,14 +16,22 @@ from flint import fmpq
 
 from analysis import controllability_gramian, critical_drop_probability, hinf_norm
 from estimators.arrays import FloatArray
-from synthesis.certificate.claims import ERROR_EQUATION, GAINS, WITH_CHANNEL, Claim, claim_name, claim_unit, rows_of
+from synthesis.certificate.claims import (
+    ERROR_EQUATION,
+    GAINS,
+    LARGER_IS_BETTER,
+    WITH_CHANNEL,
+    Claim,
+    claim_name,
+    claim_unit,
+    rows_of,
+)
 from synthesis.certificate.content import claims_of, subject_of
+from synthesis.certificate.poles import CONTINUOUS, DISCRETE, pole_levels
 from synthesis.certificate.refute import grid
 from synthesis.loop.loop import Loop
 from synthesis.loop.system import Region, System
 from synthesis.polynomials.enclosure import PolynomialMatrix
-
-LARGER_IS_BETTER = ("decay rate", "internal update", "sampled error", "drop probability")
 
 
 @dataclass(frozen=True)
@@ -82,6 +90,8 @@ def _standing(loop: Loop, points: list[Any], time: Literal["continuous", "discre
 def _values(claim: Claim, systems: list[System], names: Any, loop: Loop) -> FloatArray:
     A = np.array([_matrix(system.A, system) for system in systems])
     poles = np.linalg.eigvals(A)
+    if claim.kind in (*CONTINUOUS, *DISCRETE):
+        return pole_levels(claim.kind, poles, 1.0 if loop.sample_time is None else _number(loop.sample_time))
     match claim.kind:
         case "decay rate":
             return np.asarray(-poles.real.max(axis=-1), float)

@@ -6,7 +6,8 @@ import numpy as np
 from flint import fmpq
 
 from estimators.arrays import FloatArray
-from synthesis.certificate.claims import GAINS
+from synthesis.certificate.claims import GAINS, LARGER_IS_BETTER
+from synthesis.certificate.poles import pole_levels
 from synthesis.certificate.refute import grid
 from synthesis.loop.loop import Loop
 from synthesis.loop.system import Region, System
@@ -72,6 +73,15 @@ def slowest_decay(loop: Loop) -> float:
         return 0.0
     radius = np.abs(np.linalg.eigvals(received)).max()
     return float(-np.log(max(radius, 1e-12)) / _float(loop.sample_time))
+
+
+def frozen_pole_level(loop: Loop, kind: str) -> float:
+    """The worst level of a claim about the poles of the update (`synthesis.certificate.poles`); NaN without a place."""
+    A = np.array([_numbers(system.A) for system in _systems(loop, "discrete")])
+    if not len(A) or loop.sample_time is None:
+        return float("nan")
+    levels = pole_levels(kind, np.linalg.eigvals(A), _float(loop.sample_time))
+    return float(levels.min() if kind in LARGER_IS_BETTER else levels.max())
 
 
 def critical_probability(loop: Loop) -> float:

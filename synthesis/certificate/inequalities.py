@@ -26,7 +26,8 @@ multiplied by so many d that it is polynomial.
                       as above, in continuous time: w is held over a sample, |z|^2 counts for its length T, and an impulse is
                       1/T for one sample
 
-and P > 0 with each of them, for all parameters in their range and all rates in their bounds.
+and P > 0 with each of them, for all parameters in their range and all rates in their bounds; those about frozen poles are in
+`synthesis.certificate.poles`.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from synthesis.certificate.poles import CONTINUOUS, DISCRETE, pole_inequality
 from synthesis.loop.system import System
 
 
@@ -45,6 +47,7 @@ class Arithmetic(Protocol):
     def block(self, rows: Any) -> Any: ...  # noqa: D102
     def trace(self, matrix: Any) -> Any: ...  # noqa: D102
     def exp(self, exponent: Any) -> Any: ...  # noqa: D102
+    def cos(self, angle: Any) -> Any: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,8 @@ def _continuous(q: Question, system: System, P: Any, P_dot: Any, arithmetic: Ari
         return [("decay rate", -(S + _over(system, P_dot) + _over(system, P) * (2 * q.level)))]
     if q.kind == "fastest pole":
         return [("fastest pole", S + _over(system, P) * (2 * q.level))]
+    if q.kind in CONTINUOUS:
+        return [(q.kind, pole_inequality(q.kind, q.level, q.period, system.A, P, _over(system, P), arithmetic))]
     moving, still, shown = (1, 2, 0) if system.shared else (0, 1, 1)  # so many times d
     W, Z = arithmetic.known(q.W, P), arithmetic.known(q.Z, P)
     ZC, ZD, PBW = Z @ system.C, Z @ system.D[q.group] @ W, P @ (system.B[q.group] @ W)
@@ -103,6 +108,8 @@ def _continuous(q: Question, system: System, P: Any, P_dot: Any, arithmetic: Ari
 
 
 def _discrete(q: Question, system: System, P: Any, P_next: Any, arithmetic: Arithmetic) -> list[tuple[str, Any]]:
+    if q.kind in DISCRETE:
+        return [(q.kind, pole_inequality(q.kind, q.level, q.period, system.A, P, _over(system, P, 2), arithmetic))]
     moved, P = system.A.T @ P_next, _over(system, P, 2)
     fallen = moved @ system.A
     if q.kind in ("internal update", "sampled error"):

@@ -13,6 +13,7 @@ import numpy as np
 from flint import arb, arb_mat, fmpq, fmpq_mat, fmpq_poly
 
 from synthesis.certificate.claims import ERROR_EQUATION, GAINS, Claim
+from synthesis.certificate.poles import CONTINUOUS, DISCRETE, pole_outside
 from synthesis.certificate.refute_energy import energy_exceeds, entries_of
 from synthesis.certificate.verify import Verifier
 from synthesis.loop.loop import Loop
@@ -157,6 +158,8 @@ def _breaks(verifier: Verifier, claim: Claim, system: System) -> bool:
         return is_hurwitz(_shifted(A, level)) is False
     if claim.kind == "fastest pole":
         return is_hurwitz(_shifted(A * -1, -level)) is False
+    if claim.kind in (*CONTINUOUS, *DISCRETE):
+        return pole_outside(claim.kind, level, verifier.loop.sample_time, A)
     if claim.channel is not None and claim.kind not in GAINS:
         stable = is_hurwitz(A) if system.time == "continuous" else is_schur(A)
         return stable is False or energy_exceeds(verifier.question(claim), system)

@@ -84,6 +84,10 @@ class Balls:
         """e^x."""
         return arb(exponent).exp()
 
+    def cos(self, angle: Any) -> arb:
+        """The cosine."""
+        return arb(angle).cos()
+
 
 @dataclass(frozen=True)
 class Verifier:

@@ -10,7 +10,7 @@ import numpy as np
 from estimators.arrays import FloatArray
 from estimators.display import Display, counted
 from estimators.schedule.check import HIGHEST_ORDER
-from synthesis.certificate.claims import Claim, ClaimChannel
+from synthesis.certificate.claims import Claim, ClaimChannel, claim_unit
 from synthesis.certificate.levels import feedback_claims, held_claims, sampled, sampled_claims
 from synthesis.certificate.rounding import significant
 from synthesis.certificate.search import Search, Wish
@@ -28,6 +28,7 @@ from synthesis.design.law_table import (
     update_section,
 )
 from synthesis.design.norms import CLAIMED
+from synthesis.design.pole_regions import PoleRegions
 from synthesis.design.well_posedness import well_posedness
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import Verdict
@@ -36,7 +37,6 @@ from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
 
 SEGMENTS = (7, 14, 28, 56, 112)
-RATES = ("decay rate", "fastest pole", "internal update", "sampled error")  # claims in 1/s
 MOST_PARAMETERS = 3  # of a proof: polynomials of order 8 in more of them have too many terms
 MOST_ENTRIES, FINEST = 4000, 64  # breakpoints of a table with several parameters, and segments along one of them
 REFINEMENT = 4  # a table is compared with one of so many times its segments
@@ -61,8 +61,10 @@ class Deployment(Display):
         """The table over its breakpoints, what it cost, and the claims by kind and level."""
         model = self.gains.model
         over = [f"{p.name} [{p.unit}]" for p in model.parameters]
+        units = {claim.kind: "" if claim.channel else claim_unit(claim.kind, None, {}) for claim in self.claims}
         levels = [
-            f"{claim.kind} {claim.level:.4g}{' 1/s' if claim.kind in RATES else ''}" for claim in self.claims[::-1]
+            f"{claim.kind} {claim.level:.4g} {units[claim.kind]}".removesuffix(" 1").strip()
+            for claim in self.claims[::-1]
         ]
         limit = self.settings.interpolation_cost
         return (
@@ -183,10 +185,13 @@ def table_cost(coarse: Search, fine: Search, wish: Wish) -> float:
 
 def _claims(gains: Gains, search: Search, wishes: Sequence[Wish], settle: float) -> tuple[Claim, ...] | None:
     """What is claimed of a table, by how it is run; None if something of it cannot be proved."""
+    regions = getattr(gains.design, "regions", None)
     if not isinstance(gains, ObserverGains):
-        return feedback_claims(search, wishes, settle)
+        return feedback_claims(search, wishes, settle, regions.claims if isinstance(regions, PoleRegions) else {})
     if gains.update == "held":
-        return held_claims(search, wishes, gains.design.decay_rate, gains.design.fastest_pole, settle)
+        return held_claims(
+            search, wishes, gains.design.decay_rate, gains.design.fastest_pole, settle, gains.design.regions.claims
+        )
     return sampled_claims(search, wishes, settle)
 
 

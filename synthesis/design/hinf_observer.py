@@ -28,6 +28,7 @@ from estimators.display import Display
 from synthesis.design.asked import check_channels, check_degree_and_poles, check_shares, minimised_channel
 from synthesis.design.gains_summary import gains_summary
 from synthesis.design.norms import ChannelSizes, Norm, compact_form, levels, per_sample, require_energy
+from synthesis.design.pole_regions import PoleRegions, require_regions
 from synthesis.design.refusals import refuse_undetectable
 from synthesis.design.three_solves import Problem, three_solves
 from synthesis.errors import ProblemError
@@ -82,6 +83,7 @@ class ObserverDesign(Display):
     backoff: float = 0.01  # the minimised gain may be this fraction worse; what it buys is margin
     reserve: float = 0.01  # the pole band is designed this much tighter than it is claimed, for the table's sake
     settings: LmiSettings = field(default_factory=LmiSettings)
+    regions: PoleRegions = field(default_factory=PoleRegions)
 
     def __post_init__(self) -> None:
         check_channels(self.channels, [channel.errors for channel in self.channels], "error")
@@ -252,6 +254,8 @@ def observer_problem(
     if design.fastest_pole is not None:
         fastest = 2.0 * design.fastest_pole / (1.0 + design.reserve) / clock
         problem.require("fastest pole", frozen + P.scaled_by(below) * fastest)
+    if design.regions:
+        require_regions(problem, design.regions, design.reserve, clock, closed, P.scaled_by(below))
     for channel in design.channels:
         d, z = channel_matrices(model, channel)
         z = z / unit

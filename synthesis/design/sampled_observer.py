@@ -31,6 +31,7 @@ from synthesis.design.hinf_observer import (
     minimised,
 )
 from synthesis.design.norms import ChannelSizes, levels, per_sample, require_sampled_energy
+from synthesis.design.pole_regions import refuse_regions
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.loop.from_model import plant_of
@@ -52,6 +53,7 @@ def design_sampled_observer(model: LpvModel, design: ObserverDesign, sample_time
     >>> print(gains.verdict, gains.update, gains.sample_time)
     certified sampled 0.005
     """
+    refuse_regions(design.regions)
     if not sample_time > 0.0:
         raise ProblemError(f"sample time {sample_time} s must be positive")
     if design.fastest_pole is not None:

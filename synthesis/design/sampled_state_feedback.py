@@ -25,6 +25,7 @@ from synthesis.design.feedback_channel import feedback_channel_matrices
 from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
 from synthesis.design.fitted_update import fitted_update
 from synthesis.design.norms import ChannelSizes, levels, per_sample, require_sampled_energy
+from synthesis.design.pole_regions import refuse_regions
 from synthesis.design.refusals import refuse_unstabilisable
 from synthesis.design.state_feedback import (
     StateFeedbackDesign,
@@ -60,6 +61,7 @@ def design_sampled_state_feedback(
     >>> print(design_sampled_state_feedback(plant, asked, sample_time=0.05).verdict)
     certified
     """
+    refuse_regions(design.regions)
     if not sample_time > 0.0:
         raise ProblemError(f"sample time {sample_time} s must be positive")
     given = next((name for name in ("fastest_pole", "damping") if getattr(design, name) is not None), None)

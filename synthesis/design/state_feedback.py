@@ -31,6 +31,7 @@ from synthesis.design.asked import check_degree_and_poles, check_shares, minimis
 from synthesis.design.feedback_channel import FeedbackChannel, check_feedback_channels, feedback_channel_matrices
 from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
 from synthesis.design.norms import NORMS, ChannelSizes, compact_form, levels, require_energy
+from synthesis.design.pole_regions import PoleRegions, require_damping, require_disc, require_regions
 from synthesis.design.refusals import refuse_feedthrough, refuse_unstabilisable
 from synthesis.design.three_solves import three_solves
 from synthesis.errors import ProblemError
@@ -74,10 +75,13 @@ class StateFeedbackDesign(Display):
     backoff: float = 0.01  # the minimised gain may be this fraction worse; what it buys is margin
     reserve: float = 0.01  # regions and limits are designed this much tighter than they are asked for
     settings: LmiSettings = field(default_factory=LmiSettings)
+    regions: PoleRegions = field(default_factory=PoleRegions)
 
     def __post_init__(self) -> None:
         check_feedback_channels(self.channels, NORMS)
         check_degree_and_poles(self.degree, self.decay_rate, self.fastest_pole)
+        if self.damping is not None and self.regions.damping is not None:
+            raise ProblemError("damping and regions.damping ask for the same twice; remove one")
         if self.damping is not None and not 0.0 < self.damping < 1.0:
             raise ProblemError(f"damping {self.damping} must be a damping ratio between 0 and 1")
         check_shares(self.backoff, self.reserve)
@@ -194,12 +198,12 @@ def state_feedback_problem(
         decay = 2.0 * design.decay_rate * (1.0 + design.reserve) / clock
         problem.require("decay rate", falling - Q.scaled_by(below) * decay)
     if design.fastest_pole is not None:
-        round_ = Q.scaled_by(below) * (design.fastest_pole / (1.0 + design.reserve) / clock)
-        problem.require("fastest pole", symmetric_block([[round_, M], [None, round_]]))
+        radius = design.fastest_pole / (1.0 + design.reserve) / clock
+        require_disc(problem, "fastest pole", radius, M, Q.scaled_by(below))
     if design.damping is not None:
-        cosine = design.damping + design.reserve * (1.0 - design.damping)
-        both, across = (M + M.T) * -float(np.sqrt(1.0 - cosine**2)), (M.T - M) * cosine
-        problem.require("damping", symmetric_block([[both, across], [None, both]]))
+        require_damping(problem, design.damping + design.reserve * (1.0 - design.damping), M)
+    if design.regions:
+        require_regions(problem, design.regions, design.reserve, clock, M, Q.scaled_by(below))
     if design.limits is not None:
         require_limits(problem, model, design.limits, design.reserve, scale, Q, Q, Y)
     for channel in design.channels:
