@@ -61,8 +61,27 @@ def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
         raise ValueError(
             'design.regions are not for an observer with update = "sampled"; remove them, or give a decay rate'
         )
+    if design.dynamic_weights is not None:
+        _check_weights(design, who)
     if not feedback and deploy.limits is not None:
         raise ValueError("deploy.limits are not for an observer, which commands nothing; remove them")
+
+
+def _check_weights(design: DesignSpec, who: str) -> None:
+    """What weighs signals is computed, not measured: the law must say what it measures."""
+    if design.law in ("state feedback", "sampled state feedback"):
+        raise ValueError(
+            f'design.dynamic_weights are not for {who}: their states are not measured; take law = "output feedback", whose own '
+            "states stand for them"
+        )
+    key = {"output feedback": "measured", "static output feedback": "uses"}.get(design.law or "")
+    if key is not None and getattr(design, key) is None:
+        raise ValueError(f"design.{key} is missing: beside dynamic_weights name the outputs that the law measures")
+    shown = [f"{weight.signal}_weighted" for weight in design.dynamic_weights or ()]
+    measured = [*(design.measured or ()), *(pair[1] for pair in design.uses or ())]
+    stray = next((name for name in measured if name in shown), None)
+    if stray is not None:
+        raise ValueError(f"design.{key}: '{stray}' comes from a weight and is not measured; remove it")
 
 
 def feedback_design(spec: DesignSpec) -> FeedbackDesign:
@@ -120,8 +139,11 @@ def form_of(model: LpvModel, design: FeedbackDesign) -> tuple[Measured, int]:
 def without_other_laws(resolved: dict[str, Any]) -> dict[str, Any]:
     """A dumped specification without the keys that its law does not have: digests of observers stay what they were."""
     design, deploy = dict(resolved["design"]), dict(resolved["deploy"])
-    if design["regions"] is None:
-        design.pop("regions")
+    for key in ("regions", "dynamic_weights"):
+        if design[key] is None:
+            design.pop(key)
+    if "dynamic_weights" in design:
+        design["dynamic_weights"] = [{k: v for k, v in w.items() if v is not None} for w in design["dynamic_weights"]]
     if design["law"] is None:
         design = {key: value for key, value in design.items() if key not in ("law", *OF_LAWS)}
         deploy.pop("limits")

@@ -18,6 +18,7 @@ from studies.law_spec import (
     without_other_laws,
 )
 from studies.spec_tables import DeploySpec, DesignSpec, ModelSpec
+from studies.weight_spec import weighed
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.design.law_table import Gains
@@ -78,14 +79,17 @@ class ScheduleSpec(StrictTable):
                 quantity = Quantity(value=radius, unit="m", source="given as --radius")
                 vehicle = {**parameters.vehicle, "effective_radius": quantity}
                 parameters = parameters.model_copy(update={"vehicle": vehicle})
-            return Plant(self.build_model(parameters), parameters)
+            return Plant(self._weighed(self.build_model(parameters)), parameters)
         if radius is not None:
             raise SpecError(
                 f"spec '{self.name}': --radius is for models of the catalogue; edit {self.model.file} instead"
             )
         if Path(self.model.file).suffix != ".toml":
             raise SpecError(f"spec '{self.name}': model.file '{self.model.file}' is not a .toml file; give its path")
-        return Plant(load_model(folder / self.model.file), None)
+        return Plant(self._weighed(load_model(folder / self.model.file)), None)
+
+    def _weighed(self, model: LpvModel) -> LpvModel:
+        return weighed(model, self.gains.dynamic_weights or (), self.law)
 
     def parameter_set(self, folder: Path = Path()) -> ParameterSet:
         """The parameter values of a catalogue model: a shipped set by name, or a TOML file beside the specification."""

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from studies.weight_spec import WeightSpec
 from synthesis.design.norms import Norm
 from synthesis.toml_file import StrictTable
 
@@ -75,6 +76,7 @@ class DesignSpec(StrictTable):
     relaxation: Literal["auto", "grid", "vertex", "exact"] = "auto"
     points: int = 140
     solver: str = "CLARABEL"
+    dynamic_weights: list[WeightSpec] | None = Field(default=None, min_length=1)
     channels: list[ChannelSpec] = Field(min_length=1)
 
 
