@@ -8,6 +8,7 @@ from studies.spec_tables import DeploySpec, DesignSpec
 from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.design.law_table import FeedbackLaw
 from synthesis.design.output_feedback import OutputFeedbackDesign, design_output_feedback
+from synthesis.design.pole_regions import PoleRegions
 from synthesis.design.sampled_state_feedback import design_sampled_state_feedback
 from synthesis.design.state_feedback import GainLimits, StateFeedbackDesign, design_state_feedback
 from synthesis.design.static_feedback import design_static_feedback
@@ -24,7 +25,8 @@ KEYS_OF = {  # of [design], beside those that observers have
 }
 OF_LAWS = tuple(dict.fromkeys(key for keys in KEYS_OF.values() for key in keys))
 FeedbackDesign = StateFeedbackDesign | OutputFeedbackDesign | StaticFeedbackDesign
-OF_CHANNELS = ("errors", "performance", "sizes")  # one of the first two is there
+OF_CHANNELS = ("errors", "performance", "sizes", "norm")  # one of the first two is there
+OTHER_NORMS = (None, "state feedback", "sampled state feedback")  # laws that take more than L2 gains
 
 
 def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
@@ -40,6 +42,10 @@ def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
             raise ValueError(f"{place}: {wanted} is missing; {who} needs it")
         if channel.sizes is not None and not feedback:
             raise ValueError(f"{place}: sizes are not for an observer; remove them")
+        if channel.norm not in (None, "H-infinity") and design.law not in OTHER_NORMS:
+            raise ValueError(
+                f'{place}: norm = "{channel.norm}" is not for {who}, whose channels are L2 gains; remove it'
+            )
     if feedback and "update" in deploy.model_fields_set:
         raise ValueError(f"deploy.update is not for {who}, which runs once a sample; remove it")
     if feedback and (design.input_limits is None) != (design.state_sizes is None):
@@ -49,15 +55,45 @@ def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
     if given is not None:
         other = next(law for law, keys in KEYS_OF.items() if given in keys)
         raise ValueError(f'design.{given} is not for {who}; remove it, or name another law: law = "{other}"')
+    if design.regions is not None and design.law not in (None, "state feedback"):
+        raise ValueError(f"design.regions are not for {who}; remove them, or give a decay rate")
+    if design.regions is not None and not feedback and deploy.update == "sampled":
+        raise ValueError(
+            'design.regions are not for an observer with update = "sampled"; remove them, or give a decay rate'
+        )
+    if design.dynamic_weights is not None:
+        _check_weights(design, who)
     if not feedback and deploy.limits is not None:
         raise ValueError("deploy.limits are not for an observer, which commands nothing; remove them")
+
+
+def _check_weights(design: DesignSpec, who: str) -> None:
+    """What weighs signals is computed, not measured: the law must say what it measures."""
+    if design.law in ("state feedback", "sampled state feedback"):
+        raise ValueError(
+            f'design.dynamic_weights are not for {who}: their states are not measured; take law = "output feedback", whose own '
+            "states stand for them"
+        )
+    key = {"output feedback": "measured", "static output feedback": "uses"}.get(design.law or "")
+    if key is not None and getattr(design, key) is None:
+        raise ValueError(f"design.{key} is missing: beside dynamic_weights name the outputs that the law measures")
+    shown = [f"{weight.signal}_weighted" for weight in design.dynamic_weights or ()]
+    measured = [*(design.measured or ()), *(pair[1] for pair in design.uses or ())]
+    stray = next((name for name in measured if name in shown), None)
+    if stray is not None:
+        raise ValueError(f"design.{key}: '{stray}' comes from a weight and is not measured; remove it")
 
 
 def feedback_design(spec: DesignSpec) -> FeedbackDesign:
     """As the synthesis takes it."""
     channels = tuple(
         FeedbackChannel(
-            tuple(c.disturbances), tuple(c.performance or ()), c.bound, _numbers(c.weights), _numbers(c.sizes)
+            tuple(c.disturbances),
+            tuple(c.performance or ()),
+            c.bound,
+            _numbers(c.weights),
+            _numbers(c.sizes),
+            c.norm or "H-infinity",
         )
         for c in spec.channels
     )
@@ -77,8 +113,9 @@ def feedback_design(spec: DesignSpec) -> FeedbackDesign:
         )  # fmt: skip
     limits = None if spec.input_limits is None else GainLimits(spec.input_limits, spec.state_sizes or {})
     return StateFeedbackDesign(
-        channels, spec.degree, spec.decay_rate, spec.fastest_pole, spec.damping, limits, spec.backoff, settings=settings
-    )
+        channels, spec.degree, spec.decay_rate, spec.fastest_pole, spec.damping, limits, spec.backoff, settings=settings,
+        regions=regions_of(spec),
+    )  # fmt: skip
 
 
 def design_feedback(model: LpvModel, design: FeedbackDesign, law: str, sample_time: float) -> FeedbackLaw:
@@ -102,6 +139,11 @@ def form_of(model: LpvModel, design: FeedbackDesign) -> tuple[Measured, int]:
 def without_other_laws(resolved: dict[str, Any]) -> dict[str, Any]:
     """A dumped specification without the keys that its law does not have: digests of observers stay what they were."""
     design, deploy = dict(resolved["design"]), dict(resolved["deploy"])
+    for key in ("regions", "dynamic_weights"):
+        if design[key] is None:
+            design.pop(key)
+    if "dynamic_weights" in design:
+        design["dynamic_weights"] = [{k: v for k, v in w.items() if v is not None} for w in design["dynamic_weights"]]
     if design["law"] is None:
         design = {key: value for key, value in design.items() if key not in ("law", *OF_LAWS)}
         deploy.pop("limits")
@@ -111,6 +153,15 @@ def without_other_laws(resolved: dict[str, Any]) -> dict[str, Any]:
         deploy.pop("update")
     dropped = [{k: v for k, v in c.items() if v is not None or k not in OF_CHANNELS} for c in design["channels"]]
     return {**resolved, "design": {**design, "channels": dropped}, "deploy": deploy}
+
+
+def regions_of(spec: DesignSpec) -> PoleRegions:
+    """As the synthesis takes them."""
+    if spec.regions is None:
+        return PoleRegions()
+    strip = spec.regions.vertical_strip
+    pair = None if strip is None else (strip[0], strip[1])
+    return PoleRegions(spec.regions.disc, spec.regions.damping, pair, spec.regions.horizontal_strip)
 
 
 def _numbers(values: list[float] | None) -> tuple[float, ...] | None:

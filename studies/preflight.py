@@ -21,7 +21,7 @@ from synthesis.design.feedback_channel import FeedbackChannel, feedback_channel_
 from synthesis.design.generalised_plant import measured_rows
 from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains, channel_matrices
 from synthesis.design.output_feedback import OutputFeedbackDesign
-from synthesis.design.refusals import refuse_undetectable
+from synthesis.design.refusals import refuse_feedthrough, refuse_undetectable
 from synthesis.design.state_feedback import StateFeedbackDesign, check_limits
 from synthesis.errors import ProblemError
 from synthesis.models.lpv import LpvModel
@@ -60,6 +60,9 @@ def _check_feedback(spec: ScheduleSpec, model: LpvModel) -> None:
     pairs = [feedback_channel_matrices(model, channel) for channel in design.channels]
     limits = design.limits if isinstance(design, StateFeedbackDesign) else None
     check_limits(model, limits)
+    for channel, (W, Z) in zip(design.channels, pairs, strict=True):
+        if channel.norm != "H-infinity" and spec.law == "state feedback":
+            refuse_feedthrough(model, channel, Z, W)
     forces = [W for W, _ in pairs]
     _check_effect(model, design.channels, forces)
     if not model.inputs:

@@ -22,23 +22,24 @@ from estimators.schedule import read_content
 from studies.execution.processes import available_cores, in_order
 from studies.preflight import check_before_design
 from studies.spec import Variant, load_spec
-from synthesis.certificate.frozen import frozen_gain
+from synthesis.certificate.claims import LARGER_IS_BETTER
+from synthesis.certificate.frozen import frozen_level
 from synthesis.certificate.proof import Proof, prove
 from synthesis.design.deploy import deploy, refuse_undeployable
 from synthesis.design.export import export, schedule_content
 from synthesis.design.law_table import matrices_of
+from synthesis.design.norms import CLAIMED
 
 # A stored claim may be worse than a fresh one by this share: levels are searched in steps, and solvers differ.
 WORSE = 0.02
 AS_IT_IS = Variant()
-LARGER_IS_BETTER = ("decay rate", "internal update", "sampled error", "drop probability")
 
 
 @dataclass(frozen=True, repr=False)
 class ScheduleRun(Display):
     """One specification, done: `state` is written, kept, same (--check), drift, missing or failed.
 
-    `proofs` are those of the file that is there now, `least` the largest frozen gain of every channel (a bound from below), and
+    `proofs` are those of the file that is there now, `least` the largest frozen level of every channel (a bound from below), and
     `moved` how far the fresh gains lie from the stored ones, as a share of the largest: reported, not judged.
     """
 
@@ -96,7 +97,10 @@ def run_spec(name: str, out: Path, check: bool = False, variant: Variant = AS_IT
     deployment = deploy(spec.design(model), spec.deploy_settings())
     content = schedule_content(deployment, spec.name, spec.description, spec.resolved(plant))
     loop = deployment.loop
-    least = tuple(frozen_gain(loop, *matrices_of(model, channel)) for channel in deployment.gains.design.channels)
+    least = tuple(
+        frozen_level(loop, *matrices_of(model, channel), f"sampled {CLAIMED[channel.norm]}")
+        for channel in deployment.gains.design.channels
+    )
     path = out / f"{spec.name}.json"
     fresh = tuple(prove(content, str(path)))
     state, message, proofs, moved = compare(path, content, fresh)

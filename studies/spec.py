@@ -9,8 +9,16 @@ from typing import Any, Self
 from pydantic import Field, model_validator
 
 from estimators.errors import unknown
-from studies.law_spec import FeedbackDesign, check_keys, design_feedback, feedback_design, without_other_laws
+from studies.law_spec import (
+    FeedbackDesign,
+    check_keys,
+    design_feedback,
+    feedback_design,
+    regions_of,
+    without_other_laws,
+)
 from studies.spec_tables import DeploySpec, DesignSpec, ModelSpec
+from studies.weight_spec import weighed
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.design.law_table import Gains
@@ -71,14 +79,17 @@ class ScheduleSpec(StrictTable):
                 quantity = Quantity(value=radius, unit="m", source="given as --radius")
                 vehicle = {**parameters.vehicle, "effective_radius": quantity}
                 parameters = parameters.model_copy(update={"vehicle": vehicle})
-            return Plant(self.build_model(parameters), parameters)
+            return Plant(self._weighed(self.build_model(parameters)), parameters)
         if radius is not None:
             raise SpecError(
                 f"spec '{self.name}': --radius is for models of the catalogue; edit {self.model.file} instead"
             )
         if Path(self.model.file).suffix != ".toml":
             raise SpecError(f"spec '{self.name}': model.file '{self.model.file}' is not a .toml file; give its path")
-        return Plant(load_model(folder / self.model.file), None)
+        return Plant(self._weighed(load_model(folder / self.model.file)), None)
+
+    def _weighed(self, model: LpvModel) -> LpvModel:
+        return weighed(model, self.gains.dynamic_weights or (), self.law)
 
     def parameter_set(self, folder: Path = Path()) -> ParameterSet:
         """The parameter values of a catalogue model: a shipped set by name, or a TOML file beside the specification."""
@@ -98,13 +109,17 @@ class ScheduleSpec(StrictTable):
         """As the synthesis takes it."""
         spec = self.gains
         channels = tuple(
-            Channel(tuple(c.disturbances), tuple(c.errors or ()), c.bound, tuple(c.weights) if c.weights else None)
+            Channel(
+                tuple(c.disturbances), tuple(c.errors or ()), c.bound, tuple(c.weights) if c.weights else None, norm
+            )
             for c in spec.channels
+            for norm in (c.norm or "H-infinity",)
         )
         settings = LmiSettings(relaxation=spec.relaxation, points=spec.points, solver=spec.solver)
         return ObserverDesign(
-            channels, spec.degree, spec.decay_rate, spec.fastest_pole, backoff=spec.backoff, settings=settings
-        )
+            channels, spec.degree, spec.decay_rate, spec.fastest_pole, backoff=spec.backoff, settings=settings,
+            regions=regions_of(spec),
+        )  # fmt: skip
 
     def feedback_design(self) -> FeedbackDesign:
         """As the synthesis takes it, of a feedback law."""

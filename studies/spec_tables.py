@@ -6,6 +6,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from studies.weight_spec import WeightSpec
+from synthesis.design.norms import Norm
 from synthesis.toml_file import StrictTable
 
 
@@ -33,7 +35,8 @@ class ModelSpec(StrictTable):
 class ChannelSpec(StrictTable):
     """One channel of the design; without `bound` it is the one that is minimised.
 
-    An observer has `errors`, a feedback law `performance` signals with `sizes`.
+    An observer has `errors`, a feedback law `performance` signals with `sizes`. `norm` of an observer and of state feedback: what
+    is bounded, the L2 gain if it is left out (synthesis.design.norms).
     """
 
     disturbances: list[str] = Field(min_length=1)
@@ -42,6 +45,16 @@ class ChannelSpec(StrictTable):
     bound: float | None = Field(default=None, gt=0)
     weights: list[float] | None = None
     sizes: list[float] | None = None
+    norm: Norm | None = None
+
+
+class RegionsSpec(StrictTable):
+    """Where every frozen pole s is to lie (synthesis.design.pole_regions): 1/s, a ratio, 1/s twice, rad/s."""
+
+    disc: float | None = Field(default=None, gt=0)
+    damping: float | None = Field(default=None, gt=0, lt=1)
+    vertical_strip: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    horizontal_strip: float | None = Field(default=None, gt=0)
 
 
 class DesignSpec(StrictTable):
@@ -51,6 +64,7 @@ class DesignSpec(StrictTable):
     degree: int = 1
     decay_rate: float = 0.0
     fastest_pole: float | None = None
+    regions: RegionsSpec | None = Field(default=None, examples=["{ vertical_strip = [2.0, 80.0] }"])
     damping: float | None = None
     input_limits: dict[str, float] | None = None
     state_sizes: dict[str, float] | None = None
@@ -62,6 +76,7 @@ class DesignSpec(StrictTable):
     relaxation: Literal["auto", "grid", "vertex", "exact"] = "auto"
     points: int = 140
     solver: str = "CLARABEL"
+    dynamic_weights: list[WeightSpec] | None = Field(default=None, min_length=1)
     channels: list[ChannelSpec] = Field(min_length=1)
 
 

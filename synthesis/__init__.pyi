@@ -13,6 +13,7 @@ from .design.hinf_observer import design_observer as design_observer
 from .design.output_feedback import OutputFeedback as OutputFeedback
 from .design.output_feedback import OutputFeedbackDesign as OutputFeedbackDesign
 from .design.output_feedback import design_output_feedback as design_output_feedback
+from .design.pole_regions import PoleRegions as PoleRegions
 from .design.sampled_observer import design_sampled_observer as design_sampled_observer
 from .design.sampled_state_feedback import design_sampled_state_feedback as design_sampled_state_feedback
 from .design.stability import GainBox as GainBox
@@ -49,5 +50,6 @@ from .models.param import Signal as Signal
 from .models.parameter_set import ParameterSet as ParameterSet
 from .models.parameter_set import load_parameter_set as load_parameter_set
 from .models.weighted import weighted as weighted
+from .models.weights import first_order_weight as first_order_weight
 from .published_certificate import CertifiedRange as CertifiedRange
 from .published_certificate import check_certificate as check_certificate

@@ -163,6 +163,7 @@ def _norm(schedule: GainSchedule, claim: Claim, paths: FloatArray, seed: int) ->
         ratios, w = amplified_most(system, ROUNDS)
     else:
         ratios, w = measure(system), np.zeros((len(every), count - 1, len(channel.inputs)))
+        ratios = ratios / np.sqrt(schedule.sample_time)  # energies are integrals over time, not sums over samples
     best, random = int(ratios.argmax()), ratios[: len(paths)]
     sizes = np.array(list(channel.inputs.values()))
     return (

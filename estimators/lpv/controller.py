@@ -103,7 +103,7 @@ class LpvController(SavedWithSchedule):
     def step(self, measurement: npt.ArrayLike, parameter: npt.ArrayLike) -> LpvControllerStep:
         """Commands for the sample that begins; arguments have the shapes (*batch_shape, nv) and (.., parameters).
 
-        The last axis may be left out where it is one long.
+        The last axis may be left out where it is one long. Where no gain uses a measurement it may be anything, NaN too.
 
         Raises:
             EstimatorError: another shape, or not numbers.
@@ -111,6 +111,7 @@ class LpvController(SavedWithSchedule):
         """
         shape = self.batch_shape
         v = vectors(measurement, self.batch_shape, self.law.measured, "measurement")
+        v = self.law.used(v)
         p = vectors(parameter, self.batch_shape, len(self.schedule.parameters), "parameter")
         seen = self.monitor(np.zeros((len(v), 0)), v, p, self.samples, shape)
         found = self.law.advance(self._state, self._command, seen.measurement, seen.parameter)
@@ -172,15 +173,13 @@ class LpvController(SavedWithSchedule):
         nu, count = len(self.schedule.inputs), len(self.schedule.parameters)
         chosen = mask(where, self.batch_shape, "where")
         flat = chosen.reshape(-1)
+        seen = self.law.used(vectors(measurement, self.batch_shape, self.law.measured, "measurement"))
         sizes = (
-            (command, nu, "command"),
-            (measurement, self.law.measured, "measurement"),
-            (parameter, count, "parameter"),
+            (vectors(command, self.batch_shape, nu, "command"), nu, "command"),
+            (seen, self.law.measured, "measurement"),
+            (vectors(parameter, self.batch_shape, count, "parameter"), count, "parameter"),
         )
-        u, v, p = (
-            finite(vectors(value, self.batch_shape, size, what), (len(flat), size), what)[flat]
-            for value, size, what in sizes
-        )
+        u, v, p = (finite(value, (len(flat), size), what)[flat] for value, size, what in sizes)
         within = self.schedule.certified(p if count > 1 else p[:, 0]).reshape(len(u), count)
         self._forget(chosen)
         self._command[flat] = np.clip(u, self.law.low, self.law.high)

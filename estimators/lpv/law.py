@@ -39,6 +39,9 @@ class Law:
         else:
             self.gains = PiecewiseLinear(schedule.breakpoints, table.reshape(len(table), -1))
         self.shape = table.shape[-2:]
+        # Signals that no gain uses, such as outputs that only weigh in a design: nobody measures them.
+        idle: BoolArray = ~table.any(axis=tuple(range(table.ndim - 1)))[self.order :]
+        self.idle = idle if idle.any() and not idle.all() else None
         through = schedule.plant["D"]
         self.through = None if self.states or not self.order or not through.largest.any() else through
         if not max(np.abs(table).max(initial=0.0), through.largest.sum(initial=0.0)) <= _LARGEST:
@@ -54,6 +57,10 @@ class Law:
             K = self.gains(np.ascontiguousarray(parameters[:, 0])).T.reshape(len(parameters), *self.shape)
         k = self.order
         return K[:, :k, :k], K[:, :k, k:], K[:, k:, :k], K[:, k:, k:]
+
+    def used(self, measured: FloatArray) -> FloatArray:
+        """Measurements (n, nv) with zeros in the place of what no gain uses, whatever stood there."""
+        return measured if self.idle is None else np.asarray(np.where(self.idle, 0.0, measured))
 
     def advance(
         self, state: FloatArray, before: FloatArray, measured: FloatArray, parameters: FloatArray

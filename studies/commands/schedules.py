@@ -19,6 +19,7 @@ from studies.preflight import check_before_design
 from studies.report.schedule_figures import gain_figure
 from studies.schedules import ScheduleRun, regenerate
 from studies.spec import Variant, load_spec, shipped_specs
+from synthesis.design.norms import CLAIMED
 from synthesis.errors import SpecError
 
 HEADINGS = (
@@ -29,7 +30,8 @@ CAPTION = (
     "update [1/s] and drop probability: proved"
 )
 LEFT = ("schedule", "update", "gain of", "channel", "state")
-CHANNEL = "update: gain "
+CHANNEL = "update: gain ", "update: "  # begin the claims about channels
+OF_CHANNELS = tuple(f"sampled {kind}" for kind in CLAIMED.values())
 LONGEST_CHANNEL = 44
 MOST_GAINS = 8  # in the table of a terminal
 
@@ -114,7 +116,11 @@ def _cells(run: ScheduleRun) -> tuple[str, ...]:
     names = [above[i]["name"] + (f" from {weighed[j]}" if several else "") for i, j in places]
     ranges = [f"{low[place]:.4g}..{high[place]:.4g}" for place in places]
     bands = [f"{a:g}..{b:g}" for a, b in run.published or ()]
-    channels = [(_short(p.claim.removeprefix(CHANNEL)), p.level) for p in run.proofs if p.kind == "sampled gain"]
+    channels = [
+        (_short(p.claim.removeprefix(CHANNEL[0]).removeprefix(CHANNEL[1])), p.level)
+        for p in run.proofs
+        if p.kind in OF_CHANNELS
+    ]
     gains = [f"{least:.4g}..{level:.4g}" for least, (_, level) in zip(run.least, channels, strict=False)]
     proved = {p.kind: p.level for p in run.proofs}
     decay = proved.get("internal update", proved.get("sampled error", np.nan))

@@ -16,14 +16,22 @@ from flint import fmpq
 
 from analysis import controllability_gramian, critical_drop_probability, hinf_norm
 from estimators.arrays import FloatArray
-from synthesis.certificate.claims import ERROR_EQUATION, GAINS, WITH_CHANNEL, Claim, claim_name, claim_unit, rows_of
+from synthesis.certificate.claims import (
+    ERROR_EQUATION,
+    GAINS,
+    LARGER_IS_BETTER,
+    WITH_CHANNEL,
+    Claim,
+    claim_name,
+    claim_unit,
+    rows_of,
+)
 from synthesis.certificate.content import claims_of, subject_of
+from synthesis.certificate.poles import CONTINUOUS, DISCRETE, pole_levels
 from synthesis.certificate.refute import grid
 from synthesis.loop.loop import Loop
 from synthesis.loop.system import Region, System
 from synthesis.polynomials.enclosure import PolynomialMatrix
-
-LARGER_IS_BETTER = ("decay rate", "internal update", "sampled error", "drop probability")
 
 
 @dataclass(frozen=True)
@@ -82,6 +90,8 @@ def _standing(loop: Loop, points: list[Any], time: Literal["continuous", "discre
 def _values(claim: Claim, systems: list[System], names: Any, loop: Loop) -> FloatArray:
     A = np.array([_matrix(system.A, system) for system in systems])
     poles = np.linalg.eigvals(A)
+    if claim.kind in (*CONTINUOUS, *DISCRETE):
+        return pole_levels(claim.kind, poles, 1.0 if loop.sample_time is None else _number(loop.sample_time))
     match claim.kind:
         case "decay rate":
             return np.asarray(-poles.real.max(axis=-1), float)
@@ -103,7 +113,9 @@ def _values(claim: Claim, systems: list[System], names: Any, loop: Loop) -> Floa
     C = np.array([Z @ _entries(system.C) for system in systems])
     D = np.array([Z @ _entries(system.D[group])[:, where] * np.array(sizes) for system in systems])
     if claim.kind not in GAINS:
-        return _impulse(A, B, C, D, claim.kind.startswith("sampled"), peak=claim.kind.endswith("peak"))
+        discrete = claim.kind.startswith("sampled")
+        period = _number(loop.sample_time) if discrete and loop.sample_time is not None else 1.0
+        return np.asarray(_impulse(A, B, C, D, discrete, peak=claim.kind.endswith("peak")) / np.sqrt(period))
     return hinf_norm(A, B, C, D, discrete=claim.kind != "gain").norm
 
 

@@ -18,6 +18,7 @@ from studies.sweeps.measures import MeasureSpec
 from studies.sweeps.observer import Batch, Observer
 from synthesis.design.deploy import claim_channel, deploy
 from synthesis.design.hinf_observer import ObserverGains
+from synthesis.design.norms import CLAIMED
 from synthesis.errors import SpecError
 from synthesis.lmi.result import Verdict
 from synthesis.models.lpv import LpvModel
@@ -71,7 +72,7 @@ class CertifiedGamma(MeasureSpec):
         wanted = self.channel or design.minimised.name
         asked = next(c for c in design.channels if c.name == wanted)
         if self.deployed:
-            kind = "gain" if gains.update == "held" else "sampled gain"
+            kind = f"{'' if gains.update == 'held' else 'sampled '}{CLAIMED[asked.norm]}"
             claims = deploy(gains, spec.deploy_settings()).claims
             return next(c.level for c in claims if (c.kind, c.channel) == (kind, claim_channel(asked)))
         return (asked.bound or gains.gamma) if gains.verdict is Verdict.CERTIFIED else float("nan")

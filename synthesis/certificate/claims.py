@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from synthesis.certificate.poles import CONTINUOUS, DISCRETE
 from synthesis.polynomials.enclosure import PolynomialMatrix
 
-ERROR_EQUATION = ("decay rate", "fastest pole", "gain", "H2 norm", "energy to peak")
+ERROR_EQUATION = ("decay rate", "fastest pole", *CONTINUOUS, "gain", "H2 norm", "energy to peak")
 UPDATE = (
     "internal update",
     "sampled error",
@@ -16,6 +17,7 @@ UPDATE = (
     "drop probability",
     "sampled H2 norm",
     "sampled energy to peak",
+    *DISCRETE,
 )
 KINDS = (*ERROR_EQUATION, *UPDATE)
 GAINS = {"gain": "disturbances", "sampled gain": "disturbances", "motion gain": "motion"}  # of energy
@@ -26,35 +28,53 @@ KINDS_OF = {  # which kinds say something true about which update (synthesis.loo
     "held": (
         "decay rate",
         "fastest pole",
+        *CONTINUOUS,
         "gain",
+        "H2 norm",
+        "energy to peak",
         "internal update",
         "sampled gain",
+        "sampled H2 norm",
+        "sampled energy to peak",
         "motion gain",
         "drop probability",
     ),
-    "sampled": ("sampled error", "sampled gain", "drop probability"),
+    "sampled": ("sampled error", "sampled gain", "sampled H2 norm", "sampled energy to peak", "drop probability"),
     "feedback": (
         "sampled error",
         "sampled gain",
         "sampled H2 norm",
         "sampled energy to peak",
+        *DISCRETE,
     ),  # synthesis.loop.feedback
 }
+IMAGINARY = ("imaginary part", "sampled imaginary part")
+LARGER_IS_BETTER = (
+    *("decay rate", "internal update", "sampled error", "drop probability"),
+    *("slowest pole", "damping ratio", "sampled slowest pole"),
+)
 UPDATE_OF = {"held": "internal update", "sampled": "sampled error", "feedback": "sampled error"}
 
 WORDS = {
     "decay rate": "error equation: decay rate",
     "fastest pole": "error equation: fastest pole",
+    "slowest pole": "error equation: slowest pole",
+    "pole radius": "error equation: largest pole",
+    "damping ratio": "error equation: damping ratio",
+    "imaginary part": "error equation: imaginary part of poles",
     "gain": "error equation: gain",
     "internal update": "update: decay while the plant stands still",
     "sampled error": "update: decay",
     "sampled gain": "update: gain",
     "motion gain": "update: gain of motion",
     "drop probability": "update: drop probability",
-    "H2 norm": "H2 norm",
-    "energy to peak": "generalised H2 norm",
+    "H2 norm": "error equation: H2 norm",
+    "energy to peak": "error equation: generalised H2 norm",
     "sampled H2 norm": "update: H2 norm",
     "sampled energy to peak": "update: generalised H2 norm",
+    "sampled slowest pole": "update: slowest pole",
+    "sampled fastest pole": "update: fastest pole",
+    "sampled imaginary part": "update: imaginary part of poles",
 }
 
 
@@ -107,18 +127,22 @@ def claim_unit(kind: str, channel: ClaimChannel | None, units: Mapping[str, str]
     """The unit of a claim's level.
 
     A gain from one input of size one has the unit error/input. With sizes the inputs are numbers of their sizes, and the gain has
-    the unit of the errors ('mixed' if they differ, 1 if they have sizes, too).
+    the unit of the errors ('mixed' if they differ, 1 if they have sizes, too). An H2 norm has the root of a time in it: an energy
+    is an integral.
     """
     if channel is None:
-        return "1" if kind == "drop probability" else "1/s"
+        return {"drop probability": "1", "damping ratio": "1"}.get(kind, "rad/s" if kind in IMAGINARY else "1/s")
     above = {"1" if channel.sizes else units[name] for name in channel.errors}
-    top = above.pop() if len(above) == 1 else "mixed"
+    top, root = above.pop() if len(above) == 1 else "mixed", "" if kind in GAINS else "s^0.5"
     if not plain_unit(channel):
-        return top
+        return quotient(top, root or "1")
     (name,) = channel.inputs
     if WITH_CHANNEL[kind] == "motion" and units[name] == top:
         return "s"
-    return quotient(top, _unit(units[name], "/s" if WITH_CHANNEL[kind] == "motion" else ""))
+    below = _unit(units[name], "/s" if WITH_CHANNEL[kind] == "motion" else "")
+    if root:
+        return f"{enclosed(top)}/({root if below == '1' else f'{enclosed(below)}*{root}'})"
+    return quotient(top, below)
 
 
 def written(number: float) -> str:

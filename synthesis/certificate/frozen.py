@@ -6,6 +6,8 @@ import numpy as np
 from flint import fmpq
 
 from estimators.arrays import FloatArray
+from synthesis.certificate.claims import GAINS, LARGER_IS_BETTER
+from synthesis.certificate.poles import pole_levels
 from synthesis.certificate.refute import grid
 from synthesis.loop.loop import Loop
 from synthesis.loop.system import Region, System
@@ -13,6 +15,23 @@ from synthesis.polynomials.enclosure import PolynomialMatrix
 
 BISECTIONS = 40
 POWERS = 60  # of the second moment's map
+DOUBLINGS = 14
+
+
+def frozen_level(loop: Loop, d: FloatArray, z: FloatArray, kind: str = "sampled gain") -> float:
+    """The largest level of a claim about the update while the parameters stand still, for a channel as `frozen_gain` has it."""
+    if kind in GAINS:
+        return frozen_gain(loop, d, z)
+    A, B, C, D = _channel(loop, d, z)
+    X = B @ np.swapaxes(B, 1, 2)
+    for _ in range(DOUBLINGS):  # sums of the gramian's series, the next twice as long: never above it
+        with np.errstate(all="ignore"):
+            X, A = X + A @ X @ np.swapaxes(A, 1, 2), A @ A
+    shown = C @ X @ np.swapaxes(C, 1, 2) + D @ np.swapaxes(D, 1, 2)
+    if loop.sample_time is None or not np.isfinite(shown).all():
+        return 0.0
+    squares = np.trace(shown, axis1=1, axis2=2) if kind.endswith("H2 norm") else np.linalg.eigvalsh(shown)[:, -1]
+    return float(np.sqrt(squares.max(initial=0.0) / _float(loop.sample_time)))
 
 
 def frozen_gain(loop: Loop, d: FloatArray, z: FloatArray) -> float:
@@ -23,16 +42,22 @@ def frozen_gain(loop: Loop, d: FloatArray, z: FloatArray) -> float:
     A constant parameter is one of the admissible motions, and every frequency bounds the gain there from below. The disturbances
     are held over a sample, as in the claims.
     """
-    systems = _systems(loop, "discrete")
-    if not systems:
+    A, B, C, D = _channel(loop, d, z)
+    if not len(A):
         return 0.0
-    A = np.array([_numbers(system.A) for system in systems])
-    B, D = (np.array([_numbers(getattr(system, key)["disturbances"]) @ d for system in systems]) for key in "BD")
-    C = np.array([_numbers(system.C) for system in systems])
     angles = np.concatenate([[0.0], np.geomspace(1e-4, np.pi, 41)])
     resolvent = np.exp(1j * angles)[:, None, None, None] * np.eye(A.shape[-1]) - A
-    response = z @ (C @ np.linalg.solve(resolvent, np.broadcast_to(B, (len(angles), *B.shape))) + D)
+    response = C @ np.linalg.solve(resolvent, np.broadcast_to(B, (len(angles), *B.shape))) + D
     return float(np.linalg.norm(response, 2, axis=(-2, -1)).max())
+
+
+def _channel(loop: Loop, d: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """A, B d, z C, z D of the update on a grid."""
+    n, m, systems = loop.states, len(z), _systems(loop, "discrete")
+    A = np.array([_numbers(system.A) for system in systems]).reshape(-1, n, n)
+    B, D = (np.array([_numbers(getattr(system, key)["disturbances"]) @ d for system in systems]) for key in "BD")
+    C = np.array([z @ _numbers(system.C) for system in systems]).reshape(-1, m, n)
+    return A, B.reshape(-1, n, d.shape[1]), C, z @ D if len(D) else D.reshape(0, m, d.shape[1])
 
 
 def frozen_update(loop: Loop) -> tuple[FloatArray, FloatArray]:
@@ -48,6 +73,15 @@ def slowest_decay(loop: Loop) -> float:
         return 0.0
     radius = np.abs(np.linalg.eigvals(received)).max()
     return float(-np.log(max(radius, 1e-12)) / _float(loop.sample_time))
+
+
+def frozen_pole_level(loop: Loop, kind: str) -> float:
+    """The worst level of a claim about the poles of the update (`synthesis.certificate.poles`); NaN without a place."""
+    A = np.array([_numbers(system.A) for system in _systems(loop, "discrete")])
+    if not len(A) or loop.sample_time is None:
+        return float("nan")
+    levels = pole_levels(kind, np.linalg.eigvals(A), _float(loop.sample_time))
+    return float(levels.min() if kind in LARGER_IS_BETTER else levels.max())
 
 
 def critical_probability(loop: Loop) -> float:

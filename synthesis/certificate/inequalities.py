@@ -20,11 +20,14 @@ multiplied by so many d that it is polynomial.
                       l2 gain from W w to Z(C e + D w) below g
     drop probability q     P - (1 - q) A'P+A - q A0'P+A0 > 0,  P - A'P+A > 0        mean-square stable when every measurement is
                                                                                     lost independently with a probability up to q
-    H2 norm g         P - A'P+A - C'Z'ZC > 0,  g^2 - tr(W'B'P+B W + W'D'Z'ZDW) > 0  as above
-    energy to peak g  [P - A'P+A, -A'P+B W; *, g^2 I - W'B'P+B W] > 0,
-                      [P - C'Z'ZC, -C'Z'ZDW; *, g^2 I - W'D'Z'ZDW] > 0              as above
+    H2 norm g         P - A'P+A - C'Z'ZC > 0,  T g^2 - tr(W'B'P+B W + W'D'Z'ZDW) > 0
+    energy to peak g  [P - A'P+A, -A'P+B W; *, T g^2 I - W'B'P+B W] > 0,
+                      [P - C'Z'ZC, -C'Z'ZDW; *, T g^2 I - W'D'Z'ZDW] > 0
+                      as above, in continuous time: w is held over a sample, |z|^2 counts for its length T, and an impulse is
+                      1/T for one sample
 
-and P > 0 with each of them, for all parameters in their range and all rates in their bounds.
+and P > 0 with each of them, for all parameters in their range and all rates in their bounds; those about frozen poles are in
+`synthesis.certificate.poles`.
 """
 
 from __future__ import annotations
@@ -32,6 +35,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from synthesis.certificate.poles import CONTINUOUS, DISCRETE, pole_inequality
 from synthesis.loop.system import System
 
 
@@ -43,6 +47,7 @@ class Arithmetic(Protocol):
     def block(self, rows: Any) -> Any: ...  # noqa: D102
     def trace(self, matrix: Any) -> Any: ...  # noqa: D102
     def exp(self, exponent: Any) -> Any: ...  # noqa: D102
+    def cos(self, angle: Any) -> Any: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -79,6 +84,8 @@ def _continuous(q: Question, system: System, P: Any, P_dot: Any, arithmetic: Ari
         return [("decay rate", -(S + _over(system, P_dot) + _over(system, P) * (2 * q.level)))]
     if q.kind == "fastest pole":
         return [("fastest pole", S + _over(system, P) * (2 * q.level))]
+    if q.kind in CONTINUOUS:
+        return [(q.kind, pole_inequality(q.kind, q.level, q.period, system.A, P, _over(system, P), arithmetic))]
     moving, still, shown = (1, 2, 0) if system.shared else (0, 1, 1)  # so many times d
     W, Z = arithmetic.known(q.W, P), arithmetic.known(q.Z, P)
     ZC, ZD, PBW = Z @ system.C, Z @ system.D[q.group] @ W, P @ (system.B[q.group] @ W)
@@ -101,6 +108,8 @@ def _continuous(q: Question, system: System, P: Any, P_dot: Any, arithmetic: Ari
 
 
 def _discrete(q: Question, system: System, P: Any, P_next: Any, arithmetic: Arithmetic) -> list[tuple[str, Any]]:
+    if q.kind in DISCRETE:
+        return [(q.kind, pole_inequality(q.kind, q.level, q.period, system.A, P, _over(system, P, 2), arithmetic))]
     moved, P = system.A.T @ P_next, _over(system, P, 2)
     fallen = moved @ system.A
     if q.kind in ("internal update", "sampled error"):
@@ -115,10 +124,11 @@ def _discrete(q: Question, system: System, P: Any, P_next: Any, arithmetic: Arit
     seen, cross, direct = (_over(system, x, shown) for x in (ZC.T @ ZC, ZC.T @ ZD, ZD.T @ ZD))
     if q.kind == "sampled H2 norm":
         energy = arithmetic.trace(driven + direct)
-        bound = _over(system, _square(q, energy, arithmetic), 2)
+        bound = _over(system, _square(q, energy, arithmetic), 2) * q.period
         return [("observed energy", P - fallen - seen), ("H2 norm", bound - energy)]
     bound = _over(system, _square(q, driven, arithmetic), 2)
     if q.kind == "sampled energy to peak":
+        bound = bound * q.period
         stored = arithmetic.block([[P - fallen, -(moved @ BW)], [None, bound - driven]])
         return [("stored energy", stored), ("peak", arithmetic.block([[P - seen, -cross], [None, bound - direct]]))]
     return [("gain", arithmetic.block([[P - seen - fallen, -(moved @ BW + cross)], [None, bound - direct - driven]]))]

@@ -6,60 +6,94 @@ was proved, with the digits that are written.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
-from synthesis.certificate.claims import UPDATE_OF, Claim, ClaimChannel
-from synthesis.certificate.frozen import critical_probability, slowest_decay
+from synthesis.certificate.claims import LARGER_IS_BETTER, UPDATE_OF, Claim, ClaimChannel
+from synthesis.certificate.frozen import critical_probability, frozen_pole_level, slowest_decay
+from synthesis.certificate.poles import DISCRETE
 from synthesis.certificate.rounding import round_down, round_up, significant
 from synthesis.certificate.search import Search, Wish
 
 SHARES = (0.99, 0.97, 0.94, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1)  # of what frozen parameters allow
 MOST_PAIRS = 4  # of a state that moves and an error, each with a claim of its own
+WIDER = (1.01, 1.03, 1.1, 1.3, 2.0)  # than the frozen poles of the update
 SETTLE = (1.0, 2.0, 5.0, 20.0)  # times the wanted distance from the least gain
 
 
+def sampled(wish: Wish) -> Wish:
+    """The same wish, of the update over a sample in the place of the error equation."""
+    return replace(wish, kind=f"sampled {wish.kind}")
+
+
 def held_claims(
-    search: Search, channels: Sequence[ClaimChannel], decay_rate: float, fastest_pole: float | None, settle: float
+    search: Search,
+    levels: Sequence[Wish],
+    decay_rate: float,
+    fastest_pole: float | None,
+    settle: float,
+    regions: Mapping[str, float] = MappingProxyType({}),
 ) -> tuple[Claim, ...] | None:
-    """Claims of the error equation and of its update with held measurements; None if a wanted one cannot be had."""
+    """Claims of the error equation and of its update with held measurements; None if a wanted one cannot be had.
+
+    `levels` are wishes of the error equation without a level, one for each channel of the design: its gain or another norm.
+    `regions` are kinds of claims about frozen poles with their levels.
+    """
     wanted = [Wish("decay rate", decay_rate)] if decay_rate else []
     wanted += [] if fastest_pole is None else [Wish("fastest pole", fastest_pole)]
+    wanted += [Wish(kind, level) for kind, level in regions.items() if kind != "fastest pole" or level != fastest_pole]
     found = [search.prove(wish)[0] for wish in wanted]
-    found += [best_gain(search, Wish("gain", None, channel), settle) for channel in channels]
-    return _with_update(search, channels, found, settle)
+    found += [best_gain(search, wish, settle) for wish in levels]
+    return _with_update(search, levels, found, settle)
 
 
-def sampled_claims(search: Search, channels: Sequence[ClaimChannel], settle: float) -> tuple[Claim, ...] | None:
+def sampled_claims(search: Search, levels: Sequence[Wish], settle: float) -> tuple[Claim, ...] | None:
     """Claims of the update that corrects once a sample."""
-    return _with_update(search, channels, [], settle)
+    return _with_update(search, levels, [], settle)
 
 
-def feedback_claims(search: Search, channels: Sequence[ClaimChannel], settle: float) -> tuple[Claim, ...] | None:
-    """Claims of a feedback law that runs once a sample: decay and the gain of every channel; None if one cannot be had."""
+def feedback_claims(
+    search: Search, levels: Sequence[Wish], settle: float, regions: Mapping[str, float] = MappingProxyType({})
+) -> tuple[Claim, ...] | None:
+    """Claims of a feedback law that runs once a sample: decay and the level of every channel; None if one cannot be had.
+
+    Of the `regions` those that are regions of the update's poles, too: as they were asked for, or as wide as sampling makes them.
+    """
     found = [largest(search, UPDATE_OF["feedback"], slowest_decay(search.loop))]
-    found += [best_gain(search, Wish("sampled gain", None, channel), settle) for channel in channels]
+    found += [_region(search, f"sampled {kind}", x) for kind, x in regions.items() if f"sampled {kind}" in DISCRETE]
+    found += [best_gain(search, sampled(wish), settle) for wish in levels]
     return None if any(claim is None for claim in found) else tuple(claim for claim in found if claim is not None)
 
 
 def _with_update(
-    search: Search, channels: Sequence[ClaimChannel], found: list[Claim | None], settle: float
+    search: Search, levels: Sequence[Wish], found: list[Claim | None], settle: float
 ) -> tuple[Claim, ...] | None:
     """What the runtime's update gets beside: only the claims about drops and motion may be missing."""
     update = "held" if search.loop.time == "continuous" else "sampled"
     found += [largest(search, UPDATE_OF[update], slowest_decay(search.loop))]
-    found += [best_gain(search, Wish("sampled gain", None, channel), settle) for channel in channels]
+    found += [best_gain(search, sampled(wish), settle) for wish in levels]
     if any(claim is None for claim in found):
         return None
     extra: list[Claim | None] = []
     if update == "held":
         extra += [
             best_gain(search, Wish("motion gain", None, channel), settle)
-            for channel in motion_channels(search, channels)
+            for channel in motion_channels(search, [wish.channel for wish in levels if wish.channel is not None])
         ]
     extra += [largest(search, "drop probability", critical_probability(search.loop))]
     return tuple(claim for claim in (*found, *extra) if claim is not None)
+
+
+def _region(search: Search, kind: str, wanted: float) -> Claim | None:
+    """A claim about frozen poles at the wanted level, or at the first above the frozen one that is proved."""
+    frozen, larger = frozen_pole_level(search.loop, kind), kind in LARGER_IS_BETTER
+    beyond = (frozen / x if larger else frozen * x for x in WIDER)
+    tried = [wanted, *(round_down(x, 3) if larger else round_up(x, 3) for x in beyond if 0.0 < x < np.inf)]
+    proved = (search.prove(Wish(kind, x))[0] for x in tried)
+    return next((claim for claim in proved if claim is not None), None)
 
 
 def motion_channels(search: Search, channels: Sequence[ClaimChannel]) -> list[ClaimChannel]:

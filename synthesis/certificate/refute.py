@@ -13,6 +13,8 @@ import numpy as np
 from flint import arb, arb_mat, fmpq, fmpq_mat, fmpq_poly
 
 from synthesis.certificate.claims import ERROR_EQUATION, GAINS, Claim
+from synthesis.certificate.poles import CONTINUOUS, DISCRETE, pole_outside
+from synthesis.certificate.refute_energy import energy_exceeds, entries_of
 from synthesis.certificate.verify import Verifier
 from synthesis.loop.loop import Loop
 from synthesis.loop.plant import Plant
@@ -146,13 +148,8 @@ def _standing(point: Point) -> Region:
 
 
 def _frozen(system: System) -> Entries:
-    matrix = _constant(system.A)
-    return matrix if system.denominator is None else matrix * (1 / _constant(system.denominator)[0, 0])
-
-
-def _constant(polynomial: object) -> Entries:
-    size = (0,) * polynomial.variables  # type: ignore[attr-defined]
-    return polynomial.terms.get(size, arb_mat(*polynomial.shape))  # type: ignore[attr-defined]
+    matrix = entries_of(system.A)
+    return matrix if system.denominator is None else matrix * (1 / entries_of(system.denominator)[0, 0])
 
 
 def _shifted(matrix: Entries, rate: fmpq | arb) -> Entries:
@@ -176,18 +173,23 @@ def _breaks(verifier: Verifier, claim: Claim, system: System) -> bool:
         return is_hurwitz(_shifted(A, level)) is False
     if claim.kind == "fastest pole":
         return is_hurwitz(_shifted(A * -1, -level)) is False
+    if claim.kind in (*CONTINUOUS, *DISCRETE):
+        return pole_outside(claim.kind, level, verifier.loop.sample_time, A)
+    if claim.channel is not None and claim.kind not in GAINS:
+        stable = is_hurwitz(A) if system.time == "continuous" else is_schur(A)
+        return stable is False or energy_exceeds(verifier.question(claim), system)
     if system.time == "continuous":
-        return is_hurwitz(A) is False or (claim.kind in GAINS and _static_gain_exceeds(verifier, claim, system, A * -1))
+        return is_hurwitz(A) is False or _static_gain_exceeds(verifier, claim, system, A * -1)
     if claim.channel is not None:
         n = A.nrows()
         rest = arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)]) - A
-        return is_schur(A) is False or (claim.kind in GAINS and _static_gain_exceeds(verifier, claim, system, rest))
+        return is_schur(A) is False or _static_gain_exceeds(verifier, claim, system, rest)
     period = verifier.loop.sample_time
     if claim.kind != "drop probability":
         return is_schur(A * arb(level * period).exp()) is False
     if A.nrows() > MOST_STATES:
         return False
-    received, lost = (_kronecker(matrix) for matrix in (A, _constant(system.coasting)))
+    received, lost = (_kronecker(matrix) for matrix in (A, entries_of(system.coasting)))
     return is_schur(received * (1 - level) + lost * level) is False
 
 
@@ -196,11 +198,11 @@ def _static_gain_exceeds(verifier: Verifier, claim: Claim, system: System, rest:
     question = verifier.question(claim)
     Z, W = arb_mat(question.Z), arb_mat(question.W)
     try:
-        states = rest.solve(_constant(system.B[question.group]) * W)
+        states = rest.solve(entries_of(system.B[question.group]) * W)
     except ZeroDivisionError:
         return False
-    below = arb(1) if system.denominator is None else _constant(system.denominator)[0, 0]
-    response = Z * (_constant(system.C) * states * (1 / below) + _constant(system.D[question.group]) * W)
+    below = arb(1) if system.denominator is None else entries_of(system.denominator)[0, 0]
+    response = Z * (entries_of(system.C) * states * (1 / below) + entries_of(system.D[question.group]) * W)
     if system.shared:
         response = response * (1 / below)
     size = response.nrows()

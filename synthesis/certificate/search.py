@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from estimators.arrays import FloatArray
-from synthesis.certificate.claims import ERROR_EQUATION, WITH_CHANNEL, Claim, ClaimChannel, rows_of
+from synthesis.certificate.claims import ERROR_EQUATION, GAINS, WITH_CHANNEL, Claim, ClaimChannel, rows_of
 from synthesis.certificate.families import below_one, rate_places
 from synthesis.certificate.inequalities import Question, inequalities
 from synthesis.certificate.rounding import LYAPUNOV_DIGITS, rounded_lyapunov
@@ -263,6 +263,8 @@ class Search:
         assert wish.channel is not None
         if self.size is not None:
             return self.size
+        period = 1.0 if self.loop.sample_time is None else int(self.loop.sample_time.p) / int(self.loop.sample_time.q)
+        root = np.sqrt(period) if wish.kind.startswith("sampled") and wish.kind not in GAINS else 1.0
         cells = list(self.loop.cells())
         region: Region = cells[len(cells) // 2]
         found = self.loop.system(region, "discrete" if wish.kind not in ERROR_EQUATION else "continuous")
@@ -270,12 +272,8 @@ class Search:
             return 1.0
         system: System = in_scaled_states(found, self.scale)
         group, W, Z = WITH_CHANNEL[wish.kind], self._sizes(wish.channel, wish.kind), self._errors(wish)
-        A, B, ZC, ZD = (
-            _value(system.A),
-            _value(system.B[group]) @ W,
-            Z @ _value(system.C),
-            Z @ _value(system.D[group]) @ W,
-        )
+        A, B = _value(system.A), _value(system.B[group]) @ W
+        ZC, ZD = Z @ _value(system.C), Z @ _value(system.D[group]) @ W
         if system.denominator is not None:
             below = float(_value(system.denominator)[0, 0])
             A, B = A / below, B / below
@@ -291,7 +289,7 @@ class Search:
         except np.linalg.LinAlgError:
             size = 0.0
         step = float(np.linalg.norm(ZC @ B))
-        return next((x for x in (size, step) if 0.0 < x < np.inf), 1.0)
+        return next((x / root for x in (size, step) if 0.0 < x < np.inf), 1.0)
 
 
 def _value(matrix: object) -> FloatArray:

@@ -90,6 +90,10 @@ class Balls:
         """e^x."""
         return arb(exponent).exp()
 
+    def cos(self, angle: Any) -> arb:
+        """The cosine."""
+        return arb(angle).cos()
+
 
 @dataclass(frozen=True)
 class _Task:

@@ -7,6 +7,8 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
+from estimators.errors import unknown
+from synthesis.design.norms import NORMS, Norm
 from synthesis.errors import ProblemError
 
 HIGHEST_DEGREE = 8
@@ -27,14 +29,20 @@ class Asked(Protocol):
     def disturbances(self) -> tuple[str, ...]:
         """Where it begins."""
 
+    @property
+    def norm(self) -> Norm:
+        """In which it is measured."""
+
 
 Kind = TypeVar("Kind", bound=Asked)
 
 
-def check_channels(channels: Sequence[Asked], ends: Sequence[tuple[str, ...]], what: str) -> None:
+def check_channels(
+    channels: Sequence[Asked], ends: Sequence[tuple[str, ...]], what: str, norms: Sequence[Norm] = NORMS
+) -> None:
     """Exactly one channel is minimised, the others have positive bounds, and none is without a `what` at its end.
 
-    Raises ProblemError.
+    Raises ProblemError, also for a norm that is not one of `norms`.
     """
     if sum(channel.bound is None for channel in channels) != 1:
         raise ProblemError("exactly one channel must have no bound: it is the one that is minimised")
@@ -43,6 +51,13 @@ def check_channels(channels: Sequence[Asked], ends: Sequence[tuple[str, ...]], w
             raise ProblemError(f"channel '{channel.name}' has the bound {channel.bound}; give a positive number")
         if not channel.disturbances or not end:
             raise ProblemError(f"channel '{channel.name}' needs at least one disturbance and one {what}")
+        if channel.norm not in NORMS:
+            raise ProblemError(f"channel '{channel.name}': {unknown('norm', channel.norm, NORMS)}")
+        if channel.norm not in norms:
+            raise ProblemError(
+                f"channel '{channel.name}': the norm '{channel.norm}' is not for this law, whose channels have "
+                f"{', '.join(norms)}; observers and state feedback take it"
+            )
 
 
 def minimised_channel(channels: Sequence[Kind]) -> Kind:

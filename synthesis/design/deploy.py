@@ -10,8 +10,8 @@ import numpy as np
 from estimators.arrays import FloatArray
 from estimators.display import Display, counted
 from estimators.schedule.check import HIGHEST_ORDER
-from synthesis.certificate.claims import Claim, ClaimChannel
-from synthesis.certificate.levels import feedback_claims, held_claims, sampled_claims
+from synthesis.certificate.claims import Claim, ClaimChannel, claim_unit
+from synthesis.certificate.levels import feedback_claims, held_claims, sampled, sampled_claims
 from synthesis.certificate.rounding import significant
 from synthesis.certificate.search import Search, Wish
 from synthesis.certificate.verify import Names
@@ -28,6 +28,8 @@ from synthesis.design.law_table import (
     update_of,
     update_section,
 )
+from synthesis.design.norms import CLAIMED
+from synthesis.design.pole_regions import PoleRegions
 from synthesis.design.well_posedness import well_posedness
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import Verdict
@@ -36,7 +38,6 @@ from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
 
 SEGMENTS = (7, 14, 28, 56, 112)
-RATES = ("decay rate", "fastest pole", "internal update", "sampled error")  # claims in 1/s
 MOST_PARAMETERS = 3  # of a proof: polynomials of order 8 in more of them have too many terms
 MOST_ENTRIES, FINEST = 4000, 64  # breakpoints of a table with several parameters, and segments along one of them
 REFINEMENT = 4  # a table is compared with one of so many times its segments
@@ -62,8 +63,10 @@ class Deployment(Display):
         """The table over its breakpoints, what it cost, and the claims by kind and level."""
         model = self.gains.model
         over = [f"{p.name} [{p.unit}]" for p in model.parameters]
+        units = {claim.kind: "" if claim.channel else claim_unit(claim.kind, None, {}) for claim in self.claims}
         levels = [
-            f"{claim.kind} {claim.level:.4g}{' 1/s' if claim.kind in RATES else ''}" for claim in self.claims[::-1]
+            f"{claim.kind} {claim.level:.4g} {units[claim.kind]}".removesuffix(" 1").strip()
+            for claim in self.claims[::-1]
         ]
         limit = self.settings.interpolation_cost
         return (
@@ -108,8 +111,8 @@ def deploy(
         posed = well_posedness(model, observer.design)  # nothing bounds the gains but the channels themselves
         if posed.ill_posed:
             raise ProblemError(f"model '{model.name}' is not deployed: {posed.message}")
-    kind = "gain" if observer is not None and observer.update == "held" else "sampled gain"
-    channels = [claim_channel(channel) for channel in design.channels]
+    wishes = [Wish(CLAIMED[channel.norm], None, claim_channel(channel)) for channel in design.channels]
+    compared = wishes if observer is not None and observer.update == "held" else [sampled(wish) for wish in wishes]
     for segments in _candidates(gains, settings):
         progress(f"{' x '.join(map(str, segments))} segments")
         found: list[Deployment] = []
@@ -117,10 +120,10 @@ def deploy(
             search, points, table = _tabulated(gains, segments, settings, settings.dtype, degree)
             fine = tuple(REFINEMENT * number for number in segments)
             finer, _, _ = _tabulated(gains, fine, settings, "float64", degree)
-            cost = max(table_cost(search, finer, Wish(kind, None, channel)) for channel in channels)
+            cost = max(table_cost(search, finer, wish) for wish in compared)
             if not cost < settings.interpolation_cost:
                 continue
-            claims = _claims(gains, search, channels, settings.settle)
+            claims = _claims(gains, search, wishes, settings.settle)
             if claims is not None:
                 found.append(Deployment(gains, settings, points, table, claims, cost))
         if found:
@@ -193,13 +196,16 @@ def table_cost(coarse: Search, fine: Search, wish: Wish) -> float:
     return least / best - 1.0 if np.isfinite(least) and np.isfinite(best) else np.inf
 
 
-def _claims(gains: Gains, search: Search, channels: Sequence[ClaimChannel], settle: float) -> tuple[Claim, ...] | None:
+def _claims(gains: Gains, search: Search, wishes: Sequence[Wish], settle: float) -> tuple[Claim, ...] | None:
     """What is claimed of a table, by how it is run; None if something of it cannot be proved."""
+    regions = getattr(gains.design, "regions", None)
     if not isinstance(gains, ObserverGains):
-        return feedback_claims(search, channels, settle)
+        return feedback_claims(search, wishes, settle, regions.claims if isinstance(regions, PoleRegions) else {})
     if gains.update == "held":
-        return held_claims(search, channels, gains.design.decay_rate, gains.design.fastest_pole, settle)
-    return sampled_claims(search, channels, settle)
+        return held_claims(
+            search, wishes, gains.design.decay_rate, gains.design.fastest_pole, settle, gains.design.regions.claims
+        )
+    return sampled_claims(search, wishes, settle)
 
 
 def claim_channel(channel: Channel | FeedbackChannel) -> ClaimChannel:
@@ -261,5 +267,5 @@ def lyapunov_degrees(model: LpvModel, gains: Gains) -> list[tuple[int, ...]]:
 
 
 def _claimed(deployment: Deployment) -> float:
-    """The product of the gains that are claimed."""
-    return float(np.prod([claim.level for claim in deployment.claims if "gain" in claim.kind]))
+    """The product of the levels that are claimed for channels."""
+    return float(np.prod([claim.level for claim in deployment.claims if claim.channel is not None]))

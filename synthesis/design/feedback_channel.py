@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,16 +13,18 @@ from estimators.errors import unknown
 from synthesis.certificate.claims import ClaimChannel
 from synthesis.certificate.verify import Names
 from synthesis.design.asked import check_channels
+from synthesis.design.norms import Norm
 from synthesis.errors import ProblemError
 from synthesis.models.lpv import LpvModel
 
 
 @dataclass(frozen=True, repr=False)
 class FeedbackChannel(Display):
-    """The L2 gain from some disturbances to some performance signals: bounded by `bound`, or minimised if None.
+    """The gain from some disturbances to some performance signals: bounded by `bound`, or minimised if None.
 
     `performance` are names of states, outputs or inputs of the model. `weights` are the sizes of the disturbances that count as
-    one, `sizes` those of the performance signals, in their order; None: one each.
+    one, `sizes` those of the performance signals, in their order; None: one each. `norm` says what is meant by gain
+    (`synthesis.design.norms`): "H-infinity" (the L2 gain), "generalised H2" (the largest signal by energy) or "H2".
 
     >>> FeedbackChannel(("road",), ("body_acceleration", "force"), sizes=(1.0, 500.0)).name
     'road -> body_acceleration+force'
@@ -32,6 +35,7 @@ class FeedbackChannel(Display):
     bound: float | None = None
     weights: tuple[float, ...] | None = None
     sizes: tuple[float, ...] | None = None
+    norm: Norm = "H-infinity"
 
     @property
     def name(self) -> str:
@@ -80,6 +84,6 @@ def feedback_channel_matrices(model: LpvModel, channel: FeedbackChannel) -> tupl
     return np.asarray(W), np.asarray(Z)
 
 
-def check_feedback_channels(channels: tuple[FeedbackChannel, ...]) -> None:
-    """As `synthesis.design.asked.check_channels`."""
-    check_channels(channels, [channel.performance for channel in channels], "performance signal")
+def check_feedback_channels(channels: tuple[FeedbackChannel, ...], norms: Sequence[Norm] = ("H-infinity",)) -> None:
+    """As `synthesis.design.asked.check_channels`; a design that knows other norms names them."""
+    check_channels(channels, [channel.performance for channel in channels], "performance signal", norms)

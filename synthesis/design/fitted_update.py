@@ -63,10 +63,11 @@ def _fitted(model: LpvModel, values: Callable[[NumericModel], FloatArray]) -> Fl
         tails = [np.abs(np.take(series, -1, axis=axis)).max(axis=tuple(range(count))) for axis in range(count)]
         if all((tail <= FIT * size).all() for tail in tails):
             break
-    if tail > LOOSE * size:
+    off = max((float((tail / np.where(size > 0.0, size, 1.0)).max()) for tail in tails), default=0.0)
+    if off > LOOSE:
         raise ProblemError(
             f"model '{model.name}': no polynomial of degree {DEGREES[-1]} comes close to it over its range "
-            f"(off by {tail / size:.1g}); shrink the range"
+            f"(off by {off:.1g}); shrink the range"
         )
     powers = np.zeros((degree + 1, degree + 1))
     for k in range(degree + 1):

@@ -5,6 +5,8 @@ With V = e'P(p)e, X = P L and phi = A'P + P A - X C - C'X' + dP/dt, for the erro
     decay          phi + 2 alpha P < 0                          |e| decays at least like exp(-alpha t)
     fastest pole   phi - dP/dt + 2 r P > 0                      every frozen pole has a real part above -r
     channel d -> z [phi, P E - X F, Z'; *, -g I, 0; *, *, -g I] < 0 L2 gain from d to z = Z e at most g
+    generalised H2 [-phi, X F - P E; *, g I] > 0, [P, Z'; *, g I] > 0     |z| at most g times the root of the energy of d
+    H2             [-phi, Z'; *, g I] > 0, [W, (P E - X F)'; *, P] > 0, tr W < g     energies of z after impulses at most g^2
 
 The blocks have the form of (30), so one P serves all channels and weighs channel i by 1/g_i. Leaving that weight free would
 push the noise gain down to its static floor, where the gains are not determined any more (0.6075 against 0.634 on the
@@ -25,6 +27,8 @@ from estimators.arrays import FloatArray
 from estimators.display import Display
 from synthesis.design.asked import check_channels, check_degree_and_poles, check_shares, minimised_channel
 from synthesis.design.gains_summary import gains_summary
+from synthesis.design.norms import ChannelSizes, Norm, compact_form, levels, per_sample, require_energy
+from synthesis.design.pole_regions import PoleRegions, require_regions
 from synthesis.design.refusals import refuse_undetectable
 from synthesis.design.three_solves import Problem, three_solves
 from synthesis.errors import ProblemError
@@ -40,9 +44,10 @@ from synthesis.polynomials.matrix import symmetric_block
 
 @dataclass(frozen=True, repr=False)
 class Channel(Display):
-    """The L2 gain from some disturbances to some estimation errors: bounded by `bound`, or minimised if None.
+    """The gain from some disturbances to some estimation errors: bounded by `bound`, or minimised if None.
 
-    `weights` multiply the disturbances (their sizes), in the order of `disturbances`.
+    `weights` multiply the disturbances (their sizes), in the order of `disturbances`. `norm` says what is meant by gain
+    (`synthesis.design.norms`): "H-infinity" (the L2 gain), "generalised H2" (the largest error by energy) or "H2".
 
     >>> Channel(("force", "noise"), ("velocity",), weights=(1.0, 0.002)).name
     'force+noise -> velocity'
@@ -52,6 +57,7 @@ class Channel(Display):
     errors: tuple[str, ...]
     bound: float | None = None
     weights: tuple[float, ...] | None = None
+    norm: Norm = "H-infinity"
 
     @property
     def name(self) -> str:
@@ -77,6 +83,7 @@ class ObserverDesign(Display):
     backoff: float = 0.01  # the minimised gain may be this fraction worse; what it buys is margin
     reserve: float = 0.01  # the pole band is designed this much tighter than it is claimed, for the table's sake
     settings: LmiSettings = field(default_factory=LmiSettings)
+    regions: PoleRegions = field(default_factory=PoleRegions)
 
     def __post_init__(self) -> None:
         check_channels(self.channels, [channel.errors for channel in self.channels], "error")
@@ -87,6 +94,11 @@ class ObserverDesign(Display):
     def minimised(self) -> Channel:
         """The channel without a bound."""
         return minimised_channel(self.channels)
+
+    @property
+    def compact(self) -> bool:
+        """Whether the solver minimises the square of the level (`synthesis.design.norms`)."""
+        return compact_form([channel.norm for channel in self.channels])
 
 
 @dataclass(frozen=True, repr=False)
@@ -159,7 +171,8 @@ def minimised(
     refuse_undetectable(model)
 
     def level(objective: float) -> float:
-        return to_gamma(model, design, scale, objective)
+        found = to_gamma(model, design, scale, objective)
+        return found if sample_time is None else found / per_sample(design.minimised.norm, sample_time)
 
     found = three_solves(model.name, problem, level, design.backoff, design.settings)
     return ObserverGains(
@@ -214,14 +227,9 @@ def error_unit(model: LpvModel, design: ObserverDesign, scale: FloatArray) -> fl
     return max(float(np.abs(channel_matrices(model, channel)[1] / scale).max()) for channel in design.channels)
 
 
-def objective_name(design: ObserverDesign) -> str:
-    """What the first solve minimises: gamma^2 in the compact form of a single channel, else gamma."""
-    return "gamma^2" if len(design.channels) == 1 else "gamma"
-
-
 def to_gamma(model: LpvModel, design: ObserverDesign, scale: FloatArray, objective: float) -> float:
     """The gain that belongs to an objective value of `observer_problem`."""
-    return error_unit(model, design, scale) * float(np.sqrt(objective) if len(design.channels) == 1 else objective)
+    return error_unit(model, design, scale) * float(np.sqrt(objective) if design.compact else objective)
 
 
 def observer_problem(
@@ -269,30 +277,27 @@ def observer_problem(
     if design.fastest_pole is not None:
         fastest = 2.0 * design.fastest_pole / (1.0 + design.reserve) / clock
         problem.require("fastest pole", frozen + P.scaled_by(below) * fastest)
-    compact = len(design.channels) == 1
+    if design.regions:
+        require_regions(problem, design.regions, design.reserve, clock, closed, P.scaled_by(below))
     for channel in design.channels:
         d, z = channel_matrices(model, channel)
         z = z / unit
         force = (P @ known["E"] - X @ known["F"]) @ problem.constant(d) * (1.0 / clock)
         inputs, errors = problem.constant(np.eye(d.shape[1])), problem.constant(np.eye(len(z)))
-        level = channel.bound or gamma
-        if level is None:
-            unknown_level = problem.scalar(objective_name(design))
-            problem.minimise(objective_name(design))
+        level, bounded = channel.bound or gamma, channel.bound is not None
+        near, far = levels(problem, channel.name, bounded, None if level is None else level / unit, design.compact)
+        output = problem.constant(z / scale).scaled_by(below)
+        if channel.norm != "H-infinity":
+            sizes = ChannelSizes(channel.name, channel.norm, design.degree, far, near)
+            require_energy(problem, sizes, -phi, force, output.scaled_by(near), P, below, clock)
+            continue
+        outside = -inputs.scaled_by(far.scaled_by(below))
+        if design.compact:  # Schur complement of (30), with P scaled by gamma: a smaller block for the same bound
+            corner = phi + problem.constant(z.T @ z / np.outer(scale, scale)).scaled_by(below).scaled_by(near)
+            block = symmetric_block([[corner, force], [None, outside]])
         else:
-            unknown_level = problem.constant(np.array([[(level / unit) ** 2 if compact else level / unit]]))
-        unknown_level = unknown_level.scaled_by(below)
-        if compact:  # Schur complement of (30), with P scaled by gamma: a smaller block for the same bound
-            corner = phi + problem.constant(z.T @ z / np.outer(scale, scale)).scaled_by(below)
-            block = symmetric_block([[corner, force], [None, -inputs.scaled_by(unknown_level)]])
-        else:
-            output = problem.constant((z / scale).T).scaled_by(below)
             block = symmetric_block(
-                [
-                    [phi, force, output],
-                    [None, -inputs.scaled_by(unknown_level), None],
-                    [None, None, -errors.scaled_by(unknown_level)],
-                ]
+                [[phi, force, output.T], [None, outside, None], [None, None, -errors.scaled_by(near.scaled_by(below))]]
             )
         problem.require(f"gain {channel.name}", -block)
     return problem

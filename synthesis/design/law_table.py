@@ -80,7 +80,8 @@ def table_at(gains: Gains, points: FloatArray, sample_time: float) -> FloatArray
     Ak, Bk, Ck, Dk = gains.controller(points)
     if gains.order:
         D = gains.model.on(points).D
-        through = gains.measured == "outputs" and bool(D.any())
+        used = (Bk.any(axis=(0, 1)) | Dk.any(axis=(0, 1))) if gains.measured == "outputs" else np.zeros(0, dtype=bool)
+        through = gains.measured == "outputs" and bool(D[:, used].any())
         Ak, Bk, Ck, Dk = (_held if through else _trapezoidal)(Ak, Bk, Ck, Dk, sample_time)
     return np.concatenate([np.concatenate([Ak, Bk], axis=2), np.concatenate([Ck, Dk], axis=2)], axis=1)
 

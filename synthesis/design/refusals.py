@@ -10,6 +10,7 @@ from flint import fmpq, fmpq_mat
 
 from estimators.arrays import FloatArray
 from synthesis.certificate.refute import undetectable_place
+from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.errors import ProblemError
 from synthesis.loop.from_model import plant_of
 from synthesis.models.lpv import LpvModel
@@ -49,6 +50,21 @@ def refuse_unstabilisable(model: LpvModel) -> None:
             f"model '{model.name}' is not stabilisable at {_where(model, place)}: a mode that does not decay "
             f"({_mode(here.A[0].T, here.B[0].T)}) is moved by none of the input(s) "
             f"{', '.join(u.name for u in model.inputs)}; give it an input, or shrink the range"
+        )
+
+
+def refuse_feedthrough(model: LpvModel, channel: FeedbackChannel, Z: FloatArray, W: FloatArray) -> None:
+    """Raise ProblemError where a disturbance acts at once on a signal whose peak or impulse energy is asked for.
+
+    W (nd, k) and Z (m, nx + ny + nu) as `synthesis.design.feedback_channel.feedback_channel_matrices` has them.
+    """
+    nx, ny = len(model.states), len(model.outputs)
+    through = np.abs(Z[:, nx : nx + ny] @ model.polynomial.F @ W).max(axis=tuple(range(len(model.parameters))))
+    if through.any():
+        i, j = np.argwhere(through)[0]
+        raise ProblemError(
+            f"channel '{channel.name}': the disturbance '{channel.disturbances[j]}' acts on '{channel.performance[i]}' at once "
+            f"(F), so its {channel.norm} norm is infinite in continuous time; leave one of them out, or take a sampled law"
         )
 
 

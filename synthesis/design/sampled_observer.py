@@ -8,7 +8,8 @@ X = G K (de Oliveira, Bernussou, Geromel 1999) K needs no P+, which is not known
     decay a    [exp(-2 a T) P, *; G Phi - X C, G + G' - P+] > 0          |e|_P falls by exp(-a T) in every sample
     channel    [P, *, *, *; 0, g I, *, *; G Phi - X C, (G Gamma - X F) W, G + G' - P+, *; Z, 0, 0, g I] > 0
 
-prove an l2 gain below g (with inputs and errors both weighted by sqrt(T) it is that of continuous signals). One P and one G serve
+prove an l2 gain below g (with inputs and errors both weighted by sqrt(T) it is that of continuous signals). Other norms have a
+pair of their own in the place of the last, and levels of continuous time (`synthesis.design.norms`). One P and one G serve
 all channels, so channel i is weighed by 1/g_i. Phi and Gamma are fitted by Chebyshev polynomials in the parameters to 1e-10; what
 comes out is proved for the exact ones (`synthesis.certificate`).
 """
@@ -28,15 +29,16 @@ from synthesis.design.hinf_observer import (
     design_scale,
     error_unit,
     minimised,
-    objective_name,
     outputs_of,
 )
+from synthesis.design.norms import ChannelSizes, levels, per_sample, require_sampled_energy
+from synthesis.design.pole_regions import refuse_regions
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.motion import one_sample_later, rates
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import MatrixPolynomial, symmetric_block, variable
+from synthesis.polynomials.matrix import symmetric_block, variable
 
 POINTS = 40  # for each parameter; what holds between them is proved for the table that is deployed
 
@@ -52,6 +54,7 @@ def design_sampled_observer(model: LpvModel, design: ObserverDesign, sample_time
     >>> print(gains.verdict, gains.update, gains.sample_time)
     certified sampled 0.005
     """
+    refuse_regions(design.regions)
     if not sample_time > 0.0:
         raise ProblemError(f"sample time {sample_time} s must be positive")
     if design.fastest_pole is not None:
@@ -102,23 +105,24 @@ def _problem(
     if design.decay_rate > 0.0 or not design.channels:
         kept = float(np.exp(-2.0 * design.decay_rate * (1.0 + design.reserve) * period))
         problem.require("decay over a sample", symmetric_block([[P * kept, closed.T], [None, slack]]))
-    unit, compact = error_unit(model, design, scale), len(design.channels) == 1
+    unit = error_unit(model, design, scale)
     for channel in design.channels:
         d, z = channel_matrices(model, channel)
         z = z / unit / scale
         forced = (G @ known["Gamma"] - X @ known["F"]) @ problem.constant(d)
-        level = channel.bound or gamma
-        if level is None:
-            size: MatrixPolynomial = problem.scalar(objective_name(design))
-            problem.minimise(objective_name(design))
-        else:
-            size = problem.constant(np.array([[(level / unit) ** 2 if compact else level / unit]]))
-        inputs = problem.constant(np.eye(d.shape[1])).scaled_by(size)
-        if compact:
-            top = P - problem.constant(z.T @ z)
+        level, bounded = channel.bound or gamma, channel.bound is not None
+        ratio = None if level is None else level * per_sample(channel.norm, period) / unit
+        near, far = levels(problem, channel.name, bounded, ratio, design.compact)
+        if channel.norm != "H-infinity":
+            sizes = ChannelSizes(channel.name, channel.norm, design.degree, far, near)
+            require_sampled_energy(problem, sizes, slack, closed, P, forced, problem.constant(z).scaled_by(near))
+            continue
+        inputs = problem.constant(np.eye(d.shape[1])).scaled_by(far)
+        if design.compact:
+            top = P - problem.constant(z.T @ z).scaled_by(near)
             rows = [[top, None, closed.T], [None, inputs, forced.T], [None, None, slack]]
         else:
-            output, errors = problem.constant(z.T), problem.constant(np.eye(len(z))).scaled_by(size)
+            output, errors = problem.constant(z.T), problem.constant(np.eye(len(z))).scaled_by(near)
             rows = [
                 [P, None, closed.T, output], [None, inputs, forced.T, None], [None, None, slack, None],
                 [None, None, None, errors],

@@ -8,7 +8,8 @@ With V = x'Q(p)^-1 x, Q+ = Q one sample later, a slack matrix G(p) and Y = K G (
     channel      [Q+, Phi G + Gamma Y, Gamma_E W, 0; *, G + G' - Q, 0, (Cz G + Dz Y)'; *, *, g I, (Fz W)'; *, *, *, g I] > 0
     limit        as in `synthesis.design.state_feedback`, with G + G' - Q in the place of Q below Y_i
 
-prove an l2 gain below g. K needs no Q+, which is not known when it is used. Phi and the Gammas are fitted by Chebyshev
+prove an l2 gain below g. Other norms have a pair of their own in the place of the last, and levels of continuous time
+(`synthesis.design.norms`). K needs no Q+, which is not known when it is used. Phi and the Gammas are fitted by Chebyshev
 polynomials to 1e-10, those of a rational model as well as degree 24 does; what comes out is proved for the exact ones
 (`synthesis.certificate`). Cz, Dz and Fz of a rational model are numerators, and g I in the last row takes its denominator twice.
 Where samples are long against the loop, this is the design to take: the one in continuous time knows nothing of them.
@@ -24,6 +25,8 @@ from estimators.arrays import FloatArray
 from synthesis.design.feedback_channel import feedback_channel_matrices
 from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
 from synthesis.design.fitted_update import fitted_update
+from synthesis.design.norms import ChannelSizes, levels, per_sample, require_sampled_energy
+from synthesis.design.pole_regions import refuse_regions
 from synthesis.design.refusals import refuse_unstabilisable
 from synthesis.design.state_feedback import (
     StateFeedbackDesign,
@@ -60,6 +63,7 @@ def design_sampled_state_feedback(
     >>> print(design_sampled_state_feedback(plant, asked, sample_time=0.05).verdict)
     certified
     """
+    refuse_regions(design.regions)
     if not sample_time > 0.0:
         raise ProblemError(f"sample time {sample_time} s must be positive")
     given = next((name for name in ("fastest_pole", "damping") if getattr(design, name) is not None), None)
@@ -80,7 +84,8 @@ def design_sampled_state_feedback(
         return _problem(model, design, scale, sample_time, fitted, gamma, maximise_margin, floor)
 
     def level(objective: float) -> float:
-        return scale.disturbance * float(np.sqrt(objective) if len(design.channels) == 1 else objective)
+        found = scale.disturbance * float(np.sqrt(objective) if design.compact else objective)
+        return found / per_sample(design.minimised.norm, sample_time)
 
     found = three_solves(model.name, problem, level, design.backoff, design.settings)
     return StateFeedbackGains(
@@ -122,26 +127,25 @@ def _problem(
         problem.require("decay over a sample", symmetric_block([[later * kept, closed], [None, slack]]))
     if design.limits is not None:
         require_limits(problem, model, design.limits, design.reserve, scale, Q, slack, Y)
-    name = "gamma^2" if len(design.channels) == 1 else "gamma"
     for channel in design.channels:
         W, Z = feedback_channel_matrices(model, channel)
         W = W / scale.disturbance
         seen = performance(problem, Z, known, G, Y, model, scale)
         through = problem.constant(Z[:, nx : len(Z.T) - nu]) @ known["F"] @ problem.constant(W)
-        level = channel.bound or gamma
-        if level is None:
-            size: MatrixPolynomial = problem.scalar(name)
-            problem.minimise(name)
-        else:
-            ratio = level / scale.disturbance
-            size = problem.constant(np.array([[ratio**2 if name == "gamma^2" else ratio]]))
-        inner, outer = problem.constant(np.eye(W.shape[1])), problem.constant(np.eye(len(Z))).scaled_by(size)
-        outer = outer.scaled_by(known["denominator"]).scaled_by(
-            known["denominator"]
-        )  # `seen` and `through` are over it
-        inner = inner if name == "gamma^2" else inner.scaled_by(size)
+        driven = Gamma_E @ problem.constant(W)
+        level, bounded = channel.bound or gamma, channel.bound is not None
+        ratio = None if level is None else level * per_sample(channel.norm, period) / scale.disturbance
+        near, far = levels(problem, channel.name, bounded, ratio, design.compact)
+        if design.compact:
+            driven, through = driven.scaled_by(near), through.scaled_by(near)
+        far = far.scaled_by(known["denominator"]).scaled_by(known["denominator"])  # `seen` and `through` are over it
+        if channel.norm != "H-infinity":
+            sizes = ChannelSizes(channel.name, channel.norm, design.degree, near, far)
+            require_sampled_energy(problem, sizes, later, closed, slack, driven, seen, through)
+            continue
+        inner, outer = (problem.constant(np.eye(k)).scaled_by(size) for k, size in ((W.shape[1], near), (len(Z), far)))
         rows: list[list[MatrixPolynomial | None]] = [
-            [later, closed, Gamma_E @ problem.constant(W), None],
+            [later, closed, driven, None],
             [None, slack, None, seen.T],
             [None, None, inner, through.T],
             [None, None, None, outer],

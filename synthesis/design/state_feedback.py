@@ -7,6 +7,8 @@ Geromel 1989; Wu, Yang, Packard, Becker 1996; regions: Chilali, Gahinet 1996):
     fastest pole   [r Q, M; M', r Q] > 0                                     every frozen pole s has |s| < r
     damping        -[sin a (M + M'), cos a (M - M'); *, sin a (M + M')] > 0  |Im s| < tan a |Re s|, cos a the damping ratio
     channel        -[M + M' - dQ/dt, E, (Cz Q + Dz Y)'; *, -g I, Fz'; *, *, -g I] > 0        L2 gain from d to z at most g
+    generalised H2 [-(M + M' - dQ/dt), -E; *, g I] > 0, [Q, (Cz Q + Dz Y)'; *, g I] > 0     |z| at most g (energy of d)^(1/2)
+    H2             [-(M + M' - dQ/dt), -(Cz Q + Dz Y)'; *, g I] > 0, [W, E'; *, Q] > 0, tr W < g    energies after impulses
     limit of u_i   [q c^2, Y_i; *, Q] > 0,  Q > q S^2                        |K_i x| < c for all x with x'S^-2 x <= 1
 
 One Q serves all channels and weighs channel i by 1/g_i. A denominator of a rational model multiplies every inequality (it is
@@ -28,7 +30,9 @@ from estimators.errors import unknown
 from synthesis.design.asked import check_degree_and_poles, check_shares, minimised_channel
 from synthesis.design.feedback_channel import FeedbackChannel, check_feedback_channels, feedback_channel_matrices
 from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
-from synthesis.design.refusals import refuse_unstabilisable
+from synthesis.design.norms import NORMS, ChannelSizes, compact_form, levels, require_energy
+from synthesis.design.pole_regions import PoleRegions, require_damping, require_disc, require_regions
+from synthesis.design.refusals import refuse_feedthrough, refuse_unstabilisable
 from synthesis.design.three_solves import three_solves
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
@@ -71,10 +75,13 @@ class StateFeedbackDesign(Display):
     backoff: float = 0.01  # the minimised gain may be this fraction worse; what it buys is margin
     reserve: float = 0.01  # regions and limits are designed this much tighter than they are asked for
     settings: LmiSettings = field(default_factory=LmiSettings)
+    regions: PoleRegions = field(default_factory=PoleRegions)
 
     def __post_init__(self) -> None:
-        check_feedback_channels(self.channels)
+        check_feedback_channels(self.channels, NORMS)
         check_degree_and_poles(self.degree, self.decay_rate, self.fastest_pole)
+        if self.damping is not None and self.regions.damping is not None:
+            raise ProblemError("damping and regions.damping ask for the same twice; remove one")
         if self.damping is not None and not 0.0 < self.damping < 1.0:
             raise ProblemError(f"damping {self.damping} must be a damping ratio between 0 and 1")
         check_shares(self.backoff, self.reserve)
@@ -83,6 +90,11 @@ class StateFeedbackDesign(Display):
     def minimised(self) -> FeedbackChannel:
         """The channel without a bound."""
         return minimised_channel(self.channels)
+
+    @property
+    def compact(self) -> bool:
+        """Whether the solver minimises the square of the level (`synthesis.design.norms`)."""
+        return compact_form([channel.norm for channel in self.channels])
 
 
 @dataclass(frozen=True, repr=False)
@@ -149,7 +161,7 @@ def design_state_feedback(model: LpvModel, design: StateFeedbackDesign) -> State
         return state_feedback_problem(model, design, scale, gamma, maximise_margin, floor)
 
     def level(objective: float) -> float:
-        return scale.disturbance * float(np.sqrt(objective) if len(design.channels) == 1 else objective)
+        return scale.disturbance * float(np.sqrt(objective) if design.compact else objective)
 
     found = three_solves(model.name, problem, level, design.backoff, design.settings)
     return StateFeedbackGains(design, model, found.gamma_lower, found.gamma, found.result, found.optimum, scale)
@@ -192,12 +204,12 @@ def state_feedback_problem(
         decay = 2.0 * design.decay_rate * (1.0 + design.reserve) / clock
         problem.require("decay rate", falling - Q.scaled_by(below) * decay)
     if design.fastest_pole is not None:
-        round_ = Q.scaled_by(below) * (design.fastest_pole / (1.0 + design.reserve) / clock)
-        problem.require("fastest pole", symmetric_block([[round_, M], [None, round_]]))
+        radius = design.fastest_pole / (1.0 + design.reserve) / clock
+        require_disc(problem, "fastest pole", radius, M, Q.scaled_by(below))
     if design.damping is not None:
-        cosine = design.damping + design.reserve * (1.0 - design.damping)
-        both, across = (M + M.T) * -float(np.sqrt(1.0 - cosine**2)), (M.T - M) * cosine
-        problem.require("damping", symmetric_block([[both, across], [None, both]]))
+        require_damping(problem, design.damping + design.reserve * (1.0 - design.damping), M)
+    if design.regions:
+        require_regions(problem, design.regions, design.reserve, clock, M, Q.scaled_by(below))
     if design.limits is not None:
         require_limits(problem, model, design.limits, design.reserve, scale, Q, Q, Y)
     for channel in design.channels:
@@ -205,20 +217,24 @@ def state_feedback_problem(
         seen = performance(problem, Z, known, Q, Y, model, scale) * (1.0 / clock)
         force = known["E"] @ problem.constant(W / scale.disturbance)
         through = problem.constant(Z[:, nx : len(Z.T) - nu]) @ known["F"] @ problem.constant(W / scale.disturbance)
-        level = channel.bound or gamma
-        name = "gamma^2" if len(design.channels) == 1 else "gamma"
-        if level is None:
-            size: MatrixPolynomial = problem.scalar(name)
-            problem.minimise(name)
-        else:
-            ratio = level / scale.disturbance
-            size = problem.constant(np.array([[ratio**2 if name == "gamma^2" else ratio]]))
-        ins, outs = (problem.constant(np.eye(k)).scaled_by(below) for k in (W.shape[1], len(Z)))
-        inner = ins if name == "gamma^2" else ins.scaled_by(size)
+        level, bounded = channel.bound or gamma, channel.bound is not None
+        ratio = None if level is None else level / scale.disturbance
+        near, far = levels(problem, channel.name, bounded, ratio, design.compact)
+        if design.compact:
+            force, through = force.scaled_by(near), through.scaled_by(near)
+        if channel.norm != "H-infinity":
+            refuse_feedthrough(model, channel, Z, W)
+            sizes = ChannelSizes(channel.name, channel.norm, design.degree, near, far)
+            require_energy(problem, sizes, falling, force, seen, Q, below, clock)
+            continue
+        inner, outer = (
+            problem.constant(np.eye(k)).scaled_by(below).scaled_by(size)
+            for k, size in ((W.shape[1], near), (len(Z), far))
+        )
         rows: list[list[MatrixPolynomial | None]] = [
             [falling, -force, -seen.T],
             [None, inner, -through.T],
-            [None, None, outs.scaled_by(size)],
+            [None, None, outer],
         ]
         problem.require(f"gain {channel.name}", symmetric_block(rows))
     return problem

@@ -103,3 +103,7 @@ class Sampling:
     def exp(self, exponent: Any) -> float:
         """e^x."""
         return float(np.exp(exponent))
+
+    def cos(self, angle: Any) -> float:
+        """The cosine."""
+        return float(np.cos(angle))

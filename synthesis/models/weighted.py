@@ -12,12 +12,15 @@ import sympy as sp
 from estimators.errors import unknown
 from synthesis.errors import ModelError
 from synthesis.models.lpv import LpvModel
-from synthesis.models.param import Signal
+from synthesis.models.param import Constant, Signal
+
+RATE = "weight_rate"
 
 
 @dataclass(frozen=True)
 class _Filter:
     name: str
+    unit: str
     A: sp.Matrix
     B: sp.Matrix
     C: sp.Matrix
@@ -25,7 +28,7 @@ class _Filter:
 
     @property
     def states(self) -> tuple[Signal, ...]:
-        return tuple(Signal(f"{self.name}_weight_{i + 1}", "1") for i in range(self.A.shape[0]))
+        return tuple(Signal(f"{self.name}_weight_{i + 1}", self.unit) for i in range(self.A.shape[0]))
 
 
 def weighted(model: LpvModel, weights: Mapping[str, Any]) -> LpvModel:
@@ -35,7 +38,8 @@ def weighted(model: LpvModel, weights: Mapping[str, Any]) -> LpvModel:
     `control.TransferFunction`). A weight at a state, output or input adds the output `NAME_weighted` to the model; a design that
     must not measure it names its `measured` outputs. A weight at a disturbance shapes it: the disturbance keeps its name and
     stands for what enters the weight. Every weight adds its states, `NAME_weight_1` and so on; numbers are taken as the decimals
-    that they show.
+    that they show. Gains of weights are pure numbers: states and outputs that are added have the unit of the signal, and a
+    constant `weight_rate` of 1 1/s gives coefficients their unit (but in a model where everything has the unit 1).
 
     Raises ModelError for an unknown signal, and a weight that is no such system.
 
@@ -52,7 +56,10 @@ def weighted(model: LpvModel, weights: Mapping[str, Any]) -> LpvModel:
     for name in weights:
         if name not in [*shown, *driven]:
             raise ModelError(f"model '{model.name}', weights: {unknown('signal', name, [*shown, *driven])}")
-    filters = {name: _filter(model, name, weight) for name, weight in weights.items()}
+    rate, constants = _rate(model)
+    filters = {name: _filter(model, name, weight, rate) for name, weight in weights.items()}
+    if not any(f.states for f in filters.values()):
+        constants = model.constants
     before = [filters[name] for name in driven if name in filters]
     after = [filters[name] for name in shown if name in filters]
     n, nu, nd = len(model.states), len(model.inputs), len(driven)
@@ -82,9 +89,9 @@ def weighted(model: LpvModel, weights: Mapping[str, Any]) -> LpvModel:
         states=(*model.states, *(s for f in (*after, *before) for s in f.states)),
         inputs=model.inputs,
         disturbances=model.disturbances,
-        outputs=(*model.outputs, *(Signal(f"{f.name}_weighted", "1") for f in after)),
+        outputs=(*model.outputs, *(Signal(f"{f.name}_weighted", f.unit) for f in after)),
         parameters=model.parameters,
-        constants=model.constants,
+        constants=constants,
         A=_blocks([A, sp.zeros(n, Aa.shape[0]), E * shaped], [Ba * of_x, Aa, Ba * of_d * shaped], [None, None, Ab]),
         B=sp.Matrix.vstack(B, Ba * of_u, sp.zeros(nb, nu)),
         C=_blocks([C, sp.zeros(C.shape[0], Aa.shape[0]), F * shaped], [Da * of_x, Ca, Da * of_d * shaped]),
@@ -115,7 +122,15 @@ def _beside(filters: list[_Filter]) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix, sp
     return A, B, C, D
 
 
-def _filter(model: LpvModel, name: str, weight: Any) -> _Filter:
+def _rate(model: LpvModel) -> tuple[sp.Expr, Mapping[str, Constant]]:
+    """What coefficients of a weight per second are multiplied by, and the constants with it."""
+    signals = (*model.states, *model.inputs, *model.outputs, *model.disturbances, *model.parameters)
+    if all(named.unit == "1" for named in (*signals, *model.constants.values())):
+        return sp.Integer(1), model.constants
+    return sp.Symbol(RATE), {**model.constants, RATE: Constant(1.0, "1/s", "unit of the weights' coefficients")}
+
+
+def _filter(model: LpvModel, name: str, weight: Any, rate: sp.Expr) -> _Filter:
     import control  # half a second: paid by those who use it
 
     where = f"model '{model.name}', weight of '{name}'"
@@ -134,7 +149,8 @@ def _filter(model: LpvModel, name: str, weight: Any) -> _Filter:
     if not all(np.isfinite(m).all() for m in matrices):
         raise ModelError(f"{where} has coefficients that are not finite")
     A, B, C, D = (sp.Matrix(*m.shape, [_decimal(x) for x in m.ravel()]) for m in matrices)
-    return _Filter(name, A, B, C, D[0, 0])
+    named = (*model.states, *model.outputs, *model.inputs, *model.disturbances)
+    return _Filter(name, next(s.unit for s in named if s.name == name), A * rate, B * rate, C, D[0, 0])
 
 
 def _decimal(number: float) -> sp.Rational:

@@ -225,3 +225,9 @@ class BoxArithmetic:
         from flint import arb
 
         return arb(exponent).exp()
+
+    def cos(self, angle: Any) -> Any:
+        """The cosine as a ball."""
+        from flint import arb
+
+        return arb(angle).cos()

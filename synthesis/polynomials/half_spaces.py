@@ -120,7 +120,7 @@ class Faces:
     @property
     def slack(self) -> FloatArray:
         """What counts as rounding, for each inequality."""
-        return NEAR * np.abs(self.normals).sum(axis=1)
+        return np.asarray(NEAR * np.abs(self.normals).sum(axis=1))
 
     def inside(self, points: FloatArray) -> BoolArray:
         """Which places (.., p) are in the set; more coordinates than p are not looked at."""
@@ -137,7 +137,7 @@ class Faces:
         """Places (.., p) outside moved straight towards the middle of the set, up to its border (and within by rounding)."""
         centre = self.corners.mean(axis=0)
         step = points - centre
-        return np.asarray(centre + self._shares(step, centre).min(axis=-1)[..., None] * step)
+        return np.asarray(centre + self._shares(step, centre).min(axis=-1)[..., None] * step, np.float64)
 
     def _shares(self, step: FloatArray, centre: FloatArray) -> FloatArray:
         """The part (.., m) of every way from the centre that each inequality leaves, one at most."""

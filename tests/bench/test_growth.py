@@ -18,7 +18,7 @@ import pytest
 from estimators import GainSchedule, LpvObserver
 from synthesis.certificate.levels import held_claims
 from synthesis.certificate.proof import certificate, prove
-from synthesis.certificate.search import Search
+from synthesis.certificate.search import Search, Wish
 from synthesis.design.deploy import claim_channel, deploy, names_of, tabulate
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.export import schedule_content
@@ -114,8 +114,8 @@ def test_certify_a_table_of_ten_by_ten_cells(benchmark: Any) -> None:
     search = Search(
         deployed_loop(gains, lines, table, 0.005), names_of(model), model.parameters, 1, gains.design.settings
     )
-    channels = [claim_channel(channel) for channel in gains.design.channels]
-    claims = held_claims(search, channels, 0.05, 100.0, DeploySettings().settle)
+    wishes = [Wish("gain", None, claim_channel(channel)) for channel in gains.design.channels]
+    claims = held_claims(search, wishes, 0.05, 100.0, DeploySettings().settle)
     assert claims is not None
     content = schedule_content(type(small)(gains, small.settings, lines, table, claims, 0.0), "ten by ten")
     found = benchmark.pedantic(certificate, (content,), rounds=3)

@@ -21,8 +21,10 @@ from estimators.schedule import check_content
 from studies.report.frozen_levels import frozen_levels
 from studies.report.schedule_figures import gain_figure
 from synthesis.certificate.claims import ClaimChannel
+from synthesis.certificate.frozen import frozen_level
 from synthesis.certificate.levels import best_gain
 from synthesis.certificate.proof import certificate, prove
+from synthesis.certificate.refute import refuting_place
 from synthesis.certificate.search import Search, Wish
 from synthesis.design.deploy import Deployment, deploy
 from synthesis.design.deploy_settings import DeploySettings
@@ -125,12 +127,17 @@ def test_h2_and_peak_claims_about_a_law(deployment: Deployment) -> None:
     A, B = Phi + Gamma[:, :1] @ K[0], Gamma[:, 1:]
     C = np.vstack([[1.0, 0.0], m.C[0, 1] + m.D[0, 1] @ K[0], K[0]]) / np.array([[0.5], [4.0], [1.0]])
     D = np.array([[0.0], [0.25], [0.0]])
-    S = C @ solve_discrete_lyapunov(A, B @ B.T) @ C.T + D @ D.T
+    S = (C @ solve_discrete_lyapunov(A, B @ B.T) @ C.T + D @ D.T) / PERIOD  # of signals in continuous time
     for level, there in zip(frozen_levels(content)[1:], (np.trace(S), np.linalg.eigvalsh(S)[-1]), strict=True):
         assert level.slack >= 0.0 and level.values[-1] == pytest.approx(np.sqrt(there), rel=1e-6)
         assert level.level < 1.5 * level.values.max()
-    for claim in found:
-        assert not search.verifier.prove(replace(claim, level=0.7 * claim.level)).proved
+    for number, claim in enumerate(found):
+        lower = replace(claim, level=0.7 * claim.level)
+        assert not search.verifier.prove(lower).proved and refuting_place(search.verifier, lower) is not None
+        assert refuting_place(search.verifier, claim) is None
+        Z, W = np.eye(5)[[0, 3, 4]] / np.array([[0.5], [4.0], [1.0]]), np.ones((1, 1))
+        frozen = frozen_level(loop, W, Z, claim.kind)
+        assert frozen == pytest.approx(frozen_levels(content)[1 + number].values.max(), rel=1e-6)
 
 
 def test_a_better_claim_and_a_wrong_sign_are_not_proved(content: dict[str, Any]) -> None:

@@ -218,7 +218,7 @@ def test_claims_over_two_parameters_and_what_they_are_called() -> None:
     loop = FeedbackLoop(plant_of(model), lines, table, sample_time=decimal(PERIOD))
     search = search_of(loop, model)
     channel = ClaimChannel({"d1": 0.5}, ("x1", "u1"), (0.2, 3.0))
-    claims = feedback_claims(search, [channel], 0.01)
+    claims = feedback_claims(search, [Wish("gain", None, channel)], 0.01)
     assert claims is not None and [claim.kind for claim in claims] == ["sampled error", "sampled gain"]
     for claim in claims:
         assert Verifier(loop, search.names).prove(claim).proved

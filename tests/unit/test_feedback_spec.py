@@ -69,6 +69,12 @@ SPECS = {
     "limits": ("strut_force = [-3000.0", "strut = [-3000.0", "'strut' is no input of model 'quarter-car'; inputs: strut_force"),
     "reversed": ("[-3000.0, 3000.0]", "[3000.0, -3000.0]", "empty, reversed or not finite"),
     "damping": ("degree = 1", "degree = 1\ndamping = 1.5", "damping ratio between 0 and 1"),
+    "norm": ("weights = [0.5]", 'weights = [0.5]\nnorm = "H3"', r"design\.channels\[0\]\.norm"),
+    "feedthrough": (
+        'disturbances = ["road_velocity"]|weights = [0.5]|"suspension_deflection"',
+        'disturbances = ["acceleration_noise"]|norm = "generalised H2"|"measured_deflection"',
+        r"'acceleration_noise' acts on 'measured_body_acceleration' at once \(F\), so its generalised H2 norm is infinite",
+    ),
     "singular": (
         f"fastest_pole|{PERFORMANCE}|0.5, 0.1, 0.02, 500.0",
         '# fastest_pole|["suspension_deflection", "tire_deflection"]|0.1, 0.02',

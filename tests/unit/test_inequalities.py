@@ -190,17 +190,17 @@ def test_h2_norms_are_what_gramians_say(time: Time, seed: int) -> None:
         case.D = np.zeros((2, 2))
         P = solve_continuous_lyapunov(case.A.T, -case.C.T @ case.C - small)
         X = solve_continuous_lyapunov(case.A, -case.B @ case.B.T - small)
-        kinds, later = ("H2 norm", "energy to peak"), np.zeros((3, 3))
+        kinds, later, root = ("H2 norm", "energy to peak"), np.zeros((3, 3)), 1.0
     else:
         P = solve_discrete_lyapunov(case.A.T, case.C.T @ case.C + small)
         X = solve_discrete_lyapunov(case.A, case.B @ case.B.T + small)
-        kinds, later = ("sampled H2 norm", "sampled energy to peak"), P
-    norm = float(np.sqrt(np.trace(case.B.T @ P @ case.B + case.D.T @ case.D)))
+        kinds, later, root = ("sampled H2 norm", "sampled energy to peak"), P, np.sqrt(PERIOD)  # sums and integrals
+    norm = float(np.sqrt(np.trace(case.B.T @ P @ case.B + case.D.T @ case.D))) / root
     assert case.holds(kinds[0], 1.01 * norm, P, later)
     assert not case.holds(kinds[0], 0.99 * norm, P, later)
     assert not case.holds(kinds[0], 1.01 * norm, 0.98 * P, 0.98 * later)
     peak = float(np.sqrt(np.linalg.eigvalsh(case.C @ X @ case.C.T + case.D @ case.D.T)[-1]))
-    stored = np.linalg.inv(X) * (1.01 * peak) ** 2
+    stored, peak = np.linalg.inv(X) * (1.01 * peak) ** 2, peak / root
     after = later if time == "continuous" else stored
     assert case.holds(kinds[1], 1.02 * peak, stored, after)
     smaller = stored * (0.98 / 1.01) ** 2

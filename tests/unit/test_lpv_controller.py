@@ -232,3 +232,18 @@ def test_what_is_no_controller_is_refused() -> None:
         LpvController(schedule).step(np.zeros(3), 0.5)
     with pytest.raises(ScheduleError, match="overflow float64"):
         LpvController(law_schedule(table=np.full((3, 4, 4), 1e60)))
+
+
+def test_what_no_gain_uses_needs_no_value() -> None:
+    """An output that only weighs in the design: NaN in its place is no lost sample, in the place of the other it is."""
+    schedule = law_schedule()
+    table = schedule.table.copy()
+    table[..., 3] = 0.0  # of two own states and two outputs
+    controllers = [LpvController(law_schedule(table=table)) for _ in range(2)]
+    for value in (0.4, -0.2):
+        steps = [one.step([value, other], 0.9) for one, other in zip(controllers, (np.nan, 7.0), strict=True)]
+        assert steps[0].used and steps[0].flags == steps[1].flags
+        np.testing.assert_array_equal(steps[0].command, steps[1].command)
+    controllers[0].start([0.1, 0.1], [0.3, np.nan], 0.9)
+    assert not controllers[0].step([np.nan, 0.0], 0.9).used
+    assert not LpvController(schedule).step([0.4, np.nan], 0.9).used

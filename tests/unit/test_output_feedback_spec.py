@@ -67,6 +67,9 @@ CASES = {
     "start": (LAW, "degree = 1", "degree = 1\nstart = [[1.0]]", 'name another law: law = "static output feedback"'),
     "measured": (LAW, "degree = 1", 'degree = 1\nmeasured = ["measured_deflecton"]', "did you mean measured_deflection"),
     "errors": (LAW, "performance = [", "errors = [", "errors is not for the law 'output feedback'; give performance"),
+    "norm": (
+        LAW, "weights = [", 'norm = "generalised H2"\nweights = [', "norm = .* is not for the law 'output",
+    ),
     "noise": (
         LAW, 'fastest_pole = 400.0 # 1/s, imaginary parts counted\n\n[[design.channels]]\ndisturbances = ["road_velocity", '
         '"deflection_noise", "acceleration_noise"]\nweights = [0.5, 0.001, 0.1]',
