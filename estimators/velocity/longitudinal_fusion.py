@@ -29,11 +29,12 @@ from estimators.velocity.fusion_inputs import ConditionedInputs
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.speed_filter_few import speed_filter
 
-SPEED, BIAS, GRADE, SCALE, SLIP, RADIUS = 0, 1, 2, 3, 4, 5  # places in the state; RADIUS is the first of four
-SIZE = 9
-_MOVING = (BIAS, GRADE, SCALE)
+SPEED, BIAS, GRADE, SCALE, SLIP, SIDE, RADIUS = 0, 1, 2, 3, 4, 5, 6  # places in the state; RADIUS is the first of four
+SIZE = 10
+_MOVING = (BIAS, GRADE, SCALE, SIDE)
 _STILL = ((SPEED,),)
-_SEEN = tuple((SPEED, SLIP, RADIUS + wheel) for wheel in range(4))
+_SEEN = tuple((SPEED, SLIP, SIDE, RADIUS + wheel) for wheel in range(4))
+_AXLES = ((1, 0), (3, 2))  # right and left wheel of each
 
 
 class WheelUpdate(NamedTuple):
@@ -65,11 +66,11 @@ class LongitudinalFusion(CarsMemory):
         self.steady: Signals = self.kit.stacked([self.kit.full(0.0)] * 4)  # F_x/F_z, low-passed
         mean, rates = np.zeros((2, SIZE))
         mean[SLIP] = s.slip_compliance
-        deviations = [1.0, s.acceleration_bias, GRAVITY * s.grade, s.scale, s.slip_compliance_spread]
+        deviations = [1.0, s.acceleration_bias, GRAVITY * s.grade, s.scale, s.slip_compliance_spread, 1.0]
         spread = np.diag(np.square([*deviations, *[s.radius_single] * 4]))
         spread[RADIUS:, RADIUS:] += s.radius_common**2
         rates[[BIAS, SCALE]], rates[SLIP] = 1.0 / s.sensor_memory, 1.0 / s.slip_memory
-        rates[RADIUS:] = 1.0 / s.radius_memory
+        rates[SIDE], rates[RADIUS:] = 1.0 / s.side_speed_memory, 1.0 / s.radius_memory
         self.filter = speed_filter(mean, spread, rates, (GRADE, 1.0 / s.road_length), RADIUS, every, count)
         (self._white,) = self.kit.each(lambda R: ((R * s.wheel_speed_noise) ** 2,), radius)
 
@@ -98,13 +99,12 @@ class LongitudinalFusion(CarsMemory):
         """
         sigma, teaching, pull = elapsed * noise, elapsed, measured
         left, unsure = lateral
-        coupled = 2.0 * self.settings.error_memory * elapsed * yaw_rate * yaw_rate * unsure
         if self.kit.some(doubted):
             teaching = self.kit.where(doubted, 0.0, elapsed)
             pull = self.kit.where(doubted, self.acceleration(measured), measured)
         shift = elapsed * (pull + yaw_rate * left)
-        coupling = (-teaching, -teaching, -teaching * measured)
-        self.filter.move(elapsed, abs(self.speed), _MOVING, coupling, shift, sigma * sigma + coupled)
+        coupling = (-teaching, -teaching, -teaching * measured, elapsed * yaw_rate * self.kit.sqrt(unsure))
+        self.filter.move(elapsed, abs(self.speed), _MOVING, coupling, shift, sigma * sigma)
 
     def correct(
         self,
@@ -128,7 +128,10 @@ class LongitudinalFusion(CarsMemory):
         per_speed = s.tooth_pitch / largest(magnitude, s.dead_speed)
         held = largest(1.0, 2.0 * s.error_memory / elapsed)
         wrong_way, gate, freely = s.wrong_way_gate**2, s.gate**2, s.free_rolling
-        turned, kept = s.slip_load * abs(across), kit.exp(-elapsed / s.error_memory)
+        kept, beyond = kit.exp(-elapsed / s.error_memory), kit.sqrt(unsure)
+        left = beyond * x[SIDE]
+        turned = magnitude * s.slip_load * across
+        moved = turned * turned  # what load moves from side to side does to the radii of an axle is opposite
         (self.steady,) = kit.each(lambda old, new: (kept * old + (1.0 - kept) * new,), self.steady, mu)
         hidden = choose(blind, s.unseen_acceleration / GRAVITY, 0.0)
 
@@ -147,13 +150,13 @@ class LongitudinalFusion(CarsMemory):
         ) -> tuple[Number, ...]:
             surface, late = radius * w, per_speed * pull
             slip = (compliance + bend) * force
-            expected = gain * speed + shift + magnitude * slip
+            expected = gain * speed + shift + beside * left + magnitude * slip
             innovation = surface * (1.0 + error) - expected
             friction = largest(abs(force), hidden)
             share = s.slip_linear + 0.5 * bend + s.slip_cubic * friction * friction
-            sigma = magnitude * (s.slip_floor + turned + share * friction) + s.slip_speed
-            # what slip, pulse ring and V_y leave unexplained
-            model = sigma * sigma + late * late + beside * beside * unsure
+            sigma = magnitude * (s.slip_floor + share * friction) + s.slip_speed
+            # what slip, pulse ring and load leave unexplained
+            model = sigma * sigma + late * late + moved
             model = choose(silent, largest(model, s.dead_speed**2), model)
             # the measured surface speed here would correlate sensitivity and innovation: noise would shrink the radii
             return (
@@ -161,6 +164,7 @@ class LongitudinalFusion(CarsMemory):
                 model,
                 gain + way * slip,
                 magnitude * choose(abs(force) < s.unloaded, steady, force),
+                beside * beyond,
                 -expected / (1.0 + error),
             )
 
@@ -180,7 +184,8 @@ class LongitudinalFusion(CarsMemory):
             judged, explained, innovation, model, self._white, mu, seen.fresh, slipping
         )
         learning = free[0] & free[1] & free[2] & free[3] & (across * across < freely * freely) & kit.no(blind)
-        self.filter.weigh(innovation, variance, used, learning)
+        opposed = -moved * held
+        self.filter.weigh(innovation, variance, used, learning, [(i, k, opposed) for i, k in _AXLES])
         return WheelUpdate(innovation, used, gated)
 
     def zero_velocity_update(self, where: Number) -> None:

@@ -30,6 +30,8 @@ Columns = tuple[tuple[int, ...], ...]
 Values = Sequence[Sequence[Number]]
 """What it sees of the first state, of the second ...: h by column, each over all channels."""
 
+Shared = Sequence[tuple[int, int, Number]]
+
 
 class SpeedFilter(Memory):
     """Mean (n, b) and covariance of b cars, as its upper triangle row by row (n (n + 1)/2, b).
@@ -154,9 +156,15 @@ class SpeedFilter(Memory):
         variance: Sequence[Number],
         used: Sequence[Number],
         learning: Number = True,
+        shared: Shared = (),
     ) -> None:
-        """Corrects with the channels of `expect` that are `used`; `learning`: not only the `learned` first states."""
+        """Corrects with the channels of `expect` that are `used`; `learning`: not only the `learned` first states.
+
+        `shared`: of two channels, the later one first, the covariance of their noise.
+        """
         S = self._S
+        for later, earlier, covariance in shared:
+            S[later, earlier] = S[later, earlier] + covariance
         U: list[Number] = []
         z: list[Number] = []
         factor: list[list[Number]] = []  # L, with the reciprocals of its diagonal
