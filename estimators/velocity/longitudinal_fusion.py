@@ -29,11 +29,11 @@ from estimators.velocity.fusion_inputs import ConditionedInputs
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.speed_filter_few import speed_filter
 
-SPEED, BIAS, GRADE, SCALE, SLIP, SIDE, RADIUS = 0, 1, 2, 3, 4, 5, 6  # places in the state; RADIUS is the first of four
-SIZE = 10
+SPEED, BIAS, GRADE, SCALE, SLIP, BEND, SIDE, RADIUS = 0, 1, 2, 3, 4, 5, 6, 7  # RADIUS is the first of four
+SIZE = 11
 _MOVING = (BIAS, GRADE, SCALE, SIDE)
 _STILL = ((SPEED,),)
-_SEEN = tuple((SPEED, SLIP, SIDE, RADIUS + wheel) for wheel in range(4))
+_SEEN = tuple((SPEED, SLIP, BEND, SIDE, RADIUS + wheel) for wheel in range(4))
 _AXLES = ((1, 0), (3, 2))  # right and left wheel of each
 
 
@@ -65,11 +65,11 @@ class LongitudinalFusion(CarsMemory):
         self.radius, self.kit = radius, arithmetic((count,))
         self.steady: Signals = self.kit.stacked([self.kit.full(0.0)] * 4)  # F_x/F_z, low-passed
         mean, rates = np.zeros((2, SIZE))
-        mean[SLIP] = s.slip_compliance
-        deviations = [1.0, s.acceleration_bias, GRAVITY * s.grade, s.scale, s.slip_compliance_spread, 1.0]
+        mean[SLIP], mean[BEND] = s.slip_compliance, 1.0
+        deviations = [1.0, s.acceleration_bias, GRAVITY * s.grade, s.scale, s.slip_compliance_spread, s.slip_bend_spread, 1.0]
         spread = np.diag(np.square([*deviations, *[s.radius_single] * 4]))
         spread[RADIUS:, RADIUS:] += s.radius_common**2
-        rates[[BIAS, SCALE]], rates[SLIP] = 1.0 / s.sensor_memory, 1.0 / s.slip_memory
+        rates[[BIAS, SCALE]], rates[[SLIP, BEND]] = 1.0 / s.sensor_memory, 1.0 / s.slip_memory
         rates[SIDE], rates[RADIUS:] = 1.0 / s.side_speed_memory, 1.0 / s.radius_memory
         self.filter = speed_filter(mean, spread, rates, (GRADE, 1.0 / s.road_length), RADIUS, every, count)
         (self._white,) = self.kit.each(lambda R: ((R * s.wheel_speed_noise) ** 2,), radius)
@@ -123,7 +123,7 @@ class LongitudinalFusion(CarsMemory):
         """
         s, x, kit = self.settings, self.filter.mean, self.kit
         choose, largest = kit.where, kit.maximum
-        speed, compliance = x[SPEED], x[SLIP]
+        speed, compliance, follows = x[SPEED], x[SLIP], x[BEND]
         magnitude, way = abs(speed), kit.sign(speed)
         per_speed = s.tooth_pitch / largest(magnitude, s.dead_speed)
         held = largest(1.0, 2.0 * s.error_memory / elapsed)
@@ -149,11 +149,12 @@ class LongitudinalFusion(CarsMemory):
             steady: Number,
         ) -> tuple[Number, ...]:
             surface, late = radius * w, per_speed * pull
-            slip = (compliance + bend) * force
+            steadily = choose(abs(force) < s.unloaded, steady, force)
+            slip = (compliance + follows * bend) * force
             expected = gain * speed + shift + beside * left + magnitude * slip
             innovation = surface * (1.0 + error) - expected
             friction = largest(abs(force), hidden)
-            share = s.slip_linear + 0.5 * bend + s.slip_cubic * friction * friction
+            share = s.slip_linear + 0.25 * bend + s.slip_cubic * friction * friction
             sigma = magnitude * (s.slip_floor + share * friction) + s.slip_speed
             # what slip, pulse ring and load leave unexplained
             model = sigma * sigma + late * late + moved
@@ -163,7 +164,8 @@ class LongitudinalFusion(CarsMemory):
                 innovation,
                 model,
                 gain + way * slip,
-                magnitude * choose(abs(force) < s.unloaded, steady, force),
+                magnitude * steadily,
+                magnitude * bend * steadily,
                 beside * beyond,
                 -expected / (1.0 + error),
             )
