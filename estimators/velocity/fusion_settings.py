@@ -69,6 +69,7 @@ class FusionSettings:
     side_memory: float = 300.0  # s
     side_floor: float = 0.002  # rad, 0.1 deg: toe and linkage
     side_linear: float = 0.02  # relative error of the slip angle
+    side_speed_spread: float = 2.0  # stated deviations by which V_y may be off as long: curves of tires differ
     side_speed_memory: float = 2.0  # s: how long an error of V_y stays the same, one turn
     side_error_memory: float = 0.1  # s: how long its error stays the same, one stroke of the steering
     # what may be believed

@@ -66,7 +66,7 @@ class LongitudinalFusion(CarsMemory):
         self.steady: Signals = self.kit.stacked([self.kit.full(0.0)] * 4)  # F_x/F_z, low-passed
         mean, rates = np.zeros((2, SIZE))
         mean[SLIP], mean[BEND] = s.slip_compliance, 1.0
-        deviations = [1.0, s.acceleration_bias, GRAVITY * s.grade, s.scale, s.slip_compliance_spread, s.slip_bend_spread, 1.0]
+        deviations = [1.0, s.acceleration_bias, GRAVITY * s.grade, s.scale, s.slip_compliance_spread, s.slip_bend_spread, s.side_speed_spread]
         spread = np.diag(np.square([*deviations, *[s.radius_single] * 4]))
         spread[RADIUS:, RADIUS:] += s.radius_common**2
         rates[[BIAS, SCALE]], rates[[SLIP, BEND]] = 1.0 / s.sensor_memory, 1.0 / s.slip_memory
