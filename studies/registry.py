@@ -17,6 +17,7 @@ MODULES = {
     "resilient-velocity": "studies.papers.resilient_velocity.study",
     "ekf-ukf-lateral": "studies.papers.ekf_ukf_lateral.study",
     "smo-ekf-sideslip": "studies.papers.smo_ekf_sideslip.study",
+    "against-wheels": "studies.beyond.against_wheels.study",
     "consistency": "studies.beyond.consistency.study",
     "drop-tolerance": "studies.beyond.drop_tolerance.study",
     "fault-matrix": "studies.beyond.fault_matrix.study",

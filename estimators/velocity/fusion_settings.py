@@ -53,6 +53,7 @@ class FusionSettings:
     # longitudinal slip: slip = compliance * mu, plus an error that grows with the friction used
     slip_compliance: float = 0.03  # slip per unit of F_x/F_z: normalised stiffness 33, of a range from 15 to 80
     slip_compliance_spread: float = 0.02
+    slip_bend_spread: float = 0.5  # relative, of the slip that side slip adds: not every tire is isotropic
     slip_memory: float = 90.0  # s: a road surface, one to two km
     slip_floor: float = 0.001  # slip error of a free-rolling wheel: asphalt, on a recorded drive 0.0008
     slip_load: float = 0.01  # the same per g sideways: a turn moves load, and a radius gives by 0.5 to 1 mm per kN
@@ -68,6 +69,8 @@ class FusionSettings:
     side_memory: float = 300.0  # s
     side_floor: float = 0.002  # rad, 0.1 deg: toe and linkage
     side_linear: float = 0.02  # relative error of the slip angle
+    side_speed_spread: float = 2.0  # stated deviations by which V_y may be off as long: curves of tires differ
+    side_speed_memory: float = 2.0  # s: how long an error of V_y stays the same, one turn
     side_error_memory: float = 0.1  # s: how long its error stays the same, one stroke of the steering
     # what may be believed
     error_memory: float = 0.2  # s: how long a slip error stays the same, one stroke of a brake or throttle

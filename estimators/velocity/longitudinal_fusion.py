@@ -1,19 +1,25 @@
 """Longitudinal half of the fusion: one speed, the errors of the inertial unit, the radii, and how far to trust a wheel.
 
-    dV_x/dt = a (1 - s) - b - g + r V_y                                            P2 (15) with bias, grade and scale
-    R_i w_i = v_xt,i + |V_x| (c + e_i) mu_i - rho_i R_i w_i + error                a wheel: slip follows the force
+    dV_x/dt = a (1 - s) - b - g + r (V_y + sigma_y z)                               P2 (15) with bias, grade and scale
+    R_i w_i = v_xt,i + |V_x| (c + e_i) mu_i - rho_i R_i w_i + error                 a wheel: slip follows the force
 
 s scale error, b bias, g gravity along the road, c slip compliance, e_i what side slip adds to it, mu_i = F_x/F_z, rho_i
-relative radius error, v_xt,i speed of the wheel centre along the tire. The slip error grows with the friction used; a wheel
-whose surface leaves the car, or whose innovation is larger than its own model can explain, is left out while that lasts (the
-high-slip detection of P2 notes 7 asks the same two questions). The force tells the side to which a wheel slips: towards the
-other side a wheel is believed twice as far. Radii are learned from wheels that roll freely, where no slip hides them:
-neither one along the tire nor, through the load that a turn moves from side to side, one across it.
+relative radius error, v_xt,i speed of the wheel centre along the tire, sigma_y the deviation of V_y and z how many of these it
+is off. The slip error grows with the friction used; a wheel whose surface leaves the car, or whose innovation is larger than its
+own model can explain, is left out while that lasts (the high-slip detection of P2 notes 7 asks the same two questions). The
+force tells the side to which a wheel slips: towards the other side a wheel is believed twice as far. Radii are learned from
+wheels that roll freely, where no slip hides them: neither one along the tire nor one across it.
 
 Friction opposes slip, so slips along and across are to each other as the forces are (isotropic tire, Pacejka (2006) 3.2.3): a
 tire that slides sideways slips along by far more than c mu. What the side slip is beyond c_1 mu_y, over mu_y, is e_i
-(`LateralFusion.bend`). What V_y may be off enters r V_y and the steered wheels. Where a wheel is hardly used, c is learned with
-low-passed forces: those of the same sample hold the noise of its wheel speeds, and would shrink it.
+(`LateralFusion.bend`). Where a wheel is hardly used, c is learned with low-passed forces: those of the same sample hold the
+noise of its wheel speeds, and would shrink it.
+
+**An error that stays as long as a turn is not white.** V_y's pulls at V_x by r times itself, and at the steered wheels by
+sin(delta) times itself: it is a state; as noise, what is left of it would be taken for bias and grade. That of e_i, for no tire
+is quite isotropic, is alike on both wheels of an axle: they count as one witness, and with its density over `side_speed_memory`.
+The load that a turn moves from one side to the other changes the radii of an axle by opposite amounts: the noise of its two
+wheels is correlated by -1, and their mean has none of it.
 """
 
 from __future__ import annotations
@@ -29,11 +35,12 @@ from estimators.velocity.fusion_inputs import ConditionedInputs
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.speed_filter_few import speed_filter
 
-SPEED, BIAS, GRADE, SCALE, SLIP, RADIUS = 0, 1, 2, 3, 4, 5  # places in the state; RADIUS is the first of four
-SIZE = 9
-_MOVING = (BIAS, GRADE, SCALE)
+SPEED, BIAS, GRADE, SCALE, SLIP, SIDE, RADIUS = 0, 1, 2, 3, 4, 5, 6  # places in the state; RADIUS is the first of four
+SIZE = 10
+_MOVING = (BIAS, GRADE, SCALE, SIDE)
 _STILL = ((SPEED,),)
-_SEEN = tuple((SPEED, SLIP, RADIUS + wheel) for wheel in range(4))
+_SEEN = tuple((SPEED, SLIP, SIDE, RADIUS + wheel) for wheel in range(4))
+_AXLES = ((1, 0), (3, 2))  # right and left wheel of each
 
 
 class WheelUpdate(NamedTuple):
@@ -65,11 +72,18 @@ class LongitudinalFusion(CarsMemory):
         self.steady: Signals = self.kit.stacked([self.kit.full(0.0)] * 4)  # F_x/F_z, low-passed
         mean, rates = np.zeros((2, SIZE))
         mean[SLIP] = s.slip_compliance
-        deviations = [1.0, s.acceleration_bias, GRAVITY * s.grade, s.scale, s.slip_compliance_spread]
+        deviations = [
+            1.0,
+            s.acceleration_bias,
+            GRAVITY * s.grade,
+            s.scale,
+            s.slip_compliance_spread,
+            s.side_speed_spread,
+        ]
         spread = np.diag(np.square([*deviations, *[s.radius_single] * 4]))
         spread[RADIUS:, RADIUS:] += s.radius_common**2
         rates[[BIAS, SCALE]], rates[SLIP] = 1.0 / s.sensor_memory, 1.0 / s.slip_memory
-        rates[RADIUS:] = 1.0 / s.radius_memory
+        rates[SIDE], rates[RADIUS:] = 1.0 / s.side_speed_memory, 1.0 / s.radius_memory
         self.filter = speed_filter(mean, spread, rates, (GRADE, 1.0 / s.road_length), RADIUS, every, count)
         (self._white,) = self.kit.each(lambda R: ((R * s.wheel_speed_noise) ** 2,), radius)
 
@@ -98,13 +112,12 @@ class LongitudinalFusion(CarsMemory):
         """
         sigma, teaching, pull = elapsed * noise, elapsed, measured
         left, unsure = lateral
-        coupled = 2.0 * self.settings.error_memory * elapsed * yaw_rate * yaw_rate * unsure
         if self.kit.some(doubted):
             teaching = self.kit.where(doubted, 0.0, elapsed)
             pull = self.kit.where(doubted, self.acceleration(measured), measured)
         shift = elapsed * (pull + yaw_rate * left)
-        coupling = (-teaching, -teaching, -teaching * measured)
-        self.filter.move(elapsed, abs(self.speed), _MOVING, coupling, shift, sigma * sigma + coupled)
+        coupling = (-teaching, -teaching, -teaching * measured, elapsed * yaw_rate * self.kit.sqrt(unsure))
+        self.filter.move(elapsed, abs(self.speed), _MOVING, coupling, shift, sigma * sigma)
 
     def correct(
         self,
@@ -126,9 +139,12 @@ class LongitudinalFusion(CarsMemory):
         speed, compliance = x[SPEED], x[SLIP]
         magnitude, way = abs(speed), kit.sign(speed)
         per_speed = s.tooth_pitch / largest(magnitude, s.dead_speed)
-        held = largest(1.0, 2.0 * s.error_memory / elapsed)
+        held, lasting = (largest(1.0, 2.0 * memory / elapsed) for memory in (s.error_memory, s.side_speed_memory))
         wrong_way, gate, freely = s.wrong_way_gate**2, s.gate**2, s.free_rolling
-        turned, kept = s.slip_load * abs(across), kit.exp(-elapsed / s.error_memory)
+        kept, beyond = kit.exp(-elapsed / s.error_memory), kit.sqrt(unsure)
+        left = beyond * x[SIDE]
+        turned = magnitude * s.slip_load * across
+        moved = turned * turned  # what load moves from side to side does to the radii of an axle is opposite
         (self.steady,) = kit.each(lambda old, new: (kept * old + (1.0 - kept) * new,), self.steady, mu)
         hidden = choose(blind, s.unseen_acceleration / GRAVITY, 0.0)
 
@@ -146,41 +162,54 @@ class LongitudinalFusion(CarsMemory):
             steady: Number,
         ) -> tuple[Number, ...]:
             surface, late = radius * w, per_speed * pull
+            sliding = magnitude * s.slip_bend_spread * bend * force
             slip = (compliance + bend) * force
-            expected = gain * speed + shift + magnitude * slip
+            expected = gain * speed + shift + beside * left + magnitude * slip
             innovation = surface * (1.0 + error) - expected
             friction = largest(abs(force), hidden)
-            share = s.slip_linear + 0.5 * bend + s.slip_cubic * friction * friction
-            sigma = magnitude * (s.slip_floor + turned + share * friction) + s.slip_speed
-            # what slip, pulse ring and V_y leave unexplained
-            model = sigma * sigma + late * late + beside * beside * unsure
+            share = s.slip_linear + s.slip_cubic * friction * friction
+            sigma = magnitude * (s.slip_floor + share * friction) + s.slip_speed
+            # what slip, pulse ring and load leave unexplained
+            model = sigma * sigma + late * late + moved
             model = choose(silent, largest(model, s.dead_speed**2), model)
             # the measured surface speed here would correlate sensitivity and innovation: noise would shrink the radii
             return (
                 innovation,
                 model,
+                sliding,
                 gain + way * slip,
                 magnitude * choose(abs(force) < s.unloaded, steady, force),
+                beside * beyond,
                 -expected / (1.0 + error),
             )
 
-        innovation, model, *values = kit.each(
+        innovation, model, slid, *values = kit.each(
             predicted, seen.wheel_speed, seen.silent, mu, *course, self.radius, x[RADIUS:], self.steady
         )
 
         def judged(
-            explained: Number, off: Number, model: Number, white: Number, force: Number, fresh: Number, slips: Number
+            explained: Number,
+            off: Number,
+            model: Number,
+            slid: Number,
+            white: Number,
+            force: Number,
+            fresh: Number,
+            slips: Number,
         ) -> tuple[Number, ...]:
-            far = fresh & (off * off > choose(off * force > 0.0, gate, wrong_way) * (explained + white + model))
+            bent = slid * slid
+            error = explained + white + model + bent
+            far = fresh & (off * off > choose(off * force > 0.0, gate, wrong_way) * error)
             counts = fresh & kit.no(far | slips)
-            return far, counts, white + model * held, kit.no(counts) | (abs(force) < freely)
+            return far, counts, white + model * held + bent * lasting, kit.no(counts) | (abs(force) < freely)
 
         explained = self.filter.expect(_SEEN, values)
         gated, used, variance, free = kit.each(
-            judged, explained, innovation, model, self._white, mu, seen.fresh, slipping
+            judged, explained, innovation, model, slid, self._white, mu, seen.fresh, slipping
         )
         learning = free[0] & free[1] & free[2] & free[3] & (across * across < freely * freely) & kit.no(blind)
-        self.filter.weigh(innovation, variance, used, learning)
+        shared = [(i, k, slid[i] * slid[k] * lasting - moved * held) for i, k in _AXLES]
+        self.filter.weigh(innovation, variance, used, learning, shared)
         return WheelUpdate(innovation, used, gated)
 
     def zero_velocity_update(self, where: Number) -> None:

@@ -13,9 +13,11 @@ Which witnesses tell the same number is in `parity`, what they say and by how mu
 slip against their force disprove it without any torque, for `lost_time`. Where neither a_x nor the forces tell, the wheels
 do, by +-`unseen_acceleration`.
 
-**a_y, yaw rate.** Until it was found V_y followed it: its variance grows by that. A car that follows its steering while a_y,
-alive, contradicts it for 0.5 s is on a banked road: the variance of the bank grows, and a_y is believed again. An a_y
-that has lost its gain looks the same.
+**a_y, yaw rate.** Until it was found V_y followed it: its variance grows by that. A car that follows its steering closely, as
+one does whose tires carry little, while a_y, alive, contradicts it for 0.5 s is on a banked road: the variance of the bank
+grows, and a_y is believed again. An a_y that has lost its gain looks the same. A car that is caught from a slide turns against
+its side force for a moment, while a_y goes through zero: only an a_y that is on the other side of it, or beyond what the
+steering would carry, by more than its own allowance is doubted.
 
 **Attitude.** A levelled a_y that the turn contradicts while the one that is not levelled agrees: roll is wrong, and nothing is
 levelled. The contrary is a banked road, and no fault.

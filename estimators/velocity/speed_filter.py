@@ -6,7 +6,7 @@ The speed, the first state, moves by its own input and by the others, which keep
 
 Parameters change slowly, and forget every `every` samples for all of these at once: between, only the speed moves. Every
 parameter is a first-order Gauss-Markov process around its prior mean m_i: however long nothing excites it, its
-covariance never grows beyond the prior P0. A correction takes several channels that are independent of each other, by the
+covariance never grows beyond the prior P0. A correction takes several channels at once, by the
 Cholesky factor of their covariance, S = H P H' + R = L L', found row by row together with
 
     U = L^-1 H P,   z = L^-1 nu,   x+ = x + U' z,   P+ = P - U' U;
@@ -29,6 +29,8 @@ Columns = tuple[tuple[int, ...], ...]
 """Of each channel, the states that it sees: as many of each."""
 Values = Sequence[Sequence[Number]]
 """What it sees of the first state, of the second ...: h by column, each over all channels."""
+Shared = Sequence[tuple[int, int, Number]]
+"""Channels whose noise is not independent: the later one, the earlier one, their covariance."""
 
 
 class SpeedFilter(Memory):
@@ -154,9 +156,15 @@ class SpeedFilter(Memory):
         variance: Sequence[Number],
         used: Sequence[Number],
         learning: Number = True,
+        shared: Shared = (),
     ) -> None:
-        """Corrects with the channels of `expect` that are `used`; `learning`: not only the `learned` first states."""
+        """Corrects with the channels of `expect` that are `used`; `learning`: not only the `learned` first states.
+
+        `shared`: covariances of their noise; that of all channels together must stay positive definite.
+        """
         S = self._S
+        for later, earlier, covariance in shared:
+            S[later, earlier] = S[later, earlier] + covariance
         U: list[Number] = []
         z: list[Number] = []
         factor: list[list[Number]] = []  # L, with the reciprocals of its diagonal

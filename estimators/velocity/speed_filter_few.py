@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimators.arrays import FloatArray, IntArray
-from estimators.velocity.speed_filter import Columns, SpeedFilter, Values
+from estimators.velocity.speed_filter import Columns, Shared, SpeedFilter, Values
 
 _Row = list[float]  # a step of one car: 8.8 times faster than `SpeedFilter`
 
@@ -94,10 +94,17 @@ class SpeedFilterFew(SpeedFilter):
         return [self._S[k][k] for k in range(len(columns))]
 
     def weigh(
-        self, innovation: Sequence[float], variance: Sequence[float], used: Sequence[bool], learning: bool = True
+        self,
+        innovation: Sequence[float],
+        variance: Sequence[float],
+        used: Sequence[bool],
+        learning: bool = True,
+        shared: Shared = (),
     ) -> None:
         """Corrects with the channels of `expect` that are `used`, as `SpeedFilter.weigh`."""
         S, W, noise = self._S, self._W, variance
+        for later, earlier, covariance in shared:
+            S[later][earlier] += covariance
         if not all(used):
             rows = [k for k, counts in enumerate(used) if counts]
             if not rows:

@@ -115,7 +115,9 @@ class TurnMonitor(Exclusion):
         level, known, never = readings.level, readings.known, self._never
         _, stuck_y, stuck_r = ((run - 1.0) * elapsed > s.slowest_unit for run in seen.run)
         # a car that slides is turned further than its side force carries it, never less
-        excess = (level[SIDE] * level[STEERING] < 0.0) | (abs(level[SIDE]) > abs(level[STEERING]))
+        carried, steered = level[SIDE], level[STEERING]
+        beyond = kit.maximum(abs(carried) - abs(steered), -carried * kit.sign(steered))
+        excess = beyond > readings.allowed[SIDE]
         plausible = tuple(excess if rule.one_sided else self._always for rule in TURN.rules)
         verdicts, agree = vote(kit, TURN, readings, (stuck_r, never, stuck_y), plausible)
         yaw, roll, side = verdicts
@@ -124,7 +126,9 @@ class TurnMonitor(Exclusion):
         apart = known[SIDE] & steady & (abs(gap) > readings.allowed[YAW_RATE] + readings.allowed[SIDE] - abs(sway))
         straight = largest(abs(level[YAW_RATE]), abs(level[STEERING])) < _UNDERSTEER
         front, rear = (agree[YAW_RATE, i] & agree[i, STEERING] for i in (FRONT, REAR))
-        grip = agree[YAW_RATE, STEERING] & (front | rear)
+        # tires of a banked car carry less than its turn takes: it follows its steering closely
+        follows = abs(level[YAW_RATE] - steered) < readings.allowed[YAW_RATE] + _UNDERSTEER
+        grip = agree[YAW_RATE, STEERING] & follows & (front | rear)
         banked = self._banked(elapsed, apart & grip & (no(side.wrong) | straight) & no(stuck_y | roll.wrong), gap)
         before = self.remaining
         judged = (side._replace(wrong=side.wrong & no(banked)), yaw, roll)

@@ -10,6 +10,7 @@ import pytest
 from estimators.errors import EstimatorError
 from estimators.faults import DRIVING, Flag
 from estimators.velocity import VelocityFusion
+from estimators.velocity.longitudinal_fusion import RADIUS
 from tests.support.fusion_course import CAR, STEP, Signals, course, driven, phases, sensed
 
 LAUNCH = phases((1.0, 0.0), (4.0, 3.0), (3.0, 0.0))
@@ -70,9 +71,9 @@ def test_no_radius_is_learned_from_wheels_that_pull() -> None:
     fusion = VelocityFusion(CAR, STEP)
     signals = sensed(drive)
     driven(Signals(*(value[:200] for value in signals)), fusion)
-    before = fusion.longitudinal_filter.state[0, 5:]
+    before = fusion.longitudinal_filter.state[0, RADIUS:]
     steps, _ = driven(Signals(*(value[210:] for value in signals)), fusion)
-    np.testing.assert_allclose(fusion.longitudinal_filter.state[0, 5:], before, rtol=1e-3, atol=1e-9)
+    np.testing.assert_allclose(fusion.longitudinal_filter.state[0, RADIUS:], before, rtol=1e-3, atol=1e-9)
     assert steps[-1].used.all()
 
 

@@ -94,8 +94,12 @@ def test_weighing_is_the_correction_of_a_kalman_filter(count: int) -> None:
         y, variance = rng.normal(size=(count, 3)), 0.1 + rng.random((count, 3))
         lost = rng.random((count, 3)) < 0.4
         innovation = y - (H @ one.state[..., None])[..., 0]
-        one.weigh(told(innovation.T, count), told(variance.T, count), told(~lost.T, count))
-        step = two.correct(np.where(lost, np.nan, y), H, variance[..., None] * np.eye(3))
+        R = variance[..., None] * np.eye(3)
+        later, earlier, shared = 2, 1, -0.9 * np.sqrt(variance[:, 2] * variance[:, 1])
+        R[:, later, earlier] = R[:, earlier, later] = shared
+        pairs = [(later, earlier, told(shared[None], count)[0])]
+        one.weigh(told(innovation.T, count), told(variance.T, count), told(~lost.T, count), shared=pairs)
+        step = two.correct(np.where(lost, np.nan, y), H, R)
         np.testing.assert_allclose(one.state, step.state, rtol=1e-8, atol=1e-9)
         np.testing.assert_allclose(one.covariance, step.covariance, rtol=1e-8, atol=1e-8)
 

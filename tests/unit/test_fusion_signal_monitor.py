@@ -83,6 +83,24 @@ def test_a_slide_is_no_fault_of_the_accelerometer() -> None:
     assert all(step.inertial_used.all() for step in steps)
 
 
+def test_a_car_that_is_caught_from_a_slide_has_a_healthy_accelerometer() -> None:
+    """It turns to the other side at once, steered there by far, while its side force is still near zero: neither fault nor bank.
+
+    `sign` -1, the negative control: an a_y of the wrong sign is one that nothing but a fault explains.
+    """
+    time = STEP * np.arange(round(4.0 / STEP))
+    swung = np.clip((time - 2.0) / 0.4, 0.0, 1.0)
+    slide = turn(4.0, 0.16 * (1.0 - swung) - 0.38 * swung, speed=12.0)
+    steer = slide.signals.steer * np.where(time < 2.2, 1.0, 1.6)[:, None]
+    noise = 0.05 * np.random.default_rng(4).normal(size=time.size)
+    for sign, healthy in ((1.0, True), (-1.0, False)):
+        carried = np.interp(time, (2.0, 2.2, 2.45, 2.7), (1.9, 0.4, 0.2, -2.6 * sign))
+        ay = np.where(time < 2.0, slide.signals.ay, carried + noise)
+        steps, _ = driven(slide.signals._replace(ay=ay, steer=steer))
+        assert all(step.inertial_used.all() for step in steps) == healthy
+        assert max(abs(step.gravity[1]) for step in steps) < 0.3
+
+
 def test_steering_alone_says_nothing_of_a_live_accelerometer() -> None:
     """Wheels lost: a_y and the yaw rate contradict each other, and nothing says which is right; both are kept."""
     course = turn(8.0, YAW)
