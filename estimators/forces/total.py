@@ -19,6 +19,26 @@ class Reconciled(NamedTuple):
     used: BoolArray  # (...) whether the total was there
 
 
+LIFTED = 0.05
+"""Share of its static load below which a wheel counts as lifted: its F/F_z means nothing."""
+
+
+def normalised(
+    force: FloatArray, load: FloatArray, static: FloatArray | float, unknown: BoolArray | None = None
+) -> FloatArray:
+    """mu = F/F_z (..., 4), P1 (13), from forces and loads, N; NaN where a wheel is lifted, or its force is `unknown`.
+
+    `static`: N, what the wheels carry at rest.
+    """
+    lifted: BoolArray = load < LIFTED * static
+    if unknown is not None:
+        lifted = lifted | unknown
+    if not np.count_nonzero(lifted):
+        ratio: FloatArray = force / load
+        return ratio
+    return np.where(lifted, np.nan, force / np.where(lifted, 1.0, load))
+
+
 def reconcile(
     force: FloatArray,
     deviation: FloatArray,

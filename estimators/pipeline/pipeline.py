@@ -11,9 +11,16 @@ import numpy.typing as npt
 
 from estimators.arguments import batch, entries, mask, setting
 from estimators.arithmetic import Number, arithmetic
-from estimators.arrays import BoolArray, FlagArray, FloatArray
+from estimators.arrays import BoolArray, FlagArray
 from estimators.faults import Flag
-from estimators.forces import AttitudeStep, LateralForceEstimator, UnknownInputForceObserver, VerticalLoads, reconcile
+from estimators.forces import (
+    AttitudeStep,
+    LateralForceEstimator,
+    UnknownInputForceObserver,
+    VerticalLoads,
+    normalised,
+    reconcile,
+)
 from estimators.memory import Memory
 from estimators.pipeline.car_by_car import FEW, CarByCar
 from estimators.pipeline.checks import Forces
@@ -40,7 +47,6 @@ from estimators.velocity.rear_wheels import rear_wheel_speed
 
 REAL_SENSORS = (0.3, 0.1, 0.3)
 """m/s^2, m/s^2, rad/s^2: deviations of a_x, a_y, dr/dt for the lateral forces, sensors and model together."""
-_LIFTED = 0.05  # share of its static load below which a wheel's F/F_z means nothing
 _LATE = 0.5  # relative error of the sample time beyond which a difference quotient of wheel speeds is no acceleration
 
 
@@ -130,8 +136,7 @@ class EstimationPipeline(Memory):
         self._compliant = bool(getattr(corner_observers, "uses_forces", False))
         self._use_across = self._lateral_first or self.corner_observers is not None
         self._total_deviation = vehicle.mass * setting(acceleration_deviation, "acceleration_deviation", "m/s^2")
-        self._least_load = _LIFTED * vehicle.static_loads
-        self._kit = arithmetic(shape)
+        self._kit, self._static = arithmetic(shape), vehicle.static_loads
         self._level, self._never = np.zeros(shape), self._kit.full(False)
 
     def step(self, signals: VehicleSignals) -> PipelineStep:
@@ -151,11 +156,11 @@ class EstimationPipeline(Memory):
         delayed = kit.some(late)
         unknown = wheels.unknown | np.asarray(late)[..., None] if delayed else wheels.unknown
         agreed = reconcile(wheels.force, wheels.deviation, total, self._total_deviation, loads.load, unknown)
-        use = self._normalised(agreed.force, loads.load, unknown)
+        use = normalised(agreed.force, loads.load, self._static, unknown)
         yaw_acceleration = self.yaw_slope.step(choose(late, math.nan, turned) if delayed else turned).derivative
         yaw_acceleration = choose(abs(turned) < math.inf, kit.own(yaw_acceleration), math.nan)
         lateral = self.lateral_force.step(own_x, own_y, yaw_acceleration, angle, agreed.force, loads.load)
-        across = self._normalised(lateral.corner_force, loads.load, None) if self._use_across else None
+        across = normalised(lateral.corner_force, loads.load, self._static) if self._use_across else None
         pulls = {"forces": (agreed.force, lateral.corner_force)}
         more: dict[str, Any] = {"lateral_use": across, **pulls} if self._lateral_first else {}
         forces = Forces(
@@ -252,13 +257,3 @@ class EstimationPipeline(Memory):
             return self._never
         given = self._kit.own(entries(elapsed, self.batch_shape, "elapsed"))
         return self._kit.no(abs(given / self.sample_time - 1.0) <= _LATE)
-
-    def _normalised(self, force: FloatArray, load: FloatArray, unknown: BoolArray | None) -> FloatArray:
-        """F/F_z (..., 4); NaN where a wheel is off the ground, or its force is a mere share of the total."""
-        lifted: BoolArray = load < self._least_load
-        if unknown is not None:
-            lifted = lifted | unknown
-        if not np.count_nonzero(lifted):
-            ratio: FloatArray = force / load
-            return ratio
-        return np.where(lifted, np.nan, force / np.where(lifted, 1.0, load))
