@@ -110,14 +110,14 @@ def quiet(value: FloatArray, limit: float = LIMIT) -> bool:
     """Whether all entries are within `limit`: what every step asks first. False for NaN.
 
     Plain numbers for a handful (their sum: False may also mean that they are large together); one dot product for small
-    arrays; for large ones BLAS would start threads, and extrema are as fast.
+    arrays, unless they are large together; for large ones BLAS would start threads, and extrema are as fast.
     """
     if value.ndim == 0:
         return bool(abs(value.item()) <= limit)
     if value.ndim == 1 and value.size <= _FEW:
         return bool(sum(map(abs, value.tolist())) <= limit)
-    if value.size <= _SMALL and limit == LIMIT:
-        return bool(np.vdot(value, value) <= LIMIT * LIMIT)
+    if value.size <= _SMALL and np.vdot(value, value) <= limit * limit:
+        return True
     return bool(np.minimum.reduce(value, None) >= -limit and np.maximum.reduce(value, None) <= limit)
 
 

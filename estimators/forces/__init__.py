@@ -5,7 +5,7 @@ from estimators.forces.body_response import BodyResponse
 from estimators.forces.lateral_ukf import LateralForceEstimator, LateralForceStep
 from estimators.forces.pid import PidForceObserver
 from estimators.forces.planar import PlanarModel, planar_model, planar_outputs
-from estimators.forces.total import Reconciled, reconcile
+from estimators.forces.total import Reconciled, normalised, reconcile
 from estimators.forces.unknown_input import UnknownInputForceObserver
 from estimators.forces.vertical import LoadStep, VerticalLoads, levelled, vertical_loads
 from estimators.forces.wheel import WheelForceStep
@@ -26,6 +26,7 @@ __all__ = [
     "WheelForceFilter",
     "WheelForceStep",
     "levelled",
+    "normalised",
     "planar_model",
     "planar_outputs",
     "reconcile",

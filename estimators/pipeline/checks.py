@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,17 @@ VELOCITY = (0.5, 0.05)
 """m/s, and share of the speed."""
 _BITS = [int(check) for check in (Check.FORCE_BALANCE, Check.LATERAL_BALANCE, Check.LOAD_SUM, Check.CORNERS_DISAGREE)]
 _BITS += [int(check) for check in (Check.NO_WHEEL, Check.UNKNOWN_FORCE, Check.LATE_SAMPLE)]
+
+
+class Forces(NamedTuple):
+    """What has been found of forces since; numbers of a kit."""
+
+    gap: Number  # N, innovation of `reconcile`
+    side_gap: Number  # m/s^2, innovation of a_y
+    front: Number  # N, F_yf
+    push: Number  # N, sum of the wheels' F_x as their equations say
+    unknown: Number  # F_x of some wheel is
+    late: Number  # the sample
 
 
 class CrossChecks(Memory):
@@ -64,20 +75,17 @@ class CrossChecks(Memory):
 
     def __call__(
         self,
-        agreed: Any,
-        lateral: Any,
+        forces: Forces,
         loads: Any,
         moved: Any,
-        corners: Any,
+        corner_speed: Number | None,
         az: npt.ArrayLike | None,
-        unknown: Number,
-        late: Number,
     ) -> Consistency:
-        """One sample of the parts' steps; a gap that nobody measured is held. `unknown`: the force of any wheel is."""
+        """One sample; a gap that nobody measured is held. `corner_speed`: V_x of the corner observers, m/s."""
         kit, shape, choose, mass = self._kit, self.batch_shape, self._kit.where, self.vehicle.mass
         own, speed = kit.own, kit.own(moved.vx)
-        apart = 0.0 if corners is None else speed - own(corners.vx)
-        new = (own(agreed.innovation) / mass, own(lateral.innovation[..., 1]), apart)
+        apart = 0.0 if corner_speed is None else speed - corner_speed
+        new = (forces.gap / mass, forces.side_gap, apart)
         gaps = []
         for value, gap in zip(new, self.gaps, strict=True):
             change = self._gain * (value - gap)
@@ -102,8 +110,8 @@ class CrossChecks(Memory):
             (abs(load_gap) > LOAD) | (abs(self.heave) > HEAVE[0]),
             abs(gaps[2]) > VELOCITY[0] + VELOCITY[1] * abs(speed),
             self.alone > self._patience,
-            unknown,
-            late,
+            forces.unknown,
+            forces.late,
         )
         failed = 0
         for bit, bad in zip(_BITS, found, strict=True):

@@ -18,7 +18,7 @@ from estimators.pipeline.corner_kinds import CornerKind, CornerSample, Scheduled
 from estimators.schedule import GainSchedule
 from estimators.signals import FilteredDerivative, limits
 from estimators.vehicle import VehicleParameters
-from estimators.velocity.corners import CornerVectors, rotated, tire_motion, vehicle_frame
+from estimators.velocity.corners import CornerVectors, at_wheel, rotated, tire_motion, vehicle_frame
 from estimators.velocity.mapping import SlipWeights, weighed
 from estimators.velocity.slip import slips
 from estimators.velocity.suspension import SuspensionCompliance, SuspensionParameters
@@ -161,8 +161,8 @@ class CornerObservers(Memory):
         ) -> tuple[Number, ...]:
             """Sine and cosine of the steering, v_yt, and the inputs of both observers (`corner_acceleration`)."""
             sine, cosine = kit.sin(angle), kit.cos(angle)
-            velocity = vx - turn * y, left + turn * x
-            acceleration = forward - yaw_acceleration * y, leftward + yaw_acceleration * x
+            velocity = at_wheel(vx, left, turn, x, y)
+            acceleration = at_wheel(forward, leftward, yaw_acceleration, x, y)
             _, beside, pull_x, pull_y = tire_motion(velocity, acceleration, sine, cosine, swivel)
             return sine, cosine, beside, R * w_slope - pull_x, -pull_y
 
@@ -195,8 +195,7 @@ class CornerObservers(Memory):
         ) -> tuple[Number, ...]:
             """V_x, V_y of the centre of gravity as the corner sees them, and v_xt, NaN without a wheel speed."""
             ahead = choose(abs(given) < math.inf, R * w - slip_speed, math.nan)
-            corner_x, corner_y = rotated(ahead, beside, -sine, cosine)
-            return corner_x + turn * y, corner_y - turn * x, ahead
+            return *at_wheel(*rotated(ahead, beside, -sine, cosine), -turn, x, y), ahead
 
         seen_x, seen_y, ahead = kit.each(
             placed, speed, held[:4], kit.rows(relative, 4), beside, sine, cosine, radius, *levers

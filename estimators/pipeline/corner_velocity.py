@@ -17,7 +17,7 @@ from estimators.memory import Memory
 from estimators.pipeline.corner_set import CornerObservers, CornerSetStep
 from estimators.pipeline.parts import check_parts
 from estimators.signals import limits
-from estimators.velocity.corners import rotated
+from estimators.velocity.corners import at_wheel, rotated
 from estimators.velocity.kinematic import KinematicKalman
 from estimators.velocity.slip import slips
 
@@ -119,7 +119,8 @@ class CornerVelocity(Memory):
         def mapped(
             w: Number, angle: Number, radius: float, x: float, y: float, along: Number, across: Number
         ) -> tuple[Number, Number]:
-            ahead, beside = rotated(vx - turn * y + along, vy + turn * x + across, kit.sin(angle), kit.cos(angle))
+            forward, left = at_wheel(vx, vy, turn, x, y)
+            ahead, beside = rotated(forward + along, left + across, kit.sin(angle), kit.cos(angle))
             return slips(kit, radius * w, ahead, beside)
 
         outputs = kit.table(kit.each(mapped, held[:4], held[4:8], *self._wheels, *moves), shape)

@@ -6,7 +6,7 @@ A part with `reset`, `save` and `restore` takes part in these of the pipeline; o
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy.typing as npt
 
@@ -188,6 +188,18 @@ class SideslipResult(Protocol):
     @property
     def flags(self) -> FlagArray:
         """(...) sums of `Flag`."""
+
+
+class Parts(NamedTuple):
+    """What a pipeline is composed of; None: the default part of forces, loads and velocity, none of the others."""
+
+    longitudinal_force: LongitudinalForcePart | None
+    loads: LoadPart | None
+    attitude: AttitudePart | None
+    lateral_force: LateralForcePart | None
+    velocity: VelocityPart | None
+    corner_observers: CornerPart | None
+    sideslip: SideslipPart | None
 
 
 CORNER_PARTS = ("longitudinal_force", "readings")

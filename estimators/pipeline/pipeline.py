@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from estimators.arguments import batch, entries, mask, setting
 from estimators.arithmetic import Number, arithmetic
-from estimators.arrays import BoolArray, FlagArray, FloatArray
+from estimators.arrays import BoolArray, FlagArray
 from estimators.faults import Flag
 from estimators.forces import (
     AttitudeStep,
     LateralForceEstimator,
     UnknownInputForceObserver,
     VerticalLoads,
+    normalised,
     reconcile,
 )
 from estimators.memory import Memory
-from estimators.pipeline.checks import CrossChecks
-from estimators.pipeline.direction import DirectionOfTravel
-from estimators.pipeline.last_sample import LastSample, Tilt, possible
+from estimators.pipeline.car_by_car import FEW, CarByCar
+from estimators.pipeline.checks import Forces
+from estimators.pipeline.motion import CarMotion
 from estimators.pipeline.parts import (
     CORNER_PARTS,
     AttitudePart,
@@ -29,6 +32,7 @@ from estimators.pipeline.parts import (
     LateralForcePart,
     LoadPart,
     LongitudinalForcePart,
+    Parts,
     SideslipPart,
     VelocityPart,
     check_parts,
@@ -36,15 +40,13 @@ from estimators.pipeline.parts import (
 from estimators.pipeline.readings import WheelReadings
 from estimators.pipeline.result import PipelineStep
 from estimators.pipeline.signals import VehicleSignals
-from estimators.signals import FilteredDerivative, limits
+from estimators.signals import FilteredDerivative
 from estimators.vehicle import VehicleParameters
 from estimators.velocity import VelocityFusion
 from estimators.velocity.rear_wheels import rear_wheel_speed
-from estimators.velocity.slip import LEAST_SPEED
 
 REAL_SENSORS = (0.3, 0.1, 0.3)
 """m/s^2, m/s^2, rad/s^2: deviations of a_x, a_y, dr/dt for the lateral forces, sensors and model together."""
-_LIFTED = 0.05  # share of its static load below which a wheel's F/F_z means nothing
 _LATE = 0.5  # relative error of the sample time beyond which a difference quotient of wheel speeds is no acceleration
 
 
@@ -59,7 +61,8 @@ class EstimationPipeline(Memory):
     5. F_y of both axles from planar dynamics; front split from the model, rear split by load; before 4 where 4 asks for it;
     6. corner observers and a sideslip part (optional), beside the chain: for comparison and cross-check.
 
-    Each part is replaced by any object that follows its protocol (`parts`).
+    Each part is replaced by any object that follows its protocol (`parts`). Up to four cars with the default parts run on plain
+    numbers, one after the other (`car_by_car`), more cars on arrays: results agree to rounding.
 
     Estimates are finite whatever comes in; what was wrong is in the flags, and what does not fit together in
     `consistency`. A wheel speed that repeats bit for bit is the old one read again, for up to `repeat_time`.
@@ -86,8 +89,6 @@ class EstimationPipeline(Memory):
     True
     """
 
-    memory = ("front", "angle")
-
     def __init__(
         self,
         vehicle: VehicleParameters,
@@ -105,41 +106,38 @@ class EstimationPipeline(Memory):
         repeat_time: float = 0.025,
         unsigned_wheels: bool = False,
     ) -> None:
-        self.vehicle, self.batch_shape, self._rear = vehicle, batch(batch_shape), speed_of_rear_wheels
-        shape = self.batch_shape
+        shape = self.batch_shape = batch(batch_shape)
         time = self.sample_time = setting(sample_time, "sample_time", "s")
-        four = (*shape, 4)
+        given = Parts(longitudinal_force, loads, attitude, lateral_force, velocity, corner_observers, sideslip)
+        check_parts(given._asdict(), shape, time, CORNER_PARTS)
+        self.vehicle, self._rear, four = vehicle, speed_of_rear_wheels, (*shape, 4)
         self.longitudinal_force: LongitudinalForcePart = longitudinal_force or UnknownInputForceObserver(
             vehicle, time, four
         )
-        self.loads: LoadPart = loads or VerticalLoads(vehicle, time, shape)
         self.lateral_force: LateralForcePart = lateral_force or LateralForceEstimator(
             vehicle, time, shape, "linear", measurement_deviation=REAL_SENSORS
         )
-        self.velocity: VelocityPart = velocity or VelocityFusion(vehicle, time, shape)
-        self.attitude, self.corner_observers, self.sideslip = attitude, corner_observers, sideslip
+        self.corner_observers, self.sideslip = corner_observers, sideslip
         self.yaw_slope = FilteredDerivative(time, 0.02, shape)
-        self.checks = CrossChecks(vehicle, time, shape, repeat_time=repeat_time)
         self.readings = WheelReadings(four, max(1, round(setting(repeat_time, "repeat_time", "s") / time)))
-        names = ("longitudinal_force", "loads", "attitude", "lateral_force", "velocity", "corner_observers", "sideslip")
-        self.direction = DirectionOfTravel(vehicle, time, shape) if unsigned_wheels else None
-        own = ("yaw_slope", "checks", "readings")
-        self._named = (*(name for name in names if getattr(self, name) is not None), *own)
-        check_parts({name: getattr(self, name) for name in self._named}, shape, time, CORNER_PARTS)
-        self.parts = tuple(name for name in self._named if hasattr(getattr(self, name), "save"))
-        self.parts += ("last", "direction") if unsigned_wheels else ("last",)
-        self._lateral_first = bool(getattr(self.velocity, "uses_lateral_force", False))
-        self._takes_gravity = bool(getattr(self.velocity, "uses_gravity", False))
+
+        def motion(shape: tuple[int, ...] = ()) -> CarMotion:
+            chosen = loads or VerticalLoads(vehicle, time, shape), velocity or VelocityFusion(vehicle, time, shape)
+            return CarMotion(vehicle, time, shape, *chosen, attitude, repeat_time, unsigned_wheels)
+
+        apart = 1 < math.prod(shape) <= FEW and not unsigned_wheels and all(part is None for part in given)
+        self.motion = CarByCar(shape, motion) if apart else motion(shape)
+        if isinstance(self.motion, CarMotion):
+            self.loads, self.velocity, self.attitude = self.motion.loads, self.motion.velocity, self.motion.attitude
+        own = ("longitudinal_force", "lateral_force", "corner_observers", "sideslip", "yaw_slope", "readings")
+        self._own = tuple(name for name in own if getattr(self, name) is not None)
+        self.parts = tuple(name for name in self._own if hasattr(getattr(self, name), "save"))
+        self._lateral_first = bool(getattr(velocity, "uses_lateral_force", False))
         self._compliant = bool(getattr(corner_observers, "uses_forces", False))
         self._use_across = self._lateral_first or self.corner_observers is not None
         self._total_deviation = vehicle.mass * setting(acceleration_deviation, "acceleration_deviation", "m/s^2")
-        self._least_load = _LIFTED * vehicle.static_loads
-        self._kit = kit = arithmetic(shape)
-        self._single = math.prod(shape) == 1
-        self._level, self._never = np.zeros(shape), kit.full(False)
-        self.last = LastSample(time, shape)
-        self.front: Number = kit.full(0.0)  # F_yf of the last sample, N
-        self.angle: Number = kit.full(0.0)  # the last known steering of the front wheels, rad
+        self._kit, self._static = arithmetic(shape), vehicle.static_loads
+        self._level, self._never = np.zeros(shape), self._kit.full(False)
 
     def step(self, signals: VehicleSignals) -> PipelineStep:
         """One sample on.
@@ -147,42 +145,37 @@ class EstimationPipeline(Memory):
         Raises:
             EstimatorError: a signal of another shape, or not numbers.
         """
-        kit, shape, car, choose, last = self._kit, self.batch_shape, self.vehicle, self._kit.where, self.last
+        kit, shape, car, choose = self._kit, self.batch_shape, self.vehicle, self._kit.where
         w, steer, torque, *body = signals.arrays(shape)
         ax, ay, turn = (kit.own(value) for value in body)
-        read_x, read_y = (possible(kit, value, limits.ACCELERATION) for value in (ax, ay))
-        turned = possible(kit, turn, limits.YAW_RATE)
         late = self._late(signals.elapsed)
-        w, open_way = self._signed(w, signals, read_x)
+        w, open_way = self.motion.signed(w, ax, signals.direction)
         fresh = self.readings.step(w)
-        tilt = last.tilted(self.attitude, signals, read_x, read_y, turned)
-        read_x, read_y, turned = last.believed(read_x, read_y, turned)
-        own_x, own_y = (read_x, read_y) if tilt is None else tilt.level(read_x, read_y)
-        bias_x, bias_y = last.bias
-        own_x, own_y = own_x - bias_x, own_y - bias_y
-        lean, rise = (None, None) if tilt is None else (tilt.roll, tilt.pitch)
-        loads = self.loads.step(read_x - bias_x, read_y - bias_y, signals.az, rise, lean)
+        loads, own_x, own_y, turned, angle, total, tilt = self.motion.felt(ax, ay, turn, steer, signals)
         wheels = self.longitudinal_force.step(w, torque, loads.load, fresh=fresh)
         delayed = kit.some(late)
         unknown = wheels.unknown | np.asarray(late)[..., None] if delayed else wheels.unknown
-        front = kit.rows(steer, 4)
-        angle = possible(kit, 0.5 * (front[0] + front[1]), limits.ANGLE)
-        self.angle = choose(abs(angle) < math.inf, angle, self.angle)
-        total = car.mass * own_x + self.front * kit.sin(self.angle)
         agreed = reconcile(wheels.force, wheels.deviation, total, self._total_deviation, loads.load, unknown)
-        use = self._normalised(agreed.force, loads.load, unknown)
+        use = normalised(agreed.force, loads.load, self._static, unknown)
         yaw_acceleration = self.yaw_slope.step(choose(late, math.nan, turned) if delayed else turned).derivative
         yaw_acceleration = choose(abs(turned) < math.inf, kit.own(yaw_acceleration), math.nan)
         lateral = self.lateral_force.step(own_x, own_y, yaw_acceleration, angle, agreed.force, loads.load)
-        across = self._normalised(lateral.corner_force, loads.load, None) if self._use_across else None
-        more = {"lateral_use": across, "forces": (agreed.force, lateral.corner_force)} if self._lateral_first else {}
-        ax, ay, heavy = self._with_gravity(ax, ay, tilt)
-        moved = self.velocity.step(w, steer, ax, ay, turn, use, signals.elapsed, **more, **heavy)
+        across = normalised(lateral.corner_force, loads.load, self._static) if self._use_across else None
+        pulls = {"forces": (agreed.force, lateral.corner_force)}
+        more: dict[str, Any] = {"lateral_use": across, **pulls} if self._lateral_first else {}
+        forces = Forces(
+            gap=kit.own(agreed.innovation),
+            side_gap=kit.own(lateral.innovation[..., 1]),
+            front=kit.own(lateral.axle_force[..., 0]),
+            push=kit.own(np.add.reduce(wheels.force, -1)),
+            unknown=self._any_wheel(unknown),
+            late=late,
+        )
+        moved = self.motion.moved(w, use, forces, more)
         corners = None
         if self.corner_observers is not None and across is not None:
             corners = self.corner_observers.step(
-                *(w, steer, own_x, own_y, turn, use, across, moved.vy),
-                **({"forces": (agreed.force, lateral.corner_force)} if self._compliant else {}),
+                *(w, steer, own_x, own_y, turn, use, across, moved.vy), **(pulls if self._compliant else {})
             )
         beside = None
         if self.sideslip is not None:
@@ -193,13 +186,8 @@ class EstimationPipeline(Memory):
             beside = self.sideslip.step(
                 steered, turning, speed, pull_x, pull_y, agreed.force, loads.load, lateral.axle_force
             )
-        open_ = kit.rows(unknown, 4)
-        lost = open_[0] | open_[1] | open_[2] | open_[3]
-        consistency = self.checks(agreed, lateral, loads, moved, corners, signals.az, lost, late)
-        self.front = kit.own(lateral.axle_force[..., 0])
-        last.learn(moved, kit.own(wheels.force.sum(axis=-1)) / car.mass, lost)
-        vx, vy, _ = last.speed
-        sideslip = kit.atan(vy / kit.maximum(abs(vx), LEAST_SPEED))
+        corner_speed = None if corners is None else kit.own(corners.vx)
+        consistency, sideslip = self.motion.closed(corner_speed)
         return PipelineStep(
             vx=moved.vx,
             vy=moved.vy,
@@ -238,38 +226,16 @@ class EstimationPipeline(Memory):
             EstimatorError: a mask or speeds of another shape.
         """
         chosen = mask(where, self.batch_shape, "where")
+        self.motion.reset(chosen, vx, vy)
         corners = np.repeat(chosen[..., None], 4, axis=-1)
-        for name in self._named:
+        for name in self._own:
             part = getattr(self, name)
-            if not hasattr(part, "reset"):
-                continue
-            if name == "velocity":
-                part.reset(chosen, vx, vy)
-            else:
+            if hasattr(part, "reset"):
                 part.reset(corners if name in CORNER_PARTS else chosen)
-        here, choose = self._kit.own(chosen), self._kit.where
-        self.front, self.angle = choose(here, 0.0, self.front), choose(here, 0.0, self.angle)
-        self.last.forget(here)
-        if self.direction is not None:
-            self.direction.forget(here if self._single else np.ravel(here))
 
-    def _with_gravity(self, ax: Number, ay: Number, tilt: Tilt | None) -> tuple[Number, Number, dict[str, FloatArray]]:
-        """a_x and a_y for the velocity part, and what it takes of gravity besides: nothing, if it has to be taken off before."""
-        if tilt is None:
-            return ax, ay, {}
-        if self._takes_gravity:
-            return ax, ay, {"gravity": tilt.gravity}
-        along, across = (self._kit.own(tilt.gravity[..., k]) for k in (0, 1))
-        return ax - along, ay - across, {}
-
-    def _signed(self, w: FloatArray, signals: VehicleSignals, ax: Number) -> tuple[FloatArray, FloatArray | None]:
-        """Wheel speeds with a sign, and the deviation of V_x, m/s, where it is open; as they are, and None, if they have one."""
-        if self.direction is None:
-            return w, None
-        signed = self.direction.step(w, np.asarray(self.last.pull(ax)), signals.direction)
-        if signed.turned.any() and (reset := getattr(self.velocity, "reset", None)) is not None:
-            reset(signed.turned, signed.speed)
-        return signed.wheel_speed, signed.open_deviation
+    def _members(self) -> Iterator[tuple[str, Any]]:
+        yield "", self.motion  # its names stand beside those of the other parts
+        yield from super()._members()
 
     def _flags(self, flags: FlagArray, tilt: AttitudeStep | None, late: Number) -> FlagArray:
         """Of the whole car: `flags` of the parts, those of the attitude, and samples that came late."""
@@ -279,19 +245,15 @@ class EstimationPipeline(Memory):
             return flags
         return flags | np.asarray(self._kit.where(late, int(Flag.STALE_MEASUREMENT), 0), dtype=np.int32)
 
+    def _any_wheel(self, where: BoolArray) -> Number:
+        """Cars with a wheel `where` (..., 4)."""
+        if not np.count_nonzero(where):
+            return self._never
+        return self._kit.own(where.any(axis=-1))
+
     def _late(self, elapsed: npt.ArrayLike | None) -> Number:
         """Where the sample came so early or late that a difference quotient over it is no derivative."""
         if elapsed is None:
             return self._never
         given = self._kit.own(entries(elapsed, self.batch_shape, "elapsed"))
         return self._kit.no(abs(given / self.sample_time - 1.0) <= _LATE)
-
-    def _normalised(self, force: FloatArray, load: FloatArray, unknown: BoolArray | None) -> FloatArray:
-        """F/F_z (..., 4); NaN where a wheel is off the ground, or its force is a mere share of the total."""
-        lifted: BoolArray = load < self._least_load
-        if unknown is not None:
-            lifted = lifted | unknown
-        if not lifted.any():
-            ratio: FloatArray = force / load
-            return ratio
-        return np.where(lifted, np.nan, force / np.where(lifted, 1.0, load))

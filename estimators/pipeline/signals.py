@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from estimators.arguments import entries
+from estimators.arithmetic import Number
 from estimators.arrays import FloatArray
 from estimators.display import displayed
 
@@ -15,6 +17,10 @@ UNITS = {
     "wheel_speed": "rad/s", "ax": "m/s^2", "ay": "m/s^2", "yaw_rate": "rad/s", "steer": "rad", "torque": "N m", "az": "m/s^2",
     "roll_rate": "rad/s", "pitch_rate": "rad/s", "grade": "rad", "bank": "rad", "elapsed": "s",
 }  # fmt: skip
+
+
+CheckedSignals = tuple[FloatArray, FloatArray, FloatArray, Number, Number, Number]
+"""wheel_speed, steer, torque (..., 4), and ax, ay, yaw_rate (...): arrays, or plain numbers of one car."""
 
 
 @displayed(UNITS)
@@ -43,10 +49,8 @@ class VehicleSignals(NamedTuple):
     elapsed: npt.ArrayLike | None = None  # (...) s since the last sample, where it is not the sample time
     direction: npt.ArrayLike | None = None  # (...) gear: 1 forward, -1 backward; 0 or NaN where it does not say
 
-    def arrays(
-        self, shape: tuple[int, ...]
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """wheel_speed, steer, torque (..., 4) and ax, ay, yaw_rate (...); the others are checked as well.
+    def arrays(self, shape: tuple[int, ...]) -> CheckedSignals:
+        """What every car has, as arrays of the batch shape; the others are checked as well.
 
         Raises:
             EstimatorError: another shape, or not numbers.
@@ -62,4 +66,16 @@ class VehicleSignals(NamedTuple):
             entries(self.ax, shape, "ax"),
             entries(self.ay, shape, "ay"),
             entries(self.yaw_rate, shape, "yaw_rate"),
+        )
+
+    def of_cars(self, shape: tuple[int, ...]) -> list[VehicleSignals]:
+        """Of each car of the batch, what `arrays` does not return."""
+        cars = math.prod(shape)
+        own = {
+            name: entries(value, shape, name).ravel().tolist()
+            for name, value in zip(self._fields[6:], self[6:], strict=True)
+            if value is not None and not isinstance(value, float)
+        }
+        return (
+            [self._replace(**{name: of[k] for name, of in own.items()}) for k in range(cars)] if own else [self] * cars
         )

@@ -29,6 +29,14 @@ def rotated(x: Number, y: Number, sine: Number, cosine: Number) -> tuple[Number,
     return x * cosine + y * sine, y * cosine - x * sine
 
 
+def at_wheel(x: Number, y: Number, turn: Number, arm_x: Number, arm_y: Number) -> tuple[Number, Number]:
+    """x - r y_c, y + r x_c: velocity of a wheel centre from that of the centre of gravity, of numbers or of arrays.
+
+    Likewise the acceleration, with r' for r. The inverse takes -r.
+    """
+    return x - turn * arm_y, y + turn * arm_x
+
+
 def tire_motion(
     velocity: tuple[Number, Number],
     acceleration: tuple[Number, Number],
@@ -47,7 +55,7 @@ def corner_velocity(
 ) -> CornerVectors:
     """V_xc = V_x - r y_c, V_yc = V_y + r x_c in the vehicle frame, m/s; arguments (...)."""
     forward, left, turn = (_cornered(value) for value in (vx, vy, yaw_rate))
-    return CornerVectors(forward - turn * vehicle.corner_y, left + turn * vehicle.corner_x)
+    return CornerVectors(*at_wheel(forward, left, turn, vehicle.corner_x, vehicle.corner_y))
 
 
 def tire_frame(vector: CornerVectors, steer: npt.ArrayLike) -> CornerVectors:
@@ -90,10 +98,7 @@ def corner_acceleration(
     """
     a, b, turn, yaw_acceleration = (_cornered(value) for value in (ax, ay, yaw_rate, yaw_acceleration))
     forward, left = _cornered(vx), _cornered(vy)
-    body = (
-        a + turn * left - yaw_acceleration * vehicle.corner_y,
-        b - turn * forward + yaw_acceleration * vehicle.corner_x,
-    )
+    body = at_wheel(a + turn * left, b - turn * forward, yaw_acceleration, vehicle.corner_x, vehicle.corner_y)
     angle, rate = np.asarray(steer, dtype=np.float64), np.asarray(steer_rate, dtype=np.float64)
     velocity = corner_velocity(vehicle, vx, vy, yaw_rate)
     return CornerVectors(*tire_motion(velocity, body, np.sin(angle), np.cos(angle), rate)[2:])

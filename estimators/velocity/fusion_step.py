@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -107,6 +108,17 @@ def fusion_step(
     real = kit.table((speeds, errors, radius, slip, angle, innovation, axle.innovation, inertial), shape)
     true = kit.table((wheel.used, wheel.gated, slipping, axle.used, (standing,), used), shape)
     sums = kit.table((wheel_flags, (flags,)), shape).astype(np.int32)
+    return _step_of(real, true, sums)
+
+
+def joined_steps(steps: Sequence[FusionStep], shape: tuple[int, ...]) -> FusionStep:
+    """Steps of single cars (batch shape ()) as the one of a batch of `shape`: their tables, side by side."""
+    tables = [step.vx.base for step in steps], [step.used.base for step in steps], [step.flags.base for step in steps]
+    return _step_of(*(np.array(table).reshape(*shape, -1) for table in tables))
+
+
+def _step_of(real: FloatArray, true: BoolArray, sums: FlagArray) -> FusionStep:
+    """All fields are views of three tables."""
     return FusionStep(
         vx=real[..., 0],
         vy=real[..., 1],

@@ -19,7 +19,7 @@ from estimators.arithmetic import Arithmetic, ManyCars, Number, Signals
 from estimators.arrays import FloatArray
 from estimators.errors import EstimatorError
 from estimators.vehicle import VehicleParameters
-from estimators.velocity.corners import CornerVectors, corner_velocity, tire_frame
+from estimators.velocity.corners import CornerVectors, at_wheel, corner_velocity, tire_frame
 from estimators.velocity.slip import side_slip_angle, slip_ratio
 
 
@@ -88,7 +88,7 @@ def to_centre(
         EstimatorError: a weight outside [0, 1].
     """
     turn = np.asarray(yaw_rate, dtype=np.float64)[..., None]
-    along, across = corner.x + turn * vehicle.corner_y, corner.y - turn * vehicle.corner_x
+    along, across = at_wheel(corner.x, corner.y, -turn, vehicle.corner_x, vehicle.corner_y)
     kit, values = ManyCars(turn.shape[:-1]), []
     for value, weight, name in ((along, front_weight_x, "x"), (across, front_weight_y, "y")):
         share = np.asarray(weight, dtype=np.float64)

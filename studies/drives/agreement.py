@@ -22,7 +22,7 @@ import numpy as np
 from estimators.arrays import BoolArray, FloatArray
 from estimators.vehicle import GRAVITY
 from studies.drives.drive_file import DriveFile, Vehicle
-from studies.drives.quantities import CORNERS
+from studies.drives.quantities import CORNERS, at_corners
 from studies.drives.robust_line import Line, robust_line
 
 WINDOW = 0.2  # s of averaging, and half of the span of V'
@@ -208,7 +208,7 @@ class _Log:
 
 def _surface_speeds(signals: Mapping[str, FloatArray], car: Vehicle) -> FloatArray:
     radius = np.repeat([car.effective_radius_front, car.effective_radius_rear], 2)
-    return np.asarray(np.stack([signals[f"wheel_speed_{corner}"] for corner in CORNERS], axis=-1) * radius)
+    return np.asarray(at_corners(signals, "wheel_speed") * radius)
 
 
 def steering_angle(signals: Mapping[str, FloatArray], car: Vehicle) -> FloatArray | None:

@@ -21,7 +21,7 @@ from estimators.velocity import KinematicKalman, SlipWeights
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
 from studies.drives.prepare import CornerInputs
-from studies.drives.quantities import CORNERS
+from studies.drives.quantities import at_corners
 from studies.drives.replay import PROGRESS_STEPS, Progress
 from studies.errors import refused_at
 
@@ -123,8 +123,8 @@ def run_chain(
 ) -> Chain:
     """Every sample through the pipeline; signals that the log lacks are not flagged, missing samples are."""
     n, signals = log.time.size, log.signals
-    nothing, zero = np.full(n, np.nan), np.zeros(n)
-    torque = np.stack([signals.get(f"torque_{corner}", nothing) for corner in CORNERS], axis=-1)
+    zero = np.zeros(n)
+    torque = at_corners(signals, "torque")
     ax, ay, turn = signals["ax"], signals.get("ay", zero), signals.get("yaw_rate", zero)
     wheel, steer = inputs.wheel_speed, inputs.steer
     optional = {name: signals[name] for name in ("az", "roll_rate", "pitch_rate", "direction") if name in signals}

@@ -12,8 +12,6 @@ import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
 
-LEAST_LOAD = 0.05  # share of the static load below which a wheel counts as lifted and its normalised force as unknown
-
 
 def derivative(value: FloatArray, sample_time: float, lag: float) -> FloatArray:
     """Causal first-order derivative of (n,) samples: y' = (x' - y)/lag, per second.
@@ -71,12 +69,6 @@ def shared_forces(
     share = vertical_load[:, ~known] / vertical_load[:, ~known].sum(axis=1, keepdims=True)
     forces[:, ~known] = rest[:, None] * share
     return forces
-
-
-def normalised_forces(force: FloatArray, vertical_load: FloatArray, static_load: float) -> FloatArray:
-    """mu = F_x/F_z (n, 4), P1 (13); NaN where a wheel carries less than 5 % of ``static_load``, N."""
-    lifted = vertical_load < LEAST_LOAD * static_load
-    return np.where(lifted, np.nan, force / np.where(lifted, 1.0, vertical_load))
 
 
 def mean_over(values: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ import numpy as np
 from estimators.arrays import FloatArray
 from studies.drives.columns import Column
 from studies.drives.drive_file import DriveFile
-from studies.drives.quantities import CORNERS, SIGNALS, factor_to
+from studies.drives.quantities import CORNERS, SIGNALS, at_corners, factor_to
 from studies.errors import LogError
 
 
@@ -83,7 +83,7 @@ def _check_rolling(
 ) -> None:
     car = drive.vehicle
     radius = np.repeat([car.effective_radius_front, car.effective_radius_rear], 2)
-    surface = np.stack([signals[f"wheel_speed_{corner}"] for corner in CORNERS], axis=-1) * radius
+    surface = at_corners(signals, "wheel_speed") * radius
     fast = np.isfinite(vx) & (vx > FAST)
     ratio = surface[fast] / vx[fast, None]
     turning = np.isfinite(ratio) & (np.abs(ratio) > STANDING)

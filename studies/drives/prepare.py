@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimators.arrays import FloatArray
-from estimators.forces import vertical_loads
+from estimators.forces import normalised, vertical_loads
 from estimators.vehicle import GRAVITY
 from estimators.velocity import corner_acceleration_by_speed
 from studies.drives import corner_inputs
 from studies.drives.drive_file import DriveFile
 from studies.drives.log import DriveLog
-from studies.drives.quantities import CORNERS
+from studies.drives.quantities import CORNERS, at_corners
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def corner_inputs_of(log: DriveLog, drive: DriveFile) -> CornerInputs:
         columns = [corner_inputs.derivative(column, step, lag) for column in np.atleast_2d(value.T)]
         return np.stack(columns, axis=-1).reshape(value.shape)
 
-    wheel_speed = _four(log, "wheel_speed")
+    wheel_speed = at_corners(log.signals, "wheel_speed")
     radius = np.repeat([car.effective_radius_front, car.effective_radius_rear], 2)
     ax, ay = log.signals["ax"], measured("ay", "lateral acceleration")
     yaw_rate, vy = measured("yaw_rate", "yaw rate"), measured("vy", "lateral velocity")
@@ -87,15 +87,10 @@ def corner_inputs_of(log: DriveLog, drive: DriveFile) -> CornerInputs:
     return CornerInputs(
         time=log.time, wheel_speed=wheel_speed, radius=radius, wheel_acceleration=wheel_acceleration,
         vertical_load=load, force=force,
-        normalised_force=corner_inputs.normalised_forces(force, load, car.mass * GRAVITY / 4), free=free,
+        normalised_force=normalised(force, load, car.mass * GRAVITY / 4), free=free,
         per_speed=per_speed, steer=steer, yaw_rate=yaw_rate, ax=ax, ay=ay, vy=vy, x=car.parameters.corner_x,
         y=car.parameters.corner_y, force_sources=sources, assumptions=tuple(assumptions),
     )  # fmt: skip
-
-
-def _four(log: DriveLog, name: str) -> FloatArray:
-    nothing = np.full_like(log.time, np.nan)
-    return np.stack([log.signals.get(f"{name}_{corner}", nothing) for corner in CORNERS], axis=-1)
 
 
 def _steer(log: DriveLog, drive: DriveFile, assumptions: list[str]) -> FloatArray:
@@ -118,7 +113,7 @@ def _forces(
     """F_x per corner: wheel dynamics where the torque is known, what is left of m a_x shared by load elsewhere."""
     car = drive.vehicle
     dynamics = corner_inputs.wheel_forces(
-        _four(log, "torque"), wheel_speed, dw, load, car.wheel_inertia or 0.0, radius,
+        at_corners(log.signals, "torque"), wheel_speed, dw, load, car.wheel_inertia or 0.0, radius,
         car.rolling_resistance, drive.observer.stopped_below, car.bearing_friction,
     )  # fmt: skip
     known = np.array([f"torque_{corner}" in log.signals for corner in CORNERS])

@@ -9,15 +9,23 @@ from __future__ import annotations
 import functools
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Annotated
 
+import numpy as np
 import pint
 from pydantic import BeforeValidator
 
+from estimators.arrays import FloatArray
 from studies.errors import escaped
 
 CORNERS = ("fl", "fr", "rl", "rr")  # corner order of every array: front left, front right, rear left, rear right
+
+
+def at_corners(signals: Mapping[str, FloatArray], name: str) -> FloatArray:
+    """(n, 4) of the columns of a log; NaN where there is none."""
+    nothing = np.full(next(iter(signals.values())).shape, np.nan)
+    return np.stack([signals.get(f"{name}_{corner}", nothing) for corner in CORNERS], axis=-1)
 
 
 def _corners(name: str, unit: str) -> dict[str, str]:

@@ -65,6 +65,11 @@ def march(inputs: CornerInputs, observe: Observe, share: FloatArray) -> tuple[Fl
     ``share`` (...): effective radius of each set over that of the inputs. V_x of the last step enters the corner accelerations
     of the next, P1 notes 6. They start at rest relative to the road (z = v_r = 0) with the first sample. Wheel accelerations are
     backward differences, so step k moves the estimate from sample k - 1 to k with what is known at k: nothing looks ahead.
+
+    The recursion is that of `estimators.pipeline.CornerObservers`, and a test holds them against each other. They are two because
+    the runtime takes each sample as it comes, bridges gaps, and estimates V_y or is given it; a log has V_y, must not use a
+    derivative across a gap, and lets everything that does not depend on the estimate be worked out for all samples and designs
+    at once.
     """
     gain, shift = centre_map(inputs)
     weights = centre_weights(inputs)

@@ -65,9 +65,22 @@ def test_one_step_for_four_corners(benchmark: Any, name: str) -> None:
 
 @pytest.mark.parametrize("cars", [2, 3, 4, 8, 1000])
 def test_several_cars(benchmark: Any, cars: int) -> None:
-    """From four cars on a batch costs less than a loop over single cars; two and three cost 1.6 and 1.1 times as much."""
+    """Never more than the loop below: 0.98, 0.88, 0.84 and 0.5 times as much for two, three, four and eight cars."""
     pipeline = EstimationPipeline(CAR, TIME, (cars,))
     given = samples((cars,), 4)
     turn = iter(range(10**9))
     step = benchmark(lambda: pipeline.step(given[next(turn) % len(given)]))
     assert np.isfinite(step.vx).all()
+
+
+@pytest.mark.parametrize("cars", [2, 3, 4, 8])
+def test_a_loop_over_single_cars(benchmark: Any, cars: int) -> None:
+    pipelines = [EstimationPipeline(CAR, TIME) for _ in range(cars)]
+    given = samples((), 4)
+    turn = iter(range(10**9))
+
+    def loop() -> list[Any]:
+        signals = given[next(turn) % len(given)]
+        return [pipeline.step(signals) for pipeline in pipelines]
+
+    assert all(np.isfinite(step.vx) for step in benchmark(loop))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimators.forces import vertical_loads
+from estimators.forces import normalised, vertical_loads
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity import corner_acceleration_by_speed
 from studies.drives import corner_inputs as ci
@@ -76,7 +76,7 @@ def test_shared_forces_add_up() -> None:
 
 def test_lifted_wheels_have_no_normalised_force() -> None:
     load = np.array([[5e3, 1e2, 0.0, -50.0]])
-    mu = ci.normalised_forces(np.full((1, 4), 1e3), load, 5e3)
+    mu = normalised(np.full((1, 4), 1e3), load, 5e3)
     np.testing.assert_array_equal(mu, [[0.2, np.nan, np.nan, np.nan]])
 
 

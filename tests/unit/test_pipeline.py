@@ -21,6 +21,7 @@ from estimators.pipeline import (
     StiffnessSideslip,
     VehicleSignals,
 )
+from estimators.pipeline.car_by_car import FEW
 from estimators.sideslip import FourWheel, SingleTrack
 from estimators.vehicle import GRAVITY
 from estimators.velocity import SlipWeights, VelocityFusion
@@ -83,16 +84,15 @@ def test_steady_turn_is_found_in_all_its_parts() -> None:
     assert (last.slip_angle < 0).all()  # to the left: positive forces, negative angles (P1)
 
 
-@pytest.mark.parametrize("build", [EstimationPipeline, None], ids=["default", "all parts"])
-def test_a_batch_equals_a_loop(build: Any) -> None:
-    seeds = 3
+@pytest.mark.parametrize("seeds", [FEW + 1, 3], ids=["default", "all parts"])
+def test_a_batch_equals_a_loop(seeds: int) -> None:
     runs = [noisy(DRIVE, seed, (0.05 * seed, 0.0, 0.0)) for seed in range(seeds)]
     runs[1].torque[80:110] = np.nan
     runs[2].ax[50:60] = np.nan
     together = Truth(*(np.stack(column) for column in zip(*runs, strict=True)))
 
     def make(batch: tuple[int, ...]) -> EstimationPipeline:
-        return EstimationPipeline(CAR, TIME, batch) if build is not None else full(batch)
+        return EstimationPipeline(CAR, TIME, batch) if seeds > FEW else full(batch)
 
     batch = run(make((seeds,)), together, 0, 120)
     for seed, one in enumerate(runs):
