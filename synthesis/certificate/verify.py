@@ -134,8 +134,12 @@ class Verifier:
         if dual:
             later = -later
         question = self.question(claim)
+        task, ones = _Task(question, time, P, later, dual), (fmpq(1),) * count
+        if plant.half_spaces:  # corners of the set are where most claims about it fail
+            broken = self._fails_in_a_corner([Region.between(tuple(-x for x in ones), ones)], task)
+            if broken is not None:
+                return broken
         done_at_once, left = quickly_proved(self.loop, question, time, P, speeds, dual, self.boxes)
-        task = _Task(question, time, P, later, dual)
         for number, cell in enumerate(self.loop.cells()):
             broken = None if done_at_once[number] else self._broken(cell, task, left.get(number, []))
             if broken is not None:

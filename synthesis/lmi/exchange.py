@@ -33,6 +33,7 @@ AT_ONCE = 50_000  # places whose inequality is worked out together: 16 x 16 of t
 EDGE = 1e-7  # every inequality is solved for with this margin, and half of it may be missing where it is only looked at
 KEPT, NEARLY = 12, 1e-4
 """Places of an inequality that the next problem starts with: the tightest ones, relative to its size."""
+SPREAD = 50  # places to start with, beside those furthest out, where the set of the parameters is no box
 LOOKED_AT = {0: 1, 1: 9}  # points for each parameter, by their number; 5 for more
 SLACK = 0.02  # share of the common margin by which a place that is only looked at may fall short
 STEADY = 1e-5  # relative change of an objective that nothing will be proved at
@@ -220,15 +221,18 @@ def _family(problem: LmiProblem, entry: Inequality) -> Family:
             last[key] = entry.matrix.substitute(decisions)
         return np.asarray(last[key].at(chosen)[..., 0])
 
+    family = Family(entry.name, places, rows, known, corners(places, count), entry.strict)
+    if problem.half_spaces:  # minima would be followed out of the set
+        return family
     spacing = np.array([2.0 / (len(line) - 1) if len(line) > 2 else 0.0 for line in lines] + [0.0] * count)
-    shape = (*(len(line) for line in lines), len(rates))
-    return Family(entry.name, places, rows, known, corners(places, count), entry.strict, shape, spacing)
+    return replace(family, shape=(*(len(line) for line in lines), len(rates)), spacing=spacing)
 
 
 def corners(places: FloatArray, count: int) -> list[int]:
     """Indices to start with: every corner of the parameters with one of its rates, opposite ones with opposite rates.
 
-    Where a corner of the ranges is cut off, the place that is furthest in its direction.
+    Where a corner of the ranges is cut off, places that are furthest in some directions and others spread over the set: corners
+    alone are too few for unknowns that are affine in every parameter.
     """
     spread = np.abs(places[:, :count]).max(axis=0, initial=0.0)
     at_corner = (np.abs(places[:, :count]) >= spread - 1e-12).all(axis=1)
@@ -241,9 +245,10 @@ def corners(places: FloatArray, count: int) -> list[int]:
             found[key] = int(index)
     moving = [i for i in range(count) if len(places) and np.ptp(places[:, i]) > 0.0]
     chosen = list(found.values())
-    for signs in product((-1.0, 1.0), repeat=len(moving)) if len(chosen) < 2 ** len(moving) else ():
+    if len(chosen) == 2 ** len(moving):
+        return chosen
+    for signs in product((-1.0, 1.0), repeat=len(moving)):
         far = places[:, moving] @ np.array(signs)
-        furthest = int(np.lexsort((agree, np.round(far, 9)))[-1])
-        if furthest not in chosen:
-            chosen.append(furthest)
-    return chosen
+        chosen.append(int(np.lexsort((agree, np.round(far, 9)))[-1]))
+    chosen += range(0, len(places), max(1, len(places) // SPREAD))
+    return list(dict.fromkeys(chosen))

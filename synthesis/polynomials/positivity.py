@@ -11,6 +11,7 @@ import numpy as np
 from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
 from synthesis.polynomials.bernstein import halved, in_bernstein
+from synthesis.polynomials.cut_boxes import positive_on_part
 from synthesis.polynomials.half_spaces import Faces
 from synthesis.polynomials.matrix import MatrixPolynomial
 
@@ -70,7 +71,11 @@ def prove_positive(
             break
         open_boxes = ~(eigenvalues.reshape(len(boxes), -1).min(axis=1) > guard)
         if faces is not None:
-            open_boxes &= ~faces.misses(2.0 * lower - 1.0 + width, width)
+            centre = 2.0 * lower - 1.0 + width
+            open_boxes &= ~faces.misses(centre, width)
+            left = np.flatnonzero(open_boxes)[: MOST_NUMBERS // local.size]
+            if len(left):
+                open_boxes[left] = ~positive_on_part(boxes[left], centre[left], width[left], faces, guard)
         if not open_boxes.any():
             return Positivity(True, False, *_refine(matrix, 2.0 * place - 1.0, smallest, faces), scale)
         most = 200_000 if faces is None else MOST_NUMBERS // local.size

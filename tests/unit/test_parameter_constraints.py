@@ -21,8 +21,10 @@ from estimators import Flag, GainSchedule, LpvObserver
 from estimators.errors import RangeError, ScheduleError
 from synthesis.certificate.proof import prove
 from synthesis.design.deploy import Deployment, deploy
+from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.export import schedule_content
 from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
+from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.design.stability import affine_quadratic_stability
 from synthesis.errors import ModelError, ProblemError, SpecError
 from synthesis.exchange.model_file import load_model
@@ -61,12 +63,14 @@ def replaced(model: LpvModel, constraints: tuple[ParameterConstraint, ...]) -> L
     return LpvModel(**{key: getattr(model, key) for key in keys}, constraints=constraints)
 
 
-DESIGN = ObserverDesign((Channel(("d1", "d2"), ("x1",)),), degree=1, fastest_pole=40.0, backoff=0.1)
+CHANNEL = Channel(("d1", "d2"), ("x1",))
+DESIGN = ObserverDesign((CHANNEL,), degree=1, fastest_pole=40.0, backoff=0.1)
+SAMPLED = ObserverDesign((CHANNEL,), degree=1, backoff=0.1)
 
 
 @pytest.fixture(scope="module")
 def deployment() -> Deployment:
-    return deploy(design_observer(sensor(below(0.25)), DESIGN))
+    return deploy(design_sampled_observer(sensor(below(0.25)), SAMPLED, 0.02), DeploySettings(sample_time=0.02))
 
 
 @pytest.fixture(scope="module")
@@ -107,16 +111,16 @@ def test_designs_keep_to_the_set_and_undetectable_places_in_it_are_refused() -> 
 
 def test_the_file_holds_the_set_and_is_proved_from_it_alone(content: dict) -> None:  # type: ignore[type-arg]
     assert content["constraints"]["inequalities"] == [{"coefficients": {"p": 1.0, "q": 1.0}, "max": 0.25, "unit": "1"}]
-    assert all(proof.proved for proof in prove(content) if proof.kind != "motion gain")
+    assert all(proof.proved for proof in prove(content))
 
 
 def test_a_set_that_was_tampered_with_is_seen(content: dict) -> None:  # type: ignore[type-arg]
     """More than was proved is refuted at a place of that set; no set at all, at one of the box; a wrong one is refused."""
     content = copy.deepcopy(content)
-    content["claims"] = [claim for claim in content["claims"] if claim["kind"] in ("gain", "internal update")]
+    content["claims"] = [claim for claim in content["claims"] if claim["kind"] == "sampled error"]
     wider = copy.deepcopy(content)
     wider["constraints"]["inequalities"][0]["max"] = 1.1
-    bad = next(proof for proof in prove(wider) if proof.kind == "internal update")
+    bad = next(proof for proof in prove(wider) if proof.kind == "sampled error")
     values = [float(part.split()[0]) for part in bad.place.split(" = ")[1:3]]
     assert bad.refuted
     assert sum(values) <= 1.1
