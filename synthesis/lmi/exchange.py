@@ -28,6 +28,7 @@ from synthesis.polynomials.matrix import MatrixPolynomial
 
 ROUNDS = 20
 MORE = 6  # places that one inequality gains in a round
+ON_A_LINE = 16  # local minima that it gains if only one variable moves
 SHARE = 0.1  # of the worst violation; what is broken by less waits
 AT_ONCE = 50_000  # places whose inequality is worked out together: 16 x 16 of them are 100 MB
 EDGE = 1e-7  # every inequality is solved for with this margin, and half of it may be missing where it is only looked at
@@ -76,7 +77,7 @@ class Family:
     def worst(self, decisions: FloatArray, slack: float) -> FloatArray:
         """Places (g, v) that fall short by more than `slack`, worst first, no two of them neighbours."""
         if self.spacing is not None:
-            return self._minima(decisions, slack)
+            return self._minima(decisions, slack, ON_A_LINE if np.count_nonzero(self.spacing) == 1 else MORE)
         least = self.least(decisions)
         least[self.active] = np.inf
         short = np.flatnonzero(least < -slack)
@@ -91,12 +92,12 @@ class Family:
                 break
         return self.places[chosen]
 
-    def _minima(self, decisions: FloatArray, slack: float) -> FloatArray:
+    def _minima(self, decisions: FloatArray, slack: float, most: int) -> FloatArray:
         """The least of the local minima that fall short."""
         size = int(np.prod(self.shape))
         starts = grid_minima(self.least(decisions, self.places[:size]), self.shape, -slack)[:STARTS]
         places, values = self.around(decisions, self.places[starts])
-        return places[values < -slack][:MORE]
+        return places[values < -slack][:most]
 
     def around(self, decisions: FloatArray, places: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The local minima that places (g, v) lead to, and their values."""
@@ -203,8 +204,9 @@ def remember(families: Sequence[Family], decisions: FloatArray, memory: Memory) 
 def _family(problem: LmiProblem, entry: Inequality) -> Family:
     count = len(problem.parameters)
     degrees = entry.matrix.degrees[:count]
-    fine = LOOKED_AT.get(count, 5)
-    lines = [np.linspace(-1.0, 1.0, 2 if d == 1 and count > 1 else fine) if d else np.zeros(1) for d in degrees]
+    fine, share = LOOKED_AT.get(count, 5), 2 if count == 1 else 1
+    numbers = [2 if d == 1 and count > 1 else max(fine, share * d + 1) if d else 1 for d in degrees]
+    lines = [np.linspace(-1.0, 1.0, number) if number > 1 else np.zeros(1) for number in numbers]
     found, points = rate_samples(entry.matrix, count), problem.places_on(lines)
     grid, rates = (np.array(line, float).reshape(len(line), count) for line in (points, found))
     places = np.hstack([np.repeat(grid, len(rates), axis=0), np.tile(rates, (len(grid), 1))])

@@ -20,69 +20,14 @@ from typing import Any
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from estimators.arrays import FloatArray, IndexArray
+from estimators.arrays import FloatArray
+from synthesis.lmi.blocks import Blocks
 from synthesis.lmi.clarabel_backend import RawAnswer
 
 REGULAR = (1e-14, 1e-12, 1e-10, 1e-8)  # shares of the diagonal that keep the system definite where a direction is free
 STEP = 0.98  # of the way to the boundary
 LOST = 1e-3  # steps shorter than this lead nowhere
 LIFTED = 1e-2  # relative accuracy with which the least lift of an infeasible problem is sought
-
-
-class Blocks:
-    """The inequalities stacked by their sizes: `fixed` (g, k, k) and `free` (g, k, k, N) for each size k."""
-
-    def __init__(self, given: Sequence[FloatArray]) -> None:
-        sizes = sorted({block.shape[1] for block in given})
-        stacked = [np.concatenate([block for block in given if block.shape[1] == size]) for size in sizes]
-        self.fixed = [np.ascontiguousarray(block[..., 0]) for block in stacked]
-        self.free = [np.ascontiguousarray(block[..., 1:]) for block in stacked]
-        self.triangles = [triangle_by_rows(size) for size in sizes]
-        self.order = sum(part.shape[0] * part.shape[1] for part in self.fixed)
-
-    def linear(self, x: FloatArray) -> list[FloatArray]:
-        """sum_i x_i F_i."""
-        return [free @ x for free in self.free]
-
-    def adjoint(self, Y: Sequence[FloatArray]) -> FloatArray:
-        """<F_i, Y> summed over the blocks."""
-        total = np.zeros(self.free[0].shape[-1])
-        for free, part in zip(self.free, Y, strict=True):
-            total += free.reshape(-1, free.shape[-1]).T @ part.reshape(-1)
-        return total
-
-    def inner(self, Y: Sequence[FloatArray]) -> float:
-        """<F_0, Y>."""
-        return float(sum(np.vdot(fixed, part) for fixed, part in zip(self.fixed, Y, strict=True)))
-
-    def flat(self, matrices: Sequence[FloatArray]) -> FloatArray:
-        """Scaled triangles of all blocks, one vector."""
-        parts = [
-            (matrix[:, rows, columns] * weights).reshape(-1)
-            for matrix, (rows, columns, weights) in zip(matrices, self.triangles, strict=True)
-        ]
-        return np.concatenate(parts)
-
-    def turned(self, left: Sequence[FloatArray]) -> FloatArray:
-        """Scaled triangles of R^-1 F_i R^-T, one column for every unknown; `left` holds R^-1."""
-        parts = []
-        for inverse, free, (_, _, weights) in zip(left, self.free, self.triangles, strict=True):
-            size, count = inverse.shape[-1], free.shape[-1]
-            once = (inverse @ free.reshape(len(free), size, size * count)).reshape(free.shape)
-            flat = np.empty((len(free), len(weights), count))
-            start = 0
-            for row in range(size):  # the F_i are symmetric, and only the upper triangle of what comes out is wanted
-                np.matmul(inverse[:, row:], once[:, row], out=flat[:, start : start + size - row])
-                start += size - row
-            flat *= weights[:, None]
-            parts.append(flat.reshape(-1, count))
-        return np.concatenate(parts) if len(parts) > 1 else parts[0]
-
-
-def triangle_by_rows(size: int) -> tuple[IndexArray, IndexArray, FloatArray]:
-    """Rows and columns of the upper triangle, and the weights sqrt(2) that keep inner products."""
-    rows, columns = np.triu_indices(size)
-    return rows, columns, np.where(rows == columns, 1.0, np.sqrt(2.0))
 
 
 @dataclass
@@ -162,7 +107,7 @@ def _run(blocks: Blocks, cost: FloatArray, weights: FloatArray, tolerance: float
     if point is None:
         n = len(cost)
         return Found(Iterate(np.zeros(n), blocks.fixed, blocks.fixed), "Stalled", 0)
-    size = max(1.0, float(np.linalg.norm(blocks.flat(blocks.fixed))))
+    size = max(1.0, float(np.sqrt(sum(np.vdot(fixed, fixed) for fixed in blocks.fixed))))
     best, best_gap = point, np.inf
     near: Found | None = None
     for iteration in range(limit):
@@ -194,13 +139,13 @@ def _run(blocks: Blocks, cost: FloatArray, weights: FloatArray, tolerance: float
 
 def _start(blocks: Blocks, cost: FloatArray, weights: FloatArray) -> Iterate | None:
     """Least squares for S and Y, both then lifted inside."""
-    flat = blocks.turned([np.broadcast_to(np.eye(f.shape[1]), f.shape) for f in blocks.fixed])
-    normal = _Normal(flat.T @ flat + np.diag(weights))
+    turned = blocks.turned([np.broadcast_to(np.eye(f.shape[1]), f.shape) for f in blocks.fixed])
+    normal = _Normal(blocks.gram(turned) + np.diag(weights))
     if normal.factor is None:
         return None
-    x = normal.solve(-flat.T @ blocks.flat(blocks.fixed) - cost)
+    x = normal.solve(-blocks.against(turned, blocks.fixed) - cost)
     S = [fixed + part for fixed, part in zip(blocks.fixed, blocks.linear(x), strict=True)]
-    Y = [free @ normal.solve(cost + weights * x) for free in blocks.free]
+    Y = blocks.linear(normal.solve(cost + weights * x))
     return Iterate(x, _lifted(S), _lifted(Y))
 
 
@@ -241,8 +186,8 @@ def _step(
         left, values = zip(*(_scaling(s, y) for s, y in zip(point.S, point.Y, strict=True)), strict=True)
     except np.linalg.LinAlgError:
         return None
-    flat = blocks.turned(left)
-    system = flat.T @ flat
+    turned = blocks.turned(left)
+    system = blocks.gram(turned)
     system[np.diag_indices_from(system)] += weights
     normal = _Normal(system)
     if normal.factor is None:
@@ -252,7 +197,7 @@ def _step(
 
     def direction(right: list[FloatArray]) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
         asked = [q + part for q, part in zip(right, rest, strict=True)]
-        x = normal.solve(flat.T @ blocks.flat(asked) - dual_rest)
+        x = normal.solve(blocks.against(turned, asked) - dual_rest)
         change = [a @ part @ np.swapaxes(a, -1, -2) for a, part in zip(left, blocks.linear(x), strict=True)]
         return (
             x,

@@ -1,0 +1,87 @@
+"""Matrix inequalities stacked for the interior-point method: those of one size and with the same decisions stand together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from estimators.arrays import FloatArray, IndexArray
+
+
+class Blocks:
+    """S_j = F_j0 + sum_i x_i F_ji: `fixed` (g, k, k) and `free` (g, k, k, n) for each group, and `columns`, its decisions.
+
+    Of an output feedback one half knows nothing of the other's unknowns, and P > 0 nothing of gains: their zeros are not carried.
+    """
+
+    def __init__(self, given: Sequence[FloatArray]) -> None:
+        groups: dict[tuple[int, bytes], list[FloatArray]] = {}
+        for block in given:
+            used = np.abs(block[..., 1:]).max(axis=(0, 1, 2), initial=0.0) > 0.0
+            groups.setdefault((block.shape[1], used.tobytes()), []).append(block)
+        ordered = sorted(groups.items(), key=lambda entry: entry[0][0])  # stable: one order for one set of blocks
+        self.count = given[0].shape[-1] - 1
+        self.columns = [np.flatnonzero(np.frombuffer(used, bool)) for (_, used), _ in ordered]
+        stacked = [np.concatenate(blocks) for _, blocks in ordered]
+        self.fixed = [np.ascontiguousarray(block[..., 0]) for block in stacked]
+        self.free = [np.ascontiguousarray(b[..., 1 + c]) for b, c in zip(stacked, self.columns, strict=True)]
+        self.triangles = [triangle_by_rows(size) for (size, _), _ in ordered]
+        self.order = sum(part.shape[0] * part.shape[1] for part in self.fixed)
+
+    def linear(self, x: FloatArray) -> list[FloatArray]:
+        """sum_i x_i F_i."""
+        return [free @ x[columns] for free, columns in zip(self.free, self.columns, strict=True)]
+
+    def adjoint(self, Y: Sequence[FloatArray]) -> FloatArray:
+        """<F_i, Y> summed over the blocks."""
+        total = np.zeros(self.count)
+        for free, columns, part in zip(self.free, self.columns, Y, strict=True):
+            total[columns] += free.reshape(part.size, len(columns)).T @ part.reshape(-1)
+        return total
+
+    def inner(self, Y: Sequence[FloatArray]) -> float:
+        """<F_0, Y>."""
+        return float(sum(np.vdot(fixed, part) for fixed, part in zip(self.fixed, Y, strict=True)))
+
+    def flat(self, matrices: Sequence[FloatArray]) -> list[FloatArray]:
+        """Scaled triangles, one vector for each group."""
+        return [
+            (matrix[:, rows, columns] * weights).reshape(-1)
+            for matrix, (rows, columns, weights) in zip(matrices, self.triangles, strict=True)
+        ]
+
+    def turned(self, left: Sequence[FloatArray]) -> list[FloatArray]:
+        """Scaled triangles of R^-1 F_i R^-T, one column for every decision of a group; `left` holds R^-1."""
+        parts = []
+        for inverse, free, (_, _, weights) in zip(left, self.free, self.triangles, strict=True):
+            size, count = inverse.shape[-1], free.shape[-1]
+            once = (inverse @ free.reshape(len(free), size, size * count)).reshape(free.shape)
+            flat = np.empty((len(free), len(weights), count))
+            start = 0
+            for row in range(size):  # the F_i are symmetric, and only the upper triangle of what comes out is wanted
+                np.matmul(inverse[:, row:], once[:, row], out=flat[:, start : start + size - row])
+                start += size - row
+            flat *= weights[:, None]
+            parts.append(flat.reshape(len(free) * len(weights), count))
+        return parts
+
+    def gram(self, turned: Sequence[FloatArray]) -> FloatArray:
+        """Inner products of all pairs of columns (N, N)."""
+        total = np.zeros((self.count, self.count))
+        for part, columns in zip(turned, self.columns, strict=True):
+            total[np.ix_(columns, columns)] += part.T @ part
+        return total
+
+    def against(self, turned: Sequence[FloatArray], matrices: Sequence[FloatArray]) -> FloatArray:
+        """Inner products of the columns with given matrices (N,)."""
+        total = np.zeros(self.count)
+        for part, columns, vector in zip(turned, self.columns, self.flat(matrices), strict=True):
+            total[columns] += part.T @ vector
+        return total
+
+
+def triangle_by_rows(size: int) -> tuple[IndexArray, IndexArray, FloatArray]:
+    """Rows and columns of the upper triangle, and the weights sqrt(2) that keep inner products."""
+    rows, columns = np.triu_indices(size)
+    return rows, columns, np.where(rows == columns, 1.0, np.sqrt(2.0))
