@@ -49,7 +49,7 @@ def _check_observer(spec: ScheduleSpec, model: LpvModel) -> None:
             f"model '{model.name}' is not detectable: {hidden.words} does not decay and does not show in the output(s) "
             f"{', '.join(o.name for o in model.outputs)}; measure it, or shrink the range"
         )
-    if design.fastest_pole is None and spec.deploy.update == "held":
+    if design.fastest_pole is None and not design.regions.bounded and spec.deploy.update == "held":
         _check_noise(model, forces)
 
 
@@ -74,7 +74,7 @@ def _check_feedback(spec: ScheduleSpec, model: LpvModel) -> None:
         )
     if not isinstance(design, StateFeedbackDesign):
         refuse_undetectable(model, measured_rows(model, getattr(design, "measured", None)))
-    if design.fastest_pole is not None:
+    if design.fastest_pole is not None or (isinstance(design, StateFeedbackDesign) and design.regions.bounded):
         return
     if isinstance(design, OutputFeedbackDesign):
         _check_noise(model, forces, measured_rows(model, design.measured))
