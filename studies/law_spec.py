@@ -26,7 +26,12 @@ KEYS_OF = {  # of [design], beside those that observers have
 OF_LAWS = tuple(dict.fromkeys(key for keys in KEYS_OF.values() for key in keys))
 FeedbackDesign = StateFeedbackDesign | OutputFeedbackDesign | StaticFeedbackDesign
 OF_CHANNELS = ("errors", "performance", "sizes", "norm")  # one of the first two is there
-OTHER_NORMS = (None, "state feedback", "sampled state feedback")  # laws that take more than L2 gains
+OTHER_NORMS = (
+    None,
+    "state feedback",
+    "sampled state feedback",
+    "static output feedback",
+)  # laws that take more than L2 gains
 
 
 def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
