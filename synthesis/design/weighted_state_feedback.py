@@ -76,6 +76,7 @@ class WeightedStateFeedback(Display):
 def states_as_outputs(model: LpvModel) -> LpvModel:
     """The model with the outputs `state_NAME`, one for each state, before its own.
 
+    >>> import sympy as sp
     >>> one = {key: (Signal(name, "1"),) for key, name in zip(("states", "inputs", "outputs", "disturbances"), "xuyw")}
     >>> plant = LpvModel(name="lag", source="example", parameters=(), A=-sp.eye(1), B=sp.eye(1), C=sp.eye(1), E=sp.eye(1), **one)
     >>> [output.name for output in states_as_outputs(plant).outputs]
@@ -93,8 +94,9 @@ def states_as_outputs(model: LpvModel) -> LpvModel:
 
 def check_weighted_states(model: LpvModel, design: StateFeedbackDesign, order: int) -> None:
     """Raise ProblemError where a state of a weight (the `order` last ones) cannot be known, or is in a limit."""
+    E = sp.Matrix(model.E)
     for i in range(len(model.states) - order, len(model.states)):
-        driven = [d.name for j, d in enumerate(model.disturbances) if model.E[i, j] != 0]
+        driven = [d.name for j, d in enumerate(model.disturbances) if E[i, j] != 0]
         if driven:
             raise ProblemError(
                 f"model '{model.name}': the state {model.states[i].name} of a weight is driven by '{driven[0]}', which is not "
