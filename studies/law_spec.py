@@ -13,6 +13,7 @@ from synthesis.design.sampled_state_feedback import design_sampled_state_feedbac
 from synthesis.design.state_feedback import GainLimits, StateFeedbackDesign, design_state_feedback
 from synthesis.design.static_feedback import design_static_feedback
 from synthesis.design.static_feedback_design import StaticFeedbackDesign
+from synthesis.design.weighted_state_feedback import design_weighted_state_feedback
 from synthesis.lmi.settings import LmiSettings
 from synthesis.loop.feedback import Measured
 from synthesis.models.lpv import LpvModel
@@ -26,7 +27,12 @@ KEYS_OF = {  # of [design], beside those that observers have
 OF_LAWS = tuple(dict.fromkeys(key for keys in KEYS_OF.values() for key in keys))
 FeedbackDesign = StateFeedbackDesign | OutputFeedbackDesign | StaticFeedbackDesign
 OF_CHANNELS = ("errors", "performance", "sizes", "norm")  # one of the first two is there
-OTHER_NORMS = (None, "state feedback", "sampled state feedback")  # laws that take more than L2 gains
+OTHER_NORMS = (
+    None,
+    "state feedback",
+    "sampled state feedback",
+    "static output feedback",
+)  # laws that take more than L2 gains
 
 
 def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
@@ -69,11 +75,8 @@ def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
 
 def _check_weights(design: DesignSpec, who: str) -> None:
     """What weighs signals is computed, not measured: the law must say what it measures."""
-    if design.law in ("state feedback", "sampled state feedback"):
-        raise ValueError(
-            f'design.dynamic_weights are not for {who}: their states are not measured; take law = "output feedback", whose own '
-            "states stand for them"
-        )
+    if design.law == "sampled state feedback":
+        raise ValueError(f'design.dynamic_weights are not for {who}; take law = "state feedback" or "output feedback"')
     key = {"output feedback": "measured", "static output feedback": "uses"}.get(design.law or "")
     if key is not None and getattr(design, key) is None:
         raise ValueError(f"design.{key} is missing: beside dynamic_weights name the outputs that the law measures")
@@ -118,19 +121,28 @@ def feedback_design(spec: DesignSpec) -> FeedbackDesign:
     )  # fmt: skip
 
 
-def design_feedback(model: LpvModel, design: FeedbackDesign, law: str, sample_time: float) -> FeedbackLaw:
-    """The law of a design; of both laws of the states, the sampled one is designed for the sample time."""
+def design_feedback(
+    model: LpvModel, design: FeedbackDesign, law: str, sample_time: float, weights: int = 0
+) -> FeedbackLaw:
+    """The law of a design; of both laws of the states, the sampled one is designed for the sample time.
+
+    `weights` is the number of states of dynamic weights, the last ones of the model.
+    """
     if isinstance(design, OutputFeedbackDesign):
         return design_output_feedback(model, design)
     if isinstance(design, StaticFeedbackDesign):
         return design_static_feedback(model, design)
     if law == "sampled state feedback":
         return design_sampled_state_feedback(model, design, sample_time)
+    if weights:
+        return design_weighted_state_feedback(model, design, weights)
     return design_state_feedback(model, design)
 
 
-def form_of(model: LpvModel, design: FeedbackDesign) -> tuple[Measured, int]:
-    """What the law measures, and its order."""
+def form_of(model: LpvModel, design: FeedbackDesign, weights: int = 0) -> tuple[Measured, int]:
+    """What the law measures, and its order; `weights` as for `design_feedback`."""
+    if isinstance(design, StateFeedbackDesign) and weights:
+        return "outputs", weights
     if isinstance(design, StateFeedbackDesign):
         return "states", 0
     return "outputs", len(model.states) if isinstance(design, OutputFeedbackDesign) else 0

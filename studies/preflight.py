@@ -23,6 +23,7 @@ from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGain
 from synthesis.design.output_feedback import OutputFeedbackDesign
 from synthesis.design.refusals import refuse_feedthrough, refuse_undetectable
 from synthesis.design.state_feedback import StateFeedbackDesign, check_limits
+from synthesis.design.weighted_state_feedback import check_weighted_states
 from synthesis.errors import ProblemError
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.half_spaces import Faces
@@ -50,7 +51,7 @@ def _check_observer(spec: ScheduleSpec, model: LpvModel) -> None:
             f"model '{model.name}' is not detectable: {hidden.words} does not decay and does not show in the output(s) "
             f"{', '.join(o.name for o in model.outputs)}; measure it, or shrink the range"
         )
-    if design.fastest_pole is None and spec.deploy.update == "held":
+    if design.fastest_pole is None and not design.regions.bounded and spec.deploy.update == "held":
         _check_noise(model, forces)
 
 
@@ -63,6 +64,8 @@ def _check_feedback(spec: ScheduleSpec, model: LpvModel) -> None:
     for channel, (W, Z) in zip(design.channels, pairs, strict=True):
         if channel.norm != "H-infinity" and spec.law == "state feedback":
             refuse_feedthrough(model, channel, Z, W)
+    if spec.weight_states and isinstance(design, StateFeedbackDesign):
+        check_weighted_states(model, design, spec.weight_states)
     forces = [W for W, _ in pairs]
     _check_effect(model, design.channels, forces)
     if not model.inputs:
@@ -75,7 +78,7 @@ def _check_feedback(spec: ScheduleSpec, model: LpvModel) -> None:
         )
     if not isinstance(design, StateFeedbackDesign):
         refuse_undetectable(model, measured_rows(model, getattr(design, "measured", None)))
-    if design.fastest_pole is not None:
+    if design.fastest_pole is not None or (isinstance(design, StateFeedbackDesign) and design.regions.bounded):
         return
     if isinstance(design, OutputFeedbackDesign):
         _check_noise(model, forces, measured_rows(model, design.measured))
@@ -97,7 +100,7 @@ def check_file(spec: ScheduleSpec, model: LpvModel) -> None:
     gains: Any
     if spec.law is not None:
         design = spec.feedback_design()
-        measured, order = form_of(model, design)
+        measured, order = form_of(model, design, spec.weight_states)
         shape = order + len(model.inputs), order + len(model.states if measured == "states" else model.outputs)
         gains = SimpleNamespace(model=model, design=design, measured=measured, order=order)
     else:

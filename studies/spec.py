@@ -88,6 +88,11 @@ class ScheduleSpec(StrictTable):
             raise SpecError(f"spec '{self.name}': model.file '{self.model.file}' is not a .toml file; give its path")
         return Plant(self._weighed(load_model(folder / self.model.file)), None)
 
+    @property
+    def weight_states(self) -> int:
+        """Of dynamic weights, the last states of the model."""
+        return sum(weight.order for weight in self.gains.dynamic_weights or ())
+
     def _weighed(self, model: LpvModel) -> LpvModel:
         return weighed(model, self.gains.dynamic_weights or (), self.law)
 
@@ -128,7 +133,7 @@ class ScheduleSpec(StrictTable):
     def design(self, model: LpvModel) -> Gains:
         """The gains for the law and the update that the specification names."""
         if self.law is not None:
-            return design_feedback(model, self.feedback_design(), self.law, self.deploy.sample_time)
+            return design_feedback(model, self.feedback_design(), self.law, self.deploy.sample_time, self.weight_states)
         if self.deploy.update == "sampled":
             return design_sampled_observer(model, self.observer_design(), self.deploy.sample_time)
         return design_observer(model, self.observer_design())

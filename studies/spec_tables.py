@@ -35,8 +35,8 @@ class ModelSpec(StrictTable):
 class ChannelSpec(StrictTable):
     """One channel of the design; without `bound` it is the one that is minimised.
 
-    An observer has `errors`, a feedback law `performance` signals with `sizes`. `norm` of an observer and of state feedback: what
-    is bounded, the L2 gain if it is left out (synthesis.design.norms).
+    An observer has `errors`, a feedback law `performance` signals with `sizes`. `norm`: what is bounded, the L2 gain if it is
+    left out (synthesis.design.norms); not for dynamic output feedback.
     """
 
     disturbances: list[str] = Field(min_length=1)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from estimators.errors import unknown
+from synthesis.design.weighted_state_feedback import states_as_outputs
 from synthesis.errors import ModelError, SpecError
 from synthesis.models.lpv import LpvModel
 from synthesis.models.weighted import weighted
@@ -57,6 +59,13 @@ class WeightSpec(StrictTable):
             raise ValueError(f"weight of '{self.signal}': {error}") from None
         return self
 
+    @property
+    def order(self) -> int:
+        """Number of its states."""
+        if self.A is not None:
+            return len(self.A)
+        return 1 if self.denominator is None else len(np.trim_zeros(np.array(self.denominator), "f")) - 1
+
     def system(self) -> Any:
         """As python-control has it."""
         if self.low_gain is not None and self.high_gain is not None and self.crossover is not None:
@@ -70,7 +79,8 @@ def weighed(model: LpvModel, weights: Sequence[WeightSpec], law: str | None) -> 
     """The model with its weights in series; raises SpecError for signals that are none, stand twice, or are not for the law.
 
     The states of a weight are run with the law: an observer estimates those of its disturbances, and dynamic output feedback of
-    full order has states for them all. Static output feedback has no use for them.
+    full order has states for them all. State feedback works them out from what it measures, which are then outputs of the model
+    (synthesis.design.weighted_state_feedback). Static output feedback has no use for them.
     """
     if not weights:
         return model
@@ -87,4 +97,5 @@ def weighed(model: LpvModel, weights: Sequence[WeightSpec], law: str | None) -> 
             raise SpecError(
                 f"{where}: '{name}' is no disturbance; an observer's weights shape its disturbances ({', '.join(driven)})"
             )
-    return weighted(model, {weight.signal: weight.system() for weight in weights})
+    plain = states_as_outputs(model) if law == "state feedback" else model
+    return weighted(plain, {weight.signal: weight.system() for weight in weights})

@@ -26,6 +26,9 @@ from .design.state_feedback import design_state_feedback as design_state_feedbac
 from .design.static_feedback import StaticFeedback as StaticFeedback
 from .design.static_feedback import design_static_feedback as design_static_feedback
 from .design.static_feedback_design import StaticFeedbackDesign as StaticFeedbackDesign
+from .design.weighted_state_feedback import WeightedStateFeedback as WeightedStateFeedback
+from .design.weighted_state_feedback import design_weighted_state_feedback as design_weighted_state_feedback
+from .design.weighted_state_feedback import states_as_outputs as states_as_outputs
 from .design.well_posedness import WellPosedness as WellPosedness
 from .design.well_posedness import well_posedness as well_posedness
 from .errors import ModelError as ModelError

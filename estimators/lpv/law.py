@@ -40,8 +40,8 @@ class Law:
             self.gains = PiecewiseLinear(schedule.breakpoints, table.reshape(len(table), -1))
         self.shape = table.shape[-2:]
         # Signals that no gain uses, such as outputs that only weigh in a design: nobody measures them.
-        idle: BoolArray = ~table.any(axis=tuple(range(table.ndim - 1)))[self.order :]
-        self.idle = idle if idle.any() and not idle.all() else None
+        idle: BoolArray = ~np.asarray(table.reshape(-1, table.shape[-1]).any(axis=0))[self.order :]
+        self.idle: BoolArray | None = idle if idle.any() and not idle.all() else None
         through = schedule.plant["D"]
         self.through = None if self.states or not self.order or not through.largest.any() else through
         if not max(np.abs(table).max(initial=0.0), through.largest.sum(initial=0.0)) <= _LARGEST:

@@ -56,7 +56,7 @@ def check_channels(
         if channel.norm not in norms:
             raise ProblemError(
                 f"channel '{channel.name}': the norm '{channel.norm}' is not for this law, whose channels have "
-                f"{', '.join(norms)}; observers and state feedback take it"
+                f"{', '.join(norms)}; observers, state feedback and static output feedback take it"
             )
 
 

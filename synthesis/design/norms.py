@@ -98,7 +98,7 @@ def require_energy(
         )
         return
     problem.require(f"observed energy {channel.name}", symmetric_block([[falling, -seen.T], [None, outer]]))
-    after = _after_impulses(problem, channel, force.shape[1])
+    after = after_impulses(problem, channel, force.shape[1])
     stored = lyapunov.scaled_by(below).scaled_by(below)
     problem.require(f"impulses {channel.name}", symmetric_block([[after, force.T * root], [None, stored]]))
 
@@ -125,12 +125,12 @@ def require_sampled_energy(
         return
     observed = symmetric_block([[later, moved, None], [None, now, seen.T], [None, None, outer]])
     problem.require(f"observed energy {channel.name}", observed)
-    after = _after_impulses(problem, channel, force.shape[1])
+    after = after_impulses(problem, channel, force.shape[1])
     impulses = symmetric_block([[after, force.T, direct], [None, later, None], [None, None, outer]])
     problem.require(f"impulses {channel.name}", impulses)
 
 
-def _after_impulses(problem: LmiProblem, channel: ChannelSizes, inputs: int) -> MatrixPolynomial:
+def after_impulses(problem: LmiProblem, channel: ChannelSizes, inputs: int) -> MatrixPolynomial:
     """An unknown W (k, k) with tr W below the level, for what impulses leave in V."""
     W = problem.symmetric(f"W {channel.name}", inputs, channel.degree)
     rows = [problem.constant(np.eye(inputs)[i : i + 1]) for i in range(inputs)]

@@ -56,6 +56,12 @@ class PoleRegions(Display):
         return any(getattr(self, field.name) is not None for field in fields(self))
 
     @property
+    def bounded(self) -> bool:
+        """Whether they keep poles, and with them gains, from running away: by a disc, or by both strips."""
+        strips = self.vertical_strip is not None and self.horizontal_strip is not None
+        return self.disc is not None or strips
+
+    @property
     def claims(self) -> dict[str, float]:
         """Kinds of claims (`synthesis.certificate.poles`) with their levels."""
         near, far = self.vertical_strip or (None, None)

@@ -94,11 +94,18 @@ def design_static_feedback(model: LpvModel, design: StaticFeedbackDesign) -> Sta
             "outputs out by `uses`, or design a law with states"
         )
     plant = generalised_plant(model, design.channels)
+    for part in plant.channels:
+        through = part.Dzd.any() or (part.Dzu.any() and part.F.any())
+        if part.channel.norm != "H-infinity" and through:
+            raise ProblemError(
+                f"channel '{part.channel.name}': a disturbance acts on a performance signal at once (by F, or by F and the law), "
+                f"so its {part.channel.norm} norm is infinite in continuous time; leave the noise or the inputs out of it"
+            )
     frame = frame_of(plant)
     steps = Steps(model, design, plant.scaled(frame), frame)
     point = steps.stable(steps.start())
     point, levels = steps.lowered(point)
     settled = three_solves(
-        model.name, steps.analysis(point.K), lambda x: x * frame.unit, design.backoff, steps.settings
+        model.name, steps.analysis(point.K), lambda x: x * steps.unit(design.minimised), design.backoff, steps.settings
     )
     return StaticFeedback(design, model, settled.gamma, tuple(levels), point.K, settled.result, settled.optimum, frame)

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from estimators.display import Display
-from synthesis.design.asked import check_degree_and_poles, check_shares
+from synthesis.design.asked import check_degree_and_poles, check_shares, minimised_channel
 from synthesis.design.feedback_channel import FeedbackChannel, check_feedback_channels
+from synthesis.design.norms import NORMS
 from synthesis.errors import ProblemError
 from synthesis.lmi.settings import LmiSettings
 
@@ -37,10 +38,15 @@ class StaticFeedbackDesign(Display):
     settings: LmiSettings = field(default_factory=LmiSettings)
 
     def __post_init__(self) -> None:
-        check_feedback_channels(self.channels)
+        check_feedback_channels(self.channels, NORMS)
         check_degree_and_poles(self.degree, self.decay_rate, self.fastest_pole)
         if self.steps < 1:
             raise ProblemError(f"{self.steps} steps are none; give one at least")
         check_shares(self.backoff, self.reserve)
         if self.backoff == 0.0:
             raise ProblemError("backoff 0 leaves the last solve no room; give more")
+
+    @property
+    def minimised(self) -> FeedbackChannel:
+        """The channel without a bound."""
+        return minimised_channel(self.channels)

@@ -9,6 +9,7 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from synthesis.design.generalised_plant import ChannelPlant, GeneralisedPlant
+from synthesis.design.norms import ChannelSizes, after_impulses
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult
 from synthesis.polynomials.matrix import MatrixPolynomial, across, symmetric_block
@@ -74,6 +75,32 @@ class StaticLoop:
             f"gain {part.channel.name}",
             own,
             lambda P, K: (self._within(self.B.T @ P, 0, n), self._within(K @ seen, 0, n)),
+        )
+
+    def require_energy(self, part: ChannelPlant, level: MatrixPolynomial) -> None:
+        """The generalised H2 norm of a channel, or its H2 norm (`synthesis.design.norms`); nothing acts on it at once."""
+        E, F, Cz, Dzu = (self.problem.scaled(getattr(part, key)) for key in ("E", "F", "Cz", "Dzu"))
+        outputs, name, n = Cz + Dzu @ self.K @ self.C, part.channel.name, self.A.shape[0]
+        k, m = E.shape[1], Cz.shape[0]
+        w, z = (self.problem.constant(np.eye(size)).scaled_by(level) for size in (k, m))
+        if part.channel.norm == "generalised H2":
+            own, seen = symmetric_block([[self.rate, self.P @ E], [None, -w]]), across(self.C, F)
+            self._require(f"stored energy {name}", own, lambda P, K: (self._within(self.B.T @ P, 0, n + k), K @ seen))
+            self.problem.require(f"peak {name}", symmetric_block([[self.P, outputs.T], [None, z]]))
+            return
+        own = symmetric_block([[self.rate, outputs.T], [None, -z]])
+        self._require(
+            f"observed energy {name}",
+            own,
+            lambda P, K: (self._within(self.B.T @ P, 0, n + m), self._within(K @ self.C, 0, n + m)),
+        )
+        sizes = ChannelSizes(name, part.channel.norm, 0, level, level)
+        after = after_impulses(self.problem, sizes, k)
+        own = symmetric_block([[-after, -(self.P @ E).T], [None, -self.P]])
+        self._require(
+            f"impulses {name}",
+            own,
+            lambda P, K: (self._within(-(self.B.T @ P), k, k + n), self._within(K @ F, 0, k + n)),
         )
 
     def require_decay(self, rate: float) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from estimators.errors import unknown
+from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.design.generalised_plant import Frame, GeneralisedPlant
 from synthesis.design.static_feedback_design import StaticFeedbackDesign
 from synthesis.design.static_feedback_lmi import Point, StaticLoop, Structure
@@ -35,6 +36,10 @@ class Steps:
             self.settings = replace(self.settings, relaxation="exchange")
         self.decay = design.decay_rate * (1.0 + design.reserve) / frame.clock
         self.structure = Structure(structure(model, design.uses), design.degree)
+
+    def unit(self, channel: FeedbackChannel) -> float:
+        """What a level of one in the frame is; but for L2 gains it has a root of the frame's time in it."""
+        return self.frame.unit * (1.0 if channel.norm == "H-infinity" else float(np.sqrt(self.frame.clock)))
 
     def start(self) -> MatrixPolynomial:
         """The gains that the design starts with, in the frame. Raises ProblemError for a wrong shape or a stray entry."""
@@ -79,7 +84,7 @@ class Steps:
             levels.append(best[1])
             if levels[-1] > levels[-2] * (1.0 - FINE):
                 break
-        return best[0], [level * self.frame.unit for level in levels]
+        return best[0], [level * self.unit(self.design.minimised) for level in levels]
 
     def stable(self, K: MatrixPolynomial) -> Point:
         """A pair at which every channel has some level: the start itself, or what steps of falling growth lead to.
@@ -128,8 +133,8 @@ class Steps:
                 level = problem.scalar("gamma")
                 problem.minimise("gamma")
             else:
-                level = problem.constant(np.array([[bound / self.frame.unit]]))
-            loop.require_gain(part, level)
+                level = problem.constant(np.array([[bound / self.unit(part.channel)]]))
+            (loop.require_gain if part.channel.norm == "H-infinity" else loop.require_energy)(part, level)
         return problem, loop
 
     def _shifted(

@@ -124,8 +124,9 @@ def _beside(filters: list[_Filter]) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix, sp
 
 def _rate(model: LpvModel) -> tuple[sp.Expr, Mapping[str, Constant]]:
     """What coefficients of a weight per second are multiplied by, and the constants with it."""
-    signals = (*model.states, *model.inputs, *model.outputs, *model.disturbances, *model.parameters)
-    if all(named.unit == "1" for named in (*signals, *model.constants.values())):
+    signals = (*model.states, *model.inputs, *model.outputs, *model.disturbances)
+    units = [s.unit for s in signals] + [p.unit for p in model.parameters] + [c.unit for c in model.constants.values()]
+    if all(unit == "1" for unit in units):
         return sp.Integer(1), model.constants
     return sp.Symbol(RATE), {**model.constants, RATE: Constant(1.0, "1/s", "unit of the weights' coefficients")}
 

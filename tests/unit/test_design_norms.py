@@ -25,6 +25,8 @@ from synthesis.design.output_feedback import OutputFeedbackDesign
 from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.design.sampled_state_feedback import design_sampled_state_feedback
 from synthesis.design.state_feedback import StateFeedbackDesign, design_state_feedback
+from synthesis.design.static_feedback import design_static_feedback
+from synthesis.design.static_feedback_design import StaticFeedbackDesign
 from synthesis.errors import ProblemError
 from synthesis.models.discretise import zero_order_hold
 from synthesis.models.lpv import LpvModel
@@ -153,6 +155,32 @@ def test_the_claim_is_about_the_table_and_a_lower_one_is_refuted(law_of: str) ->
     place = kinds.index("sampled energy to peak")
     content["claims"][place]["level"] *= 0.8 * frozen_levels(content)[place].values.max() / peak.level
     assert [proof.refuted for proof in prove(content)] == [i == place for i in range(len(kinds))]
+
+
+@pytest.mark.parametrize("norm", [PEAK, "H2"])
+def test_static_output_feedback_of_all_states_comes_near_state_feedback(norm: Norm) -> None:
+    """Both states measured: a level of its own loop, and hardly above the least one, whatever unit time has."""
+    levels, scaled = [], (1, 10**6)
+    for speed in scaled:
+        model = small_model(
+            [[0, speed], [(-4 - p) * speed, -sp.Rational(speed, 10)]], sp.eye(2), (parameter("p", 0.0, 1e-6, 0.0),),
+            B=[[0], [speed]], E=[[0], [speed]],
+        )  # fmt: skip
+        found = design_static_feedback(model, StaticFeedbackDesign((law(norm),), degree=0, start=((-3.0, -3.0),)))
+        A, B, C = closed(found.gain(STILL)[0])
+        assert energies(A * speed, B * speed, C)[norm] <= found.gamma
+        levels.append(found.gamma / np.sqrt(speed))
+    least = design_state_feedback(spring(), StateFeedbackDesign((law(norm),))).gamma_lower
+    assert least is not None and levels == pytest.approx([least] * 2, rel=0.04) and min(levels) >= least
+    # Noise that the law passes on: position alone, a fastest pole in the place of a cost of the input.
+    channel = FeedbackChannel(("d1", "d2"), ("x1",), weights=(1.0, 0.3), norm=norm)
+    found = design_static_feedback(spring(), StaticFeedbackDesign((channel,), degree=0, fastest_pole=8.0))
+    at, K = spring().on(STILL), found.gain(STILL)[0]
+    A, E = at.A[0] + at.B[0] @ K @ at.C[0], (at.E[0] + at.B[0] @ K @ at.F[0]) * np.array([1.0, 0.3])
+    assert 0.98 * found.gamma < energies(A, E, np.eye(1, 2))[norm] <= found.gamma
+    noisy = replace(law(norm), disturbances=("d2",))
+    with pytest.raises(ProblemError, match=r"by F and the law\), so its .* norm is infinite"):
+        design_static_feedback(spring(), StaticFeedbackDesign((noisy,)))
 
 
 def test_what_has_no_such_norm_is_refused() -> None:

@@ -15,6 +15,7 @@ from scipy.linalg import expm
 
 from estimators.arrays import FloatArray
 from estimators.errors import GainsmithError
+from studies.preflight import check_before_design
 from studies.report.frozen_levels import frozen_levels
 from studies.spec import load_spec
 from synthesis.certificate.claims import LARGER_IS_BETTER
@@ -140,6 +141,23 @@ def test_claims_about_poles_of_the_deployed_table() -> None:
             if claim["kind"] in kinds:
                 claim["level"] = float(frozen.values[frozen.tightest] * (1.01 if frozen.larger_is_better else 0.99))
         assert [proof.refuted for proof in prove(content)] == [proof.kind in kinds for proof in proofs]
+
+
+def test_a_disc_bounds_gains_as_a_fastest_pole_does(tmp_path: Path) -> None:
+    """Without either, a law whose input no channel sees is refused; a strip of imaginary parts alone is no bound."""
+    examples = Path(__file__).parents[2] / "studies" / "examples"
+    (tmp_path / "quarter-car.toml").write_text((examples / "quarter-car.toml").read_text())
+    text = (examples / "quarter-car-feedback.toml").read_text().replace("fastest_pole = 300.0", "regions = REGIONS")
+    performance = '["measured_body_acceleration", "suspension_deflection", "tire_deflection", "strut_force"]'
+    text = text.replace(performance, '["tire_deflection"]').replace("[0.5, 0.1, 0.02, 500.0]", "[0.02]")
+    for given, good in (("{ disc = 300.0 }", True), ("{ horizontal_strip = 300.0 }", False)):
+        (tmp_path / "law.toml").write_text(text.replace("REGIONS", given))
+        spec, folder = load_spec(tmp_path / "law.toml")
+        if good:
+            check_before_design(spec, spec.plant(folder).model)
+        else:
+            with pytest.raises(GainsmithError, match="so its gains have no bound"):
+                check_before_design(spec, spec.plant(folder).model)
 
 
 def test_regions_that_mean_nothing_are_refused(tmp_path: Path) -> None:

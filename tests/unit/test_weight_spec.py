@@ -9,7 +9,7 @@ import control
 import numpy as np
 import pytest
 
-from estimators import GainSchedule, LpvObserver
+from estimators import GainSchedule, LpvController, LpvObserver
 from estimators.errors import GainsmithError
 from studies.preflight import check_before_design
 from studies.spec import load_spec
@@ -18,6 +18,7 @@ from synthesis.certificate.proof import prove
 from synthesis.design.deploy import deploy
 from synthesis.design.export import schedule_content
 from synthesis.design.output_feedback import OutputFeedback
+from synthesis.design.weighted_state_feedback import WeightedStateFeedback
 from synthesis.models.discretise import zero_order_hold
 from synthesis.models.weights import first_order_weight
 
@@ -143,6 +144,51 @@ def test_a_coloured_disturbance_is_a_state_of_the_observer() -> None:
     assert not prove(content)[place].proved
 
 
+STATES = LAW.replace('"output feedback"', '"state feedback"').replace('measured = ["measured_position"]\n', "")
+
+
+def test_state_feedback_works_out_the_states_of_its_weights(tmp_path: Path) -> None:
+    """The law carries a copy of them, so that the plant without a weight keeps the level; from the file to the run."""
+    spec, model = loaded(tmp_path, STATES.replace("fastest_pole = 20.0", "fastest_pole = 8.0"))
+    gains = spec.design(model)
+    assert isinstance(gains, WeightedStateFeedback) and gains.order == 1
+    (Ak,), (Bk,), (Ck,), (Dk,) = gains.controller(np.array([2.0]))
+    assert not Bk[:, 2:].any() and not Dk[:, 2:].any()
+    A, B = np.array([[0.0, 1.0], [-1.0, -0.2]]), np.array([[0.0], [0.5]])
+    loop = np.block([[A + B @ Dk[:, :2], B @ Ck], [Bk[:, :2], Ak]])
+    weight, levels = first_order_weight(10.0, 0.5, 0.8), []
+    for frequency in np.concatenate([[0.0], np.geomspace(1e-3, 100.0, 200)]):
+        x = np.linalg.solve(1j * frequency * np.eye(3) - loop, np.array([0.0, 0.5, 0.0]))
+        u = Dk[:, :2] @ x[:2] + Ck @ x[2:]
+        levels.append(np.linalg.norm([weight(1j * frequency) * x[0] / 0.5, u[0] / 2.0]))
+    assert 0.9 * gains.gamma < max(levels) <= gains.gamma
+    content = schedule_content(deploy(gains, spec.deploy_settings()), spec.name)
+    assert all(proof.proved for proof in prove(content))
+    controller, x, T = LpvController(GainSchedule.from_content(content)), np.zeros(2), spec.deploy.sample_time
+    Phi, Gamma = zero_order_hold(A, B, T)
+    for _ in range(2000):
+        step = controller.step([*x, np.nan, np.nan], 2.0)
+        x = Phi @ x + Gamma @ (step.command + 1.0)
+    u = Dk[:, :2] @ [0.0, 0.0] + Ck @ np.linalg.solve(-Ak, Bk[:, 0])  # at rest, for a position of one
+    assert step.used and x[0] == pytest.approx(0.5 / (1.0 - 0.5 * (Dk[0, 0] + u[0])), rel=0.02)
+
+
+def test_weights_that_state_feedback_cannot_know_are_refused(tmp_path: Path) -> None:
+    pushed = STATES.replace('signal = "position"', 'signal = "push"').replace("position_weighted", "position")
+    noisy = STATES.replace('signal = "position"', 'signal = "measured_position"').replace(
+        "position_w", "measured_position_w"
+    )
+    limited = STATES.replace("degree = 0", "degree = 0\ninput_limits = { force = 1.0 }\nstate_sizes = { position = 1.0, "
+                             "velocity = 1.0, position_weight_1 = 1.0 }")  # fmt: skip
+    for text, words in (
+        (pushed, "the state push_weight_1 of a weight is driven by 'push', which is not measured"),
+        (noisy, "measured_position_weight_1 of a weight is driven by 'noise'"),
+        (limited, "limits of gains are not for a law with states of weights"),
+    ):
+        with pytest.raises(GainsmithError, match=words):
+            loaded(tmp_path, text)
+
+
 WEIGHT = "low_gain = 10.0\nhigh_gain = 0.5\ncrossover = 0.8"
 REFUSED = {
     "improper": (WEIGHT, "numerator = [1.0, 0.0, 1.0]\ndenominator = [1.0, 2.0]", "numerator has the degree 2, .* improper"),
@@ -162,7 +208,7 @@ REFUSED = {
     ),
     "measured": ('measured = ["measured_position"]\n', "", "design.measured is missing: beside dynamic_weights"),
     "weighted": ('["measured_position"]', '["measured_position", "position_weighted"]', "comes from a weight and is not"),
-    "states": ('law = "output feedback"', 'law = "state feedback"', "not for the law 'state feedback': their states are"),
+    "sampled states": ('law = "output feedback"', 'law = "sampled state feedback"', "not for the law 'sampled"),
     "channel": ('"position_weighted", "force"', '"velocity_weighted", "force"', "unknown performance signal 'velocity_weighted'"),
 }  # fmt: skip
 
@@ -173,7 +219,7 @@ def test_weights_are_refused_before_the_solve(case: str, tmp_path: Path, monkeyp
     old, new, words = REFUSED[case]
     assert old in LAW
     text = LAW.replace(old, new)
-    if case == "states":
+    if case == "sampled states":
         text = text.replace('measured = ["measured_position"]\n', "")
     with pytest.raises(GainsmithError, match=words) as caught:
         loaded(tmp_path, text)
