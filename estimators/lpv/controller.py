@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arguments import LIMIT, batch, finite, mask, quiet, vectors
+from estimators.arguments import finite, mask, vectors
 from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.display import displayed
 from estimators.errors import EstimatorError, ScheduleError
-from estimators.lpv.inputs import SignalMonitor
 from estimators.lpv.law import Law
+from estimators.lpv.runtime import LpvRuntime, beyond_bounds
 from estimators.schedule import GainSchedule
-from estimators.schedule.runtime import SavedWithSchedule, check_options
 
 
 @displayed({})
@@ -29,7 +27,7 @@ class LpvControllerStep(NamedTuple):
     parameter: FloatArray  # (..., parameters) that were used
 
 
-class LpvController(SavedWithSchedule):
+class LpvController(LpvRuntime):
     """u = Ck(p) xk + Dk(p) v, xk+ = Ak(p) xk + Bk(p) v once a sample, v the plant's states or outputs; static where it has no xk.
 
     The gains are the table that was proved (`gainsmith certify`); proofs are about commands within the limits.
@@ -68,7 +66,6 @@ class LpvController(SavedWithSchedule):
     """
 
     memory = ("_state", "_command", "waiting", "samples", "renewed")
-    parts: tuple[str, ...] = ("monitor",)
 
     def __init__(
         self,
@@ -80,25 +77,16 @@ class LpvController(SavedWithSchedule):
     ) -> None:
         if schedule.update != "feedback":
             raise ScheduleError(f"schedule '{schedule.name}' is that of an observer; take LpvObserver")
-        check_options(outside, stale_after)
         if hold < 0:
             raise EstimatorError(f"hold = {hold} samples must not be negative")
-        super().__init__(batch(batch_shape))
-        self.schedule, self.hold, count = schedule, int(hold), math.prod(self.batch_shape)
-        self.law = Law(schedule)
-        self.monitor = SignalMonitor(
-            schedule.parameters, (0, self.law.measured), schedule.sample_time, count, outside == "refuse", stale_after,
-            schedule.constraints,
-        )  # fmt: skip
-        self._state: FloatArray = np.zeros((count, self.law.order))
+        self.law, self.hold = Law(schedule), int(hold)
+        super().__init__(schedule, batch_shape, outside, stale_after, self.law.order, 0, self.law.measured)
+        count = len(self._state)
         self._command: FloatArray = np.tile(self.law.rest, (count, 1))
         self.waiting = np.zeros(count, dtype=np.int64)  # samples without measurements
-        self.samples = 0
 
-    @property
-    def state(self) -> FloatArray:
-        """A copy of the law's own state, shape (*batch_shape, order)."""
-        return self._state.copy().reshape(*self.batch_shape, self.law.order)
+    def _used(self, measurement: FloatArray) -> FloatArray:
+        return self.law.used(measurement)
 
     def step(self, measurement: npt.ArrayLike, parameter: npt.ArrayLike) -> LpvControllerStep:
         """Commands for the sample that begins; arguments have the shapes (*batch_shape, nv) and (.., parameters).
@@ -109,15 +97,11 @@ class LpvController(SavedWithSchedule):
             EstimatorError: another shape, or not numbers.
             RangeError: outside the certified box, if the controller refuses that; nothing is changed then.
         """
-        shape = self.batch_shape
-        v = vectors(measurement, self.batch_shape, self.law.measured, "measurement")
-        v = self.law.used(v)
-        p = vectors(parameter, self.batch_shape, len(self.schedule.parameters), "parameter")
-        seen = self.monitor(np.zeros((len(v), 0)), v, p, self.samples, shape)
+        count = len(self._state)
+        seen = self._signals(np.zeros((count, 0)), measurement, parameter)
         found = self.law.advance(self._state, self._command, seen.measurement, seen.parameter)
         state, command, limited = found
-        flags: FlagArray = np.zeros(shape, dtype=np.int32) if seen.flags is None else seen.flags.reshape(shape)
-        used: BoolArray = np.ones(len(v), dtype=np.bool_)
+        used: BoolArray = np.ones(count, dtype=np.bool_)
         if seen.coast is not None:
             used = ~seen.coast
             self.waiting = np.where(used, 0, self.waiting + 1)
@@ -128,20 +112,17 @@ class LpvController(SavedWithSchedule):
             limited = limited & ~waits
         else:
             self.waiting[:] = 0
-        if not (quiet(state.reshape(-1)) and quiet(command.reshape(-1))):
-            gone: BoolArray = np.asarray((~(np.absolute(np.hstack([state, command])) <= LIMIT)).any(axis=1))
+        gone = beyond_bounds(state, command)
+        if gone is not None:
             state, command = np.where(gone[:, None], 0.0, state), np.where(gone[:, None], self.law.rest, command)
-            self._renew(gone.reshape(shape))
         self._state, self._command = state, command
-        self.samples += 1
-        self._flag_renewed(flags)
-        nu = len(self.schedule.inputs)
+        flags = self._flagged(seen, gone)
         return LpvControllerStep(
-            command.copy().reshape(*shape, nu),
-            limited.reshape(*shape, nu),
-            used.reshape(shape),
+            self._shaped(command.copy()),
+            limited.reshape(*self.batch_shape, limited.shape[-1]),
+            used.reshape(self.batch_shape),
             flags,
-            seen.parameter.reshape(*shape, len(self.schedule.parameters)),
+            self._shaped(seen.parameter),
         )
 
     def reset(self, where: npt.ArrayLike | None = None) -> None:
@@ -185,8 +166,7 @@ class LpvController(SavedWithSchedule):
         self._command[flat] = np.clip(u, self.law.low, self.law.high)
         self._state[flat] = self.law.starting(self._command[flat], v, within)
 
-    def _forget(self, chosen: BoolArray) -> None:
-        flat = chosen.reshape(-1)
-        self._state[flat], self._command[flat], self.waiting[flat] = 0.0, self.law.rest, 0
-        self.monitor.forget(flat)
-        self._renew(chosen)
+    def _forget(self, chosen: BoolArray) -> BoolArray:
+        flat = super()._forget(chosen)
+        self._command[flat], self.waiting[flat] = self.law.rest, 0
+        return flat

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arguments import LIMIT, batch, finite, mask, quiet, vectors
+from estimators.arguments import finite, mask, vectors
 from estimators.arrays import BoolArray, FlagArray, FloatArray
 from estimators.display import displayed
 from estimators.lpv.exact_step import ExactStep
-from estimators.lpv.inputs import SignalMonitor
+from estimators.lpv.runtime import LpvRuntime, beyond_bounds
 from estimators.schedule import GainSchedule
-from estimators.schedule.runtime import SavedWithSchedule, check_options
 
 _CHUNK = 4096  # entries worked on at once: what lies between the operations stays in the cache
 
@@ -30,7 +28,7 @@ class LpvObserverStep(NamedTuple):
     parameter: FloatArray  # (..., parameters) that were used
 
 
-class LpvObserver(SavedWithSchedule):
+class LpvObserver(LpvRuntime):
     """xhat' = A(p) xhat + B(p) u + L(p) (y - C(p) xhat - D(p) u), updated exactly with u, y and p held over a sample.
 
     A schedule whose update is "sampled" instead predicts exactly with u and p held and adds K(p) (y - C(p) xhat - D(p) u) once a
@@ -57,9 +55,6 @@ class LpvObserver(SavedWithSchedule):
     (True, True)
     """
 
-    memory = ("_state", "samples", "renewed")
-    parts: tuple[str, ...] = ("monitor",)
-
     def __init__(
         self,
         schedule: GainSchedule,
@@ -67,22 +62,9 @@ class LpvObserver(SavedWithSchedule):
         outside: Literal["flag", "refuse"] = "flag",
         stale_after: int | None = None,
     ) -> None:
-        check_options(outside, stale_after)
-        super().__init__(batch(batch_shape))
-        self.schedule, count = schedule, math.prod(self.batch_shape)
         self.exact = ExactStep(schedule)
         self.sizes = self.exact.sizes
-        self.monitor = SignalMonitor(
-            schedule.parameters, self.sizes[1:], schedule.sample_time, count, outside == "refuse", stale_after,
-            schedule.constraints,
-        )  # fmt: skip
-        self._state: FloatArray = np.zeros((count, self.sizes[0]))
-        self.samples = 0
-
-    @property
-    def state(self) -> FloatArray:
-        """A copy of the estimate, shape (*batch_shape, states)."""
-        return self._state.copy().reshape(*self.batch_shape, self.sizes[0])
+        super().__init__(schedule, batch_shape, outside, stale_after, *self.sizes)
 
     def step(self, held_input: npt.ArrayLike, measurement: npt.ArrayLike, parameter: npt.ArrayLike) -> LpvObserverStep:
         """Moves every entry by one sample; arguments have the shapes (*batch_shape, nu), (.., ny) and (.., parameters).
@@ -94,37 +76,25 @@ class LpvObserver(SavedWithSchedule):
             RangeError: outside the certified box, if the observer refuses that; the state is then unchanged.
         """
         shape = self.batch_shape
-        u = vectors(held_input, self.batch_shape, self.sizes[1], "input")
-        y = vectors(measurement, self.batch_shape, self.sizes[2], "measurement")
-        p = vectors(parameter, self.batch_shape, len(self.schedule.parameters), "parameter")
-        seen = self.monitor(u, y, p, self.samples, shape)
+        seen = self._signals(vectors(held_input, shape, self.sizes[1], "input"), measurement, parameter)
         used = None if seen.coast is None else ~seen.coast
-        innovation = np.empty_like(y)
+        innovation = np.empty_like(seen.measurement)
         moved = np.empty_like(self._state)
-        for start in range(0, len(p), _CHUNK):
+        for start in range(0, len(moved), _CHUNK):
             part = slice(start, start + _CHUNK)
             moved[part], innovation[part] = self.exact.advance(
                 self._state[part], seen.held_input[part], seen.measurement[part], seen.parameter[part],
                 None if used is None else used[part],
             )  # fmt: skip
-        self._state = moved
-        self.samples += 1
-        flags: FlagArray = np.zeros(shape, dtype=np.int32) if seen.flags is None else seen.flags.reshape(shape)
-        if not quiet(moved.reshape(-1)):
-            gone = ~(np.absolute(moved) <= LIMIT).all(axis=1)  # an unstable model coasting for long
+        gone = beyond_bounds(moved)  # an unstable model coasting for long
+        if gone is not None:
             moved[gone] = 0.0
-            self._renew(gone.reshape(shape))
-        self._flag_renewed(flags)
+        self._state = moved
+        flags = self._flagged(seen, gone)
         if seen.missing is not None:
             innovation[seen.missing] = np.nan
         everywhere: BoolArray = np.ones(shape, dtype=np.bool_) if used is None else used.reshape(shape)
-        return LpvObserverStep(
-            self.state,
-            innovation.reshape(*shape, self.sizes[2]),
-            everywhere,
-            flags,
-            seen.parameter.reshape(*shape, len(self.schedule.parameters)),
-        )
+        return LpvObserverStep(self.state, self._shaped(innovation), everywhere, flags, self._shaped(seen.parameter))
 
     def reset(self, where: npt.ArrayLike | None = None, state: npt.ArrayLike = 0.0) -> None:
         """Sets the entries `where` (mask of the batch shape; None: all) to `state` and forgets what they have seen.
@@ -135,7 +105,6 @@ class LpvObserver(SavedWithSchedule):
             EstimatorError: another shape, or a state that is not finite.
         """
         chosen = mask(where, self.batch_shape, "where")
-        full, flat = finite(state, (*self.batch_shape, self.sizes[0]), "state"), chosen.reshape(-1)
-        self._state[flat] = full.reshape(-1, self.sizes[0])[flat]
-        self.monitor.forget(flat)
-        self._renew(chosen)
+        full = finite(state, (*self.batch_shape, self.sizes[0]), "state").reshape(self._state.shape)
+        flat = self._forget(chosen)
+        self._state[flat] = full[flat]

@@ -15,7 +15,7 @@ from estimators.arrays import AnyArray, BoolArray, FloatArray
 from estimators.forces import LoadStep
 from estimators.memory import Memory, Saved
 from estimators.pipeline.checks import Forces
-from estimators.pipeline.motion import CarMotion, Felt
+from estimators.pipeline.motion import BeforeForces, CarMotion
 from estimators.pipeline.result import Consistency
 from estimators.pipeline.signals import VehicleSignals
 from estimators.velocity.fusion_step import FusionStep, joined_steps
@@ -42,24 +42,26 @@ class CarByCar(Memory):
         """As they are: the wheel speeds of these cars have a sign."""
         return w, None
 
-    def felt(self, ax: Number, ay: Number, turn: Number, steer: FloatArray, signals: VehicleSignals) -> Felt:
-        """As `CarMotion.felt`."""
+    def before_forces(
+        self, ax: Number, ay: Number, turn: Number, steer: FloatArray, signals: VehicleSignals
+    ) -> BeforeForces:
+        """As `CarMotion.before_forces`."""
         body = (value.ravel().tolist() for value in (ax, ay, turn))
         given = zip(*body, steer.reshape(-1, 4), signals.of_cars(self.batch_shape), strict=True)
-        found = [car.felt(*own) for car, own in zip(self.cars, given, strict=True)]
+        found = [car.before_forces(*own) for car, own in zip(self.cars, given, strict=True)]
         numbers = np.array([one[1:6] for one in found]).T.reshape(5, *self.batch_shape)
-        return Felt(joined([one.loads for one in found], self.batch_shape), *numbers)
+        return BeforeForces(joined([one.loads for one in found], self.batch_shape), *numbers)
 
-    def moved(self, w: FloatArray, use: FloatArray, forces: Forces, more: dict[str, Any]) -> FusionStep:
-        """As `CarMotion.moved`; one car is finished before the next."""
+    def after_forces(self, w: FloatArray, use: FloatArray, forces: Forces, more: dict[str, Any]) -> FusionStep:
+        """As `CarMotion.after_forces`; one car is finished before the next."""
         own = map(Forces._make, zip(*(value.ravel().tolist() for value in forces), strict=True))
         given = zip(self.cars, w.reshape(-1, 4), use.reshape(-1, 4), own, strict=True)
-        found = [(car.moved(wheels, uses, known, more), *car.closed()) for car, wheels, uses, known in given]
+        found = [(car.after_forces(wheels, uses, known, more), *car.checked()) for car, wheels, uses, known in given]
         steps, self._checks, self._sideslip = zip(*found, strict=True)
         return joined_steps(steps, self.batch_shape)
 
-    def closed(self, corner_speed: Number | None = None) -> tuple[Consistency, Number]:
-        """As `CarMotion.closed`: what `moved` has found; no corner observers run beside these cars."""
+    def checked(self, corner_speed: Number | None = None) -> tuple[Consistency, Number]:
+        """As `CarMotion.checked`: what `after_forces` has found; no corner observers run beside these cars."""
         return joined(self._checks, self.batch_shape), np.array(self._sideslip)
 
     def reset(self, chosen: BoolArray, vx: npt.ArrayLike, vy: npt.ArrayLike) -> None:

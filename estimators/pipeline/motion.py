@@ -23,7 +23,7 @@ from estimators.vehicle import VehicleParameters
 from estimators.velocity.slip import LEAST_SPEED
 
 
-class Felt(NamedTuple):
+class BeforeForces(NamedTuple):
     """What the inertial unit says of a sample, before the force of any wheel is known; numbers of a kit."""
 
     loads: LoadStep
@@ -38,7 +38,7 @@ class Felt(NamedTuple):
 class CarMotion(Memory):
     """The parts that run on plain numbers of one car, or on arrays of many: arguments as `EstimationPipeline`.
 
-    A sample goes through `signed`, `felt`, `moved` and `closed`, and leaves what the next of them needs.
+    A sample goes through `signed`, `before_forces`, `after_forces` and `checked`, and leaves what the next of them needs.
     """
 
     memory = ("front", "angle")
@@ -66,7 +66,7 @@ class CarMotion(Memory):
         self.front: Number = kit.full(0.0)  # F_yf of the last sample, N
         self.angle: Number = kit.full(0.0)  # the last known steering of the front wheels, rad
         self._given: tuple[Number, Number, Number, FloatArray, VehicleSignals]  # of this sample
-        self._felt: Felt
+        self._before: BeforeForces
         self._forces: Forces
         self._moved: VelocityResult
 
@@ -80,7 +80,9 @@ class CarMotion(Memory):
             reset(signed.turned, signed.speed)
         return signed.wheel_speed, signed.open_deviation
 
-    def felt(self, ax: Number, ay: Number, turn: Number, steer: FloatArray, signals: VehicleSignals) -> Felt:
+    def before_forces(
+        self, ax: Number, ay: Number, turn: Number, steer: FloatArray, signals: VehicleSignals
+    ) -> BeforeForces:
         """Takes the readings of the unit, m/s^2 and rad/s, and the steering (..., 4), rad."""
         kit, last, choose = self._kit, self.last, self._kit.where
         read_x, read_y = (possible(kit, value, limits.ACCELERATION) for value in (ax, ay))
@@ -97,12 +99,12 @@ class CarMotion(Memory):
         self.angle = choose(abs(angle) < math.inf, angle, self.angle)
         total = self.vehicle.mass * own_x + self.front * kit.sin(self.angle)
         self._given = ax, ay, turn, steer, signals
-        self._felt = Felt(loads, own_x, own_y, turned, angle, total, tilt)
-        return self._felt
+        self._before = BeforeForces(loads, own_x, own_y, turned, angle, total, tilt)
+        return self._before
 
-    def moved(self, w: FloatArray, use: FloatArray, forces: Forces, more: dict[str, Any]) -> VelocityResult:
+    def after_forces(self, w: FloatArray, use: FloatArray, forces: Forces, more: dict[str, Any]) -> VelocityResult:
         """Steps the velocity part: wheel speeds, F_x/F_z (..., 4), and `more` where it asks for it."""
-        (ax, ay, turn, steer, signals), tilt = self._given, self._felt.tilt
+        (ax, ay, turn, steer, signals), tilt = self._given, self._before.tilt
         if tilt is not None and self._takes_gravity:
             more = {**more, "gravity": tilt.gravity}
         elif tilt is not None:  # has to be taken off before
@@ -111,10 +113,10 @@ class CarMotion(Memory):
         self._forces, self._moved = forces, self.velocity.step(w, steer, ax, ay, turn, use, signals.elapsed, **more)
         return self._moved
 
-    def closed(self, corner_speed: Number | None = None) -> tuple[Consistency, Number]:
+    def checked(self, corner_speed: Number | None = None) -> tuple[Consistency, Number]:
         """Cross-checks, and the sideslip, rad; learns for the next sample. `corner_speed`: V_x of corner observers, m/s."""
         kit, last, forces, moved = self._kit, self.last, self._forces, self._moved
-        consistency = self.checks(forces, self._felt.loads, moved, corner_speed, self._given[-1].az)
+        consistency = self.checks(forces, self._before.loads, moved, corner_speed, self._given[-1].az)
         self.front = forces.front
         last.learn(moved, forces.push / self.vehicle.mass, forces.unknown)
         vx, vy, _ = last.speed

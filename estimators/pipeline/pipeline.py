@@ -151,7 +151,7 @@ class EstimationPipeline(Memory):
         late = self._late(signals.elapsed)
         w, open_way = self.motion.signed(w, ax, signals.direction)
         fresh = self.readings.step(w)
-        loads, own_x, own_y, turned, angle, total, tilt = self.motion.felt(ax, ay, turn, steer, signals)
+        loads, own_x, own_y, turned, angle, total, tilt = self.motion.before_forces(ax, ay, turn, steer, signals)
         wheels = self.longitudinal_force.step(w, torque, loads.load, fresh=fresh)
         delayed = kit.some(late)
         unknown = wheels.unknown | np.asarray(late)[..., None] if delayed else wheels.unknown
@@ -171,7 +171,7 @@ class EstimationPipeline(Memory):
             unknown=self._any_wheel(unknown),
             late=late,
         )
-        moved = self.motion.moved(w, use, forces, more)
+        moved = self.motion.after_forces(w, use, forces, more)
         corners = None
         if self.corner_observers is not None and across is not None:
             corners = self.corner_observers.step(
@@ -187,7 +187,7 @@ class EstimationPipeline(Memory):
                 steered, turning, speed, pull_x, pull_y, agreed.force, loads.load, lateral.axle_force
             )
         corner_speed = None if corners is None else kit.own(corners.vx)
-        consistency, sideslip = self.motion.closed(corner_speed)
+        consistency, sideslip = self.motion.checked(corner_speed)
         return PipelineStep(
             vx=moved.vx,
             vy=moved.vy,
