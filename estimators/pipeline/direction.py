@@ -87,12 +87,12 @@ class DirectionOfTravel(CarsMemory):
         # at rest nothing is known of the next way; a start counts from half a second before the wheels say so
         evidence = choose(rest, 0.99 * evidence, evidence)
         evidence = choose(surface > FASTEST, 2.0 * _SURE, evidence)
-        told = (given == 1.0) | (given == -1.0)
-        evidence = choose(told, given * 2.0 * _SURE, evidence)
+        known = (given == 1.0) | (given == -1.0)
+        evidence = choose(known, given * 2.0 * _SURE, evidence)
         found = choose(abs(evidence) > 0.1 * _SURE, kit.sign(evidence), choose(first, 1.0, self.way))
         # on the move only what is sure turns it around
-        turns = first | rest | told | (abs(evidence) > _SURE)
+        turns = first | rest | known | (abs(evidence) > _SURE)
         way = choose(turns, found, self.way)
         changed = no(first) & (way != self.way) & no(rest)
         self.evidence, self.surface, self.way = evidence, surface, way
-        return way, changed, surface, told | (abs(evidence) > _SURE)
+        return way, changed, surface, known | (abs(evidence) > _SURE)

@@ -13,7 +13,7 @@ from estimators.schedule.gain_schedule import GainSchedule
 
 
 def check_options(outside: str, stale_after: int | None) -> None:
-    """What every runtime may be told.
+    """What every runtime may be given.
 
     Raises:
         EstimatorError: an option that means nothing.

@@ -153,11 +153,11 @@ class VelocityFusion(Memory):
         lost = lost | self.longitudinal_reset(dt, standing, seen, wheel, slipping, mu, self._radius)
         along.zero_velocity_update(standing)
         front, rear = (slipping[i] | slipping[i + 1] | wheel.gated[i] | wheel.gated[i + 1] for i in (0, 2))
-        told = kit.no(unknown)
+        known = kit.no(unknown)
         # wheels that slide sideways do not turn, and have no slip angle; no road is so slippery that the car feels nothing
         calm, silent = across.friction(b) < self.settings.unloaded, seen.silent
         front_rolls, rear_rolls = (calm | kit.no(silent[i] & silent[i + 1]) for i in (0, 2))
-        rolling = (told & seen.steered & front_rolls & kit.no(front), told & rear_rolls & kit.no(rear))
+        rolling = (known & seen.steered & front_rolls & kit.no(front), known & rear_rolls & kit.no(rear))
         usable = kit.stacked((rolling[0] & steered, rolling[1]))
         fl, fr, rl, rr = seen.steer
         angles = kit.stacked((0.5 * (fl + fr), 0.5 * (rl + rr)))

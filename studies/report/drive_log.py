@@ -42,11 +42,11 @@ def complaints(report: Report) -> list[str]:
 def agreeing(report: Report) -> str:
     """How many comparisons of the signals with one another agree."""
     frames = report.get("frames", ())
-    told = [row for row in frames if row["verdict"] == "agrees"]
-    if not told:
+    agreeing = [row for row in frames if row["verdict"] == "agrees"]
+    if not agreeing:
         return ""
-    agree = f"{len(told)} of {len(frames)} comparisons of the signals with one another agree"
-    return f"{agree}." if len(told) == len(frames) else f"{agree}; the others are in the table of the log."
+    agree = f"{len(agreeing)} of {len(frames)} comparisons of the signals with one another agree"
+    return f"{agree}." if len(agreeing) == len(frames) else f"{agree}; the others are in the table of the log."
 
 
 def log_tables(report: Report) -> list[Table]:

@@ -58,7 +58,7 @@ class Chassis:
 
 @dataclass(frozen=True, repr=False)
 class TruthVehicle(Display):
-    """One car of the truth; `parameters` is what estimators may be told of it (exactly, or with an error of their own)."""
+    """One car of the truth; `parameters` is what estimators may know of it (exactly, or with an error of their own)."""
 
     name: str
     parameters: VehicleParameters
@@ -75,7 +75,7 @@ class TruthVehicle(Display):
         for name in changes:
             if name not in base | body | own:
                 raise SpecError(f"truth vehicle '{self.name}': {unknown('parameter', name, base | body | own)}")
-        # rolling_resistance is in both: the truth has it, and what estimators are told of it is their own business
+        # rolling_resistance is in both: the truth has it, and what estimators know of it is their own business
         chassis = {k: v for k, v in changes.items() if k in body}
         car = {k: v for k, v in changes.items() if k in base - body}
         rest: dict[str, object] = {k: v for k, v in changes.items() if k in own}

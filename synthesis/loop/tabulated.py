@@ -61,7 +61,7 @@ class Tabulated:
                     place = (*powers, *(0,) * count)
                     terms[place] = terms[place] + value * factor if place in terms else value * factor
         found = PolynomialMatrix(terms, self._gain_shape, 2 * count).balls()
-        return found.blurred(lambda i, j: self._gain_rounding[i, j].abs_upper()) if self.rounded else found
+        return found.inflated(lambda i, j: self._gain_rounding[i, j].abs_upper()) if self.rounded else found
 
     def plant_on(self, region: Region, letters: str, divided: bool) -> dict[str, PolynomialMatrix] | None:
         """Plant matrices on a region: numerators, or `divided` by the denominator; None if that is not positive there."""
@@ -112,7 +112,7 @@ class Tabulated:
         # u = (p - middle) / half of a float64 p: the rounding of `middle` is felt in units of `half`.
         axes = self.plant.axes
         argument = [ROUNDING * (1 + max(abs(axis.low), abs(axis.high)) / axis.half) for axis in axes]
-        return matrix.balls().blurred(_evaluation_error(matrix, argument, 0 if self.plant.is_polynomial else 1))
+        return matrix.balls().inflated(_evaluation_error(matrix, argument, 0 if self.plant.is_polynomial else 1))
 
 
 def _evaluation_error(matrix: PolynomialMatrix, argument: Sequence[fmpq], more: int) -> Any:

@@ -133,7 +133,7 @@ class PolynomialMatrix:
         """The same polynomial with balls for coefficients."""
         return self.map(arb_mat)
 
-    def blurred(self, radius: Callable[[int, int], Any]) -> PolynomialMatrix:
+    def inflated(self, radius: Callable[[int, int], Any]) -> PolynomialMatrix:
         """Every entry (i, j) uncertain by +-radius(i, j), everywhere."""
         rows, columns = self.shape
         spread = arb_mat(rows, columns, [arb(0, radius(i, j)) for i in range(rows) for j in range(columns)])
@@ -150,7 +150,7 @@ class PolynomialMatrix:
         found = PolynomialMatrix(kept, self.shape, self.variables)
         if size is None:
             return found
-        return found.blurred(lambda i, j: size[i, j].abs_upper())
+        return found.inflated(lambda i, j: size[i, j].abs_upper())
 
     def shortened(self, share: float) -> PolynomialMatrix:
         """Without its highest terms, as many as add up to no more than this share of the largest row sum of all terms."""

@@ -40,7 +40,7 @@ def phi(matrix: PolynomialMatrix, order: int = ORDER) -> PolynomialMatrix | None
     for k in range(TERMS - 1, 0, -1):
         found = (X @ found).truncated(order) + unit * fmpq(1, factorial(k))
     rest = small**TERMS / factorial(TERMS + 1) / (1 - small / (TERMS + 2))
-    found = found.blurred(lambda _i, _j: rest.abs_upper())
+    found = found.inflated(lambda _i, _j: rest.abs_upper())
     for _ in range(halvings):
         grown = unit + (X @ found).truncated(order) * fmpq(1, 2)
         found = (grown @ found).truncated(order)

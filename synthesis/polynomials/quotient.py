@@ -98,7 +98,7 @@ def _quotient(above: PolynomialMatrix, below: PolynomialMatrix, smallest: arb, o
     rest = arb_mat(*above.shape)
     for entries in to_chebyshev(above - found.scaled_by(below)).terms.values():
         rest = rest + magnitudes(entries)
-    return found.blurred(lambda i, j: (rest[i, j] / smallest).abs_upper())
+    return found.inflated(lambda i, j: (rest[i, j] / smallest).abs_upper())
 
 
 def _values(matrix: PolynomialMatrix, axes: list[int], points: FloatArray) -> FloatArray:

@@ -137,7 +137,7 @@ def test_what_is_cut_off_is_no_more_than_it_must_be() -> None:
 
 
 def test_blurring_is_what_it_says() -> None:
-    ball = constant(fmpq_mat([[1, 2], [3, 4]]), 1).blurred(lambda i, j: arb(i + 2 * j)).terms[(0,)]
+    ball = constant(fmpq_mat([[1, 2], [3, 4]]), 1).inflated(lambda i, j: arb(i + 2 * j)).terms[(0,)]
     for i in range(2):
         for j in range(2):
             middle = 1 + 2 * i + j
@@ -295,14 +295,14 @@ def test_exponentials_are_narrow() -> None:
 def test_exponentials_of_balls_contain_those_of_every_matrix_in_them() -> None:
     rng = np.random.default_rng(5)
     exact = with_norm(random_matrix(rng, (2, 2), 1, 1), 2.0)
-    blurred = exact.balls().blurred(lambda i, j: arb("0.01"))
-    integral = phi(blurred)
+    inflated = exact.balls().inflated(lambda i, j: arb("0.01"))
+    integral = phi(inflated)
     assert integral is not None
     for _ in range(8):
         shift = fmpq_mat(2, 2, [random_rational(rng, 0.01) for _ in range(4)])
         t = random_point(rng, 1)
         wanted = by_mpmath(value(exact + constant(shift, 1), t))
-        assert holds(integral, t, wanted[0]) and holds(exponential(blurred, integral), t, wanted[1])
+        assert holds(integral, t, wanted[0]) and holds(exponential(inflated, integral), t, wanted[1])
 
 
 def test_exponentials_of_large_matrices_are_not_tried() -> None:

@@ -9,7 +9,7 @@ from studies.truth import Manoeuvre, Truth, simulate_manoeuvres
 from studies.truth.profile import Piece
 
 SECONDS = 9.0
-FAULT = (3.0, 5.0)  # s; every drive changes its pace within
+FAULT = (3.0, 5.0)  # s; every drive changes its speed within
 _CAR = {"parameters": "corner-estimation", "drivetrain": "AWD", "maximum_torque": "4000 N*m", "maximum_power": "200 kW"}
 
 

@@ -87,8 +87,8 @@ def matrix(seeds: int, chosen: Sequence[Case] | None = None) -> list[Cell]:
         for b, drive in enumerate(truth.names):
             vx, vy, vx_after, vy_after = (float(e[k, :, b, part].max()) for part in (during, after) for e in errors)
             longest = max(_longest(row) for row in beyond[k, :, b]) * time
-            told = _told(off[k, :, b], flagged[k, :, b], round(FLAG_TIME / time))
-            found.append(Cell(signal, fault, drive, vx, vy, vx_after, vy_after, longest, told))
+            in_time = _flagged_in_time(off[k, :, b], flagged[k, :, b], round(FLAG_TIME / time))
+            found.append(Cell(signal, fault, drive, vx, vy, vx_after, vy_after, longest, in_time))
     return found
 
 
@@ -117,7 +117,7 @@ def _longest(condition: BoolArray) -> int:
     return int(np.diff(edges)[::2].max(initial=0))
 
 
-def _told(off: BoolArray, flagged: BoolArray, samples: int) -> bool | None:
+def _flagged_in_time(off: BoolArray, flagged: BoolArray, samples: int) -> bool | None:
     """Whether every draw (seeds, n) is flagged within the samples from which its signal is far off without a break."""
     verdicts = []
     for far, flags in zip(off, flagged, strict=True):
