@@ -206,9 +206,9 @@ def test_limits_of_an_input_that_there_is_not_are_refused(deployment: Deployment
 
 
 class Lag:
-    """A law with a state of its own, as a design of dynamic feedback hands it over: xk' = a xk + b y, u = c xk + d y."""
+    """A law with a state of its own, as a design of dynamic feedback hands it over: xk' = a xk + b y + second y2, u = c xk + d y."""
 
-    measured, order = "outputs", 1
+    measured, order, second = "outputs", 1, 0.0
 
     def __init__(self, model: LpvModel, base: StateFeedbackGains, values: tuple[float, float, float, float]) -> None:
         self.model, self.design, self.result, self.verdict = model, base.design, base.result, base.verdict
@@ -219,11 +219,12 @@ class Lag:
         found = [np.zeros((len(points), *shape)) for shape in shapes]
         for array, value in zip(found, self.values, strict=True):
             array[:, 0, 0] = value
+        found[1][:, 0, 1:] = self.second
         return tuple(found)
 
 
 def test_a_law_with_states_is_discretised_deployed_and_proved(deployment: Deployment) -> None:
-    """A lead of the position on the mass without its acceleration: trapezoidal; with it: held, and no feedthrough is lost."""
+    """A lead of the position on the mass: trapezoidal; with a use for its acceleration, on which the input acts: held."""
     plain = small_model(
         [[0, 1], [1 + p, -sp.Rational(1, 2)]], [[1, 0]], (parameter("p", 0.0, 2.0, 3.0),),
         B=[[0], [2]], E=[[0], [1]], F=[[0]],
@@ -246,8 +247,15 @@ def test_a_law_with_states_is_discretised_deployed_and_proved(deployment: Deploy
     assert done.claims[0].P.shape == (3, 3)
     assert len(gain_figure(schedule_content(done, "lag")).rows) == 2
     acting: Any = Lag(mass(), base, (-20.0, 20.0, 12.0, -16.0))
-    a, b, _, c, d, none = table_at(acting, points, PERIOD)[0].ravel()
-    assert (a, b) == pytest.approx((np.exp(-1.0), 1.0 - np.exp(-1.0))) and (c, d, none) == (12.0, -16.0, 0.0)
+    np.testing.assert_allclose(np.delete(table_at(acting, points, PERIOD), 2, axis=2), found)  # no use for it
+    acting.second = 10.0
+    a, b, second, c, d, none = table_at(acting, points, PERIOD)[0].ravel()
+    kept = np.exp(-1.0)
+    assert (a, b, second) == pytest.approx((kept, 1.0 - kept, 0.5 * (1.0 - kept))) and (c, d, none) == (
+        12.0,
+        -16.0,
+        0.0,
+    )
     wrong = schedule_content(done, "lag")
     wrong["gain"]["table"] = (np.array(wrong["gain"]["table"]) * np.array([[1.0, 1.0], [1.0, -1.0]])).tolist()
     assert prove(wrong)[0].refuted
