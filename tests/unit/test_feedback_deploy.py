@@ -206,7 +206,7 @@ def test_limits_of_an_input_that_there_is_not_are_refused(deployment: Deployment
 
 
 class Lag:
-    """A law with a state of its own, as a design of dynamic feedback hands it over: xk' = a xk + b y + second y2, u = c xk + d y."""
+    """A law as a design of dynamic feedback hands it over: xk' = a xk + b y + second y2, u = c xk + d y."""
 
     measured, order, second = "outputs", 1, 0.0
 
