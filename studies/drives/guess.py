@@ -22,6 +22,7 @@ from synthesis.errors import SpecError
 NEEDED = (*(f"wheel_speed_{corner}" for corner in ("fl", "fr", "rl", "rr")), "ax")
 FASTEST = 100.0  # Hz from which on the shipped sample time of 5 ms is taken
 RADIUS = 0.33  # m where no reference velocity says it: the shipped schedules are for it
+RATES = ("yaw_rate", "roll_rate", "pitch_rate")
 WEIGHTLESS = "left out: az must hold gravity, +9.81 m/s^2 at rest"
 CALM = 0.3  # share of such samples, those of least acceleration, that the radii are taken from
 FAST = 5.0  # m/s of the reference above which wheels roll
@@ -145,17 +146,29 @@ def _one_steering(files: list[_Found]) -> None:
             del file.guesses[column]
 
 
-def _unit(one: Guess, value: FloatArray) -> tuple[str, str, str]:
-    """Unit, sign and a remark: from the header if it says one, else from the range."""
+def _kind(name: str) -> str:
+    """What columns of one sensor, and so of one unit, have in common."""
+    kind = name.rsplit("_", 1)[0] if name[-3:] in ("_fl", "_fr", "_rl", "_rr") else name
+    return "rate" if kind in RATES else kind
+
+
+def _high(value: FloatArray) -> float:
     known = np.abs(value[np.isfinite(value)])
-    high = float(np.percentile(known, 99.0)) if known.size else 0.0
-    middle = float(np.nanmedian(value)) if known.size else 0.0
+    return float(np.percentile(known, 99.0)) if known.size else 0.0
+
+
+def _unit(file: _Found, column: str) -> tuple[str, str, str]:
+    """Unit, sign and a remark: from the header if it says one, else from the range of all columns of the kind."""
+    one, value = file.guesses[column], file.values[column]
+    kind = _kind(one.name)
+    alike = [name for name, other in file.guesses.items() if _kind(other.name) == kind and other.table == one.table]
+    high = max(_high(file.values[name]) for name in alike)
+    middle = float(np.nanmedian(value)) if np.isfinite(value).any() else 0.0
     sign = ', sign = "negative"' if one.name == "az" and middle < 0.0 else ""
     if one.name == "az" and abs(middle) < 0.05:
         return one.unit or "m/s^2", "", WEIGHTLESS
     if one.unit is not None:
         return one.unit, sign, ""
-    kind = one.name.rsplit("_", 1)[0] if one.name[-3:] in ("_fl", "_fr", "_rl", "_rr") else one.name
     unit = {
         "wheel_speed": "rpm" if high > 400.0 else "rad/s", "torque": "N*m", "steer": "deg" if high > 1.3 else "rad",
         "steering": "deg" if high > 1.3 else "rad", "hand_wheel": "deg" if high > 15.0 else "rad",
@@ -193,9 +206,8 @@ def _radii(files: list[_Found]) -> tuple[float, float]:
 
 
 def _factor(file: _Found, column: str) -> float:
-    one = file.guesses[column]
     try:
-        return factor_to(_unit(one, file.values[column])[0], "m/s" if one.name == "vx" else "rad/s")
+        return factor_to(_unit(file, column)[0], "m/s" if file.guesses[column].name == "vx" else "rad/s")
     except ValueError:
         return np.nan
 
@@ -264,7 +276,7 @@ def _rows(file: _Found, table: str, several: bool) -> list[str]:
     for column, one in file.guesses.items():
         if one.table != table:
             continue
-        unit, sign, remark = _unit(one, file.values[column])
+        unit, sign, remark = _unit(file, column)
         log = f"log = {_quoted(file.path.stem)}, " if several else ""
         comment = f" # CHECK: {remark}" if remark else ""
         off = "# " if remark == WEIGHTLESS else ""

@@ -37,6 +37,7 @@ _REFERENCE = {
     r"(gps|gnss|ins|reference) ?(speed|velocity)|(vehicle )?speed|velocity|geschwindigkeit|fahrzeuggeschwindigkeit|v ?long)",
     "vy": r"(vy|v ?y|velocity ?y|lat(eral)? ?(velocity|vel|speed)|quergeschwindigkeit|v ?lat)",
 }  # fmt: skip
+_BESIDE = {"ref", "reference", "true", "truth", "gps", "gnss", "ins", "optical"}  # what measures a reference
 _UNITS = {
     "°": "deg", "grad": "deg", "degree": "deg", "degrees": "deg", "°/s": "deg/s",
     "deg/sec": "deg/s", "degps": "deg/s", "dps": "deg/s",
@@ -96,8 +97,9 @@ def _guess(column: str, unit: str) -> Guess | None:
                 if name == "time"
                 else Guess("signals", name, _unit(said, SIGNALS[name]))
             )
+    bare = " ".join(word for word in words if word not in _BESIDE)
     for name, pattern in _REFERENCE.items():
-        if re.fullmatch(pattern, text):
+        if re.fullmatch(pattern, text) or re.fullmatch(pattern, bare):
             return Guess("reference", name, _unit(said, REFERENCES[name]))
     return None
 

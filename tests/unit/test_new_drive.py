@@ -12,6 +12,7 @@ from studies.cli import main
 from studies.commands import new
 from studies.commands.new import DRIVEN, run_new
 from studies.drives.drive_file import read_drive
+from studies.drives.guess import guess
 from studies.truth import Measured, Sensors, draw, load_manoeuvre, simulate_manoeuvres
 from studies.truth.export import write_log
 from synthesis.errors import SpecError
@@ -62,6 +63,15 @@ def test_its_signals_agree_and_a_wrong_unit_does_not(
     capsys.readouterr()
     assert main(["run", str(log), "--drive", str(wrong), "--check"]) == 2
     assert "yaw_rate" in capsys.readouterr().err
+
+
+def test_a_guess_finds_the_columns_of_the_file(written: tuple[Path, Path]) -> None:
+    """From names and ranges alone; the roll rate, though small, has the unit of the other rates."""
+    guessed, known = guess([written[0]]), read_drive(written[1])
+    assert guessed.missing == ()
+    assert guessed.found == {name: one.column for name, one in (known.signals | known.reference).items()}
+    rates = [line for line in guessed.text.splitlines() if "_rate = " in line]
+    assert len(rates) == 3 and all('unit = "deg/s"' in line for line in rates)
 
 
 def test_nothing_is_replaced_or_left_half_written(
