@@ -56,7 +56,7 @@ def _words(kind: Any) -> str:
         return " or ".join(_words(part) for part in inside)
     if origin is list:
         return (
-            f"list of {_words(inside[0])}".replace("number", "numbers")
+            re.sub(r"numbers?$", "numbers", f"list of {_words(inside[0])}")
             if not _is_table(inside[0])
             else "tables, see below"
         )
