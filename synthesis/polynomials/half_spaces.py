@@ -120,7 +120,7 @@ class Faces:
     @property
     def slack(self) -> FloatArray:
         """What counts as rounding, for each inequality."""
-        return NEAR * np.abs(self.normals).sum(axis=1)
+        return np.asarray(NEAR * np.abs(self.normals).sum(axis=1))
 
     def inside(self, points: FloatArray) -> BoolArray:
         """Which places (.., p) are in the set; more coordinates than p are not looked at."""
