@@ -31,7 +31,8 @@ class RangeRank(Display):
     `verdict`: "full": everywhere, proved by the sign of a minor's common factor in ball arithmetic; "lost": on the set
     `loss.condition` = 0, which passes through the box (and what constraints leave of it), shown by two exact signs; "never": for
     no value; "open": not decided (a rate without bound, a second derivative, or a matrix too large for symbols; then `loss` is
-    None). `blocks` is how many outputs with their derivatives were used.
+    None).
+    `blocks` is how many outputs with their derivatives were used.
     """
 
     verdict: Verdict

@@ -25,7 +25,7 @@ from synthesis.polynomials.multiplier import borders, lessened
 
 MOST_VERTICES = 8
 DEPTH, MOST_PIECES = 3, 300  # halvings along every parameter, and pieces that are tried at once
-CUT_DEPTH, MOST_CUT = 5, 1200  # where the set of the parameters is no box: pieces outside are left out
+CUT_DEPTH, MOST_CUT = 5, {2: 1200, 3: 200}  # where the set of the parameters is no box: pieces outside are left out
 
 
 def quickly_proved(
@@ -63,7 +63,7 @@ def quickly_proved(
     good = proved.copy()
     good[parents] = True  # until one of its pieces fails
     plant = loop.plant
-    halvings, most = (CUT_DEPTH, MOST_CUT) if plant.half_spaces else (DEPTH, MOST_PIECES)
+    halvings, most = (CUT_DEPTH, MOST_CUT[count]) if plant.half_spaces else (DEPTH, MOST_PIECES)
     helped = False
     for depth in range(halvings * count):
         if not 0 < len(pieces) <= most:
