@@ -9,8 +9,9 @@ X = G K (de Oliveira, Bernussou, Geromel 1999) K needs no P+, which is not known
     channel    [P, *, *, *; 0, g I, *, *; G Phi - X C, (G Gamma - X F) W, G + G' - P+, *; Z, 0, 0, g I] > 0
 
 prove an l2 gain below g (with inputs and errors both weighted by sqrt(T) it is that of continuous signals). One P and one G serve
-all channels, so channel i is weighed by 1/g_i. Phi and Gamma are fitted by Chebyshev polynomials in the parameters to 1e-10; what
-comes out is proved for the exact ones (`synthesis.certificate`).
+all channels, so channel i is weighed by 1/g_i. Phi and Gamma are fitted by Chebyshev polynomials in the parameters
+(`synthesis.design.fitted_update`); what comes out is proved for the exact ones (`synthesis.certificate`). Of a rational model a
+power of its denominator multiplies every inequality.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimators.arrays import FloatArray
-from synthesis.design.fitted_update import fitted_outputs, fitted_update
+from synthesis.design.fitted_update import fitted_update, lifted, power_below
 from synthesis.design.hinf_observer import (
     ObserverDesign,
     ObserverGains,
@@ -59,8 +60,8 @@ def design_sampled_observer(model: LpvModel, design: ObserverDesign, sample_time
     design = replace(design, settings=settings)
     scale = design_scale(model, design) / np.sqrt(sample_time)  # errors in their size if time is counted in samples
     Phi, _, Gamma = fitted_update(model, scale, sample_time)
-    C, F = fitted_outputs(model, scale)
-    fitted = {"Phi": Phi, "Gamma": Gamma, "C": C, "F": F}
+    scaled = model.polynomial.with_states_scaled(scale)
+    fitted = {"Phi": Phi, "Gamma": Gamma, "C": scaled.C, "F": scaled.F, "denominator": scaled.denominator}
 
     def problem(gamma: float | None, maximise_margin: bool = True, floor: float = 0.0) -> LmiProblem:
         return _problem(model, design, scale, sample_time, fitted, gamma, maximise_margin, floor)
@@ -90,30 +91,36 @@ def _problem(
         plant_of(model).axes, P, one, lambda i: variable(count + i, 2 * count), lambda x: int(x.p) / int(x.q)
     )
     later = one_sample_later(P, speeds, period)
-    closed, slack = G @ known["Phi"] - X @ known["C"], G + G.T - later
+    power = power_below(model)  # what Phi and Gamma are over; C and F are over d
+
+    def over(matrix: MatrixPolynomial, times: int = power) -> MatrixPolynomial:
+        return lifted(matrix, known["denominator"], times)
+
+    C, F = (over(known[key], max(power - 1, 0)) for key in ("C", "F"))
+    closed, slack = G @ known["Phi"] - X @ C, over(G + G.T - later)
     problem.require("P > 0", P)
     if design.decay_rate > 0.0 or not design.channels:
         kept = float(np.exp(-2.0 * design.decay_rate * (1.0 + design.reserve) * period))
-        problem.require("decay over a sample", symmetric_block([[P * kept, closed.T], [None, slack]]))
+        problem.require("decay over a sample", symmetric_block([[over(P) * kept, closed.T], [None, slack]]))
     unit, compact = error_unit(model, design, scale), len(design.channels) == 1
     for channel in design.channels:
         d, z = channel_matrices(model, channel)
         z = z / unit / scale
-        forced = (G @ known["Gamma"] - X @ known["F"]) @ problem.constant(d)
+        forced = (G @ known["Gamma"] - X @ F) @ problem.constant(d)
         level = channel.bound or gamma
         if level is None:
             size: MatrixPolynomial = problem.scalar(objective_name(design))
             problem.minimise(objective_name(design))
         else:
             size = problem.constant(np.array([[(level / unit) ** 2 if compact else level / unit]]))
-        inputs = problem.constant(np.eye(d.shape[1])).scaled_by(size)
+        inputs = over(problem.constant(np.eye(d.shape[1])).scaled_by(size))
         if compact:
-            top = P - problem.constant(z.T @ z)
+            top = over(P - problem.constant(z.T @ z))
             rows = [[top, None, closed.T], [None, inputs, forced.T], [None, None, slack]]
         else:
-            output, errors = problem.constant(z.T), problem.constant(np.eye(len(z))).scaled_by(size)
+            output, errors = over(problem.constant(z.T)), over(problem.constant(np.eye(len(z))).scaled_by(size))
             rows = [
-                [P, None, closed.T, output], [None, inputs, forced.T, None], [None, None, slack, None],
+                [over(P), None, closed.T, output], [None, inputs, forced.T, None], [None, None, slack, None],
                 [None, None, None, errors],
             ]  # fmt: skip
         problem.require(f"gain {channel.name}", symmetric_block(rows))

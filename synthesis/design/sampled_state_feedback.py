@@ -9,9 +9,9 @@ With V = x'Q(p)^-1 x, Q+ = Q one sample later, a slack matrix G(p) and Y = K G (
     limit        as in `synthesis.design.state_feedback`, with G + G' - Q in the place of Q below Y_i
 
 prove an l2 gain below g. K needs no Q+, which is not known when it is used. Phi and the Gammas are fitted by Chebyshev
-polynomials to 1e-10, those of a rational model as well as degree 24 does; what comes out is proved for the exact ones
-(`synthesis.certificate`). Cz, Dz and Fz of a rational model are numerators, and g I in the last row takes its denominator twice.
-Where samples are long against the loop, this is the design to take: the one in continuous time knows nothing of them.
+polynomials (`synthesis.design.fitted_update`); what comes out is proved for the exact ones (`synthesis.certificate`). Of a
+rational model a power of its denominator multiplies every inequality. Where samples are long against the loop, this is the design
+to take: the one in continuous time knows nothing of them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 from estimators.arrays import FloatArray
 from synthesis.design.feedback_channel import feedback_channel_matrices
 from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
-from synthesis.design.fitted_update import fitted_update
+from synthesis.design.fitted_update import fitted_update, lifted, power_below
 from synthesis.design.refusals import refuse_unstabilisable
 from synthesis.design.state_feedback import (
     StateFeedbackDesign,
@@ -110,17 +110,22 @@ def _problem(
         plant_of(model).axes, Q, one, lambda i: variable(count + i, 2 * count), lambda x: int(x.p) / int(x.q)
     )
     later, closed, slack = one_sample_later(Q, speeds, period), Phi @ G + Gamma @ Y, G + G.T - Q
+    power = power_below(model)  # closed is over d^power, the performance over d
+
+    def over(matrix: MatrixPolynomial, times: int = power) -> MatrixPolynomial:
+        return lifted(matrix, known["denominator"], times)
+
     problem.require("Q > 0", Q)
     if design.decay_rate > 0.0:
         kept = float(np.exp(-2.0 * design.decay_rate * (1.0 + design.reserve) * period))
-        problem.require("decay over a sample", symmetric_block([[later * kept, closed], [None, slack]]))
+        problem.require("decay over a sample", symmetric_block([[over(later) * kept, closed], [None, over(slack)]]))
     if design.limits is not None:
         require_limits(problem, model, design.limits, design.reserve, scale, Q, slack, Y)
     name = "gamma^2" if len(design.channels) == 1 else "gamma"
     for channel in design.channels:
         W, Z = feedback_channel_matrices(model, channel)
         W = W / scale.disturbance
-        seen = performance(problem, Z, known, G, Y, model, scale)
+        seen = over(performance(problem, Z, known, G, Y, model, scale), max(power - 1, 0))
         through = problem.constant(Z[:, nx : len(Z.T) - nu]) @ known["F"] @ problem.constant(W)
         level = channel.bound or gamma
         if level is None:
@@ -130,15 +135,12 @@ def _problem(
             ratio = level / scale.disturbance
             size = problem.constant(np.array([[ratio**2 if name == "gamma^2" else ratio]]))
         inner, outer = problem.constant(np.eye(W.shape[1])), problem.constant(np.eye(len(Z))).scaled_by(size)
-        outer = outer.scaled_by(known["denominator"]).scaled_by(
-            known["denominator"]
-        )  # `seen` and `through` are over it
         inner = inner if name == "gamma^2" else inner.scaled_by(size)
         rows: list[list[MatrixPolynomial | None]] = [
-            [later, closed, Gamma_E @ problem.constant(W), None],
-            [None, slack, None, seen.T],
-            [None, None, inner, through.T],
-            [None, None, None, outer],
+            [over(later), closed, Gamma_E @ problem.constant(W), None],
+            [None, over(slack), None, seen.T],
+            [None, None, over(inner), over(through, max(power - 1, 0)).T],
+            [None, None, None, over(outer)],
         ]
         problem.require(f"gain {channel.name}", symmetric_block(rows))
     return problem
