@@ -1,4 +1,8 @@
-"""The plant over a sample as polynomials in the parameters, for a design in discrete time."""
+r"""The plant over a sample as polynomials in the parameters, for a design in discrete time.
+
+Of a rational plant A = N / d the exponentials are entire in 1/d, and d^3 times them is close to a polynomial of a low degree
+where the exponentials themselves ask for one that is high: e^(TN/d) = 1 + TN/d + (TN/d)^2 / 2 + ..
+"""
 
 from __future__ import annotations
 
@@ -11,68 +15,79 @@ from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
 from synthesis.models.discretise import zero_order_hold
 from synthesis.models.lpv import LpvModel
-from synthesis.models.numeric import NumericModel
+from synthesis.models.numeric import NumericModel, values
+from synthesis.polynomials.matrix import MatrixPolynomial
 
-FIT = 1e-10  # relative
-LOOSE = 1e-4  # beyond it a fit is none: what comes out is proved anyway, but was designed for another plant
+FIT, OF_RATIONAL = 1e-10, 1e-7  # relative; what comes out is proved for the exact matrices anyway
+LOOSE = 1e-4  # beyond it a fit is none: the design would be one for another plant
 DEGREES = (4, 8, 12, 16, 24)
+POWER = 3  # of the denominator
+
+
+def power_below(model: LpvModel) -> int:
+    """The power of the model's denominator that `fitted_update` is over: none of a polynomial model."""
+    return 0 if model.polynomial.is_polynomial else POWER
+
+
+def lifted(matrix: MatrixPolynomial, below: MatrixPolynomial, times: int) -> MatrixPolynomial:
+    """The matrix times a power of the denominator."""
+    for _ in range(times):
+        matrix = matrix.scaled_by(below)
+    return matrix
 
 
 def fitted_update(model: LpvModel, scale: FloatArray, period: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """e^(TA), T phi(TA) B and T phi(TA) E in the states diag(scale) x, as polynomials in u, fitted to 1e-10 if degree 24 does.
+    """e^(TA), T phi(TA) B and T phi(TA) E in the states diag(scale) x, as polynomials in u over d^k, k = `power_below`.
 
-    Coefficients (d_1+1, ..., d_p+1, rows, columns). What comes out of a design is proved for the exact matrices. Raises
-    ProblemError for a fit that is worse than 1e-4.
+    Coefficients (d_1+1, ..., d_p+1, rows, columns), fitted to 1e-10, of a rational model to 1e-7. Raises ProblemError where
+    degree 24 leaves more than 1e-4.
     """
     n, inputs = len(model.states), len(model.inputs)
 
     def update(at: NumericModel) -> FloatArray:
         driven = np.concatenate([at.B, at.E], axis=-1) * scale[:, None]
-        return np.concatenate(zero_order_hold(at.A * scale[:, None] / scale, driven, period), axis=-1)
+        moved = np.concatenate(zero_order_hold(at.A * scale[:, None] / scale, driven, period), axis=-1)
+        return np.asarray(moved * values(model.polynomial.denominator, model.scaled(at.points)) ** power_below(model))
 
     series = _fitted(model, update)
     return series[..., :n], series[..., n : n + inputs], series[..., n + inputs :]
 
 
-def fitted_outputs(model: LpvModel, scale: FloatArray, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """C and F for the states diag(scale) x and outputs over their sizes: of a polynomial model as they are, else fitted."""
-    below = sizes[:, None]
-    if model.polynomial.is_polynomial:
-        scaled = model.polynomial.with_states_scaled(scale)
-        return scaled.C / below, scaled.F / below
-    series = _fitted(model, lambda at: np.concatenate([at.C / scale, at.F], axis=-1) / below)
-    return series[..., : len(model.states)], series[..., len(model.states) :]
+def _fitted(model: LpvModel, update: Callable[[NumericModel], FloatArray]) -> FloatArray:
+    """Monomial coefficients of the Chebyshev series of least degrees, one for every parameter, that is close enough.
 
-
-def _fitted(model: LpvModel, values: Callable[[NumericModel], FloatArray]) -> FloatArray:
-    """Monomial coefficients of the Chebyshev series of least degree that leaves no more than `FIT` of any column.
-
-    Of any column, as each has a unit of its own: the size of an input or a disturbance must not decide how well another is met.
+    In every column, as each has a unit of its own: the size of an input or a disturbance must not decide how well another is met.
     """
-    for degree in DEGREES:
-        nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
-        count = len(model.parameters)
-        points = np.array(list(product(nodes, repeat=count))).reshape(len(nodes) ** count, count)
-        middle, half = (np.array([getattr(p, key) for p in model.parameters]) for key in ("middle", "half_width"))
-        found = values(model.on(middle + half * points))
-        series = found.reshape(*(len(nodes),) * count, *found.shape[1:])
-        inverse = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, degree))
-        for axis in range(count):
+    count = len(model.parameters)
+    middle, half = (np.array([getattr(p, key) for p in model.parameters]) for key in ("middle", "half_width"))
+    degrees = [DEGREES[0]] * count
+    wanted = OF_RATIONAL if power_below(model) else FIT
+    while True:
+        lines = [np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1)) for degree in degrees]
+        points = np.array(list(product(*lines))).reshape(-1, count)
+        found = update(model.on(middle + half * points))
+        series = found.reshape(*(degree + 1 for degree in degrees), *found.shape[1:])
+        for axis, line in enumerate(lines):
+            inverse = np.linalg.inv(np.polynomial.chebyshev.chebvander(line, degrees[axis]))
             series = np.moveaxis(np.tensordot(inverse, series, axes=(1, axis)), 0, axis)
         size = np.abs(series).max(axis=tuple(range(count + 1)))
+        size = np.where(size > 0.0, size, 1.0)
         tails = [np.abs(np.take(series, -1, axis=axis)).max(axis=tuple(range(count))) for axis in range(count)]
-        if all((tail <= FIT * size).all() for tail in tails):
+        off = np.array([float((tail / size).max()) for tail in tails])
+        short = [axis for axis in range(count) if off[axis] > wanted and degrees[axis] < DEGREES[-1]]
+        if not short:
             break
-    off = max((float((tail / np.where(size > 0.0, size, 1.0)).max()) for tail in tails), default=0.0)
-    if off > LOOSE:
+        for axis in short:
+            degrees[axis] = next(degree for degree in DEGREES if degree > degrees[axis])
+    if (off > LOOSE).any():
         raise ProblemError(
-            f"model '{model.name}': no polynomial of degree {DEGREES[-1]} comes close to it over its range "
-            f"(off by {off:.1g}); shrink the range"
+            f"model '{model.name}': no polynomial of degree {DEGREES[-1]} in '{model.parameters[int(off.argmax())].name}' comes "
+            f"close to its update over a sample (off by {off.max():.1g}); shrink the range"
         )
-    powers = np.zeros((degree + 1, degree + 1))
-    for k in range(degree + 1):
-        column = np.polynomial.chebyshev.cheb2poly(np.eye(degree + 1)[k])
-        powers[: len(column), k] = column
-    for axis in range(count):
+    for axis, degree in enumerate(degrees):
+        powers = np.zeros((degree + 1, degree + 1))
+        for k in range(degree + 1):
+            column = np.polynomial.chebyshev.cheb2poly(np.eye(degree + 1)[k])
+            powers[: len(column), k] = column
         series = np.moveaxis(np.tensordot(powers, series, axes=(1, axis)), 0, axis)
     return np.asarray(series)

@@ -15,7 +15,7 @@ units, V is that of the minimised channel, and every bounded one weighs as much 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -112,12 +112,16 @@ def require_sampled_energy(
     force: MatrixPolynomial,
     seen: MatrixPolynomial,
     through: MatrixPolynomial | None = None,
+    over: Callable[[MatrixPolynomial], MatrixPolynomial] = lambda matrix: matrix,
 ) -> None:
-    """V goes from `now` to `later` by `moved`; d adds `force` (n, k), and to z = `seen` `through` (m, k) at once."""
-    outer = _sized(problem, channel.outer, seen.shape[0])
+    """V goes from `now` to `later` by `moved`; d adds `force` (n, k), and to z = `seen` `through` (m, k) at once.
+
+    All of them are multiplied by one positive polynomial, and `over` multiplies by it.
+    """
+    outer = over(_sized(problem, channel.outer, seen.shape[0]))
     direct = None if through is None else through.T
     if channel.norm == "generalised H2":
-        inner = _sized(problem, channel.inner, force.shape[1])
+        inner = over(_sized(problem, channel.inner, force.shape[1]))
         stored = symmetric_block([[later, moved, force], [None, now, None], [None, None, inner]])
         shown = symmetric_block([[now, None, seen.T], [None, inner, direct], [None, None, outer]])
         problem.require(f"stored energy {channel.name}", stored)

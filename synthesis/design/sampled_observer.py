@@ -10,8 +10,9 @@ X = G K (de Oliveira, Bernussou, Geromel 1999) K needs no P+, which is not known
 
 prove an l2 gain below g (with inputs and errors both weighted by sqrt(T) it is that of continuous signals). Other norms have a
 pair of their own in the place of the last, and levels of continuous time (`synthesis.design.norms`). One P and one G serve
-all channels, so channel i is weighed by 1/g_i. Phi and Gamma are fitted by Chebyshev polynomials in the parameters to 1e-10; what
-comes out is proved for the exact ones (`synthesis.certificate`).
+all channels, so channel i is weighed by 1/g_i. Phi and Gamma are fitted by Chebyshev polynomials in the parameters
+(`synthesis.design.fitted_update`); what comes out is proved for the exact ones (`synthesis.certificate`). Of a rational model a
+power of its denominator multiplies every inequality.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimators.arrays import FloatArray
-from synthesis.design.fitted_update import fitted_outputs, fitted_update
+from synthesis.design.fitted_update import fitted_update, lifted, power_below
 from synthesis.design.hinf_observer import (
     ObserverDesign,
     ObserverGains,
@@ -38,7 +39,7 @@ from synthesis.lmi.problem import LmiProblem
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.motion import one_sample_later, rates
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.matrix import symmetric_block, variable
+from synthesis.polynomials.matrix import MatrixPolynomial, symmetric_block, variable
 
 POINTS = 40  # for each parameter; what holds between them is proved for the table that is deployed
 
@@ -63,8 +64,14 @@ def design_sampled_observer(model: LpvModel, design: ObserverDesign, sample_time
     design = replace(design, settings=settings)
     scale = design_scale(model, design) / np.sqrt(sample_time)  # errors in their size if time is counted in samples
     Phi, _, Gamma = fitted_update(model, scale, sample_time)
-    C, F = fitted_outputs(model, scale, outputs_of(model, design, scale))
-    fitted = {"Phi": Phi, "Gamma": Gamma, "C": C, "F": F}
+    scaled, sizes = model.polynomial.with_states_scaled(scale), outputs_of(model, design, scale)[:, None]
+    fitted = {
+        "Phi": Phi,
+        "Gamma": Gamma,
+        "C": scaled.C / sizes,
+        "F": scaled.F / sizes,
+        "denominator": scaled.denominator,
+    }
 
     def problem(gamma: float | None, maximise_margin: bool = True, floor: float = 0.0) -> LmiProblem:
         return _problem(model, design, scale, sample_time, fitted, gamma, maximise_margin, floor)
@@ -100,31 +107,38 @@ def _problem(
         plant_of(model).axes, P, one, lambda i: variable(count + i, 2 * count), lambda x: int(x.p) / int(x.q)
     )
     later = one_sample_later(P, speeds, period)
-    closed, slack = G @ known["Phi"] - X @ known["C"], G + G.T - later
+    power = power_below(model)  # what Phi and Gamma are over; C and F are over d
+
+    def over(matrix: MatrixPolynomial, times: int = power) -> MatrixPolynomial:
+        return lifted(matrix, known["denominator"], times)
+
+    C, F = (over(known[key], max(power - 1, 0)) for key in ("C", "F"))
+    closed, slack = G @ known["Phi"] - X @ C, over(G + G.T - later)
     problem.require("P > 0", P)
     if design.decay_rate > 0.0 or not design.channels:
         kept = float(np.exp(-2.0 * design.decay_rate * (1.0 + design.reserve) * period))
-        problem.require("decay over a sample", symmetric_block([[P * kept, closed.T], [None, slack]]))
+        problem.require("decay over a sample", symmetric_block([[over(P) * kept, closed.T], [None, slack]]))
     unit = error_unit(model, design, scale)
     for channel in design.channels:
         d, z = channel_matrices(model, channel)
         z = z / unit / scale
-        forced = (G @ known["Gamma"] - X @ known["F"]) @ problem.constant(d)
+        forced = (G @ known["Gamma"] - X @ F) @ problem.constant(d)
         level, bounded = channel.bound or gamma, channel.bound is not None
         ratio = None if level is None else level * per_sample(channel.norm, period) / unit
         near, far = levels(problem, channel.name, bounded, ratio, design.compact)
         if channel.norm != "H-infinity":
             sizes = ChannelSizes(channel.name, channel.norm, design.degree, far, near)
-            require_sampled_energy(problem, sizes, slack, closed, P, forced, problem.constant(z).scaled_by(near))
+            seen = over(problem.constant(z).scaled_by(near))
+            require_sampled_energy(problem, sizes, slack, closed, over(P), forced, seen, over=over)
             continue
-        inputs = problem.constant(np.eye(d.shape[1])).scaled_by(far)
+        inputs = over(problem.constant(np.eye(d.shape[1])).scaled_by(far))
         if design.compact:
-            top = P - problem.constant(z.T @ z).scaled_by(near)
+            top = over(P - problem.constant(z.T @ z).scaled_by(near))
             rows = [[top, None, closed.T], [None, inputs, forced.T], [None, None, slack]]
         else:
-            output, errors = problem.constant(z.T), problem.constant(np.eye(len(z))).scaled_by(near)
+            output, errors = over(problem.constant(z.T)), over(problem.constant(np.eye(len(z))).scaled_by(near))
             rows = [
-                [P, None, closed.T, output], [None, inputs, forced.T, None], [None, None, slack, None],
+                [over(P), None, closed.T, output], [None, inputs, forced.T, None], [None, None, slack, None],
                 [None, None, None, errors],
             ]  # fmt: skip
         problem.require(f"gain {channel.name}", symmetric_block(rows))

@@ -10,9 +10,9 @@ With V = x'Q(p)^-1 x, Q+ = Q one sample later, a slack matrix G(p) and Y = K G (
 
 prove an l2 gain below g. Other norms have a pair of their own in the place of the last, and levels of continuous time
 (`synthesis.design.norms`). K needs no Q+, which is not known when it is used. Phi and the Gammas are fitted by Chebyshev
-polynomials to 1e-10, those of a rational model as well as degree 24 does; what comes out is proved for the exact ones
-(`synthesis.certificate`). Cz, Dz and Fz of a rational model are numerators, and g I in the last row takes its denominator twice.
-Where samples are long against the loop, this is the design to take: the one in continuous time knows nothing of them.
+polynomials (`synthesis.design.fitted_update`); what comes out is proved for the exact ones (`synthesis.certificate`). Of a
+rational model a power of its denominator multiplies every inequality. Where samples are long against the loop, this is the design
+to take: the one in continuous time knows nothing of them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import numpy as np
 from estimators.arrays import FloatArray
 from synthesis.design.feedback_channel import feedback_channel_matrices
 from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
-from synthesis.design.fitted_update import fitted_update
+from synthesis.design.fitted_update import fitted_update, lifted, power_below
 from synthesis.design.norms import ChannelSizes, levels, per_sample, require_sampled_energy
 from synthesis.design.pole_regions import refuse_regions
 from synthesis.design.refusals import refuse_unstabilisable
@@ -121,16 +121,21 @@ def _problem(
         plant_of(model).axes, Q, one, lambda i: variable(count + i, 2 * count), lambda x: int(x.p) / int(x.q)
     )
     later, closed, slack = one_sample_later(Q, speeds, period), Phi @ G + Gamma @ Y, G + G.T - Q
+    power = power_below(model)  # closed is over d^power, the performance over d
+
+    def over(matrix: MatrixPolynomial, times: int = power) -> MatrixPolynomial:
+        return lifted(matrix, known["denominator"], times)
+
     problem.require("Q > 0", Q)
     if design.decay_rate > 0.0:
         kept = float(np.exp(-2.0 * design.decay_rate * (1.0 + design.reserve) * period))
-        problem.require("decay over a sample", symmetric_block([[later * kept, closed], [None, slack]]))
+        problem.require("decay over a sample", symmetric_block([[over(later) * kept, closed], [None, over(slack)]]))
     if design.limits is not None:
         require_limits(problem, model, design.limits, design.reserve, scale, Q, slack, Y)
     for channel in design.channels:
         W, Z = feedback_channel_matrices(model, channel)
         W = W / scale.disturbance
-        seen = performance(problem, Z, known, G, Y, model, scale)
+        seen = over(performance(problem, Z, known, G, Y, model, scale), max(power - 1, 0))
         through = problem.constant(Z[:, nx : len(Z.T) - nu]) @ known["F"] @ problem.constant(W)
         driven = Gamma_E @ problem.constant(W)
         level, bounded = channel.bound or gamma, channel.bound is not None
@@ -138,17 +143,17 @@ def _problem(
         near, far = levels(problem, channel.name, bounded, ratio, design.compact)
         if design.compact:
             driven, through = driven.scaled_by(near), through.scaled_by(near)
-        far = far.scaled_by(known["denominator"]).scaled_by(known["denominator"])  # `seen` and `through` are over it
+        through = over(through, max(power - 1, 0))
         if channel.norm != "H-infinity":
             sizes = ChannelSizes(channel.name, channel.norm, design.degree, near, far)
-            require_sampled_energy(problem, sizes, later, closed, slack, driven, seen, through)
+            require_sampled_energy(problem, sizes, over(later), closed, over(slack), driven, seen, through, over)
             continue
         inner, outer = (problem.constant(np.eye(k)).scaled_by(size) for k, size in ((W.shape[1], near), (len(Z), far)))
         rows: list[list[MatrixPolynomial | None]] = [
-            [later, closed, driven, None],
-            [None, slack, None, seen.T],
-            [None, None, inner, through.T],
-            [None, None, None, outer],
+            [over(later), closed, driven, None],
+            [None, over(slack), None, seen.T],
+            [None, None, over(inner), through.T],
+            [None, None, None, over(outer)],
         ]
         problem.require(f"gain {channel.name}", symmetric_block(rows))
     return problem

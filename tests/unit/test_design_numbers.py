@@ -12,7 +12,7 @@ from flint import fmpq, fmpq_mat
 from scipy.linalg import expm
 
 from synthesis.certificate.unknowns import in_scaled_states
-from synthesis.design.fitted_update import fitted_update
+from synthesis.design.fitted_update import fitted_update, power_below
 from synthesis.design.hinf_observer import Channel, ObserverDesign
 from synthesis.design.stability import affine_quadratic_stability
 from synthesis.errors import ProblemError
@@ -43,6 +43,22 @@ def test_discretised_plants_are_polynomials_close_to_exponentials(parameters: tu
             for t in u:
                 there = np.tensordot(t ** np.arange(len(there)), there, 1)
             np.testing.assert_allclose(there, wanted, atol=1e-8)
+
+
+def test_discretised_rational_plants_are_over_a_power_of_their_denominator() -> None:
+    """A wide range of 1/p, and what 24 degrees do not reach without that power."""
+    plant = small_model([[-1 / p, 3 - p], [q / p, -1]], [[1, 0]], (parameter("p", 0.2, 5.0), TWO[1]), E=[[1 / p], [2]])
+    scale, period = np.array([2.0, 0.1]), 0.05
+    Phi, _, Gamma = fitted_update(plant, scale, period)
+    assert Phi.shape[:2] <= (13, 9)
+    for u, v in np.random.default_rng(1).uniform(-1.0, 1.0, (5, 2)):
+        at = plant.on(np.array([[2.6 + 2.4 * u, 0.5 + 2.5 * v]]))
+        A, E = at.A[0] * scale[:, None] / scale, at.E[0] * scale[:, None]
+        block = expm(period * np.block([[A, E], [np.zeros((1, 3))]]))
+        below = (1.0 + 2.4 / 2.6 * u) ** power_below(plant)
+        for value, wanted in ((Phi, block[:2, :2]), (Gamma, block[:2, 2:])):
+            there = np.tensordot(v ** np.arange(value.shape[1]), np.tensordot(u ** np.arange(len(value)), value, 1), 1)
+            np.testing.assert_allclose(there, wanted * below, atol=1e-5)
 
 
 def test_the_place_of_an_unstable_pole_is_in_the_words() -> None:
