@@ -53,7 +53,7 @@ class FusionSettings:
     # longitudinal slip: slip = compliance * mu, plus an error that grows with the friction used
     slip_compliance: float = 0.03  # slip per unit of F_x/F_z: normalised stiffness 33, of a range from 15 to 80
     slip_compliance_spread: float = 0.02
-    slip_bend_spread: float = 0.5  # relative, of the slip that side slip adds: not every tire is isotropic
+    slip_bend_spread: float = 0.3  # relative, of the slip that side slip adds: not every tire is isotropic
     slip_memory: float = 90.0  # s: a road surface, one to two km
     slip_floor: float = 0.001  # slip error of a free-rolling wheel: asphalt, on a recorded drive 0.0008
     slip_load: float = 0.01  # the same per g sideways: a turn moves load, and a radius gives by 0.5 to 1 mm per kN
