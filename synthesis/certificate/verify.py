@@ -36,7 +36,7 @@ from synthesis.polynomials.rational import decimal
 DEPTH = 14  # halvings of a cell before a proof gives up
 MOST_REGIONS = 400  # open or done, for one claim on one cell
 FEW = 8  # pieces that float64 left: more of them say that it is tight, and balls would take long
-LESS = 8  # times fewer on a cell that the border of the set cuts: it takes more of each
+LESS = 8  # times fewer, for every parameter but one, on a cell that the border of the set cuts: each costs more
 ORDER = 8  # total degree of the inequalities that is kept; products of exponentials have twice that, of no weight
 
 
@@ -158,7 +158,7 @@ class Verifier:
             return broken
         waiting, done = [(cell, 0)], 0
         cut = any(not h.contains(cell.offset, cell.factor) for h in plant.half_spaces)
-        most = self.most_regions // LESS if cut else self.most_regions
+        most = self.most_regions // LESS ** (count - 1) if cut else self.most_regions
         while waiting:
             region, depth = waiting.pop()
             if cut and plant.misses(region.offset, region.factor):
@@ -176,7 +176,7 @@ class Verifier:
                     continue  # outside, though of no single inequality
                 return Outcome(False, undecided, (*place, *region.offset[count:]))
             if pieces:
-                broken = self._fails_in_a_corner(pieces, task)
+                broken = self._fails_in_a_corner(pieces[:FEW], task)
                 if broken is not None or len(pieces) > FEW:
                     place = plant.place_in(pieces[0].offset, pieces[0].factor) or pieces[0].offset[:count]
                     return broken or Outcome(False, undecided, (*place, *pieces[0].offset[count:]))
