@@ -78,7 +78,7 @@ class Frame:
     """Coordinates in which the solver works: states T x (`states` is T), inputs and outputs over their sizes.
 
     Time is counted in units of 1/clock s, and a gain of `unit` is one. The least gain does not depend on them; how well it is
-    found does.
+    found does. `joint` is the error covariance, and the cost matrix, in the middle of the range in these coordinates.
     """
 
     states: FloatArray
@@ -86,6 +86,17 @@ class Frame:
     outputs: FloatArray
     unit: float
     clock: float
+    joint: FloatArray
+
+    @property
+    def regulator(self) -> FloatArray:
+        """T_r: in the states T_r x the cost matrix is one (`synthesis.design.halves`)."""
+        return _power(self.joint, 0.5) @ self.states
+
+    @property
+    def filter(self) -> FloatArray:
+        """T_f: in the states T_f x the error covariance is one."""
+        return _power(self.joint, -0.5) @ self.states
 
 
 def generalised_plant(
@@ -143,8 +154,8 @@ def frame_of(plant: GeneralisedPlant) -> Frame:
     eigenvalue of S R, whose root is the unit. With T T = G, the geometric mean of S^-1 and R (G S G = R), both become alike. It
     is the only symmetric T that does that: nothing turns where modes are alike.
     """
-    A, B, C = (_middle(getattr(plant, key), plant.denominator) for key in ("A", "B", "C"))
-    E, F, Cz, Dzu = (_gathered(plant, key) for key in ("E", "F", "Cz", "Dzu"))
+    A, B, C = (middle(getattr(plant, key), plant.denominator) for key in ("A", "B", "C"))
+    E, F, Cz, Dzu = (gathered(plant, key) for key in ("E", "F", "Cz", "Dzu"))
     seen = C / output_sizes(C * np.linalg.norm(E, axis=1), F)[:, None]
     moved = B / output_sizes(B.T * np.linalg.norm(Cz, axis=0), Dzu.T)
     balanced = signal_scale(A, np.hstack([E, moved]), np.vstack([Cz, seen]))
@@ -161,11 +172,12 @@ def frame_of(plant: GeneralisedPlant) -> Frame:
     T = _power(back @ _power(between, 0.5) @ back, 0.5)
     speed = float(np.linalg.norm(T @ A @ np.linalg.inv(T), 2))
     clock = speed if 0.0 < speed < np.inf else 1.0
+    joint = T @ S @ T / unit
     T = T * np.sqrt(clock)  # in that time errors vary by S / clock, and states cost clock R
     root = np.sqrt(unit)
     inputs = 1.0 / output_sizes((T @ B).T / clock, Dzu.T / root)  # what they cost; for free, what they move
     outputs = output_sizes(np.linalg.solve(T, C.T).T, F / root)
-    return Frame(T * balanced, inputs, outputs, unit, clock)
+    return Frame(T * balanced, inputs, outputs, unit, clock, 0.5 * (joint + joint.T))
 
 
 def _variance(A: FloatArray, C: FloatArray, E: FloatArray, F: FloatArray) -> FloatArray:
@@ -197,12 +209,13 @@ def _power(matrix: FloatArray, exponent: float) -> FloatArray:
     return np.asarray((vectors * np.maximum(values, values[-1] * 1e-14) ** exponent) @ vectors.T)
 
 
-def _middle(coefficients: FloatArray, below: FloatArray) -> FloatArray:
+def middle(coefficients: FloatArray, below: FloatArray) -> FloatArray:
+    """Of a numerator over its denominator, in the middle of the range."""
     first = (0,) * (coefficients.ndim - 2)
     return np.asarray(coefficients[first] / below[first])
 
 
-def _gathered(plant: GeneralisedPlant, key: str) -> FloatArray:
+def gathered(plant: GeneralisedPlant, key: str) -> FloatArray:
     """Of all channels in the middle of the range: inputs side by side, performance signals one below the other."""
-    parts = [_middle(getattr(part, key), plant.denominator) for part in plant.channels]
+    parts = [middle(getattr(part, key), plant.denominator) for part in plant.channels]
     return np.concatenate(parts, axis=1 if key in ("E", "F") else 0)

@@ -34,7 +34,7 @@ from synthesis.design.three_solves import Problem, three_solves
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
-from synthesis.lmi.scaling import HEAVY, observer_scale, output_sizes, regular_riccati
+from synthesis.lmi.scaling import correction_sizes, observer_scale
 from synthesis.lmi.settings import LmiSettings
 from synthesis.loop.observer import Update
 from synthesis.models.lpv import LpvModel
@@ -208,18 +208,11 @@ def _sizes(model: LpvModel, design: ObserverDesign) -> FloatArray:
 
 
 def outputs_of(model: LpvModel, design: ObserverDesign, scale: FloatArray) -> FloatArray:
-    """Sizes (ny,) by which outputs are divided: the dual of those of inputs (`synthesis.design.feedback_scale`).
-
-    With them the mid-range Kalman filter corrects scaled states by `HEAVY`. Without one, or where it leaves an output aside, the
-    noise counts.
-    """
+    """Sizes (ny,) by which outputs are divided: `correction_sizes` in the middle of the range."""
     middle = model.on(np.array([[p.middle for p in model.parameters]]).reshape(1, len(model.parameters)))
     A, C, E, F = (getattr(middle, key)[0] for key in "ACEF")
     sizes = _sizes(model, design)
-    found = regular_riccati(A, C, E * sizes, F * sizes)
-    gain = np.zeros(len(C)) if found is None else np.linalg.norm(found[1] * scale[:, None], axis=0)
-    noise = output_sizes(C / scale, F * sizes)
-    return np.asarray(np.where(gain > 0.0, HEAVY / np.where(gain > 0.0, gain, 1.0), noise))
+    return correction_sizes(A, C, E * sizes, F * sizes, scale)
 
 
 def error_unit(model: LpvModel, design: ObserverDesign, scale: FloatArray) -> float:

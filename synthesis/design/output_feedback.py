@@ -19,6 +19,7 @@ from estimators.display import Display
 from synthesis.design.asked import check_degree_and_poles, check_shares, minimised_channel
 from synthesis.design.feedback_channel import FeedbackChannel, check_feedback_channels
 from synthesis.design.generalised_plant import Frame, GeneralisedPlant, frame_of, generalised_plant, measured_rows
+from synthesis.design.halves import halves_of
 from synthesis.design.output_feedback_lmi import Still, Wanted, build
 from synthesis.design.reconstruct import reconstructed
 from synthesis.design.refusals import refuse_undetectable, refuse_unstabilisable
@@ -111,9 +112,9 @@ class OutputFeedback(Display):
         """
         place = self.model.scaled(points)
         given = generalised_plant(self.model, self.design.channels, self.design.measured)
-        found = reconstructed(given.scaled(self.frame), self.result, self.wanted, place, self.level)
+        found = reconstructed(halves_of(given, self.frame), self.result, self.wanted, place, self.level)
         Ak, Bk, Ck, Dk = found
-        T, u, y, clock = self.frame.states, self.frame.inputs[:, None], self.frame.outputs, self.frame.clock
+        T, u, y, clock = self.frame.filter, self.frame.inputs[:, None], self.frame.outputs, self.frame.clock
         back = np.linalg.inv(T) * clock
         Ak, Bk, Ck, Dk = back @ Ak @ T, back @ Bk / y, u * Ck @ T, u * Dk / y
         D = values(given.D, place) / values(given.denominator, place)
@@ -150,7 +151,7 @@ def design_output_feedback(model: LpvModel, design: OutputFeedbackDesign) -> Out
     refuse_undetectable(model, measured_rows(model, design.measured))
     plant = generalised_plant(model, design.channels, design.measured)
     feedthrough, frame = _feedthrough(model, design, plant), frame_of(plant)
-    scaled, tight = plant.scaled(frame), 1.0 + design.reserve
+    halves, tight = halves_of(plant, frame), 1.0 + design.reserve
     radius = None if design.fastest_pole is None else design.fastest_pole / tight / frame.clock
     settings = design.settings
     if settings.relaxation == "auto":  # unknowns that run away at the optimum end other solvers early
@@ -165,7 +166,7 @@ def design_output_feedback(model: LpvModel, design: OutputFeedbackDesign) -> Out
             bounds = {c: gamma if c.bound is None else c.bound for c in design.channels}
             levels = {c: None if bound is None else bound / frame.unit for c, bound in bounds.items()}
             return build(
-                scaled, model.parameters, wanted, levels, margin and gamma is not None, floor, model.half_spaces
+                halves, model.parameters, wanted, levels, margin and gamma is not None, floor, model.half_spaces
             )
 
         memory = starting_places(problem(None))

@@ -16,8 +16,9 @@ The off-diagonal term is the only place where Ak would need the rate. It vanishe
     decay          A_c + A_c' + dP/dt + 2 alpha P_c < 0
     fastest pole   [r P_c, A_c; A_c', r P_c] > 0                                           every frozen pole within a disc
 
-Ah enters the upper right block of one inequality only where nothing else is asked for: then it is eliminated (projection lemma:
-both diagonal parts, each with its own share of the rest, suffice) and worked out place by place from the others.
+The halves of Y and of X are written in coordinates of their own, with J for I (`synthesis.design.halves`). Ah enters the upper
+right block of one inequality only where nothing else is asked for: then it is eliminated (projection lemma: both diagonal parts,
+each with its own share of the rest, suffice) and worked out place by place from the others.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from typing import Literal
 import numpy as np
 
 from synthesis.design.feedback_channel import FeedbackChannel
-from synthesis.design.generalised_plant import ChannelPlant, GeneralisedPlant
+from synthesis.design.generalised_plant import ChannelPlant
+from synthesis.design.halves import Halves
 from synthesis.lmi.problem import LmiProblem
 from synthesis.models.param import SchedulingParameter
 from synthesis.polynomials.half_spaces import HalfSpaces
@@ -54,7 +56,7 @@ class Wanted:
 
 
 def build(
-    plant: GeneralisedPlant,
+    plant: Halves,
     parameters: tuple[SchedulingParameter, ...],
     wanted: Wanted,
     levels: dict[FeedbackChannel, float | None],
@@ -62,27 +64,32 @@ def build(
     floor: float = 0.0,
     half_spaces: HalfSpaces = (),
 ) -> LmiProblem:
-    """The problem in the plant's coordinates; a level of None is the unknown `gamma` that is minimised."""
+    """The problem in the coordinates of the halves; a level of None is the unknown `gamma` that is minimised."""
     problem = LmiProblem(parameters, maximise_margin, least_norm=floor > 0.0, floor=floor, half_spaces=half_spaces)
     loop = _Loop(problem, plant, wanted)
     problem.require("coupling", loop.coupling)
-    parts = [(part, _level(problem, levels[part.channel])) for part in plant.channels]
+    parts = [
+        ({"Y": first, "X": second}, _level(problem, levels[first.channel]))
+        for first, second in zip(plant.regulator.channels, plant.filter.channels, strict=True)
+    ]
     if wanted.eliminated(len(parts)):
         ((part, level),) = parts
         for half, word in (("Y", "regulator"), ("X", "filter")):
-            block = loop.gain(part, level, loop.rate(half), loop.input(part, half), loop.output(part, half).T)
-            problem.require(f"gain {part.channel.name}, {word}", -block)
+            block = loop.gain(part[half], level, loop.rate(half), loop.input(part, half), loop.output(part, half).T)
+            problem.require(f"gain {part[half].channel.name}, {word}", -block)
         return problem
     rate = symmetric_block([[loop.rate("Y"), loop.cross], [None, loop.rate("X")]])
     if wanted.decay:
-        problem.require("decay rate", -(rate + loop.coupling.scaled_by(loop.below) * (2.0 * wanted.decay)))
+        problem.require(
+            "decay rate", -(rate + loop.weighted(loop.coupling).scaled_by(loop.below) * (2.0 * wanted.decay))
+        )
     if wanted.radius is not None:
         disc = loop.coupling.scaled_by(loop.below) * wanted.radius
         problem.require("fastest pole", symmetric_block([[disc, loop.closed_loop()], [None, disc]]))
     for part, level in parts:
         inputs = over(loop.input(part, "Y"), loop.input(part, "X"))
         outputs = over(loop.output(part, "Y").T, loop.output(part, "X").T)
-        problem.require(f"gain {part.channel.name}", -loop.gain(part, level, rate, inputs, outputs))
+        problem.require(f"gain {part['X'].channel.name}", -loop.gain(part["X"], level, rate, inputs, outputs))
     return problem
 
 
@@ -94,66 +101,79 @@ def _level(problem: LmiProblem, level: float | None) -> MatrixPolynomial:
     return unknown
 
 
-class _Loop:
-    """The closed loop after the congruence, affine in the unknowns, over `below`.
+Pair = dict[str, ChannelPlant]  # a channel in the coordinates of both halves
 
-    That is the denominator of the plant, and its square where B Dh C is a product of two quotients.
+
+class _Loop:
+    """The closed loop after the congruence, affine in the unknowns, over `below`; rows of rates are weighted.
+
+    `below` is the denominator of the plant, and its square where B Dh C is a product of two quotients.
     """
 
-    def __init__(self, problem: LmiProblem, plant: GeneralisedPlant, wanted: Wanted) -> None:
+    def __init__(self, problem: LmiProblem, plant: Halves, wanted: Wanted) -> None:
         self.problem, self.clock = problem, wanted.clock
-        denominator = problem.scaled(plant.denominator)
+        self.A = {half: problem.scaled(plant.half(half).A) for half in "YX"}
+        self.B, self.C = problem.scaled(plant.regulator.B), problem.scaled(plant.filter.C)
+        denominator = problem.scaled(plant.filter.denominator)
         self.lift = denominator if wanted.feedthrough and any(denominator.degrees) else None
-        self.A, self.B, self.C = (problem.scaled(getattr(plant, key)) for key in ("A", "B", "C"))  # numerators
-        self.below = self._over(denominator)
-        n, m, k = self.A.shape[0], self.B.shape[1], self.C.shape[0]
-        degree = {"X": _degrees(problem, wanted, "X"), "Y": _degrees(problem, wanted, "Y")}
-        self.unknown = {name: problem.symmetric(name, n, degree[name]) for name in ("X", "Y")}
+        self.below, self.joint = self._over(denominator), problem.constant(plant.joint)
+        self.weights = {half: problem.constant(np.diag(plant.weights[half])) for half in "YX"}
+        self.lifts = {half: problem.constant(np.diag(1.0 / plant.weights[half])) for half in "YX"}
+        n, m, k = self.A["X"].shape[0], self.B.shape[1], self.C.shape[0]
+        degree = {half: _degrees(problem, wanted, half) for half in "YX"}
+        self.unknown = {half: problem.symmetric(half, n, degree[half]) for half in "XY"}
         self.Bh = problem.matrix("Bh", n, k, wanted.degree)
         self.Ch = problem.matrix("Ch", m, n, wanted.degree)
         self.Dh = problem.matrix("Dh", m, k, wanted.degree) if wanted.feedthrough else None
         # What stands in the upper right of A_c + A_c': Ah' and the known part that would only have to be cancelled.
-        self.cross = (
-            None if wanted.eliminated(len(plant.channels)) else self._over(problem.matrix("cross", n, n, wanted.degree))
-        )
+        free = not wanted.eliminated(len(plant.filter.channels))
+        self.cross = self._over(problem.matrix("cross", n, n, wanted.degree)) if free else None
 
     @property
     def coupling(self) -> MatrixPolynomial:
-        """[Y I; I X]."""
-        unit = self.problem.constant(np.eye(self.A.shape[0]))
-        return symmetric_block([[self.unknown["Y"], unit], [None, self.unknown["X"]]])
+        """[Y J; J' X]."""
+        return symmetric_block([[self.unknown["Y"], self.joint], [None, self.unknown["X"]]])
+
+    def weighted(self, whole: MatrixPolynomial) -> MatrixPolynomial:
+        """A matrix of both halves with its rows and columns weighted."""
+        n = self.joint.shape[0]
+        zero = self.problem.constant(np.zeros((n, n)))
+        both = over(across(self.weights["Y"], zero), across(zero, self.weights["X"]))
+        return both @ whole @ both
 
     def closed(self, half: str) -> MatrixPolynomial:
         """A Y + B Ch or X A + Bh C."""
         if half == "Y":
-            return self._over(self.A) @ self.unknown["Y"] + self._over(self.B) @ self.Ch
-        return self.unknown["X"] @ self._over(self.A) + self.Bh @ self._over(self.C)
+            return self._over(self.A["Y"]) @ self.unknown["Y"] + self._over(self.B) @ self.Ch
+        return self.unknown["X"] @ self._over(self.A["X"]) + self.Bh @ self._over(self.C)
 
     def rate(self, half: str) -> MatrixPolynomial:
         """One diagonal block of A_c + A_c' + dP/dt."""
         closed = self.closed(half)
         moved = self.problem.time_derivative(self.unknown[half]).scaled_by(self.below) * (1.0 / self.clock)
-        return closed + closed.T + (moved * -1.0 if half == "Y" else moved)
+        total = closed + closed.T + (moved * -1.0 if half == "Y" else moved)
+        return self.weights[half] @ total @ self.weights[half]
 
     def closed_loop(self) -> MatrixPolynomial:
         """A_c."""
         assert self.cross is not None
-        right = self._with_feedthrough(self.A, self.B, self.C)
-        return over(across(self.closed("Y"), right), across(self.cross.T - right.T, self.closed("X")))
+        right = self._with_feedthrough(self.A["Y"] @ self.joint, self.B, self.C)
+        cross = self.lifts["Y"] @ self.cross @ self.lifts["X"]
+        return over(across(self.closed("Y"), right), across(cross.T - right.T, self.closed("X")))
 
-    def input(self, part: ChannelPlant, half: str) -> MatrixPolynomial:
+    def input(self, part: Pair, half: str) -> MatrixPolynomial:
         """E + B Dh F or X E + Bh F."""
-        E, F = self.problem.scaled(part.E), self.problem.scaled(part.F)
+        E, F = self.problem.scaled(part[half].E), self.problem.scaled(part[half].F)
         if half == "Y":
-            return self._with_feedthrough(E, self.B, F)
-        return self.unknown["X"] @ self._over(E) + self.Bh @ self._over(F)
+            return self.weights[half] @ self._with_feedthrough(E, self.B, F)
+        return self.weights[half] @ (self.unknown["X"] @ self._over(E) + self.Bh @ self._over(F))
 
-    def output(self, part: ChannelPlant, half: str) -> MatrixPolynomial:
+    def output(self, part: Pair, half: str) -> MatrixPolynomial:
         """Cz Y + Dzu Ch or Cz + Dzu Dh C."""
-        Cz, Dzu = self.problem.scaled(part.Cz), self.problem.scaled(part.Dzu)
+        Cz, Dzu = self.problem.scaled(part[half].Cz), self.problem.scaled(part[half].Dzu)
         if half == "X":
-            return self._with_feedthrough(Cz, Dzu, self.C)
-        return self._over(Cz) @ self.unknown["Y"] + self._over(Dzu) @ self.Ch
+            return self._with_feedthrough(Cz, Dzu, self.C) @ self.weights[half]
+        return (self._over(Cz) @ self.unknown["Y"] + self._over(Dzu) @ self.Ch) @ self.weights[half]
 
     def gain(
         self, part: ChannelPlant, level: MatrixPolynomial, rate: MatrixPolynomial, inputs: MatrixPolynomial,

@@ -15,15 +15,19 @@ class Blocks:
     Of an output feedback one half knows nothing of the other's unknowns, and P > 0 nothing of gains: their zeros are not carried.
     """
 
-    def __init__(self, given: Sequence[FloatArray]) -> None:
+    def __init__(self, given: Sequence[FloatArray], margins: Sequence[float] = ()) -> None:
         groups: dict[tuple[int, bytes], list[FloatArray]] = {}
-        for block in given:
+        taken: dict[tuple[int, bytes], list[FloatArray]] = {}
+        for block, margin in zip(given, margins or (0.0,) * len(given), strict=True):
             used = np.abs(block[..., 1:]).max(axis=(0, 1, 2), initial=0.0) > 0.0
-            groups.setdefault((block.shape[1], used.tobytes()), []).append(block)
+            key = block.shape[1], used.tobytes()
+            groups.setdefault(key, []).append(block)
+            taken.setdefault(key, []).append(np.full(len(block), margin))
         ordered = sorted(groups.items(), key=lambda entry: entry[0][0])  # stable: one order for one set of blocks
         self.count = given[0].shape[-1] - 1
         self.columns = [np.flatnonzero(np.frombuffer(used, bool)) for (_, used), _ in ordered]
         stacked = [np.concatenate(blocks) for _, blocks in ordered]
+        self.margins = [np.concatenate(taken[key]) for key, _ in ordered]
         self.fixed = [np.ascontiguousarray(block[..., 0]) for block in stacked]
         self.free = [np.ascontiguousarray(b[..., 1 + c]) for b, c in zip(stacked, self.columns, strict=True)]
         self.triangles = [triangle_by_rows(size) for (size, _), _ in ordered]
@@ -43,6 +47,11 @@ class Blocks:
     def inner(self, Y: Sequence[FloatArray]) -> float:
         """<F_0, Y>."""
         return float(sum(np.vdot(fixed, part) for fixed, part in zip(self.fixed, Y, strict=True)))
+
+    def without_margins(self, Y: Sequence[FloatArray]) -> float:
+        """<F_0, Y> of the inequalities before their `margins` were taken off: what dual bounds are about."""
+        back = (np.einsum("gii,g->", part, margin) for part, margin in zip(Y, self.margins, strict=True))
+        return self.inner(Y) + float(sum(back))
 
     def flat(self, matrices: Sequence[FloatArray]) -> list[FloatArray]:
         """Scaled triangles, one vector for each group."""

@@ -129,7 +129,8 @@ def solve_sampled(relaxed: RelaxedProblem, settings: LmiSettings, tolerance: flo
         values[..., 0] -= part.margin * np.eye(values.shape[1])
         blocks.append(values)
     tolerance = max(settings.tolerance, tolerance)
-    found = solve_with_interior(blocks, relaxed.cost, relaxed.weights, tolerance, settings.max_iterations)
+    margins = [part.margin for part in relaxed.sampled]
+    found = solve_with_interior(blocks, relaxed.cost, relaxed.weights, tolerance, settings.max_iterations, margins)
     if not found.infeasible:
         return found
     other = solve_with_clarabel(assemble(relaxed), len(relaxed.cost), settings)  # which polishes its evidence

@@ -54,20 +54,27 @@ class Found:
 
 
 def solve_with_interior(
-    given: Sequence[FloatArray], cost: FloatArray, weights: FloatArray, tolerance: float, limit: int = 100
+    given: Sequence[FloatArray],
+    cost: FloatArray,
+    weights: FloatArray,
+    tolerance: float,
+    limit: int = 100,
+    margins: Sequence[float] = (),
 ) -> RawAnswer:
-    """Solve; `given` holds arrays (g, k, k, 1+N), margins taken off."""
+    """Solve; `given` holds arrays (g, k, k, 1+N) with their margins taken off. Bounds and evidence are those without margins."""
     began = perf_counter()
-    blocks = Blocks(given)
+    blocks = Blocks(given, margins)
     found = _run(blocks, cost, weights, tolerance, limit)
     excluded, iterations = 0.0, found.iterations
     if found.status == "Stalled" and not _strict(blocks, found.point.x):
-        excluded, more = _lift(given, limit)
+        excluded, more = _lift(given, margins, limit)
         iterations += more
     bound = -np.inf
     if not weights.any() and not excluded:
         rest = cost - blocks.adjoint(found.point.Y)
-        bound = -blocks.inner(found.point.Y) - float(10.0 * np.abs(rest) @ np.maximum(np.abs(found.point.x), 1e-3))
+        bound = -blocks.without_margins(found.point.Y) - float(
+            10.0 * np.abs(rest) @ np.maximum(np.abs(found.point.x), 1e-3)
+        )
     status = "PrimalInfeasible" if excluded else found.status
     seconds = perf_counter() - began
     return RawAnswer("interior", found.point.x, status, excluded > 0.0, excluded, iterations, seconds, bound)
@@ -80,7 +87,7 @@ def _strict(blocks: Blocks, x: FloatArray) -> bool:
     )
 
 
-def _lift(given: Sequence[FloatArray], limit: int) -> tuple[float, int]:
+def _lift(given: Sequence[FloatArray], margins: Sequence[float], limit: int) -> tuple[float, int]:
     """The 1-norm below which no decisions satisfy the inequalities, and the steps that it took to find out.
 
     The least s with F(x) + s I >= 0 is sought. Its multipliers have <F_i, Y> near zero, so that a feasible x would give
@@ -96,9 +103,10 @@ def _lift(given: Sequence[FloatArray], limit: int) -> tuple[float, int]:
     cost = np.zeros(count + 1)
     cost[-1] = 1.0
     found = _run(Blocks([*lifted, floor]), cost, np.zeros(count + 1), LIFTED, limit)
-    blocks = Blocks([*given, np.zeros((1, 1, 1, count + 1))])  # the floor of s takes no part
+    taken = [*(margins or (0.0,) * len(given)), 0.0]
+    blocks = Blocks([*given, np.zeros((1, 1, 1, count + 1))], taken)  # the floor of s takes no part
     Y = found.point.Y
-    gap, rest = -blocks.inner(Y), float(np.abs(blocks.adjoint(Y)).max())
+    gap, rest = -blocks.without_margins(Y), float(np.abs(blocks.adjoint(Y)).max())
     return (gap / max(rest, np.finfo(float).tiny) if gap > 0.0 else 0.0), found.iterations
 
 

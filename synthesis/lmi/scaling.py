@@ -61,6 +61,17 @@ def output_sizes(C: FloatArray, F: FloatArray) -> FloatArray:
     return np.asarray(np.where(sizes > 0.0, sizes, 1.0))
 
 
+def correction_sizes(A: FloatArray, C: FloatArray, E: FloatArray, F: FloatArray, scale: FloatArray) -> FloatArray:
+    """Sizes (ny,) of outputs: the dual of those of inputs (`synthesis.design.feedback_scale`).
+
+    With them the Kalman filter corrects the states diag(scale) x by `HEAVY`. Without one, or where it leaves an output aside, the
+    noise counts.
+    """
+    found = regular_riccati(A, C, E, F)
+    gain = np.zeros(len(C)) if found is None else np.linalg.norm(found[1] * scale[:, None], axis=0)
+    return np.asarray(np.where(gain > 0.0, HEAVY / np.where(gain > 0.0, gain, 1.0), output_sizes(C / scale, F)))
+
+
 def error_scale(A: FloatArray) -> FloatArray:
     """Diagonal balancing of one matrix: rows and columns of the mid-range error matrix get equal norms.
 
