@@ -6,6 +6,7 @@ import copy
 import json
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from estimators import GainSchedule, LpvController, ScheduleError
 from estimators.arrays import FloatArray
 from synthesis.certificate.proof import certificate
 from synthesis.certificate.search import Search, Wish
-from synthesis.design.deploy import deploy
+from synthesis.design.deploy import deploy, lyapunov_degrees
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.export import export, schedule_content
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_names
@@ -142,6 +143,14 @@ def contents() -> dict[str, dict[str, Any]]:
     laws = {"sampled": sampled(moving), "output": output(jumping), "static": static(jumping)}
     settings = DeploySettings(sample_time=PERIOD)
     return {name: schedule_content(deploy(law, settings), f"rational-{name}") for name, law in laws.items()}
+
+
+def test_degrees_of_P_that_are_tried() -> None:
+    """Of a rational plant that of the gains and one more; none in a parameter that may jump; of a polynomial one its own alone."""
+    asked: Any = SimpleNamespace(design=SimpleNamespace(degree=1), rational=2)
+    polynomial, rational = twins(rate=0.5)
+    assert lyapunov_degrees(rational, asked) == [(1,), (2,)] and lyapunov_degrees(polynomial, asked) == [(3,)]
+    assert lyapunov_degrees(twins()[1], asked) == [(0,)]
 
 
 @pytest.mark.parametrize("name", LAWS)
