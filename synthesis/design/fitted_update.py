@@ -64,7 +64,8 @@ def _fitted(model: LpvModel, update: Callable[[NumericModel], FloatArray]) -> Fl
     wanted = OF_RATIONAL if power_below(model) else FIT
     while True:
         lines = [np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1)) for degree in degrees]
-        points = np.array(list(product(*lines))).reshape(-1, count)
+        nodes = list(product(*lines))  # one empty node without parameters
+        points = np.array(nodes).reshape(len(nodes), count)
         found = update(model.on(middle + half * points))
         series = found.reshape(*(degree + 1 for degree in degrees), *found.shape[1:])
         for axis, line in enumerate(lines):

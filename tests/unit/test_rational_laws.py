@@ -6,6 +6,7 @@ import copy
 import json
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,14 +19,18 @@ from estimators import GainSchedule, LpvController, ScheduleError
 from estimators.arrays import FloatArray
 from synthesis.certificate.proof import certificate
 from synthesis.certificate.search import Search, Wish
-from synthesis.design.deploy import deploy
+from synthesis.design.deploy import deploy, lyapunov_degrees
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.export import export, schedule_content
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_names
+from synthesis.design.feedback_scale import FeedbackScale
+from synthesis.design.fitted_update import fitted_update
 from synthesis.design.generalised_plant import generalised_plant
+from synthesis.design.hinf_observer import Channel, ObserverDesign
 from synthesis.design.law_table import FeedbackLaw
 from synthesis.design.output_feedback import OutputFeedbackDesign, design_output_feedback
-from synthesis.design.sampled_state_feedback import design_sampled_state_feedback
+from synthesis.design.sampled_observer import design_sampled_observer
+from synthesis.design.sampled_state_feedback import _problem, design_sampled_state_feedback
 from synthesis.design.state_feedback import StateFeedbackDesign
 from synthesis.design.static_feedback import design_static_feedback
 from synthesis.design.static_feedback_design import StaticFeedbackDesign
@@ -43,12 +48,11 @@ from tests.support.lmi_cases import parameter, small_model
 
 PERIOD = 0.02
 NOISY = FeedbackChannel(("d1", "d2", "d3"), ("x1", "y2", "u1"))
-FORCE = FeedbackChannel(("d1",), ("x1", "y2", "u1"))
 PLACES = np.linspace(0.25, 1.0, 5)
 
 
 def sampled(model: LpvModel, degree: int = 0) -> FeedbackLaw:
-    return design_sampled_state_feedback(model, StateFeedbackDesign((FORCE,), degree, decay_rate=0.2), PERIOD)
+    return design_sampled_state_feedback(model, StateFeedbackDesign((NOISY,), degree, decay_rate=0.2), PERIOD)
 
 
 def output(model: LpvModel, degree: int = 1, feedthrough: bool | None = None) -> FeedbackLaw:
@@ -94,6 +98,40 @@ def test_the_same_plant_in_another_parameter_has_the_same_gamma(name: str) -> No
     assert gammas[1] == pytest.approx(gammas[0], rel=5e-3)
     channel = found[1].design.channels[0]
     assert 0.7 * gammas[1] < max(peak(found[1], channel, p) for p in PLACES) <= gammas[1]
+
+
+def test_the_inequality_of_a_sampled_law_is_over_the_cube_of_the_denominator() -> None:
+    """For any Q, G and Y, against the update by a matrix exponential, at places with rates; no scaling."""
+    model, rng = twins(rate=0.5)[1], np.random.default_rng(6)
+    scale = FeedbackScale(np.ones(2), np.ones(1), disturbance=1.0, clock=1.0)
+    fitted = fitted_update(model, scale.states, PERIOD)
+    problem = _problem(model, StateFeedbackDesign((NOISY,)), scale, PERIOD, fitted, 1.7, False, 0.0)
+    decisions = rng.normal(size=problem.decisions)
+    Q, G, Y = (problem.unknowns[key].substitute(decisions) for key in "QGY")
+    for u, r in rng.uniform(-1.0, 1.0, (4, 2)):
+        place, at = np.array([[u, r]]), model.on(np.array([0.625 + 0.375 * u]))
+        A, B, C, E, F = (getattr(at, key)[0] for key in "ABCEF")
+        whole = expm(PERIOD * np.block([[A, B, E], [np.zeros((4, 6))]]))
+        q, g, y = (m.at(place)[0, ..., 0] for m in (Q, G, Y))
+        later = Q.at(place + np.array([PERIOD * 0.5 * r / 0.375, 0.0]))[0, ..., 0]
+        closed, slack = whole[:2, :2] @ g + whole[:2, 2:3] @ y, g + g.T - q
+        seen, through = np.vstack([g[:1], C[1:] @ g, y]), np.vstack([np.zeros((1, 3)), F[1:], np.zeros((1, 3))])
+        wanted = np.block([
+            [later, closed, whole[:2, 3:], np.zeros((2, 3))], [closed.T, slack, np.zeros((2, 3)), seen.T],
+            [whole[:2, 3:].T, np.zeros((3, 2)), np.eye(3), through.T],
+            [np.zeros((3, 2)), seen, through, 1.7**2 * np.eye(3)],
+        ])  # fmt: skip
+        found = problem.inequalities[-1].matrix.substitute(decisions).at(place)[0, ..., 0]
+        below = float(values(model.polynomial.denominator, place[:, :1])[0, 0, 0])
+        np.testing.assert_allclose(found / below**3, wanted, atol=1e-5)
+
+
+def test_a_sampled_observer_of_the_twins_has_the_same_gamma() -> None:
+    found = [
+        design_sampled_observer(model, ObserverDesign((Channel(("d1", "d2", "d3"), ("x2",)),), degree=0), PERIOD).gamma
+        for model in twins()
+    ]
+    assert found[1] == pytest.approx(found[0], rel=2e-3)
 
 
 def test_a_feedthrough_is_worth_something_and_is_used() -> None:
@@ -142,6 +180,14 @@ def contents() -> dict[str, dict[str, Any]]:
     laws = {"sampled": sampled(moving), "output": output(jumping), "static": static(jumping)}
     settings = DeploySettings(sample_time=PERIOD)
     return {name: schedule_content(deploy(law, settings), f"rational-{name}") for name, law in laws.items()}
+
+
+def test_degrees_of_P_that_are_tried() -> None:
+    """Of a rational plant that of the gains and one more, of a polynomial one its own alone; none where a parameter may jump."""
+    asked: Any = SimpleNamespace(design=SimpleNamespace(degree=1), rational=2)
+    polynomial, rational = twins(rate=0.5)
+    assert lyapunov_degrees(rational, asked) == [(1,), (2,)] and lyapunov_degrees(polynomial, asked) == [(3,)]
+    assert lyapunov_degrees(twins()[1], asked) == [(0,)]
 
 
 @pytest.mark.parametrize("name", LAWS)
