@@ -2,7 +2,7 @@
 
 The gain of a cell that the border cuts is interpolated from all its corners; those outside get the gains of the design there,
 beyond the set that they were designed for, so that the gains inside stay what they are. Breakpoints of no such cell are used by
-no claim; they get gains of the border, so that a runtime that was told to go on outside finds some that are finite and near.
+no claim; they get gains of the border, so that a runtime that goes on outside finds some that are finite and near.
 """
 
 from __future__ import annotations
