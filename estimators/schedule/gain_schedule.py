@@ -108,8 +108,7 @@ class GainSchedule(Display):
         ]
         return (
             f"GainSchedule '{self.name}'",
-            f"scheduling: {'; '.join(scheduling) or 'none'}",
-            *([] if self.constraints is None else [f"constraints: {', '.join(self.constraints.words)}"]),
+            f"scheduling: {'; '.join([*scheduling, *(self.constraints.words if self.constraints else ())]) or 'none'}",
             f"gains: {'; '.join(gains)}",
             f"update: {self.update}, every {1e3 * self.sample_time:g} ms",
             f"sha256: {self.sha256[:16]}",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from flint import fmpq
 
+from estimators.display import Display
 from estimators.errors import unknown
 from estimators.schedule.constraints import MOST, constraint_words
 from synthesis.errors import ModelError
@@ -19,8 +20,8 @@ TOUCH, ROUNDED = fmpq(1, 2**40), fmpq(1, 2**47)
 """So far beyond an inequality is still proved, in parts of the range and of its terms: a runtime tests it in float64."""
 
 
-@dataclass(frozen=True)
-class ParameterConstraint:
+@dataclass(frozen=True, repr=False)
+class ParameterConstraint(Display):
     """sum of coefficients[name] * name <= maximum, the parameters in their units, the sum and `maximum` in `unit`.
 
     >>> ParameterConstraint({"load": 1.0, "speed": 2.0}, 3.0).words

@@ -101,8 +101,7 @@ class LpvModel(Display):
             f"{counted(len(self.states), 'state')}: {listed(self.states)}",
             f"inputs; outputs: {listed(self.inputs)}; {listed(self.outputs)}",
             f"disturbances: {listed(self.disturbances)}",
-            f"{counted(len(moving), 'parameter')}: {', '.join(moving) or 'none'}",
-            *([f"constraints: {', '.join(c.words for c in self.constraints)}"] if self.constraints else ()),
+            f"{counted(len(moving), 'parameter')}: {', '.join([*moving, *(c.words for c in self.constraints)]) or 'none'}",
         )
 
     def _check_names(self) -> None:
