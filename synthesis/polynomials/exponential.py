@@ -21,6 +21,7 @@ TERMS = 16  # of the series at |X| <= 1/2: remainder 2e-20
 ORDER = 8  # largest total degree in t that is kept
 SHORT = 2.0**-36  # share of the highest terms that is given away for shorter polynomials; halving a region wins it back
 SMALL = 2.0**-6  # row sum that is small enough
+ROUNDED = 2.0**-16  # of the largest entry: what is smaller counts as so large in balancing
 LARGEST = 50.0  # row sum of M beyond which nothing useful can come out (e^50)
 
 
@@ -74,9 +75,10 @@ def balance_of(size: FloatArray) -> list[fmpq]:
     """The same from bounds of the absolute values (n, n)."""
     n, size = len(size), np.array(size)
     # Opposite a zero any size can be had (A = [[a, 1e6], [0, b]]): as if there stood what makes it that of the diagonal.
+    # Opposite one that is only nearly zero, by rounding, weights would run away otherwise.
     diagonal, largest = max(float(np.diag(size).max(initial=0.0)), SMALL), float(size.max(initial=0.0))
-    if diagonal < largest < np.inf:
-        size = np.maximum(size, diagonal * (diagonal / largest))
+    if largest < np.inf:
+        size = np.maximum(size, diagonal * (diagonal / largest) if diagonal < largest else ROUNDED * largest)
     np.fill_diagonal(size, 0.0)
     exponents = np.zeros(n, dtype=int)
     for _ in range(8):

@@ -146,3 +146,15 @@ def test_a_number_that_is_a_ball_is_enclosed() -> None:
     ball = arb_mat([[1]])[0, 0] / 3
     found = constants(np.eye(1), 1, 8) * ball
     assert abs(rational(found.middle[0, 0, 0, 0]) - fmpq(1, 3)) <= rational(found.radius[0, 0, 0])
+
+
+@pytest.mark.parametrize("rounding", [0.0, 1e-250])
+def test_a_triangular_matrix_is_enclosed_as_closely_as_another(rounding: float) -> None:
+    """Opposite an entry that is zero but for rounding: e^A of [[0.5, 1], [0, -1]], whose (1, 0) is not even a zero in balls."""
+    A = np.array([[[0.5, 1.0], [0.0, -1.0]]])
+    matrix = Boxes(A[:, None], np.array([[[0.0, 0.0], [rounding, 0.0]]]), 1, 0)
+    integral = box_exponential.phi(matrix)
+    assert integral is not None
+    found = box_exponential.exponential(matrix, integral)
+    assert np.abs(found.middle[0, 0] - expm(A[0])).max() < 1e-14
+    assert found.radius.max() < 2e-13
