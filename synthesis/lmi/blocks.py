@@ -19,29 +19,34 @@ class Blocks:
         groups: dict[tuple[int, bytes], list[FloatArray]] = {}
         taken: dict[tuple[int, bytes], list[FloatArray]] = {}
         for block, margin in zip(given, margins or (0.0,) * len(given), strict=True):
-            used = np.abs(block[..., 1:]).max(axis=(0, 1, 2), initial=0.0) > 0.0
+            used = block[..., 1:].any(axis=(0, 1, 2))
             key = block.shape[1], used.tobytes()
             groups.setdefault(key, []).append(block)
             taken.setdefault(key, []).append(np.full(len(block), margin))
         ordered = sorted(groups.items(), key=lambda entry: entry[0][0])  # stable: one order for one set of blocks
         self.count = given[0].shape[-1] - 1
-        self.columns = [np.flatnonzero(np.frombuffer(used, bool)) for (_, used), _ in ordered]
+        chosen = [np.flatnonzero(np.frombuffer(used, bool)) for (_, used), _ in ordered]
+        # A slice where all are used: no copy is made of what is large.
+        self.columns = [slice(None) if len(c) == self.count else c for c in chosen]
         stacked = [np.concatenate(blocks) for _, blocks in ordered]
         self.margins = [np.concatenate(taken[key]) for key, _ in ordered]
         self.fixed = [np.ascontiguousarray(block[..., 0]) for block in stacked]
-        self.free = [np.ascontiguousarray(b[..., 1 + c]) for b, c in zip(stacked, self.columns, strict=True)]
+        self.free = [np.ascontiguousarray(b[..., 1:][..., c]) for b, c in zip(stacked, self.columns, strict=True)]
         self.triangles = [triangle_by_rows(size) for (size, _), _ in ordered]
         self.order = sum(part.shape[0] * part.shape[1] for part in self.fixed)
 
     def linear(self, x: FloatArray) -> list[FloatArray]:
         """sum_i x_i F_i."""
-        return [free @ x[columns] for free, columns in zip(self.free, self.columns, strict=True)]
+        return [
+            (free.reshape(fixed.size, free.shape[-1]) @ x[columns]).reshape(fixed.shape)
+            for fixed, free, columns in zip(self.fixed, self.free, self.columns, strict=True)
+        ]
 
     def adjoint(self, Y: Sequence[FloatArray]) -> FloatArray:
         """<F_i, Y> summed over the blocks."""
         total = np.zeros(self.count)
         for free, columns, part in zip(self.free, self.columns, Y, strict=True):
-            total[columns] += free.reshape(part.size, len(columns)).T @ part.reshape(-1)
+            total[columns] += free.reshape(part.size, free.shape[-1]).T @ part.reshape(-1)
         return total
 
     def inner(self, Y: Sequence[FloatArray]) -> float:
@@ -79,7 +84,8 @@ class Blocks:
         """Inner products of all pairs of columns (N, N)."""
         total = np.zeros((self.count, self.count))
         for part, columns in zip(turned, self.columns, strict=True):
-            total[np.ix_(columns, columns)] += part.T @ part
+            here = columns if isinstance(columns, slice) else np.ix_(columns, columns)
+            total[here] += part.T @ part
         return total
 
     def against(self, turned: Sequence[FloatArray], matrices: Sequence[FloatArray]) -> FloatArray:
