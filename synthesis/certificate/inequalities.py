@@ -38,6 +38,8 @@ from typing import Any, Protocol
 from synthesis.certificate.poles import CONTINUOUS, DISCRETE, pole_inequality
 from synthesis.loop.system import System
 
+POSITIVE = "P > 0"
+
 
 class Arithmetic(Protocol):
     """What differs between balls and unknowns beside the operators of the ring."""
@@ -71,7 +73,7 @@ def inequalities(
     question: Question, system: System, P: Any, later: Any, arithmetic: Arithmetic
 ) -> list[tuple[str, Any]]:
     """Named symmetric matrices that must be positive definite; `later` is dP/dt (continuous) or P+ (discrete)."""
-    named = [("P > 0", P)]
+    named = [(POSITIVE, P)]
     if system.time == "continuous":
         return named + _continuous(question, system, P, later, arithmetic)
     return named + _discrete(question, system, P, later, arithmetic)

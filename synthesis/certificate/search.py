@@ -16,7 +16,7 @@ import numpy as np
 from estimators.arrays import FloatArray
 from synthesis.certificate.claims import ERROR_EQUATION, GAINS, WITH_CHANNEL, Claim, ClaimChannel, rows_of
 from synthesis.certificate.families import below_one, rate_places
-from synthesis.certificate.inequalities import Question, inequalities
+from synthesis.certificate.inequalities import POSITIVE, Question, inequalities
 from synthesis.certificate.rounding import LYAPUNOV_DIGITS, rounded_lyapunov
 from synthesis.certificate.sampled_loop import SampledLoop
 from synthesis.certificate.unknowns import in_scaled_states
@@ -179,12 +179,14 @@ class Search:
 
         last: dict[bool, tuple[tuple[bytes, bytes], dict[str, FloatArray]]] = {}
 
-        def named(chosen: FloatArray, decisions: FloatArray | None = None) -> dict[str, FloatArray]:
-            """All inequalities there: the families ask for them one by one."""
+        def named(chosen: FloatArray, decisions: FloatArray | None, name: str = "") -> dict[str, FloatArray]:
+            """All inequalities there: the families ask for them one by one. P itself needs nothing of the loop."""
             key = chosen.tobytes(), b"" if decisions is None else decisions.tobytes()
             if (decisions is not None) in last and last[decisions is not None][0] == key:
                 return last[decisions is not None][1]
             here = [m if decisions is None else m.substitute(decisions) for m in (P, later)]
+            if name == POSITIVE:
+                return {name: here[0].at(chosen)}
             now, then = (Samples(m.at(chosen)) for m in here)
             found = inequalities(question, sampled.at(chosen[:, :count]), now, then, Sampling())
             out = {name: np.broadcast_to(m.values, (len(chosen), *m.values.shape[1:])) for name, m in found}
@@ -195,7 +197,7 @@ class Search:
 
         def family(name: str) -> Family:
             def rows(chosen: FloatArray) -> FloatArray:
-                values = named(chosen)[name]
+                values = named(chosen, None, name)[name]
                 values = np.pad(values, [*[(0, 0)] * 3, (0, problem.decisions + 1 - values.shape[-1])])
                 values = 0.5 * (values + np.swapaxes(values, 1, 2))
                 if margin is not None:
@@ -203,14 +205,14 @@ class Search:
                 return values
 
             def known(decisions: FloatArray, chosen: FloatArray) -> FloatArray:
-                values = named(chosen, decisions)[name]
+                values = named(chosen, decisions, name)[name]
                 values = values[..., 0] + values[..., 1:] @ decisions[: values.shape[-1] - 1]
                 values = 0.5 * (values + np.swapaxes(values, 1, 2))
                 return values if margin is None else values - decisions[margin] * np.eye(values.shape[1])
 
             return Family(name, places, rows, known, corners(places, count))
 
-        families = [family(name) for name in named(places[:1])]
+        families = [family(name) for name in named(places[:1], None)]
         if wish.level is not None and wish.channel is None:
             families.append(below_one(P, places, count))
         recall(families, self._memory.get(wish.kind, {}))
