@@ -75,7 +75,7 @@ from flint import fmpq_mat
 from gainsmith import load_model
 from studies.spec import shipped_examples
 from synthesis.certificate.levels import feedback_claims
-from synthesis.certificate.search import Search
+from synthesis.certificate.search import Search, Wish
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_names
 from synthesis.loop.feedback import FeedbackLoop
 from synthesis.loop.from_model import plant_of
@@ -92,7 +92,9 @@ points = [round(0.05125 * k, 5) for k in range(9)]
 less = [1.0 / (1.0 + x / value["doubling_pitch"]) for x in points]
 table = {(k,): fmpq_mat([[decimal(round(g * x, 9)) for g in (0.01882681, 0.008068634)]]) for k, x in enumerate(less)}
 loop = FeedbackLoop(plant_of(pitched), (tuple(decimal(x) for x in points),), table, "outputs", sample_time=decimal(T))
-for claim in feedback_claims(Search(loop, feedback_names(pitched), pitched.parameters), [channel.claim], settle=0.005):
+for claim in feedback_claims(
+    Search(loop, feedback_names(pitched), pitched.parameters), [Wish("gain", None, channel.claim)], settle=0.005
+):
     print(f"published PI: {claim.kind} {claim.level:.4g}")
 
 # %% [markdown]
