@@ -25,6 +25,7 @@ from estimators.velocity.zero_velocity import ZeroVelocityDetector
 _MISSING_INPUT, _RESET, _GATED = int(Flag.MISSING_INPUT), int(Flag.RESET), int(Flag.GATED)
 _FASTEST = 200.0  # m/s: an estimate beyond it is lost
 _FORGET = 0.05  # s after which parameters forget; they remember for 5 s at least, the slopes of the road at 40 m/s
+_SLIDES = 0.3  # sideslip, rad: deviation of a car whose V_x was lost
 _WIDEST = 50.0  # m/s of standard deviation: a wider one says no more, and is kept from growing
 
 
@@ -161,7 +162,9 @@ class VelocityFusion(Memory):
         usable = kit.stacked((rolling[0] & steered, rolling[1]))
         fl, fr, rl, rr = seen.steer
         angles = kit.stacked((0.5 * (fl + fr), 0.5 * (rl + rr)))
-        axle = across.correct(dt, felt, r, yaw_acceleration, angles, along.speed, a + road[0], usable, doubt[1])
+        axle = across.correct(
+            dt, felt, r, yaw_acceleration, angles, along.speed, a + road[0], usable, rolling, doubt[1]
+        )
         self.signal_monitor.learn(dt, seen, wheel.innovation, along.speed, axle, rolling)
         restarted = self.lateral_reset(dt, along.speed, axle, usable)
         across.blind(dt, unknown)
@@ -214,8 +217,10 @@ class VelocityFusion(Memory):
         blind = self.new & kit.no(asked | fresh)
         unsure = choose(blind, 30.0, 0.1 + 0.03 * abs(first))  # without any wheel: any speed of a road
         self.longitudinal_filter.renew(self.new, first, unsure * unsure)
-        beside = choose(abs(self.start[1]) < math.inf, self.start[1], 0.0)
-        unsure = 0.05 + 0.02 * abs(first)
+        given = abs(self.start[1]) < math.inf
+        beside = choose(given, self.start[1], 0.0)
+        # a car that was lost may slide
+        unsure = choose(self.renewed & kit.no(given), _SLIDES, 0.02) * abs(first) + 0.05
         self.lateral_filter.renew(self.new, beside, unsure * unsure)
         self.zero_velocity.begin(self.new, asked & (abs(first) + abs(beside) > self.settings.dead_speed))
         self.new = blind

@@ -8,12 +8,16 @@ A single-track car whose side slip follows its forces, with stiffnesses that ada
 friction coefficient enters. alpha is positive where F_y is (P4, P5), the opposite of P1. The accelerometer feels forces
 alone, so mu needs no bank.
 
-Every axle on one road: where one is further off than its model explains, neither is believed more than that, for a second
-(`axle_error`); an axle without side force is, and leads V_y back, for it does not slip sideways on any road.
+Every axle on one road: where one is further off than its model explains, or the two differ, which no V_y explains, neither is
+believed more than that (half the difference), for a second (`axle_error`), even where the steering is not believed. Such an
+error lasts as long as the turn, and no number of samples averages it away: each counts with the density of one of
+`lost_time`, where toe and linkage change with every stroke of the steering (`side_error_memory`). Without side force an axle
+is believed, and leads V_y back, for it does not slip sideways on any road.
 
 Two scale errors decide how far the kinematics may be believed in a turn, where a and r V_x are large and cancel: s is that
 of a, sensor and leftover body roll; s_t is that of the product r V_x, of the yaw rate sensor and of the speed, whose error
-is that of the radii. Only the sensor's share of s_t is taken off the yaw rate.
+is that of the radii. Only the sensor's share of s_t is taken off the yaw rate. Attitude follows the estimated speeds, and
+what it leaves in a wanders with their errors: b, s and s_t forget within `levelling_memory`, the gyro's b_r does not.
 """
 
 from __future__ import annotations
@@ -50,7 +54,7 @@ class AxleUpdate(NamedTuple):
 class LateralFusion(CarsMemory):
     """V_y filter of `count` cars."""
 
-    memory = ("axle_error", "bend")
+    memory = ("axle_error", "bend", "apart")
 
     def __init__(self, vehicle: VehicleParameters, settings: FusionSettings, every: int, count: int) -> None:
         s = self.settings = settings
@@ -60,11 +64,13 @@ class LateralFusion(CarsMemory):
         tires = [s.side_compliance_spread, s.side_cubic_spread] * 2
         scale, turn_scale = s.scale**2 + s.body_roll**2, s.scale**2 + s.radius_common**2
         body = [1.0, s.acceleration_bias**2, s.yaw_rate_bias**2, scale, turn_scale, (GRAVITY * s.bank) ** 2]
-        rates[BIAS:BANK], rates[TIRES:] = 1.0 / s.sensor_memory, 1.0 / s.side_memory
+        rates[[BIAS, SCALE, TURN_SCALE]] = 1.0 / s.levelling_memory
+        rates[YAW_BIAS], rates[TIRES:] = 1.0 / s.sensor_memory, 1.0 / s.side_memory
         spread = np.diag([*body, *np.square(tires)])
         self.filter = speed_filter(mean, spread, rates, (BANK, 1.0 / s.road_length), SIZE, every, count)
         self.axle_error: Number = self.kit.full(0.0)  # m/s by which axles have been off of late
         self.bend: Signals = self.kit.stacked([self.kit.full(0.0)] * 2)  # side slip per F_y/F_z beyond c_1, rad
+        self.apart: Number = self.kit.full(0.0)  # m/s between what the axles say of V_y, low-passed
         self._both = self.kit.signals((1.0, 1.0))
         self._sensor = s.scale**2 / turn_scale  # share of the yaw rate sensor in s_t
         m, L, inertia = vehicle.mass, vehicle.wheelbase, vehicle.yaw_inertia
@@ -136,21 +142,22 @@ class LateralFusion(CarsMemory):
         speed: Number,
         acceleration: Number,
         usable: Signals,
+        rolling: Signals,
         doubt: Number,
     ) -> AxleUpdate:
-        """`steer` of the axles, rad; `acceleration` a_x, for the loads; `usable`: the tires of the axle do not slip.
+        """`steer` of the axles, rad; `acceleration` a_x, for the loads; `rolling`: the tires of the axle do not slip.
 
-        `doubt`: m/s^2 by which an a_y that is not the sensor's may be off.
+        `usable`: and its steering is believed. `doubt`: m/s^2 by which an a_y that is not the sensor's may be off.
         """
         s, x, kit = self.settings, self.filter.mean, self.kit
         largest, smallest = kit.maximum, kit.minimum
         magnitude, turn, left = abs(speed), self.yaw_rate(yaw_rate), x[SPEED]
         own = measured * (1.0 - x[SCALE]) - x[BIAS]
-        held = largest(1.0, 2.0 * s.side_error_memory / elapsed)
+        held, lasting = (largest(1.0, 2.0 * time / elapsed) for time in (s.side_error_memory, s.lost_time))
         sensed, one, gate = self._sensor * yaw_rate, kit.full(1.0), s.gate**2
         kept, sure = kit.exp(-elapsed / s.lost_time), s.unloaded - s.gate * doubt / GRAVITY
         slid = self.axle_error > s.dead_speed
-        axle_error, rolling = self.axle_error * self.axle_error, largest(magnitude, 1.0)
+        axle_error, at_least = self.axle_error * self.axle_error, largest(magnitude, 1.0)
 
         def predicted(
             angle: Number,
@@ -175,12 +182,18 @@ class LateralFusion(CarsMemory):
             values = (one, steep, -arm * one, steep * measured, -arm * sensed, linear, linear * square)
             unknown = steep * doubt
             # what the tires slip sideways by the kinematics, beyond the straight line
-            beyond = (abs(innovation + magnitude * side) - sigma) / rolling - c1 * abs(mu)
+            beyond = (abs(innovation + magnitude * side) - sigma) / at_least - c1 * abs(mu)
             excess = smallest(largest(beyond, 0.0) * abs(mu) / largest(square, _TOLD), _STEEPEST)
             return innovation, mu, sigma * sigma + unknown * unknown, white, excess, *values
 
         tires = x[TIRES::2], x[TIRES + 1 :: 2]
         innovation, mu, model, white, excess, *values = kit.each(predicted, steer, *tires, *self._axles)
+        bent = kit.exp(-elapsed / s.error_memory)
+
+        (self.bend,) = kit.each(lambda old, new: (bent * old + (1.0 - bent) * new,), self.bend, excess)
+        both = rolling[0] & rolling[1]
+        self.apart = bent * self.apart + (1.0 - bent) * kit.where(both, innovation[0] - innovation[1], 0.0)
+        gap = 0.5 * abs(self.apart)
 
         def judged(
             explained: Number,
@@ -190,19 +203,21 @@ class LateralFusion(CarsMemory):
             linear: Number,
             friction: Number,
             usable: Number,
+            gap: Number,
         ) -> tuple[Number, ...]:
             shows, error = linear * s.side_compliance_spread, white + model
             calm = abs(friction) < sure
             far = usable & kit.no((calm & slid) | (off * off < gate * (explained + error)))
-            wide = white + (model + kit.where(calm, 0.0, axle_error)) * held
-            return usable & kit.no(far), wide, shows * shows > error, kit.where(far & kit.no(calm), abs(off), 0.0)
+            wide = white + model * held + kit.where(calm, 0.0, axle_error) * lasting
+            beyond = kit.where(calm, 0.0, largest(kit.where(far, abs(off), 0.0), gap))
+            return usable & kit.no(far), wide, shows * shows > error, beyond
 
         explained = self.filter.expect(_SEEN, values)
-        used, variance, excited, beyond = kit.each(judged, explained, innovation, model, white, values[5], mu, usable)
+        used, variance, excited, beyond = kit.each(
+            judged, explained, innovation, model, white, values[5], mu, usable, kit.stacked((gap, gap))
+        )
         self.axle_error = kit.maximum(kept * self.axle_error, kit.maximum(*beyond))
         self.filter.weigh(innovation, variance, used)
-        bent = kit.exp(-elapsed / s.error_memory)
-        (self.bend,) = kit.each(lambda old, new: (bent * old + (1.0 - bent) * new,), self.bend, excess)
         return AxleUpdate(innovation, used, mu, excited[0] | excited[1])
 
     @property

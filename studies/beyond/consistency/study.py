@@ -26,9 +26,18 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def consistency_part(scope: Scope, tire: str) -> PartResult:
+GROUPS = {"p1": ("p1-",), "p2": ("p2-",), "others": ("p3-", "p4-", "p5-", "floor-")}
+"""Manoeuvres by the start of their names: a part each, for workers to share and for a run that goes on to keep."""
+
+
+def members(group: str) -> tuple[str, ...]:
+    """The shipped manoeuvres of a group."""
+    return tuple(name for name in sorted(shipped_manoeuvres()) if name.startswith(GROUPS[group]))
+
+
+def consistency_part(scope: Scope, tire: str, group: str) -> PartResult:
     """A row for every manoeuvre, a picture of their NEES, and how many are inside the band."""
-    truth = simulated_truth(tuple(sorted(shipped_manoeuvres())), tire, scope)
+    truth = simulated_truth(members(group), tire, scope)
     found = sorted((one.judged() for one in errors(truth, range(scope.seeds))), key=lambda one: one.manoeuvre)
     low, high = average_band(scope.seeds, 1)
     caption = (
@@ -37,13 +46,13 @@ def consistency_part(scope: Scope, tire: str) -> PartResult:
         "at most twice too wide or by 1.4 too narrow. Radii differ from those assumed by 1.5 % (all wheels) and 0.5 % (each)."
     )
     counts = {
-        f"{tire}: manoeuvres with {name} {word}": float(sum(_side(one.nees[k]) == side for one in found))
+        f"{tire}, {group}: manoeuvres with {name} {word}": float(sum(_side(one.nees[k]) == side for one in found))
         for k, name in enumerate(("V_x", "V_y", "both"))
         for side, word in ((1, "overconfident"), (0, "true"), (-1, "too wide"))
     }
     return PartResult(
-        tables=[Table(f"consistency-{tire}", caption, COLUMNS, [_row(one) for one in found])],
-        figures=[picture(f"consistency-{tire}", caption, found)],
+        tables=[Table(f"consistency-{tire}-{group}", caption, COLUMNS, [_row(one) for one in found])],
+        figures=[picture(f"consistency-{tire}-{group}", caption, found)],
         measures=counts,
     )
 
@@ -91,13 +100,14 @@ STUDY = Study(
     "tire radii: normalised errors, where the pipeline is overconfident and where its deviations are far too wide.",
     tuple(
         Part(
-            tire,
-            f"NEES on {tire} tires",
-            partial(consistency_part, tire=tire),
-            230.0,
+            f"{tire}-{group}",
+            f"NEES on {tire} tires, manoeuvres of group {group}",
+            partial(consistency_part, tire=tire, group=group),
+            140.0,
             (SIMULATIONS[tire],),
             tire == LUGRE,
         )
         for tire in (LUGRE, MAGIC_FORMULA)
+        for group in GROUPS
     ),
 )
