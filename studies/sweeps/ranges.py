@@ -15,6 +15,7 @@ from estimators.errors import unknown
 from studies.sweeps.observer import Observer
 from studies.sweeps.plant import Parameter
 from synthesis.errors import SpecError
+from synthesis.models.param import check_unit, same_unit
 from synthesis.toml_file import StrictTable
 
 ALL = "constants"  # the name that stands for every parameter of the plant
@@ -77,7 +78,7 @@ def parameter_ranges(observer: Observer, table: Mapping[str, RangeSpec]) -> tupl
 
 def _parameter_range(observer: Observer, parameter: Parameter, vary: RangeSpec) -> ParameterRange:
     where = f"subject '{observer.name}': vary.{parameter.name}"
-    if vary.unit is not None and vary.unit != parameter.unit:
+    if vary.unit is not None and not same_unit(check_unit(vary.unit, where), parameter.unit):
         raise SpecError(f"{where}: unit '{vary.unit}' is not '{parameter.unit}', in which the parameter is given")
     try:
         if vary.relative is not None:

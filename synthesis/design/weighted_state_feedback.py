@@ -113,6 +113,16 @@ def design_weighted_state_feedback(model: LpvModel, design: StateFeedbackDesign,
 
     `order` is the number of states of the weights. Raises ProblemError as it does, for a weight that depends on something
     that is not measured, and for limits of gains.
+
+    >>> import control, sympy as sp
+    >>> one = {key: (Signal(name, "1"),) for key, name in zip(("states", "inputs", "outputs", "disturbances"), "xuyd")}
+    >>> plant = LpvModel(name="lag", source="example", parameters=(), A=-sp.eye(1), B=sp.eye(1), C=sp.eye(1), E=sp.eye(1), **one)
+    >>> shaped = weighted(states_as_outputs(plant), {"x": control.tf([0.3, 1.2], [1, 0.04])})  # slow errors cost more
+    >>> design = StateFeedbackDesign((FeedbackChannel(("d",), ("x_weighted", "u")),))
+    >>> law = design_weighted_state_feedback(shaped, design, order=1)
+    >>> print(law.verdict), [matrix.shape for matrix in law.controller([[]])]
+    certified
+    (None, [(1, 1, 1), (1, 1, 3), (1, 1, 1), (1, 1, 3)])
     """
     check_weighted_states(model, design, order)
     return WeightedStateFeedback(design_state_feedback(model, design), order)

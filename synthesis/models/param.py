@@ -45,6 +45,12 @@ def check_unit(unit: str, where: str) -> str:
     return unit
 
 
+def same_unit(one: str, other: str) -> bool:
+    """Whether two units that pint knows are one, however they are written: "(m/s)/(1)" and "m/s"."""
+    first, second = (registry().parse_units(unit) for unit in (one, other))  # type: ignore[attr-defined]
+    return bool(first == second)
+
+
 def check_name(name: str, what: str) -> None:
     """Raise ModelError for a name that cannot be a symbol."""
     if not (name.isidentifier() and name.isascii() and len(name) <= LONGEST_NAME):

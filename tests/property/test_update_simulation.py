@@ -38,7 +38,7 @@ def test_no_run_beats_a_certificate(part: int) -> None:
     assert set(report.tally.checks) >= kinds | {"sum over a run", "converged"}
 
 
-@pytest.mark.parametrize("seeds", [range(100, 108), range(112, 120)])
+@pytest.mark.parametrize("seeds", [range(100, 112), range(112, 120)])
 def test_the_verifier_decides_random_lyapunov_functions_within_two_percent(seeds: range) -> None:
     """For a random P the best level is known from the runtime's own matrices on a grid: a bit worse is proved, better refused."""
     decided: Counter[str] = Counter()

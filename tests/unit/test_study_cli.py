@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[2]
     ("arguments", "words"),
     [
         (["drop-tolerence"], "unknown study 'drop-tolerence'; did you mean drop-tolerance"),
-        (["--all", "qqqq"], "unknown study 'qqqq'; known: consistency, corner-estimation, drop-tolerance"),
+        (["--all", "qqqq"], "unknown study 'qqqq'; known: against-wheels, consistency, corner-estimation"),
         ([], "name a study or give --all"),
         (["friction-floor", "--workers", "0"], "--workers 0"),
         (["friction-floor", "--seeds", "1"], "--seeds 1"),

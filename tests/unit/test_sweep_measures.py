@@ -24,7 +24,7 @@ from studies.sweeps.evaluate import INVALID, NOT_A_NUMBER, VALID, evaluate
 from studies.sweeps.measures import Measure
 from studies.sweeps.observer import Batch, Gains, Observer, model_observer
 from studies.sweeps.plant import polynomial_plant
-from studies.sweeps.ranges import RangeSpec
+from studies.sweeps.ranges import RangeSpec, parameter_ranges
 from studies.sweeps.spec import MEASURES, ObserverSpec, designed_from
 from studies.sweeps.sweep import Sweep
 from synthesis.errors import SpecError
@@ -135,6 +135,15 @@ def test_gains_that_correct_once_a_sample_are_measured_by_the_radius_of_their_up
         norm.check(sampled)
     with pytest.raises(SpecError, match="correct once a sample"):
         norm(batch)
+
+
+def test_a_unit_may_be_written_in_any_way_and_must_be_the_same_one() -> None:
+    own = replace(model_observer("mass", MASS, GAIN, 0.01), update="held")
+    for unit in ("(m/s)/(m/s)", "1/s*s", "(m/s)/(1)/(m/s)"):
+        (found,) = parameter_ranges(own, {"gain_position_rate": RangeSpec(range=(0.5, 0.9), unit=unit)})
+        assert found.unit == own.parameters["gain_position_rate"].unit
+    with pytest.raises(SpecError, match="unit 'm' is not"):
+        parameter_ranges(own, {"gain_position_rate": RangeSpec(range=(0.5, 0.9), unit="m")})
 
 
 def test_units_of_a_constant_gain_are_those_of_the_update() -> None:
