@@ -11,7 +11,7 @@ from flint import fmpq_mat
 from analysis.lpv.question import Question, Searched
 from analysis.norms.hinf import hinf_norm, stability_margin
 from estimators.arrays import FloatArray
-from synthesis.polynomials.half_spaces import Faces
+from synthesis.polynomials.half_spaces import faces_of
 from synthesis.polynomials.rational import rational
 from synthesis.polynomials.stable import is_hurwitz, is_schur
 
@@ -24,7 +24,7 @@ def climb(question: Searched, value: Callable[[FloatArray], FloatArray]) -> tupl
     count = len(question.axes)
     line = np.linspace(-1.0, 1.0, POINTS.get(count, FEWEST))
     grid = np.array(list(product(line, repeat=count)), float).reshape(-1, count)
-    faces = Faces.of(question.half_spaces) if question.half_spaces else None
+    faces = faces_of(question.half_spaces)
     if faces is not None:
         grid = faces.drawn_in(faces.on_lines([line] * count))
     found = value(grid)

@@ -23,7 +23,7 @@ from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.enclosure import PolynomialMatrix, constant, zero
 from synthesis.polynomials.exponential import balance
 from synthesis.polynomials.half_spaces import HalfSpaces
-from synthesis.polynomials.rational import decimal
+from synthesis.polynomials.rational import as_float, decimal
 
 Inputs = Sequence[str] | Mapping[str, float]
 
@@ -133,7 +133,7 @@ class Question:
 
     def physical(self, u: FloatArray) -> FloatArray:
         """Parameter values of scaled ones, (.., p)."""
-        middle, half = (np.array([_float(getattr(axis, key)) for axis in self.axes]) for key in ("middle", "half"))
+        middle, half = (np.array([as_float(getattr(axis, key)) for axis in self.axes]) for key in ("middle", "half"))
         return np.asarray(middle + half * u)
 
 
@@ -186,10 +186,6 @@ def at_points(matrix: PolynomialMatrix, u: FloatArray) -> FloatArray:
     total = np.zeros((len(u), *matrix.shape))
     for powers, entries in matrix.terms.items():
         weight = np.prod(u ** np.array(powers, int), axis=1) if powers else np.ones(len(u))
-        numbers = np.array([_float(x) for x in entries.entries()]).reshape(matrix.shape)
+        numbers = np.array([as_float(x) for x in entries.entries()]).reshape(matrix.shape)
         total += weight[:, None, None] * numbers
     return total
-
-
-def _float(number: fmpq) -> float:
-    return int(number.p) / int(number.q)

@@ -12,6 +12,7 @@ from synthesis.certificate.refute import grid
 from synthesis.loop.loop import Loop
 from synthesis.loop.system import Region, System
 from synthesis.polynomials.enclosure import PolynomialMatrix
+from synthesis.polynomials.rational import as_float
 
 BISECTIONS = 40
 POWERS = 60  # of the second moment's map
@@ -31,7 +32,7 @@ def frozen_level(loop: Loop, d: FloatArray, z: FloatArray, kind: str = "sampled 
     if loop.sample_time is None or not np.isfinite(shown).all():
         return 0.0
     squares = np.trace(shown, axis1=1, axis2=2) if kind.endswith("H2 norm") else np.linalg.eigvalsh(shown)[:, -1]
-    return float(np.sqrt(squares.max(initial=0.0) / _float(loop.sample_time)))
+    return float(np.sqrt(squares.max(initial=0.0) / as_float(loop.sample_time)))
 
 
 def frozen_gain(loop: Loop, d: FloatArray, z: FloatArray) -> float:
@@ -72,7 +73,7 @@ def slowest_decay(loop: Loop) -> float:
     if not len(received) or loop.sample_time is None:
         return 0.0
     radius = np.abs(np.linalg.eigvals(received)).max()
-    return float(-np.log(max(radius, 1e-12)) / _float(loop.sample_time))
+    return float(-np.log(max(radius, 1e-12)) / as_float(loop.sample_time))
 
 
 def frozen_pole_level(loop: Loop, kind: str) -> float:
@@ -80,7 +81,7 @@ def frozen_pole_level(loop: Loop, kind: str) -> float:
     A = np.array([_numbers(system.A) for system in _systems(loop, "discrete")])
     if not len(A) or loop.sample_time is None:
         return float("nan")
-    levels = pole_levels(kind, np.linalg.eigvals(A), _float(loop.sample_time))
+    levels = pole_levels(kind, np.linalg.eigvals(A), as_float(loop.sample_time))
     return float(levels.min() if kind in LARGER_IS_BETTER else levels.max())
 
 
@@ -135,7 +136,3 @@ def _numbers(matrix: PolynomialMatrix) -> FloatArray:
     if entries is None:
         return np.zeros(matrix.shape)
     return np.array([float(x.mid()) for x in entries.entries()]).reshape(matrix.shape)
-
-
-def _float(number: fmpq) -> float:
-    return int(number.p) / int(number.q)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from fractions import Fraction
 from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly_ctx
@@ -17,7 +16,7 @@ from synthesis.models.formula import parse, read, used
 from synthesis.polynomials.chebyshev import to_chebyshev
 from synthesis.polynomials.enclosure import PolynomialMatrix, constant
 from synthesis.polynomials.quotient import least
-from synthesis.polynomials.rational import decimal, rational
+from synthesis.polynomials.rational import as_float, decimal, rational
 
 LAST_DIGIT = fmpq(1, 2**51)  # of the sum of an entry's coefficients: what rounding them to float64 can change
 MOST_TEXT = 100_000  # characters of all formulas together
@@ -71,7 +70,7 @@ def _refuse_poles(entries: Mapping[tuple[str, int, int], ExactFraction], axes: t
         found = least(below)
         if found.bound is None:
             values = (
-                f"{axis.name} = {_float(axis.middle + axis.half * u):.6g} {axis.unit}"
+                f"{axis.name} = {as_float(axis.middle + axis.half * u):.6g} {axis.unit}"
                 for axis, u in zip(axes, _zero(below, found.place), strict=True)
             )
             raise ModelError(
@@ -176,10 +175,6 @@ def _check_stored(stored: Mapping[str, Any], exact: PolynomialMatrix, place: str
                 target, is_ = wanted.terms.get(orders, zero)[i, j], given.get(orders, zero)[i, j]
                 if abs(is_ - target) > size * LAST_DIGIT:
                     raise ScheduleError(
-                        f"{place}: entry [{i}][{j}] of order {list(orders)} is {_float(is_):.17g}, "
-                        f"the formula and the constants give {_float(target):.17g}"
+                        f"{place}: entry [{i}][{j}] of order {list(orders)} is {as_float(is_):.17g}, "
+                        f"the formula and the constants give {as_float(target):.17g}"
                     )
-
-
-def _float(number: fmpq) -> float:
-    return float(Fraction(int(number.p), int(number.q)))

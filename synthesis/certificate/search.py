@@ -32,6 +32,7 @@ from synthesis.loop.motion import one_sample_later, rates, time_derivative
 from synthesis.loop.system import Region, System, Time
 from synthesis.models.param import SchedulingParameter
 from synthesis.polynomials.matrix import MatrixPolynomial, variable
+from synthesis.polynomials.rational import as_float
 
 ANGLES = np.concatenate([[0.0], np.geomspace(1e-3, np.pi, 15)])  # per sample, where the size of a gain is looked for
 ACCURACY = 1e-4  # relative, of a least gain or a largest margin: what holds is proved afterwards
@@ -171,7 +172,7 @@ class Search:
         period = 0.0 if self.loop.sample_time is None else int(self.loop.sample_time.p) / int(self.loop.sample_time.q)
         u = [variable(i, 2 * count) for i in range(2 * count)]  # and r
         jump = (lambda i: (u[count + i] - u[i]) * (1.0 / period)) if discrete and period else None
-        speeds = rates(self.loop.plant.axes, P, one, lambda i: u[count + i], lambda x: int(x.p) / int(x.q), jump)
+        speeds = rates(self.loop.plant.axes, P, one, lambda i: u[count + i], as_float, jump)
         later = one_sample_later(P, speeds, period) if discrete else time_derivative(P, speeds)
         places = rate_places(sampled.grid, later, count)
         unknown = None if square is None else Samples(square.coefficients.reshape(1, 1, 1, -1))
@@ -184,10 +185,13 @@ class Search:
             key = chosen.tobytes(), b"" if decisions is None else decisions.tobytes()
             if (decisions is not None) in last and last[decisions is not None][0] == key:
                 return last[decisions is not None][1]
-            here = [m if decisions is None else m.substitute(decisions) for m in (P, later)]
+
+            def at(matrix: MatrixPolynomial) -> FloatArray:
+                return (matrix if decisions is None else matrix.substitute(decisions)).at(chosen)
+
             if name == POSITIVE:
-                return {name: here[0].at(chosen)}
-            now, then = (Samples(m.at(chosen)) for m in here)
+                return {name: at(P)}
+            now, then = Samples(at(P)), Samples(at(later))
             found = inequalities(question, sampled.at(chosen[:, :count]), now, then, Sampling())
             out = {name: np.broadcast_to(m.values, (len(chosen), *m.values.shape[1:])) for name, m in found}
             last[decisions is not None] = key, out

@@ -14,25 +14,18 @@ import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.half_spaces import Faces
-
-
-def faces_of(model: LpvModel) -> Faces | None:
-    """The set of the parameters in scaled floats; None for a box."""
-    return Faces.of(model.half_spaces) if model.half_spaces else None
+from synthesis.polynomials.half_spaces import Faces, faces_of
 
 
 def tabulated_places(model: LpvModel, lines: Sequence[FloatArray]) -> FloatArray:
     """Parameter values (g, p), one for every breakpoint in order, at which the gains are worked out."""
-    points, faces = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(lines)), faces_of(model)
+    points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(lines))
+    faces = faces_of(model.half_spaces)
     if faces is None:
         return points
-    middle, half, low, high = (
-        np.array([getattr(p, key) for p in model.parameters]) for key in ("middle", "half_width", "minimum", "maximum")
-    )
-    far = ~_used(faces, [(line - m) / h for line, m, h in zip(lines, middle, half, strict=True)]).reshape(-1)
-    drawn = middle + half * faces.drawn_in((points - middle) / half)
-    return np.where(far[:, None], np.clip(drawn, low, high), points)
+    u = model.scaled(points)
+    used = _used(faces, [np.unique(column) for column in u.T]).reshape(-1)
+    return np.where(used[:, None], points, model.physical(faces.drawn_in(u)))
 
 
 def _used(faces: Faces, lines: Sequence[FloatArray]) -> BoolArray:

@@ -15,7 +15,7 @@ from synthesis.certificate.levels import feedback_claims, held_claims, sampled, 
 from synthesis.certificate.rounding import significant
 from synthesis.certificate.search import Search, Wish
 from synthesis.certificate.verify import Names
-from synthesis.design.cut_table import faces_of, tabulated_places
+from synthesis.design.cut_table import tabulated_places
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_names
 from synthesis.design.hinf_observer import Channel, ObserverGains
@@ -36,6 +36,7 @@ from synthesis.lmi.result import Verdict
 from synthesis.loop.feedback import FeedbackLoop
 from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.half_spaces import faces_of
 
 SEGMENTS = (7, 14, 28, 56, 112)
 MOST_PARAMETERS = 3  # of a proof: polynomials of order 8 in more of them have too many terms
@@ -170,7 +171,7 @@ def _candidates(gains: Gains, settings: DeploySettings) -> Iterator[tuple[int, .
 def _along(gains: Gains, axis: int, settings: DeploySettings) -> int:
     """The least number of segments, a power of two, that interpolates well along one parameter, the others at both ends."""
     parameters = gains.model.parameters
-    others, faces = [np.array([p.minimum, p.maximum]) for p in parameters], faces_of(gains.model)
+    others, faces = [np.array([p.minimum, p.maximum]) for p in parameters], faces_of(gains.model.half_spaces)
     others[axis] = np.linspace(parameters[axis].minimum, parameters[axis].maximum, FINEST + 1)
     grid = np.stack(np.meshgrid(*others, indexing="ij"), axis=-1)
     found, share = table_at(gains, grid.reshape(-1, len(parameters)), settings.sample_time), settings.interpolation_cost

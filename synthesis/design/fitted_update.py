@@ -16,7 +16,6 @@ from synthesis.errors import ProblemError
 from synthesis.models.discretise import zero_order_hold
 from synthesis.models.lpv import LpvModel
 from synthesis.models.numeric import NumericModel, values
-from synthesis.polynomials.matrix import MatrixPolynomial
 
 FIT, OF_RATIONAL = 1e-10, 1e-7  # relative; what comes out is proved for the exact matrices anyway
 LOOSE = 1e-4  # beyond it a fit is none: the design would be one for another plant
@@ -27,13 +26,6 @@ POWER = 3  # of the denominator
 def power_below(model: LpvModel) -> int:
     """The power of the model's denominator that `fitted_update` is over: none of a polynomial model."""
     return 0 if model.polynomial.is_polynomial else POWER
-
-
-def lifted(matrix: MatrixPolynomial, below: MatrixPolynomial, times: int) -> MatrixPolynomial:
-    """The matrix times a power of the denominator."""
-    for _ in range(times):
-        matrix = matrix.scaled_by(below)
-    return matrix
 
 
 def fitted_update(model: LpvModel, scale: FloatArray, period: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -30,7 +30,7 @@ from synthesis.design.gains_summary import gains_summary
 from synthesis.design.norms import ChannelSizes, Norm, compact_form, levels, per_sample, require_energy
 from synthesis.design.pole_regions import PoleRegions, require_regions
 from synthesis.design.refusals import refuse_undetectable
-from synthesis.design.three_solves import Problem, three_solves
+from synthesis.design.three_solves import Problem, problem_for, three_solves
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
@@ -240,13 +240,7 @@ def observer_problem(
     common margin of all inequalities is maximised. With a `floor` every inequality keeps that margin, and the decisions of
     least norm are sought.
     """
-    problem = LmiProblem(
-        model.parameters,
-        maximise_margin and gamma is not None,
-        least_norm=floor > 0.0,
-        floor=floor,
-        half_spaces=model.half_spaces,
-    )
+    problem = problem_for(model, gamma, maximise_margin, floor)
     unit = error_unit(model, design, scale)
     scaled = model.polynomial.with_states_scaled(scale)
     known = {key: problem.scaled(getattr(scaled, key)) for key in ("A", "C", "E", "F", "denominator")}

@@ -99,7 +99,7 @@ def require_energy(
         return
     problem.require(f"observed energy {channel.name}", symmetric_block([[falling, -seen.T], [None, outer]]))
     after = after_impulses(problem, channel, force.shape[1])
-    stored = lyapunov.scaled_by(below).scaled_by(below)
+    stored = lyapunov.scaled_by(below, 2)
     problem.require(f"impulses {channel.name}", symmetric_block([[after, force.T * root], [None, stored]]))
 
 

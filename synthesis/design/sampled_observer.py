@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimators.arrays import FloatArray
-from synthesis.design.fitted_update import fitted_update, lifted, power_below
+from synthesis.design.fitted_update import fitted_update, power_below
 from synthesis.design.hinf_observer import (
     ObserverDesign,
     ObserverGains,
@@ -34,12 +34,14 @@ from synthesis.design.hinf_observer import (
 )
 from synthesis.design.norms import ChannelSizes, levels, per_sample, require_sampled_energy
 from synthesis.design.pole_regions import refuse_regions
+from synthesis.design.three_solves import problem_for
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.motion import one_sample_later, rates
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.matrix import MatrixPolynomial, symmetric_block, variable
+from synthesis.polynomials.rational import as_float
 
 POINTS = 40  # for each parameter; what holds between them is proved for the table that is deployed
 
@@ -89,13 +91,7 @@ def _problem(
     maximise_margin: bool,
     floor: float,
 ) -> LmiProblem:
-    problem = LmiProblem(
-        model.parameters,
-        maximise_margin and gamma is not None,
-        least_norm=floor > 0.0,
-        floor=floor,
-        half_spaces=model.half_spaces,
-    )
+    problem = problem_for(model, gamma, maximise_margin, floor)
     known = {key: problem.scaled(array) for key, array in fitted.items()}
     nx, ny, count = len(model.states), len(model.outputs), len(model.parameters)
     degree = tuple(0 if p.may_jump else design.degree for p in model.parameters)
@@ -103,14 +99,12 @@ def _problem(
     G = problem.matrix("G", nx, nx, design.degree)
     X = problem.matrix("X", nx, ny, design.degree)
     one = problem.constant(np.ones((1, 1)))
-    speeds = rates(
-        plant_of(model).axes, P, one, lambda i: variable(count + i, 2 * count), lambda x: int(x.p) / int(x.q)
-    )
+    speeds = rates(plant_of(model).axes, P, one, lambda i: variable(count + i, 2 * count), as_float)
     later = one_sample_later(P, speeds, period)
     power = power_below(model)  # what Phi and Gamma are over; C and F are over d
 
     def over(matrix: MatrixPolynomial, times: int = power) -> MatrixPolynomial:
-        return lifted(matrix, known["denominator"], times)
+        return matrix.scaled_by(known["denominator"], times)
 
     C, F = (over(known[key], max(power - 1, 0)) for key in ("C", "F"))
     closed, slack = G @ known["Phi"] - X @ C, over(G + G.T - later)

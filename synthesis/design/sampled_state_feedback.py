@@ -24,7 +24,7 @@ import numpy as np
 from estimators.arrays import FloatArray
 from synthesis.design.feedback_channel import feedback_channel_matrices
 from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
-from synthesis.design.fitted_update import fitted_update, lifted, power_below
+from synthesis.design.fitted_update import fitted_update, power_below
 from synthesis.design.norms import ChannelSizes, levels, per_sample, require_sampled_energy
 from synthesis.design.pole_regions import refuse_regions
 from synthesis.design.refusals import refuse_unstabilisable
@@ -35,13 +35,14 @@ from synthesis.design.state_feedback import (
     performance,
     require_limits,
 )
-from synthesis.design.three_solves import three_solves
+from synthesis.design.three_solves import problem_for, three_solves
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.motion import one_sample_later, rates
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.matrix import MatrixPolynomial, symmetric_block, variable
+from synthesis.polynomials.rational import as_float
 
 POINTS = 40  # for each parameter; what holds between them is proved for the table that is deployed
 
@@ -103,13 +104,7 @@ def _problem(
     maximise_margin: bool,
     floor: float,
 ) -> LmiProblem:
-    problem = LmiProblem(
-        model.parameters,
-        maximise_margin and gamma is not None,
-        least_norm=floor > 0.0,
-        floor=floor,
-        half_spaces=model.half_spaces,
-    )
+    problem = problem_for(model, gamma, maximise_margin, floor)
     nx, nu, count = len(model.states), len(model.inputs), len(model.parameters)
     applied = scale.applied(model.polynomial)
     known = {key: problem.scaled(getattr(applied, key)) for key in ("C", "D", "F", "denominator")}
@@ -117,14 +112,12 @@ def _problem(
     Q = problem.symmetric("Q", nx, tuple(0 if p.may_jump else design.degree for p in model.parameters) or 0)
     G, Y = problem.matrix("G", nx, nx, design.degree), problem.matrix("Y", nu, nx, design.degree)
     one = problem.constant(np.ones((1, 1)))
-    speeds = rates(
-        plant_of(model).axes, Q, one, lambda i: variable(count + i, 2 * count), lambda x: int(x.p) / int(x.q)
-    )
+    speeds = rates(plant_of(model).axes, Q, one, lambda i: variable(count + i, 2 * count), as_float)
     later, closed, slack = one_sample_later(Q, speeds, period), Phi @ G + Gamma @ Y, G + G.T - Q
     power = power_below(model)  # closed is over d^power, the performance over d
 
     def over(matrix: MatrixPolynomial, times: int = power) -> MatrixPolynomial:
-        return lifted(matrix, known["denominator"], times)
+        return matrix.scaled_by(known["denominator"], times)
 
     problem.require("Q > 0", Q)
     if design.decay_rate > 0.0:

@@ -33,7 +33,7 @@ from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
 from synthesis.design.norms import NORMS, ChannelSizes, compact_form, levels, require_energy
 from synthesis.design.pole_regions import PoleRegions, require_damping, require_disc, require_regions
 from synthesis.design.refusals import refuse_feedthrough, refuse_unstabilisable
-from synthesis.design.three_solves import three_solves
+from synthesis.design.three_solves import problem_for, three_solves
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
@@ -181,13 +181,7 @@ def state_feedback_problem(
     common margin of all inequalities is maximised. With a `floor` every inequality keeps that margin, and the decisions of
     least norm are sought. Of a single channel Q stands for g Q, and gamma^2 is minimised.
     """
-    problem = LmiProblem(
-        model.parameters,
-        maximise_margin and gamma is not None,
-        least_norm=floor > 0.0,
-        floor=floor,
-        half_spaces=model.half_spaces,
-    )
+    problem = problem_for(model, gamma, maximise_margin, floor)
     scaled, clock = scale.applied(model.polynomial), scale.clock
     known = {key: problem.scaled(getattr(scaled, key)) for key in ("A", "B", "C", "D", "E", "F", "denominator")}
     below, nx, nu = known["denominator"], len(model.states), len(model.inputs)

@@ -120,11 +120,7 @@ class StaticLoop:
 
     def _over(self, matrix: MatrixPolynomial, times: int = 1) -> MatrixPolynomial:
         """The matrix times a power of the denominator."""
-        if self.below is None:
-            return matrix
-        for _ in range(times):
-            matrix = matrix.scaled_by(self.below)
-        return matrix
+        return matrix if self.below is None else matrix.scaled_by(self.below, times)
 
     def _within(self, matrix: MatrixPolynomial, start: int, width: int) -> MatrixPolynomial:
         """[0, matrix, 0] of the given width."""

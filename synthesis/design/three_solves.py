@@ -20,6 +20,7 @@ from synthesis.lmi.relaxation import rate_vertices, relaxation_of
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.lmi.solve import solve
+from synthesis.models.lpv import LpvModel
 
 KEPT = 0.95  # of the largest common margin, when the gains are chosen
 STEPS = (1.001, 1.01, 1.1, 1.5, 3.0, 10.0, 100.0)  # from the level that a solver names to one that holds
@@ -50,6 +51,17 @@ def least(problem: Problem, backoff: float, settings: LmiSettings, memory: Memor
     # By exchange it is not handed on: it need not hold on the continuum, only the level a back-off above it.
     bounding = backoff > 0.0 and relaxation_of(first, settings) == "exchange"
     return solve(first, replace(settings, verify=not bounding), memory)
+
+
+def problem_for(model: LpvModel, gamma: float | None, maximise_margin: bool, floor: float) -> LmiProblem:
+    """The problem without inequalities that a design begins with, over the model's set of parameters.
+
+    With `gamma` a margin may be maximised; with a `floor` of all margins the decisions of least norm are sought.
+    """
+    return LmiProblem(
+        model.parameters, maximise_margin and gamma is not None, least_norm=floor > 0.0, floor=floor,
+        half_spaces=model.half_spaces,
+    )  # fmt: skip
 
 
 def starting_places(problem: LmiProblem) -> Memory:

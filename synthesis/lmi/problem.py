@@ -14,7 +14,7 @@ from estimators.display import Display, counted
 from synthesis.errors import ProblemError
 from synthesis.lmi.basis import chebyshev_basis
 from synthesis.models.param import SchedulingParameter
-from synthesis.polynomials.half_spaces import Faces, HalfSpaces
+from synthesis.polynomials.half_spaces import Faces, HalfSpaces, faces_of
 from synthesis.polynomials.matrix import MatrixPolynomial, constant, variable
 
 MARGIN = "margin"
@@ -94,7 +94,7 @@ class LmiProblem(Display):
     @cached_property
     def faces(self) -> Faces | None:
         """The set of the parameters in floats; None for a box."""
-        return Faces.of(self.half_spaces) if self.half_spaces else None
+        return faces_of(self.half_spaces)
 
     def places_on(self, lines: Sequence[FloatArray]) -> FloatArray:
         """The places (g, p) of a rectilinear grid of scaled parameters; where the set is no box, those of it and its border.

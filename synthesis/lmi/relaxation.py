@@ -131,8 +131,7 @@ def _sample(problem: LmiProblem, entry: Inequality, axes: list[FloatArray], marg
     """Points of the parameters it depends on, times the vertices of the rates it depends on."""
     count = len(problem.parameters)
     used = [axis if degree else np.zeros(1) for axis, degree in zip(axes, entry.matrix.degrees[:count], strict=True)]
-    points = problem.places_on(used)
-    grid = np.array(points, float).reshape(len(points), count)
+    grid = problem.places_on(used)
     rates = np.array(rate_samples(entry.matrix, count))
     places = np.hstack([np.tile(grid, (len(rates), 1)), np.repeat(rates, len(grid), axis=0)])
     values = widened(entry.matrix.at(places), problem.decisions)

@@ -15,6 +15,7 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 
 from estimators.arrays import BoolArray, FloatArray
+from synthesis.polynomials.rational import as_float
 
 Point = tuple[fmpq, ...]
 NEAR = 1e-9  # of |a|_1, within which a float place counts as in the set
@@ -112,9 +113,9 @@ class Faces:
         count = len(half_spaces[0].normal)
         corners = corners_of((fmpq(0),) * count, (fmpq(1),) * count, half_spaces)
         return cls(
-            np.array([[_float(a) for a in h.normal] for h in half_spaces]),
-            np.array([_float(h.bound) for h in half_spaces]),
-            np.array([[_float(u) for u in corner] for corner in corners]).reshape(len(corners), count),
+            np.array([[as_float(a) for a in h.normal] for h in half_spaces]),
+            np.array([as_float(h.bound) for h in half_spaces]),
+            np.array([[as_float(u) for u in corner] for corner in corners]).reshape(len(corners), count),
         )
 
     @property
@@ -166,5 +167,6 @@ class Faces:
         return np.asarray(points[np.sort(first)])
 
 
-def _float(number: fmpq) -> float:
-    return int(number.p) / int(number.q)
+def faces_of(half_spaces: HalfSpaces) -> Faces | None:
+    """The set in floats; None for a box."""
+    return Faces.of(half_spaces) if half_spaces else None

@@ -75,11 +75,15 @@ class MatrixPolynomial:
             return _convolve(self, other, shape, lambda known, unknown: np.einsum("ij,...jkm->...ikm", known, unknown))
         return _convolve(other, self, shape, lambda known, unknown: np.einsum("...ijm,jk->...ikm", unknown, known))
 
-    def scaled_by(self, scalar: MatrixPolynomial) -> MatrixPolynomial:
-        """Multiply by a 1 x 1 polynomial: a rate, a common denominator, or an unknown scalar."""
-        if scalar.decisions:
-            return _convolve(self, scalar, self.shape, lambda known, unknown: known[..., None] * unknown)
-        return _convolve(scalar, self, self.shape, lambda known, unknown: known[0, 0] * unknown)
+    def scaled_by(self, scalar: MatrixPolynomial, times: int = 1) -> MatrixPolynomial:
+        """Multiply by a 1 x 1 polynomial, so many times: a rate, a common denominator, or an unknown scalar."""
+        found = self
+        for _ in range(times):
+            if scalar.decisions:
+                found = _convolve(found, scalar, self.shape, lambda known, unknown: known[..., None] * unknown)
+            else:
+                found = _convolve(scalar, found, self.shape, lambda known, unknown: known[0, 0] * unknown)
+        return found
 
     def derivative(self, variable: int) -> MatrixPolynomial:
         """Partial derivative with respect to one variable."""

@@ -15,6 +15,7 @@ from flint import fmpq
 from estimators.arrays import BoolArray, FloatArray
 from synthesis.polynomials.boxes import EPS, INFLATE, Boxes, orders
 from synthesis.polynomials.half_spaces import HalfSpaces
+from synthesis.polynomials.rational import as_float
 
 ABOVE = 2.0**-46  # of the terms of g: so much it is taken too large, which covers its rounding
 
@@ -39,10 +40,10 @@ def borders(
     """
     count = len(half_spaces[0].normal)
     u, f = (
-        np.array([[_float(x) for x in row[:count]] for row in rows]).reshape(-1, count) for rows in (offsets, factors)
+        np.array([[as_float(x) for x in row[:count]] for row in rows]).reshape(-1, count) for rows in (offsets, factors)
     )
-    normals = np.array([[_float(a) for a in h.normal] for h in half_spaces])
-    bounds = np.array([_float(h.bound + h.slack) for h in half_spaces])
+    normals = np.array([[as_float(a) for a in h.normal] for h in half_spaces])
+    bounds = np.array([as_float(h.bound + h.slack) for h in half_spaces])
     start = bounds - u @ normals.T
     start = start + ABOVE * (np.abs(bounds) + np.abs(u) @ np.abs(normals).T + f @ np.abs(normals).T)
     slopes = normals * f[:, None]
@@ -71,7 +72,3 @@ def lessened(matrix: Boxes, start: FloatArray, slopes: FloatArray) -> Boxes:
     most = (np.abs(start) + np.abs(slopes).sum(axis=1))[:, None, None]
     taken = Boxes(middle, INFLATE * EPS * (len(V[0]) + 4) * most * size, matrix.variables, matrix.highest)
     return matrix - taken
-
-
-def _float(number: fmpq) -> float:
-    return int(number.p) / int(number.q)

@@ -30,6 +30,11 @@ def decimal(number: float | int) -> fmpq:
     return fmpq(exact.numerator, exact.denominator)
 
 
+def as_float(number: fmpq) -> float:
+    """The float64 next to a rational number."""
+    return int(number.p) / int(number.q)
+
+
 def polynomial_matrix(monomials: Sequence[Sequence[int]], coefficients: Sequence[Any]) -> Matrix:
     """sum_k p^(monomials[k]) coefficients[k] for one parameter p."""
     rows, columns = len(coefficients[0]), len(coefficients[0][0])

@@ -43,6 +43,16 @@ def test_a_third_of_sigma_leaves_the_band(driven: list[Errors]) -> None:
     assert not any(one.within(BAND)[2] for one in sure)
 
 
+@pytest.mark.parametrize(("manoeuvre", "seconds"), [("p1-brake-in-turn-snow", 5.0), ("p2-launch-ice", 6.0)])
+def test_errors_that_last_a_manoeuvre_are_in_the_deviation_of_the_lateral_velocity(
+    manoeuvre: str, seconds: float
+) -> None:
+    """Axles that differ on snow (NEES 10 if that is not looked at), and levelling by speeds that err (4.5 if it is constant)."""
+    truth = simulate_manoeuvres([load_manoeuvre(manoeuvre).model_copy(update={"duration": seconds})])
+    (found,) = errors(truth, range(4))
+    assert BAND[0] < found.judged().nees[1] < BAND[1]
+
+
 def test_radii_of_a_seed_are_its_own_and_as_wide_as_the_fusion_assumes(truth: Truth) -> None:
     drawn = draw(truth.until(0.1), TEST_CAR, range(400))
     ratio = drawn.signals["wheel_speed"][:, 1, 0] / with_own_radii(drawn).signals["wheel_speed"][:, 1, 0] - 1.0
