@@ -146,3 +146,16 @@ def test_the_pipeline_recovers_too() -> None:
     steps = pipeline_truth.run(EstimationPipeline(CAR, STEP), truth)
     assert sum(bool(step.flags & Flag.RESET) for step in steps) == 1
     assert np.abs(np.array([step.vx for step in steps]) - truth.vx)[round((0.2 + LATEST) / STEP) :].max() < 0.2
+
+
+def test_a_car_that_starts_again_without_a_lateral_velocity_may_slide() -> None:
+    """Steering is unknown, so that the rear axle alone leads V_y; with V_y given it is believed."""
+    samples = [Signals(*one) for one in zip(*sensed(ROLLING), strict=True)]
+    deviations = []
+    for beside in (np.nan, 0.0):
+        fusion = VelocityFusion(CAR, STEP)
+        for one in samples[:100]:
+            fusion.step(*one)
+        fusion.reset(vy=beside)
+        deviations.append(float(fusion.step(*samples[100]._replace(steer=np.full(4, np.nan))).vy_deviation))
+    assert deviations[0] > 1.2 * deviations[1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import sympy as sp
@@ -96,3 +97,20 @@ def test_positive_on_the_part_inside_is_proved_and_nothing_else() -> None:
         wrong += not true
     assert found[True] >= 5  # the multiplier proves what the box does not
     assert wrong >= 5
+
+
+def test_what_a_multiplier_takes_for_the_set_holds_all_of_it() -> None:
+    """g in floats is never below the exact one, slack included, in any corner of a box: no place of the set is left out."""
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        draw = [fmpq(int(x), int(y)) for x, y in zip(rng.integers(-999, 999, 8), rng.integers(1, 997, 8), strict=True)]
+        space = HalfSpace((draw[0], draw[1]), draw[2], abs(draw[3]) / 10**12)
+        offset, factor = (draw[4] / 1000, draw[5] / 1000), (abs(draw[6]) / 1000, abs(draw[7]) / 1000)
+        _, (start,), (slopes,) = borders((space,), [offset], [factor])
+        size = sum(abs(float(x.p) / float(x.q)) for x in draw)
+        for signs in product((-1, 1), repeat=2):
+            place = [o + f * s for o, f, s in zip(offset, factor, signs, strict=True)]
+            exact = space.bound + space.slack - sum((a * u for a, u in zip(space.normal, place, strict=True)), fmpq(0))
+            taken = fmpq(*float(start).as_integer_ratio())
+            taken -= sum((fmpq(*float(m).as_integer_ratio()) * s for m, s in zip(slopes, signs, strict=True)), fmpq(0))
+            assert exact <= taken <= exact + fmpq(*(1e-9 * (size + 1.0) ** 2).as_integer_ratio())

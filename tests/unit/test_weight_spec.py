@@ -173,6 +173,23 @@ def test_state_feedback_works_out_the_states_of_its_weights(tmp_path: Path) -> N
     assert step.used and x[0] == pytest.approx(0.5 / (1.0 - 0.5 * (Dk[0, 0] + u[0])), rel=0.02)
 
 
+def test_the_law_with_its_copy_of_the_weights_has_the_poles_of_the_design(tmp_path: Path) -> None:
+    """Also of a weight that the law itself drives, at an input: plant and copy together are the weighted plant under u = K x."""
+    drives = '[[design.dynamic_weights]]\nsignal = "force"\nlow_gain = 0.5\nhigh_gain = 4.0\ncrossover = 3.0\n'
+    text = STATES.replace("[[design.channels]]", f"{drives}[[design.channels]]").replace(
+        '"force"]', '"force_weighted"]'
+    )
+    spec, model = loaded(tmp_path, text)
+    law = spec.design(model)
+    (Ak,), (Bk,), (Ck,), (Dk,) = law.controller(np.array([2.0]))
+    at, (K,) = model.on([2.0]), law.gains.gain(np.array([2.0]))
+    A, B = np.array([[0.0, 1.0], [-1.0, -0.2]]), np.array([[0.0], [0.5]])
+    loop = np.block([[A + B @ Dk[:, :2], B @ Ck], [Bk[:, :2], Ak]])
+    wanted = np.sort_complex(np.linalg.eigvals(at.A[0] + at.B[0] @ K))
+    assert law.order == 2 and np.abs(at.B[0][2:]).max() > 0.1
+    np.testing.assert_allclose(np.sort_complex(np.linalg.eigvals(loop)), wanted, rtol=1e-8)
+
+
 def test_weights_that_state_feedback_cannot_know_are_refused(tmp_path: Path) -> None:
     pushed = STATES.replace('signal = "position"', 'signal = "push"').replace("position_weighted", "position")
     noisy = STATES.replace('signal = "position"', 'signal = "measured_position"').replace(
