@@ -94,23 +94,37 @@ def _taylor(
     inverse = np.linalg.inv(np.vander(nodes, order, increasing=True))
     places = (start[None] + change[None] * nodes[:, None, None]).reshape(-1, start.shape[1])
     A, B, C, D = (m.reshape(order, len(start), *m.shape[1:]) for m in question.frozen(places))
-    n, m, p = A.shape[-1], B.shape[-1], C.shape[-2]
-    flow = np.zeros((order, len(start), n + m, n + m), complex)
-    flow[..., :n, :n], flow[..., :n, n:] = A - 1j * frequency * np.eye(n), B
+    count, n, m, p = len(start), A.shape[-1], B.shape[-1], C.shape[-2]
+    flow = np.concatenate([A - 1j * frequency * np.eye(n), B], axis=-1)
     shown = np.concatenate([C, D], axis=-1)
     flow, shown = (np.tensordot(inverse, x, axes=(1, 0)) for x in (flow, shown))
-    terms = [np.broadcast_to(np.eye(n + m, dtype=complex), flow.shape[1:])]
+    rates, seen = (_beside(x[..., :n]) for x in (flow, shown))
+    # Rows of xi of the terms, the last one first: those that one product needs stand below each other. Term 0 is the identity.
+    terms = np.zeros((count, TERMS * n, n + m), complex)
     for k in range(TERMS):
-        terms.append(sum(flow[i] @ terms[k - i] for i in range(min(order, k + 1))) * (h / (k + 1))[:, None, None])
-    out = [np.zeros((len(start), p, n + m), complex) for _ in range(TERMS + order)]
-    for i in range(order):
-        for k, term in enumerate(terms):
-            out[i + k] = out[i + k] + shown[i] @ term
-    stacked = np.stack(out, axis=1)
-    weights = 1.0 / (1.0 + np.add.outer(np.arange(len(out)), np.arange(len(out))))
-    weighed = (weights @ stacked.reshape(len(start), len(out), -1)).reshape(len(start), -1, n + m)
-    energy = np.conj(np.swapaxes(stacked.reshape(len(start), -1, n + m), -1, -2)) @ weighed
-    return np.sum(terms, axis=0), energy * h[:, None, None]
+        above, known = (TERMS - k) * n, min(order, k) * n
+        term = rates[..., :known] @ terms[:, above : above + known] + (flow[k] if k < order else 0.0)
+        terms[:, above - n : above] = term * (h / (k + 1))[:, None, None]
+    powers = TERMS + order
+    out = np.zeros((count, powers, p, n + m), complex)
+    for k in range(powers):
+        low, high = max(0, k - TERMS), min(order, k)
+        above = (TERMS - k + low) * n
+        out[:, k] = seen[..., low * n : high * n] @ terms[:, above : above + (high - low) * n]
+        if k < order:
+            out[:, k] += shown[k]
+    weights = 1.0 / (1.0 + np.add.outer(np.arange(powers), np.arange(powers)))
+    weighed = (weights @ out.reshape(count, powers, -1)).reshape(count, -1, n + m)
+    energy = np.conj(np.swapaxes(out.reshape(count, -1, n + m), -1, -2)) @ weighed
+    step = np.broadcast_to(np.eye(n + m, dtype=complex), (count, n + m, n + m)).copy()
+    step[:, :n] += terms.reshape(count, TERMS, n, n + m).sum(axis=1)
+    return step, energy * h[:, None, None]
+
+
+def _beside(blocks: ComplexArray) -> ComplexArray:
+    """(order, N, rows, n) as (N, rows, order n)."""
+    moved = np.moveaxis(blocks, 0, -2)
+    return moved.reshape(*moved.shape[:-2], -1)
 
 
 def _discrete(question: Searched, path: Path, frequency: float) -> Lifted:

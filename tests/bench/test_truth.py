@@ -25,13 +25,14 @@ SPREAD = {"mass": 0.1, "cg_height": 0.05, "yaw_inertia": 0.1, "wheel_inertia": 0
 @pytest.mark.parametrize("tire", TIRES)
 def test_monte_carlo_over_vehicles(benchmark: Any, tire: str, workers: int) -> None:
     manoeuvre = load_manoeuvre("p1-lane-change-snow").with_tire(tire)
+    runs = 20 if benchmark.disabled else RUNS
     one = shortened(manoeuvre.course(), SECONDS)
-    cars = varied(manoeuvre.truth_vehicle(), SPREAD, range(RUNS))
-    benchmark.extra_info["vehicle_seconds"] = RUNS * SECONDS
+    cars = varied(manoeuvre.truth_vehicle(), SPREAD, range(runs))
+    benchmark.extra_info["vehicle_seconds"] = runs * SECONDS
 
     def batch() -> Any:
-        return simulate_in_processes([one] * RUNS, cars, workers, record=KEPT, record_time=0.005)
+        return simulate_in_processes([one] * runs, cars, workers, record=KEPT, record_time=0.005)
 
     truth = benchmark.pedantic(batch, rounds=1, iterations=1)
-    assert truth["vx"].shape == (RUNS, round(SECONDS / 0.005) + 1)
+    assert truth["vx"].shape == (runs, round(SECONDS / 0.005) + 1)
     assert truth["vx"].std(axis=0)[-1] > 0.0  # they are different cars

@@ -69,6 +69,7 @@ def test_observers_find_the_velocity_that_no_baseline_finds(tmp_path: Path, text
     assert not data.replay.flags.any()
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_metrics_are_those_of_the_closed_form(whole_run: tuple[RunResult, Path, list[float]]) -> None:
     result, out, _ = whole_run
     assert json.loads((out / "metrics.json").read_text()) == result.metrics

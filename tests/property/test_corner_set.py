@@ -58,7 +58,7 @@ def alike(first: Any, second: Any, name: str) -> None:
 @pytest.mark.parametrize("lateral", [True, False])
 @pytest.mark.parametrize("weights", [None, SlipWeights()])
 @pytest.mark.parametrize("kind", ["scheduled", "switched", "Kalman"])
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.integers(0, 1000), FAULTS, SPEEDS)
 def test_one_car_is_an_entry_of_many(
     kind: str,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -147,8 +148,8 @@ def designed(kind: str, model: LpvModel, weights: float = 1.0, time: float = 1.0
 @pytest.mark.parametrize(
     ("kind", "gamma", "size"),
     [
-        *(("held", 0.2119, size) for size in (1e-6, 1e-3, 1.0, 1e3, 1e6)),
-        *(("sampled", 0.2061, size) for size in (1e-6, 1.0, 1e6)),
+        *(("held", 0.2119, size) for size in (1e-6, 1e-3, 1e6)),
+        *(("sampled", 0.2061, size) for size in (1e-6, 1e6)),
     ],
 )
 def test_units_of_disturbances_change_nothing(kind: str, gamma: float, size: float) -> None:
@@ -164,11 +165,16 @@ def test_units_of_states_change_nothing(kind: str, gamma: float, states: tuple[f
     assert designed(kind, mass_spring(states=states)) / states[0] == pytest.approx(gamma, rel=1e-2)
 
 
+@cache
+def in_seconds(kind: str) -> float:
+    return designed(kind, mass_spring())
+
+
 @pytest.mark.parametrize("kind", ["held", "sampled"])
 @pytest.mark.parametrize("time", [1e-6, 1e3, 1e6])
 def test_the_unit_of_time_changes_nothing(kind: str, time: float) -> None:
     """To three digits: a rate of the parameter that was off by such a factor would show."""
-    assert designed(kind, mass_spring(time=time), time=time) == pytest.approx(designed(kind, mass_spring()), rel=2e-3)
+    assert designed(kind, mass_spring(time=time), time=time) == pytest.approx(in_seconds(kind), rel=2e-3)
 
 
 @pytest.mark.parametrize("weights", [(1.0, 0.0), (np.nan, 1.0), (1.0, np.inf), (-1.0, 1.0)])

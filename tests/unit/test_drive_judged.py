@@ -97,6 +97,7 @@ def test_the_total_force_obeys_the_rule_beside_it_and_has_a_baseline(tmp_path: P
     assert found["notes"] == {}
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_a_total_force_that_is_judged_against_its_own_input_says_so(tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", pulsed())
     own = run_drive([log], write_drive(tmp_path, with_total("ax")), tmp_path / "out")
@@ -134,6 +135,7 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> tuple[DriveData, Run
     return replay_drive([log], drive), result, pl.read_csv(folder / "out" / "estimates.csv")
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_every_part_that_runs_has_its_columns(
     everything: tuple[DriveData, RunResult, pl.DataFrame], tmp_path: Path
 ) -> None:

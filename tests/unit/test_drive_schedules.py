@@ -78,6 +78,7 @@ def test_a_schedule_of_another_car_is_refused_before_the_log_is_read(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("blank_figures")
 @pytest.mark.parametrize(
     ("radius", "said"),
     [

@@ -84,7 +84,7 @@ def test_the_front_difference_stays_within_the_stated_bound(steer: float, noise:
     rho, runner = 0.9, LateralForceEstimator(CAR, TIME, split_deviation=1000.0, measurement_deviation=noise)
     walk = 130.0**2 * (1.0 + rho**2)
     bound = math.sqrt(walk / 2 + math.sqrt(walk**2 / 4 + walk * 1000.0**2))
-    for k in range(2000):
+    for k in range(1200):
         found = runner.step(0.0, 0.0, 0.0, steer, np.zeros(4), load)
         if k > 600:
             assert found.deviation[2] <= bound + rho * found.deviation[0]

@@ -44,7 +44,7 @@ def turned(signals: Signals, rng: np.random.Generator) -> None:
     signals.ay[:] += wave * DRIVE.speed**2 / 3.0
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(st.integers(0, 1000), st.lists(FAULT, max_size=4), st.booleans())
 def test_one_car_is_an_entry_of_a_batch(seed: int, faults: list[tuple[str, Any, int, int, int]], late: bool) -> None:
     rng = np.random.default_rng(seed)

@@ -7,7 +7,8 @@ all of them as entries of one batch. While a fault lasts V_x may err by its `dur
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -327,6 +328,28 @@ READ = {
 }  # fmt: skip
 
 
+def with_attitude(shape: tuple[int, ...]) -> EstimationPipeline:
+    return EstimationPipeline(VehicleParameters.published_suv(), 0.005, shape, attitude=AttitudeObserver(0.005, shape))
+
+
+def readings(shape: tuple[int, ...]) -> dict[str, FloatArray]:
+    """What every sensor reads in a slow turn."""
+    given = {"wheel_speed": np.full((*shape, 4), 50.0), "steer": np.full((*shape, 4), 0.02)}
+    given["torque"] = np.full((*shape, 4), 50.0)
+    for key, value in (("ax", 0.5), ("ay", 1.0), ("yaw_rate", 0.06), ("az", 9.8), ("grade", 0.01)):
+        given[key] = np.full(shape, value)
+    return given | {key: np.zeros(shape) for key in ("roll_rate", "pitch_rate", "bank")}
+
+
+@cache
+def settled(shape: tuple[int, ...]) -> dict[str, Any]:
+    """The memory of a pipeline after 90 samples of that turn."""
+    pipeline, given = with_attitude(shape), readings(shape)
+    for _ in range(90):
+        pipeline.step(VehicleSignals(**given))
+    return pipeline.save()
+
+
 @pytest.mark.parametrize(("shape", "factor"), [((), 1e28), ((3,), 1.0)], ids=["one car", "three cars"])
 @pytest.mark.parametrize("name", READ)
 def test_what_no_sensor_reads_is_estimated_as_if_it_were_missing(
@@ -335,19 +358,10 @@ def test_what_no_sensor_reads_is_estimated_as_if_it_were_missing(
     """Whatever parts read a signal, an attitude among them: bit for bit the forces and velocities of a missing reading."""
 
     def last(bad: float) -> PipelineStep:
-        pipeline = EstimationPipeline(
-            VehicleParameters.published_suv(), 0.005, shape, attitude=AttitudeObserver(0.005, shape)
-        )
-        for k in range(110):
-            given = {"wheel_speed": np.full((*shape, 4), 50.0), "steer": np.full((*shape, 4), 0.02)}
-            given["torque"] = np.full((*shape, 4), 50.0)
-            for key, value in (("ax", 0.5), ("ay", 1.0), ("yaw_rate", 0.06), ("az", 9.8), ("grade", 0.01)):
-                given[key] = np.full(shape, value)
-            given |= {key: np.zeros(shape) for key in ("roll_rate", "pitch_rate", "bank")}
-            if k >= 90 and given[name].ndim > len(shape):
-                given[name][..., 0] = bad
-            elif k >= 90:
-                given[name] = np.full(shape, bad)
+        pipeline, given = with_attitude(shape), readings(shape)
+        pipeline.restore(settled(shape))
+        given[name][(..., 0) if given[name].ndim > len(shape) else ...] = bad
+        for _ in range(20):
             step = pipeline.step(VehicleSignals(**given))
         return step
 
