@@ -29,7 +29,7 @@ from tests.support import exact_stability as oracle
 from tests.support.lmi_cases import parameter, small_model
 from tests.support.stability_cases import FAMILIES, Case, asked, case_of, complaint, survey
 
-CASES, PARTS = 150, 3
+CASES, PARTS = 120, 3
 p = sp.Symbol("p")
 
 

@@ -21,7 +21,7 @@ from tests.support.update_campaign import UPDATE_KIND, Case, campaign, random_ca
 from tests.support.update_judge import Judge, Tally
 from tests.support.update_run import Paths, probed, simulate
 
-PLANTS, PARTS = 24, 2
+PLANTS, PARTS = 18, 2
 CONTROLS = (1, 2, 6, 10, 11, 13)
 UNSTABLE = (1, 6, 10, 13)  # plants that do not stand the loss of every measurement
 

@@ -21,7 +21,7 @@ def normalised_errors(settings: FusionSettings) -> np.ndarray:
     change every `error_memory`, in the size that the settings state; white noise of all sensors.
     """
     draw = np.random.default_rng(7)
-    pull = phases((1.0, 0.0), (3.0, 1.5), (1.5, 0.0), (2.5, -2.5), (2.0, 0.0))
+    pull = phases((1.0, 0.0), (2.5, 1.5), (1.0, 0.0), (2.0, -2.5), (1.0, 0.0))
     speed = 15.0 + STEP * np.concatenate([[0.0], np.cumsum(pull[1:])])
     mu = pull / GRAVITY
     bias = OWN.acceleration_bias * draw.normal(size=CARS)

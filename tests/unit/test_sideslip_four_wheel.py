@@ -154,7 +154,7 @@ def test_zero_steer_keeps_covariance_bounded_and_forgets_an_offset(kind: Any) ->
     observer = FourWheelObserver(CAR, kind)
     observer.reset(state=[0, 20, 0.05, 800, 0, 0, 0, 0])
     sizes = []
-    for k in range(3000):
+    for k in range(2000):
         step = observer.step(0.0, CAR.static_loads, [0.0, 20.0, 0.0, 0.0])
         if k % 500 == 499:
             sizes.append(np.diag(step.filter.covariance))
@@ -168,7 +168,7 @@ def test_standstill_fades_to_zero_with_bounded_covariance_and_drives_off(kind: A
     observer = FourWheelObserver(CAR, kind)
     observer.reset(state=[0.1, 0.2, 0.3, 500, -500, 100, 0, 0])
     sizes = []
-    for k in range(2000):
+    for k in range(1500):
         step = observer.step(0.3, CAR.static_loads, np.zeros(4))
         if k % 500 == 499:
             sizes.append(np.diag(step.filter.covariance))
