@@ -21,7 +21,7 @@ from synthesis.polynomials.enclosure import PolynomialMatrix
 def refuse_undetectable(model: LpvModel, measured: Sequence[int] | None = None) -> None:
     """Raise ProblemError where an unstable mode does not show in the output (or in some of its rows): no gain helps there."""
     plant, rows = plant_of(model), range(len(model.outputs)) if measured is None else measured
-    if measured is not None:
+    if measured is not None:  # one polynomial: no design for chosen outputs takes a plant by cells
         C = plant.matrices["C"]
         chosen = {
             powers: fmpq_mat([[entries[i, j] for j in range(C.shape[1])] for i in rows])
@@ -59,7 +59,11 @@ def refuse_feedthrough(model: LpvModel, channel: FeedbackChannel, Z: FloatArray,
     W (nd, k) and Z (m, nx + ny + nu) as `synthesis.design.feedback_channel.feedback_channel_matrices` has them.
     """
     nx, ny = len(model.states), len(model.outputs)
-    through = np.abs(Z[:, nx : nx + ny] @ model.polynomial.F @ W).max(axis=tuple(range(len(model.parameters))))
+    sizes = [
+        np.abs(Z[:, nx : nx + ny] @ piece.polynomial.F @ W).max(axis=tuple(range(len(model.parameters))))
+        for piece in model.pieces
+    ]
+    through = np.max(sizes, axis=0)
     if through.any():
         i, j = np.argwhere(through)[0]
         raise ProblemError(
