@@ -57,6 +57,8 @@ def _lines(model: LpvModel) -> Iterator[str]:
         yield f"{'constraint':<14}{constraint.words}"
     for name, constant in model.constants.items():
         yield f"{'constant':<14}{name} = {constant.value:g} {constant.unit} ({constant.source})"
+    for words in model.table_words:
+        yield f"{'tables':<14}{words}"
     for key in MATRICES:
         matrix = getattr(model, key)
         for i, row in enumerate(matrix.tolist()):
