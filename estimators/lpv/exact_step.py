@@ -80,7 +80,11 @@ class ExactStep:
                 stored[key] = scale * matrix.pieces
                 continue
             if isinstance(matrix, PlantQuotient):
-                stored["denominator"], matrix, self.divided = matrix.denominator.coefficients[None], matrix.numerator, True
+                stored["denominator"], matrix, self.divided = (
+                    matrix.denominator.coefficients[None],
+                    matrix.numerator,
+                    True,
+                )
             stored[key] = scale * matrix.coefficients[None]
         self.orders = [max(1, *(part.shape[1 + axis] for part in stored.values())) for axis in range(count)]
         flat, number = [], len(stored["A"])

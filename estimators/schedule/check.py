@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from estimators.schedule.check_update import LoopSizes, check_gain, check_update
 from estimators.schedule.check_tables import check_cells, check_tables
+from estimators.schedule.check_update import LoopSizes, check_gain, check_update
 from estimators.schedule.checker import DEEPEST, LONGEST_NAME, Checker, quoted, shown, too_deep
 from estimators.schedule.constraints import check_constraints
 

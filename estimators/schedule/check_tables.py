@@ -1,6 +1,6 @@
 """The form of tables over parameters, and of a plant that is a polynomial on each cell of their grid.
 
-    model.tables  {name: {"unit", "source", "over": [parameters], "breakpoints": [[..], ..], "values": nested as the breakpoints}}
+    model.tables  {name: {"unit", "source", "over": [names], "breakpoints": [[..], ..], "values": nested alike}}
     plant         {"breakpoints": [[..] for every parameter], "cells": [{"A": .., .., "F": ..}, ..]}
 
 Cells stand in the order of their breakpoints, those of the last parameter fastest; the Chebyshev polynomials of a cell run over it:
@@ -67,7 +67,9 @@ def check_cells(
         place, entry = f"plant.breakpoints[{i}]", scheduling[i]
         numbers = [check.number(x, place) for x in check.items(line, place, most=MOST_CELLS + 1)]
         if len(numbers) < 2 or numbers[0] != entry["min"] or numbers[-1] != entry["max"]:
-            check.fail(place, f"must start at min = {entry['min']} and end at max = {entry['max']} {shown(entry['unit'], 30)}")
+            check.fail(
+                place, f"must start at min = {entry['min']} and end at max = {entry['max']} {shown(entry['unit'], 30)}"
+            )
         if any(not b - a > closest * (entry["max"] - entry["min"]) for a, b in pairwise(numbers)):
             check.fail(place, "must rise clearly from one to the next")
         counts.append(len(numbers) - 1)

@@ -56,7 +56,8 @@ class PlantByCells(NamedTuple):
             ScheduleError: always.
         """
         raise ScheduleError(
-            "the plant of the schedule is a polynomial by cells (tables), what uses it here takes one polynomial; take LpvObserver"
+            "the plant of the schedule is a polynomial by cells (tables), what uses it here takes one polynomial; "
+            "take LpvObserver"
         )
 
 

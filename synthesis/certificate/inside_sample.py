@@ -77,10 +77,10 @@ def _on_parts(plant: Plant) -> list[dict[str, PolynomialMatrix]] | None:
     count = len(plant.axes)
     if plant.is_polynomial:
         parts = []
-        for offset, factor, piece in plant.cells:
+        for middle, factor, piece in plant.cells:
             given = {key: piece.matrices[key] for key in "AB"}
             slopes = {f"{key}{i}": m.derivative(i) for key, m in given.items() for i in range(count)}
-            parts.append({key: m.affine(offset, factor).balls() for key, m in (given | slopes).items()})
+            parts.append({key: m.affine(middle, factor).balls() for key, m in (given | slopes).items()})
         return parts
     d, given = plant.denominator, {key: plant.matrices[key] for key in "AB"}
     turned = {

@@ -103,14 +103,20 @@ def _zero(below: PolynomialMatrix, place: tuple[fmpq, ...]) -> list[fmpq]:
 def check_stored_plant(stored: Mapping[str, Any], plant: Plant, where: str) -> None:
     """The stored float64 coefficients are the exact ones, rounded. Raises ScheduleError naming the entry."""
     if bool(plant.pieces) != ("cells" in stored):
-        raise ScheduleError(f"{where}: plant: is {'one polynomial' if plant.pieces else 'by cells'}, the model's tables say otherwise")
+        raise ScheduleError(
+            f"{where}: plant: is {'one polynomial' if plant.pieces else 'by cells'}, the model's tables say otherwise"
+        )
     if plant.pieces:
         for i, (line, given) in enumerate(zip(plant.lines, stored["breakpoints"], strict=True)):
             if [decimal(x) for x in given] != list(line):
-                raise ScheduleError(f"{where}: plant.breakpoints[{i}]: are not the ends and the breakpoints of the tables between")
+                raise ScheduleError(
+                    f"{where}: plant.breakpoints[{i}]: are not the ends and the breakpoints of the tables between"
+                )
         for k, (offset, factor, piece) in enumerate(plant.cells):
             for key, matrix in piece.matrices.items():
-                _check_stored(stored["cells"][k][key], matrix.affine(offset, factor), f"{where}: plant.cells[{k}].{key}")
+                _check_stored(
+                    stored["cells"][k][key], matrix.affine(offset, factor), f"{where}: plant.cells[{k}].{key}"
+                )
         return
     for key, matrix in plant.matrices.items():
         _check_stored(stored[key], matrix, f"{where}: plant.{key}")
@@ -137,13 +143,15 @@ def _entries(
     values = {
         axis.name: ExactFraction(context.gens()[i] * axis.half + axis.middle, work) for i, axis in enumerate(axes)
     }
-    for number, name in enumerate(tables, len(axes)):
+    for index, name in enumerate(tables, len(axes)):
         if name in values:
             raise ScheduleError(f"{where}: model.tables.{name}: is the name of a scheduling parameter, too")
-        values[name] = ExactFraction(context.gens()[number], work)
+        values[name] = ExactFraction(context.gens()[index], work)
     for name, entry in model["constants"].items():
         if name in values:
-            raise ScheduleError(f"{where}: model.constants.{name}: is the name of a scheduling parameter or a table, too")
+            raise ScheduleError(
+                f"{where}: model.constants.{name}: is the name of a scheduling parameter or a table, too"
+            )
         values[name] = ExactFraction(context.constant(decimal(entry["value"])), work)
     mentioned: set[str] = set()
     found = {}
@@ -163,7 +171,9 @@ def _entries(
     for kind in ("constants", "tables"):
         idle = sorted(set(model.get(kind, ())) - mentioned)
         if idle and tied:
-            raise ScheduleError(f"{where}: model.{kind}.{idle[0]}: appears in no formula; what it says is tied to nothing")
+            raise ScheduleError(
+                f"{where}: model.{kind}.{idle[0]}: appears in no formula; what it says is tied to nothing"
+            )
     return found
 
 

@@ -263,7 +263,9 @@ def lyapunov_degrees(model: LpvModel, gains: Gains) -> list[tuple[int, ...]]:
     a law of a rational plant is tried: its P hardly moves, or follows a quotient.
     """
     own = int(getattr(gains, "rational", 0))
-    quotient = not isinstance(gains, ObserverGains) and not all(piece.polynomial.is_polynomial for piece in model.pieces)
+    quotient = not isinstance(gains, ObserverGains) and not all(
+        piece.polynomial.is_polynomial for piece in model.pieces
+    )
     tried = (
         tuple(0 if p.may_jump else max(gains.design.degree, 1) + more for p in model.parameters)
         for more in (OF_RATIONAL if quotient else (own,))

@@ -155,7 +155,7 @@ def constraints_of(model: LpvModel) -> dict[str, Any]:
 
 
 def _plant(model: LpvModel) -> dict[str, Any]:
-    """Matrices over a common denominator, which is left out where it is one; of a plant by cells, on each in its own coordinates."""
+    """Matrices over a common denominator, left out where it is one; of a plant by cells those of each in its coordinates."""
     if len(model.pieces) > 1:
         cells = [
             {key: stored(piece.exact.matrices[key].affine(piece.offset, piece.factor)) for key in SHAPES}

@@ -245,22 +245,22 @@ def observer_problem(
     unit, nx, ny = error_unit(model, design, scale), len(model.states), len(model.outputs)
     # A parameter that jumps may move the gains, but not the Lyapunov function.
     jumps = any(p.may_jump for p in model.parameters)
-    P = problem.symmetric(
+    whole = problem.symmetric(
         "P", nx, tuple(0 if p.may_jump else design.degree for p in model.parameters) if jumps else design.degree
     )
     gains = KinkedUnknown.of(problem, model, "X", (nx, ny), design.degree)
     outputs = problem.constant(np.diag(1.0 / outputs_of(model, design, scale)))
     sizes: dict[str, tuple[MatrixPolynomial, MatrixPolynomial]] = {}
-    problem.require("P > 0", P)
+    problem.require("P > 0", whole)
     for number, piece in enumerate(model.pieces):
         problem.on_cell(number, piece.box)
         scaled = piece.polynomial.with_states_scaled(scale)
-        known = {key: problem.scaled(getattr(scaled, key)) for key in ("A", "C", "E", "F", "denominator")}
+        known = {k: problem.here(problem.scaled(getattr(scaled, k))) for k in ("A", "C", "E", "F", "denominator")}
         known["C"], known["F"] = outputs @ known["C"], outputs @ known["F"]
-        below, X = known["denominator"], gains.on(piece)
+        below, P, X = known["denominator"], problem.here(whole), gains.on(piece)
         closed = (P @ known["A"] - X @ known["C"]) * (1.0 / clock)
         frozen = closed + closed.T
-        phi = frozen + problem.time_derivative(P).scaled_by(below) * (1.0 / clock)
+        phi = frozen + problem.here(problem.time_derivative(whole)).scaled_by(below) * (1.0 / clock)
         decay = 2.0 * design.decay_rate * (1.0 + design.reserve) / clock
         if design.decay_rate > 0.0 or not design.channels:
             problem.require("decay rate", -(phi + P.scaled_by(below) * decay))

@@ -2,8 +2,8 @@
 
     X(u) = sum over k of X_k T_k(u) + sum over borders b of each u_i of X_ib max(0, u_i - b)
 
-On a cell this is a polynomial; across a border it is continuous, as the table that is deployed. With degree 1 and one parameter it
-is every continuous matrix that is straight on each cell.
+On a cell this is a polynomial; across a border it is continuous, as the table that is deployed. With degree 1 and one parameter
+it is every continuous matrix that is straight on each cell.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ class KinkedUnknown:
         return cls(problem, own[name], tuple((i, border, slope) for i, border, slope in bends if slope is not None))
 
     def on(self, piece: ModelPiece) -> MatrixPolynomial:
-        """The polynomial that it is on a cell."""
+        """The polynomial that it is on a cell that is asked about (`LmiProblem.on_cell`), in its local variables."""
         total, variables = self.smooth, self.problem.variables
         for i, border, slope in self.bends:
             if piece.box[0][i] > border:
                 beyond = variable(i, variables) - self.problem.constant(np.array([[border]]))
                 total = total + slope.scaled_by(beyond)
-        return total
+        return self.problem.here(total)
 
 
 def borders(model: LpvModel) -> Iterator[tuple[int, float]]:

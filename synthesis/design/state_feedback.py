@@ -185,19 +185,20 @@ def state_feedback_problem(
     nx, nu = len(model.states), len(model.inputs)
     # A parameter that jumps may move the gains, but not the Lyapunov function.
     jumps = any(p.may_jump for p in model.parameters)
-    Q = problem.symmetric(
+    whole = problem.symmetric(
         "Q", nx, tuple(0 if p.may_jump else design.degree for p in model.parameters) if jumps else design.degree
     )
     gains = KinkedUnknown.of(problem, model, "Y", (nu, nx), design.degree)
     sizes: dict[str, tuple[MatrixPolynomial, MatrixPolynomial]] = {}
-    problem.require("Q > 0", Q)
+    problem.require("Q > 0", whole)
     for number, piece in enumerate(model.pieces):
         problem.on_cell(number, piece.box)
         scaled = scale.applied(piece.polynomial)
-        known = {key: problem.scaled(getattr(scaled, key)) for key in ("A", "B", "C", "D", "E", "F", "denominator")}
-        below, Y = known["denominator"], gains.on(piece)
+        letters = ("A", "B", "C", "D", "E", "F", "denominator")
+        known = {key: problem.here(problem.scaled(getattr(scaled, key))) for key in letters}
+        below, Q, Y = known["denominator"], problem.here(whole), gains.on(piece)
         M = (known["A"] @ Q + known["B"] @ Y) * (1.0 / clock)
-        falling = problem.time_derivative(Q).scaled_by(below) * (1.0 / clock) - (M + M.T)
+        falling = problem.here(problem.time_derivative(whole)).scaled_by(below) * (1.0 / clock) - (M + M.T)
         if design.decay_rate > 0.0:
             decay = 2.0 * design.decay_rate * (1.0 + design.reserve) / clock
             problem.require("decay rate", falling - Q.scaled_by(below) * decay)
@@ -270,10 +271,8 @@ def require_limits(
     """The limits of the docstring, for K Q K' < Y below^-1 Y'."""
     S = scale.states * np.array([limits.sizes[s.name] for s in model.states])
     largest = float(S.max())
-    if "q" not in problem.unknowns:  # of the docstring, times the largest size squared
-        q = problem.scalar("q")
-        problem.require("states within their sizes", Q - problem.constant(np.diag((S / largest) ** 2)).scaled_by(q))
-    q = problem.unknowns["q"]
+    q = problem.unknowns.get("q") or problem.scalar("q")  # of the docstring, times the largest size squared
+    problem.require("states within their sizes", Q - problem.constant(np.diag((S / largest) ** 2)).scaled_by(q))
     for i, signal in enumerate(model.inputs):
         if signal.name in limits.inputs:
             most = limits.inputs[signal.name] / (1.0 + reserve) / scale.inputs[i] / largest

@@ -83,6 +83,6 @@ def energy_problem(
     size = problem.constant(np.eye(len(model.outputs))).scaled_by(energy)
     for number, piece in enumerate(model.pieces):
         problem.on_cell(number, piece.box)
-        problem.require("gain energy", symmetric_block([[size, gains.on(piece).T], [None, P]]))
+        problem.require("gain energy", symmetric_block([[size, gains.on(piece).T], [None, problem.here(P)]]))
     problem.minimise("gain energy")
     return problem

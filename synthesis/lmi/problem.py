@@ -194,7 +194,7 @@ class LmiProblem(Display):
         return total
 
     def require(self, name: str, matrix: MatrixPolynomial, strict: bool = True) -> None:
-        """matrix > 0 (pass the negative for < 0) on the whole box, or on the cell that is being asked about."""
+        """matrix > 0 (pass the negative for < 0) on the whole box, or on the cell that is asked about (`on_cell`)."""
         coefficients = matrix.coefficients
         if matrix.shape[0] != matrix.shape[1]:
             raise ProblemError(f"inequality '{name}' has the shape {matrix.shape}; it must be square and symmetric")
@@ -208,20 +208,23 @@ class LmiProblem(Display):
         if strict:
             matrix = self._with_margin(matrix)
         offset, factor = self.cell or (np.zeros(self.variables), np.ones(self.variables))
-        matrix = matrix.affine(offset, factor) if self.cell else matrix
         floor = self.floor if strict else 0.0
         self.inequalities.append(Inequality(name + self.suffix, matrix, offset, factor, strict, floor))
 
     def on_cell(self, number: int = 0, box: tuple[FloatArray, FloatArray] | None = None) -> None:
         """What follows is required on a box of the parameters u = offset + factor t, |t| <= 1, (p,) each, and for all rates.
 
-        Without a box, or where it is the whole range, it is required on the whole range.
+        Its matrices are given in t (`here`). Without a box, or where it is the whole range, all is as it was.
         """
         self.cell, self.suffix = None, ""
         if box is not None and not (box[1] == 1.0).all():
             count = len(self.parameters)
             self.cell = np.concatenate([box[0], np.zeros(count)]), np.concatenate([box[1], np.ones(count)])
             self.suffix = f", cell {number + 1}"
+
+    def here(self, matrix: MatrixPolynomial) -> MatrixPolynomial:
+        """A matrix in u in the local variables of the cell that is asked about."""
+        return matrix.affine(*self.cell) if self.cell else matrix
 
     def _with_margin(self, matrix: MatrixPolynomial) -> MatrixPolynomial:
         unit = self.constant(np.eye(matrix.shape[0]))

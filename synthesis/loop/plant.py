@@ -144,7 +144,9 @@ class ByCells(dict[str, PolynomialMatrix]):
     """Stands for the matrices of a plant by cells, which are others on every cell."""
 
     def __missing__(self, key: str) -> NoReturn:
-        raise ProblemError("this takes one polynomial plant for the whole range; a plant by cells (tables) is not supported here")
+        raise ProblemError(
+            "this takes one polynomial plant for the whole range; a plant by cells (tables) is not supported here"
+        )
 
     def items(self) -> NoReturn:
         """None."""
@@ -157,7 +159,7 @@ def by_cells(
     matrices: Sequence[Mapping[str, PolynomialMatrix]],
     half_spaces: HalfSpaces = (),
 ) -> Plant:
-    """A plant that is a polynomial on each cell of a grid, the last parameter's cells running fastest; kinks and jumps between."""
+    """A plant that is a polynomial on each cell of a grid, the last parameter's cells running fastest."""
     one = constant(fmpq_mat([[1]]), len(axes))
     pieces = tuple(Plant(axes, found, one) for found in matrices)
     if len(pieces) == 1:

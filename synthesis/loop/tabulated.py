@@ -31,7 +31,7 @@ class Tabulated:
     rounded: bool
 
     def cells(self) -> Iterator[Region]:
-        """The boxes between neighbouring breakpoints, of the table and of a plant by cells, that are not wholly outside the set."""
+        """The boxes between neighbouring breakpoints (of table and plant), without those wholly outside the set."""
         borders = self.plant.lines or ((),) * len(self.breakpoints)
         edges = [
             [(axis.scaled(low), axis.scaled(high)) for low, high in pairwise(sorted({*points, *more}))]
@@ -104,7 +104,7 @@ class Tabulated:
     def _plants_local(self, key: str, cells: Sequence[Region], owners: IndexArray) -> Boxes:
         """One of the matrices on many regions, each in one cell of the plant."""
         places = [np.flatnonzero(owners == number) for number in np.unique(owners)]
-        parts = [local(self._plants[owners[own[0]]][key], [cells[i] for i in own]) for own in places]
+        parts = [local(self._plants[owners[own[0]]][key], [cells[int(i)] for i in own]) for own in places]
         if len(parts) == 1:
             return parts[0]
         order = np.argsort(np.concatenate(places))
@@ -113,7 +113,7 @@ class Tabulated:
 
     @cached_property
     def _plants(self) -> list[dict[str, PolynomialMatrix]]:
-        """Matrices (numerators) in u of every cell of the plant, as balls; uncertain by what float64 may be off in the runtime."""
+        """Matrices (numerators) in u of every cell of the plant, as balls; uncertain by what float64 may be off."""
         return [
             {key: self._evaluated(matrix, box) for key, matrix in piece.matrices.items()}
             for *box, piece in self.plant.cells

@@ -40,7 +40,8 @@ class LpvModel(Display):
     in the matrices by their names: the plant is a polynomial on each cell of their grid (`pieces`), with kinks between them.
 
     Matrices are sympy matrices whose symbols are the names of `parameters`, `constants` and `tables`, polynomial or rational in
-    the parameters (polynomial with tables). A disturbance whose column of E is zero is measurement noise. B, D, E and F default to zero.
+    the parameters (with tables, polynomial). A disturbance whose column of E is zero is measurement noise. B, D, E and F
+    default to zero.
 
     Raises ModelError for a stray symbol, a shape that does not fit, a parameter or constant that never appears, a
     dependence that is not rational, a denominator that vanishes inside the range, and repeated names.
@@ -201,7 +202,9 @@ class LpvModel(Display):
     def middle_piece(self) -> ModelPiece:
         """The piece that holds the middle of the ranges."""
         zero = fmpq(0)
-        return next(q for q in self.pieces if all(o - f <= zero <= o + f for o, f in zip(q.offset, q.factor, strict=True)))
+        return next(
+            q for q in self.pieces if all(o - f <= zero <= o + f for o, f in zip(q.offset, q.factor, strict=True))
+        )
 
     @property
     def jumps(self) -> tuple[str, ...]:
@@ -311,7 +314,8 @@ class LpvModel(Display):
         Entries become Chebyshev polynomials (least squares), stored as exact rationals: of `degree`, or of the lowest degree that
         leaves no entry off by more than `tolerance` of its largest value (at most half as many as points, so that points are left
         to tell). `fit` says what the plant is between the points: "polynomial", the fit itself; "piecewise-linear", straight
-        lines, so that the residual is bounded over the whole range.
+        lines, so that the residual is bounded over the whole range. With the fit "table" there is none: the plant is multilinear
+        between the points, exactly, another polynomial on every cell (`Table`); a point of a line that stands twice is a jump.
 
         The residual enters the model as a stated uncertainty (`synthesis.models.fitted`): for each row that is off, a disturbance
         `NAME_fit_error` between -1 and 1 with a constant `NAME_fit_error_size`; name these disturbances in the channels of a

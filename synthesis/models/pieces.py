@@ -40,9 +40,7 @@ class ModelPiece:
         return np.array([as_float(x) for x in self.offset]), np.array([as_float(x) for x in self.factor])
 
 
-def scaled_lines(
-    lines: Sequence[Sequence[float]], ranges: Sequence[tuple[fmpq, fmpq]]
-) -> tuple[tuple[fmpq, ...], ...]:
+def scaled_lines(lines: Sequence[Sequence[float]], ranges: Sequence[tuple[fmpq, fmpq]]) -> tuple[tuple[fmpq, ...], ...]:
     """Breakpoints in u = (p - middle)/half, from those in p; `ranges` are middles and half widths."""
     return tuple(
         tuple((decimal(x) - middle) / half for x in line) for line, (middle, half) in zip(lines, ranges, strict=True)
@@ -60,7 +58,9 @@ def on_cells(
     Tables are given as `Table.plain`; `names` are those of the parameters.
     """
     count = len(names)
-    ranges = [((decimal(line[0]) + decimal(line[-1])) / 2, (decimal(line[-1]) - decimal(line[0])) / 2) for line in lines]
+    ranges = [
+        ((decimal(line[0]) + decimal(line[-1])) / 2, (decimal(line[-1]) - decimal(line[0])) / 2) for line in lines
+    ]
     read = []
     for table in tables:
         places = [names.index(name) for name in table["over"]]
@@ -86,7 +86,7 @@ def pieces_of(
     constants: Mapping[str, Constant],
     tables: Mapping[str, Table],
 ) -> tuple[tuple[tuple[float, ...], ...], tuple[ModelPiece, ...]]:
-    """The grid of the cells and the model on each. Raises ModelError for entries that are no polynomials of parameters and tables."""
+    """The grid of the cells and the model on each. Raises ModelError for entries that divide by parameters or tables."""
     names = [sp.Symbol(name) for name in (*(p.name for p in parameters), *tables)]
     for key in MATRICES:
         for (i, j), entry in zip(np.ndindex(*symbolic[key].shape), symbolic[key], strict=True):
@@ -95,7 +95,9 @@ def pieces_of(
                     f"{where}: {key}[{i},{j}] = {entry} divides by a parameter or a table; a model with tables is a polynomial "
                     "of both: tabulate the quotient"
                 )
-    free = tuple(SchedulingParameter(name, table.unit, -1.0, 1.0, -math.inf, math.inf) for name, table in tables.items())
+    free = tuple(
+        SchedulingParameter(name, table.unit, -1.0, 1.0, -math.inf, math.inf) for name, table in tables.items()
+    )
     whole = extract(where, symbolic, (*parameters, *free), constants)
     plain = [table.plain for table in tables.values()]
     lines = cell_lines(plain, [(p.name, p.minimum, p.maximum) for p in parameters], where)

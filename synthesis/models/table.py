@@ -1,7 +1,7 @@
 """Tables over scheduling parameters: quantities of a model that are known at breakpoints and multilinear between them.
 
-A formula uses a table by its name, like a constant. On a box between breakpoints a table is a polynomial of the parameters, and so
-is then every entry that uses it: the plant is a polynomial on each cell of the grid of all breakpoints, with kinks on the borders.
+A formula uses a table by its name, like a constant. On a box between breakpoints a table is a polynomial of the parameters, and
+so is then every entry that uses it: the plant is a polynomial on each cell of the grid of all breakpoints, with kinks between.
 A breakpoint that stands twice is a jump: the table ends at the first value and goes on from the second; at it the plant may be
 either.
 """
@@ -127,5 +127,7 @@ def cell_lines(
     lines = tuple((low, *sorted(x for x in inside[name] if low < x < high), high) for name, low, high in ranges)
     count = prod(len(line) - 1 for line in lines)
     if count > MOST_CELLS:
-        raise ModelError(f"{where}: the tables cut the range in {count} cells, at most {MOST_CELLS} are proved; thin them")
+        raise ModelError(
+            f"{where}: the tables cut the range in {count} cells, at most {MOST_CELLS} are proved; thin them"
+        )
     return lines
