@@ -65,7 +65,11 @@ def rebuilt_plant(content: Mapping[str, Any], axes: tuple[Axis, ...], where: str
     lines = cell_lines(
         tables.values(), [(p["name"], float(p["min"]), float(p["max"])) for p in content["scheduling"]], where
     )
-    found = on_cells(list(tables.values()), [axis.name for axis in axes], lines, matrices)
+    found = on_cells(list(tables.values()), [axis.name for axis in axes], lines, matrices, where)
+    if any(max(m.degrees) > HIGHEST_ORDER for _, _, piece in found for m in piece.values()):
+        raise ModelError(
+            f"{where}: model.matrices: a power above {HIGHEST_ORDER} of a scheduling parameter, with tables put in"
+        )
     return by_cells(axes, tuple(tuple(decimal(x) for x in line) for line in lines), [m for _, _, m in found])
 
 

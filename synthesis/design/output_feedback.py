@@ -147,6 +147,7 @@ def design_output_feedback(model: LpvModel, design: OutputFeedbackDesign) -> Out
     certified
     (None, (3, 1, 1))
     """
+    model.refuse_tables("output feedback")
     refuse_unstabilisable(model)
     refuse_undetectable(model, measured_rows(model, design.measured))
     plant = generalised_plant(model, design.channels, design.measured)

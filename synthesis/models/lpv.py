@@ -162,7 +162,7 @@ class LpvModel(Display):
 
         Raises ModelError for a model with tables, which is another polynomial on every cell: see `pieces`.
         """
-        self.refuse_tables("what takes one polynomial for the whole range")
+        self.refuse_tables("a design or an analysis of one polynomial for the whole range")
         matrices = {key: getattr(self, key) for key in MATRICES}
         return extract(f"model '{self.name}'", matrices, self.parameters, self.constants)
 
@@ -225,7 +225,7 @@ class LpvModel(Display):
     @cached_property
     def polynomial(self) -> PolynomialModel:
         """`exact` as float64 coefficient arrays."""
-        self.refuse_tables("what takes one polynomial for the whole range")
+        self.refuse_tables("a design or an analysis of one polynomial for the whole range")
         return self.pieces[0].polynomial
 
     def on(self, grid: ArrayLike) -> NumericModel:

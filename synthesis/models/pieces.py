@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ from synthesis.models.param import Constant, SchedulingParameter
 from synthesis.models.table import Table, cell_lines
 from synthesis.polynomials.multilinear import Point, boxes, composed, multilinear
 from synthesis.polynomials.rational import as_float, decimal
+
+MOST_PRODUCTS = 400_000  # on all cells together
 
 
 @dataclass(frozen=True)
@@ -52,10 +55,11 @@ def on_cells(
     names: Sequence[str],
     lines: Sequence[Sequence[float]],
     matrices: Mapping[str, Any],
+    where: str,
 ) -> list[tuple[Point, Point, dict[str, Any]]]:
     """Matrices in (u, t), t the tables in order, on every cell of `lines` as polynomials in u: offset, factor, matrices.
 
-    Tables are given as `Table.plain`; `names` are those of the parameters.
+    Tables are given as `Table.plain`; `names` are those of the parameters. Raises ModelError for too much work.
     """
     count = len(names)
     ranges = [
@@ -72,6 +76,12 @@ def on_cells(
             return decimal(float(entry))
 
         read.append((own, value, places))
+    products = sum(1 + sum(powers[count:]) for m in matrices.values() for powers in m.terms)
+    number = prod(len(line) - 1 for line in lines)
+    if number * (products + len(tables)) > MOST_PRODUCTS:
+        raise ModelError(
+            f"{where}: {number} cells with {products} products of tables are too many to be worked out; thin the breakpoints"
+        )
     found = []
     for offset, factor in boxes(scaled_lines(lines, ranges)):
         here = [multilinear(own, value, places, offset) for own, value, places in read]
@@ -101,7 +111,7 @@ def pieces_of(
     whole = extract(where, symbolic, (*parameters, *free), constants)
     plain = [table.plain for table in tables.values()]
     lines = cell_lines(plain, [(p.name, p.minimum, p.maximum) for p in parameters], where)
-    cells = on_cells(plain, [p.name for p in parameters], lines, whole.matrices)
+    cells = on_cells(plain, [p.name for p in parameters], lines, whole.matrices, where)
     one = whole.denominator
     below = type(one)({(0,) * len(parameters): m for m in one.terms.values()}, (1, 1), len(parameters))
     return lines, tuple(ModelPiece(offset, factor, ExactModel(m, below)) for offset, factor, m in cells)
