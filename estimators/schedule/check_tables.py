@@ -3,8 +3,8 @@
     model.tables  {name: {"unit", "source", "over": [names], "breakpoints": [[..], ..], "values": nested alike}}
     plant         {"breakpoints": [[..] for every parameter], "cells": [{"A": .., .., "F": ..}, ..]}
 
-Cells stand in the order of their breakpoints, those of the last parameter fastest. The Chebyshev polynomials of a cell run over it:
-their argument is -1 and 1 at its ends. A breakpoint that stands twice in a table is a jump.
+Cells stand in the order of their breakpoints, those of the last parameter fastest. The argument of the Chebyshev polynomials of a
+cell is -1 and 1 at its ends. A breakpoint that stands twice in a table is a jump.
 """
 
 from __future__ import annotations

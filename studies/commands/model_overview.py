@@ -120,7 +120,7 @@ def overview(model: LpvModel) -> Overview:
     ends = [(p.minimum, p.maximum) for p in model.parameters]
     middle = model.centre[0]
     if len(ends) == 1:
-        points = np.union1d(np.linspace(*ends[0], 5), model.lines[0][:MOST_ROWS] if model.tables else [])[:, None]
+        points = np.union1d(np.linspace(*ends[0], 5), model.cells.lines[0][:MOST_ROWS] if model.tables else [])[:, None]
     else:
         corners = (
             model.physical(Faces.of(model.half_spaces).corners) if model.half_spaces else np.array(list(product(*ends)))

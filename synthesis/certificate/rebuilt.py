@@ -12,9 +12,8 @@ from estimators.schedule.check import HIGHEST_ORDER, SHAPES
 from synthesis.certificate.exact_fraction import MOST_WORK, ExactFraction, Work, common_denominator, numerator
 from synthesis.errors import ModelError
 from synthesis.loop.plant import Axis, Plant, by_cells
+from synthesis.models.cells import cell_lines, on_cells
 from synthesis.models.formula import parse, read, used
-from synthesis.models.pieces import on_cells
-from synthesis.models.table import cell_lines
 from synthesis.polynomials.chebyshev import to_chebyshev
 from synthesis.polynomials.enclosure import PolynomialMatrix, constant
 from synthesis.polynomials.quotient import least

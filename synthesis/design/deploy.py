@@ -226,7 +226,7 @@ def tabulate(
     numbers = (segments,) * len(parameters) if isinstance(segments, int) else segments
     lines = tuple(
         with_borders(np.linspace(p.minimum, p.maximum, n + 1), borders)
-        for p, n, borders in zip(parameters, numbers, gains.model.lines, strict=True)
+        for p, n, borders in zip(parameters, numbers, gains.model.cells.lines, strict=True)
     )
     points = tabulated_places(gains.model, lines)
     table, digits = table_at(gains, points, sample_time), TABLE_DIGITS + extra_digits(gains)

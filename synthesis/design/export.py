@@ -161,7 +161,7 @@ def _plant(model: LpvModel) -> dict[str, Any]:
             {key: stored(piece.exact.matrices[key].affine(piece.offset, piece.factor)) for key in SHAPES}
             for piece in model.pieces
         ]
-        return {"breakpoints": [list(line) for line in model.lines], "cells": cells}
+        return {"breakpoints": [list(line) for line in model.cells.lines], "cells": cells}
     exact = model.pieces[0].exact
     below = {"denominator": stored(exact.denominator)} if any(exact.denominator.degrees) else {}
     return {key: stored(exact.matrices[key]) for key in SHAPES} | below

@@ -183,7 +183,7 @@ def minimised(
 
 def design_scale(model: LpvModel, design: ObserverDesign) -> FloatArray:
     """`observer_scale` with every disturbance in the largest size that a channel gives it: units of sizes do not matter."""
-    poly, sizes = model.middle_piece.polynomial, _sizes(model, design)
+    poly, sizes = model.cells.middle.polynomial, _sizes(model, design)
     return observer_scale(replace(poly, E=poly.E * sizes, F=poly.F * sizes), model.parameters)
 
 

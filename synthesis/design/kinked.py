@@ -55,7 +55,7 @@ class KinkedUnknown:
 
 def borders(model: LpvModel) -> Iterator[tuple[int, float]]:
     """Parameter and scaled place of every border between cells."""
-    for i, (line, p) in enumerate(zip(model.lines, model.parameters, strict=True)):
+    for i, (line, p) in enumerate(zip(model.cells.lines, model.parameters, strict=True)):
         yield from ((i, (x - p.middle) / p.half_width) for x in line[1:-1])
 
 

@@ -19,5 +19,5 @@ def plant_of(model: LpvModel) -> Plant:
     )  # fmt: skip
     if not model.tables:
         return Plant(axes, model.exact.matrices, model.exact.denominator, model.half_spaces)
-    lines = tuple(tuple(decimal(x) for x in line) for line in model.lines)
+    lines = tuple(tuple(decimal(x) for x in line) for line in model.cells.lines)
     return by_cells(axes, lines, [piece.exact.matrices for piece in model.pieces], model.half_spaces)

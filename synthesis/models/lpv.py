@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
-from flint import fmpq
 
 from estimators.arrays import FloatArray
 from estimators.display import Display, counted
@@ -22,9 +21,9 @@ from synthesis.models.from_jacobian import jacobian_fields
 from synthesis.models.nonlinear import NonlinearModel
 from synthesis.models.numeric import NumericModel, evaluate_pieces
 from synthesis.models.param import Constant, SchedulingParameter, Signal
-from synthesis.models.pieces import ModelPiece, pieces_of
+from synthesis.models.pieces import ModelPiece, Pieces, pieces_of, whole
 from synthesis.models.symbols import plain
-from synthesis.models.table import Table, check_tables
+from synthesis.models.table import Table, check_tables, table_words
 from synthesis.polynomials.half_spaces import Faces, HalfSpaces
 
 if TYPE_CHECKING:
@@ -115,17 +114,8 @@ class LpvModel(Display):
             f"inputs; outputs: {listed(self.inputs)}; {listed(self.outputs)}",
             f"disturbances: {listed(self.disturbances)}",
             f"{counted(len(moving), 'parameter')}: {', '.join([*moving, *(c.words for c in self.constraints)]) or 'none'}",
-            *self.table_words,
+            *table_words(self.tables, self.parameters, len(self.pieces)),
         )
-
-    @property
-    def table_words(self) -> tuple[str, ...]:
-        """One line on the tables and their jumps; none without tables."""
-        if not self.tables:
-            return ()
-        listed = [f"{key} [{t.unit}] over {', '.join(t.over)}" for key, t in self.tables.items()]
-        jumps = f"; jumps: {', '.join(self.jumps)}" if self.jumps else ""
-        return (f"{counted(len(listed), 'table')}, {counted(len(self.pieces), 'cell')}: {', '.join(listed)}{jumps}",)
 
     def _check_names(self) -> None:
         if not self.states or not self.outputs:
@@ -168,7 +158,7 @@ class LpvModel(Display):
 
     def __getstate__(self) -> dict[str, object]:
         """Without exact numbers, which cannot be pickled and are worked out again where they are needed."""
-        exact = ("exact", "half_spaces", "pieces", "_cells")
+        exact = ("exact", "half_spaces", "cells")
         return {key: value for key, value in self.__dict__.items() if key not in exact}
 
     def refuse_tables(self, what: str) -> None:
@@ -180,42 +170,17 @@ class LpvModel(Display):
             )
 
     @cached_property
-    def _cells(self) -> tuple[tuple[tuple[float, ...], ...], tuple[ModelPiece, ...]]:
-        if self.tables:
-            matrices = {key: getattr(self, key) for key in MATRICES}
-            return pieces_of(f"model '{self.name}'", matrices, self.parameters, self.constants, self.tables)
-        count = len(self.parameters)
-        whole = ModelPiece((fmpq(0),) * count, (fmpq(1),) * count, self.exact)
-        return tuple((p.minimum, p.maximum) for p in self.parameters), (whole,)
+    def cells(self) -> Pieces:
+        """The pieces of the model with the borders between them."""
+        if not self.tables:
+            return whole(self.parameters, self.exact)
+        matrices = {key: getattr(self, key) for key in MATRICES}
+        return pieces_of(f"model '{self.name}'", matrices, self.parameters, self.constants, self.tables)
 
     @property
     def pieces(self) -> tuple[ModelPiece, ...]:
         """The model on every cell of its tables, the last parameter's running fastest; without tables on the whole range."""
-        return self._cells[1]
-
-    @property
-    def lines(self) -> tuple[tuple[float, ...], ...]:
-        """The borders of the cells: of every parameter its ends and the breakpoints of tables between them."""
-        return self._cells[0]
-
-    @property
-    def middle_piece(self) -> ModelPiece:
-        """The piece that holds the middle of the ranges."""
-        zero = fmpq(0)
-        return next(
-            q for q in self.pieces if all(o - f <= zero <= o + f for o, f in zip(q.offset, q.factor, strict=True))
-        )
-
-    @property
-    def jumps(self) -> tuple[str, ...]:
-        """Where tables jump, in words."""
-        units = {p.name: p.unit for p in self.parameters}
-        return tuple(
-            f"{key} at {name} = {place:g} {units[name]}"
-            for key, table in self.tables.items()
-            for name, places in table.jumps.items()
-            for place in places
-        )
+        return self.cells.all
 
     @cached_property
     def half_spaces(self) -> HalfSpaces:
@@ -243,7 +208,7 @@ class LpvModel(Display):
         if points.ndim != 2 or points.shape[-1] != count:
             raise ModelError(f"model '{self.name}': a grid of shape {points.shape} does not fit {count} parameters")
         self._check_range(points)
-        inner = [np.array(line[1:-1]) for line in self.lines]
+        inner = [np.array(line[1:-1]) for line in self.cells.lines]
         borders = [(line - p.middle) / p.half_width for line, p in zip(inner, self.parameters, strict=True)]
         return evaluate_pieces([piece.polynomial for piece in self.pieces], borders, self.parameters, points)
 

@@ -6,8 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import prod
-from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -15,13 +13,12 @@ from flint import fmpq
 
 from estimators.arrays import FloatArray
 from synthesis.errors import ModelError
+from synthesis.models.cells import cell_lines, on_cells
 from synthesis.models.extract import MATRICES, ExactModel, PolynomialModel, extract, in_floats
 from synthesis.models.param import Constant, SchedulingParameter
-from synthesis.models.table import Table, cell_lines
-from synthesis.polynomials.multilinear import Point, boxes, composed, multilinear
-from synthesis.polynomials.rational import as_float, decimal
-
-MOST_PRODUCTS = 400_000  # on all cells together
+from synthesis.models.table import Table
+from synthesis.polynomials.multilinear import Point
+from synthesis.polynomials.rational import as_float
 
 
 @dataclass(frozen=True)
@@ -43,50 +40,23 @@ class ModelPiece:
         return np.array([as_float(x) for x in self.offset]), np.array([as_float(x) for x in self.factor])
 
 
-def scaled_lines(lines: Sequence[Sequence[float]], ranges: Sequence[tuple[fmpq, fmpq]]) -> tuple[tuple[fmpq, ...], ...]:
-    """Breakpoints in u = (p - middle)/half, from those in p; `ranges` are middles and half widths."""
-    return tuple(
-        tuple((decimal(x) - middle) / half for x in line) for line, (middle, half) in zip(lines, ranges, strict=True)
-    )
+@dataclass(frozen=True)
+class Pieces:
+    """All pieces, the last parameter's running fastest, and the borders between them: of every parameter, its ends among them."""
+
+    lines: tuple[tuple[float, ...], ...]
+    all: tuple[ModelPiece, ...]
+
+    @property
+    def middle(self) -> ModelPiece:
+        """The piece that holds the middle of the ranges."""
+        return next(q for q in self.all if all(abs(o) <= f for o, f in zip(q.offset, q.factor, strict=True)))
 
 
-def on_cells(
-    tables: Sequence[Mapping[str, Any]],
-    names: Sequence[str],
-    lines: Sequence[Sequence[float]],
-    matrices: Mapping[str, Any],
-    where: str,
-) -> list[tuple[Point, Point, dict[str, Any]]]:
-    """Matrices in (u, t), t the tables in order, on every cell of `lines` as polynomials in u: offset, factor, matrices.
-
-    Tables are given as `Table.plain`; `names` are those of the parameters. Raises ModelError for too much work.
-    """
-    count = len(names)
-    ranges = [
-        ((decimal(line[0]) + decimal(line[-1])) / 2, (decimal(line[-1]) - decimal(line[0])) / 2) for line in lines
-    ]
-    read = []
-    for table in tables:
-        places = [names.index(name) for name in table["over"]]
-        own = scaled_lines(table["breakpoints"], [ranges[i] for i in places])
-
-        def value(index: tuple[int, ...], entry: Any = table["values"]) -> fmpq:
-            for k in index:
-                entry = entry[k]
-            return decimal(float(entry))
-
-        read.append((own, value, places))
-    products = sum(1 + sum(powers[count:]) for m in matrices.values() for powers in m.terms)
-    number = prod(len(line) - 1 for line in lines)
-    if number * (products + len(tables)) > MOST_PRODUCTS:
-        raise ModelError(
-            f"{where}: {number} cells with {products} products of tables are too many to be worked out; thin the breakpoints"
-        )
-    found = []
-    for offset, factor in boxes(scaled_lines(lines, ranges)):
-        here = [multilinear(own, value, places, offset) for own, value, places in read]
-        found.append((offset, factor, {key: composed(m, here, count) for key, m in matrices.items()}))
-    return found
+def whole(parameters: Sequence[SchedulingParameter], exact: ExactModel) -> Pieces:
+    """A model of one polynomial, or quotient, for the whole range."""
+    piece = ModelPiece((fmpq(0),) * len(parameters), (fmpq(1),) * len(parameters), exact)
+    return Pieces(tuple((p.minimum, p.maximum) for p in parameters), (piece,))
 
 
 def pieces_of(
@@ -95,8 +65,8 @@ def pieces_of(
     parameters: Sequence[SchedulingParameter],
     constants: Mapping[str, Constant],
     tables: Mapping[str, Table],
-) -> tuple[tuple[tuple[float, ...], ...], tuple[ModelPiece, ...]]:
-    """The grid of the cells and the model on each. Raises ModelError for entries that divide by parameters or tables."""
+) -> Pieces:
+    """The model on the cells of its tables. Raises ModelError for entries that divide by parameters or tables."""
     names = [sp.Symbol(name) for name in (*(p.name for p in parameters), *tables)]
     for key in MATRICES:
         for (i, j), entry in zip(np.ndindex(*symbolic[key].shape), symbolic[key], strict=True):
@@ -108,10 +78,10 @@ def pieces_of(
     free = tuple(
         SchedulingParameter(name, table.unit, -1.0, 1.0, -math.inf, math.inf) for name, table in tables.items()
     )
-    whole = extract(where, symbolic, (*parameters, *free), constants)
+    mixed = extract(where, symbolic, (*parameters, *free), constants)
     plain = [table.plain for table in tables.values()]
     lines = cell_lines(plain, [(p.name, p.minimum, p.maximum) for p in parameters], where)
-    cells = on_cells(plain, [p.name for p in parameters], lines, whole.matrices, where)
-    one = whole.denominator
+    cells = on_cells(plain, [p.name for p in parameters], lines, mixed.matrices, where)
+    one = mixed.denominator
     below = type(one)({(0,) * len(parameters): m for m in one.terms.values()}, (1, 1), len(parameters))
-    return lines, tuple(ModelPiece(offset, factor, ExactModel(m, below)) for offset, factor, m in cells)
+    return Pieces(lines, tuple(ModelPiece(offset, factor, ExactModel(m, below)) for offset, factor, m in cells))

@@ -8,19 +8,17 @@ either.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import prod
 from typing import Any
 
 import numpy as np
 
+from estimators.display import counted
 from estimators.errors import unknown
 from synthesis.errors import ModelError
 from synthesis.models.param import SchedulingParameter, check_unit
-
-MOST_CELLS = 4096  # of a plant: each has a polynomial and inequalities of its own
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,21 +111,17 @@ def check_tables(tables: Mapping[str, Table], parameters: Sequence[SchedulingPar
                 )
 
 
-def cell_lines(
-    tables: Iterable[Mapping[str, Any]], ranges: Sequence[tuple[str, float, float]], where: str
-) -> tuple[tuple[float, ...], ...]:
-    """The grid of the plant's cells: of every parameter (name, min, max) the ends and all breakpoints of tables between them.
-
-    Raises ModelError for more than MOST_CELLS cells.
-    """
-    inside: dict[str, set[float]] = {name: set() for name, _, _ in ranges}
-    for table in tables:
-        for name, line in zip(table["over"], table["breakpoints"], strict=True):
-            inside[name] |= {float(x) for x in line}
-    lines = tuple((low, *sorted(x for x in inside[name] if low < x < high), high) for name, low, high in ranges)
-    count = prod(len(line) - 1 for line in lines)
-    if count > MOST_CELLS:
-        raise ModelError(
-            f"{where}: the tables cut the range in {count} cells, at most {MOST_CELLS} are proved; thin them"
-        )
-    return lines
+def table_words(tables: Mapping[str, Table], parameters: Sequence[SchedulingParameter], cells: int) -> tuple[str, ...]:
+    """One line on the tables and their jumps; none without tables."""
+    if not tables:
+        return ()
+    units = {p.name: p.unit for p in parameters}
+    listed = [f"{key} [{table.unit}] over {', '.join(table.over)}" for key, table in tables.items()]
+    jumps = [
+        f"{key} at {name} = {place:g} {units[name]}"
+        for key, table in tables.items()
+        for name, places in table.jumps.items()
+        for place in places
+    ]
+    words = f"{counted(len(listed), 'table')}, {counted(cells, 'cell')}: {', '.join(listed)}"
+    return (f"{words}; jumps: {', '.join(jumps)}" if jumps else words,)

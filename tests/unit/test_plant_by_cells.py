@@ -41,11 +41,14 @@ def moving(rate: float = 1.0, name: str = "p") -> SchedulingParameter:
     return SchedulingParameter(name, "1", 0.0, 2.0, -rate, rate)
 
 
+STEADY = moving()
+
+
 def table(points: Any, values: Any, over: tuple[str, ...] = ("p",)) -> Table:
     return Table("1", "test", over, points if len(over) > 1 else (points,), values)
 
 
-def plant(A: Any, tables: dict[str, Table], parameters: Any = (moving(),), B: Any = 1) -> LpvModel:
+def plant(A: Any, tables: dict[str, Table], parameters: Any = (STEADY,), B: Any = 1) -> LpvModel:
     """x' = A x + B u + w, y = x + n / 2."""
     one = {key: (Signal(name, "1"),) for key, name in (("states", "x"), ("outputs", "y"), ("inputs", "u"))}
     return LpvModel(
@@ -216,7 +219,7 @@ def test_the_runtime_runs_the_plant_of_the_table(content: dict[str, Any]) -> Non
         one = observer.step(np.array([0.3]), np.array([0.8]), places[k]).estimate
         assert one[0] == pytest.approx((expm(whole) @ [1.0, 1.0])[0], rel=1e-13)
         assert found[k, 0] == pytest.approx(one[0], rel=1e-14)
-    with pytest.raises(ScheduleError, match="by cells .* take LpvObserver"):
+    with pytest.raises(ScheduleError, match=r"by cells .* take LpvObserver"):
         _ = schedule.polynomials
 
 
@@ -226,7 +229,7 @@ def test_several_parameters_and_tables_make_the_cells_of_all() -> None:
     model = plant(
         -a * b - p * q, {"a": over_both, "b": table((0.0, 1.5, 2.0), [1.0, 2.0, 1.5])}, (moving(), moving(1.0, "q"))
     )
-    assert model.lines == ((0.0, 0.7, 1.5, 2.0), (0.0, 2.0))
+    assert model.cells.lines == ((0.0, 0.7, 1.5, 2.0), (0.0, 2.0))
     draw = np.random.default_rng(0).uniform(0.0, 2.0, (50, 2))
     share = (draw[:, 1] + 1.0) / 4.0
     ends = [np.interp(draw[:, 0], [0.0, 0.7, 2.0], column) for column in ([1.0, 0.5, 2.0], [2.0, 4.0, 1.0])]
