@@ -19,7 +19,7 @@ from synthesis.exchange.model_table import ModelFile, ParameterTable, Rows, Sign
 from synthesis.models.constraint import ParameterConstraint, scaled_set
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Constant, SchedulingParameter, Signal
-from synthesis.models.table import Table, check_tables
+from synthesis.models.table import Table, check_table
 from synthesis.toml_file import read_table, read_toml
 from synthesis.toml_places import Path, Places
 
@@ -67,7 +67,7 @@ class _Reader:
             for name, t in table.tables.items()
         }
         for name, one in tables.items():
-            self._made(("tables", name), check_tables, {name: one}, parameters, f"tables.{name}")
+            self._made(("tables", name), check_table, one, parameters, f"tables.{name}")
         self._unique()
         formulas = Formulas(self.file, self.places, table)
         matrices = {}

@@ -23,7 +23,7 @@ from synthesis.models.numeric import NumericModel, evaluate_pieces
 from synthesis.models.param import Constant, SchedulingParameter, Signal
 from synthesis.models.pieces import ModelPiece, Pieces, pieces_of, whole
 from synthesis.models.symbols import plain
-from synthesis.models.table import Table, check_tables, table_words
+from synthesis.models.table import Table, check_table, table_words
 from synthesis.polynomials.half_spaces import Faces, HalfSpaces
 
 if TYPE_CHECKING:
@@ -92,7 +92,8 @@ class LpvModel(Display):
             object.__setattr__(self, key, matrix)
         self._check_symbols()
         self.half_spaces  # noqa: B018  a set that is empty must not exist
-        check_tables(self.tables, self.parameters, f"model '{self.name}'")
+        for key, table in self.tables.items():
+            check_table(table, self.parameters, f"model '{self.name}': table '{key}'")
         if self.tables and self.constraints:
             raise ModelError(
                 f"model '{self.name}' has tables and constraints between its parameters; one of both is supported: leave the "
@@ -107,14 +108,15 @@ class LpvModel(Display):
         def listed(signals: tuple[Signal, ...]) -> str:
             return ", ".join(f"{s.name} [{s.unit}]" for s in signals) or "none"
 
+        tables = table_words(self.tables, self.parameters, len(self.pieces)) if self.tables else ()
         moving = [f"{p.name} {p.minimum:g} to {p.maximum:g} {p.unit}" for p in self.parameters]
+        box = ", ".join([*moving, *(c.words for c in self.constraints)])
         return (
             f"LpvModel '{self.name}' ({self.source})",
             f"{counted(len(self.states), 'state')}: {listed(self.states)}",
             f"inputs; outputs: {listed(self.inputs)}; {listed(self.outputs)}",
             f"disturbances: {listed(self.disturbances)}",
-            f"{counted(len(moving), 'parameter')}: {', '.join([*moving, *(c.words for c in self.constraints)]) or 'none'}",
-            *table_words(self.tables, self.parameters, len(self.pieces)),
+            f"{counted(len(moving), 'parameter')}: {'; '.join([box or 'none', *tables])}",
         )
 
     def _check_names(self) -> None:

@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from estimators.display import counted
+from estimators.display import Display, counted
 from estimators.errors import unknown
 from synthesis.errors import ModelError
 from synthesis.models.param import SchedulingParameter, check_unit
 
 
-@dataclass(frozen=True, eq=False)
-class Table:
+@dataclass(frozen=True, eq=False, repr=False)
+class Table(Display):
     """Values (b_1, .., b_k) at the breakpoints (b_i,) of the parameters `over`, multilinear between them.
 
     Raises ModelError for breakpoints that do not rise or stand more than twice, and for values that do not fit them.
@@ -64,6 +64,20 @@ class Table:
         object.__setattr__(self, "breakpoints", lines)
         object.__setattr__(self, "values", values)
 
+    def summary(self) -> tuple[str, ...]:
+        """Range of the values over those of the breakpoints, and jumps."""
+        spans = [
+            f"{name} {line[0]:g} to {line[-1]:g}, {len(line)} points"
+            for name, line in zip(self.over, self.breakpoints, strict=True)
+        ]
+        jumps = [f"{name} = {place:g}" for name, places in self.jumps.items() for place in places]
+        return (
+            f"Table ({self.source})",
+            f"values: {self.values.min():.6g} to {self.values.max():.6g} {self.unit}",
+            f"over: {'; '.join(spans)}",
+            f"jumps: {', '.join(jumps) or 'none'}",
+        )
+
     @property
     def jumps(self) -> dict[str, tuple[float, ...]]:
         """Breakpoints that stand twice, by parameter."""
@@ -96,19 +110,18 @@ def _check_line(name: str, line: Sequence[float]) -> None:
         raise ModelError(f"table: jumps at an end of the breakpoints of {name}; give one value there")
 
 
-def check_tables(tables: Mapping[str, Table], parameters: Sequence[SchedulingParameter], where: str) -> None:
-    """Raise ModelError for tables over parameters that there are not, or that do not cover a range."""
+def check_table(table: Table, parameters: Sequence[SchedulingParameter], where: str) -> None:
+    """Raise ModelError for a table over parameters that there are not, or that does not cover a range."""
     known = {p.name: p for p in parameters}
-    for key, table in tables.items():
-        for name, line in zip(table.over, table.breakpoints, strict=True):
-            if name not in known:
-                raise ModelError(f"{where}: table '{key}': {unknown('parameter', name, list(known))}")
-            p = known[name]
-            if line[0] > p.minimum or line[-1] < p.maximum:
-                raise ModelError(
-                    f"{where}: table '{key}' covers {name} from {line[0]:g} to {line[-1]:g} {p.unit}, its range is "
-                    f"[{p.minimum:g}, {p.maximum:g}] {p.unit}; nothing is extrapolated, so shrink the range or add breakpoints"
-                )
+    for name, line in zip(table.over, table.breakpoints, strict=True):
+        if name not in known:
+            raise ModelError(f"{where}: {unknown('parameter', name, list(known))}")
+        p = known[name]
+        if line[0] > p.minimum or line[-1] < p.maximum:
+            raise ModelError(
+                f"{where}: covers {name} from {line[0]:g} to {line[-1]:g} {p.unit}, its range is [{p.minimum:g}, "
+                f"{p.maximum:g}] {p.unit}; nothing is extrapolated, so shrink the range or add breakpoints"
+            )
 
 
 def table_words(tables: Mapping[str, Table], parameters: Sequence[SchedulingParameter], cells: int) -> tuple[str, ...]:

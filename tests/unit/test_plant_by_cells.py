@@ -10,15 +10,21 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
+from flint import fmpq, fmpq_mat
+from scipy.interpolate import RegularGridInterpolator
 from scipy.linalg import expm
 
 from estimators import LpvObserver
 from estimators.errors import ScheduleError
 from estimators.schedule import GainSchedule
+from estimators.schedule.plant_cells import plant_by_cells
+from synthesis.certificate.claims import ClaimChannel
 from synthesis.certificate.proof import prove
+from synthesis.certificate.search import Search, Wish
+from synthesis.certificate.verify import Names
 from synthesis.design.deploy import Deployment, deploy
 from synthesis.design.deploy_settings import DeploySettings
-from synthesis.design.export import schedule_content
+from synthesis.design.export import _plant, schedule_content
 from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
 from synthesis.design.output_feedback import OutputFeedbackDesign, design_output_feedback
@@ -27,6 +33,7 @@ from synthesis.design.sampled_state_feedback import design_sampled_state_feedbac
 from synthesis.design.state_feedback import StateFeedbackDesign, design_state_feedback
 from synthesis.errors import ModelError, ProblemError
 from synthesis.loop.from_model import plant_of
+from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
 from synthesis.models.table import Table
@@ -50,7 +57,9 @@ def table(points: Any, values: Any, over: tuple[str, ...] = ("p",)) -> Table:
 
 def plant(A: Any, tables: dict[str, Table], parameters: Any = (STEADY,), B: Any = 1) -> LpvModel:
     """x' = A x + B u + w, y = x + n / 2."""
-    one = {key: (Signal(name, "1"),) for key, name in (("states", "x"), ("outputs", "y"), ("inputs", "u"))}
+    one: dict[str, Any] = {
+        key: (Signal(name, "1"),) for key, name in (("states", "x"), ("outputs", "y"), ("inputs", "u"))
+    }
     return LpvModel(
         "by cells", "test", **one, parameters=parameters, disturbances=(Signal("w", "1"), Signal("n", "1")),
         A=sp.Matrix([[A]]), B=sp.Matrix([[B]]), C=sp.eye(1), E=sp.Matrix([[1, 0]]), F=sp.Matrix([[0, sp.Rational(1, 2)]]),
@@ -240,10 +249,45 @@ def test_several_parameters_and_tables_make_the_cells_of_all() -> None:
 
 def test_a_jump_is_stated_and_belongs_to_the_upper_cell_at_its_place() -> None:
     model = plant(-a, {"a": JUMP})
-    assert model.summary()[-1] == "1 table, 2 cells: a [1] over p; jumps: a at p = 0.7 1"
+    assert model.summary()[-1].endswith("; 1 table, 2 cells: a [1] over p; jumps: a at p = 0.7 1")
     assert model.on([0.7 - 1e-9, 0.7, 0.7 + 1e-9]).A[:, 0, 0] == pytest.approx([-2.0, -1.0, -1.0], abs=1e-7)
     assert not plant_of(model).is_continuous
     assert "jumps" not in plant(-a, {"a": KINK}).summary()[-1]
+    stored = plant_by_cells(_plant(model), {"A": (1, 1)})["A"]
+    assert stored.at(np.array([0.7 - 1e-9, 0.7, 0.7 + 1e-9]))[:, 0, 0] == pytest.approx([-2.0, -1.0, -1.0], abs=1e-7)
+
+
+def test_a_search_sees_both_sides_of_a_jump() -> None:
+    """At the jump itself the upper side decides: a level that holds on both sides of it is found and proved, not one below."""
+    table_of_gains: dict[tuple[int, ...], Any] = {(k,): fmpq_mat([[2]]) for k in range(2)}
+    loop = ObserverLoop(
+        plant_of(plant(-a, {"a": JUMP})), ((fmpq(0), fmpq(2)),), table_of_gains, sample_time=fmpq(1, 50)
+    )
+    search = Search(loop, Names(("x",), ("w", "n")), (STEADY,), 0)
+    assert search.prove(Wish("decay rate", 2.999))[0] is not None  # 2 + 1 at the jump from above
+    claim, outcome = search.prove(Wish("decay rate", 3.001))
+    assert claim is None and (outcome is None or not outcome.proved)
+    assert search.least_gain(Wish("gain", None, ClaimChannel({"w": 1.0}, ("x",)))) == pytest.approx(1.0 / 3.0, rel=1e-5)
+
+
+def test_cells_at_once_are_those_one_by_one() -> None:
+    """On a grid of two parameters the cells do not come in the order of the plant's."""
+    both = table(((0.0, 0.7, 2.0), (0.0, 1.5, 2.0)), [[1.0, 2.0, 5.0], [0.5, 4.0, 0.1], [2.0, 1.0, 3.0]], ("p", "q"))
+    gains = {index: fmpq_mat([[1 + sum(index)]]) for index in np.ndindex(3, 3)}
+    lines = ((fmpq(0), fmpq(1), fmpq(2)), (fmpq(0), fmpq(1, 2), fmpq(2)))
+    loop = ObserverLoop(plant_of(plant(-a - p, {"a": both}, (moving(), moving(1.0, "q")))), lines, gains)
+    cells = list(loop.cells())[::-1]
+    at_once = loop.on_boxes("continuous", cells)
+    assert len(cells) == 9 and at_once is not None
+    for number, cell in enumerate(cells):
+        alone = loop.system(cell, "continuous")
+        assert alone is not None
+        middle = float(alone.A.terms[0, 0, 0, 0][0, 0].mid())
+        assert at_once.A.middle[number, 0, 0, 0] == pytest.approx(middle, rel=1e-12)
+        u = [int(x.p) / int(x.q) for x in cell.offset[:2]]
+        wanted = RegularGridInterpolator(both.breakpoints, both.values)([[1.0 + x for x in u]])[0] + 1.0 + u[0]
+        assert middle == pytest.approx(-wanted - sum(1.0 * np.interp(1.0 + x, line, [1.0, 2.0, 3.0]) - 1.0 for x, line in
+                                                      zip(u, ([0.0, 1.0, 2.0], [0.0, 0.5, 2.0]), strict=True)) - 1.0)  # fmt: skip
 
 
 def test_what_knows_no_cells_says_so_before_the_solve() -> None:
