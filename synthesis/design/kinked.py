@@ -55,8 +55,8 @@ class KinkedUnknown:
 
 def borders(model: LpvModel) -> Iterator[tuple[int, float]]:
     """Parameter and scaled place of every border between cells."""
-    for i, (line, p) in enumerate(zip(model.cells.lines, model.parameters, strict=True)):
-        yield from ((i, (x - p.middle) / p.half_width) for x in line[1:-1])
+    for i, line in enumerate(model.cells.borders):
+        yield from ((i, float(border)) for border in line)
 
 
 def bend(name: str, parameter: int, border: float) -> str:

@@ -210,9 +210,7 @@ class LpvModel(Display):
         if points.ndim != 2 or points.shape[-1] != count:
             raise ModelError(f"model '{self.name}': a grid of shape {points.shape} does not fit {count} parameters")
         self._check_range(points)
-        inner = [np.array(line[1:-1]) for line in self.cells.lines]
-        borders = [(line - p.middle) / p.half_width for line, p in zip(inner, self.parameters, strict=True)]
-        return evaluate_pieces([piece.polynomial for piece in self.pieces], borders, self.parameters, points)
+        return evaluate_pieces([p.polynomial for p in self.pieces], self.cells.borders, self.parameters, points)
 
     @property
     def centre(self) -> FloatArray:

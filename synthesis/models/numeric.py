@@ -46,9 +46,7 @@ def evaluate_pieces(
 ) -> NumericModel:
     """The same of a model by cells, whose inner `borders` (b_i,) are scaled; a point on a border is taken above it."""
     scaled = (points - np.array([p.middle for p in parameters])) / np.array([p.half_width for p in parameters])
-    owner: IndexArray = np.zeros(len(points), dtype=np.intp)
-    for column, border in zip(scaled.T, borders, strict=True):
-        owner = owner * (len(border) + 1) + np.searchsorted(border - ON_BORDER, column, "right")
+    owner = owners(borders, scaled)
     arrays = {key: np.zeros((len(points), *getattr(pieces[0], key).shape[-2:])) for key in MATRICES}
     for index in np.unique(owner):
         model, chosen = pieces[index], owner == index
@@ -59,6 +57,14 @@ def evaluate_pieces(
     for array in (points, *arrays.values()):
         array.setflags(write=False)
     return NumericModel(points, **arrays)
+
+
+def owners(borders: Sequence[FloatArray], u: FloatArray) -> IndexArray:
+    """The number of the cell that holds each of the scaled parameters (g, p), the last parameter's cells running fastest."""
+    owner: IndexArray = np.zeros(len(u), dtype=np.intp)
+    for column, border in zip(u.T, borders, strict=True):
+        owner = owner * (len(border) + 1) + np.searchsorted(border - ON_BORDER, column, "right")
+    return owner
 
 
 def values(coefficients: FloatArray, points: FloatArray) -> FloatArray:

@@ -11,10 +11,11 @@ import numpy as np
 import sympy as sp
 from flint import fmpq
 
-from estimators.arrays import FloatArray
+from estimators.arrays import FloatArray, IndexArray
 from synthesis.errors import ModelError
 from synthesis.models.cells import cell_lines, on_cells
 from synthesis.models.extract import MATRICES, ExactModel, PolynomialModel, extract, in_floats
+from synthesis.models.numeric import owners
 from synthesis.models.param import Constant, SchedulingParameter
 from synthesis.models.table import Table
 from synthesis.polynomials.multilinear import Point
@@ -46,6 +47,19 @@ class Pieces:
 
     lines: tuple[tuple[float, ...], ...]
     all: tuple[ModelPiece, ...]
+
+    @property
+    def borders(self) -> list[FloatArray]:
+        """The inner borders of every parameter, scaled."""
+        found = []
+        for line in self.lines:
+            low, high = line[0], line[-1]
+            found.append((np.array(line[1:-1]) - 0.5 * (low + high)) / (0.5 * (high - low)))
+        return found
+
+    def owner(self, u: FloatArray) -> IndexArray:
+        """The number of the piece that holds each of the scaled parameters (g, p)."""
+        return owners(self.borders, u)
 
     @property
     def middle(self) -> ModelPiece:

@@ -31,6 +31,8 @@ from synthesis.design.output_feedback import OutputFeedbackDesign, design_output
 from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.design.sampled_state_feedback import design_sampled_state_feedback
 from synthesis.design.state_feedback import StateFeedbackDesign, design_state_feedback
+from synthesis.design.static_feedback import design_static_feedback
+from synthesis.design.static_feedback_design import StaticFeedbackDesign
 from synthesis.errors import ModelError, ProblemError
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.observer import ObserverLoop
@@ -41,6 +43,7 @@ from synthesis.models.table import Table
 NOISE, PERIOD = 0.5, 0.02
 ERROR = (Channel(("w", "n"), ("x",)),)
 LAW = (FeedbackChannel(("w",), ("x", "u")),)
+NOISY_LAW = (FeedbackChannel(("w", "n"), ("x", "u")),)
 p, q, a, b = sp.symbols("p q a b")
 
 
@@ -68,6 +71,7 @@ def plant(A: Any, tables: dict[str, Table], parameters: Any = (STEADY,), B: Any 
 
 
 KINK = table((0.0, 0.7, 2.0), [3.0, 1.0, 2.5])
+KINK_LINE = ([0.0, 0.7, 2.0], [3.0, 1.0, 2.5])
 JUMP = table((0.0, 0.7, 0.7, 2.0), [3.0, 2.0, 1.0, 2.5])
 
 
@@ -110,7 +114,7 @@ def test_gains_bend_where_the_plant_does() -> None:
         )
 
 
-@pytest.mark.parametrize("law", ["held", "sampled", "feedback", "sampled feedback"])
+@pytest.mark.parametrize("law", ["held", "sampled", "feedback", "sampled feedback", "output feedback"])
 def test_a_polynomial_plant_that_is_cut_keeps_its_level(law: str) -> None:
     cut = plant(-1 - a**2, {"a": table((0.0, 0.3, 1.1, 2.0), [0.0, 0.3, 1.1, 2.0])})
     levels = []
@@ -121,10 +125,28 @@ def test_a_polynomial_plant_that_is_cut_keeps_its_level(law: str) -> None:
             levels.append(design_sampled_observer(model, ObserverDesign(ERROR, degree=0), PERIOD).gamma_lower)
         elif law == "feedback":
             levels.append(design_state_feedback(model, StateFeedbackDesign(LAW, degree=0)).gamma_lower)
+        elif law == "output feedback":
+            levels.append(design_output_feedback(model, OutputFeedbackDesign(NOISY_LAW, degree=0)).gamma_lower)
         else:
             levels.append(design_sampled_state_feedback(model, StateFeedbackDesign(LAW, degree=0), PERIOD).gamma_lower)
     assert len(cut.pieces) == 3
     assert levels[0] == pytest.approx(levels[1], rel=1e-4)
+
+
+def test_output_feedback_of_a_kink_lies_between_its_frozen_loops_and_is_proved() -> None:
+    """The controller is worked out on each piece; every frozen closed loop stays below the level, the worst one near it."""
+    model = plant(a, {"a": KINK})
+    found = design_output_feedback(model, OutputFeedbackDesign(NOISY_LAW))
+    places, frequencies, worst = np.linspace(0.0, 2.0, 21), 1j * np.geomspace(1e-2, 1e2, 60), 0.0
+    for rate, Ak, Bk, Ck, Dk in zip(
+        np.interp(places, *KINK_LINE), *(m[:, 0, 0] for m in found.controller(places)), strict=True
+    ):
+        A, C = np.array([[rate + Dk, Ck], [Bk, Ak]]), np.array([[1.0, 0.0], [Dk, Ck]])
+        B, D = np.array([[1.0, NOISE * Dk], [0.0, NOISE * Bk]]), np.array([[0.0, 0.0], [0.0, NOISE * Dk]])
+        assert np.linalg.eigvals(A).real.max() < 0.0
+        answers = C @ np.linalg.solve(frequencies[:, None, None] * np.eye(2) - A, B[None].astype(complex)) + D
+        worst = max(worst, float(np.linalg.norm(answers, 2, axis=(1, 2)).max()))
+    assert 0.8 * found.gamma < worst <= found.gamma
 
 
 @pytest.fixture(scope="module")
@@ -293,6 +315,6 @@ def test_cells_at_once_are_those_one_by_one() -> None:
 def test_what_knows_no_cells_says_so_before_the_solve() -> None:
     model = plant(-a, {"a": KINK})
     with pytest.raises(ModelError, match=r"table\(s\) a: .* does not support a plant by cells"):
-        design_output_feedback(model, OutputFeedbackDesign(LAW))
+        design_static_feedback(model, StaticFeedbackDesign(LAW))
     with pytest.raises(ModelError, match="divides by a parameter or a table"):
         plant(-1 / a, {"a": KINK})
