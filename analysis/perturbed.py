@@ -53,6 +53,7 @@ class PerturbedModel(Display):
     _functions: Mapping[str, Callable[..., Any]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        self.model.refuse_tables("a sweep over constants")
         scheduled = [p.name for p in self.model.parameters]
         names = (*scheduled, *self.model.constants)
         symbols = [sp.Symbol(name) for name in names]

@@ -36,6 +36,7 @@ def static_gain(model: LpvModel, disturbance: str, error: str) -> StaticGain:
     >>> print(static_gain(model, "friction", "relative_velocity").expression)  # no gain L in it
     -sigma0/(effective_radius*kappa*sigma2*wheel_speed + sigma0)
     """
+    model.refuse_tables("a formula of the static gain")
     d, z = selection(model, (disturbance,), (error,))
     gain = sp.Matrix(len(model.states), len(model.outputs), lambda i, j: sp.Symbol(f"L_{i + 1}_{j + 1}"))
     A_e, B_e = sp.Matrix(model.A) - gain * sp.Matrix(model.C), sp.Matrix(model.E) - gain * sp.Matrix(model.F)

@@ -129,6 +129,7 @@ def observability_matrix(
     >>> observability_matrix(model).matrix.shape
     (2, 2)
     """
+    model.refuse_tables("a matrix of formulas in the parameters")
     names = [p.name for p in model.parameters]
     for key, value in (motion or {}).items():
         for name in (key, value):
@@ -149,6 +150,7 @@ def controllability_matrix(model: LpvModel, blocks: int | None = None) -> Observ
     >>> controllability_matrix(model).matrix.shape
     (2, 2)
     """
+    model.refuse_tables("a matrix of formulas in the parameters")
     if not model.inputs:
         raise AnalysisError(f"model '{model.name}' has no inputs: nothing of it can be controlled")
     rows = blocks or len(model.states)
@@ -178,6 +180,7 @@ def frozen_observability_matrix(model: LpvModel, blocks: int | None = None) -> O
     >>> frozen_observability_matrix(model).frozen
     True
     """
+    model.refuse_tables("a matrix of formulas in the parameters")
     out = observability_of(model.A, model.C, {}, blocks or len(model.states), [s.name for s in model.states])
     return _of_model(model, out, frozen=True)
 

@@ -30,8 +30,8 @@ class RangeRank(Display):
 
     `verdict`: "full": everywhere, proved by the sign of a minor's common factor in ball arithmetic; "lost": on the set
     `loss.condition` = 0, which passes through the box (and what constraints leave of it), shown by two exact signs; "never": for
-    no value; "open": not decided (a rate without bound, a second derivative, or a matrix too large for symbols; then `loss` is
-    None).
+    no value; "open": not decided (a rate without bound, a second derivative; tables, or a matrix too large for symbols: then
+    `loss` is None).
     `blocks` is how many outputs with their derivatives were used.
     """
 
@@ -65,6 +65,8 @@ def controllability_over_range(model: LpvModel) -> RangeRank:
 def _over_range(model: LpvModel, each: int, matrix: Callable[[int], ObservabilityMatrix]) -> RangeRank:
     n = len(model.states)
     found = RangeRank("open", 0, None)
+    if model.tables:  # no one formula of the parameters
+        return found
     for blocks in range(ceil(n / each), n + 1):
         if comb(blocks * each, n) > MOST_MINORS:
             break

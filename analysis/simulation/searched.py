@@ -17,7 +17,8 @@ from analysis.simulation.channel import channel_of
 from analysis.simulation.linear import Linear
 from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule, PlantQuotient
-from estimators.schedule.plant import PlantPolynomial, PlantPolynomials
+from estimators.schedule.gain_schedule import AnyPlant
+from estimators.schedule.plant_cells import PlantByCells
 from synthesis.certificate.claims import ERROR_EQUATION, ClaimChannel
 from synthesis.loop.plant import Axis
 from synthesis.models.constraint import ParameterConstraint, half_spaces_of
@@ -44,7 +45,7 @@ class ScheduleQuestion:
     def order(self) -> int:
         """One more than the degree of the error equation along a line in one cell: that of the plant, and of L times C.
 
-        A rational plant counts as a polynomial that comes close to it over the short pieces of a trajectory.
+        A rational plant, and one by cells, counts as a polynomial that comes close over the short pieces of a trajectory.
         """
         degrees = {key: _degree(matrix) for key, matrix in self.schedule.plant.items()}
         most: int = max(*(degrees[key] for key in "AE"), *(degrees[key] + len(self.axes) for key in "CF"))
@@ -169,7 +170,9 @@ def largest_continuous_gain(question: ScheduleQuestion, count: int) -> tuple[flo
     return gain, np.broadcast_to(question.physical(place[None]), (count, len(place)))
 
 
-def _degree(matrix: PlantPolynomial | PlantPolynomials | PlantQuotient) -> int:
+def _degree(matrix: AnyPlant) -> int:
+    if isinstance(matrix, PlantByCells):
+        return int(sum(n - 1 for n in matrix.pieces.shape[1:-2])) + CLOSE
     if isinstance(matrix, PlantQuotient):
         return _degree(matrix.numerator) + 2 * _degree(matrix.denominator) + CLOSE
     return sum(max(n - 1, 0) for n in matrix.coefficients.shape[:-2])

@@ -22,6 +22,7 @@ from estimators.errors import ScheduleError
 from estimators.interpolate import Multilinear
 from estimators.schedule import GainSchedule
 from estimators.schedule.plant import chebyshev
+from estimators.schedule.plant_cells import PlantByCells
 from estimators.schedule.quotient import PlantQuotient
 
 _ENOUGH = 2.0**-53
@@ -66,28 +67,37 @@ class ExactStep:
         self.sizes = len(schedule.states), len(schedule.inputs), len(schedule.outputs)
         nx, nu, ny = self.sizes
         period = schedule.sample_time
-        stored: dict[str, FloatArray] = {}
+        stored: dict[str, FloatArray] = {}  # with the cells of the plant in front
         sizes: dict[str, FloatArray] = {}
         count = len(schedule.parameters)
+        first = schedule.plant["A"]
+        self.cells = first if isinstance(first, PlantByCells) else None
         self.divided = False
         for key, scale in (("A", period), ("B", period), ("C", 1.0), ("D", 1.0)):
             matrix = schedule.plant[key]
             sizes[key] = scale * matrix.largest
+            if isinstance(matrix, PlantByCells):
+                stored[key] = scale * matrix.pieces
+                continue
             if isinstance(matrix, PlantQuotient):
-                stored["denominator"], matrix, self.divided = matrix.denominator.coefficients, matrix.numerator, True
-            stored[key] = scale * matrix.coefficients
-        self.orders = [max(1, *(part.shape[axis] for part in stored.values())) for axis in range(count)]
-        flat = []
+                stored["denominator"], matrix, self.divided = (
+                    matrix.denominator.coefficients[None],
+                    matrix.numerator,
+                    True,
+                )
+            stored[key] = scale * matrix.coefficients[None]
+        self.orders = [max(1, *(part.shape[1 + axis] for part in stored.values())) for axis in range(count)]
+        flat, number = [], len(stored["A"])
         shapes = {"A": (nx, nx), "B": (nx, nu), "C": (ny, nx), "D": (ny, nu)}
         for key, shape in (shapes | ({"denominator": (1, 1)} if self.divided else {})).items():
-            full = np.zeros((*self.orders, *shape))
-            full[tuple(slice(n) for n in stored[key].shape[:count])] = stored[key]
-            flat.append(full.reshape(math.prod(self.orders), shape[0] * shape[1]))
-        self.coefficients: FloatArray = np.hstack(flat)
-        self.ends = np.cumsum([part.shape[1] for part in flat])[:-1]
-        first = schedule.plant["A"]
-        self.middle: FloatArray = np.atleast_1d(first.middle)
-        self.half: FloatArray = np.atleast_1d(first.half)
+            full = np.zeros((number, *self.orders, *shape))
+            full[(slice(None), *(slice(n) for n in stored[key].shape[1 : 1 + count]))] = stored[key]
+            flat.append(full.reshape(number, math.prod(self.orders), shape[0] * shape[1]))
+        self.coefficients: FloatArray = np.concatenate(flat, axis=2)
+        self.ends = np.cumsum([part.shape[2] for part in flat])[:-1]
+        if self.cells is None:
+            self.middle, self.half = (np.atleast_1d(getattr(first, key)) for key in ("middle", "half"))
+            self.coefficients = self.coefficients[0]
         self.sampled = schedule.observer_update == "sampled"
         table = schedule.table if self.sampled else period * schedule.table
         self.gains = Multilinear(schedule.grid, table)
@@ -129,8 +139,11 @@ class ExactStep:
     def plant(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """T A, T B, C and D at parameters (n, p)."""
         nx, nu, ny = self.sizes
-        basis = chebyshev((parameters - self.middle) / self.half, self.orders)
-        values = basis @ self.coefficients
+        if self.cells is None:
+            values = chebyshev((parameters - self.middle) / self.half, self.orders) @ self.coefficients
+        else:
+            number, t = self.cells.local(parameters)
+            values = (chebyshev(t, self.orders)[:, None] @ self.coefficients.take(number, 0))[:, 0]
         if self.divided:  # by the last column
             values = values / values[:, -1:]
         A, B, C, D = np.split(values, self.ends, axis=1)[:4]

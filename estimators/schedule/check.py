@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from estimators.schedule.check_tables import check_cells, check_tables
 from estimators.schedule.check_update import LoopSizes, check_gain, check_update
 from estimators.schedule.checker import DEEPEST, LONGEST_NAME, Checker, quoted, shown, too_deep
 from estimators.schedule.constraints import check_constraints
@@ -38,7 +39,8 @@ def check_content(content: Mapping[str, Any], where: str) -> None:
     """Checks the form of everything; digests are checked when a file is read.
 
     The plant is xdot = A x + B u + E d, y = C x + D u + F d, its matrices polynomials in u = (p - middle)/half of each parameter,
-    over `plant.denominator` where there is one (a positive polynomial; absent: one);
+    over `plant.denominator` where there is one (a positive polynomial; absent: one), or a plant by cells
+    (`estimators.schedule.check_tables`, of `model.tables`, which may be left out);
     `gain.table` has the shape (breakpoints of each parameter, rows, columns): an observer's states by outputs, or what
     `gain_signals` names. Rates are numbers, or both null: the parameter may jump, and no P depends on it. `constraints`, which
     may be left out, are linear inequalities between the parameters (`estimators.schedule.constraints`). `provenance` says where
@@ -60,12 +62,9 @@ def check_content(content: Mapping[str, Any], where: str) -> None:
     if "constraints" in content:
         check_constraints(check, content["constraints"], content["scheduling"])
     loop = check_update(check, content["update"], sizes)
-    check.keys(content["plant"], "plant", tuple(SHAPES), ("denominator",))
-    for key, kinds in SHAPES.items():
-        shape = (sizes[kinds[0]], sizes[kinds[1]])
-        check.polynomial(content["plant"][key], f"plant.{key}", len(counts), shape, HIGHEST_ORDER)
-    if "denominator" in content["plant"]:
-        check.polynomial(content["plant"]["denominator"], "plant.denominator", len(counts), (1, 1), HIGHEST_ORDER)
+    if "tables" in content["model"]:
+        check_tables(check, content["model"]["tables"], content["scheduling"], MOST_BREAKPOINTS)
+    _plant(check, content["plant"], content["scheduling"], sizes)
     check_gain(check, content["gain"], (*counts, loop.rows, loop.columns))
     for index, claim in enumerate(check.items(content["claims"], "claims", most=MOST_CLAIMS)):
         _claim(check, claim, f"claims[{index}]", len(counts), loop)
@@ -85,9 +84,21 @@ def check_depth(content: Any, where: str) -> None:
         Checker(where).fail(place, f"lists and objects are nested too deeply; at most {DEEPEST} levels are read")
 
 
+def _plant(check: Checker, plant: Any, scheduling: Any, sizes: Mapping[str, int]) -> None:
+    shapes = {key: (sizes[rows], sizes[columns]) for key, (rows, columns) in SHAPES.items()}
+    if isinstance(plant, Mapping) and "cells" in plant:
+        check_cells(check, plant, scheduling, shapes, HIGHEST_ORDER, CLOSEST)
+        return
+    check.keys(plant, "plant", tuple(SHAPES), ("denominator",))
+    for key, shape in shapes.items():
+        check.polynomial(plant[key], f"plant.{key}", len(scheduling), shape, HIGHEST_ORDER)
+    if "denominator" in plant:
+        check.polynomial(plant["denominator"], "plant.denominator", len(scheduling), (1, 1), HIGHEST_ORDER)
+
+
 def _model(check: Checker, model: Any) -> dict[str, int]:
     """The number of states, inputs, outputs and disturbances."""
-    check.keys(model, "model", ("id", "source", *SIGNALS, "constants", "matrices"))
+    check.keys(model, "model", ("id", "source", *SIGNALS, "constants", "matrices"), ("tables",))
     check.text(model["id"], "model.id", most=2 * LONGEST_NAME)
     check.text(model["source"], "model.source")
     names: list[str] = []

@@ -21,6 +21,7 @@ from estimators.schedule.constraints import ParameterSet, parameter_set
 from estimators.schedule.files import check_seal, read_content, sealed
 from estimators.schedule.gain_signals import gain_signals, per_second, quotient
 from estimators.schedule.plant import PlantPolynomial, PlantPolynomials, plant_of
+from estimators.schedule.plant_cells import PlantByCells, plant_by_cells
 from estimators.schedule.quotient import PlantQuotient, quotients
 from estimators.schedule.upgrade import FIRST_FORMAT, upgraded
 
@@ -28,6 +29,7 @@ SHIPPED = Path(__file__).parents[1] / "schedules"
 Update = Literal["held", "sampled"]  # of an observer
 Kind = Literal["held", "sampled", "feedback"]
 Limit = tuple[float, float] | None
+AnyPlant = PlantPolynomial | PlantPolynomials | PlantQuotient | PlantByCells
 
 
 class Signal(NamedTuple):
@@ -82,7 +84,7 @@ class GainSchedule(Display):
     table: FloatArray
     sample_time: float
     update: Kind
-    plant: Mapping[str, PlantPolynomial | PlantPolynomials | PlantQuotient]
+    plant: Mapping[str, AnyPlant]
     states: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
@@ -175,10 +177,10 @@ class GainSchedule(Display):
         """The plant as polynomials of the only parameter.
 
         Raises:
-            ScheduleError: there are several, or the plant is divided by one.
+            ScheduleError: there are several, or the plant is divided by one or is a plant by cells.
         """
         self._only_one()
-        if isinstance(self.plant["A"], PlantQuotient):
+        if isinstance(self.plant["A"], PlantQuotient | PlantByCells):
             _ = self.plant["A"].coefficients  # refuses
         return {key: matrix for key, matrix in self.plant.items() if isinstance(matrix, PlantPolynomial)}
 
@@ -304,11 +306,12 @@ def _build(content: Mapping[str, Any], where: str) -> GainSchedule:
     }
     sizes = {kind: len(found) for kind, found in signals.items()}
     ranges = [(parameter.min, parameter.max) for parameter in parameters]
-    numerators = {
-        key: plant_of(content["plant"][key], ranges, (sizes[rows], sizes[columns]))
-        for key, (rows, columns) in SHAPES.items()
-    }
-    plant: Mapping[str, PlantPolynomial | PlantPolynomials | PlantQuotient] = numerators
+    shapes = {key: (sizes[rows], sizes[columns]) for key, (rows, columns) in SHAPES.items()}
+    plant: Mapping[str, AnyPlant]
+    if "cells" in content["plant"]:
+        plant = plant_by_cells(content["plant"], shapes)
+    else:
+        plant = numerators = {key: plant_of(content["plant"][key], ranges, shape) for key, shape in shapes.items()}
     if "denominator" in content["plant"]:
         below = plant_of(content["plant"]["denominator"], ranges, (1, 1))
         plant = quotients(numerators, below, [parameter.name for parameter in parameters], where)

@@ -68,7 +68,8 @@ class ExactUpdate:
         entries = plant_entries(schedule)
         self.constants: list[Number] = [entry[0] if len(entry) == 1 else 0.0 for entry in entries]
         self.varying = [(place, entry) for place, entry in enumerate(entries) if len(entry) > 1]
-        self.middle, self.half = schedule.plant["A"].middle, schedule.plant["A"].half
+        first = schedule.polynomials["A"]
+        self.middle, self.half = first.middle, first.half
         self.sampled = schedule.observer_update == "sampled"
         factor = 1.0 if self.sampled else schedule.sample_time
         self.gains = PiecewiseLinear(schedule.breakpoints, factor * schedule.table[:, :, 0])  # K or T L

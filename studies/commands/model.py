@@ -16,6 +16,7 @@ from synthesis.design.export import formula
 from synthesis.models.extract import MATRICES
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter
+from synthesis.models.table import table_words
 
 
 def run_model(file: str, out: Path | None, as_json: bool) -> int:
@@ -57,6 +58,8 @@ def _lines(model: LpvModel) -> Iterator[str]:
         yield f"{'constraint':<14}{constraint.words}"
     for name, constant in model.constants.items():
         yield f"{'constant':<14}{name} = {constant.value:g} {constant.unit} ({constant.source})"
+    for words in table_words(model.tables, model.parameters, len(model.pieces)):
+        yield f"{'tables':<14}{words}"
     for key in MATRICES:
         matrix = getattr(model, key)
         for i, row in enumerate(matrix.tolist()):

@@ -103,6 +103,7 @@ class Overview:
                 {"coefficients": dict(c.coefficients), "max": c.maximum, "unit": c.unit} for c in model.constraints
             ],
             "constants": {name: {"value": c.value, "unit": c.unit, "source": c.source} for name, c in model.constants.items()},
+            **({"tables": {name: table.plain for name, table in model.tables.items()}} if model.tables else {}),
             "matrices": {key: [[formula(e, model) for e in row] for row in getattr(model, key).tolist()] for key in SHAPES},
             "poles": [
                 {"at": dict(zip([p.name for p in model.parameters], map(float, point), strict=True)),
@@ -119,7 +120,7 @@ def overview(model: LpvModel) -> Overview:
     ends = [(p.minimum, p.maximum) for p in model.parameters]
     middle = model.centre[0]
     if len(ends) == 1:
-        points = np.linspace(*ends[0], 5)[:, None]
+        points = np.union1d(np.linspace(*ends[0], 5), model.cells.lines[0][:MOST_ROWS] if model.tables else [])[:, None]
     else:
         corners = (
             model.physical(Faces.of(model.half_spaces).corners) if model.half_spaces else np.array(list(product(*ends)))

@@ -12,6 +12,7 @@ import numpy as np
 from analysis.perturbed import Matrices, PerturbedModel
 from estimators.arrays import FloatArray
 from estimators.schedule import GainSchedule, PlantPolynomial, PlantQuotient
+from estimators.schedule.plant_cells import PlantByCells
 from synthesis.models.extract import MATRICES
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
@@ -94,6 +95,8 @@ def polynomial_plant(schedule: GainSchedule) -> Plant:
     `A_2_1` multiplies the entry in row 2, column 1 of A, at every value of the scheduling parameter.
     """
     entries, p = {}, schedule.parameter
+    if isinstance(schedule.plant["A"], PlantByCells):
+        _ = schedule.polynomials  # refuses
     found = {key: m for key, m in schedule.plant.items() if isinstance(m, PlantPolynomial | PlantQuotient)}
     for key in "ACEF":
         present = found[key].largest > 0.0

@@ -50,14 +50,14 @@ class InsideSample:
 
 
 def inside_sample(loop: Loop) -> InsideSample | None:
-    """The bounds for a loop with a sample time; None if a parameter may jump, or if a bound is not finite."""
+    """The bounds for a loop with a sample time; None if a parameter or the plant may jump, or if a bound is not finite."""
     plant, period = loop.plant, loop.sample_time
-    if period is None or any(axis.may_jump for axis in plant.axes):
+    if period is None or any(axis.may_jump for axis in plant.axes) or not plant.is_continuous:
         return None
     parts = _on_parts(plant)
     if parts is None:
         return None
-    n, nu = plant.states, plant.matrices["B"].shape[1]
+    n, nu = plant.states, plant.shape("B")[1]
     grown = (_over_parts(_comparison, [part["A"] for part in parts]) * arb(period)).exp()
     largest = _over_parts(_largest, [part["B"] for part in parts])
     moved, driven = arb_mat(n, n), arb_mat(n, nu)
@@ -74,11 +74,15 @@ def inside_sample(loop: Loop) -> InsideSample | None:
 
 def _on_parts(plant: Plant) -> list[dict[str, PolynomialMatrix]] | None:
     """A, B and their derivatives A0, B0, A1, .. by u_0, u_1, .. on parts that cover the range, balls; None if one is open."""
-    A, B, d, count = plant.matrices["A"], plant.matrices["B"], plant.denominator, len(plant.axes)
-    given = {"A": A, "B": B}
+    count = len(plant.axes)
     if plant.is_polynomial:
-        slopes = {f"{key}{i}": m.derivative(i) for key, m in given.items() for i in range(count)}
-        return [{key: m.balls() for key, m in (given | slopes).items()}]
+        parts = []
+        for middle, factor, piece in plant.cells:
+            given = {key: piece.matrices[key] for key in "AB"}
+            slopes = {f"{key}{i}": m.derivative(i) for key, m in given.items() for i in range(count)}
+            parts.append({key: m.affine(middle, factor).balls() for key, m in (given | slopes).items()})
+        return parts
+    d, given = plant.denominator, {key: plant.matrices[key] for key in "AB"}
     turned = {
         f"{key}{i}": m.derivative(i).scaled_by(d) - m.scaled_by(d.derivative(i))
         for key, m in given.items() for i in range(count)

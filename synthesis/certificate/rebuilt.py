@@ -11,7 +11,8 @@ from estimators.errors import ScheduleError
 from estimators.schedule.check import HIGHEST_ORDER, SHAPES
 from synthesis.certificate.exact_fraction import MOST_WORK, ExactFraction, Work, common_denominator, numerator
 from synthesis.errors import ModelError
-from synthesis.loop.plant import Axis, Plant
+from synthesis.loop.plant import Axis, Plant, by_cells
+from synthesis.models.cells import cell_lines, on_cells
 from synthesis.models.formula import parse, read, used
 from synthesis.polynomials.chebyshev import to_chebyshev
 from synthesis.polynomials.enclosure import PolynomialMatrix, constant
@@ -26,11 +27,14 @@ HALVINGS = 40  # towards the zero of a denominator, for the message
 def rebuilt_plant(content: Mapping[str, Any], axes: tuple[Axis, ...], where: str, tied: bool) -> Plant:
     """The plant of formulas and constants in powers of u, over one common denominator that is positive on the range.
 
-    The denominator is the least one, and one in the middle of the range. Raises ScheduleError or ModelError where formulas cannot
-    be read, where the denominator is not positive, and (if `tied`) for constants in no formula.
+    The denominator is the least one, and one in the middle of the range. With tables the plant is a polynomial on each cell of
+    their grid. Raises ScheduleError or ModelError where formulas cannot be read, where the denominator is not positive, for
+    formulas that divide by a parameter or a table where there are tables, and (if `tied`) for constants and tables in no formula.
     """
+    tables = content["model"].get("tables", {})
     entries = _entries(content, axes, where, tied)
-    _refuse_poles(entries, axes, where)
+    if not tables:
+        _refuse_poles(entries, axes, where)
     try:
         common = common_denominator(list(entries.values()))
     except ModelError as error:
@@ -45,15 +49,27 @@ def rebuilt_plant(content: Mapping[str, Any], axes: tuple[Axis, ...], where: str
             raise ModelError(f"{place}: {error}") from None
         for powers, coefficient in _powers(above, place).items():
             cells[key].setdefault(powers, [fmpq(0)] * (rows * columns))[i * columns + j] = coefficient
+    count = len(axes) + len(tables)
     matrices = {
         key: PolynomialMatrix({powers: fmpq_mat(*shapes[key], entries) for powers, entries in found.items()},
-                              shapes[key], len(axes))
+                              shapes[key], count)
         for key, found in cells.items()
     }  # fmt: skip
     one = constant(fmpq_mat([[1]]), len(axes))
-    if common is None:
-        return Plant(axes, matrices, one)
-    return Plant(axes, matrices, _scalar(common, f"{where}: model.matrices: denominator"))
+    if not tables:
+        below = one if common is None else _scalar(common, f"{where}: model.matrices: denominator")
+        return Plant(axes, matrices, below)
+    if common is not None:
+        raise ModelError(f"{where}: model.matrices: a formula divides by a parameter or a table; with tables none may")
+    lines = cell_lines(
+        tables.values(), [(p["name"], float(p["min"]), float(p["max"])) for p in content["scheduling"]], where
+    )
+    found = on_cells(list(tables.values()), [axis.name for axis in axes], lines, matrices, where)
+    if any(max(m.degrees) > HIGHEST_ORDER for _, _, piece in found for m in piece.values()):
+        raise ModelError(
+            f"{where}: model.matrices: a power above {HIGHEST_ORDER} of a scheduling parameter, with tables put in"
+        )
+    return by_cells(axes, tuple(tuple(decimal(x) for x in line) for line in lines), [m for _, _, m in found])
 
 
 def _refuse_poles(entries: Mapping[tuple[str, int, int], ExactFraction], axes: tuple[Axis, ...], where: str) -> None:
@@ -89,6 +105,22 @@ def _zero(below: PolynomialMatrix, place: tuple[fmpq, ...]) -> list[fmpq]:
 
 def check_stored_plant(stored: Mapping[str, Any], plant: Plant, where: str) -> None:
     """The stored float64 coefficients are the exact ones, rounded. Raises ScheduleError naming the entry."""
+    if bool(plant.pieces) != ("cells" in stored):
+        raise ScheduleError(
+            f"{where}: plant: is {'one polynomial' if plant.pieces else 'by cells'}, the model's tables say otherwise"
+        )
+    if plant.pieces:
+        for i, (line, given) in enumerate(zip(plant.lines, stored["breakpoints"], strict=True)):
+            if [decimal(x) for x in given] != list(line):
+                raise ScheduleError(
+                    f"{where}: plant.breakpoints[{i}]: are not the ends and the breakpoints of the tables between"
+                )
+        for k, (offset, factor, piece) in enumerate(plant.cells):
+            for key, matrix in piece.matrices.items():
+                _check_stored(
+                    stored["cells"][k][key], matrix.affine(offset, factor), f"{where}: plant.cells[{k}].{key}"
+                )
+        return
     for key, matrix in plant.matrices.items():
         _check_stored(stored[key], matrix, f"{where}: plant.{key}")
     place = f"{where}: plant.denominator"
@@ -104,18 +136,25 @@ def check_stored_plant(stored: Mapping[str, Any], plant: Plant, where: str) -> N
 def _entries(
     content: Mapping[str, Any], axes: tuple[Axis, ...], where: str, tied: bool
 ) -> dict[tuple[str, int, int], ExactFraction]:
-    """Every entry of every matrix, reduced."""
+    """Every entry of every matrix, reduced, in the scaled parameters and the tables as they are."""
     model = content["model"]
-    context = fmpq_mpoly_ctx.get(tuple(f"u{i}" for i in range(len(axes))), "lex")
+    tables = model.get("tables", {})
+    context = fmpq_mpoly_ctx.get(tuple(f"u{i}" for i in range(len(axes) + len(tables))), "lex")
     if sum(len(text) for rows in model["matrices"].values() for row in rows for text in row) > MOST_TEXT:
         raise ScheduleError(f"{where}: model.matrices: formulas of more than {MOST_TEXT} characters together")
     work = Work(MOST_WORK)
     values = {
         axis.name: ExactFraction(context.gens()[i] * axis.half + axis.middle, work) for i, axis in enumerate(axes)
     }
+    for index, name in enumerate(tables, len(axes)):
+        if name in values:
+            raise ScheduleError(f"{where}: model.tables.{name}: is the name of a scheduling parameter, too")
+        values[name] = ExactFraction(context.gens()[index], work)
     for name, entry in model["constants"].items():
         if name in values:
-            raise ScheduleError(f"{where}: model.constants.{name}: is the name of a scheduling parameter, too")
+            raise ScheduleError(
+                f"{where}: model.constants.{name}: is the name of a scheduling parameter or a table, too"
+            )
         values[name] = ExactFraction(context.constant(decimal(entry["value"])), work)
     mentioned: set[str] = set()
     found = {}
@@ -132,11 +171,12 @@ def _entries(
                     words = str(error)
                     raise ModelError(words if words.startswith(where) else f"{place}: {words}") from None
                 _powers(found[key, i, j].above, place)
-    idle = sorted(set(model["constants"]) - mentioned)
-    if idle and tied:
-        raise ScheduleError(
-            f"{where}: model.constants.{idle[0]}: appears in no formula; what it says is tied to nothing"
-        )
+    for kind in ("constants", "tables"):
+        idle = sorted(set(model.get(kind, ())) - mentioned)
+        if idle and tied:
+            raise ScheduleError(
+                f"{where}: model.{kind}.{idle[0]}: appears in no formula; what it says is tied to nothing"
+            )
     return found
 
 

@@ -78,16 +78,22 @@ def undetectable_place(plant: Plant, parts: int = 8) -> Point | None:
     Looked for on a grid and, with one parameter, wherever in the range the observability matrix loses rank at a rational number.
     """
     lines = [[fmpq(2 * k - parts, parts) for k in range(parts + 1)]] * len(plant.axes)
-    for number, point in enumerate(chain(_corners(plant), product(*lines), _hiding(plant))):
-        if number > MOST_POINTS:
-            break
-        if not plant.admits(point):
-            continue
-        A, C = (plant.matrices[key].at(point) for key in "AC")
-        below = plant.denominator.at(point)[0, 0]
-        hidden = _hidden(A * (1 / below), C)
-        if hidden is not None and is_hurwitz(hidden) is False:
-            return point
+    for offset, factor, piece in plant.cells:
+        inside = [
+            tuple(o + f * x for o, f, x in zip(offset, factor, local, strict=True))
+            for local in (product(*lines) if not plant.pieces else product((-1, 0, 1), repeat=len(lines)))
+        ]
+        for number, point in enumerate(chain(_corners(plant) if not plant.pieces else (), inside, _hiding(piece))):
+            if number > MOST_POINTS:
+                break
+            in_cell = all(abs(u - o) <= f for u, o, f in zip(point, offset, factor, strict=True))
+            if not in_cell or not plant.admits(point):
+                continue
+            A, C = (piece.matrices[key].at(point) for key in "AC")
+            below = piece.denominator.at(point)[0, 0]
+            hidden = _hidden(A * (1 / below), C)
+            if hidden is not None and is_hurwitz(hidden) is False:
+                return point
     return None
 
 

@@ -21,6 +21,7 @@ from synthesis.polynomials.half_spaces import Faces
 
 MOST_PLACES = 4000  # of the parameters; larger tables are looked at in the corners of their cells only
 MOST_STANDING = 600  # places of a rational plant that are looked at one by one
+INSIDE = 1e-7  # of a cell of a plant that jumps, from its border
 MATRICES = ("A", "C", "coasting", "denominator")
 GROUPS = ("B", "D")
 
@@ -45,6 +46,8 @@ class SampledLoop:
         count, cells = len(self.loop.plant.axes), list(self.loop.cells())
         parts = self.points - 1 if self.points is not None else 4 if count == 1 else 2
         line = np.linspace(-1.0, 1.0, (parts if len(cells) * (parts + 1) ** count <= MOST_PLACES else 1) + 1)
+        if not self.loop.plant.is_continuous:  # the corner of a cell is another place than that of the next one
+            line = line * (1.0 - INSIDE)
         local = np.array(list(product(line, repeat=count))).reshape(len(line) ** count, count)
         if not self.loop.plant.is_polynomial and self.time == "discrete" and len(cells) * len(local) <= MOST_STANDING:
             if not self._fill_standing(cells, local):

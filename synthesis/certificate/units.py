@@ -83,7 +83,8 @@ def check_dimensions(model: Mapping[str, Any], scheduling: Any, where: str) -> N
     Raises ModelError naming the entry.
     """
     units = {s["name"]: s["unit"] for kind in ("states", "inputs", "outputs", "disturbances") for s in model[kind]}
-    named = {p["name"]: p["unit"] for p in scheduling} | {name: c["unit"] for name, c in model["constants"].items()}
+    named = {p["name"]: p["unit"] for p in scheduling}
+    named |= {name: entry["unit"] for kind in ("constants", "tables") for name, entry in model.get(kind, {}).items()}
     if all(unit == "1" for unit in (*units.values(), *named.values())):
         return
     names = {name: dimension(unit, f"{where}: unit of {name}") for name, unit in named.items()}

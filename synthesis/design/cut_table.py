@@ -16,6 +16,8 @@ from estimators.arrays import BoolArray, FloatArray
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.half_spaces import Faces, faces_of
 
+NEAR = 0.1  # of a segment
+
 
 def tabulated_places(model: LpvModel, lines: Sequence[FloatArray]) -> FloatArray:
     """Parameter values (g, p), one for every breakpoint in order, at which the gains are worked out."""
@@ -26,6 +28,16 @@ def tabulated_places(model: LpvModel, lines: Sequence[FloatArray]) -> FloatArray
     u = model.scaled(points)
     used = _used(faces, [np.unique(column) for column in u.T]).reshape(-1)
     return np.where(used[:, None], points, model.physical(faces.drawn_in(u)))
+
+
+def with_borders(line: FloatArray, borders: Sequence[float]) -> FloatArray:
+    """Breakpoints, and those of the plant's cells, where gains bend; of an equidistant one that is very near it stays alone."""
+    inner = np.array(borders[1:-1])
+    if not len(inner):
+        return line
+    near = np.abs(line[:, None] - inner).min(axis=1) < NEAR * (line[1] - line[0])
+    near[[0, -1]] = False
+    return np.union1d(line[~near], inner)
 
 
 def _used(faces: Faces, lines: Sequence[FloatArray]) -> BoolArray:

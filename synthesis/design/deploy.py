@@ -15,7 +15,7 @@ from synthesis.certificate.levels import feedback_claims, held_claims, sampled, 
 from synthesis.certificate.rounding import significant
 from synthesis.certificate.search import Search, Wish
 from synthesis.certificate.verify import Names
-from synthesis.design.cut_table import tabulated_places
+from synthesis.design.cut_table import tabulated_places, with_borders
 from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_names
 from synthesis.design.hinf_observer import Channel, ObserverGains
@@ -144,7 +144,8 @@ def refuse_undeployable(model: LpvModel) -> None:
         raise ProblemError(
             f"model '{model.name}' has {count} scheduling parameters; a table that is deployed has 1 to {MOST_PARAMETERS}"
         )
-    highest = max(max(m.degrees) for m in (*model.exact.matrices.values(), model.exact.denominator))
+    exact = [piece.exact for piece in model.pieces]
+    highest = max(max(m.degrees) for one in exact for m in (*one.matrices.values(), one.denominator))
     if highest > HIGHEST_ORDER:
         raise ProblemError(
             f"model '{model.name}' has a power {highest} of a scheduling parameter over its common denominator; schedule files "
@@ -223,7 +224,10 @@ def tabulate(
     """Equidistant breakpoints of every parameter and gains there, rounded to a few digits and to the type that stores them."""
     parameters = gains.model.parameters
     numbers = (segments,) * len(parameters) if isinstance(segments, int) else segments
-    lines = tuple(np.linspace(p.minimum, p.maximum, n + 1) for p, n in zip(parameters, numbers, strict=True))
+    lines = tuple(
+        with_borders(np.linspace(p.minimum, p.maximum, n + 1), borders)
+        for p, n, borders in zip(parameters, numbers, gains.model.cells.lines, strict=True)
+    )
     points = tabulated_places(gains.model, lines)
     table, digits = table_at(gains, points, sample_time), TABLE_DIGITS + extra_digits(gains)
     largest = np.abs(table).max(axis=0)
@@ -259,7 +263,9 @@ def lyapunov_degrees(model: LpvModel, gains: Gains) -> list[tuple[int, ...]]:
     a law of a rational plant is tried: its P hardly moves, or follows a quotient.
     """
     own = int(getattr(gains, "rational", 0))
-    quotient = not isinstance(gains, ObserverGains) and not model.polynomial.is_polynomial
+    quotient = not isinstance(gains, ObserverGains) and not all(
+        piece.polynomial.is_polynomial for piece in model.pieces
+    )
     tried = (
         tuple(0 if p.may_jump else max(gains.design.degree, 1) + more for p in model.parameters)
         for more in (OF_RATIONAL if quotient else (own,))

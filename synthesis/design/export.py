@@ -107,7 +107,7 @@ def stored(matrix: PolynomialMatrix) -> dict[str, Any]:
 
 def formula(entry: sp.Expr, model: LpvModel) -> str:
     """A matrix entry in the grammar of `synthesis.models.formula`; what it cannot say symbolically it says in numbers."""
-    symbols = [sp.Symbol(name) for name in (*(p.name for p in model.parameters), *model.constants)]
+    symbols = [sp.Symbol(name) for name in (*(p.name for p in model.parameters), *model.tables, *model.constants)]
     plain = entry.subs({s: sp.Symbol(s.name) for s in entry.free_symbols})
     plain = plain.replace(lambda e: e.is_Float, lambda e: sp.Rational(str(e)))
     rational = all(number.is_Rational for number in plain.atoms(sp.Number)) and not plain.atoms(
@@ -117,7 +117,7 @@ def formula(entry: sp.Expr, model: LpvModel) -> str:
     if rational and plain.is_rational_function(*symbols):
         return str(plain)
     values = {sp.Symbol(name): sp.Rational(str(c.value)) for name, c in model.constants.items()}
-    parameters = symbols[: len(model.parameters)]
+    parameters = symbols[: len(model.parameters) + len(model.tables)]
     parts = []
     for part in sp.fraction(sp.cancel(sp.together(plain.subs(values)))):
         terms = {powers: sp.Rational(str(sp.N(c, 17))) for powers, c in sp.Poly(part, *parameters).terms()}
@@ -133,7 +133,8 @@ def _model(model: LpvModel) -> dict[str, Any]:
     matrices = {
         key: [[formula(entry, model) for entry in row] for row in getattr(model, key).tolist()] for key in SHAPES
     }
-    return {"id": model.name, "source": model.source, **signals, "constants": constants, "matrices": matrices}
+    tables = {"tables": {name: table.plain for name, table in model.tables.items()}} if model.tables else {}
+    return {"id": model.name, "source": model.source, **signals, "constants": constants, **tables, "matrices": matrices}
 
 
 def constraints_of(model: LpvModel) -> dict[str, Any]:
@@ -154,8 +155,14 @@ def constraints_of(model: LpvModel) -> dict[str, Any]:
 
 
 def _plant(model: LpvModel) -> dict[str, Any]:
-    """Matrices over a common denominator, which is left out where it is one."""
-    exact = model.exact
+    """Matrices over a common denominator, left out where it is one; of a plant by cells those of each in its coordinates."""
+    if len(model.pieces) > 1:
+        cells = [
+            {key: stored(piece.exact.matrices[key].affine(piece.offset, piece.factor)) for key in SHAPES}
+            for piece in model.pieces
+        ]
+        return {"breakpoints": [list(line) for line in model.cells.lines], "cells": cells}
+    exact = model.pieces[0].exact
     below = {"denominator": stored(exact.denominator)} if any(exact.denominator.degrees) else {}
     return {key: stored(exact.matrices[key]) for key in SHAPES} | below
 

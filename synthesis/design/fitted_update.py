@@ -16,6 +16,7 @@ from synthesis.errors import ProblemError
 from synthesis.models.discretise import zero_order_hold
 from synthesis.models.lpv import LpvModel
 from synthesis.models.numeric import NumericModel, values
+from synthesis.models.pieces import ModelPiece
 
 FIT, OF_RATIONAL = 1e-10, 1e-7  # relative; what comes out is proved for the exact matrices anyway
 LOOSE = 1e-4  # beyond it a fit is none: the design would be one for another plant
@@ -23,13 +24,17 @@ DEGREES = (4, 8, 12, 16, 24)
 POWER = 3  # of the denominator
 
 
-def power_below(model: LpvModel) -> int:
+def power_below(piece: ModelPiece) -> int:
     """The power of the model's denominator that `fitted_update` is over: none of a polynomial model."""
-    return 0 if model.polynomial.is_polynomial else POWER
+    return 0 if piece.polynomial.is_polynomial else POWER
 
 
-def fitted_update(model: LpvModel, scale: FloatArray, period: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """e^(TA), T phi(TA) B and T phi(TA) E in the states diag(scale) x, as polynomials in u over d^k, k = `power_below`.
+def fitted_update(
+    model: LpvModel, piece: ModelPiece, scale: FloatArray, period: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """e^(TA), T phi(TA) B and T phi(TA) E in the states diag(scale) x, as polynomials over d^k, k = `power_below`.
+
+    Of a piece of the model in its local variables: in u, where it is the whole range.
 
     Coefficients (d_1+1, ..., d_p+1, rows, columns), fitted to 1e-10, of a rational model to 1e-7. Raises ProblemError where
     degree 24 leaves more than 1e-4.
@@ -39,21 +44,22 @@ def fitted_update(model: LpvModel, scale: FloatArray, period: float) -> tuple[Fl
     def update(at: NumericModel) -> FloatArray:
         driven = np.concatenate([at.B, at.E], axis=-1) * scale[:, None]
         moved = np.concatenate(zero_order_hold(at.A * scale[:, None] / scale, driven, period), axis=-1)
-        return np.asarray(moved * values(model.polynomial.denominator, model.scaled(at.points)) ** power_below(model))
+        return np.asarray(moved * values(piece.polynomial.denominator, model.scaled(at.points)) ** power_below(piece))
 
-    series = _fitted(model, update)
+    series = _fitted(model, piece, update)
     return series[..., :n], series[..., n : n + inputs], series[..., n + inputs :]
 
 
-def _fitted(model: LpvModel, update: Callable[[NumericModel], FloatArray]) -> FloatArray:
+def _fitted(model: LpvModel, piece: ModelPiece, update: Callable[[NumericModel], FloatArray]) -> FloatArray:
     """Monomial coefficients of the Chebyshev series of least degrees, one for every parameter, that is close enough.
 
     In every column, as each has a unit of its own: the size of an input or a disturbance must not decide how well another is met.
     """
     count = len(model.parameters)
     middle, half = (np.array([getattr(p, key) for p in model.parameters]) for key in ("middle", "half_width"))
+    middle, half = middle + half * piece.box[0], half * piece.box[1]
     degrees = [DEGREES[0]] * count
-    wanted = OF_RATIONAL if power_below(model) else FIT
+    wanted = OF_RATIONAL if power_below(piece) else FIT
     while True:
         lines = [np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1)) for degree in degrees]
         nodes = list(product(*lines))  # one empty node without parameters

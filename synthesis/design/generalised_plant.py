@@ -20,7 +20,9 @@ from estimators.errors import unknown
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_channel_matrices
 from synthesis.errors import ProblemError
 from synthesis.lmi.scaling import output_sizes, signal_scale
+from synthesis.models.extract import PolynomialModel
 from synthesis.models.lpv import LpvModel
+from synthesis.models.pieces import ModelPiece
 
 SHAKE = 1e-6  # of the mean variance, on every state: what nothing excites, or nothing weighs, has no size of its own
 REGULAR = (0.0, 1e-6, 1e-3, 1.0)  # of the size of every measurement, where some have no noise
@@ -100,17 +102,20 @@ class Frame:
 
 
 def generalised_plant(
-    model: LpvModel, channels: Sequence[FeedbackChannel], measured: Sequence[str] | None = None
+    model: LpvModel,
+    channels: Sequence[FeedbackChannel],
+    measured: Sequence[str] | None = None,
+    piece: ModelPiece | None = None,
 ) -> GeneralisedPlant:
-    """Numerators of all matrices. Raises ProblemError for unknown names."""
-    poly, rows = model.polynomial, measured_rows(model, measured)
+    """Numerators of all matrices, on one of the model's pieces where it has several. Raises ProblemError for unknown names."""
+    poly, rows = model.polynomial if piece is None else piece.polynomial, measured_rows(model, measured)
     return GeneralisedPlant(
         poly.A,
         poly.B,
         poly.C[..., rows, :],
         poly.D[..., rows, :],
         poly.denominator,
-        tuple(_channel_plant(model, channel, rows) for channel in channels),
+        tuple(_channel_plant(model, poly, channel, rows) for channel in channels),
     )
 
 
@@ -123,8 +128,8 @@ def measured_rows(model: LpvModel, measured: Sequence[str] | None) -> list[int]:
     return [outputs.index(name) for name in measured or outputs]
 
 
-def _channel_plant(model: LpvModel, channel: FeedbackChannel, rows: list[int]) -> ChannelPlant:
-    poly, below = model.polynomial, model.polynomial.denominator
+def _channel_plant(model: LpvModel, poly: PolynomialModel, channel: FeedbackChannel, rows: list[int]) -> ChannelPlant:
+    below = poly.denominator
     W, Z = feedback_channel_matrices(model, channel)
     nx, nu, nd = len(model.states), len(model.inputs), len(model.disturbances)
     blocks = {

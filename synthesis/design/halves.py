@@ -31,11 +31,11 @@ class Halves:
         return self.regulator if name == "Y" else self.filter
 
 
-def halves_of(plant: GeneralisedPlant, frame: Frame) -> Halves:
-    """The plant as given, in the coordinates of the frame."""
+def halves_of(plant: GeneralisedPlant, frame: Frame, weights: dict[str, FloatArray] | None = None) -> Halves:
+    """The plant as given, in the coordinates of the frame; `weights` are its own, or those of another piece of it."""
     regulator = plant.scaled(replace(frame, states=frame.regulator))
     observer = plant.scaled(replace(frame, states=frame.filter))
-    weights = {"Y": _weights(regulator, "B"), "X": _weights(observer, "C")}
+    weights = weights or {"Y": _weights(regulator, "B"), "X": _weights(observer, "C")}
     return Halves(regulator, observer, frame.joint, weights)
 
 

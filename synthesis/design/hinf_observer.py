@@ -27,6 +27,7 @@ from estimators.arrays import FloatArray
 from estimators.display import Display
 from synthesis.design.asked import check_channels, check_degree_and_poles, check_shares, minimised_channel
 from synthesis.design.gains_summary import gains_summary
+from synthesis.design.kinked import KinkedUnknown, kinked_values
 from synthesis.design.norms import ChannelSizes, Norm, compact_form, levels, per_sample, require_energy
 from synthesis.design.pole_regions import PoleRegions, require_regions
 from synthesis.design.refusals import refuse_undetectable
@@ -39,7 +40,7 @@ from synthesis.lmi.settings import LmiSettings
 from synthesis.loop.observer import Update
 from synthesis.models.lpv import LpvModel
 from synthesis.models.selection import selection
-from synthesis.polynomials.matrix import symmetric_block
+from synthesis.polynomials.matrix import MatrixPolynomial, symmetric_block
 
 
 @dataclass(frozen=True, repr=False)
@@ -134,7 +135,7 @@ class ObserverGains(Display):
         u = self.model.scaled(points)
         still = np.hstack([u, np.zeros_like(u)])
         left = self.result.values["G" if self.update == "sampled" else "P"].at(still)[..., 0]
-        X = self.result.values["X"].at(still)[..., 0] / outputs_of(self.model, self.design, self.scale)
+        X = kinked_values(self.result.values, self.model, "X", u) / outputs_of(self.model, self.design, self.scale)
         return np.asarray(np.linalg.solve(left, X) / self.scale[:, None])
 
 
@@ -182,7 +183,7 @@ def minimised(
 
 def design_scale(model: LpvModel, design: ObserverDesign) -> FloatArray:
     """`observer_scale` with every disturbance in the largest size that a channel gives it: units of sizes do not matter."""
-    poly, sizes = model.polynomial, _sizes(model, design)
+    poly, sizes = model.cells.middle.polynomial, _sizes(model, design)
     return observer_scale(replace(poly, E=poly.E * sizes, F=poly.F * sizes), model.parameters)
 
 
@@ -241,52 +242,56 @@ def observer_problem(
     least norm are sought.
     """
     problem = problem_for(model, gamma, maximise_margin, floor)
-    unit = error_unit(model, design, scale)
-    scaled = model.polynomial.with_states_scaled(scale)
-    known = {key: problem.scaled(getattr(scaled, key)) for key in ("A", "C", "E", "F", "denominator")}
-    below, nx, ny = known["denominator"], len(model.states), len(model.outputs)
-    outputs = problem.constant(np.diag(1.0 / outputs_of(model, design, scale)))
-    known["C"], known["F"] = outputs @ known["C"], outputs @ known["F"]
+    unit, nx, ny = error_unit(model, design, scale), len(model.states), len(model.outputs)
     # A parameter that jumps may move the gains, but not the Lyapunov function.
     jumps = any(p.may_jump for p in model.parameters)
-    P = problem.symmetric(
+    whole = problem.symmetric(
         "P", nx, tuple(0 if p.may_jump else design.degree for p in model.parameters) if jumps else design.degree
     )
-    X = problem.matrix("X", nx, ny, design.degree)
-    closed = (P @ known["A"] - X @ known["C"]) * (1.0 / clock)
-    frozen = closed + closed.T
-    phi = frozen + problem.time_derivative(P).scaled_by(below) * (1.0 / clock)
-    decay = 2.0 * design.decay_rate * (1.0 + design.reserve) / clock
-
-    problem.require("P > 0", P)
-    if design.decay_rate > 0.0 or not design.channels:
-        problem.require("decay rate", -(phi + P.scaled_by(below) * decay))
-    if design.fastest_pole is not None:
-        fastest = 2.0 * design.fastest_pole / (1.0 + design.reserve) / clock
-        problem.require("fastest pole", frozen + P.scaled_by(below) * fastest)
-    if design.regions:
-        require_regions(problem, design.regions, design.reserve, clock, closed, P.scaled_by(below))
-    for channel in design.channels:
-        d, z = channel_matrices(model, channel)
-        z = z / unit
-        force = (P @ known["E"] - X @ known["F"]) @ problem.constant(d) * (1.0 / clock)
-        inputs, errors = problem.constant(np.eye(d.shape[1])), problem.constant(np.eye(len(z)))
-        level, bounded = channel.bound or gamma, channel.bound is not None
-        near, far = levels(problem, channel.name, bounded, None if level is None else level / unit, design.compact)
-        output = problem.constant(z / scale).scaled_by(below)
-        if channel.norm != "H-infinity":
-            sizes = ChannelSizes(channel.name, channel.norm, design.degree, far, near)
-            require_energy(problem, sizes, -phi, force, output.scaled_by(near), P, below, clock)
-            continue
-        outside = -inputs.scaled_by(far.scaled_by(below))
-        if design.compact:  # Schur complement of (30), with P scaled by gamma: a smaller block for the same bound
-            corner = phi + problem.constant(z.T @ z / np.outer(scale, scale)).scaled_by(below).scaled_by(near)
-            block = symmetric_block([[corner, force], [None, outside]])
-        else:
-            block = symmetric_block(
-                [[phi, force, output.T], [None, outside, None], [None, None, -errors.scaled_by(near.scaled_by(below))]]
-            )
-        problem.require(f"gain {channel.name}", -block)
+    gains = KinkedUnknown.of(problem, model, "X", (nx, ny), design.degree)
+    outputs = problem.constant(np.diag(1.0 / outputs_of(model, design, scale)))
+    sizes: dict[str, tuple[MatrixPolynomial, MatrixPolynomial]] = {}
+    problem.require("P > 0", whole)
+    for number, piece in enumerate(model.pieces):
+        problem.on_cell(number, piece.box)
+        scaled = piece.polynomial.with_states_scaled(scale)
+        known = {k: problem.here(problem.scaled(getattr(scaled, k))) for k in ("A", "C", "E", "F", "denominator")}
+        known["C"], known["F"] = outputs @ known["C"], outputs @ known["F"]
+        below, P, X = known["denominator"], problem.here(whole), gains.on(piece)
+        closed = (P @ known["A"] - X @ known["C"]) * (1.0 / clock)
+        frozen = closed + closed.T
+        phi = frozen + problem.here(problem.time_derivative(whole)).scaled_by(below) * (1.0 / clock)
+        decay = 2.0 * design.decay_rate * (1.0 + design.reserve) / clock
+        if design.decay_rate > 0.0 or not design.channels:
+            problem.require("decay rate", -(phi + P.scaled_by(below) * decay))
+        if design.fastest_pole is not None:
+            fastest = 2.0 * design.fastest_pole / (1.0 + design.reserve) / clock
+            problem.require("fastest pole", frozen + P.scaled_by(below) * fastest)
+        if design.regions:
+            require_regions(problem, design.regions, design.reserve, clock, closed, P.scaled_by(below))
+        for channel in design.channels:
+            d, z = channel_matrices(model, channel)
+            z = z / unit
+            force = (P @ known["E"] - X @ known["F"]) @ problem.constant(d) * (1.0 / clock)
+            level, bounded = channel.bound or gamma, channel.bound is not None
+            if channel.name not in sizes:
+                ratio = None if level is None else level / unit
+                sizes[channel.name] = levels(problem, channel.name, bounded, ratio, design.compact)
+            near, far = sizes[channel.name]
+            output = problem.constant(z / scale).scaled_by(below)
+            if channel.norm != "H-infinity":
+                own = ChannelSizes(channel.name, channel.norm, design.degree, far, near)
+                require_energy(problem, own, -phi, force, output.scaled_by(near), P, below, clock)
+                continue
+            outside = -problem.constant(np.eye(d.shape[1])).scaled_by(far.scaled_by(below))
+            if design.compact:  # Schur complement of (30), with P scaled by gamma: a smaller block for the same bound
+                corner = phi + problem.constant(z.T @ z / np.outer(scale, scale)).scaled_by(below).scaled_by(near)
+                block = symmetric_block([[corner, force], [None, outside]])
+            else:
+                errors = problem.constant(np.eye(len(z))).scaled_by(near.scaled_by(below))
+                block = symmetric_block([[phi, force, output.T], [None, outside, None], [None, None, -errors]])
+            problem.require(f"gain {channel.name}", -block)
+    problem.on_cell()
     return problem
 
 

@@ -136,7 +136,7 @@ def require_sampled_energy(
 
 def after_impulses(problem: LmiProblem, channel: ChannelSizes, inputs: int) -> MatrixPolynomial:
     """An unknown W (k, k) with tr W below the level, for what impulses leave in V."""
-    W = problem.symmetric(f"W {channel.name}", inputs, channel.degree)
+    W = problem.symmetric(f"W {channel.name}{problem.suffix}", inputs, channel.degree)
     rows = [problem.constant(np.eye(inputs)[i : i + 1]) for i in range(inputs)]
     total = -channel.inner
     for row in rows:

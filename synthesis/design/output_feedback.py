@@ -31,7 +31,6 @@ from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
 from synthesis.loop.feedback import Measured
 from synthesis.models.lpv import LpvModel
-from synthesis.models.numeric import values
 
 RATIONAL = 2  # degrees of P that come close to an inverse
 
@@ -111,20 +110,32 @@ class OutputFeedback(Display):
         The states are an estimate of those of the plant, in their units. Columns of outputs that are not measured are zero.
         """
         place = self.model.scaled(points)
-        given = generalised_plant(self.model, self.design.channels, self.design.measured)
-        found = reconstructed(halves_of(given, self.frame), self.result, self.wanted, place, self.level)
-        Ak, Bk, Ck, Dk = found
+        plants, middle = plants_of(self.model, self.design)
+        weights = halves_of(middle, self.frame).weights
+        owner = self.model.cells.owner(place)
+        parts = []
+        for index in np.unique(owner):
+            halves = halves_of(plants[index], self.frame, weights)
+            parts.append(reconstructed(halves, self.result, self.wanted, place[owner == index], self.level))
+        order = np.argsort(np.argsort(owner, kind="stable"), kind="stable")
+        Ak, Bk, Ck, Dk = (np.concatenate(matrices)[order] for matrices in zip(*parts, strict=True))
         T, u, y, clock = self.frame.filter, self.frame.inputs[:, None], self.frame.outputs, self.frame.clock
         back = np.linalg.inv(T) * clock
         Ak, Bk, Ck, Dk = back @ Ak @ T, back @ Bk / y, u * Ck @ T, u * Dk / y
-        D = values(given.D, place) / values(given.denominator, place)
-        seen = np.eye(len(self.model.outputs))[measured_rows(self.model, self.design.measured)]
+        rows = measured_rows(self.model, self.design.measured)
+        D, seen = self.model.on(points).D[:, rows], np.eye(len(self.model.outputs))[rows]
         return Ak - Bk @ D @ Ck, Bk @ seen, Ck, Dk @ seen  # designed for y - D u, and Dk D = 0
 
     @property
     def level(self) -> float:
         """gamma in the unit of the frame."""
         return self.gamma / self.frame.unit
+
+
+def plants_of(model: LpvModel, design: OutputFeedbackDesign) -> tuple[list[GeneralisedPlant], GeneralisedPlant]:
+    """On every piece of the model, and the one in the middle of the range."""
+    plants = [generalised_plant(model, design.channels, design.measured, piece) for piece in model.pieces]
+    return plants, plants[model.pieces.index(model.cells.middle)]
 
 
 def design_output_feedback(model: LpvModel, design: OutputFeedbackDesign) -> OutputFeedback:
@@ -149,9 +160,10 @@ def design_output_feedback(model: LpvModel, design: OutputFeedbackDesign) -> Out
     """
     refuse_unstabilisable(model)
     refuse_undetectable(model, measured_rows(model, design.measured))
-    plant = generalised_plant(model, design.channels, design.measured)
-    feedthrough, frame = _feedthrough(model, design, plant), frame_of(plant)
-    halves, tight = halves_of(plant, frame), 1.0 + design.reserve
+    plants, middle = plants_of(model, design)
+    feedthrough, frame, tight = _feedthrough(model, design, plants), frame_of(middle), 1.0 + design.reserve
+    weights = halves_of(middle, frame).weights
+    halves = [(piece.box, halves_of(plant, frame, weights)) for piece, plant in zip(model.pieces, plants, strict=True)]
     radius = None if design.fastest_pole is None else design.fastest_pole / tight / frame.clock
     settings = design.settings
     if settings.relaxation == "auto":  # unknowns that run away at the optimum end other solvers early
@@ -194,9 +206,9 @@ def _forms(model: LpvModel, design: OutputFeedbackDesign) -> tuple[Still, ...]:
     return ("X", "Y") if follows and design.degree else ("Y",)
 
 
-def _feedthrough(model: LpvModel, design: OutputFeedbackDesign, plant: GeneralisedPlant) -> bool:
+def _feedthrough(model: LpvModel, design: OutputFeedbackDesign, plants: list[GeneralisedPlant]) -> bool:
     """Whether Dk is an unknown. Raises ProblemError where it is asked for and cannot be."""
-    loops = bool(plant.D.any())
+    loops = any(plant.D.any() for plant in plants)
     if design.feedthrough and loops:
         raise ProblemError(
             f"model '{model.name}' takes no feedthrough: the inputs act on a measured output at once (D), which would close an "

@@ -23,11 +23,13 @@ each with its own share of the rest, suffice) and worked out place by place from
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from estimators.arrays import FloatArray
 from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.design.generalised_plant import ChannelPlant
 from synthesis.design.halves import Halves
@@ -36,6 +38,7 @@ from synthesis.models.param import SchedulingParameter
 from synthesis.polynomials.half_spaces import HalfSpaces
 from synthesis.polynomials.matrix import MatrixPolynomial, across, over, symmetric_block
 
+Box = tuple[FloatArray, FloatArray]  # offset and factor
 Still = Literal["X", "Y"]  # which of both does not move
 
 
@@ -56,7 +59,7 @@ class Wanted:
 
 
 def build(
-    plant: Halves,
+    plants: Sequence[tuple[Box, Halves]],
     parameters: tuple[SchedulingParameter, ...],
     wanted: Wanted,
     levels: dict[FeedbackChannel, float | None],
@@ -64,12 +67,29 @@ def build(
     floor: float = 0.0,
     half_spaces: HalfSpaces = (),
 ) -> LmiProblem:
-    """The problem in the coordinates of the halves; a level of None is the unknown `gamma` that is minimised."""
+    """The problem in the coordinates of the halves; a level of None is the unknown `gamma` that is minimised.
+
+    `plants` are those of the pieces of a model, each on its box (`LmiProblem.on_cell`).
+    """
     problem = LmiProblem(parameters, maximise_margin, least_norm=floor > 0.0, floor=floor, half_spaces=half_spaces)
-    loop = _Loop(problem, plant, wanted)
-    problem.require("coupling", loop.coupling)
+    first = plants[0][1]
+    unknowns = _unknowns(problem, first, wanted)
+    J = problem.constant(first.joint)
+    problem.require("coupling", symmetric_block([[unknowns["Y"], J], [None, unknowns["X"]]]))
+    level = {part.channel: _level(problem, levels[part.channel]) for part in first.filter.channels}
+    for number, (box, plant) in enumerate(plants):
+        problem.on_cell(number, box)
+        _require(problem, _Loop(problem, plant, wanted, unknowns), plant, wanted, level)
+    problem.on_cell()
+    return problem
+
+
+def _require(
+    problem: LmiProblem, loop: _Loop, plant: Halves, wanted: Wanted, levels: dict[FeedbackChannel, MatrixPolynomial]
+) -> None:
+    """What is asked of one piece."""
     parts = [
-        ({"Y": first, "X": second}, _level(problem, levels[first.channel]))
+        ({"Y": first, "X": second}, levels[first.channel])
         for first, second in zip(plant.regulator.channels, plant.filter.channels, strict=True)
     ]
     if wanted.eliminated(len(parts)):
@@ -77,7 +97,7 @@ def build(
         for half, word in (("Y", "regulator"), ("X", "filter")):
             block = loop.gain(part[half], level, loop.rate(half), loop.input(part, half), loop.output(part, half).T)
             problem.require(f"gain {part[half].channel.name}, {word}", -block)
-        return problem
+        return
     rate = symmetric_block([[loop.rate("Y"), loop.cross], [None, loop.rate("X")]])
     if wanted.decay:
         problem.require(
@@ -90,7 +110,23 @@ def build(
         inputs = over(loop.input(part, "Y"), loop.input(part, "X"))
         outputs = over(loop.output(part, "Y").T, loop.output(part, "X").T)
         problem.require(f"gain {part['X'].channel.name}", -loop.gain(part["X"], level, rate, inputs, outputs))
-    return problem
+
+
+def _unknowns(problem: LmiProblem, plant: Halves, wanted: Wanted) -> dict[str, MatrixPolynomial]:
+    """X, Y, Bh, Ch and, where they are, Dh and `cross`: what stands in the upper right of A_c + A_c'.
+
+    That is Ah' and the known part that would only have to be cancelled.
+    """
+    n, m, k = len(plant.joint), plant.regulator.B.shape[-1], plant.filter.C.shape[-2]
+    degree = {half: _degrees(problem, wanted, half) for half in "YX"}
+    found = {half: problem.symmetric(half, n, degree[half]) for half in "XY"}
+    found["Bh"] = problem.matrix("Bh", n, k, wanted.degree)
+    found["Ch"] = problem.matrix("Ch", m, n, wanted.degree)
+    if wanted.feedthrough:
+        found["Dh"] = problem.matrix("Dh", m, k, wanted.degree)
+    if not wanted.eliminated(len(plant.filter.channels)):
+        found["cross"] = problem.matrix("cross", n, n, wanted.degree)
+    return found
 
 
 def _level(problem: LmiProblem, level: float | None) -> MatrixPolynomial:
@@ -110,24 +146,24 @@ class _Loop:
     `below` is the denominator of the plant, and its square where B Dh C is a product of two quotients.
     """
 
-    def __init__(self, problem: LmiProblem, plant: Halves, wanted: Wanted) -> None:
+    def __init__(
+        self, problem: LmiProblem, plant: Halves, wanted: Wanted, unknowns: dict[str, MatrixPolynomial]
+    ) -> None:
         self.problem, self.clock = problem, wanted.clock
-        self.A = {half: problem.scaled(plant.half(half).A) for half in "YX"}
-        self.B, self.C = problem.scaled(plant.regulator.B), problem.scaled(plant.filter.C)
-        denominator = problem.scaled(plant.filter.denominator)
+        self.A = {half: self._known(plant.half(half).A) for half in "YX"}
+        self.B, self.C = self._known(plant.regulator.B), self._known(plant.filter.C)
+        denominator = self._known(plant.filter.denominator)
         self.lift = denominator if wanted.feedthrough and any(denominator.degrees) else None
         self.below, self.joint = self._over(denominator), problem.constant(plant.joint)
         self.weights = {half: problem.constant(np.diag(plant.weights[half])) for half in "YX"}
         self.lifts = {half: problem.constant(np.diag(1.0 / plant.weights[half])) for half in "YX"}
-        n, m, k = self.A["X"].shape[0], self.B.shape[1], self.C.shape[0]
-        degree = {half: _degrees(problem, wanted, half) for half in "YX"}
-        self.unknown = {half: problem.symmetric(half, n, degree[half]) for half in "XY"}
-        self.Bh = problem.matrix("Bh", n, k, wanted.degree)
-        self.Ch = problem.matrix("Ch", m, n, wanted.degree)
-        self.Dh = problem.matrix("Dh", m, k, wanted.degree) if wanted.feedthrough else None
-        # What stands in the upper right of A_c + A_c': Ah' and the known part that would only have to be cancelled.
-        free = not wanted.eliminated(len(plant.filter.channels))
-        self.cross = self._over(problem.matrix("cross", n, n, wanted.degree)) if free else None
+        self.moved = {half: problem.here(problem.time_derivative(unknowns[half])) for half in "XY"}
+        here = {name: problem.here(matrix) for name, matrix in unknowns.items()}
+        self.unknown, self.Bh, self.Ch, self.Dh = here, here["Bh"], here["Ch"], here.get("Dh")
+        self.cross = self._over(here["cross"]) if "cross" in here else None
+
+    def _known(self, coefficients: FloatArray) -> MatrixPolynomial:
+        return self.problem.here(self.problem.scaled(coefficients))
 
     @property
     def coupling(self) -> MatrixPolynomial:
@@ -150,7 +186,7 @@ class _Loop:
     def rate(self, half: str) -> MatrixPolynomial:
         """One diagonal block of A_c + A_c' + dP/dt."""
         closed = self.closed(half)
-        moved = self.problem.time_derivative(self.unknown[half]).scaled_by(self.below) * (1.0 / self.clock)
+        moved = self.moved[half].scaled_by(self.below) * (1.0 / self.clock)
         total = closed + closed.T + (moved * -1.0 if half == "Y" else moved)
         return self.weights[half] @ total @ self.weights[half]
 
@@ -163,14 +199,14 @@ class _Loop:
 
     def input(self, part: Pair, half: str) -> MatrixPolynomial:
         """E + B Dh F or X E + Bh F."""
-        E, F = self.problem.scaled(part[half].E), self.problem.scaled(part[half].F)
+        E, F = self._known(part[half].E), self._known(part[half].F)
         if half == "Y":
             return self.weights[half] @ self._with_feedthrough(E, self.B, F)
         return self.weights[half] @ (self.unknown["X"] @ self._over(E) + self.Bh @ self._over(F))
 
     def output(self, part: Pair, half: str) -> MatrixPolynomial:
         """Cz Y + Dzu Ch or Cz + Dzu Dh C."""
-        Cz, Dzu = self.problem.scaled(part[half].Cz), self.problem.scaled(part[half].Dzu)
+        Cz, Dzu = self._known(part[half].Cz), self._known(part[half].Dzu)
         if half == "X":
             return self._with_feedthrough(Cz, Dzu, self.C) @ self.weights[half]
         return (self._over(Cz) @ self.unknown["Y"] + self._over(Dzu) @ self.Ch) @ self.weights[half]
@@ -180,7 +216,7 @@ class _Loop:
         outputs: MatrixPolynomial,
     ) -> MatrixPolynomial:  # fmt: skip
         """The block of a channel; `outputs` is C_c'."""
-        direct = self._with_feedthrough(*(self.problem.scaled(m) for m in (part.Dzd, part.Dzu, part.F)))
+        direct = self._with_feedthrough(*(self._known(m) for m in (part.Dzd, part.Dzu, part.F)))
         level = level.scaled_by(self.below)
         w, z = (self.problem.constant(np.eye(size)).scaled_by(level) for size in (direct.shape[1], direct.shape[0]))
         return symmetric_block([[rate, inputs, outputs], [None, -w, direct.T], [None, None, -z]])

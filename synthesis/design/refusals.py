@@ -13,6 +13,7 @@ from synthesis.certificate.refute import undetectable_place
 from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.errors import ProblemError
 from synthesis.loop.from_model import plant_of
+from synthesis.loop.plant import Plant
 from synthesis.models.lpv import LpvModel
 from synthesis.models.numeric import NumericModel
 from synthesis.polynomials.enclosure import PolynomialMatrix
@@ -22,13 +23,8 @@ def refuse_undetectable(model: LpvModel, measured: Sequence[int] | None = None) 
     """Raise ProblemError where an unstable mode does not show in the output (or in some of its rows): no gain helps there."""
     plant, rows = plant_of(model), range(len(model.outputs)) if measured is None else measured
     if measured is not None:
-        C = plant.matrices["C"]
-        chosen = {
-            powers: fmpq_mat([[entries[i, j] for j in range(C.shape[1])] for i in rows])
-            for powers, entries in C.terms.items()
-        }
-        seen = PolynomialMatrix(chosen, (len(rows), C.shape[1]), C.variables)
-        plant = replace(plant, matrices={**plant.matrices, "C": seen})
+        pieces = tuple(_of_rows(piece, rows) for piece in plant.pieces)
+        plant = replace(plant, pieces=pieces) if pieces else _of_rows(plant, rows)
     place = undetectable_place(plant)
     if place is not None:
         here = _here(model, place)
@@ -37,6 +33,17 @@ def refuse_undetectable(model: LpvModel, measured: Sequence[int] | None = None) 
             f"({_mode(here.A[0], here.C[0][list(rows)])}) does not show in the output(s) "
             f"{', '.join(model.outputs[i].name for i in rows)}; measure it, or shrink the range"
         )
+
+
+def _of_rows(plant: Plant, rows: Sequence[int]) -> Plant:
+    """The plant with some of its outputs."""
+    C = plant.matrices["C"]
+    chosen = {
+        powers: fmpq_mat([[entries[i, j] for j in range(C.shape[1])] for i in rows])
+        for powers, entries in C.terms.items()
+    }
+    seen = PolynomialMatrix(chosen, (len(rows), C.shape[1]), C.variables)
+    return replace(plant, matrices={**plant.matrices, "C": seen})
 
 
 def refuse_unstabilisable(model: LpvModel) -> None:
@@ -59,7 +66,11 @@ def refuse_feedthrough(model: LpvModel, channel: FeedbackChannel, Z: FloatArray,
     W (nd, k) and Z (m, nx + ny + nu) as `synthesis.design.feedback_channel.feedback_channel_matrices` has them.
     """
     nx, ny = len(model.states), len(model.outputs)
-    through = np.abs(Z[:, nx : nx + ny] @ model.polynomial.F @ W).max(axis=tuple(range(len(model.parameters))))
+    sizes = [
+        np.abs(Z[:, nx : nx + ny] @ piece.polynomial.F @ W).max(axis=tuple(range(len(model.parameters))))
+        for piece in model.pieces
+    ]
+    through = np.max(sizes, axis=0)
     if through.any():
         i, j = np.argwhere(through)[0]
         raise ProblemError(

@@ -17,6 +17,7 @@ power of its denominator multiplies every inequality.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,6 +33,7 @@ from synthesis.design.hinf_observer import (
     minimised,
     outputs_of,
 )
+from synthesis.design.kinked import KinkedUnknown
 from synthesis.design.norms import ChannelSizes, levels, per_sample, require_sampled_energy
 from synthesis.design.pole_regions import refuse_regions
 from synthesis.design.three_solves import problem_for
@@ -65,18 +67,10 @@ def design_sampled_observer(model: LpvModel, design: ObserverDesign, sample_time
     settings = replace(design.settings, points=min(design.settings.points, POINTS))
     design = replace(design, settings=settings)
     scale = design_scale(model, design) / np.sqrt(sample_time)  # errors in their size if time is counted in samples
-    Phi, _, Gamma = fitted_update(model, scale, sample_time)
-    scaled, sizes = model.polynomial.with_states_scaled(scale), outputs_of(model, design, scale)[:, None]
-    fitted = {
-        "Phi": Phi,
-        "Gamma": Gamma,
-        "C": scaled.C / sizes,
-        "F": scaled.F / sizes,
-        "denominator": scaled.denominator,
-    }
+    updates = [fitted_update(model, piece, scale, sample_time) for piece in model.pieces]
 
     def problem(gamma: float | None, maximise_margin: bool = True, floor: float = 0.0) -> LmiProblem:
-        return _problem(model, design, scale, sample_time, fitted, gamma, maximise_margin, floor)
+        return _problem(model, design, scale, sample_time, updates, gamma, maximise_margin, floor)
 
     return minimised(model, design, scale, problem, "sampled", sample_time)
 
@@ -86,54 +80,65 @@ def _problem(
     design: ObserverDesign,
     scale: FloatArray,
     period: float,
-    fitted: dict[str, FloatArray],
+    updates: Sequence[tuple[FloatArray, FloatArray, FloatArray]],
     gamma: float | None,
     maximise_margin: bool,
     floor: float,
 ) -> LmiProblem:
     problem = problem_for(model, gamma, maximise_margin, floor)
-    known = {key: problem.scaled(array) for key, array in fitted.items()}
     nx, ny, count = len(model.states), len(model.outputs), len(model.parameters)
     degree = tuple(0 if p.may_jump else design.degree for p in model.parameters)
-    P = problem.symmetric("P", nx, degree or 0)
-    G = problem.matrix("G", nx, nx, design.degree)
-    X = problem.matrix("X", nx, ny, design.degree)
+    whole = problem.symmetric("P", nx, degree or 0)
+    slacks = problem.matrix("G", nx, nx, design.degree)
+    gains = KinkedUnknown.of(problem, model, "X", (nx, ny), design.degree)
     one = problem.constant(np.ones((1, 1)))
-    speeds = rates(plant_of(model).axes, P, one, lambda i: variable(count + i, 2 * count), as_float)
-    later = one_sample_later(P, speeds, period)
-    power = power_below(model)  # what Phi and Gamma are over; C and F are over d
+    speeds = rates(plant_of(model).axes, whole, one, lambda i: variable(count + i, 2 * count), as_float)
+    moved = one_sample_later(whole, speeds, period)
+    unit, outputs = error_unit(model, design, scale), outputs_of(model, design, scale)[:, None]
+    sizes: dict[str, tuple[MatrixPolynomial, MatrixPolynomial]] = {}
+    problem.require("P > 0", whole)
+    for number, (piece, (Phi, _, Gamma)) in enumerate(zip(model.pieces, updates, strict=True)):
+        problem.on_cell(number, piece.box)
+        scaled = piece.polynomial.with_states_scaled(scale)
+        given = {"C": scaled.C / outputs, "F": scaled.F / outputs, "denominator": scaled.denominator}
+        known = {key: problem.here(problem.scaled(array)) for key, array in given.items()}
+        P, later, G, X = *(problem.here(m) for m in (whole, moved, slacks)), gains.on(piece)
+        power = power_below(piece)  # what Phi and Gamma are over; C and F are over d
 
-    def over(matrix: MatrixPolynomial, times: int = power) -> MatrixPolynomial:
-        return matrix.scaled_by(known["denominator"], times)
+        def over(
+            matrix: MatrixPolynomial, times: int = power, d: MatrixPolynomial = known["denominator"]
+        ) -> MatrixPolynomial:
+            return matrix.scaled_by(d, times)
 
-    C, F = (over(known[key], max(power - 1, 0)) for key in ("C", "F"))
-    closed, slack = G @ known["Phi"] - X @ C, over(G + G.T - later)
-    problem.require("P > 0", P)
-    if design.decay_rate > 0.0 or not design.channels:
-        kept = float(np.exp(-2.0 * design.decay_rate * (1.0 + design.reserve) * period))
-        problem.require("decay over a sample", symmetric_block([[over(P) * kept, closed.T], [None, slack]]))
-    unit = error_unit(model, design, scale)
-    for channel in design.channels:
-        d, z = channel_matrices(model, channel)
-        z = z / unit / scale
-        forced = (G @ known["Gamma"] - X @ F) @ problem.constant(d)
-        level, bounded = channel.bound or gamma, channel.bound is not None
-        ratio = None if level is None else level * per_sample(channel.norm, period) / unit
-        near, far = levels(problem, channel.name, bounded, ratio, design.compact)
-        if channel.norm != "H-infinity":
-            sizes = ChannelSizes(channel.name, channel.norm, design.degree, far, near)
-            seen = over(problem.constant(z).scaled_by(near))
-            require_sampled_energy(problem, sizes, slack, closed, over(P), forced, seen, over=over)
-            continue
-        inputs = over(problem.constant(np.eye(d.shape[1])).scaled_by(far))
-        if design.compact:
-            top = over(P - problem.constant(z.T @ z).scaled_by(near))
-            rows = [[top, None, closed.T], [None, inputs, forced.T], [None, None, slack]]
-        else:
-            output, errors = over(problem.constant(z.T)), over(problem.constant(np.eye(len(z))).scaled_by(near))
-            rows = [
-                [over(P), None, closed.T, output], [None, inputs, forced.T, None], [None, None, slack, None],
-                [None, None, None, errors],
-            ]  # fmt: skip
-        problem.require(f"gain {channel.name}", symmetric_block(rows))
+        C, F = (over(known[key], max(power - 1, 0)) for key in ("C", "F"))
+        closed, slack = G @ problem.scaled(Phi) - X @ C, over(G + G.T - later)
+        if design.decay_rate > 0.0 or not design.channels:
+            kept = float(np.exp(-2.0 * design.decay_rate * (1.0 + design.reserve) * period))
+            problem.require("decay over a sample", symmetric_block([[over(P) * kept, closed.T], [None, slack]]))
+        for channel in design.channels:
+            d, z = channel_matrices(model, channel)
+            z = z / unit / scale
+            forced = (G @ problem.scaled(Gamma) - X @ F) @ problem.constant(d)
+            level, bounded = channel.bound or gamma, channel.bound is not None
+            if channel.name not in sizes:
+                ratio = None if level is None else level * per_sample(channel.norm, period) / unit
+                sizes[channel.name] = levels(problem, channel.name, bounded, ratio, design.compact)
+            near, far = sizes[channel.name]
+            if channel.norm != "H-infinity":
+                own = ChannelSizes(channel.name, channel.norm, design.degree, far, near)
+                seen = over(problem.constant(z).scaled_by(near))
+                require_sampled_energy(problem, own, slack, closed, over(P), forced, seen, over=over)
+                continue
+            inputs = over(problem.constant(np.eye(d.shape[1])).scaled_by(far))
+            if design.compact:
+                top = over(P - problem.constant(z.T @ z).scaled_by(near))
+                rows = [[top, None, closed.T], [None, inputs, forced.T], [None, None, slack]]
+            else:
+                output, errors = over(problem.constant(z.T)), over(problem.constant(np.eye(len(z))).scaled_by(near))
+                rows = [
+                    [over(P), None, closed.T, output], [None, inputs, forced.T, None], [None, None, slack, None],
+                    [None, None, None, errors],
+                ]  # fmt: skip
+            problem.require(f"gain {channel.name}", symmetric_block(rows))
+    problem.on_cell()
     return problem

@@ -17,6 +17,7 @@ to take: the one in continuous time knows nothing of them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +26,7 @@ from estimators.arrays import FloatArray
 from synthesis.design.feedback_channel import feedback_channel_matrices
 from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
 from synthesis.design.fitted_update import fitted_update, power_below
+from synthesis.design.kinked import KinkedUnknown
 from synthesis.design.norms import ChannelSizes, levels, per_sample, require_sampled_energy
 from synthesis.design.pole_regions import refuse_regions
 from synthesis.design.refusals import refuse_unstabilisable
@@ -79,10 +81,10 @@ def design_sampled_state_feedback(
     # Sums over samples in the place of integrals: what a state costs is divided by the sample time.
     states = plain.states * np.sqrt(plain.clock / sample_time)
     scale = replace(plain, states=states, disturbance=plain.disturbance * np.sqrt(plain.clock * sample_time), clock=1.0)
-    fitted = fitted_update(model, states, sample_time)
+    updates = [fitted_update(model, piece, states, sample_time) for piece in model.pieces]
 
     def problem(gamma: float | None, maximise_margin: bool = True, floor: float = 0.0) -> LmiProblem:
-        return _problem(model, design, scale, sample_time, fitted, gamma, maximise_margin, floor)
+        return _problem(model, design, scale, sample_time, updates, gamma, maximise_margin, floor)
 
     def level(objective: float) -> float:
         found = scale.disturbance * float(np.sqrt(objective) if design.compact else objective)
@@ -99,54 +101,67 @@ def _problem(
     design: StateFeedbackDesign,
     scale: FeedbackScale,
     period: float,
-    fitted: tuple[FloatArray, FloatArray, FloatArray],
+    updates: Sequence[tuple[FloatArray, FloatArray, FloatArray]],
     gamma: float | None,
     maximise_margin: bool,
     floor: float,
 ) -> LmiProblem:
     problem = problem_for(model, gamma, maximise_margin, floor)
     nx, nu, count = len(model.states), len(model.inputs), len(model.parameters)
-    applied = scale.applied(model.polynomial)
-    known = {key: problem.scaled(getattr(applied, key)) for key in ("C", "D", "F", "denominator")}
-    Phi, Gamma, Gamma_E = (problem.scaled(array) for array in (fitted[0], fitted[1] * scale.inputs, fitted[2]))
-    Q = problem.symmetric("Q", nx, tuple(0 if p.may_jump else design.degree for p in model.parameters) or 0)
-    G, Y = problem.matrix("G", nx, nx, design.degree), problem.matrix("Y", nu, nx, design.degree)
+    whole = problem.symmetric("Q", nx, tuple(0 if p.may_jump else design.degree for p in model.parameters) or 0)
+    slacks = problem.matrix("G", nx, nx, design.degree)
+    gains = KinkedUnknown.of(problem, model, "Y", (nu, nx), design.degree)
     one = problem.constant(np.ones((1, 1)))
-    speeds = rates(plant_of(model).axes, Q, one, lambda i: variable(count + i, 2 * count), as_float)
-    later, closed, slack = one_sample_later(Q, speeds, period), Phi @ G + Gamma @ Y, G + G.T - Q
-    power = power_below(model)  # closed is over d^power, the performance over d
+    speeds = rates(plant_of(model).axes, whole, one, lambda i: variable(count + i, 2 * count), as_float)
+    moved = one_sample_later(whole, speeds, period)
+    sizes: dict[str, tuple[MatrixPolynomial, MatrixPolynomial]] = {}
+    problem.require("Q > 0", whole)
+    for number, (piece, update) in enumerate(zip(model.pieces, updates, strict=True)):
+        problem.on_cell(number, piece.box)
+        applied = scale.applied(piece.polynomial)
+        known = {key: problem.here(problem.scaled(getattr(applied, key))) for key in ("C", "D", "F", "denominator")}
+        Phi, Gamma, Gamma_E = (problem.scaled(array) for array in (update[0], update[1] * scale.inputs, update[2]))
+        Q, later, G, Y = *(problem.here(m) for m in (whole, moved, slacks)), gains.on(piece)
+        closed, slack = Phi @ G + Gamma @ Y, G + G.T - Q
+        power = power_below(piece)  # closed is over d^power, the performance over d
 
-    def over(matrix: MatrixPolynomial, times: int = power) -> MatrixPolynomial:
-        return matrix.scaled_by(known["denominator"], times)
+        def over(
+            matrix: MatrixPolynomial, times: int = power, d: MatrixPolynomial = known["denominator"]
+        ) -> MatrixPolynomial:
+            return matrix.scaled_by(d, times)
 
-    problem.require("Q > 0", Q)
-    if design.decay_rate > 0.0:
-        kept = float(np.exp(-2.0 * design.decay_rate * (1.0 + design.reserve) * period))
-        problem.require("decay over a sample", symmetric_block([[over(later) * kept, closed], [None, over(slack)]]))
-    if design.limits is not None:
-        require_limits(problem, model, design.limits, design.reserve, scale, Q, slack, Y)
-    for channel in design.channels:
-        W, Z = feedback_channel_matrices(model, channel)
-        W = W / scale.disturbance
-        seen = over(performance(problem, Z, known, G, Y, model, scale), max(power - 1, 0))
-        through = problem.constant(Z[:, nx : len(Z.T) - nu]) @ known["F"] @ problem.constant(W)
-        driven = Gamma_E @ problem.constant(W)
-        level, bounded = channel.bound or gamma, channel.bound is not None
-        ratio = None if level is None else level * per_sample(channel.norm, period) / scale.disturbance
-        near, far = levels(problem, channel.name, bounded, ratio, design.compact)
-        if design.compact:
-            driven, through = driven.scaled_by(near), through.scaled_by(near)
-        through = over(through, max(power - 1, 0))
-        if channel.norm != "H-infinity":
-            sizes = ChannelSizes(channel.name, channel.norm, design.degree, near, far)
-            require_sampled_energy(problem, sizes, over(later), closed, over(slack), driven, seen, through, over)
-            continue
-        inner, outer = (problem.constant(np.eye(k)).scaled_by(size) for k, size in ((W.shape[1], near), (len(Z), far)))
-        rows: list[list[MatrixPolynomial | None]] = [
-            [over(later), closed, driven, None],
-            [None, over(slack), None, seen.T],
-            [None, None, over(inner), through.T],
-            [None, None, None, over(outer)],
-        ]
-        problem.require(f"gain {channel.name}", symmetric_block(rows))
+        if design.decay_rate > 0.0:
+            kept = float(np.exp(-2.0 * design.decay_rate * (1.0 + design.reserve) * period))
+            problem.require("decay over a sample", symmetric_block([[over(later) * kept, closed], [None, over(slack)]]))
+        if design.limits is not None:
+            require_limits(problem, model, design.limits, design.reserve, scale, Q, slack, Y)
+        for channel in design.channels:
+            W, Z = feedback_channel_matrices(model, channel)
+            W = W / scale.disturbance
+            seen = over(performance(problem, Z, known, G, Y, model, scale), max(power - 1, 0))
+            through = problem.constant(Z[:, nx : len(Z.T) - nu]) @ known["F"] @ problem.constant(W)
+            driven = Gamma_E @ problem.constant(W)
+            level, bounded = channel.bound or gamma, channel.bound is not None
+            if channel.name not in sizes:
+                ratio = None if level is None else level * per_sample(channel.norm, period) / scale.disturbance
+                sizes[channel.name] = levels(problem, channel.name, bounded, ratio, design.compact)
+            near, far = sizes[channel.name]
+            if design.compact:
+                driven, through = driven.scaled_by(near), through.scaled_by(near)
+            through = over(through, max(power - 1, 0))
+            if channel.norm != "H-infinity":
+                own = ChannelSizes(channel.name, channel.norm, design.degree, near, far)
+                require_sampled_energy(problem, own, over(later), closed, over(slack), driven, seen, through, over)
+                continue
+            inner, outer = (
+                problem.constant(np.eye(k)).scaled_by(size) for k, size in ((W.shape[1], near), (len(Z), far))
+            )
+            rows: list[list[MatrixPolynomial | None]] = [
+                [over(later), closed, driven, None],
+                [None, over(slack), None, seen.T],
+                [None, None, over(inner), through.T],
+                [None, None, None, over(outer)],
+            ]
+            problem.require(f"gain {channel.name}", symmetric_block(rows))
+    problem.on_cell()
     return problem

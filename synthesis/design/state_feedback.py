@@ -30,6 +30,7 @@ from estimators.errors import unknown
 from synthesis.design.asked import check_degree_and_poles, check_shares, minimised_channel
 from synthesis.design.feedback_channel import FeedbackChannel, check_feedback_channels, feedback_channel_matrices
 from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
+from synthesis.design.kinked import KinkedUnknown, kinked_values
 from synthesis.design.norms import NORMS, ChannelSizes, compact_form, levels, require_energy
 from synthesis.design.pole_regions import PoleRegions, require_damping, require_disc, require_regions
 from synthesis.design.refusals import refuse_feedthrough, refuse_unstabilisable
@@ -126,9 +127,8 @@ class StateFeedbackGains(Display):
         """K at parameter values (g,) or (g, p): array (g, nu, nx)."""
         u = self.model.scaled(points)
         still = np.hstack([u, np.zeros_like(u)])
-        right, Y = (
-            self.result.values[key].at(still)[..., 0] for key in ("Q" if self.sample_time is None else "G", "Y")
-        )
+        right = self.result.values["Q" if self.sample_time is None else "G"].at(still)[..., 0]
+        Y = kinked_values(self.result.values, self.model, "Y", u)
         K = np.swapaxes(np.linalg.solve(np.swapaxes(right, -1, -2), np.swapaxes(Y, -1, -2)), -1, -2)
         return np.asarray(K * self.scale.inputs[:, None] * self.scale.states)
 
@@ -181,56 +181,64 @@ def state_feedback_problem(
     common margin of all inequalities is maximised. With a `floor` every inequality keeps that margin, and the decisions of
     least norm are sought. Of a single channel Q stands for g Q, and gamma^2 is minimised.
     """
-    problem = problem_for(model, gamma, maximise_margin, floor)
-    scaled, clock = scale.applied(model.polynomial), scale.clock
-    known = {key: problem.scaled(getattr(scaled, key)) for key in ("A", "B", "C", "D", "E", "F", "denominator")}
-    below, nx, nu = known["denominator"], len(model.states), len(model.inputs)
+    problem, clock = problem_for(model, gamma, maximise_margin, floor), scale.clock
+    nx, nu = len(model.states), len(model.inputs)
     # A parameter that jumps may move the gains, but not the Lyapunov function.
     jumps = any(p.may_jump for p in model.parameters)
-    Q = problem.symmetric(
+    whole = problem.symmetric(
         "Q", nx, tuple(0 if p.may_jump else design.degree for p in model.parameters) if jumps else design.degree
     )
-    Y = problem.matrix("Y", nu, nx, design.degree)
-    M = (known["A"] @ Q + known["B"] @ Y) * (1.0 / clock)
-    falling = problem.time_derivative(Q).scaled_by(below) * (1.0 / clock) - (M + M.T)
-    problem.require("Q > 0", Q)
-    if design.decay_rate > 0.0:
-        decay = 2.0 * design.decay_rate * (1.0 + design.reserve) / clock
-        problem.require("decay rate", falling - Q.scaled_by(below) * decay)
-    if design.fastest_pole is not None:
-        radius = design.fastest_pole / (1.0 + design.reserve) / clock
-        require_disc(problem, "fastest pole", radius, M, Q.scaled_by(below))
-    if design.damping is not None:
-        require_damping(problem, design.damping + design.reserve * (1.0 - design.damping), M)
-    if design.regions:
-        require_regions(problem, design.regions, design.reserve, clock, M, Q.scaled_by(below))
-    if design.limits is not None:
-        require_limits(problem, model, design.limits, design.reserve, scale, Q, Q, Y)
-    for channel in design.channels:
-        W, Z = feedback_channel_matrices(model, channel)
-        seen = performance(problem, Z, known, Q, Y, model, scale) * (1.0 / clock)
-        force = known["E"] @ problem.constant(W / scale.disturbance)
-        through = problem.constant(Z[:, nx : len(Z.T) - nu]) @ known["F"] @ problem.constant(W / scale.disturbance)
-        level, bounded = channel.bound or gamma, channel.bound is not None
-        ratio = None if level is None else level / scale.disturbance
-        near, far = levels(problem, channel.name, bounded, ratio, design.compact)
-        if design.compact:
-            force, through = force.scaled_by(near), through.scaled_by(near)
-        if channel.norm != "H-infinity":
-            refuse_feedthrough(model, channel, Z, W)
-            sizes = ChannelSizes(channel.name, channel.norm, design.degree, near, far)
-            require_energy(problem, sizes, falling, force, seen, Q, below, clock)
-            continue
-        inner, outer = (
-            problem.constant(np.eye(k)).scaled_by(below).scaled_by(size)
-            for k, size in ((W.shape[1], near), (len(Z), far))
-        )
-        rows: list[list[MatrixPolynomial | None]] = [
-            [falling, -force, -seen.T],
-            [None, inner, -through.T],
-            [None, None, outer],
-        ]
-        problem.require(f"gain {channel.name}", symmetric_block(rows))
+    gains = KinkedUnknown.of(problem, model, "Y", (nu, nx), design.degree)
+    sizes: dict[str, tuple[MatrixPolynomial, MatrixPolynomial]] = {}
+    problem.require("Q > 0", whole)
+    for number, piece in enumerate(model.pieces):
+        problem.on_cell(number, piece.box)
+        scaled = scale.applied(piece.polynomial)
+        letters = ("A", "B", "C", "D", "E", "F", "denominator")
+        known = {key: problem.here(problem.scaled(getattr(scaled, key))) for key in letters}
+        below, Q, Y = known["denominator"], problem.here(whole), gains.on(piece)
+        M = (known["A"] @ Q + known["B"] @ Y) * (1.0 / clock)
+        falling = problem.here(problem.time_derivative(whole)).scaled_by(below) * (1.0 / clock) - (M + M.T)
+        if design.decay_rate > 0.0:
+            decay = 2.0 * design.decay_rate * (1.0 + design.reserve) / clock
+            problem.require("decay rate", falling - Q.scaled_by(below) * decay)
+        if design.fastest_pole is not None:
+            radius = design.fastest_pole / (1.0 + design.reserve) / clock
+            require_disc(problem, "fastest pole", radius, M, Q.scaled_by(below))
+        if design.damping is not None:
+            require_damping(problem, design.damping + design.reserve * (1.0 - design.damping), M)
+        if design.regions:
+            require_regions(problem, design.regions, design.reserve, clock, M, Q.scaled_by(below))
+        if design.limits is not None:
+            require_limits(problem, model, design.limits, design.reserve, scale, Q, Q, Y)
+        for channel in design.channels:
+            W, Z = feedback_channel_matrices(model, channel)
+            seen = performance(problem, Z, known, Q, Y, model, scale) * (1.0 / clock)
+            force = known["E"] @ problem.constant(W / scale.disturbance)
+            through = problem.constant(Z[:, nx : len(Z.T) - nu]) @ known["F"] @ problem.constant(W / scale.disturbance)
+            level, bounded = channel.bound or gamma, channel.bound is not None
+            if channel.name not in sizes:
+                ratio = None if level is None else level / scale.disturbance
+                sizes[channel.name] = levels(problem, channel.name, bounded, ratio, design.compact)
+            near, far = sizes[channel.name]
+            if design.compact:
+                force, through = force.scaled_by(near), through.scaled_by(near)
+            if channel.norm != "H-infinity":
+                refuse_feedthrough(model, channel, Z, W)
+                own = ChannelSizes(channel.name, channel.norm, design.degree, near, far)
+                require_energy(problem, own, falling, force, seen, Q, below, clock)
+                continue
+            inner, outer = (
+                problem.constant(np.eye(k)).scaled_by(below).scaled_by(size)
+                for k, size in ((W.shape[1], near), (len(Z), far))
+            )
+            rows: list[list[MatrixPolynomial | None]] = [
+                [falling, -force, -seen.T],
+                [None, inner, -through.T],
+                [None, None, outer],
+            ]
+            problem.require(f"gain {channel.name}", symmetric_block(rows))
+    problem.on_cell()
     return problem
 
 
@@ -263,7 +271,7 @@ def require_limits(
     """The limits of the docstring, for K Q K' < Y below^-1 Y'."""
     S = scale.states * np.array([limits.sizes[s.name] for s in model.states])
     largest = float(S.max())
-    q = problem.scalar("q")  # of the docstring, times the largest size squared
+    q = problem.unknowns.get("q") or problem.scalar("q")  # of the docstring, times the largest size squared
     problem.require("states within their sizes", Q - problem.constant(np.diag((S / largest) ** 2)).scaled_by(q))
     for i, signal in enumerate(model.inputs):
         if signal.name in limits.inputs:

@@ -85,6 +85,7 @@ def design_static_feedback(model: LpvModel, design: StaticFeedbackDesign) -> Sta
     >>> print(found.verdict, found.gain([1.0, 2.0]).shape)
     certified (2, 1, 1)
     """
+    model.refuse_tables("static output feedback")
     refuse_unstabilisable(model)
     refuse_undetectable(model)
     seen = structure(model, design.uses).any(axis=0)

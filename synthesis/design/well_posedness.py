@@ -15,6 +15,7 @@ import numpy as np
 from estimators.arrays import FloatArray
 from estimators.display import Display
 from synthesis.design.hinf_observer import ObserverDesign, observer_problem, timed_scale, to_gamma
+from synthesis.design.kinked import KinkedUnknown
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.solve import solve
@@ -77,9 +78,11 @@ def energy_problem(
 ) -> LmiProblem:
     """The constraints of the design at this gamma, and the least w with w I > X'P^-1 X = L'PL everywhere."""
     problem = observer_problem(model, design, scale, gamma, maximise_margin=False, clock=clock)
-    P, X = problem.unknowns["P"], problem.unknowns["X"]
+    P, gains = problem.unknowns["P"], KinkedUnknown.found(problem, model, "X")
     energy = problem.scalar("gain energy")
     size = problem.constant(np.eye(len(model.outputs))).scaled_by(energy)
-    problem.require("gain energy", symmetric_block([[size, X.T], [None, P]]))
+    for number, piece in enumerate(model.pieces):
+        problem.on_cell(number, piece.box)
+        problem.require("gain energy", symmetric_block([[size, gains.on(piece).T], [None, problem.here(P)]]))
     problem.minimise("gain energy")
     return problem

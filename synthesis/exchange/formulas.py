@@ -30,7 +30,8 @@ class Formulas:
 
     def __init__(self, file: str, places: Places, table: ModelFile) -> None:
         self.file, self.places, self.table = file, places, table
-        named = {p.name: p.unit for p in table.parameters} | {name: c.unit for name, c in table.constants.items()}
+        named = {p.name: p.unit for p in table.parameters}
+        named |= {name: entry.unit for kind in (table.constants, table.tables) for name, entry in kind.items()}
         signals = [s.unit for kind in ("states", "inputs", "outputs", "disturbances") for s in getattr(table, kind)]
         self.with_units = any(unit != "1" for unit in (*named.values(), *signals))
         self.units = {name: dimension(unit, f"{file}: unit of {name}") for name, unit in named.items()}
@@ -38,7 +39,7 @@ class Formulas:
         self.extents: dict[str, Extent] = dict.fromkeys(named, NAME)
         self.needs: dict[str, set[str]] = {}  # of every definition
         self.mentioned: set[str] = set()
-        for kind in ("constants", "definitions"):
+        for kind in ("constants", "tables", "definitions"):
             for name in getattr(table, kind):
                 self._placed((kind, name), "", partial(check_name, name, kind.removesuffix("s")))
         self._define()
@@ -97,7 +98,7 @@ class Formulas:
             if name not in needed:
                 needed.add(name)
                 waiting += self.needs.get(name, ())
-        for kind in ("definitions", "constants"):
+        for kind in ("definitions", "constants", "tables"):
             for name in getattr(self.table, kind):
                 if name not in needed:
                     where = f"{self.file}:{self.places.at((kind, name))}"

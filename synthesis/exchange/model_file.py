@@ -19,6 +19,7 @@ from synthesis.exchange.model_table import ModelFile, ParameterTable, Rows, Sign
 from synthesis.models.constraint import ParameterConstraint, scaled_set
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Constant, SchedulingParameter, Signal
+from synthesis.models.table import Table, check_table
 from synthesis.toml_file import read_table, read_toml
 from synthesis.toml_places import Path, Places
 
@@ -61,6 +62,12 @@ class _Reader:
             name: self._made(("constants", name), Constant, c.value, c.unit, c.source)
             for name, c in table.constants.items()
         }
+        tables = {
+            name: self._made(("tables", name), Table, t.unit, t.source, tuple(t.over), t.lines, t.values)
+            for name, t in table.tables.items()
+        }
+        for name, one in tables.items():
+            self._made(("tables", name), check_table, one, parameters, f"tables.{name}")
         self._unique()
         formulas = Formulas(self.file, self.places, table)
         matrices = {}
@@ -85,6 +92,7 @@ class _Reader:
                 parameters=parameters,
                 constants=constants,
                 constraints=constraints,
+                tables=tables,
                 **signals,
                 **matrices,
             )
@@ -131,7 +139,7 @@ class _Reader:
             for kind in (*SIGNALS, "parameters")
             for i, s in enumerate(getattr(self.table, kind))
         ]
-        for key in ("constants", "definitions"):
+        for key in ("constants", "tables", "definitions"):
             named += [((key, name), name) for name in getattr(self.table, key)]
         for place, name in named:
             if name in seen:

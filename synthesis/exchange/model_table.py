@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
@@ -49,6 +49,22 @@ class ConstantTable(StrictTable):
     source: str = Field(min_length=1, examples=["data sheet"])
 
 
+class TableTable(StrictTable):
+    """One quantity over parameters: breakpoints of each of them (a plain list for one), and a value for every breakpoint."""
+
+    unit: str = Field(examples=["1/s"])
+    source: str = Field(min_length=1, examples=["bench test"])
+    over: Annotated[list[str], Field(min_length=1)]
+    breakpoints: list[float] | list[list[float]]
+    values: list[Any]
+
+    @property
+    def lines(self) -> tuple[tuple[float, ...], ...]:
+        """Breakpoints of every parameter."""
+        lines = [line for line in self.breakpoints if isinstance(line, list)]
+        return tuple(map(tuple, lines)) if lines else (tuple(x for x in self.breakpoints if isinstance(x, float)),)
+
+
 class ConstraintTable(StrictTable):
     """One inequality between parameters: a formula that is linear in them, or their coefficients, up to `max` in `unit`."""
 
@@ -86,6 +102,7 @@ class ModelFile(StrictTable):
     disturbances: list[SignalTable] = Field(default_factory=list)
     parameters: list[ParameterTable] = Field(default_factory=list)
     constants: dict[str, ConstantTable] = Field(default_factory=dict)
+    tables: dict[str, TableTable] = Field(default_factory=dict)
     definitions: dict[str, Entry] = Field(default_factory=dict)
     constraints: list[ConstraintTable] = Field(default_factory=list)
     matrices: MatrixTables

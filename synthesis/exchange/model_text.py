@@ -50,6 +50,11 @@ def model_text(model: LpvModel) -> str:
             f"{name} = {{ value = {_number(c.value)}, unit = {_text(c.unit)}, source = {_text(c.source)} }}"
             for name, c in model.constants.items()
         ]
+    for name, table in model.tables.items():
+        breakpoints = [list(line) for line in table.breakpoints]
+        lines += ["", f"[tables.{name}]", f"unit = {_text(table.unit)}", f"source = {_text(table.source)}"]
+        lines += [f"over = {json.dumps(list(table.over))}", f"breakpoints = {breakpoints}"]
+        lines += [f"values = {table.values.tolist()}"]
     lines += ["", "[matrices]"]
     for key in MATRICES:
         matrix = getattr(model, key)

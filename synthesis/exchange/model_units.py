@@ -19,6 +19,7 @@ def check_units(model: LpvModel) -> None:
     content = {
         **{kind: [{"name": s.name, "unit": s.unit} for s in getattr(model, kind)] for kind in kinds},
         "constants": {name: {"unit": c.unit} for name, c in model.constants.items()},
+        "tables": {name: {"unit": table.unit} for name, table in model.tables.items()},
         "matrices": {key: [[formula(e, model) for e in row] for row in getattr(model, key).tolist()] for key in PLACES},
     }
     check_dimensions(content, [{"name": p.name, "unit": p.unit} for p in model.parameters], f"model '{model.name}'")

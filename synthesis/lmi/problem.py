@@ -53,7 +53,8 @@ class LmiProblem(Display):
     parameter counted CURVED times: a strictly convex problem, whose one answer moves little when the data or the processor
     change. (Maximal margins and least gammas are attained on flat sets.) Of all answers it takes one that varies little.
 
-    With `half_spaces` every inequality is asked for where these hold, too: the parameters' set is no box.
+    With `half_spaces` every inequality is asked for where these hold, too: the parameters' set is no box. Where the data are
+    another polynomial on every cell, `on_cell` says on which the inequalities that follow are required.
 
     >>> problem = LmiProblem((SchedulingParameter("speed", "m/s", 10.0, 40.0, -5.0, 5.0),))
     >>> P = problem.symmetric("P", 2, degree=1)
@@ -73,6 +74,8 @@ class LmiProblem(Display):
     objective: str | None = None
     sense: float = 1.0
     half_spaces: HalfSpaces = ()
+    cell: tuple[FloatArray, FloatArray] | None = None
+    suffix: str = ""  # of the names of what is required on a cell
 
     def __post_init__(self) -> None:
         if self.maximise_margin:
@@ -191,7 +194,7 @@ class LmiProblem(Display):
         return total
 
     def require(self, name: str, matrix: MatrixPolynomial, strict: bool = True) -> None:
-        """matrix > 0 on the whole box (pass the negative for < 0)."""
+        """matrix > 0 (pass the negative for < 0) on the whole box, or on the cell that is asked about (`on_cell`)."""
         coefficients = matrix.coefficients
         if matrix.shape[0] != matrix.shape[1]:
             raise ProblemError(f"inequality '{name}' has the shape {matrix.shape}; it must be square and symmetric")
@@ -204,8 +207,24 @@ class LmiProblem(Display):
         matrix = (matrix + matrix.T) * 0.5  # takes off the rounding, so that no triangle is preferred
         if strict:
             matrix = self._with_margin(matrix)
-        offset, factor = np.zeros(self.variables), np.ones(self.variables)
-        self.inequalities.append(Inequality(name, matrix, offset, factor, strict, self.floor if strict else 0.0))
+        offset, factor = self.cell or (np.zeros(self.variables), np.ones(self.variables))
+        floor = self.floor if strict else 0.0
+        self.inequalities.append(Inequality(name + self.suffix, matrix, offset, factor, strict, floor))
+
+    def on_cell(self, number: int = 0, box: tuple[FloatArray, FloatArray] | None = None) -> None:
+        """What follows is required on a box of the parameters u = offset + factor t, |t| <= 1, (p,) each, and for all rates.
+
+        Its matrices are given in t (`here`). Without a box, or where it is the whole range, all is as it was.
+        """
+        self.cell, self.suffix = None, ""
+        if box is not None and not (box[1] == 1.0).all():
+            count = len(self.parameters)
+            self.cell = np.concatenate([box[0], np.zeros(count)]), np.concatenate([box[1], np.ones(count)])
+            self.suffix = f", cell {number + 1}"
+
+    def here(self, matrix: MatrixPolynomial) -> MatrixPolynomial:
+        """A matrix in u in the local variables of the cell that is asked about."""
+        return matrix.affine(*self.cell) if self.cell else matrix
 
     def _with_margin(self, matrix: MatrixPolynomial) -> MatrixPolynomial:
         unit = self.constant(np.eye(matrix.shape[0]))

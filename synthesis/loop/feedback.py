@@ -60,8 +60,8 @@ class FeedbackLoop(Tabulated):
     _systems: dict[Any, System | None] = field(default_factory=dict, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        m = self.plant.matrices
-        wanted = self.order + self.inputs, self.order + (self.plant.states if self.by_states else m["C"].shape[0])
+        measured = self.plant.states if self.by_states else self.plant.shape("C")[0]
+        wanted = self.order + self.inputs, self.order + measured
         if self._gain_shape != wanted:
             raise ProblemError(f"the gains have the shape {self._gain_shape}; this plant and law need {wanted}")
         if not self.by_states:
@@ -84,7 +84,7 @@ class FeedbackLoop(Tabulated):
     @property
     def inputs(self) -> int:
         """Number of inputs of the plant."""
-        return int(self.plant.matrices["B"].shape[1])
+        return self.plant.shape("B")[1]
 
     @property
     def states(self) -> int:
@@ -176,8 +176,8 @@ class FeedbackLoop(Tabulated):
             raise ProblemError(f"a {self.time}-time feedback loop makes no claims about {time} time")
 
     def _refuse_algebraic_loop(self) -> None:
-        D, nk = self.plant.matrices["D"], self.order
-        acted = {i for m in D.terms.values() for i in range(m.nrows()) for j in range(m.ncols()) if m[i, j] != 0}
+        nk, through = self.order, [m for *_, piece in self.plant.cells for m in piece.matrices["D"].terms.values()]
+        acted = {i for m in through for i in range(m.nrows()) for j in range(m.ncols()) if m[i, j] != 0}
         for gain in self.table.values():
             for j in acted:
                 if any(gain[i, nk + j] != 0 for i in range(nk, nk + self.inputs)):

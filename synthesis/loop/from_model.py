@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from synthesis.loop.plant import Axis, Plant
+from synthesis.loop.plant import Axis, Plant, by_cells
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.rational import decimal
 
@@ -17,4 +17,7 @@ def plant_of(model: LpvModel) -> Plant:
         ))
         for p in model.parameters
     )  # fmt: skip
-    return Plant(axes, model.exact.matrices, model.exact.denominator, model.half_spaces)
+    if not model.tables:
+        return Plant(axes, model.exact.matrices, model.exact.denominator, model.half_spaces)
+    lines = tuple(tuple(decimal(x) for x in line) for line in model.cells.lines)
+    return by_cells(axes, lines, [piece.exact.matrices for piece in model.pieces], model.half_spaces)

@@ -97,7 +97,8 @@ class ObserverLoop(Tabulated):
         return self._equation(plant, gain, unit(self.plant.states, axes), below)
 
     def _error_equation(self, region: Region) -> System:
-        plant = {key: region.local(self._plant[key]) for key in "ACEF"}
+        plant = self.plant_on(region, "ACEF", False)
+        assert plant is not None  # only a quotient may be none
         below = None if self._below is None else region.local(self._below)
         return self._equation(plant, self.gain(region), identity(self.plant.states, 2 * region.parameters), below)
 

@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 from flint import arb, fmpq, fmpq_mat
 
+from estimators.arrays import IndexArray
 from synthesis.loop.on_boxes import HIGHEST, MOST_BOXES, gains, local, rounding_of
 from synthesis.loop.plant import Plant
 from synthesis.loop.system import Region
 from synthesis.polynomials import box_quotient, quotient
 from synthesis.polynomials.boxes import Boxes
 from synthesis.polynomials.enclosure import PolynomialMatrix, Powers
+from synthesis.polynomials.half_spaces import Point
 
 ROUNDING = fmpq(1, 2**50)  # of float64, with room: every rounding below costs at most 2^-53 of what is rounded
 
@@ -29,10 +31,11 @@ class Tabulated:
     rounded: bool
 
     def cells(self) -> Iterator[Region]:
-        """The boxes between neighbouring breakpoints, without those wholly outside the set of the parameters."""
+        """The boxes between neighbouring breakpoints (of table and plant), without those wholly outside the set."""
+        borders = self.plant.lines or ((),) * len(self.breakpoints)
         edges = [
-            [(axis.scaled(low), axis.scaled(high)) for low, high in pairwise(points)]
-            for axis, points in zip(self.plant.axes, self.breakpoints, strict=True)
+            [(axis.scaled(low), axis.scaled(high)) for low, high in pairwise(sorted({*points, *more}))]
+            for axis, points, more in zip(self.plant.axes, self.breakpoints, borders, strict=True)
         ]
         for cell in product(*edges):
             region = Region.between(tuple(low for low, _ in cell), tuple(high for _, high in cell))
@@ -65,7 +68,8 @@ class Tabulated:
 
     def plant_on(self, region: Region, letters: str, divided: bool) -> dict[str, PolynomialMatrix] | None:
         """Plant matrices on a region: numerators, or `divided` by the denominator; None if that is not positive there."""
-        plant = {key: region.local(self._plant[key]) for key in letters}
+        here = self._plants[self.plant.number(region.offset)]
+        plant = {key: region.local(here[key]) for key in letters}
         return quotient.quotients(plant, region.local(self._below)) if divided and self._below is not None else plant
 
     def _at_once(self, cells: Sequence[Region], letters: str, divided: bool) -> tuple[dict[str, Boxes], Boxes] | None:
@@ -75,7 +79,8 @@ class Tabulated:
             return None
         shape = self._gain_shape
         rounding = rounding_of(self._gain_rounding, shape) if self.rounded else np.zeros(shape)
-        plant: dict[str, Boxes] | None = {key: local(self._plant[key], cells) for key in letters}
+        owners = np.array([self.plant.number(cell.offset) for cell in cells])
+        plant: dict[str, Boxes] | None = {key: self._plants_local(key, cells, owners) for key in letters}
         if plant is not None and divided and self._below is not None:
             plant = box_quotient.quotients(plant, local(self._below, cells))
         return None if plant is None else (plant, gains(self.table, self.breakpoints, axes, cells, rounding))
@@ -96,23 +101,41 @@ class Tabulated:
         largest = [[max(abs(gain[i, j]) for gain in self.table.values()) for j in range(columns)] for i in range(rows)]
         return {(i, j): arb(largest[i][j] * steepest * ROUNDING * 4) for i in range(rows) for j in range(columns)}
 
+    def _plants_local(self, key: str, cells: Sequence[Region], owners: IndexArray) -> Boxes:
+        """One of the matrices on many regions, each in one cell of the plant."""
+        places = [np.flatnonzero(owners == number) for number in np.unique(owners)]
+        parts = [local(self._plants[owners[own[0]]][key], [cells[int(i)] for i in own]) for own in places]
+        if len(parts) == 1:
+            return parts[0]
+        order = np.argsort(np.concatenate(places))
+        middle, radius = (np.concatenate([getattr(part, k) for part in parts])[order] for k in ("middle", "radius"))
+        return Boxes(middle, radius, parts[0].variables, parts[0].highest)
+
     @cached_property
-    def _plant(self) -> dict[str, PolynomialMatrix]:
-        """Plant matrices (numerators) in u, as balls; uncertain by what the runtime's evaluation in float64 may be off."""
-        return {key: self._evaluated(matrix) for key, matrix in self.plant.matrices.items()}
+    def _plants(self) -> list[dict[str, PolynomialMatrix]]:
+        """Matrices (numerators) in u of every cell of the plant, as balls; uncertain by what float64 may be off."""
+        return [
+            {key: self._evaluated(matrix, box) for key, matrix in piece.matrices.items()}
+            for *box, piece in self.plant.cells
+        ]
 
     @cached_property
     def _below(self) -> PolynomialMatrix | None:
         """The denominator likewise; None where it is one."""
         return None if self.plant.is_polynomial else self._evaluated(self.plant.denominator)
 
-    def _evaluated(self, matrix: PolynomialMatrix) -> PolynomialMatrix:
+    def _evaluated(self, matrix: PolynomialMatrix, box: Sequence[Point] = ()) -> PolynomialMatrix:
         if not self.rounded:
             return matrix.balls()
-        # u = (p - middle) / half of a float64 p: the rounding of `middle` is felt in units of `half`.
-        axes = self.plant.axes
-        argument = [ROUNDING * (1 + max(abs(axis.low), abs(axis.high)) / axis.half) for axis in axes]
-        return matrix.balls().inflated(_evaluation_error(matrix, argument, 0 if self.plant.is_polynomial else 1))
+        # u = (p - middle) / half of a float64 p: the rounding of `middle` is felt in units of `half`, those of its cell.
+        axes, summed = self.plant.axes, matrix
+        halves = [axis.half for axis in axes]
+        if self.plant.pieces:
+            summed, halves = matrix.affine(*box), [h * f for h, f in zip(halves, box[1], strict=True)]
+        argument = [
+            ROUNDING * (1 + max(abs(axis.low), abs(axis.high)) / half) for axis, half in zip(axes, halves, strict=True)
+        ]
+        return matrix.balls().inflated(_evaluation_error(summed, argument, 0 if self.plant.is_polynomial else 1))
 
 
 def _evaluation_error(matrix: PolynomialMatrix, argument: Sequence[fmpq], more: int) -> Any:

@@ -69,10 +69,14 @@ class Fitted:
         middle, half = map(sp.Symbol, names)
         return (sp.Symbol(p.name) - middle) / half
 
+    def unit(self, key: str, i: int, j: int) -> str:
+        """That of a place."""
+        above, beside = (self.signals[kind] for kind in SHAPES[key])
+        return "1" if self.normalised else quotient(above[i].unit, beside[j].unit, "s" if key in "ABE" else "1")
+
     def _one(self, key: str, i: int, j: int) -> sp.Expr:
         """The unit of a place, as a constant of the value one."""
-        above, beside = (self.signals[kind] for kind in SHAPES[key])
-        unit = "1" if self.normalised else quotient(above[i].unit, beside[j].unit, "s" if key in "ABE" else "1")
+        unit = self.unit(key, i, j)
         if unit == "1":
             return sp.Integer(1)
         words = unit.replace("**", "").replace("/", "_per_")

@@ -16,9 +16,11 @@ from synthesis.errors import ModelError
 from synthesis.models.chebyshev_fit import at_points, between_points, fitted
 from synthesis.models.fitted import Fitted, beyond_tolerance, without_exact
 from synthesis.models.grid import grid_lines, table
+from synthesis.models.grid_tables import as_tables
 from synthesis.models.param import SchedulingParameter, Signal
 
-Fit = Literal["polynomial", "piecewise-linear"]
+Fit = Literal["polynomial", "piecewise-linear", "table"]
+TABLE = "table"  # no fit at all
 FITS: dict[str, Callable[..., FloatArray]] = {"polynomial": at_points, "piecewise-linear": between_points}
 HIGHEST_DEGREE = 8
 
@@ -37,11 +39,13 @@ def grid_fields(
 ) -> dict[str, Any]:
     """What `LpvModel` is made of, from tables of its matrices by their letters. Raises ModelError; see `LpvModel.from_grid`."""
     where = f"model '{name}'"
-    if fit not in FITS:
-        raise ModelError(f"{where}: fit '{fit}' is not known; write {' or '.join(FITS)}")
+    if fit not in (*FITS, TABLE):
+        raise ModelError(f"{where}: fit '{fit}' is not known; write {' or '.join((*FITS, TABLE))}")
+    if fit == TABLE and degree is not None:
+        raise ModelError(f"{where}: a table has no degree; leave it out, or take the fit 'polynomial'")
     if not parameters:
         raise ModelError(f"{where}: a grid needs at least one scheduling parameter")
-    lines, order = grid_lines(points, parameters, where)
+    lines, order = grid_lines(points, parameters, where, fit == TABLE)
     tables = {}
     for key, (above, beside) in SHAPES.items():
         shape = (len(signals[above]), len(signals[beside]))
@@ -53,6 +57,13 @@ def grid_fields(
             raise ModelError(
                 f"{where}: {key} has {tables[key].shape[-2:]} entries; {shape[0]} {above} and {shape[1]} {beside} need {shape}"
             )
+    if fit == TABLE:
+        build = Fitted(where, source, tuple(parameters), signals)
+        formulas, found_tables = as_tables(build, source, lines, tables)
+        return dict(
+            name=name, source=source, parameters=tuple(parameters), constants=build.constants, tables=found_tables,
+            **signals, **formulas,
+        )  # fmt: skip
     scaled = tuple((line - p.middle) / p.half_width for line, p in zip(lines, parameters, strict=True))
     found, residuals = _fit(where, scaled, tables, degree, FITS[fit], tolerance)
     largest = {key: np.abs(values).max(axis=tuple(range(len(lines)))) for key, values in tables.items()}

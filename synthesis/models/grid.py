@@ -17,10 +17,14 @@ SAME = 1e-9  # of the span: coordinates that are closer are one
 
 
 def grid_lines(
-    points: Mapping[str, ArrayLike] | ArrayLike, parameters: Sequence[SchedulingParameter], where: str
+    points: Mapping[str, ArrayLike] | ArrayLike,
+    parameters: Sequence[SchedulingParameter],
+    where: str,
+    jumps: bool = False,
 ) -> tuple[tuple[FloatArray, ...], IndexArray | None]:
     """The lines of the grid and, for points in any order, the place of each (g,) in the flattened grid.
 
+    With `jumps` a value of a line may stand twice (`synthesis.models.table`).
     `points` maps each parameter to its line, or lists all points (g, p). Raises ModelError for lines that do not rise, points
     that are no full grid (naming one that is missing or twice), and a range that the grid does not cover.
     """
@@ -33,7 +37,7 @@ def grid_lines(
         missing = next((name for name in names if name not in points), None)
         if missing is not None:
             raise ModelError(f"{where}: points: the grid line of '{missing}' is missing; give its values")
-        lines = tuple(_line(points[p.name], p, where) for p in parameters)
+        lines = tuple(_line(points[p.name], p, where, jumps) for p in parameters)
     else:
         lines, order = _from_list(_numbers(points, where), parameters, where)
     for p, line in zip(parameters, lines, strict=True):
@@ -74,11 +78,12 @@ def _numbers(values: Any, where: str) -> FloatArray:
     return found
 
 
-def _line(values: ArrayLike, p: SchedulingParameter, where: str) -> FloatArray:
+def _line(values: ArrayLike, p: SchedulingParameter, where: str, jumps: bool = False) -> FloatArray:
     line = _numbers(values, f"{where}: grid line of {p.name}")
     if line.ndim != 1 or len(line) < 2:
         raise ModelError(f"{where}: the grid line of {p.name} needs at least two values in one row")
-    bad = np.flatnonzero(np.diff(line) <= 0.0)
+    steps = np.diff(line)
+    bad = np.flatnonzero(steps < 0.0 if jumps else steps <= 0.0)
     if len(bad):
         k = int(bad[0])
         raise ModelError(

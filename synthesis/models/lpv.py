@@ -15,13 +15,15 @@ from estimators.display import Display, counted
 from estimators.errors import unknown
 from synthesis.errors import ModelError
 from synthesis.models.constraint import ParameterConstraint, scaled_set, still_cutting
-from synthesis.models.extract import MATRICES, ExactModel, PolynomialModel, extract, in_floats
+from synthesis.models.extract import MATRICES, ExactModel, PolynomialModel, extract
 from synthesis.models.from_grid import Fit, from_systems, grid_fields, with_noise
 from synthesis.models.from_jacobian import jacobian_fields
 from synthesis.models.nonlinear import NonlinearModel
-from synthesis.models.numeric import NumericModel, evaluate
+from synthesis.models.numeric import NumericModel, evaluate_pieces
 from synthesis.models.param import Constant, SchedulingParameter, Signal
+from synthesis.models.pieces import ModelPiece, Pieces, pieces_of, whole
 from synthesis.models.symbols import plain
+from synthesis.models.table import Table, check_table, table_words
 from synthesis.polynomials.half_spaces import Faces, HalfSpaces
 
 if TYPE_CHECKING:
@@ -33,10 +35,12 @@ class LpvModel(Display):
     r"""x' = A(p) x + B(p) u + E(p) d,  y = C(p) x + D(p) u + F(p) d, with p(t) in a box and dp/dt in another.
 
     `constraints` are linear inequalities between the parameters that cut corners off their box; the matrices are defined on
-    all of it. Rate bounds hold as far as the set allows.
+    all of it. Rate bounds hold as far as the set allows. `tables` are quantities that are known at breakpoints (`Table`), used
+    in the matrices by their names: the plant is a polynomial on each cell of their grid (`pieces`), with kinks between them.
 
-    Matrices are sympy matrices whose symbols are the names of `parameters` and `constants`, polynomial or rational in
-    the parameters. A disturbance whose column of E is zero is measurement noise. B, D, E and F default to zero.
+    Matrices are sympy matrices whose symbols are the names of `parameters`, `constants` and `tables`, polynomial or rational in
+    the parameters (with tables, polynomial). A disturbance whose column of E is zero is measurement noise. B, D, E and F
+    default to zero.
 
     Raises ModelError for a stray symbol, a shape that does not fit, a parameter or constant that never appears, a
     dependence that is not rational, a denominator that vanishes inside the range, and repeated names.
@@ -68,6 +72,7 @@ class LpvModel(Display):
     F: sp.Matrix | None = None
     constants: Mapping[str, Constant] = field(default_factory=dict)
     constraints: tuple[ParameterConstraint, ...] = ()
+    tables: Mapping[str, Table] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         nx, ny, nu, nd = len(self.states), len(self.outputs), len(self.inputs), len(self.disturbances)
@@ -87,7 +92,15 @@ class LpvModel(Display):
             object.__setattr__(self, key, matrix)
         self._check_symbols()
         self.half_spaces  # noqa: B018  a set that is empty must not exist
-        self.polynomial  # noqa: B018  a model that is not rational, or divides by zero, must not exist
+        for key, table in self.tables.items():
+            check_table(table, self.parameters, f"model '{self.name}': table '{key}'")
+        if self.tables and self.constraints:
+            raise ModelError(
+                f"model '{self.name}' has tables and constraints between its parameters; one of both is supported: leave the "
+                "constraints out, or fit polynomials to the tables"
+            )
+        for piece in self.pieces:  # a model that is not rational, or divides by zero, must not exist
+            piece.polynomial  # noqa: B018
 
     def summary(self) -> tuple[str, ...]:
         """Signals and parameters with their units; `gainsmith model` shows the rest."""
@@ -95,20 +108,22 @@ class LpvModel(Display):
         def listed(signals: tuple[Signal, ...]) -> str:
             return ", ".join(f"{s.name} [{s.unit}]" for s in signals) or "none"
 
+        tables = table_words(self.tables, self.parameters, len(self.pieces)) if self.tables else ()
         moving = [f"{p.name} {p.minimum:g} to {p.maximum:g} {p.unit}" for p in self.parameters]
+        box = ", ".join([*moving, *(c.words for c in self.constraints)])
         return (
             f"LpvModel '{self.name}' ({self.source})",
             f"{counted(len(self.states), 'state')}: {listed(self.states)}",
             f"inputs; outputs: {listed(self.inputs)}; {listed(self.outputs)}",
             f"disturbances: {listed(self.disturbances)}",
-            f"{counted(len(moving), 'parameter')}: {', '.join([*moving, *(c.words for c in self.constraints)]) or 'none'}",
+            f"{counted(len(moving), 'parameter')}: {'; '.join([box or 'none', *tables])}",
         )
 
     def _check_names(self) -> None:
         if not self.states or not self.outputs:
             raise ModelError(f"model '{self.name}' needs at least one state and one output")
         names = [s.name for s in (*self.states, *self.inputs, *self.outputs, *self.disturbances)]
-        names += [p.name for p in self.parameters] + list(self.constants)
+        names += [p.name for p in self.parameters] + list(self.constants) + list(self.tables)
         repeated = sorted({name for name in names if names.count(name) > 1})
         if repeated:
             raise ModelError(f"model '{self.name}' uses the name(s) {', '.join(repeated)} twice; names must be unique")
@@ -117,7 +132,8 @@ class LpvModel(Display):
 
     def _check_symbols(self) -> None:
         used = {str(symbol) for key in MATRICES for symbol in getattr(self, key).free_symbols}
-        known = {p.name for p in self.parameters} | set(self.constants)
+        known = {p.name for p in self.parameters} | set(self.constants) | set(self.tables)
+        used |= {name for key in used & set(self.tables) for name in self.tables[key].over}
         stray = sorted(used - known)
         if stray:
             raise ModelError(
@@ -127,19 +143,46 @@ class LpvModel(Display):
         idle = sorted({p.name for p in self.parameters} - used)
         if idle:
             raise ModelError(f"model '{self.name}': parameter(s) {', '.join(idle)} appear in no matrix; remove them")
-        idle = sorted(set(self.constants) - used)
-        if idle:
-            raise ModelError(f"model '{self.name}': constant(s) {', '.join(idle)} appear in no matrix; remove them")
+        for kind, names in (("constant", self.constants), ("table", self.tables)):
+            idle = sorted(set(names) - used)
+            if idle:
+                raise ModelError(f"model '{self.name}': {kind}(s) {', '.join(idle)} appear in no matrix; remove them")
 
     @cached_property
     def exact(self) -> ExactModel:
-        """Exact polynomials of the matrices in the scaled parameters u in [-1, 1], over a common denominator."""
+        """Exact polynomials of the matrices in the scaled parameters u in [-1, 1], over a common denominator.
+
+        Raises ModelError for a model with tables, which is another polynomial on every cell: see `pieces`.
+        """
+        self.refuse_tables("a design or an analysis of one polynomial for the whole range")
         matrices = {key: getattr(self, key) for key in MATRICES}
         return extract(f"model '{self.name}'", matrices, self.parameters, self.constants)
 
     def __getstate__(self) -> dict[str, object]:
         """Without exact numbers, which cannot be pickled and are worked out again where they are needed."""
-        return {key: value for key, value in self.__dict__.items() if key not in ("exact", "half_spaces")}
+        exact = ("exact", "half_spaces", "cells")
+        return {key: value for key, value in self.__dict__.items() if key not in exact}
+
+    def refuse_tables(self, what: str) -> None:
+        """Raise ModelError where `what` does not know of tables."""
+        if self.tables:
+            raise ModelError(
+                f"model '{self.name}' has the table(s) {', '.join(self.tables)}: {what} does not support a plant by cells; fit a "
+                "polynomial to them (LpvModel.from_grid)"
+            )
+
+    @cached_property
+    def cells(self) -> Pieces:
+        """The pieces of the model with the borders between them."""
+        if not self.tables:
+            return whole(self.parameters, self.exact)
+        matrices = {key: getattr(self, key) for key in MATRICES}
+        return pieces_of(f"model '{self.name}'", matrices, self.parameters, self.constants, self.tables)
+
+    @property
+    def pieces(self) -> tuple[ModelPiece, ...]:
+        """The model on every cell of its tables, the last parameter's running fastest; without tables on the whole range."""
+        return self.cells.all
 
     @cached_property
     def half_spaces(self) -> HalfSpaces:
@@ -149,7 +192,8 @@ class LpvModel(Display):
     @cached_property
     def polynomial(self) -> PolynomialModel:
         """`exact` as float64 coefficient arrays."""
-        return in_floats(self.exact)
+        self.refuse_tables("a design or an analysis of one polynomial for the whole range")
+        return self.pieces[0].polynomial
 
     def on(self, grid: ArrayLike) -> NumericModel:
         """The model at g parameter values: the only border between sympy and numpy.
@@ -166,7 +210,7 @@ class LpvModel(Display):
         if points.ndim != 2 or points.shape[-1] != count:
             raise ModelError(f"model '{self.name}': a grid of shape {points.shape} does not fit {count} parameters")
         self._check_range(points)
-        return evaluate(self.polynomial, self.parameters, points)
+        return evaluate_pieces([p.polynomial for p in self.pieces], self.cells.borders, self.parameters, points)
 
     @property
     def centre(self) -> FloatArray:
@@ -235,7 +279,8 @@ class LpvModel(Display):
         Entries become Chebyshev polynomials (least squares), stored as exact rationals: of `degree`, or of the lowest degree that
         leaves no entry off by more than `tolerance` of its largest value (at most half as many as points, so that points are left
         to tell). `fit` says what the plant is between the points: "polynomial", the fit itself; "piecewise-linear", straight
-        lines, so that the residual is bounded over the whole range.
+        lines, so that the residual is bounded over the whole range. With the fit "table" there is none: the plant is multilinear
+        between the points, exactly, another polynomial on every cell (`Table`); a point of a line that stands twice is a jump.
 
         The residual enters the model as a stated uncertainty (`synthesis.models.fitted`): for each row that is off, a disturbance
         `NAME_fit_error` between -1 and 1 with a constant `NAME_fit_error_size`; name these disturbances in the channels of a

@@ -84,6 +84,7 @@ def weighted(model: LpvModel, weights: Mapping[str, Any]) -> LpvModel:
     nb = Ab.shape[0]
     return LpvModel(
         constraints=model.constraints,
+        tables=model.tables,
         name=f"{model.name} weighted",
         source=model.source,
         states=(*model.states, *(s for f in (*after, *before) for s in f.states)),

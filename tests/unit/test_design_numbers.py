@@ -32,7 +32,7 @@ def test_discretised_plants_are_polynomials_close_to_exponentials(parameters: tu
     other = q if len(parameters) == 2 else sp.Integer(1)
     plant = small_model([[-p, 3 + other], [p * other / 2, -1 - p]], [[1, p]], parameters, E=[[1], [2]], F=[[1]])
     scale, period = np.array([2.0, 0.1]), 0.05
-    (Phi, _, Gamma), draw = fitted_update(plant, scale, period), np.random.default_rng(0)
+    (Phi, _, Gamma), draw = fitted_update(plant, plant.pieces[0], scale, period), np.random.default_rng(0)
     for _ in range(5):
         u = draw.uniform(-1.0, 1.0, len(parameters))
         A = plant.A.subs({a.name: a.middle + a.half_width * t for t, a in zip(u, parameters, strict=True)})
@@ -49,13 +49,13 @@ def test_discretised_rational_plants_are_over_a_power_of_their_denominator() -> 
     """A wide range of 1/p, and what 24 degrees do not reach without that power."""
     plant = small_model([[-1 / p, 3 - p], [q / p, -1]], [[1, 0]], (parameter("p", 0.2, 5.0), TWO[1]), E=[[1 / p], [2]])
     scale, period = np.array([2.0, 0.1]), 0.05
-    Phi, _, Gamma = fitted_update(plant, scale, period)
+    Phi, _, Gamma = fitted_update(plant, plant.pieces[0], scale, period)
     assert Phi.shape[:2] <= (13, 9)
     for u, v in np.random.default_rng(1).uniform(-1.0, 1.0, (5, 2)):
         at = plant.on(np.array([[2.6 + 2.4 * u, 0.5 + 2.5 * v]]))
         A, E = at.A[0] * scale[:, None] / scale, at.E[0] * scale[:, None]
         block = expm(period * np.block([[A, E], [np.zeros((1, 3))]]))
-        below = (1.0 + 2.4 / 2.6 * u) ** power_below(plant)
+        below = (1.0 + 2.4 / 2.6 * u) ** power_below(plant.pieces[0])
         for value, wanted in ((Phi, block[:2, :2]), (Gamma, block[:2, 2:])):
             there = np.tensordot(v ** np.arange(value.shape[1]), np.tensordot(u ** np.arange(len(value)), value, 1), 1)
             np.testing.assert_allclose(there, wanted * below, atol=1e-5)

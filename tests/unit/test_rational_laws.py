@@ -104,8 +104,8 @@ def test_the_inequality_of_a_sampled_law_is_over_the_cube_of_the_denominator() -
     """For any Q, G and Y, against the update by a matrix exponential, at places with rates; no scaling."""
     model, rng = twins(rate=0.5)[1], np.random.default_rng(6)
     scale = FeedbackScale(np.ones(2), np.ones(1), disturbance=1.0, clock=1.0)
-    fitted = fitted_update(model, scale.states, PERIOD)
-    problem = _problem(model, StateFeedbackDesign((NOISY,)), scale, PERIOD, fitted, 1.7, False, 0.0)
+    fitted = fitted_update(model, model.pieces[0], scale.states, PERIOD)
+    problem = _problem(model, StateFeedbackDesign((NOISY,)), scale, PERIOD, [fitted], 1.7, False, 0.0)
     decisions = rng.normal(size=problem.decisions)
     Q, G, Y = (problem.unknowns[key].substitute(decisions) for key in "QGY")
     for u, r in rng.uniform(-1.0, 1.0, (4, 2)):
