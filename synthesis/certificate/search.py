@@ -47,6 +47,7 @@ class Wish:
     kind: str
     level: float | None
     channel: ClaimChannel | None = None
+    centre: float | None = None
 
 
 @dataclass
@@ -115,7 +116,7 @@ class Search:
                 return None, outcome
             coefficients = asked.P.substitute(found.decisions).coefficients[..., 0]
             P = rounded_lyapunov(coefficients * unit**2, self.scale, len(self.parameters), self.digits)
-            claim = Claim(wish.kind, float(wish.level or 0.0), P, wish.channel)
+            claim = Claim(wish.kind, float(wish.level or 0.0), P, wish.channel, wish.centre)
             outcome = self.verifier.prove(claim)
             if outcome.proved:
                 return claim, outcome
@@ -235,7 +236,7 @@ class Search:
     def _question(self, wish: Wish, period: float, square: object) -> Question:
         """Errors in the unit of `_output_unit`, inputs in one that makes the least gain a number near one."""
         if wish.channel is None:
-            return Question(wish.kind, float(wish.level or 0.0), period=period)
+            return Question(wish.kind, float(wish.level or 0.0), period=period, centre=wish.centre)
         group, size = WITH_CHANNEL[wish.kind], self._unit(wish)
         Z, W = self._errors(wish) / self._output_unit(wish), self._sizes(wish.channel, wish.kind)
         level = None if wish.level is None else wish.level / size

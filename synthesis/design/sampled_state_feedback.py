@@ -26,8 +26,8 @@ from synthesis.design.feedback_channel import feedback_channel_matrices
 from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
 from synthesis.design.fitted_update import fitted_update, power_below
 from synthesis.design.norms import ChannelSizes, levels, per_sample, require_sampled_energy
-from synthesis.design.pole_regions import refuse_regions
 from synthesis.design.refusals import refuse_unstabilisable
+from synthesis.design.sampled_regions import require_discs, sampled_discs
 from synthesis.design.state_feedback import (
     StateFeedbackDesign,
     StateFeedbackGains,
@@ -52,8 +52,8 @@ def design_sampled_state_feedback(
 ) -> StateFeedbackGains:
     """K(p) for the given sample time (s); `gamma` is the l2 gain over samples.
 
-    Raises ProblemError for pole regions (of poles in continuous time), for a model whose update over a sample no polynomial fits,
-    and as `design_state_feedback`.
+    Raises ProblemError for regions that are none of an update's poles (`synthesis.design.sampled_regions`), for a model whose
+    update over a sample no polynomial fits, and as `design_state_feedback`.
 
     >>> import sympy as sp
     >>> one = {key: (Signal(name, "1"),) for key, name in zip(("states", "inputs", "outputs", "disturbances"), "xuyw")}
@@ -64,7 +64,6 @@ def design_sampled_state_feedback(
     >>> print(design_sampled_state_feedback(plant, asked, sample_time=0.05).verdict)
     certified
     """
-    refuse_regions(design.regions)
     if not sample_time > 0.0:
         raise ProblemError(f"sample time {sample_time} s must be positive")
     given = next((name for name in ("fastest_pole", "damping") if getattr(design, name) is not None), None)
@@ -72,6 +71,7 @@ def design_sampled_state_feedback(
         raise ProblemError(
             f"a sampled design has no {given}: leave it out; sizes of inputs in channels bound its gains"
         )
+    sampled_discs(design.regions, sample_time)
     refuse_unstabilisable(model)
     check_limits(model, design.limits)
     design = replace(design, settings=replace(design.settings, points=min(design.settings.points, POINTS)))
@@ -123,6 +123,8 @@ def _problem(
     if design.decay_rate > 0.0:
         kept = float(np.exp(-2.0 * design.decay_rate * (1.0 + design.reserve) * period))
         problem.require("decay over a sample", symmetric_block([[over(later) * kept, closed], [None, over(slack)]]))
+    discs = sampled_discs(design.regions, period, design.reserve)
+    require_discs(problem, discs, design.degree, closed, G, over)
     if design.limits is not None:
         require_limits(problem, model, design.limits, design.reserve, scale, Q, slack, Y)
     for channel in design.channels:
