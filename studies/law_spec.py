@@ -66,7 +66,7 @@ def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
     if design.regions is not None:
         _check_regions(design, deploy, who)
     if design.dynamic_weights is not None:
-        _check_weights(design, who)
+        _check_weights(design)
     if not feedback and deploy.limits is not None:
         raise ValueError("deploy.limits are not for an observer, which commands nothing; remove them")
 
@@ -82,10 +82,8 @@ def _check_regions(design: DesignSpec, deploy: DeploySpec, who: str) -> None:
         raise ValueError(f"design.{error}") from None
 
 
-def _check_weights(design: DesignSpec, who: str) -> None:
+def _check_weights(design: DesignSpec) -> None:
     """What weighs signals is computed, not measured: the law must say what it measures."""
-    if design.law == "sampled state feedback":
-        raise ValueError(f'design.dynamic_weights are not for {who}; take law = "state feedback" or "output feedback"')
     key = {"output feedback": "measured", "static output feedback": "uses"}.get(design.law or "")
     if key is not None and getattr(design, key) is None:
         raise ValueError(f"design.{key} is missing: beside dynamic_weights name the outputs that the law measures")
@@ -141,10 +139,11 @@ def design_feedback(
         return design_output_feedback(model, design)
     if isinstance(design, StaticFeedbackDesign):
         return design_static_feedback(model, design)
-    if law == SAMPLED:
-        return design_sampled_state_feedback(model, design, sample_time)
+    period = sample_time if law == SAMPLED else None
     if weights:
-        return design_weighted_state_feedback(model, design, weights)
+        return design_weighted_state_feedback(model, design, weights, period)
+    if period is not None:
+        return design_sampled_state_feedback(model, design, period)
     return design_state_feedback(model, design)
 
 

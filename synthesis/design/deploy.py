@@ -202,7 +202,8 @@ def _claims(gains: Gains, search: Search, wishes: Sequence[Wish], settle: float)
     regions = getattr(gains.design, "regions", PoleRegions())
     of_update = [Wish(kind, level, centre=centre) for kind, level, centre in regions.of_update]
     if not isinstance(gains, ObserverGains):
-        designed = getattr(gains, "sample_time", None) is not None
+        # A copy of weights has their own poles, and sampling moves those of a design in continuous time.
+        designed = getattr(gains, "sample_time", None) is not None and not gains.order
         return feedback_claims(search, wishes, settle, of_update, widened=not designed)
     if gains.update == "held":
         return held_claims(

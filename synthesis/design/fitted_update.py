@@ -13,7 +13,7 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
-from synthesis.models.discretise import zero_order_hold
+from synthesis.models.discretise import weights_over_sample
 from synthesis.models.lpv import LpvModel
 from synthesis.models.numeric import NumericModel, values
 
@@ -28,9 +28,12 @@ def power_below(model: LpvModel) -> int:
     return 0 if model.polynomial.is_polynomial else POWER
 
 
-def fitted_update(model: LpvModel, scale: FloatArray, period: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def fitted_update(
+    model: LpvModel, scale: FloatArray, period: float, weights: int = 0
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """e^(TA), T phi(TA) B and T phi(TA) E in the states diag(scale) x, as polynomials in u over d^k, k = `power_below`.
 
+    The last states are of `weights` that run once a sample (`synthesis.models.discretise.weights_over_sample`).
     Coefficients (d_1+1, ..., d_p+1, rows, columns), fitted to 1e-10, of a rational model to 1e-7. Raises ProblemError where
     degree 24 leaves more than 1e-4.
     """
@@ -38,7 +41,8 @@ def fitted_update(model: LpvModel, scale: FloatArray, period: float) -> tuple[Fl
 
     def update(at: NumericModel) -> FloatArray:
         driven = np.concatenate([at.B, at.E], axis=-1) * scale[:, None]
-        moved = np.concatenate(zero_order_hold(at.A * scale[:, None] / scale, driven, period), axis=-1)
+        held = weights_over_sample(at.A * scale[:, None] / scale, driven, weights, period)
+        moved = np.concatenate(held, axis=-1)
         return np.asarray(moved * values(model.polynomial.denominator, model.scaled(at.points)) ** power_below(model))
 
     series = _fitted(model, update)

@@ -48,9 +48,11 @@ POINTS = 40  # for each parameter; what holds between them is proved for the tab
 
 
 def design_sampled_state_feedback(
-    model: LpvModel, design: StateFeedbackDesign, sample_time: float
+    model: LpvModel, design: StateFeedbackDesign, sample_time: float, weights: int = 0
 ) -> StateFeedbackGains:
     """K(p) for the given sample time (s); `gamma` is the l2 gain over samples.
+
+    The last states are of `weights` that run once a sample.
 
     Raises ProblemError for regions that are none of an update's poles (`synthesis.design.sampled_regions`), for a model whose
     update over a sample no polynomial fits, and as `design_state_feedback`.
@@ -79,7 +81,7 @@ def design_sampled_state_feedback(
     # Sums over samples in the place of integrals: what a state costs is divided by the sample time.
     states = plain.states * np.sqrt(plain.clock / sample_time)
     scale = replace(plain, states=states, disturbance=plain.disturbance * np.sqrt(plain.clock * sample_time), clock=1.0)
-    fitted = fitted_update(model, states, sample_time)
+    fitted = fitted_update(model, states, sample_time, weights)
 
     def problem(gamma: float | None, maximise_margin: bool = True, floor: float = 0.0) -> LmiProblem:
         return _problem(model, design, scale, sample_time, fitted, gamma, maximise_margin, floor)
