@@ -14,10 +14,12 @@ from synthesis.design.state_feedback import GainLimits, StateFeedbackDesign, des
 from synthesis.design.static_feedback import design_static_feedback
 from synthesis.design.static_feedback_design import StaticFeedbackDesign
 from synthesis.design.weighted_state_feedback import design_weighted_state_feedback
+from synthesis.errors import ProblemError
 from synthesis.lmi.settings import LmiSettings
 from synthesis.loop.feedback import Measured
 from synthesis.models.lpv import LpvModel
 
+SAMPLED = "sampled state feedback"
 KEYS_OF = {  # of [design], beside those that observers have
     "state feedback": ("damping", "input_limits", "state_sizes"),
     "sampled state feedback": ("damping", "input_limits", "state_sizes"),
@@ -61,22 +63,27 @@ def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
     if given is not None:
         other = next(law for law, keys in KEYS_OF.items() if given in keys)
         raise ValueError(f'design.{given} is not for {who}; remove it, or name another law: law = "{other}"')
-    if design.regions is not None and design.law not in (None, "state feedback"):
-        raise ValueError(f"design.regions are not for {who}; remove them, or give a decay rate")
-    if design.regions is not None and not feedback and deploy.update == "sampled":
-        raise ValueError(
-            'design.regions are not for an observer with update = "sampled"; remove them, or give a decay rate'
-        )
+    if design.regions is not None:
+        _check_regions(design, deploy, who)
     if design.dynamic_weights is not None:
-        _check_weights(design, who)
+        _check_weights(design)
     if not feedback and deploy.limits is not None:
         raise ValueError("deploy.limits are not for an observer, which commands nothing; remove them")
 
 
-def _check_weights(design: DesignSpec, who: str) -> None:
+def _check_regions(design: DesignSpec, deploy: DeploySpec, who: str) -> None:
+    """Their law has them, in its time."""
+    if design.law not in (None, "state feedback", SAMPLED):
+        raise ValueError(f"design.regions are not for {who}; remove them, or give a decay rate")
+    discrete = design.law == SAMPLED or (design.law is None and deploy.update == "sampled")
+    try:
+        regions_of(design).refuse_for("discrete" if discrete else "continuous")
+    except ProblemError as error:
+        raise ValueError(f"design.{error}") from None
+
+
+def _check_weights(design: DesignSpec) -> None:
     """What weighs signals is computed, not measured: the law must say what it measures."""
-    if design.law == "sampled state feedback":
-        raise ValueError(f'design.dynamic_weights are not for {who}; take law = "state feedback" or "output feedback"')
     key = {"output feedback": "measured", "static output feedback": "uses"}.get(design.law or "")
     if key is not None and getattr(design, key) is None:
         raise ValueError(f"design.{key} is missing: beside dynamic_weights name the outputs that the law measures")
@@ -132,10 +139,11 @@ def design_feedback(
         return design_output_feedback(model, design)
     if isinstance(design, StaticFeedbackDesign):
         return design_static_feedback(model, design)
-    if law == "sampled state feedback":
-        return design_sampled_state_feedback(model, design, sample_time)
+    period = sample_time if law == SAMPLED else None
     if weights:
-        return design_weighted_state_feedback(model, design, weights)
+        return design_weighted_state_feedback(model, design, weights, period)
+    if period is not None:
+        return design_sampled_state_feedback(model, design, period)
     return design_state_feedback(model, design)
 
 
@@ -154,6 +162,8 @@ def without_other_laws(resolved: dict[str, Any]) -> dict[str, Any]:
     for key in ("regions", "dynamic_weights"):
         if design[key] is None:
             design.pop(key)
+    if "regions" in design:  # the key is younger than the digests
+        design["regions"] = {k: v for k, v in design["regions"].items() if v is not None or k != "sampled_disc"}
     if "dynamic_weights" in design:
         design["dynamic_weights"] = [{k: v for k, v in w.items() if v is not None} for w in design["dynamic_weights"]]
     if design["law"] is None:
@@ -171,9 +181,9 @@ def regions_of(spec: DesignSpec) -> PoleRegions:
     """As the synthesis takes them."""
     if spec.regions is None:
         return PoleRegions()
-    strip = spec.regions.vertical_strip
-    pair = None if strip is None else (strip[0], strip[1])
-    return PoleRegions(spec.regions.disc, spec.regions.damping, pair, spec.regions.horizontal_strip)
+    given = spec.regions
+    strip, disc = (None if x is None else (x[0], x[1]) for x in (given.vertical_strip, given.sampled_disc))
+    return PoleRegions(given.disc, given.damping, strip, given.horizontal_strip, disc)
 
 
 def _numbers(values: list[float] | None) -> tuple[float, ...] | None:

@@ -65,7 +65,7 @@ def _check_feedback(spec: ScheduleSpec, model: LpvModel) -> None:
         if channel.norm != "H-infinity" and spec.law == "state feedback":
             refuse_feedthrough(model, channel, Z, W)
     if spec.weight_states and isinstance(design, StateFeedbackDesign):
-        check_weighted_states(model, design, spec.weight_states)
+        check_weighted_states(model, spec.weight_states)
     forces = [W for W, _ in pairs]
     _check_effect(model, design.channels, forces)
     if not model.inputs:

@@ -49,12 +49,16 @@ class ChannelSpec(StrictTable):
 
 
 class RegionsSpec(StrictTable):
-    """Where every frozen pole s is to lie (synthesis.design.pole_regions): 1/s, a ratio, 1/s twice, rad/s."""
+    """Where every frozen pole s is to lie (synthesis.design.pole_regions): 1/s, a ratio, 1/s twice, rad/s.
+
+    Of a sampled design the strips (synthesis.design.sampled_regions), and centre and radius of a disc of the poles z = exp(s T).
+    """
 
     disc: float | None = Field(default=None, gt=0)
     damping: float | None = Field(default=None, gt=0, lt=1)
     vertical_strip: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
     horizontal_strip: float | None = Field(default=None, gt=0)
+    sampled_disc: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
 
 
 class DesignSpec(StrictTable):

@@ -21,6 +21,7 @@ FORMS = {
     "coefficients": ("numerator", "denominator"),
     "matrices": ("A", "B", "C", "D"),
 }
+STATE_FEEDBACK = ("state feedback", "sampled state feedback")
 MOST_STATES = 8  # of one weight
 
 
@@ -97,5 +98,5 @@ def weighed(model: LpvModel, weights: Sequence[WeightSpec], law: str | None) -> 
             raise SpecError(
                 f"{where}: '{name}' is no disturbance; an observer's weights shape its disturbances ({', '.join(driven)})"
             )
-    plain = states_as_outputs(model) if law == "state feedback" else model
+    plain = states_as_outputs(model) if law in STATE_FEEDBACK else model
     return weighted(plain, {weight.signal: weight.system() for weight in weights})

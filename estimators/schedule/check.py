@@ -177,10 +177,12 @@ def _parameter(check: Checker, entry: Any, place: str) -> None:
 
 
 def _claim(check: Checker, claim: Any, place: str, parameters: int, loop: LoopSizes) -> None:
-    check.keys(claim, place, ("kind", "level", "P"), ("channel",))
+    check.keys(claim, place, ("kind", "level", "P"), ("channel", "centre"))
     check.text(claim["kind"], f"{place}.kind", most=LONGEST_NAME)
     check.positive(claim["level"], f"{place}.level")
     check.polynomial(claim["P"], f"{place}.P", parameters, (loop.states, loop.states), HIGHEST_ORDER)
+    if "centre" in claim:
+        check.number(claim["centre"], f"{place}.centre")
     if "channel" in claim:
         channel = claim["channel"]
         check.keys(channel, f"{place}.channel", ("inputs", "errors"))

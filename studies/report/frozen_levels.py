@@ -76,7 +76,8 @@ def frozen_levels(content: Mapping[str, Any], where: str = "schedule") -> list[F
         systems = _standing(loop, points, "continuous" if claim.kind in ERROR_EQUATION else "discrete")
         kept = np.array([system is not None for system in systems])
         values = _values(claim, [s for s in systems if s is not None], subject.names, loop)
-        name, unit = (make(claim.kind, claim.channel, subject.units) for make in (claim_name, claim_unit))
+        name = claim_name(claim.kind, claim.channel, subject.units, claim.centre)
+        unit = claim_unit(claim.kind, claim.channel, subject.units)
         found.append(FrozenLevel(name, claim.kind, unit, claim.level, places[kept], values))
     return found
 
@@ -91,6 +92,7 @@ def _values(claim: Claim, systems: list[System], names: Any, loop: Loop) -> Floa
     A = np.array([_matrix(system.A, system) for system in systems])
     poles = np.linalg.eigvals(A)
     if claim.kind in (*CONTINUOUS, *DISCRETE):
+        poles = poles - (claim.centre or 0.0)
         return pole_levels(claim.kind, poles, 1.0 if loop.sample_time is None else _number(loop.sample_time))
     match claim.kind:
         case "decay rate":

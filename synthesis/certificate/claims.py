@@ -39,7 +39,10 @@ KINDS_OF = {  # which kinds say something true about which update (synthesis.loo
         "motion gain",
         "drop probability",
     ),
-    "sampled": ("sampled error", "sampled gain", "sampled H2 norm", "sampled energy to peak", "drop probability"),
+    "sampled": (
+        *("sampled error", "sampled gain", "sampled H2 norm", "sampled energy to peak", "drop probability"),
+        *DISCRETE,
+    ),
     "feedback": (
         "sampled error",
         "sampled gain",
@@ -49,6 +52,7 @@ KINDS_OF = {  # which kinds say something true about which update (synthesis.loo
     ),  # synthesis.loop.feedback
 }
 IMAGINARY = ("imaginary part", "sampled imaginary part")
+WITHOUT_UNIT = ("drop probability", "damping ratio", "sampled disc")
 LARGER_IS_BETTER = (
     *("decay rate", "internal update", "sampled error", "drop probability"),
     *("slowest pole", "damping ratio", "sampled slowest pole"),
@@ -75,6 +79,7 @@ WORDS = {
     "sampled slowest pole": "update: slowest pole",
     "sampled fastest pole": "update: fastest pole",
     "sampled imaginary part": "update: imaginary part of poles",
+    "sampled disc": "update: radius of poles z",
 }
 
 
@@ -103,12 +108,13 @@ class Claim:
     level: float
     P: PolynomialMatrix
     channel: ClaimChannel | None = None
+    centre: float | None = None  # of a disc of poles z, which alone has one
 
 
-def claim_name(kind: str, channel: ClaimChannel | None, units: Mapping[str, str]) -> str:
+def claim_name(kind: str, channel: ClaimChannel | None, units: Mapping[str, str], centre: float | None = None) -> str:
     """What is claimed, in words; sizes of inputs with their units wherever they are not plainly one."""
     if channel is None:
-        return WORDS[kind]
+        return WORDS[kind] if centre is None else f"{WORDS[kind]} about {written(centre)}"
     plain = plain_unit(channel)
     motion = "/s" if WITH_CHANNEL[kind] == "motion" else ""
     mark = "'" if motion else ""
@@ -131,7 +137,7 @@ def claim_unit(kind: str, channel: ClaimChannel | None, units: Mapping[str, str]
     is an integral.
     """
     if channel is None:
-        return {"drop probability": "1", "damping ratio": "1"}.get(kind, "rad/s" if kind in IMAGINARY else "1/s")
+        return "1" if kind in WITHOUT_UNIT else "rad/s" if kind in IMAGINARY else "1/s"
     above = {"1" if channel.sizes else units[name] for name in channel.errors}
     top, root = above.pop() if len(above) == 1 else "mixed", "" if kind in GAINS else "s^0.5"
     if not plain_unit(channel):

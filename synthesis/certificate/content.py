@@ -126,6 +126,10 @@ def claims_of(content: Mapping[str, Any], subject: Subject, where: str) -> list[
             raise ScheduleError(
                 f"{place}: a claim of the kind '{kind}' needs {'a' if kind in WITH_CHANNEL else 'no'} channel"
             )
+        if (kind == "sampled disc") != ("centre" in claim):
+            raise ScheduleError(
+                f"{place}: a claim of the kind '{kind}' needs {'a' if kind == 'sampled disc' else 'no'} centre"
+            )
         if kind == "drop probability" and not claim["level"] < 1.0:
             raise ScheduleError(f"{place}: a probability lies below 1, not at {claim['level']:g}")
         channel = None
@@ -139,8 +143,8 @@ def claims_of(content: Mapping[str, Any], subject: Subject, where: str) -> list[
                     if name not in known_names:
                         raise ScheduleError(f"{place}.channel: '{name}' is none of {', '.join(known_names)}")
         P = _lyapunov(claim["P"], subject, f"{place}.P")
-        found.append(Claim(kind, claim["level"], from_chebyshev(P), channel))
-    said = [(c.kind, repr(c.channel)) for c in found]
+        found.append(Claim(kind, claim["level"], from_chebyshev(P), channel, claim.get("centre")))
+    said = [(c.kind, repr(c.channel), c.centre) for c in found]
     if len(set(said)) < len(said):
         raise ScheduleError(f"{where}: claims: one thing is claimed twice")
     if not any(claim.kind == UPDATE_OF[update] for claim in found):

@@ -2,12 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from estimators.arrays import FloatArray
 from synthesis.lmi.exchange import Family, corners
+from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.relaxation import rate_samples
 from synthesis.polynomials.matrix import MatrixPolynomial
+
+
+@dataclass
+class Asked:
+    """A claim that is searched as an LMI problem: its unknown P and the inequalities at the places where they are looked at."""
+
+    problem: LmiProblem
+    P: MatrixPolynomial
+    families: list[Family]
+
+    def add(self, inequality: str, place: FloatArray) -> bool:
+        """Solve for this place, too; False if that changes nothing."""
+        return sum(family.add(place) for family in self.families if family.name == inequality) > 0
 
 
 def rate_places(grid: FloatArray, later: MatrixPolynomial, count: int) -> FloatArray:

@@ -57,7 +57,7 @@ class Question:
     """A claim with its numbers in the arithmetic at hand.
 
     `level` is a number, or for a gain that is minimised `square` an unknown 1 x 1 polynomial in the place of level^2. `W` and `Z`
-    are rows of numbers.
+    are rows of numbers; `centre` is that of a disc of poles.
     """
 
     kind: str
@@ -67,6 +67,7 @@ class Question:
     Z: Any = None
     period: Any = None
     square: Any = None
+    centre: Any = None
 
 
 def inequalities(
@@ -111,7 +112,10 @@ def _continuous(q: Question, system: System, P: Any, P_dot: Any, arithmetic: Ari
 
 def _discrete(q: Question, system: System, P: Any, P_next: Any, arithmetic: Arithmetic) -> list[tuple[str, Any]]:
     if q.kind in DISCRETE:
-        return [(q.kind, pole_inequality(q.kind, q.level, q.period, system.A, P, _over(system, P, 2), arithmetic))]
+        A = system.A
+        if q.centre is not None:
+            A = A - _over(system, arithmetic.eye(A.shape[0], P)) * q.centre
+        return [(q.kind, pole_inequality(q.kind, q.level, q.period, A, P, _over(system, P, 2), arithmetic))]
     moved, P = system.A.T @ P_next, _over(system, P, 2)
     fallen = moved @ system.A
     if q.kind in ("internal update", "sampled error"):

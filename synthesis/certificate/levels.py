@@ -14,7 +14,6 @@ import numpy as np
 
 from synthesis.certificate.claims import LARGER_IS_BETTER, UPDATE_OF, Claim, ClaimChannel
 from synthesis.certificate.frozen import critical_probability, frozen_pole_level, slowest_decay
-from synthesis.certificate.poles import DISCRETE
 from synthesis.certificate.rounding import round_down, round_up, significant
 from synthesis.certificate.search import Search, Wish
 
@@ -50,20 +49,22 @@ def held_claims(
     return _with_update(search, levels, found, settle)
 
 
-def sampled_claims(search: Search, levels: Sequence[Wish], settle: float) -> tuple[Claim, ...] | None:
-    """Claims of the update that corrects once a sample."""
-    return _with_update(search, levels, [], settle)
+def sampled_claims(
+    search: Search, levels: Sequence[Wish], settle: float, regions: Sequence[Wish] = ()
+) -> tuple[Claim, ...] | None:
+    """Claims of the update that corrects once a sample; `regions` are wishes about its poles."""
+    return _with_update(search, levels, [search.prove(wish)[0] for wish in regions], settle)
 
 
 def feedback_claims(
-    search: Search, levels: Sequence[Wish], settle: float, regions: Mapping[str, float] = MappingProxyType({})
+    search: Search, levels: Sequence[Wish], settle: float, regions: Sequence[Wish] = (), widened: bool = False
 ) -> tuple[Claim, ...] | None:
     """Claims of a feedback law that runs once a sample: decay and the level of every channel; None if one cannot be had.
 
-    Of the `regions` those that are regions of the update's poles, too: as they were asked for, or as wide as sampling makes them.
+    `regions` are wishes about the update's poles: as they were asked for, or (`widened`) as wide as sampling makes them.
     """
     found = [largest(search, UPDATE_OF["feedback"], slowest_decay(search.loop))]
-    found += [_region(search, f"sampled {kind}", x) for kind, x in regions.items() if f"sampled {kind}" in DISCRETE]
+    found += [_widened(search, wish) if widened else search.prove(wish)[0] for wish in regions]
     found += [best_gain(search, sampled(wish), settle) for wish in levels]
     return None if any(claim is None for claim in found) else tuple(claim for claim in found if claim is not None)
 
@@ -87,12 +88,12 @@ def _with_update(
     return tuple(claim for claim in (*found, *extra) if claim is not None)
 
 
-def _region(search: Search, kind: str, wanted: float) -> Claim | None:
+def _widened(search: Search, wish: Wish) -> Claim | None:
     """A claim about frozen poles at the wanted level, or at the first above the frozen one that is proved."""
-    frozen, larger = frozen_pole_level(search.loop, kind), kind in LARGER_IS_BETTER
+    frozen, larger = frozen_pole_level(search.loop, wish.kind), wish.kind in LARGER_IS_BETTER
     beyond = (frozen / x if larger else frozen * x for x in WIDER)
-    tried = [wanted, *(round_down(x, 3) if larger else round_up(x, 3) for x in beyond if 0.0 < x < np.inf)]
-    proved = (search.prove(Wish(kind, x))[0] for x in tried)
+    tried = [wish.level, *(round_down(x, 3) if larger else round_up(x, 3) for x in beyond if 0.0 < x < np.inf)]
+    proved = (search.prove(replace(wish, level=x))[0] for x in tried)
     return next((claim for claim in proved if claim is not None), None)
 
 

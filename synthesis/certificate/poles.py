@@ -12,6 +12,9 @@ With S = P A + A'P and K = P A - A'P (Chilali, Gahinet 1996; P may follow the pa
     slowest pole a      exp(-2 a T) P - A'P A > 0                                   Re s < -a
     fastest pole b      A'P A - exp(-2 b T) P > 0                                   Re s > -b
     imaginary part w    [(1 - c^2) S, c K; *, S] > 0, c = cos(w T), w T < pi/2      |Im s| < w
+    disc r about q      r^2 P - (A - q)'P (A - q) > 0                               |z - q| < r
+
+Whoever asks about a disc subtracts its centre q from A before.
 
 A vertical strip is the pair of a slowest and a fastest pole, a horizontal one a bound on imaginary parts.
 """
@@ -28,7 +31,7 @@ from synthesis.polynomials.enclosure import Entries
 from synthesis.polynomials.stable import is_hurwitz, is_schur
 
 CONTINUOUS = ("slowest pole", "pole radius", "damping ratio", "imaginary part")
-DISCRETE = ("sampled slowest pole", "sampled fastest pole", "sampled imaginary part")
+DISCRETE = ("sampled slowest pole", "sampled fastest pole", "sampled imaginary part", "sampled disc")
 
 
 def pole_inequality(kind: str, level: Any, period: Any, A: Any, P: Any, wide: Any, arithmetic: Any) -> Any:
@@ -47,6 +50,8 @@ def pole_inequality(kind: str, level: Any, period: Any, A: Any, P: Any, wide: An
         case "sampled imaginary part":
             cosine = arithmetic.cos(level * period)
             return arithmetic.block([[S * (1 - cosine * cosine), K * cosine], [None, S]])
+        case "sampled disc":
+            return wide * (level * level) - A.T @ product
     distance = wide * arithmetic.exp(-2 * level * period) - A.T @ product
     return distance if kind == "sampled slowest pole" else -distance
 
@@ -57,7 +62,7 @@ def pole_outside(kind: str, level: fmpq, period: fmpq | None, A: Entries) -> boo
         turned = A if kind == "slowest pole" else _turned(A, arb(0), arb(1))
         shift = level if kind == "slowest pole" else -level
         return is_hurwitz(turned + _unit(turned.nrows()) * shift) is False
-    if kind == "pole radius":
+    if kind in ("pole radius", "sampled disc"):
         return is_schur(A * (1 / arb(level))) is False
     if kind == "damping ratio":
         return is_hurwitz(_turned(A, (1 - arb(level) ** 2).sqrt(), arb(level))) is False
@@ -75,7 +80,9 @@ def pole_outside(kind: str, level: fmpq, period: fmpq | None, A: Entries) -> boo
 
 
 def pole_levels(kind: str, poles: Any, period: float) -> FloatArray:
-    """The best level at each place (g,), in floats, from its poles (g, n), in discrete time z."""
+    """The best level at each place (g,), in floats, from its poles (g, n), in discrete time z (of a disc z - q)."""
+    if kind == "sampled disc":
+        return np.asarray(np.abs(poles).max(axis=-1), float)
     if kind in DISCRETE:
         with np.errstate(divide="ignore"):
             poles = np.log(poles.astype(complex)) / period

@@ -77,7 +77,7 @@ def certificate(content: Mapping[str, Any], where: str = "schedule") -> Certific
 
 def _proof(claim: Claim, verifier: Verifier, subject: Subject) -> Proof:
     name, unit = (
-        claim_name(claim.kind, claim.channel, subject.units),
+        claim_name(claim.kind, claim.channel, subject.units, claim.centre),
         claim_unit(claim.kind, claim.channel, subject.units),
     )
     outcome = verifier.prove(claim)

@@ -180,6 +180,7 @@ def _breaks(verifier: Verifier, claim: Claim, system: System) -> bool:
     if claim.kind == "fastest pole":
         return is_hurwitz(_shifted(A * -1, -level)) is False
     if claim.kind in (*CONTINUOUS, *DISCRETE):
+        A = A if claim.centre is None else _shifted(A, -decimal(claim.centre))
         return pole_outside(claim.kind, level, verifier.loop.sample_time, A)
     if claim.channel is not None and claim.kind not in GAINS:
         stable = is_hurwitz(A) if system.time == "continuous" else is_schur(A)

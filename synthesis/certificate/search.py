@@ -15,11 +15,12 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from synthesis.certificate.claims import ERROR_EQUATION, GAINS, WITH_CHANNEL, Claim, ClaimChannel, rows_of
-from synthesis.certificate.families import below_one, rate_places
+from synthesis.certificate.families import Asked, below_one, rate_places
+from synthesis.certificate.frozen import frozen_level
 from synthesis.certificate.inequalities import POSITIVE, Question, inequalities
 from synthesis.certificate.rounding import LYAPUNOV_DIGITS, rounded_lyapunov
 from synthesis.certificate.sampled_loop import SampledLoop
-from synthesis.certificate.unknowns import in_scaled_states
+from synthesis.certificate.unknowns import in_scaled_states, middle_of
 from synthesis.certificate.verify import MOST_REGIONS, Names, Outcome, Verifier
 from synthesis.lmi.clarabel_backend import RawAnswer
 from synthesis.lmi.exchange import Family, Memory, corners, exchange, recall, remember
@@ -47,19 +48,7 @@ class Wish:
     kind: str
     level: float | None
     channel: ClaimChannel | None = None
-
-
-@dataclass
-class Asked:
-    """A wish as an LMI problem: its unknown P and the inequalities at the places where they are looked at."""
-
-    problem: LmiProblem
-    P: MatrixPolynomial
-    families: list[Family]
-
-    def add(self, inequality: str, place: FloatArray) -> bool:
-        """Solve for this place, too; False if that changes nothing."""
-        return sum(family.add(place) for family in self.families if family.name == inequality) > 0
+    centre: float | None = None
 
 
 @dataclass(frozen=True)
@@ -95,7 +84,7 @@ class Search:
         middle = self.loop.system(cells[len(cells) // 2], self.loop.time)
         if middle is None:
             return np.ones(self.loop.states)
-        A = _value(in_scaled_states(middle, np.ones(self.loop.states)).A)
+        A = middle_of(in_scaled_states(middle, np.ones(self.loop.states)).A)
         # Balancing looks at the diagonal, too; that of an update is near one whatever the units of the states are.
         return error_scale(A - np.eye(len(A)) if middle.time == "discrete" else A)
 
@@ -115,7 +104,7 @@ class Search:
                 return None, outcome
             coefficients = asked.P.substitute(found.decisions).coefficients[..., 0]
             P = rounded_lyapunov(coefficients * unit**2, self.scale, len(self.parameters), self.digits)
-            claim = Claim(wish.kind, float(wish.level or 0.0), P, wish.channel)
+            claim = Claim(wish.kind, float(wish.level or 0.0), P, wish.channel, wish.centre)
             outcome = self.verifier.prove(claim)
             if outcome.proved:
                 return claim, outcome
@@ -145,7 +134,13 @@ class Search:
         return self._least[key]
 
     def _held_level(self, wish: Wish, named: float) -> float:
-        """The first level above one that a stalled solve named where all inequalities have a margin; inf if none of a few has."""
+        """The first level above one that a stalled solve named where all inequalities have a margin; inf if none of a few has.
+
+        No level of an update lies below the one of parameters that stand still, whatever the solve names.
+        """
+        if wish.channel is not None and wish.kind.startswith("sampled"):
+            d, z = self._sizes(wish.channel, wish.kind), self._errors(wish)
+            named = max(named if np.isfinite(named) else 0.0, frozen_level(self.loop, d, z, wish.kind))
         levels = (named * step for step in STALLED) if np.isfinite(named) else ()
         return next((x for x in levels if self.largest_margin(replace(wish, level=x)) > 0.0), np.inf)
 
@@ -235,7 +230,7 @@ class Search:
     def _question(self, wish: Wish, period: float, square: object) -> Question:
         """Errors in the unit of `_output_unit`, inputs in one that makes the least gain a number near one."""
         if wish.channel is None:
-            return Question(wish.kind, float(wish.level or 0.0), period=period)
+            return Question(wish.kind, float(wish.level or 0.0), period=period, centre=wish.centre)
         group, size = WITH_CHANNEL[wish.kind], self._unit(wish)
         Z, W = self._errors(wish) / self._output_unit(wish), self._sizes(wish.channel, wish.kind)
         level = None if wish.level is None else wish.level / size
@@ -278,10 +273,10 @@ class Search:
             return 1.0
         system: System = in_scaled_states(found, self.scale)
         group, W, Z = WITH_CHANNEL[wish.kind], self._sizes(wish.channel, wish.kind), self._errors(wish)
-        A, B = _value(system.A), _value(system.B[group]) @ W
-        ZC, ZD = Z @ _value(system.C), Z @ _value(system.D[group]) @ W
+        A, B = middle_of(system.A), middle_of(system.B[group]) @ W
+        ZC, ZD = Z @ middle_of(system.C), Z @ middle_of(system.D[group]) @ W
         if system.denominator is not None:
-            below = float(_value(system.denominator)[0, 0])
+            below = float(middle_of(system.denominator)[0, 0])
             A, B = A / below, B / below
             ZC, ZD = (ZC / below, ZD / below) if system.shared else (ZC, ZD)
         if system.time == "discrete":
@@ -296,9 +291,3 @@ class Search:
             size = 0.0
         step = float(np.linalg.norm(ZC @ B))
         return next((x / root for x in (size, step) if 0.0 < x < np.inf), 1.0)
-
-
-def _value(matrix: object) -> FloatArray:
-    """A known matrix polynomial in the middle of its region."""
-    coefficients = matrix.coefficients  # type: ignore[attr-defined]
-    return np.asarray(coefficients[(0,) * matrix.variables][..., 0])  # type: ignore[attr-defined]

@@ -49,3 +49,9 @@ def in_scaled_states(system: System, scale: FloatArray) -> System:
         None if system.denominator is None else floats(system.denominator),
         system.shared,
     )
+
+
+def middle_of(matrix: object) -> FloatArray:
+    """A known matrix polynomial in the middle of its region."""
+    coefficients = matrix.coefficients  # type: ignore[attr-defined]
+    return np.asarray(coefficients[(0,) * matrix.variables][..., 0])  # type: ignore[attr-defined]

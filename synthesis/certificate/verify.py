@@ -221,7 +221,8 @@ class Verifier:
         """The numbers of a claim, exact."""
         level, period = decimal(claim.level), self.loop.sample_time
         if claim.channel is None:
-            return Question(claim.kind, level, period=period)
+            centre = None if claim.centre is None else decimal(claim.centre)
+            return Question(claim.kind, level, period=period, centre=centre)
         group = WITH_CHANNEL[claim.kind]
         inputs = self.names.disturbances if group == "disturbances" else self.names.states
         places, sizes = rows_of(inputs, claim.channel)

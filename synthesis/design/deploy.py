@@ -200,14 +200,17 @@ def table_cost(coarse: Search, fine: Search, wish: Wish) -> float:
 
 def _claims(gains: Gains, search: Search, wishes: Sequence[Wish], settle: float) -> tuple[Claim, ...] | None:
     """What is claimed of a table, by how it is run; None if something of it cannot be proved."""
-    regions = getattr(gains.design, "regions", None)
+    regions = getattr(gains.design, "regions", PoleRegions())
+    of_update = [Wish(kind, level, centre=centre) for kind, level, centre in regions.of_update]
     if not isinstance(gains, ObserverGains):
-        return feedback_claims(search, wishes, settle, regions.claims if isinstance(regions, PoleRegions) else {})
+        # A copy of weights has their own poles, and sampling moves those of a design in continuous time.
+        designed = getattr(gains, "sample_time", None) is not None and not gains.order
+        return feedback_claims(search, wishes, settle, of_update, widened=not designed)
     if gains.update == "held":
         return held_claims(
             search, wishes, gains.design.decay_rate, gains.design.fastest_pole, settle, gains.design.regions.claims
         )
-    return sampled_claims(search, wishes, settle)
+    return sampled_claims(search, wishes, settle, of_update)
 
 
 def claim_channel(channel: Channel | FeedbackChannel) -> ClaimChannel:

@@ -173,6 +173,8 @@ def _claim(claim: Claim) -> dict[str, Any]:
         channel = claim.channel
         errors = dict(zip(channel.errors, channel.sizes, strict=True)) if channel.sizes else list(channel.errors)
         out["channel"] = {"inputs": dict(channel.inputs), "errors": errors}
+    if claim.centre is not None:
+        out["centre"] = claim.centre
     return out | {"P": stored(claim.P)}
 
 

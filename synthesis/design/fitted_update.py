@@ -13,7 +13,7 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from synthesis.errors import ProblemError
-from synthesis.models.discretise import zero_order_hold
+from synthesis.models.discretise import weights_over_sample
 from synthesis.models.lpv import LpvModel
 from synthesis.models.numeric import NumericModel, values
 from synthesis.models.pieces import ModelPiece
@@ -30,12 +30,13 @@ def power_below(piece: ModelPiece) -> int:
 
 
 def fitted_update(
-    model: LpvModel, piece: ModelPiece, scale: FloatArray, period: float
+    model: LpvModel, piece: ModelPiece, scale: FloatArray, period: float, weights: int = 0
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """e^(TA), T phi(TA) B and T phi(TA) E in the states diag(scale) x, as polynomials over d^k, k = `power_below`.
 
     Of a piece of the model in its local variables: in u, where it is the whole range.
 
+    The last states are of `weights` that run once a sample (`synthesis.models.discretise.weights_over_sample`).
     Coefficients (d_1+1, ..., d_p+1, rows, columns), fitted to 1e-10, of a rational model to 1e-7. Raises ProblemError where
     degree 24 leaves more than 1e-4.
     """
@@ -43,7 +44,8 @@ def fitted_update(
 
     def update(at: NumericModel) -> FloatArray:
         driven = np.concatenate([at.B, at.E], axis=-1) * scale[:, None]
-        moved = np.concatenate(zero_order_hold(at.A * scale[:, None] / scale, driven, period), axis=-1)
+        held = weights_over_sample(at.A * scale[:, None] / scale, driven, weights, period)
+        moved = np.concatenate(held, axis=-1)
         return np.asarray(moved * values(piece.polynomial.denominator, model.scaled(at.points)) ** power_below(piece))
 
     series = _fitted(model, piece, update)

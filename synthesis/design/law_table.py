@@ -5,8 +5,9 @@ A law that was designed in continuous time, xk' = Ak xk + Bk v, u = Ck xk + Dk v
     xk+ = (I - T Ak/2)^-1 ((I + T Ak/2) xk + T Bk v),    u = Ck (I - T Ak/2)^-1 (xk + T/2 Bk v) + Dk v
 
 or, where the plant's inputs act on a measured output at once (D), by holding v over the sample: then u stays without feedthrough.
-Its states stay those of the design (up to terms of order T), so that the table may be interpolated. What sampling and
-interpolation cost is in the claims.
+Its states stay those of the design (up to terms of order T), so that the table may be interpolated. State feedback with dynamic
+weights has an update of its own (`synthesis.design.weighted_state_feedback`). What sampling and interpolation cost is in the
+claims.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.feedback_channel import FeedbackChannel, feedback_channel_matrices
 from synthesis.design.hinf_observer import Channel, ObserverGains, channel_matrices
 from synthesis.design.state_feedback import GainLimits
+from synthesis.design.weighted_state_feedback import Law, WeightedStateFeedback
 from synthesis.errors import ProblemError
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings
@@ -77,13 +79,16 @@ def table_at(gains: Gains, points: FloatArray, sample_time: float) -> FloatArray
     """What stands in the table at parameter values (g, p): L or K of an observer, [[Ak, Bk], [Ck, Dk]] over a sample of a law."""
     if isinstance(gains, ObserverGains):
         return gains.gain(points)
+    if isinstance(gains, WeightedStateFeedback):
+        Ak, Bk, Ck, Dk = gains.over_sample(points, sample_time)
+        return np.block([[Ak, Bk], [Ck, Dk]])
     Ak, Bk, Ck, Dk = gains.controller(points)
     if gains.order:
         D = gains.model.on(points).D
         used = (Bk.any(axis=(0, 1)) | Dk.any(axis=(0, 1))) if gains.measured == "outputs" else np.zeros(0, dtype=bool)
         through = gains.measured == "outputs" and bool(D[:, used].any())
         Ak, Bk, Ck, Dk = (_held if through else _trapezoidal)(Ak, Bk, Ck, Dk, sample_time)
-    return np.concatenate([np.concatenate([Ak, Bk], axis=2), np.concatenate([Ck, Dk], axis=2)], axis=1)
+    return np.block([[Ak, Bk], [Ck, Dk]])
 
 
 def refuse_beyond_limits(gains: Gains, table: FloatArray) -> None:
@@ -92,7 +97,9 @@ def refuse_beyond_limits(gains: Gains, table: FloatArray) -> None:
     if not isinstance(limits, GainLimits):
         return
     sizes = np.array([limits.sizes[s.name] for s in gains.model.states])
-    largest = np.linalg.norm(table.reshape(-1, *table.shape[-2:]) * sizes, axis=-1).max(axis=0)
+    order = 0 if isinstance(gains, ObserverGains) else gains.order
+    rows = table.reshape(-1, *table.shape[-2:])[:, order:, : len(sizes)]  # first of the law's own states, which weigh
+    largest = np.linalg.norm(rows * np.roll(sizes, order), axis=-1).max(axis=0)
     for signal, found in zip(gains.model.inputs, largest, strict=True):
         if signal.name in limits.inputs and not found <= limits.inputs[signal.name]:
             raise ProblemError(
@@ -141,9 +148,6 @@ def matrices_of(model: LpvModel, channel: Channel | FeedbackChannel) -> tuple[Fl
     if isinstance(channel, FeedbackChannel):
         return feedback_channel_matrices(model, channel)
     return channel_matrices(model, channel)
-
-
-Law = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 def _trapezoidal(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, period: float) -> Law:

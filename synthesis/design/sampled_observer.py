@@ -35,7 +35,7 @@ from synthesis.design.hinf_observer import (
 )
 from synthesis.design.kinked import KinkedUnknown
 from synthesis.design.norms import ChannelSizes, levels, per_sample, require_sampled_energy
-from synthesis.design.pole_regions import refuse_regions
+from synthesis.design.sampled_regions import require_discs, sampled_discs
 from synthesis.design.three_solves import problem_for
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
@@ -51,7 +51,8 @@ POINTS = 40  # for each parameter; what holds between them is proved for the tab
 def design_sampled_observer(model: LpvModel, design: ObserverDesign, sample_time: float) -> ObserverGains:
     """K(p) for the given sample time; `gain` of the result gives K in the units state/output.
 
-    Raises ProblemError for a bound on the fastest pole (an update has none), and as `design_observer`.
+    Raises ProblemError for a bound on the fastest pole (an update has none), for regions that are none of its poles
+    (`synthesis.design.sampled_regions`), and as `design_observer`.
 
     >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
     >>> wanted = Channel(("friction", "force_noise"), ("relative_velocity",), weights=(1.0, 0.1))
@@ -59,11 +60,11 @@ def design_sampled_observer(model: LpvModel, design: ObserverDesign, sample_time
     >>> print(gains.verdict, gains.update, gains.sample_time)
     certified sampled 0.005
     """
-    refuse_regions(design.regions)
     if not sample_time > 0.0:
         raise ProblemError(f"sample time {sample_time} s must be positive")
     if design.fastest_pole is not None:
         raise ProblemError("a sampled design has no fastest pole: leave it out; noise channels bound its gains")
+    sampled_discs(design.regions, sample_time)
     settings = replace(design.settings, points=min(design.settings.points, POINTS))
     design = replace(design, settings=settings)
     scale = design_scale(model, design) / np.sqrt(sample_time)  # errors in their size if time is counted in samples
@@ -96,6 +97,7 @@ def _problem(
     moved = one_sample_later(whole, speeds, period)
     unit, outputs = error_unit(model, design, scale), outputs_of(model, design, scale)[:, None]
     sizes: dict[str, tuple[MatrixPolynomial, MatrixPolynomial]] = {}
+    discs = sampled_discs(design.regions, period, design.reserve)
     problem.require("P > 0", whole)
     for number, (piece, (Phi, _, Gamma)) in enumerate(zip(model.pieces, updates, strict=True)):
         problem.on_cell(number, piece.box)
@@ -115,6 +117,7 @@ def _problem(
         if design.decay_rate > 0.0 or not design.channels:
             kept = float(np.exp(-2.0 * design.decay_rate * (1.0 + design.reserve) * period))
             problem.require("decay over a sample", symmetric_block([[over(P) * kept, closed.T], [None, slack]]))
+        require_discs(problem, discs, design.degree, closed.T, G.T, over)
         for channel in design.channels:
             d, z = channel_matrices(model, channel)
             z = z / unit / scale

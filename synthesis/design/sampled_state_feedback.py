@@ -28,8 +28,8 @@ from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
 from synthesis.design.fitted_update import fitted_update, power_below
 from synthesis.design.kinked import KinkedUnknown
 from synthesis.design.norms import ChannelSizes, levels, per_sample, require_sampled_energy
-from synthesis.design.pole_regions import refuse_regions
 from synthesis.design.refusals import refuse_unstabilisable
+from synthesis.design.sampled_regions import require_discs, sampled_discs
 from synthesis.design.state_feedback import (
     StateFeedbackDesign,
     StateFeedbackGains,
@@ -50,12 +50,14 @@ POINTS = 40  # for each parameter; what holds between them is proved for the tab
 
 
 def design_sampled_state_feedback(
-    model: LpvModel, design: StateFeedbackDesign, sample_time: float
+    model: LpvModel, design: StateFeedbackDesign, sample_time: float, weights: int = 0
 ) -> StateFeedbackGains:
     """K(p) for the given sample time (s); `gamma` is the l2 gain over samples.
 
-    Raises ProblemError for pole regions (of poles in continuous time), for a model whose update over a sample no polynomial fits,
-    and as `design_state_feedback`.
+    The last states are of `weights` that run once a sample.
+
+    Raises ProblemError for regions that are none of an update's poles (`synthesis.design.sampled_regions`), for a model whose
+    update over a sample no polynomial fits, and as `design_state_feedback`.
 
     >>> import sympy as sp
     >>> one = {key: (Signal(name, "1"),) for key, name in zip(("states", "inputs", "outputs", "disturbances"), "xuyw")}
@@ -66,7 +68,6 @@ def design_sampled_state_feedback(
     >>> print(design_sampled_state_feedback(plant, asked, sample_time=0.05).verdict)
     certified
     """
-    refuse_regions(design.regions)
     if not sample_time > 0.0:
         raise ProblemError(f"sample time {sample_time} s must be positive")
     given = next((name for name in ("fastest_pole", "damping") if getattr(design, name) is not None), None)
@@ -74,6 +75,7 @@ def design_sampled_state_feedback(
         raise ProblemError(
             f"a sampled design has no {given}: leave it out; sizes of inputs in channels bound its gains"
         )
+    sampled_discs(design.regions, sample_time)
     refuse_unstabilisable(model)
     check_limits(model, design.limits)
     design = replace(design, settings=replace(design.settings, points=min(design.settings.points, POINTS)))
@@ -81,7 +83,7 @@ def design_sampled_state_feedback(
     # Sums over samples in the place of integrals: what a state costs is divided by the sample time.
     states = plain.states * np.sqrt(plain.clock / sample_time)
     scale = replace(plain, states=states, disturbance=plain.disturbance * np.sqrt(plain.clock * sample_time), clock=1.0)
-    updates = [fitted_update(model, piece, states, sample_time) for piece in model.pieces]
+    updates = [fitted_update(model, piece, states, sample_time, weights) for piece in model.pieces]
 
     def problem(gamma: float | None, maximise_margin: bool = True, floor: float = 0.0) -> LmiProblem:
         return _problem(model, design, scale, sample_time, updates, gamma, maximise_margin, floor)
@@ -115,6 +117,7 @@ def _problem(
     speeds = rates(plant_of(model).axes, whole, one, lambda i: variable(count + i, 2 * count), as_float)
     moved = one_sample_later(whole, speeds, period)
     sizes: dict[str, tuple[MatrixPolynomial, MatrixPolynomial]] = {}
+    discs = sampled_discs(design.regions, period, design.reserve)
     problem.require("Q > 0", whole)
     for number, (piece, update) in enumerate(zip(model.pieces, updates, strict=True)):
         problem.on_cell(number, piece.box)
@@ -133,6 +136,7 @@ def _problem(
         if design.decay_rate > 0.0:
             kept = float(np.exp(-2.0 * design.decay_rate * (1.0 + design.reserve) * period))
             problem.require("decay over a sample", symmetric_block([[over(later) * kept, closed], [None, over(slack)]]))
+        require_discs(problem, discs, design.degree, closed, G, over)
         if design.limits is not None:
             require_limits(problem, model, design.limits, design.reserve, scale, Q, slack, Y)
         for channel in design.channels:

@@ -23,6 +23,15 @@ def zero_order_hold(A: FloatArray, B: FloatArray, sample_time: float) -> tuple[F
     return transition[..., :n, :n], transition[..., :n, n:]
 
 
+def weights_over_sample(A: FloatArray, B: FloatArray, order: int, sample_time: float) -> tuple[FloatArray, FloatArray]:
+    """`zero_order_hold` of states of which the `order` last ones, of weights, see the others as they are when a sample begins."""
+    own = A.shape[-1] - order
+    seen = (np.arange(A.shape[-1]) >= own)[:, None]
+    Phi, Gamma = zero_order_hold(A, B, sample_time)
+    held, driven = zero_order_hold(A * seen, B * seen, sample_time)
+    return np.where(seen, held, Phi), np.where(seen, driven, Gamma)
+
+
 def closed_loop_update(
     A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, gain: FloatArray, sample_time: float
 ) -> tuple[FloatArray, FloatArray]:

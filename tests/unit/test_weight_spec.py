@@ -10,15 +10,19 @@ import numpy as np
 import pytest
 
 from estimators import GainSchedule, LpvController, LpvObserver
+from estimators.arrays import FloatArray
 from estimators.errors import GainsmithError
 from studies.preflight import check_before_design
 from studies.spec import load_spec
 from studies.weight_spec import WeightSpec
 from synthesis.certificate.proof import prove
 from synthesis.design.deploy import deploy
+from synthesis.design.deploy_settings import DeploySettings
 from synthesis.design.export import schedule_content
+from synthesis.design.law_table import refuse_beyond_limits
 from synthesis.design.output_feedback import OutputFeedback
 from synthesis.design.weighted_state_feedback import WeightedStateFeedback
+from synthesis.errors import ProblemError
 from synthesis.models.discretise import zero_order_hold
 from synthesis.models.weights import first_order_weight
 
@@ -173,6 +177,79 @@ def test_state_feedback_works_out_the_states_of_its_weights(tmp_path: Path) -> N
     assert step.used and x[0] == pytest.approx(0.5 / (1.0 - 0.5 * (Dk[0, 0] + u[0])), rel=0.02)
 
 
+def closed(law: WeightedStateFeedback, period: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Oscillator with weight and copy over a sample, from the equations of each: a push, to W position and force in their sizes.
+
+    States: position, velocity, weight in continuous time, copy.
+    """
+    (Ak,), (Bk,), (Ck,), (Dk,) = law.over_sample(np.array([2.0]), period)
+    W = control.ss(first_order_weight(10.0, 0.5, 0.8))
+    A = np.array([[0.0, 1.0, 0.0], [-1.0, -0.2, 0.0], [1.0, 0.0, W.A[0, 0]]])
+    Phi, moved = zero_order_hold(A, np.array([[0.0], [0.5], [0.0]]), period)
+    u = np.hstack([Dk[:, :2], np.zeros((1, 1)), Ck])
+    rows = np.vstack([np.hstack([Phi, np.zeros((3, 1))]) + moved @ u, np.hstack([Bk[:, :2], [[0.0]], Ak])])
+    seen = np.vstack([np.array([W.D[0, 0], 0.0, W.C[0, 0] * W.B[0, 0], 0.0]) / 0.5, u / 2.0])
+    return rows, np.vstack([moved, [[0.0]]]), seen
+
+
+def level_of(law: WeightedStateFeedback, period: float, copied: float = 0.0) -> float:
+    """The largest gain over frequencies; infinite of an unstable loop. `copied` times the copy: the weight's output."""
+    A, B, C = closed(law, period)
+    if copied:
+        C[0, 2:] = 0.0, copied / 0.5
+    if np.abs(np.linalg.eigvals(A)).max() >= 1.0:
+        return float("inf")
+    z = np.exp(1j * np.concatenate([[0.0], np.geomspace(1e-4, np.pi, 300)]))[:, None, None]
+    return float(np.linalg.norm(C @ np.linalg.solve(z * np.eye(4) - A, B[None].astype(complex)), 2, (1, 2)).max())
+
+
+def test_weights_of_a_law_that_is_designed_for_long_samples(tmp_path: Path) -> None:
+    """The level of the design holds for the weight as the law runs it; a design in continuous time does worse on such samples."""
+    T = 0.8
+    text = STATES.replace('"state feedback"', '"sampled state feedback"')
+    spec, model = loaded(
+        tmp_path, text.replace("sample_time = 0.02", f"sample_time = {T}").replace("fastest_pole = 20.0\n", "")
+    )
+    law = spec.design(model)
+    assert isinstance(law, WeightedStateFeedback) and law.sample_time == T
+    (Ak,), (Bk,), _, _ = law.over_sample(np.array([2.0]), T)
+    corner = 0.8 * np.sqrt(0.75 / 99.0)  # the position is held over a sample, and the force does not act on the weight
+    np.testing.assert_allclose(Ak, np.exp(-corner * T), rtol=1e-9)
+    np.testing.assert_allclose(Bk[0, :2], [(1.0 - np.exp(-corner * T)) / corner, 0.0], rtol=1e-9)
+    copied = float(model.on([2.0]).C[0, -1, 2])
+    assert 0.9 * law.gamma < level_of(law, T, copied) <= law.gamma
+    spec, model = loaded(tmp_path, STATES.replace("fastest_pole = 20.0", "fastest_pole = 8.0"))
+    assert level_of(spec.design(model), T) > 1.2 * level_of(law, T)
+    content = schedule_content(deploy(law, DeploySettings(sample_time=T)), "long")
+    proofs = prove(content)
+    assert all(proof.proved for proof in proofs)
+    place = next(i for i, proof in enumerate(proofs) if proof.kind == "sampled gain")
+    assert level_of(law, T) < proofs[place].level < 1.05 * level_of(law, T)
+    content["claims"][place]["level"] = 0.99 * level_of(law, T)
+    assert not prove(content)[place].proved
+    with pytest.raises(ProblemError, match=r"samples of 0.8 s has no law in continuous time"):
+        law.controller(np.array([2.0]))
+
+
+LIMIT = "degree = 0\ninput_limits = { force = 3.0 }\nstate_sizes = { position = 1.0, velocity = 1.0, position_weight_1 = 0.3 }"
+
+
+@pytest.mark.parametrize("law", ["state feedback", "sampled state feedback"])
+def test_limits_of_a_law_with_weights_hold_for_states_and_copies_of_a_size(law: str, tmp_path: Path) -> None:
+    """|K S| of the deployed table; without the limit it is larger. A table beyond it is refused."""
+    text = STATES.replace('"state feedback"', f'"{law}"').replace("fastest_pole = 20.0\n", "")
+    S, commanded = np.array([0.3, 1.0, 1.0]), []  # of the copy, then of what is measured
+    for given in (LIMIT, "degree = 0"):
+        spec, model = loaded(tmp_path, text.replace("degree = 0", given))
+        found = deploy(gains := spec.design(model), spec.deploy_settings())
+        commanded.append(np.linalg.norm(found.table[:, 1, :3] * S, axis=-1).max())
+        if given == LIMIT:
+            refuse_beyond_limits(gains, found.table)
+            with pytest.raises(ProblemError, match=r"the table commands up to 3\..* its limit is 3 N"):
+                refuse_beyond_limits(gains, found.table * 3.1 / commanded[0])
+    assert commanded[0] <= 3.0 < commanded[1]
+
+
 def test_the_law_with_its_copy_of_the_weights_has_the_poles_of_the_design(tmp_path: Path) -> None:
     """Also of a weight that the law itself drives, at an input: plant and copy together are the weighted plant under u = K x."""
     drives = '[[design.dynamic_weights]]\nsignal = "force"\nlow_gain = 0.5\nhigh_gain = 4.0\ncrossover = 3.0\n'
@@ -195,12 +272,11 @@ def test_weights_that_state_feedback_cannot_know_are_refused(tmp_path: Path) -> 
     noisy = STATES.replace('signal = "position"', 'signal = "measured_position"').replace(
         "position_w", "measured_position_w"
     )
-    limited = STATES.replace("degree = 0", "degree = 0\ninput_limits = { force = 1.0 }\nstate_sizes = { position = 1.0, "
-                             "velocity = 1.0, position_weight_1 = 1.0 }")  # fmt: skip
+    limited = STATES.replace("degree = 0", LIMIT.replace(", position_weight_1 = 0.3", ""))
     for text, words in (
         (pushed, "the state push_weight_1 of a weight is driven by 'push', which is not measured"),
         (noisy, "measured_position_weight_1 of a weight is driven by 'noise'"),
-        (limited, "limits of gains are not for a law with states of weights"),
+        (limited, r"the state\(s\) position_weight_1 have no size"),
     ):
         with pytest.raises(GainsmithError, match=words):
             loaded(tmp_path, text)
@@ -225,7 +301,6 @@ REFUSED = {
     ),
     "measured": ('measured = ["measured_position"]\n', "", "design.measured is missing: beside dynamic_weights"),
     "weighted": ('["measured_position"]', '["measured_position", "position_weighted"]', "comes from a weight and is not"),
-    "sampled states": ('law = "output feedback"', 'law = "sampled state feedback"', "not for the law 'sampled"),
     "channel": ('"position_weighted", "force"', '"velocity_weighted", "force"', "unknown performance signal 'velocity_weighted'"),
 }  # fmt: skip
 
@@ -236,8 +311,6 @@ def test_weights_are_refused_before_the_solve(case: str, tmp_path: Path, monkeyp
     old, new, words = REFUSED[case]
     assert old in LAW
     text = LAW.replace(old, new)
-    if case == "sampled states":
-        text = text.replace('measured = ["measured_position"]\n', "")
     with pytest.raises(GainsmithError, match=words) as caught:
         loaded(tmp_path, text)
     assert "\n" not in str(caught.value)
