@@ -113,12 +113,12 @@ def _taylor(
         out[:, k] = seen[..., low * n : high * n] @ terms[:, above : above + (high - low) * n]
         if k < order:
             out[:, k] += shown[k]
-    weights = 1.0 / (1.0 + np.add.outer(np.arange(powers), np.arange(powers)))
+    weights = 1.0 / (1.0 + np.add.outer(np.arange(powers), np.arange(powers))) + 0j
     weighed = (weights @ out.reshape(count, powers, -1)).reshape(count, -1, n + m)
-    energy: ComplexArray = np.conj(np.swapaxes(out.reshape(count, -1, n + m), -1, -2)) @ weighed
+    energy = np.conj(np.swapaxes(out.reshape(count, -1, n + m), -1, -2)) @ weighed
     step = np.broadcast_to(np.eye(n + m, dtype=complex), (count, n + m, n + m)).copy()
     step[:, :n] += terms.reshape(count, TERMS, n, n + m).sum(axis=1)
-    return step, np.asarray(energy * h[:, None, None])
+    return step, energy * h[:, None, None]
 
 
 def _beside(blocks: ComplexArray) -> ComplexArray:
