@@ -90,6 +90,10 @@ class AttitudeObserver(Renewable):
         self.yaw_rate: Number = kit.full(0.0)  # the last known ones
         self.road: Signals = kit.stacked([kit.full(0.0)] * 2)  # bank and grade
 
+    def like(self, batch_shape: tuple[int, ...]) -> AttitudeObserver:
+        """The same for another batch, as new."""
+        return AttitudeObserver(self.sample_time, batch_shape, self.time_constant, self.gain)
+
     def step(
         self,
         rate_x: npt.ArrayLike,

@@ -137,11 +137,16 @@ class VerticalLoads(Renewable):
     ) -> None:
         super().__init__(batch(batch_shape))
         self.vehicle, self.dynamic = vehicle, dynamic
-        self.response = BodyResponse(sample_time, self.batch_shape, (pitch, roll))
+        self._sample_time, self._modes = sample_time, (pitch, roll)
+        self.response = BodyResponse(sample_time, self.batch_shape, self._modes)
         self._wheels, self._kit = _wheels(vehicle), arithmetic(self.batch_shape)
         self.felt: Signals = self._at_rest()  # the last known a_x, a_y, a_z
         self.angles: Signals = self._kit.stacked([self._kit.full(0.0)] * 2)  # and pitch, roll
         self._nowhere: BoolArray = np.zeros((*self.batch_shape, 4), dtype=np.bool_)
+
+    def like(self, batch_shape: tuple[int, ...]) -> VerticalLoads:
+        """The same for another batch, as new."""
+        return VerticalLoads(self.vehicle, self._sample_time, batch_shape, self.dynamic, *self._modes)
 
     def _at_rest(self) -> Signals:
         return self._kit.stacked([self._kit.full(value) for value in (0.0, 0.0, GRAVITY)])
