@@ -183,10 +183,14 @@ class VerticalLoads(Renewable):
         if self.dynamic:
             along, across = self.response.follow([along, across])
         lean = self.vehicle.cg_height * across / kit.maximum(up, LEAST_GRAVITY) + sway
-        load = kit.table((_transferred(self._wheels, along, lean, up),), shape)
+        load = _transferred(self._wheels, along, lean, up)
+        carried = (load[0] >= 0.0) & (load[1] >= 0.0) & (load[2] >= 0.0) & (load[3] >= 0.0)
         flags: FlagArray = np.array(reasons, dtype=np.int32).reshape(shape)
         self._flag_renewed(flags)
-        return self._limited(load, flags)
+        loads = kit.table((load,), shape)
+        if kit.some(kit.no(carried)):
+            return LoadStep(without_negative(loads), loads < 0.0, flags)
+        return LoadStep(loads, self._nowhere.copy(), flags)
 
     def _held(
         self, given: tuple[npt.ArrayLike, ...], names: tuple[str, ...], last: Signals, limit: float
@@ -199,11 +203,6 @@ class VerticalLoads(Renewable):
             held.append(kit.where(good, new, old))
             lost = lost | kit.no(good)
         return held, lost
-
-    def _limited(self, load: FloatArray, flags: FlagArray) -> LoadStep:
-        if np.minimum.reduce(load, None) >= 0.0:
-            return LoadStep(load, self._nowhere.copy(), flags)
-        return LoadStep(without_negative(load), load < 0.0, flags)
 
     def reset(self, where: npt.ArrayLike | None = None) -> None:
         """Starts the entries `where` (bool mask of the batch shape; None: all) afresh; flagged RESET at the next step."""
