@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -69,5 +70,9 @@ class VehicleSignals(NamedTuple):
 
     def of_cars(self, shape: tuple[int, ...]) -> list[VehicleSignals]:
         """Of each car of the batch, what `arrays` does not return."""
-        columns = [apart(value, shape, name) for name, value in zip(self._fields[6:], self[6:], strict=True)]
-        return [VehicleSignals._make((*self[:6], *own)) for own in zip(*columns, strict=True)]
+        cars = [list(self) for _ in range(math.prod(shape))]
+        for place, value in enumerate(self[6:], 6):
+            if value is not None and not isinstance(value, float):
+                for car, own in zip(cars, apart(value, shape, self._fields[place]), strict=True):
+                    car[place] = own
+        return [VehicleSignals._make(car) for car in cars]
