@@ -107,7 +107,7 @@ def _modes(A: FloatArray, C: FloatArray, discrete: bool, tolerance: float) -> Ha
             block, whole = moved[here][:, part, part], part.start > 0
             found = np.linalg.eigvals(block).astype(complex)
             eigenvalues[here, part] = found
-            # Beside hidden modes their seen copies are judged on the seen part alone: the pair as a whole hides that eigenvalue.
+            # Beside hidden modes their seen copies are tested on the seen part alone: the pair as a whole hides that eigenvalue.
             pair, output = (moved[here], sees[here]) if whole else (block, sees[here][:, :, part])
             distance[here, part] = _smallest(pair, output, found)
             clear[here, part] = _smallest(block, None, _border(found, size[here], discrete))
