@@ -161,8 +161,8 @@ from .switching.similarity import symmetric_growth as symmetric_growth
 from .uncertainty.delay import DelayMargin as DelayMargin
 from .uncertainty.delay import delay_margin as delay_margin
 from .uncertainty.jitter import Jitter as Jitter
-from .uncertainty.jitter import judge_sample_times as judge_sample_times
 from .uncertainty.jitter import sample_time_jitter as sample_time_jitter
+from .uncertainty.jitter import stable_for_sample_times as stable_for_sample_times
 from .uncertainty.margin import RobustStabilityMargin as RobustStabilityMargin
 from .uncertainty.margin import robust_stability_margin as robust_stability_margin
 from .uncertainty.worst_gain import WorstCaseGain as WorstCaseGain

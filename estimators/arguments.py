@@ -78,6 +78,17 @@ def number(value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> float:
     return float(value) if isinstance(value, float) else float(entries(value, shape, what).item())
 
 
+def apart(value: npt.ArrayLike | None, shape: tuple[int, ...], what: str) -> list[Any]:
+    """The plain numbers of `entries`, one after the other; None as often, if it is None.
+
+    Raises:
+        EstimatorError: not numbers, or another shape.
+    """
+    if value is None or isinstance(value, float):
+        return [value] * math.prod(shape)
+    return entries(value, shape, what).ravel().tolist()
+
+
 def pair(
     first: npt.ArrayLike, second: npt.ArrayLike, shape: tuple[int, ...], what: str = "first", other: str = "second"
 ) -> FloatArray:

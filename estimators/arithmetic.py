@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from itertools import chain
 from typing import Any
 
@@ -41,6 +42,10 @@ class Arithmetic:
     no: Any  # negation of a condition
     known: Any  # whether a number is finite
     some: Any  # whether a condition holds for any car
+
+    def silent(self) -> AbstractContextManager[Any]:
+        """Within it, what is not finite is made without a warning."""
+        raise NotImplementedError
 
     def full(self, value: float | bool) -> Number:
         """The same for every car."""
@@ -91,6 +96,9 @@ class Arithmetic:
         raise NotImplementedError
 
 
+_NOTHING = nullcontext()
+
+
 def _choose(condition: bool, yes: Any, otherwise: Any) -> Any:
     return yes if condition else otherwise
 
@@ -118,13 +126,17 @@ class OneCar(Arithmetic):
     where, maximum, minimum = staticmethod(_choose), staticmethod(_larger), staticmethod(_smaller)
     sign, no, known, some = map(staticmethod, (_sign, _not, math.isfinite, bool))
 
+    def silent(self) -> AbstractContextManager[Any]:
+        """Plain numbers warn of nothing."""
+        return _NOTHING
+
     def full(self, value: float | bool) -> Number:
         """`value` itself."""
         return value
 
     def own(self, value: npt.ArrayLike) -> Number:
         """The only entry."""
-        return value if isinstance(value, float) else np.asarray(value).item()
+        return value if type(value) is float else np.asarray(value).item()  # numpy's own floats are slow
 
     def car(self, value: npt.ArrayLike, shape: tuple[int, ...], what: str) -> Number:
         """A float."""
@@ -175,6 +187,10 @@ class ManyCars(Arithmetic):
     def some(condition: Any) -> bool:
         """Whether it holds for any car."""
         return bool(np.count_nonzero(condition))
+
+    def silent(self) -> AbstractContextManager[Any]:
+        """Of numpy."""
+        return np.errstate(invalid="ignore", over="ignore")
 
     def full(self, value: float | bool) -> Number:
         """An array."""

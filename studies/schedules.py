@@ -2,7 +2,7 @@
 
 The optimum of a design is flat, and processors round differently: a fresh table may differ from a stored one in its last digit at
 equal guarantees. A stored file is kept as it is when it comes from the same specification, every claim of it is proved again,
-and no claim is worse than what was found just now. So regenerating changes nothing on any machine, and a check judges claims,
+and no claim is worse than what was found just now. So regenerating changes nothing on any machine, and a check compares claims,
 not digits.
 """
 
@@ -40,7 +40,7 @@ class ScheduleRun(Display):
     """One specification, done: `state` is written, kept, same (--check), drift, missing or failed.
 
     `proofs` are those of the file that is there now, `least` the largest frozen level of every channel (a bound from below), and
-    `moved` how far the fresh gains lie from the stored ones, as a share of the largest: reported, not judged.
+    `moved` how far the fresh gains lie from the stored ones, as a share of the largest: reported, not compared.
     """
 
     shown_units: ClassVar = {"seconds": "s"}

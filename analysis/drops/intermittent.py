@@ -94,7 +94,7 @@ def certify_static_gain(
 ) -> StaticGain:
     """Whether some static gain is mean-square stable at this arrival rate.
 
-    The gain comes from the nonlinear Perron problem (method "riccati") or from the LMI (method "lmi"), and is judged by its
+    The gain comes from the nonlinear Perron problem (method "riccati") or from the LMI (method "lmi"), and is checked by its
     radius alone; a refutation is one matrix inequality by either method. Raises AnalysisError for matrices that do not fit.
     """
     plant, output = checked_plant(A, C)

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import expm
 
-from analysis.checks import as_stack, leading, positive, square
+from analysis.checks import as_stack, leading, square
 from analysis.errors import AnalysisError
 from analysis.markov.chain import ROW_SUM_TOLERANCE, stationary_distribution
 from analysis.markov.enclosure import enclosed, verdicts
 from analysis.markov.power import abscissa_estimate
 from analysis.markov.second_moment import triangle
-from analysis.markov.system import LARGE, LIFTED, MarkovJumpSystem
+from analysis.markov.system import LARGE, LIFTED
 from analysis.mode_objects import state_matrices
 from estimators.arrays import AnyArray, BoolArray, FloatArray
 from estimators.display import Display
@@ -109,14 +109,6 @@ class MarkovJumpProcess(Display):
             raise AnalysisError(f"moments has {start.shape[-1]} entries; m n(n+1)/2 = {operator.shape[-1]} are needed")
         steps = instants.reshape(-1, *(1,) * operator.ndim) * operator
         return np.asarray((expm(steps) @ start[..., None])[..., 0])
-
-    def small_step(self, step: float) -> MarkovJumpSystem:
-        """The jump system of one short step in s: modes e^{A_i h}, transition e^{Q h}; jumps only at its ends.
-
-        Its radius r obeys log(r) / h -> abscissa as h -> 0: the independent check for tests and Monte Carlo.
-        """
-        h = positive("step", step)
-        return MarkovJumpSystem(expm(self.modes * h), expm(self.generator * h))
 
 
 def second_moment_flow(modes: FloatArray, generator: FloatArray) -> FloatArray:

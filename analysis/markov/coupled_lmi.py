@@ -38,7 +38,7 @@ class MeanSquareCertificate(Display):
 
 
 def mean_square_lmi(system: MarkovJumpSystem, settings: LmiSettings | None = None) -> MeanSquareCertificate:
-    """Search P_1..P_m, maximising the margin, and judge them outside the solver.
+    """Search P_1..P_m, maximising the margin, and check them outside the solver.
 
     Raises AnalysisError for a batch of systems; ProblemError as `solve`.
 

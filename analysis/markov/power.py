@@ -1,4 +1,4 @@
-r"""The second-moment radius without the operator as a matrix: power iteration, judged by two-sided bounds.
+r"""The second-moment radius without the operator as a matrix: power iteration between two-sided bounds.
 
 One step T X costs 2 m matrix products of size n; the operator as a matrix has (m n (n+1)/2)^2 entries. X = T^k I tends to the
 eigenvector, and `analysis.markov.bracket` turns any X into bounds. Where other eigenvalues have the modulus of the radius (a
@@ -46,7 +46,7 @@ class _Operator:
     apply: Callable[[FloatArray], FloatArray]
     sizes: Callable[[FloatArray], FloatArray]
     step: Callable[[FloatArray], FloatArray]
-    judge: Callable[[FloatArray, BoolArray], Bracket]
+    bracket: Callable[[FloatArray, BoolArray], Bracket]
     discrete: bool
     relative: float
 
@@ -58,12 +58,12 @@ def radius_estimate(modes: FloatArray, transition: FloatArray, relative: float =
     def moved(A: FloatArray, X: FloatArray) -> FloatArray:
         return np.asarray((onward @ (A @ X @ np.swapaxes(A, -1, -2)).reshape(len(X), -1)).reshape(X.shape))
 
-    def judge(X: FloatArray, kept: BoolArray) -> Bracket:
+    def bracket(X: FloatArray, kept: BoolArray) -> Bracket:
         return discrete_bracket(modes, transition, X, kept, relative)
 
     absolute = np.abs(modes)
     operator = _Operator(
-        lambda X: moved(modes, X), lambda X: moved(absolute, X), lambda X: moved(modes, X), judge, True, relative
+        lambda X: moved(modes, X), lambda X: moved(absolute, X), lambda X: moved(modes, X), bracket, True, relative
     )
     blocks = step_blocks(modes, transition)
     return _largest([_cycle(modes, transition, kept, relative) or _searched(operator, kept) for kept in blocks], 0.0)
@@ -78,14 +78,14 @@ def abscissa_estimate(modes: FloatArray, generator: FloatArray, relative: float 
         drift = A @ X
         return np.asarray(drift + np.swapaxes(drift, -1, -2) + (Q.T @ X.reshape(len(X), -1)).reshape(X.shape))
 
-    def judge(X: FloatArray, kept: BoolArray) -> Bracket:
+    def bracket(X: FloatArray, kept: BoolArray) -> Bracket:
         return continuous_bracket(modes, generator, X, kept, relative)
 
     operator = _Operator(
         lambda X: flow(modes, generator, X),
         lambda X: flow(np.abs(modes), np.abs(generator), X),
         lambda X: X + short * flow(modes, generator, X),  # short enough for the abscissa to lead
-        judge,
+        bracket,
         False,
         relative,
     )
@@ -105,19 +105,19 @@ def _searched(operator: _Operator, kept: BoolArray) -> Estimate:
     if unknowns <= SMALL:
         return _written_out(operator, both)
     one = np.where(both, np.eye(kept.shape[1]), 0.0)
-    X, found, averaged, done = one, operator.judge(one, kept), False, 0
+    X, found, averaged, done = one, operator.bracket(one, kept), False, 0
     for look in LOOKS if operator.discrete else LOOKS[:1]:  # short steps of a process say little: Arnoldi's method does
         for _ in range(look - done):
             X = _unit(operator.step(X) * both, X if averaged else None)
         done, before = look, found.width
-        found = found.meet(operator.judge(X, kept))
+        found = found.meet(operator.bracket(X, kept))
         if found.width <= CLOSED:
             return Estimate(found.middle, *found)
         averaged = averaged or not found.width < 0.5 * before
     value, X = _arnoldi(operator.apply, X, both)
-    found = found.meet(operator.judge(X, kept))
+    found = found.meet(operator.bracket(X, kept))
     for part in BORDER if found.width > CLOSED else ():
-        found = found.meet(operator.judge(X + part * float(np.abs(X).max()) * one, kept))
+        found = found.meet(operator.bracket(X + part * float(np.abs(X).max()) * one, kept))
     if np.isnan(value) or (found.width > WIDE and unknowns <= LARGE):
         exact = _written_out(operator, both)
         value, found = exact.value, found.meet(Bracket(exact.lower, exact.upper))

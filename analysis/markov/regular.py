@@ -21,7 +21,7 @@ from estimators.arrays import AnyArray, BoolArray, FloatArray
 from synthesis.lmi.result import Verdict
 
 SQUARINGS = 6  # of H
-EXACT = 24  # unknowns up to which one member is judged in rational arithmetic where enclosures do not decide
+EXACT = 24  # unknowns up to which one member is decided in rational arithmetic where enclosures do not decide
 
 
 def regular_cells(

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.checks import square, symmetric
+from analysis.checks import symmetric
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray, IndexArray
 
@@ -64,16 +64,8 @@ def unpack(vector: FloatArray, size: int) -> FloatArray:
     return out
 
 
-def symmetric_square(matrix: ArrayLike) -> FloatArray:
-    """S(A) of shape (..., n(n+1)/2, n(n+1)/2) for A (..., n, n).
-
-    Raises AnalysisError for matrices that are not square or not finite.
-    """
-    return lifted(square("matrix", matrix))
-
-
 def lifted(A: FloatArray) -> FloatArray:
-    """S(A) without the checks.
+    """S(A) of shape (..., n(n+1)/2, n(n+1)/2) for square A (..., n, n), which is not checked.
 
     The entry of column (k, l), k < l, collects a_ik a_jl + a_il a_jk of (A (x) A); half of it on the diagonal k = l.
     """

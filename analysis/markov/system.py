@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.checks import as_stack, leading, positive_semidefinite, square, whole
+from analysis.checks import leading, positive_semidefinite, square, whole
 from analysis.errors import AnalysisError
 from analysis.markov.chain import distribution, stationary_distribution, stochastic
 from analysis.markov.enclosure import DATA, EPS, enclosed, verdicts
@@ -161,24 +161,6 @@ class MarkovJumpSystem(Display):
     def stationary_distribution(self) -> FloatArray:
         """pi = pi P, shape (..., m). Raises AnalysisError if the chain has several closed classes."""
         return stationary_distribution(self.transition)
-
-    def propagate_mean(self, state: ArrayLike, mode_distribution: ArrayLike, steps: int) -> FloatArray:
-        """E[x 1{mode = j}] for k = 0..steps, shape (steps+1, ..., m, n); sum over m for E[x].
-
-        `state` (..., n) is the initial state, independent of the initial mode with probabilities (..., m).
-        """
-        x = as_stack("state", state, ndim=1)
-        pi = distribution("mode_distribution", mode_distribution, self.mode_count)
-        if x.shape[-1] != self.size:
-            raise AnalysisError(f"state has {x.shape[-1]} entries for {self.size} states")
-        mean = pi[..., :, None] * x[..., None, :]
-        mean = np.broadcast_to(mean, np.broadcast_shapes(mean.shape, (*self.batch_shape, self.mode_count, self.size)))
-        out = np.empty((_steps(steps) + 1, *mean.shape))
-        out[0] = mean
-        for k in range(len(out) - 1):
-            moved = (self.modes @ out[k][..., None])[..., 0]
-            out[k + 1] = np.swapaxes(self.transition, -1, -2) @ moved
-        return out
 
     def propagate_second_moment(self, second_moment: ArrayLike, mode_distribution: ArrayLike, steps: int) -> FloatArray:
         """E[x x' 1{mode = j}] for k = 0..steps, shape (steps+1, ..., m, n, n); its trace summed over m is E|x|^2.

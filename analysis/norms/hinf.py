@@ -120,7 +120,7 @@ def _norm(given: tuple[Any, ...], tolerance: float, band: tuple[float, float] | 
     step = SMALL if handles(systems) else max(1, CHUNK // (16 * systems.A.shape[-1] ** 2))
     for start in range(0, len(systems), step):
         part = slice(start, start + step)
-        with np.errstate(all="ignore"):  # what overflows is not finite, is not proved, and goes on to the next road
+        with np.errstate(all="ignore"):  # what overflows is not finite, is not proved, and goes on to the next method
             norm[part], frequency[part], upper[part], undecided[part] = _flat(
                 systems.pick(part), tolerance, ends, stable
             )

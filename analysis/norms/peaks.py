@@ -1,4 +1,4 @@
-"""Peaks of the gain of stacks of systems over a band: a fast road with its proof, then two slower ones for what it leaves
+"""Peaks of the gain of stacks of systems over a band: a fast method with its proof, then two slower ones for what it leaves
 open."""
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ class Stability(NamedTuple):
 
 
 def stability(A: FloatArray, discrete: bool) -> Stability:
-    """Of A (g, n, n). Systems with two states are judged by trace and determinant, entry by entry, others by singular values."""
+    """Of A (g, n, n). Systems with two states are decided by trace and determinant, entry by entry, others by singular values."""
     if A.shape[-1] <= 2:
         return _small(A, discrete)
     poles, vectors = np.linalg.eig(A)

@@ -26,7 +26,7 @@ from estimators.arrays import BoolArray, FloatArray, IndexArray
 ROUNDS = 16
 TRIED = (0.3, 3.0)  # of the squared corner frequency, before the search
 APART = 1e3
-TRUSTED = 1e-5  # relative loss by cancellation from which on another road is taken
+TRUSTED = 1e-5  # relative loss by cancellation from which on another formula is taken
 Parabola: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]  # of 1, t, t^2; or k, y, z of k a + y s + z
 
 

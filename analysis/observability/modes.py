@@ -58,18 +58,6 @@ class HautusTest(Display):
         """No hidden mode certainly grows, but one is on the border of stability at this precision, (...)."""
         return np.asarray(~self.frozen_detectable & ~(self.hidden & self.grows).any(axis=-1))
 
-    def require_detectable(self, name: str = "the pair (A, C)") -> None:
-        """Raise AnalysisError that names the first mode that is hidden and does not certainly decay, and what to do."""
-        bad = self.hidden & ~self.decays
-        if bad.any():
-            place = tuple(int(i) for i in np.argwhere(bad)[0])
-            where = f" at {place[:-1]}" if len(place) > 1 else ""
-            how = "does not decay" if self.grows[place] else "is on the border of stability at this precision"
-            raise AnalysisError(
-                f"{name} is not detectable{where}: the mode {self.eigenvalues[place]:.6g} is hidden (distance "
-                f"{self.distance[place]:.1e}) and {how}; add a sensor that sees it or leave that operating point"
-            )
-
 
 def hautus_test(
     A: Any, C: ArrayLike | None = None, discrete: bool | None = None, tolerance: float = 1e-9
@@ -119,7 +107,7 @@ def _modes(A: FloatArray, C: FloatArray, discrete: bool, tolerance: float) -> Ha
             block, whole = moved[here][:, part, part], part.start > 0
             found = np.linalg.eigvals(block).astype(complex)
             eigenvalues[here, part] = found
-            # Beside hidden modes their seen copies are judged on the seen part alone: the pair as a whole hides that eigenvalue.
+            # Beside hidden modes their seen copies are tested on the seen part alone: the pair as a whole hides that eigenvalue.
             pair, output = (moved[here], sees[here]) if whole else (block, sees[here][:, :, part])
             distance[here, part] = _smallest(pair, output, found)
             clear[here, part] = _smallest(block, None, _border(found, size[here], discrete))

@@ -63,20 +63,6 @@ class StochasticObservability(Display):
         met = np.flatnonzero(self.directions == 0)
         return int(met[0]) if len(met) else None
 
-    def samples_below(self, level: float) -> int | None:
-        """Samples after which lambda_max(M_k) stays below a level (> 0) to the end of the record; None if it does not."""
-        if not level > 0.0:
-            raise AnalysisError(f"level = {level} must be positive; samples_needed asks for an exact zero")
-        above = np.flatnonzero(self.largest_unknown >= level)
-        first = int(above[-1]) + 1 if len(above) else 0
-        return first if first < len(self.M) else None
-
-    def peak_after(self, samples: int) -> float:
-        """Largest lambda_max(N_k) for k >= samples: test 2 holds with any bound above it on this record."""
-        if not 0 <= samples < len(self.N):
-            raise AnalysisError(f"samples = {samples} is outside the record of {len(self.N) - 1} samples")
-        return float(self.largest_known[samples:].max())
-
 
 def stochastic_observability(
     A: ArrayLike, C: ArrayLike, Q: ArrayLike, R: ArrayLike, rank_tolerance: float = RANK_TOLERANCE
@@ -139,28 +125,6 @@ def stochastic_observability_along(
     """
     sequence = sampled_sequence(model, trajectory, sample_time)
     return stochastic_observability(sequence.A, sequence.C, Q, R, rank_tolerance)
-
-
-def wheel_speed_tests(
-    model: LpvModel,
-    wheel_speed: ArrayLike,
-    wheel_acceleration: ArrayLike,
-    sample_time: float,
-    Q: ArrayLike,
-    R: ArrayLike,
-    rank_tolerance: float = RANK_TOLERANCE,
-) -> StochasticObservability:
-    """P2 Figs 2 and 3 for a record of wheel speed [rad/s] and wheel acceleration [rad/s^2], both (K,)."""
-    speed, acceleration = (
-        as_stack(name, values, ndim=1)
-        for name, values in (("wheel_speed", wheel_speed), ("wheel_acceleration", wheel_acceleration))
-    )
-    if speed.shape != acceleration.shape or speed.ndim != 1:
-        raise AnalysisError(
-            f"wheel_speed has the shape {speed.shape} and wheel_acceleration {acceleration.shape}; give two equal (K,)"
-        )
-    trajectory = np.stack([speed, acceleration], axis=1)
-    return stochastic_observability_along(model, trajectory, sample_time, Q, R, rank_tolerance)
 
 
 def _limit_gain(

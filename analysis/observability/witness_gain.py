@@ -27,7 +27,7 @@ def witness_gain(
     for weight in WEIGHTS:
         try:
             with np.errstate(all="ignore"), catch_warnings():
-                simplefilter("ignore", RuntimeWarning)  # scipy perturbs a singular equation: P is judged below
+                simplefilter("ignore", RuntimeWarning)  # scipy perturbs a singular equation: P is checked below
                 noise = weight * np.eye(m)
                 if discrete:
                     X = linalg.solve_discrete_are(A.T, C.T, np.eye(n), noise)

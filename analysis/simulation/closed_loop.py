@@ -1,4 +1,4 @@
-r"""A feedback law in closed loop over a sample, from plant and table alone: a second road beside the runtime.
+r"""A feedback law in closed loop over a sample, from plant and table alone: independent of the runtime.
 
     x+ = Phi x + T phi(TA) (B u + E d),  xk+ = Ak xk + Bk v,  u = Ck xk + Dk v,  K = [[Ak, Bk], [Ck, Dk]]
 

@@ -1,4 +1,4 @@
-r"""The error of an update along parameter trajectories, from plant and table alone: a second road beside the runtime.
+r"""The error of an update along parameter trajectories, from plant and table alone: independent of the runtime.
 
     held     e+ = e^M e + T phi(M) (E - L F) d + T (phi(TA) - phi(M)) x',   M = T (A - L C)
     sampled  e+ = (e^(TA) - K C) e + (T phi(TA) E - K F) d

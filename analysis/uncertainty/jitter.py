@@ -103,7 +103,7 @@ def jitter_claim(
     """
     if observer.update != "sampled":
         raise AnalysisError(
-            f"jitter is judged for the update 'sampled', this observer is '{observer.update}'; design it with its sample time"
+            f"jitter is analysed for the update 'sampled', this observer is '{observer.update}'; design it with its sample time"
         )
     if not 0.0 < shortest < longest:
         raise AnalysisError(
@@ -134,10 +134,10 @@ def _loop_and_names(observer: ObserverLoop, shortest: float, longest: float) -> 
     return loop, Names(tuple(f"x{i + 1}" for i in range(observer.plant.states)), ())
 
 
-def judge_sample_times(A: ArrayLike, C: ArrayLike, K: ArrayLike, sample_times: Sequence[float]) -> Verdict:
+def stable_for_sample_times(A: ArrayLike, C: ArrayLike, K: ArrayLike, sample_times: Sequence[float]) -> Verdict:
     """Whether the sequence, repeated for ever, is stable: exact signs on enclosed exponentials.
 
-    >>> print(judge_sample_times([[0.0]], [[1.0]], [[0.5]], [0.01, 0.02]))
+    >>> print(stable_for_sample_times([[0.0]], [[1.0]], [[0.5]], [0.01, 0.02]))
     certified
     """
     a, c, k = observer_matrices(A, C, K)
@@ -157,7 +157,7 @@ def _refuted(A: FloatArray, C: FloatArray, K: FloatArray, period: float) -> tupl
         modes = np.array([expm(A * t) - K @ C for t in times])
         found = search_products(modes, 1e-6, DEPTH)
         word = tuple(float(times[i]) for i in found.word)
-        if found.rate >= 1.0 and judge_sample_times(A, C, K, word) is Verdict.REFUTED:
+        if found.rate >= 1.0 and stable_for_sample_times(A, C, K, word) is Verdict.REFUTED:
             upper = high = max(abs(t / period - 1.0) for t in word) * (1.0 + 1e-15)
             witness = word
         elif witness is None:

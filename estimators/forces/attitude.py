@@ -90,6 +90,10 @@ class AttitudeObserver(Renewable):
         self.yaw_rate: Number = kit.full(0.0)  # the last known ones
         self.road: Signals = kit.stacked([kit.full(0.0)] * 2)  # bank and grade
 
+    def like(self, batch_shape: tuple[int, ...]) -> AttitudeObserver:
+        """The same for another batch, as new."""
+        return AttitudeObserver(self.sample_time, batch_shape, self.time_constant, self.gain)
+
     def step(
         self,
         rate_x: npt.ArrayLike,
@@ -129,7 +133,7 @@ class AttitudeObserver(Renewable):
             turn = choose(known[2], turn, self.yaw_rate)
             road = [choose(good, new, old) for good, new, old in zip(known[3:], road, self.road, strict=True)]
         self.yaw_rate, self.road = turn, kit.stacked(road)
-        with np.errstate(invalid="ignore", over="ignore"):
+        with kit.silent():
             sines = (side - across) / GRAVITY, (ahead - along) / GRAVITY
         used = [abs(value) <= LIMIT for value in sines]
         roll, pitch = self.angle
@@ -143,13 +147,15 @@ class AttitudeObserver(Renewable):
         self.angle, self.lagged = (kit.stacked(values) for values in zip(*moved, strict=True))
         total = np.arcsin(kit.table((self.angle,), shape))
         body, counts = total - kit.table((self.road,), shape), kit.table((used,), shape)
-        innovation = np.where(counts, kit.table((self.lagged,), shape), np.nan)
+        off = [choose(good, value, math.nan) for good, value in zip(used, self.lagged, strict=True)]
         reasons = choose(complete, 0, int(Flag.MISSING_INPUT)) | choose(
             used[0] & used[1], 0, int(Flag.MISSING_MEASUREMENT)
         )
         flags: FlagArray = np.array(reasons, dtype=np.int32).reshape(shape)
         self._flag_renewed(flags)
-        return AttitudeStep(body[..., 0], body[..., 1], total[..., 0], total[..., 1], innovation, counts, flags)
+        return AttitudeStep(
+            body[..., 0], body[..., 1], total[..., 0], total[..., 1], kit.table((off,), shape), counts, flags
+        )
 
     def reset(self, where: npt.ArrayLike | None = None, roll: float = 0.0, pitch: float = 0.0) -> None:
         """Sets the entries `where` (bool mask; None: all) to the given angles against the horizon, rad; flagged RESET next.

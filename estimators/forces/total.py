@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -66,6 +67,9 @@ def reconcile(
         unknown_share: of the load.
     """
     given = np.asarray(total, dtype=np.float64)
+    known = force.shape == (4,) and total_deviation > 0.0 and math.isfinite(given)
+    if known and not np.count_nonzero(unknown):  # on plain numbers, to the last bit, in a third of the time
+        return _of_one_car(force.tolist(), deviation.tolist(), given.item(), total_deviation)
     weight, prior, there = deviation**2, force, np.isfinite(given)
     calm = np.count_nonzero(there) == there.size  # three times faster than `all` and `any` for a few wheels
     if not calm or np.count_nonzero(unknown):
@@ -81,3 +85,14 @@ def reconcile(
         gain = np.where(there[..., None], gain, 0.0)
     change = gain * (gap if calm else np.where(there, gap, 0.0))[..., None]
     return Reconciled(prior + change, np.sqrt(weight * (1.0 - gain)), gap, there)
+
+
+def _of_one_car(force: list[float], deviation: list[float], total: float, total_deviation: float) -> Reconciled:
+    """Four wheels and a sum that are all known."""
+    w1, w2, w3, w4 = weight = [value * value for value in deviation]
+    f1, f2, f3, f4 = force
+    gap, scale = total - (f1 + f2 + f3 + f4), w1 + w2 + w3 + w4 + total_deviation**2
+    gain = [w / scale for w in weight]
+    agreed = [f + g * gap for f, g in zip(force, gain, strict=True)]
+    left = [math.sqrt(w * (1.0 - g)) for w, g in zip(weight, gain, strict=True)]
+    return Reconciled(np.array(agreed), np.array(left), np.array(gap), np.array(True))

@@ -137,11 +137,16 @@ class VerticalLoads(Renewable):
     ) -> None:
         super().__init__(batch(batch_shape))
         self.vehicle, self.dynamic = vehicle, dynamic
-        self.response = BodyResponse(sample_time, self.batch_shape, (pitch, roll))
+        self._sample_time, self._modes = sample_time, (pitch, roll)
+        self.response = BodyResponse(sample_time, self.batch_shape, self._modes)
         self._wheels, self._kit = _wheels(vehicle), arithmetic(self.batch_shape)
         self.felt: Signals = self._at_rest()  # the last known a_x, a_y, a_z
         self.angles: Signals = self._kit.stacked([self._kit.full(0.0)] * 2)  # and pitch, roll
         self._nowhere: BoolArray = np.zeros((*self.batch_shape, 4), dtype=np.bool_)
+
+    def like(self, batch_shape: tuple[int, ...]) -> VerticalLoads:
+        """The same for another batch, as new."""
+        return VerticalLoads(self.vehicle, self._sample_time, batch_shape, self.dynamic, *self._modes)
 
     def _at_rest(self) -> Signals:
         return self._kit.stacked([self._kit.full(value) for value in (0.0, 0.0, GRAVITY)])
@@ -178,10 +183,14 @@ class VerticalLoads(Renewable):
         if self.dynamic:
             along, across = self.response.follow([along, across])
         lean = self.vehicle.cg_height * across / kit.maximum(up, LEAST_GRAVITY) + sway
-        load = kit.table((_transferred(self._wheels, along, lean, up),), shape)
+        load = _transferred(self._wheels, along, lean, up)
+        carried = (load[0] >= 0.0) & (load[1] >= 0.0) & (load[2] >= 0.0) & (load[3] >= 0.0)
         flags: FlagArray = np.array(reasons, dtype=np.int32).reshape(shape)
         self._flag_renewed(flags)
-        return self._limited(load, flags)
+        loads = kit.table((load,), shape)
+        if kit.some(kit.no(carried)):
+            return LoadStep(without_negative(loads), loads < 0.0, flags)
+        return LoadStep(loads, self._nowhere.copy(), flags)
 
     def _held(
         self, given: tuple[npt.ArrayLike, ...], names: tuple[str, ...], last: Signals, limit: float
@@ -194,11 +203,6 @@ class VerticalLoads(Renewable):
             held.append(kit.where(good, new, old))
             lost = lost | kit.no(good)
         return held, lost
-
-    def _limited(self, load: FloatArray, flags: FlagArray) -> LoadStep:
-        if np.minimum.reduce(load, None) >= 0.0:
-            return LoadStep(load, self._nowhere.copy(), flags)
-        return LoadStep(without_negative(load), load < 0.0, flags)
 
     def reset(self, where: npt.ArrayLike | None = None) -> None:
         """Starts the entries `where` (bool mask of the batch shape; None: all) afresh; flagged RESET at the next step."""

@@ -63,10 +63,10 @@ class DirectionOfTravel(CarsMemory):
         kit, shape = self.kit, self.batch_shape
         gear = kit.car(math.nan if given is None else given, shape, "direction")
         found = self._found(kit.rows(wheel_speed, 4), kit.car(pull, shape, "pull"), gear)
-        way, turned, surface, known = (np.reshape(value, shape) for value in found)
+        way, turned, surface, known = (np.asarray(value).reshape(shape) for value in found)
         # the other way is off by twice the speed, and a little more while the car brakes: three deviations cover it
         return SignedWheels(
-            np.abs(wheel_speed) * way[..., None], turned, way * surface, np.where(known, 0.0, 0.8 * surface)
+            np.absolute(wheel_speed) * way[..., None], turned, way * surface, 0.8 * surface * np.logical_not(known)
         )
 
     def _found(self, wheel_speed: Signals, pull: Number, given: Number) -> tuple[Number, Number, Number, Number]:

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy.typing as npt
 
-from estimators.arguments import entries
 from estimators.arithmetic import Arithmetic, Number, arithmetic
 from estimators.arrays import FloatArray
 from estimators.faults import Flag
@@ -89,7 +88,7 @@ class LastSample(Memory):
 
         def read(given: npt.ArrayLike | None, name: str, limit: float) -> Number:
             """NaN for what is absent, and for what no sensor reads."""
-            return math.nan if given is None else possible(kit, kit.own(entries(given, shape, name)), limit)
+            return math.nan if given is None else possible(kit, kit.car(given, shape, name), limit)
 
         tilt = attitude.step(
             read(signals.roll_rate, "roll_rate", limits.YAW_RATE),

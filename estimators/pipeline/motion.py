@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from estimators.arithmetic import Number, arithmetic
 from estimators.arrays import BoolArray, FloatArray
-from estimators.forces import LoadStep
+from estimators.forces import AttitudeStep, LoadStep
 from estimators.memory import Memory
 from estimators.pipeline.checks import CrossChecks, Forces
-from estimators.pipeline.direction import DirectionOfTravel
+from estimators.pipeline.direction import DirectionOfTravel, SignedWheels
 from estimators.pipeline.last_sample import LastSample, Tilt, possible
 from estimators.pipeline.parts import AttitudePart, LoadPart, VelocityPart, VelocityResult
 from estimators.pipeline.result import Consistency
@@ -32,13 +32,14 @@ class BeforeForces(NamedTuple):
     yaw_rate: Number  # rad/s, as believed
     steer: Number  # rad, of the front wheels; NaN where missing
     total: Number  # N, what the forces in the wheel planes add up to
-    tilt: Tilt | None = None
+    attitude: AttitudeStep | None = None
 
 
 class CarMotion(Memory):
     """The parts that run on plain numbers of one car, or on arrays of many: arguments as `EstimationPipeline`.
 
-    A sample goes through `signed`, `before_forces`, `after_forces` and `checked`, and leaves what the next of them needs.
+    A sample goes through `signed`, `before_forces`, `after_forces` and `checked`, and leaves what the next of them needs. Without
+    a velocity part of its own, `felt` and `take` are the two halves of `after_forces`.
     """
 
     memory = ("front", "angle")
@@ -49,7 +50,7 @@ class CarMotion(Memory):
         sample_time: float,
         batch_shape: tuple[int, ...],
         loads: LoadPart,
-        velocity: VelocityPart,
+        velocity: VelocityPart | None,
         attitude: AttitudePart | None = None,
         repeat_time: float = 0.025,
         unsigned_wheels: bool = False,
@@ -67,18 +68,19 @@ class CarMotion(Memory):
         self.angle: Number = kit.full(0.0)  # the last known steering of the front wheels, rad
         self._given: tuple[Number, Number, Number, FloatArray, VehicleSignals]  # of this sample
         self._before: BeforeForces
+        self._tilt: Tilt | None
         self._forces: Forces
         self._moved: VelocityResult
 
-    def signed(self, w: FloatArray, ax: Number, gear: npt.ArrayLike | None) -> tuple[FloatArray, FloatArray | None]:
-        """Wheel speeds with a sign, and the deviation of V_x, m/s, where it is open; as they are, and None, if they have one."""
+    def signed(self, w: FloatArray, ax: Number, gear: npt.ArrayLike | None) -> SignedWheels | None:
+        """Wheel speeds with a sign; None, if they have one."""
         if self.direction is None:
-            return w, None
+            return None
         pull = self.last.pull(possible(self._kit, ax, limits.ACCELERATION))
         signed = self.direction.step(w, np.asarray(pull), gear)
-        if signed.turned.any() and (reset := getattr(self.velocity, "reset", None)) is not None:
+        if np.count_nonzero(signed.turned) and (reset := getattr(self.velocity, "reset", None)) is not None:
             reset(signed.turned, signed.speed)
-        return signed.wheel_speed, signed.open_deviation
+        return signed
 
     def before_forces(
         self, ax: Number, ay: Number, turn: Number, steer: FloatArray, signals: VehicleSignals
@@ -87,7 +89,7 @@ class CarMotion(Memory):
         kit, last, choose = self._kit, self.last, self._kit.where
         read_x, read_y = (possible(kit, value, limits.ACCELERATION) for value in (ax, ay))
         turned = possible(kit, turn, limits.YAW_RATE)
-        tilt = last.tilted(self.attitude, signals, read_x, read_y, turned)
+        tilt = self._tilt = last.tilted(self.attitude, signals, read_x, read_y, turned)
         read_x, read_y, turned = last.believed(read_x, read_y, turned)
         own_x, own_y = (read_x, read_y) if tilt is None else tilt.level(read_x, read_y)
         bias_x, bias_y = last.bias
@@ -99,19 +101,31 @@ class CarMotion(Memory):
         self.angle = choose(abs(angle) < math.inf, angle, self.angle)
         total = self.vehicle.mass * own_x + self.front * kit.sin(self.angle)
         self._given = ax, ay, turn, steer, signals
-        self._before = BeforeForces(loads, own_x, own_y, turned, angle, total, tilt)
+        self._before = BeforeForces(loads, own_x, own_y, turned, angle, total, None if tilt is None else tilt.step)
         return self._before
 
     def after_forces(self, w: FloatArray, use: FloatArray, forces: Forces, more: dict[str, Any]) -> VelocityResult:
         """Steps the velocity part: wheel speeds, F_x/F_z (..., 4), and `more` where it asks for it."""
-        (ax, ay, turn, steer, signals), tilt = self._given, self._before.tilt
-        if tilt is not None and self._takes_gravity:
-            more = {**more, "gravity": tilt.gravity}
-        elif tilt is not None:  # has to be taken off before
-            along, across = (self._kit.own(tilt.gravity[..., k]) for k in (0, 1))
-            ax, ay = ax - along, ay - across
-        self._forces, self._moved = forces, self.velocity.step(w, steer, ax, ay, turn, use, signals.elapsed, **more)
-        return self._moved
+        assert self.velocity is not None
+        _, _, turn, steer, signals = self._given
+        ax, ay, gravity = self.felt(self._takes_gravity)
+        if gravity is not None:
+            more = {**more, "gravity": gravity}
+        moved = self.velocity.step(w, steer, ax, ay, turn, use, signals.elapsed, **more)
+        self.take(forces, moved)
+        return moved
+
+    def felt(self, with_gravity: bool) -> tuple[Number, Number, FloatArray | None]:
+        """a_x, a_y for a velocity part, m/s^2, and the gravity in them (..., 4), unless it has to be taken off before."""
+        ax, ay, tilt = *self._given[:2], self._tilt
+        if tilt is None or with_gravity:
+            return ax, ay, None if tilt is None else tilt.gravity
+        along, across = (self._kit.own(tilt.gravity[..., k]) for k in (0, 1))
+        return ax - along, ay - across, None
+
+    def take(self, forces: Forces, moved: VelocityResult) -> None:
+        """What has been found of the sample, for `checked`."""
+        self._forces, self._moved = forces, moved
 
     def checked(self, corner_speed: Number | None = None) -> tuple[Consistency, Number]:
         """Cross-checks, and the sideslip, rad; learns for the next sample. `corner_speed`: V_x of corner observers, m/s."""

@@ -1,6 +1,7 @@
 """The parts of a pipeline: what each must be able to do, and whether it fits.
 
-A part with `reset`, `save` and `restore` takes part in these of the pipeline; one without counts as stateless.
+A part with `reset`, `save` and `restore` takes part in these of the pipeline; one without counts as stateless. A part with
+`like(batch_shape)`, the same with another batch and without what it has learned, can be divided: see `divides`.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
 import numpy.typing as npt
 
 from estimators.arrays import BoolArray, FlagArray, FloatArray
@@ -224,3 +226,11 @@ def check_parts(
             raise EstimatorError(
                 f"{name} is for sample_time = {time:g} s, the pipeline runs at {sample_time:g} s; build both for one"
             )
+
+
+def divides(part: Any) -> bool:
+    """Whether a part of several cars may be replaced by one for each: its own class has `like`, and it has not begun; or None."""
+    if part is None or "like" not in vars(type(part)):  # a subclass may do more than what it inherits can build
+        return part is None
+    own, new = part.save(), part.like(part.batch_shape).save()
+    return all(np.array_equal(own[name], new[name], equal_nan=True) for name in new)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,7 @@ from estimators.pipeline.parts import (
     SideslipPart,
     VelocityPart,
     check_parts,
+    divides,
 )  # fmt: skip
 from estimators.pipeline.readings import WheelReadings
 from estimators.pipeline.result import PipelineStep
@@ -61,8 +63,9 @@ class EstimationPipeline(Memory):
     5. F_y of both axles from planar dynamics; front split from the model, rear split by load; before 4 where 4 asks for it;
     6. corner observers and a sideslip part (optional), beside the chain: for comparison and cross-check.
 
-    Each part is replaced by any object that follows its protocol (`parts`). Up to four cars with the default parts run on plain
-    numbers, one after the other (`car_by_car`), more cars on arrays: results agree to rounding.
+    Each part is replaced by any object that follows its protocol (`parts`). Up to four cars run on plain numbers, one after the
+    other (`car_by_car`), more cars on arrays: results agree to rounding. Loads, attitude and velocity of few cars are then
+    copies `like` the part given, one for each (`divides`), and not that part itself.
 
     Estimates are finite whatever comes in; what was wrong is in the flags, and what does not fit together in
     `consistency`. A wheel speed that repeats bit for bit is the old one read again, for up to `repeat_time`.
@@ -121,12 +124,16 @@ class EstimationPipeline(Memory):
         self.yaw_slope = FilteredDerivative(time, 0.02, shape)
         self.readings = WheelReadings(four, max(1, round(setting(repeat_time, "repeat_time", "s") / time)))
 
-        def motion(shape: tuple[int, ...] = ()) -> CarMotion:
-            chosen = loads or VerticalLoads(vehicle, time, shape), velocity or VelocityFusion(vehicle, time, shape)
-            return CarMotion(vehicle, time, shape, *chosen, attitude, repeat_time, unsigned_wheels)
+        def motion(shape: tuple[int, ...], loads: Any, velocity: Any, attitude: Any) -> CarMotion:
+            return CarMotion(vehicle, time, shape, loads, velocity, attitude, repeat_time, unsigned_wheels)
 
-        apart = 1 < math.prod(shape) <= FEW and not unsigned_wheels and all(part is None for part in given)
-        self.motion = CarByCar(shape, motion) if apart else motion(shape)
+        chosen = (
+            loads or VerticalLoads(vehicle, time, shape),
+            velocity or VelocityFusion(vehicle, time, shape),
+            attitude,
+        )
+        apart = 1 < math.prod(shape) <= FEW and divides(chosen[0]) and divides(attitude)
+        self.motion = CarByCar(shape, partial(motion, ()), *chosen) if apart else motion(shape, *chosen)
         if isinstance(self.motion, CarMotion):
             self.loads, self.velocity, self.attitude = self.motion.loads, self.motion.velocity, self.motion.attitude
         own = ("longitudinal_force", "lateral_force", "corner_observers", "sideslip", "yaw_slope", "readings")
@@ -149,16 +156,18 @@ class EstimationPipeline(Memory):
         w, steer, torque, *body = signals.arrays(shape)
         ax, ay, turn = (kit.own(value) for value in body)
         late = self._late(signals.elapsed)
-        w, open_way = self.motion.signed(w, ax, signals.direction)
+        if (signed := self.motion.signed(w, ax, signals.direction)) is not None:
+            w = signed.wheel_speed
         fresh = self.readings.step(w)
-        loads, own_x, own_y, turned, angle, total, tilt = self.motion.before_forces(ax, ay, turn, steer, signals)
+        loads, own_x, own_y, turned, angle, total, attitude = self.motion.before_forces(ax, ay, turn, steer, signals)
         wheels = self.longitudinal_force.step(w, torque, loads.load, fresh=fresh)
         delayed = kit.some(late)
         unknown = wheels.unknown | np.asarray(late)[..., None] if delayed else wheels.unknown
         agreed = reconcile(wheels.force, wheels.deviation, total, self._total_deviation, loads.load, unknown)
         use = normalised(agreed.force, loads.load, self._static, unknown)
         yaw_acceleration = self.yaw_slope.step(choose(late, math.nan, turned) if delayed else turned).derivative
-        yaw_acceleration = choose(abs(turned) < math.inf, kit.own(yaw_acceleration), math.nan)
+        if kit.some(lost := kit.no(abs(turned) < math.inf)):
+            yaw_acceleration = choose(lost, math.nan, kit.own(yaw_acceleration))
         lateral = self.lateral_force.step(own_x, own_y, yaw_acceleration, angle, agreed.force, loads.load)
         across = normalised(lateral.corner_force, loads.load, self._static) if self._use_across else None
         pulls = {"forces": (agreed.force, lateral.corner_force)}
@@ -191,7 +200,7 @@ class EstimationPipeline(Memory):
         return PipelineStep(
             vx=moved.vx,
             vy=moved.vy,
-            vx_deviation=moved.vx_deviation if open_way is None else np.hypot(moved.vx_deviation, open_way),
+            vx_deviation=moved.vx_deviation if signed is None else np.hypot(moved.vx_deviation, signed.open_deviation),
             vy_deviation=moved.vy_deviation,
             sideslip=np.asarray(sideslip).reshape(shape),
             yaw_rate=moved.yaw_rate,
@@ -202,17 +211,17 @@ class EstimationPipeline(Memory):
             force_z=loads.load,
             slip=moved.slip,
             slip_angle=moved.slip_angle,
-            roll=self._level if tilt is None else tilt.step.roll,
-            pitch=self._level if tilt is None else tilt.step.pitch,
+            roll=self._level if attitude is None else attitude.roll,
+            pitch=self._level if attitude is None else attitude.pitch,
             consistency=consistency,
-            flags=self._flags(moved.flags | loads.flags | lateral.flags, None if tilt is None else tilt.step, late),
+            flags=self._flags(moved.flags | loads.flags | lateral.flags, attitude, late),
             wheel_flags=moved.wheel_flags | wheels.flags,
             wheels=wheels,
             reconciled=agreed,
             loads=loads,
             lateral=lateral,
             velocity=moved,
-            attitude=None if tilt is None else tilt.step,
+            attitude=attitude,
             corners=corners,
             sideslip_step=beside,
         )
@@ -237,10 +246,10 @@ class EstimationPipeline(Memory):
         yield "", self.motion  # its names stand beside those of the other parts
         yield from super()._members()
 
-    def _flags(self, flags: FlagArray, tilt: AttitudeStep | None, late: Number) -> FlagArray:
+    def _flags(self, flags: FlagArray, attitude: AttitudeStep | None, late: Number) -> FlagArray:
         """Of the whole car: `flags` of the parts, those of the attitude, and samples that came late."""
-        if tilt is not None:
-            flags = flags | tilt.flags
+        if attitude is not None:
+            flags = flags | attitude.flags
         if not self._kit.some(late):
             return flags
         return flags | np.asarray(self._kit.where(late, int(Flag.STALE_MEASUREMENT), 0), dtype=np.int32)

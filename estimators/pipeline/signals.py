@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from estimators.arguments import entries
+from estimators.arguments import apart, entries
 from estimators.arithmetic import Number
 from estimators.arrays import FloatArray
 from estimators.display import displayed
@@ -70,12 +70,9 @@ class VehicleSignals(NamedTuple):
 
     def of_cars(self, shape: tuple[int, ...]) -> list[VehicleSignals]:
         """Of each car of the batch, what `arrays` does not return."""
-        cars = math.prod(shape)
-        own = {
-            name: entries(value, shape, name).ravel().tolist()
-            for name, value in zip(self._fields[6:], self[6:], strict=True)
-            if value is not None and not isinstance(value, float)
-        }
-        return (
-            [self._replace(**{name: of[k] for name, of in own.items()}) for k in range(cars)] if own else [self] * cars
-        )
+        cars = [list(self) for _ in range(math.prod(shape))]
+        for place, value in enumerate(self[6:], 6):
+            if value is not None and not isinstance(value, float):
+                for car, own in zip(cars, apart(value, shape, self._fields[place]), strict=True):
+                    car[place] = own
+        return [VehicleSignals._make(car) for car in cars]

@@ -94,6 +94,10 @@ class VelocityFusion(Memory):
         self.start: Signals = kit.stacked([kit.full(math.nan)] * 2)  # V_x, V_y asked for by `reset`
         self._usual, self._never = kit.full(self.sample_time), kit.full(False)
 
+    def like(self, batch_shape: tuple[int, ...]) -> VelocityFusion:
+        """The same for another batch, as new."""
+        return VelocityFusion(self.vehicle, self.sample_time, batch_shape, self.settings)
+
     def step(
         self,
         wheel_speed: npt.ArrayLike,

@@ -97,10 +97,11 @@ class HighSlipDetector(Memory):
         self.window[..., place] = np.where(np.isfinite(size), size, self.window[..., place - 1])
         self.position = np.array((place + 1) % s.window)
         known = np.isfinite(self.window)
-        count = np.maximum(known.sum(axis=-1), 1)
-        filled = np.where(known, self.window, 0.0)
-        mean = filled.sum(axis=-1) / count
-        variance = np.where(known, (filled - mean[..., None]) ** 2, 0.0).sum(axis=-1) / count
+        full = np.count_nonzero(known) == known.size  # as it is after the first samples: half the time
+        count = s.window if full else np.maximum(known.sum(axis=-1), 1)
+        filled = self.window if full else np.where(known, self.window, 0.0)
+        off = filled - (np.add.reduce(filled, -1) / count)[..., None]
+        variance = np.add.reduce(off * off if full else np.where(known, off * off, 0.0), -1) / count
         threshold = adaptive_threshold(variance, s.lower, s.upper, s.rate)
         by_slip: BoolArray = np.absolute(ratio) >= threshold[..., None]
         by_acceleration: BoolArray = np.absolute(spin) >= s.wheel_acceleration

@@ -65,19 +65,17 @@ class LtvFilter(CovarianceFilter):
             EstimatorError: the correction is not finite.
         """
         n, shape, size = self.size, self.batch_shape, len(self._wide)
-        columns = np.concatenate(
-            (
-                self._mean.reshape(-1, n).T,
-                self._spread.reshape(-1, n * n).T[self._lower],
-                noise.reshape(-1, 2).T,
-                mu.reshape(1, -1),
-                given.reshape(3, -1),
-            )
+        columns = (
+            self._mean.reshape(-1, n).T,
+            self._spread.reshape(-1, n * n).T[self._lower],
+            noise.reshape(-1, 2).T,
+            mu.reshape(1, -1),
+            given.reshape(3, -1),
         )
         if isinstance(self._kit, OneCar):
-            table = np.array(self._kit.each(self._sample, *columns.tolist()))
+            table = np.array(self._kit.each(self._sample, *(row for part in columns for row in part.tolist())))
         else:
-            table = np.stack(np.broadcast_arrays(*self._kit.each(self._sample, *columns)))
+            table = np.stack(np.broadcast_arrays(*self._kit.each(self._sample, *np.concatenate(columns))))
         mean = table[:n].T.reshape(*shape, n)
         if not all_bounded(mean):
             raise EstimatorError("the correction is not finite; check the acceleration and the force")

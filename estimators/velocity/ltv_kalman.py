@@ -118,7 +118,9 @@ class LtvKalmanObserver(Renewable):
         given[1] = entries(wheel_speed, shape, "wheel_speed")
         given[2] = entries(wheel_acceleration, shape, "wheel_acceleration")
         mu = entries(normalised_force, shape, "normalised_force")
-        high = np.broadcast_to(np.asarray(high_slip, dtype=np.bool_), shape)
+        high = np.asarray(high_slip, dtype=np.bool_)
+        if high.shape != shape:
+            high = np.broadcast_to(high, shape)
         flags: FlagArray = np.zeros(shape, dtype=np.int32)
         if np.vdot(given, given) < _LARGEST**2:  # False for NaN
             self.seen = given

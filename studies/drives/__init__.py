@@ -1,1 +1,1 @@
-"""Recorded drives: read, replayed through the corner observers, judged against references and baselines."""
+"""Recorded drives: read, replayed through the corner observers, compared with references and baselines."""

@@ -119,7 +119,7 @@ def reference_axle_force(log: DriveLog, axle: Axle) -> FloatArray | None:
 
 
 def notes(drive: DriveFile) -> dict[str, str]:
-    """What a reader of a row must know to judge it, by signal."""
+    """What a reader of a row must know beside it, by signal."""
     measured, reference = drive.signals["ax"], drive.reference.get("ax")
     if reference is None or (drive.log_of(measured), measured.column) != (drive.log_of(reference), reference.column):
         return {}

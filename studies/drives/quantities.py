@@ -43,7 +43,7 @@ REFERENCES: dict[str, str] = {
     "vx": "m/s", "vy": "m/s", "ax": "m/s^2", "yaw_rate": "rad/s", **_corners("force_x", "N"),
     **_corners("force_y", "N"), **_corners("force_z", "N"),
 }  # fmt: skip
-"""What the estimates may be judged against, and its SI unit; never an input."""
+"""What the estimates may be compared with, and its SI unit; never an input."""
 
 _UNIT = re.compile(r"(1/)?[A-Za-zµ°][A-Za-zµ°_]*([*/ ]+[A-Za-zµ°][A-Za-zµ°_]*|(\^|\*\*)-?[0-9])*")
 _QUANTITY = re.compile(r"\s*([-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]{1,3})?)\s*(.*?)\s*")

@@ -29,7 +29,7 @@ class Line:
 
     @property
     def clear(self) -> bool:
-        """Whether the two signals follow one another closely enough to judge sign and size."""
+        """Whether the two signals follow one another closely enough to compare sign and size."""
         return self.quality >= LEAST_QUALITY
 
 

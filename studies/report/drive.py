@@ -12,7 +12,7 @@ from studies.drives.plots import figures
 from studies.drives.raised import Raised, raised
 from studies.drives.run import RunResult
 from studies.plots import Figure
-from studies.report.drive_errors import COVERED, LEAST_COVERED, WORDS, coverage, error_table, judged, kind_of
+from studies.report.drive_errors import COVERED, LEAST_COVERED, WORDS, coverage, error_table, kind_of, statements
 from studies.report.drive_log import agreeing, complaints, flag_table, log_tables
 from studies.report.html.page import filled
 from studies.report.tiles import drawn, tiled
@@ -27,10 +27,10 @@ MOST_SAID = 6  # flags on the first page
 def drive_page(result: RunResult) -> str:
     """The page of `gainsmith run --report`."""
     data, metrics = result.data, result.metrics
-    said, covered, flags = judged(metrics), coverage(data), raised(data)
+    said, covered, flags = statements(metrics), coverage(data), raised(data)
     honest, proud = _deviations(covered)
     pipeline = metrics["pipeline"]
-    judging = [one for one in said if not one.circular]
+    independent = [one for one in said if not one.circular]
     with TemporaryDirectory() as folder:
         lead = f"{data.drive.name}: "
         groups = [
@@ -49,8 +49,8 @@ def drive_page(result: RunResult) -> str:
         metrics=metrics, drive=data.drive, said=said, first=[g for g in groups if g.name in FIRST],
         more=[g for g in groups if g.name not in FIRST], ribbons=shown_flags, rules=pipeline.get("rules", {}),
         estimators=pipeline.get("estimators", {}),
-        holds=[*(one.sentence for one in judging if one.holds), *honest, *filter(None, [agreeing(metrics["log"])])],
-        broken=[*(one.sentence for one in judging if not one.holds), *proud, *complaints(metrics["log"]), *_alarms(flags)],
+        holds=[*(one.sentence for one in independent if one.holds), *honest, *filter(None, [agreeing(metrics["log"])])],
+        broken=[*(one.sentence for one in independent if not one.holds), *proud, *complaints(metrics["log"]), *_alarms(flags)],
         know=[*_circular(metrics["pipeline"].get("notes", {})), *_assumed(result)],
         errors=error_table(metrics, covered), flags=flag_table(flags), log=log_tables(metrics["log"]),
     )  # fmt: skip

@@ -36,10 +36,10 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class Judged:
+class Statement:
     """A kind of quantity (``what``), whether the pipeline is nearer than every baseline, and the sentence that says it.
 
-    ``circular``: the reference goes into the estimate, so that it judges nothing.
+    ``circular``: the reference goes into the estimate, so that it shows nothing.
     """
 
     what: str
@@ -61,7 +61,7 @@ def kind_of(signal: str) -> str:
     return kind if place in (*CORNERS, *AXLES) else signal
 
 
-def judged(metrics: Mapping[str, Any]) -> list[Judged]:
+def statements(metrics: Mapping[str, Any]) -> list[Statement]:
     """One sentence for each kind of quantity that the pipeline estimates and the log has a reference for."""
     notes, signals, found = metrics["pipeline"].get("notes", {}), signals_of(metrics), []
     for kind in dict.fromkeys(map(kind_of, signals)):
@@ -76,7 +76,7 @@ def judged(metrics: Mapping[str, Any]) -> list[Judged]:
             near = f"nearer than {' and '.join(sides[True])}" if sides[True] else ""
             far = f"not nearer than {' and '.join(sides[False])}" if sides[False] else ""
             found.append(
-                Judged(kind, not sides[False], "; ".join(filter(None, (text, near, far))) + ".", kind in notes)
+                Statement(kind, not sides[False], "; ".join(filter(None, (text, near, far))) + ".", kind in notes)
             )
     return found
 

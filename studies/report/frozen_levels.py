@@ -1,4 +1,4 @@
-"""How near a schedule comes to what is proved about it, at every constant parameter value: a second road, in floats.
+"""How near a schedule comes to what is proved about it, at every constant parameter value: a second calculation, in floats.
 
 A constant parameter is one of the admissible motions, so no proved level can be better than what is found here; how far it
 stays behind is the price of motion and of the proof. Norms and drop probabilities come from `analysis`, which shares nothing

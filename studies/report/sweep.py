@@ -75,11 +75,11 @@ def sweep_page(
 
 
 def gate_of(result: SweepResult, baseline: Baseline | None, place: str, compared: Sequence[Comparison] | None) -> Gate:
-    """What the comparison says; without a baseline nothing is judged, and designs without a number are still named."""
+    """What the comparison says; without a baseline nothing is compared, and designs without a number are still named."""
     missing = result.count("designs without a number")
     numberless = (f"{missing} designs have a measure that is not a number.",) if missing else ()
     if compared is None or baseline is None:
-        verdict = "Nothing is judged: no baseline was given. Make one with --baseline FILE --update-baseline."
+        verdict = "Nothing is compared: no baseline was given. Make one with --baseline FILE --update-baseline."
         return Gate(verdict, (), numberless, None)
     bad = [one for one in compared if not one.good]
     made = ", ".join(f"{name} {number}" for name, number in baseline.made_with.items())

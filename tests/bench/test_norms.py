@@ -13,11 +13,11 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from analysis.norms.hamiltonian import crosses_level
 from analysis.norms.hinf import hinf_norm
 from analysis.perturbed import PerturbedModel
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.parameter_set import load_parameter_set
+from tests.support.level_crossing import crosses_level
 
 control = pytest.importorskip("control")
 SUBSET = 400 if find_spec("slycot") else 40

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.norms.hamiltonian import crosses_level
 from analysis.norms.hinf import hinf_norm
+from tests.support.level_crossing import crosses_level
 
 
 def build(seed: int, modes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:

@@ -8,7 +8,6 @@ import sympy as sp
 from scipy.optimize import brentq
 
 from analysis.errors import AnalysisError
-from analysis.norms.hamiltonian import crosses_level
 from analysis.norms.hinf import hinf_norm, stability_margin
 from analysis.norms.observer_error import error_hinf_norm
 from analysis.norms.static_gain import static_gain
@@ -16,6 +15,7 @@ from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
 from synthesis.models.parameter_set import load_parameter_set
+from tests.support.level_crossing import crosses_level
 
 BOTH = ("friction", "acceleration_error")
 SPEEDS = np.linspace(0.0, 140.0, 141)

@@ -20,7 +20,7 @@ from studies.drives.run import RunResult, replay_drive
 from studies.execution.processes import Serial
 from studies.plots import Axis, Band, Figure, Line, Panel
 from studies.report.drive import drive_page
-from studies.report.drive_errors import coverage, judged
+from studies.report.drive_errors import coverage, statements
 from studies.report.drive_log import complaints
 from studies.report.sweep import gate_of, sweep_page
 from studies.report.tiles import apart
@@ -115,7 +115,7 @@ def test_a_quantity_holds_where_no_baseline_is_nearer(pipeline: float, holds: bo
         }
 
     velocity = {"pipeline": entry(pipeline), "mean_wheel_speed": entry(0.2), "corner_observers": entry(0.01)}
-    (said,) = judged({"velocity": velocity, "pipeline": {}})
+    (said,) = statements({"velocity": velocity, "pipeline": {}})
     assert said.holds is holds and f"off by {pipeline} m/s RMS, {2 * pipeline} m/s at most" in said.sentence
     assert ("not nearer than mean wheel speed (0.2 m/s)" in said.sentence) is not holds
 
@@ -188,7 +188,7 @@ def test_a_broken_gate_names_the_statistic_and_no_baseline_judges_nothing(swept:
     (said,) = gate.broken
     assert "noise norm, worst" in said and "a loss of 100 % where 1 % is tolerated" in said
     none = gate_of(swept, None, "", None)
-    assert none.verdict.startswith("Nothing is judged") and (none.holds, none.broken, none.table) == ((), (), None)
+    assert none.verdict.startswith("Nothing is compared") and (none.holds, none.broken, none.table) == ((), (), None)
 
 
 @pytest.mark.parametrize(("width", "dark"), [(390, True), (1280, False)])

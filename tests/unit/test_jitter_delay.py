@@ -11,7 +11,7 @@ from scipy.signal import place_poles
 
 from analysis.errors import AnalysisError
 from analysis.uncertainty.delay import delay_margin
-from analysis.uncertainty.jitter import holds, jitter_claim, judge_sample_times, sample_time_jitter
+from analysis.uncertainty.jitter import holds, jitter_claim, sample_time_jitter, stable_for_sample_times
 from analysis.uncertainty.jitter_loop import observer_of
 from synthesis.lmi.result import Verdict
 from synthesis.loop.from_model import plant_of
@@ -34,8 +34,8 @@ def test_a_scalar_observer() -> None:
     assert found.lower < exact < found.upper * (1 + 1e-12)
     assert found.upper - found.lower < 2e-3
     assert found.witness is not None
-    assert judge_sample_times([[1.0]], [[1.0]], [[1.0]], found.witness) is Verdict.REFUTED
-    assert judge_sample_times([[1.0]], [[1.0]], [[1.0]], [0.9 * t for t in found.witness]) is Verdict.CERTIFIED
+    assert stable_for_sample_times([[1.0]], [[1.0]], [[1.0]], found.witness) is Verdict.REFUTED
+    assert stable_for_sample_times([[1.0]], [[1.0]], [[1.0]], [0.9 * t for t in found.witness]) is Verdict.CERTIFIED
 
 
 def test_an_order_of_sample_times_destroys_what_each_keeps_stable() -> None:

@@ -8,7 +8,7 @@ import pytest
 from analysis.errors import AnalysisError
 from analysis.markov.chain import recurrent, stationary_distribution
 from analysis.markov.montecarlo import check_second_moment
-from analysis.markov.second_moment import smat, svec, symmetric_square
+from analysis.markov.second_moment import lifted, smat, svec
 from analysis.markov.system import MarkovJumpSystem, independent
 
 DRAW = np.random.default_rng(7)
@@ -29,9 +29,9 @@ def full_radius(modes: np.ndarray, transition: np.ndarray) -> float:
 def test_symmetric_square_moves_a_second_moment() -> None:
     A, X = DRAW.normal(size=(5, 4, 4)), DRAW.normal(size=(5, 4, 4))
     X = X + np.swapaxes(X, 1, 2)
-    moved = smat((symmetric_square(A) @ svec(X)[..., None])[..., 0])
+    moved = smat((lifted(A) @ svec(X)[..., None])[..., 0])
     np.testing.assert_allclose(moved, A @ X @ np.swapaxes(A, 1, 2), rtol=1e-13, atol=1e-12)
-    np.testing.assert_allclose(symmetric_square(np.swapaxes(A, 1, 2)), np.swapaxes(symmetric_square(A), 1, 2))
+    np.testing.assert_allclose(lifted(np.swapaxes(A, 1, 2)), np.swapaxes(lifted(A), 1, 2))
     np.testing.assert_allclose((svec(X) ** 2).sum(-1), (X**2).sum((-2, -1)))
 
 
@@ -60,12 +60,10 @@ def test_propagation_starts_in_the_given_mode() -> None:
     """From mode 0 with certainty, one step applies A_0 and lands in mode j with transition[0, j]: fixes the orientation."""
     system = MarkovJumpSystem(THREE, CYCLIC)
     x = np.array([1.0, -2.0, 0.5])
-    mean = system.propagate_mean(x, [1.0, 0.0, 0.0], 2)
-    np.testing.assert_allclose(mean[1], CYCLIC[0][:, None] * (THREE[0] @ x))
-    second = np.einsum("j,jkl,l->k", CYCLIC[0], THREE, THREE[0] @ x)
-    np.testing.assert_allclose(mean[2].sum(axis=0), second)
-    X = system.propagate_second_moment(np.outer(x, x), [1.0, 0.0, 0.0], 1)
-    np.testing.assert_allclose(X[1], CYCLIC[0][:, None, None] * (THREE[0] @ np.outer(x, x) @ THREE[0].T), atol=1e-14)
+    X = system.propagate_second_moment(np.outer(x, x), [1.0, 0.0, 0.0], 2)
+    first = np.outer(THREE[0] @ x, THREE[0] @ x)
+    np.testing.assert_allclose(X[1], CYCLIC[0][:, None, None] * first, atol=1e-14)
+    np.testing.assert_allclose(X[2].sum(axis=0), np.einsum("j,jkl,lm,jnm->kn", CYCLIC[0], THREE, first, THREE))
 
 
 def test_growth_of_the_propagated_moment_is_the_radius() -> None:
@@ -102,7 +100,7 @@ def test_large_batches_of_two_states_equal_their_members(modes: int) -> None:
 
 def test_independent_modes_reduce_to_the_mean_operator() -> None:
     system = independent(THREE, [0.2, 0.5, 0.3])
-    mean = np.einsum("i,ijk->jk", [0.2, 0.5, 0.3], symmetric_square(THREE))
+    mean = np.einsum("i,ijk->jk", [0.2, 0.5, 0.3], lifted(THREE))
     assert system.second_moment_radius() == pytest.approx(np.abs(np.linalg.eigvals(mean)).max(), rel=1e-12)
 
 
@@ -159,13 +157,11 @@ def test_bad_input_is_refused(modes: object, transition: object, words: str) -> 
 def test_bad_starts_are_refused() -> None:
     system = MarkovJumpSystem(THREE, CYCLIC)
     with pytest.raises(AnalysisError, match=r"sums to 0\.9"):
-        system.propagate_mean([1, 2, 3], [0.5, 0.4, 0.0], 1)
-    with pytest.raises(AnalysisError, match="2 entries for 3 states"):
-        system.propagate_mean([1, 2], [1, 0, 0], 1)
+        system.propagate_second_moment(np.eye(3), [0.5, 0.4, 0.0], 1)
     with pytest.raises(AnalysisError, match="eigenvalue -1"):
         system.propagate_second_moment(-np.eye(3), [1, 0, 0], 1)
     with pytest.raises(AnalysisError, match="steps"):
-        system.propagate_mean([1, 2, 3], [1, 0, 0], -1)
+        system.propagate_second_moment(np.eye(3), [1, 0, 0], -1)
     with pytest.raises(AnalysisError, match=r"a symmetric matrix of size n"):
         smat(np.zeros(4))
 

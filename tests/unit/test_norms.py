@@ -8,12 +8,12 @@ from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
 
 from analysis.errors import AnalysisError
 from analysis.norms.h2 import h2_norm
-from analysis.norms.hamiltonian import crosses_level
 from analysis.norms.hinf import hinf_norm, stability_margin
 from analysis.norms.observer_error import error_hinf_norm
 from estimators.errors import GainsmithError
 from synthesis.models.catalogue.corner import corner_velocity_model
 from synthesis.models.parameter_set import load_parameter_set
+from tests.support.level_crossing import crosses_level
 
 
 def oscillator(frequency, damping):

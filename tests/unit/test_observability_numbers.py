@@ -8,7 +8,6 @@ import sympy as sp
 
 from analysis import stabilizable
 from analysis.errors import AnalysisError
-from analysis.observability.continuous import continuous_gramian
 from analysis.observability.detectability import detectable
 from analysis.observability.gramians import sequence_controllability, sequence_observability
 from analysis.observability.hidden_modes import undetectable_mode
@@ -16,6 +15,7 @@ from analysis.observability.real_roots import real_roots
 from analysis.observability.stochastic import RANK_TOLERANCE, stochastic_observability
 from analysis.observability.windows import uniform_detectability, uniform_stabilisability
 from synthesis.lmi.result import Verdict
+from tests.support.continuous_gramian import continuous_gramian
 from tests.support.lmi_cases import small_model
 
 x = sp.Symbol("x")

@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimators import Flag
-from estimators.pipeline import EstimationPipeline, PipelineStep, VehicleSignals
+from estimators import Flag, GainSchedule
+from estimators.forces import AttitudeObserver, VerticalLoads
+from estimators.pipeline import CornerObservers, CornerVelocity, EstimationPipeline, PipelineStep, VehicleSignals
 from estimators.pipeline.car_by_car import FEW, CarByCar
 from estimators.vehicle import GRAVITY
+from estimators.velocity import FusionSettings, SlipWeights, VelocityFusion
 from tests.support.pipeline_truth import CAR, TIME, Truth, noisy, sample, straight, turning
+from tests.support.schedule_content import schedule_content
 
 SHAPE = (2, 2)
 PLACES = list(product(*map(range, SHAPE)))
@@ -34,9 +37,10 @@ def signals(truth: Truth, k: int, place: int | None = None) -> VehicleSignals:
     """With signals that only some cars have an odd value of: the car at `place`, or all of them."""
     up = GRAVITY * (1.0 + 0.01 * np.arange(4.0))
     late = TIME * np.where((np.arange(4) == 3) & (k == 12), 3.0, 1.0)
-    if place is not None:
-        return sample(truth, k)._replace(az=up[place], elapsed=late[place])
-    return sample(truth, k)._replace(az=up.reshape(SHAPE), elapsed=late.reshape(SHAPE))
+    gear = np.where((np.arange(4) == 3) & (k > HALF), -1.0, 0.0)  # found to be in reverse
+    own = {"az": up, "elapsed": late, "roll_rate": 0.01 * up, "pitch_rate": np.sin(0.1 * k + up), "direction": gear}
+    shaped = {name: v.reshape(SHAPE) if place is None else v[place] for name, v in own.items()}
+    return sample(truth, k)._replace(grade=0.02, **shaped)
 
 
 def compare(batch: Any, alone: Any, place: tuple[int, ...], name: str = "") -> int:
@@ -53,16 +57,38 @@ def compare(batch: Any, alone: Any, place: tuple[int, ...], name: str = "") -> i
     return 1
 
 
-def test_each_of_a_few_cars_is_a_pipeline_of_its_own() -> None:
+def pipeline(name: str, shape: tuple[int, ...] = ()) -> EstimationPipeline:
+    """Default parts, parts of the user that can be divided, and a velocity part that cannot."""
+    if name == "default":
+        return EstimationPipeline(CAR, TIME, shape)
+    along, across = (GainSchedule.from_content(schedule_content(n), n) for n in ("longitudinal", "lateral"))
+    corners = CornerObservers(CAR, along, across, shape, weights=SlipWeights())
+    attitude = AttitudeObserver(TIME, shape, time_constant=1.0)
+    if name == "corners":
+        return EstimationPipeline(
+            CAR, TIME, shape, attitude=attitude, velocity=CornerVelocity(corners), unsigned_wheels=True
+        )
+    return EstimationPipeline(
+        *(CAR, TIME, shape),
+        loads=VerticalLoads(CAR, TIME, shape, roll=(2.0, 0.4)),
+        attitude=attitude,
+        velocity=VelocityFusion(CAR, TIME, shape, FusionSettings(dead_speed=0.4)),
+        corner_observers=corners,
+        unsigned_wheels=True,
+    )
+
+
+@pytest.mark.parametrize("name", ["default", "own", "corners"])
+def test_each_of_a_few_cars_is_a_pipeline_of_its_own(name: str) -> None:
     runs = cars()
     whole = Truth(*(np.stack(column).reshape(*SHAPE, *column[0].shape) for column in zip(*runs, strict=True)))
-    batch, ones = EstimationPipeline(CAR, TIME, SHAPE), [EstimationPipeline(CAR, TIME) for _ in runs]
+    batch, ones = pipeline(name, SHAPE), [pipeline(name) for _ in runs]
     assert isinstance(batch.motion, CarByCar)
     last: list[PipelineStep] = []
     for k in range(N):
         if k == HALF:
-            saved = {name: array.copy() for name, array in batch.save().items()}
-            batch = EstimationPipeline(CAR, TIME, SHAPE)
+            saved = {key: array.copy() for key, array in batch.save().items()}
+            batch = pipeline(name, SHAPE)
             batch.restore(saved)
             batch.reset(np.array([[False, True], [False, False]]), vx=12.0)
             ones[1].reset(vx=12.0)
@@ -70,17 +96,55 @@ def test_each_of_a_few_cars_is_a_pipeline_of_its_own() -> None:
         last = [one.step(signals(run, k, i)) for i, (one, run) in enumerate(zip(ones, runs, strict=True))]
         if k % 5 < 2:
             assert all(compare(together, one, place) > 60 for one, place in zip(last, PLACES, strict=True))
-        assert bool(together.flags[0, 1] & Flag.RESET) == (k == HALF)
-    assert together.velocity.standing.tolist() == [[False, False], [True, False]]
+        if name != "corners":  # that part has no flag of its own for it
+            assert bool(together.flags[0, 1] & Flag.RESET) == (k == HALF)
+    if name == "default":
+        assert together.velocity.standing.tolist() == [[False, False], [True, False]]
+    assert (together.vx[1, 1] < 0.0) == (name != "default")
     for place, one in zip(PLACES, ones, strict=True):
         mine, own = batch.save(), one.save()
         assert mine.keys() == own.keys()
-        for name in batch.motion.save():
-            np.testing.assert_allclose(mine[name][place], own[name], rtol=1e-9, atol=1e-9, err_msg=name)
+        for key in ones[0].motion.save():
+            if name == "corners" and key.startswith("velocity."):  # the cars of its arrays are not in front
+                continue
+            np.testing.assert_allclose(mine[key][place], own[key], rtol=1e-9, atol=1e-9, err_msg=key)
     with pytest.raises(AssertionError):  # the answers of two cars in each other's place
         compare(together, last[0], PLACES[3])
 
 
-def test_more_cars_and_other_parts_run_on_arrays() -> None:
-    many = EstimationPipeline(CAR, TIME, (FEW + 1,)), EstimationPipeline(CAR, TIME, (2,), unsigned_wheels=True)
+class Softer(VerticalLoads):
+    """Of a user, who has not said how it is divided."""
+
+
+def test_more_cars_and_parts_that_cannot_be_divided_run_on_arrays() -> None:
+    begun = AttitudeObserver(TIME, (2,))
+    begun.step(0.1, 0.0, 0.0, 0.0)
+    many = [
+        EstimationPipeline(CAR, TIME, (FEW + 1,)),
+        EstimationPipeline(CAR, TIME, (2,), loads=Softer(CAR, TIME, (2,))),
+        EstimationPipeline(CAR, TIME, (2,), attitude=begun),
+    ]
     assert not any(isinstance(pipeline.motion, CarByCar) for pipeline in many)
+
+
+def test_a_velocity_part_that_has_begun_goes_on() -> None:
+    """It steps both cars at once, with the gravity that each of them says."""
+    starts = np.array([12.0, 13.0])
+    whole, *ones = [VelocityFusion(CAR, TIME, shape) for shape in ((2,), (), ())]
+    whole.reset(vx=starts)
+    for one, start in zip(ones, starts, strict=True):
+        one.reset(vx=start)
+    few = EstimationPipeline(CAR, TIME, (2,), attitude=AttitudeObserver(TIME, (2,)), velocity=whole)
+    alone = [EstimationPipeline(CAR, TIME, attitude=AttitudeObserver(TIME), velocity=one) for one in ones]
+    assert isinstance(few.motion, CarByCar)
+    assert few.motion.velocity is whole
+    blind, rates = np.full(4, np.nan), np.array([-0.5, 0.2])
+    for _ in range(10):
+        together = few.step(VehicleSignals(np.tile(blind, (2, 1)), ax=0.1, pitch_rate=rates, roll_rate=0.0))
+        last = [
+            one.step(VehicleSignals(blind, 0.1, pitch_rate=p, roll_rate=0.0))
+            for one, p in zip(alone, rates, strict=True)
+        ]
+    np.testing.assert_allclose(together.vx, [one.vx for one in last], rtol=1e-12)
+    np.testing.assert_allclose(together.vx, starts, atol=0.05)
+    assert abs(np.diff(together.vx - starts)[0]) > 1e-4

@@ -27,7 +27,7 @@ def driven(truth: Truth) -> list[Errors]:
 
 @pytest.fixture(scope="module")
 def found(driven: list[Errors]) -> list[Consistency]:
-    return [one.judged() for one in driven]
+    return [one.tested() for one in driven]
 
 
 def test_the_stated_deviations_are_true_on_what_tires_hold(found: list[Consistency]) -> None:
@@ -38,7 +38,7 @@ def test_the_stated_deviations_are_true_on_what_tires_hold(found: list[Consisten
 
 def test_a_third_of_sigma_leaves_the_band(driven: list[Errors]) -> None:
     """The negative control: the same estimates, stated three times as sure."""
-    sure = [one.judged(shrink=3.0) for one in driven]
+    sure = [one.tested(shrink=3.0) for one in driven]
     assert np.mean([one.nees[2] for one in sure]) > BAND[1]
     assert not any(one.within(BAND)[2] for one in sure)
 
@@ -50,7 +50,7 @@ def test_errors_that_last_a_manoeuvre_are_in_the_deviation_of_the_lateral_veloci
     """Axles that differ on snow (NEES 10 if that is not looked at), and levelling by speeds that err (4.5 if it is constant)."""
     truth = simulate_manoeuvres([load_manoeuvre(manoeuvre).model_copy(update={"duration": seconds})])
     (found,) = errors(truth, range(4))
-    assert BAND[0] < found.judged().nees[1] < BAND[1]
+    assert BAND[0] < found.tested().nees[1] < BAND[1]
 
 
 def test_radii_of_a_seed_are_its_own_and_as_wide_as_the_fusion_assumes(truth: Truth) -> None:

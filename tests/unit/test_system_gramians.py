@@ -20,8 +20,8 @@ from analysis import (
 )
 from analysis.errors import AnalysisError
 from analysis.norms import gramians
-from analysis.norms.hamiltonian import crosses_level
 from analysis.norms.planar import planar_hinf_norm, planar_margin
+from tests.support.level_crossing import crosses_level
 
 
 def random_system(seed: int, discrete: bool, n: int = 5) -> tuple[np.ndarray, ...]:

@@ -61,7 +61,7 @@ class Errors:
     error: FloatArray
     sigma: FloatArray
 
-    def judged(self, shrink: float = 1.0) -> Consistency:
+    def tested(self, shrink: float = 1.0) -> Consistency:
         """``shrink`` divides the stated deviations."""
         sigma = self.sigma / shrink
         square = (self.error / sigma) ** 2

@@ -38,7 +38,7 @@ def members(group: str) -> tuple[str, ...]:
 def consistency_part(scope: Scope, tire: str, group: str) -> PartResult:
     """A row for every manoeuvre, a picture of their NEES, and how many are inside the band."""
     truth = simulated_truth(members(group), tire, scope)
-    found = sorted((one.judged() for one in errors(truth, range(scope.seeds))), key=lambda one: one.manoeuvre)
+    found = sorted((one.tested() for one in errors(truth, range(scope.seeds))), key=lambda one: one.manoeuvre)
     low, high = average_band(scope.seeds, 1)
     caption = (
         f"Average NEES over {scope.seeds} seeds and time on {tire} tires; 1 where the stated deviation is true. An ideal "
