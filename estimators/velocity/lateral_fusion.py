@@ -111,7 +111,6 @@ class LateralFusion(CarsMemory):
         yaw_noise: Number,
         speed: Number,
         believed: Number,
-        present: Number,
     ) -> None:
         """`measured` a_y and `yaw_rate` as the unit gives them, with their standard deviations; `speed` V_x.
 
@@ -119,7 +118,7 @@ class LateralFusion(CarsMemory):
         `present`) the axles are all there is, and believed again.
         """
         travel = elapsed * speed
-        self.axle_error = self.kit.where(present, self.axle_error, 0.0)
+        self.axle_error = self.kit.where(believed, self.axle_error, 0.0)
         coupling = (-elapsed, -elapsed, travel, -elapsed * measured, travel * yaw_rate)
         if self.kit.some(self.kit.no(believed)):
             x, choose = self.filter.mean, self.kit.where
