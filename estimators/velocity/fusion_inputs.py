@@ -37,6 +37,7 @@ class ConditionedInputs(NamedTuple):
     steer: Signals
     steered: Number  # whether all steering angles were there
     locked: Number  # whether they have been the same for longer than a slow sensor is
+    present: Number  # whether all inertial signals were there
     alive: Number  # whether a_x was there, and has not been the same for longer than a slow sensor is
     flags: Number
     wheel_flags: Signals
@@ -110,7 +111,7 @@ class FusionInputs(CarsMemory):
         wheels = (speed, fresh, gap, silent, self.steer)
         alive = good[0] & (run[0] < _LONGEST_RUN) & ((run[0] - 1.0) * elapsed < self.settings.slowest_unit)
         locked = self.locked > self.settings.slowest_unit
-        return ConditionedInputs(value, noise, run, good, *wheels, steered, locked, alive, flags, wheel_flags)
+        return ConditionedInputs(value, noise, run, good, *wheels, steered, locked, present, alive, flags, wheel_flags)
 
     def slipping(self, acceleration: Signals, fresh: Signals, elapsed: Number, doubt: Number) -> Signals:
         """Fresh wheels whose surface leaves the car, |R w' - a| too large, now or within the hold time.

@@ -54,7 +54,7 @@ class AxleUpdate(NamedTuple):
 class LateralFusion(CarsMemory):
     """V_y filter of `count` cars."""
 
-    memory = ("axle_error", "bend", "apart")
+    memory = ("axle_error", "lasting_error", "bend", "apart")
 
     def __init__(self, vehicle: VehicleParameters, settings: FusionSettings, every: int, count: int) -> None:
         s = self.settings = settings
@@ -69,6 +69,7 @@ class LateralFusion(CarsMemory):
         spread = np.diag([*body, *np.square(tires)])
         self.filter = speed_filter(mean, spread, rates, (BANK, 1.0 / s.road_length), SIZE, every, count)
         self.axle_error: Number = self.kit.full(0.0)  # m/s by which axles have been off of late
+        self.lasting_error: Number = self.kit.full(0.0)  # the same, low-passed
         self.bend: Signals = self.kit.stacked([self.kit.full(0.0)] * 2)  # side slip per F_y/F_z beyond c_1, rad
         self.apart: Number = self.kit.full(0.0)  # m/s between what the axles say of V_y, low-passed
         self._both = self.kit.signals((1.0, 1.0))
@@ -111,6 +112,7 @@ class LateralFusion(CarsMemory):
         yaw_noise: Number,
         speed: Number,
         believed: Number,
+        present: Number,
     ) -> None:
         """`measured` a_y and `yaw_rate` as the unit gives them, with their standard deviations; `speed` V_x.
 
@@ -118,7 +120,7 @@ class LateralFusion(CarsMemory):
         `present`) the axles are all there is, and believed again.
         """
         travel = elapsed * speed
-        self.axle_error = self.kit.where(believed, self.axle_error, 0.0)
+        self.axle_error = self.kit.where(present, self.axle_error, 0.0)
         coupling = (-elapsed, -elapsed, travel, -elapsed * measured, travel * yaw_rate)
         if self.kit.some(self.kit.no(believed)):
             x, choose = self.filter.mean, self.kit.where
@@ -216,8 +218,15 @@ class LateralFusion(CarsMemory):
             judged, explained, innovation, model, white, values[5], mu, usable, kit.stacked((gap, gap))
         )
         self.axle_error = kit.maximum(kept * self.axle_error, kit.maximum(*beyond))
+        self.lasting_error = kept * self.lasting_error + (1.0 - kept) * self.axle_error
         self.filter.weigh(innovation, variance, used)
         return AxleUpdate(innovation, used, mu, excited[0] | excited[1])
+
+    def excuse(self, where: Number) -> None:
+        """A sensor of the cars `where` was found wrong: what axles were off by since shortly before is its error, not theirs."""
+        self.axle_error = self.kit.where(
+            where, self.kit.minimum(self.axle_error, self.lasting_error), self.axle_error
+        )
 
     @property
     def wheel_bend(self) -> Signals:

@@ -150,6 +150,7 @@ class TurnMonitor(Exclusion):
         begun_y, begun_r, begun_roll = ((now > 0.0) & (old == 0.0) for now, old in zip(left, before, strict=True))
         followed = kit.where(begun_r, level[YAW_RATE] - level[REAR], gap) * s.error_memory
         self.across.filter.widen(begun_y | begun_r | begun_roll, followed * followed)
+        self.across.excuse(begun_y | begun_r)
         self.remaining = kit.stacked(left)
         used_y, used_r = known[SIDE] & (left[0] == 0.0) & no(stuck_y), known[YAW_RATE] & (left[1] == 0.0)
         apart_now = abs(now[YAW_RATE] - now[SIDE])
