@@ -142,7 +142,8 @@ class TurnMonitor(Exclusion):
         front, rear = (agree[YAW_RATE, i] & agree[i, STEERING] for i in (FRONT, REAR))
         # tires of a banked car carry less than its turn takes: it follows its steering closely
         follows = abs(level[YAW_RATE] - steered) < readings.allowed[YAW_RATE] + _UNDERSTEER
-        grip = agree[YAW_RATE, STEERING] & follows & (front | rear)
+        second = agree[YAW_RATE, STEERING] & (front | rear)
+        grip = second & follows
         banked = self._banked(elapsed, apart & grip & (no(side.wrong) | straight) & no(stuck_y | roll.wrong), gap)
         before = self.remaining
         judged = (side._replace(wrong=side.wrong & no(banked)), yaw, roll)
@@ -154,7 +155,8 @@ class TurnMonitor(Exclusion):
         self.remaining = kit.stacked(left)
         used_y, used_r = known[SIDE] & (left[0] == 0.0) & no(stuck_y), known[YAW_RATE] & (left[1] == 0.0)
         apart_now = abs(now[YAW_RATE] - now[SIDE])
-        pending = used_y & used_r & leaps & (apart_now > allowed[YAW_RATE] + allowed[SIDE])
+        # of a car whose steering and wheels do not follow its turn, which slides, a_y is the best there is
+        pending = used_y & used_r & leaps & second & (apart_now > allowed[YAW_RATE] + allowed[SIDE])
         pending = kit.where(pending, apart_now, 0.0)
         reported = known[SIDE] & (left[0] == 0.0)  # one that repeats what the others say is no fault
         levelled = left[2] == 0.0
