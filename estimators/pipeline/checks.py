@@ -16,6 +16,12 @@ from estimators.vehicle import GRAVITY, VehicleParameters
 
 BALANCE = 0.6
 """m/s^2 that sum of F/m and acceleration may stay apart: 0.15 of bias, 2 % of torque at 0.5 g, drag at 30 m/s (0.3)."""
+LEAP = (0.3, 0.15)
+"""m/s^2, and share of what a_x changes: by how much the first of these gaps may change within `LEAP_TIME`.
+
+Drag, grade, bias and mass stay the same for so long; pads and motors are as wrong as their force is."""
+LEAP_TIME, LEAP_LAG = 0.2, 0.1
+"""s; two such times at most, and of the low-pass before: above the lag of a force observer."""
 LOAD = 0.05
 """Relative."""
 HEAVE = (0.25, 0.2)
@@ -51,7 +57,8 @@ class CrossChecks(Memory):
         EstimatorError: a time that is not positive.
     """
 
-    memory = ("gaps", "alone", "heave")
+    memory = ("gaps", "alone", "heave", "quick", "recent", "older", "phase")
+    unknowns = ("quick", "recent", "older")
 
     def __init__(
         self,
@@ -68,8 +75,14 @@ class CrossChecks(Memory):
         )
         self._kit = arithmetic(self.batch_shape)
         self.gaps: list[Number] = [self._kit.full(0.0)] * 3
-        self._quick = 1.0 - math.exp(-sample_time / HEAVE[1])
+        self._heave = 1.0 - math.exp(-sample_time / HEAVE[1])
+        self._leap, self._turn = 1.0 - math.exp(-sample_time / LEAP_LAG), LEAP_TIME / sample_time
         self.heave: Number = self._kit.full(0.0)  # a_z/g - 1, low-passed
+        unknown = [self._kit.full(math.nan)] * 2
+        self.quick: list[Number] = unknown[:]  # m/s^2, force gap and a_x, low-passed
+        self.recent: list[Number] = unknown[:]  # the same at the last turn of `LEAP_TIME`
+        self.older: list[Number] = unknown[:]  # and at the one before
+        self.phase: Number = self._kit.full(0.0)  # samples since
         self._never = self._kit.full(False)
         self.alone: Number = self._kit.full(0.0)  # samples since a wheel last supported V_x
 
@@ -94,7 +107,7 @@ class CrossChecks(Memory):
         up = GRAVITY if az is None else own(entries(az, shape, "az"))
         there = abs(up) < 1e6  # False for NaN
         self.heave = self.heave + choose(
-            there, self._quick * (choose(there, up, 0.0) / GRAVITY - 1.0 - self.heave), 0.0
+            there, self._heave * (choose(there, up, 0.0) / GRAVITY - 1.0 - self.heave), 0.0
         )
         known = (abs(up) > 0.1 * GRAVITY) & (abs(up) < math.inf)
         load = kit.rows(loads.load, 4)
@@ -105,7 +118,7 @@ class CrossChecks(Memory):
         self.alone = choose(supported, 0.0, kit.minimum(self.alone + 1.0, self._patience + 1.0))
         contested = getattr(moved, "force_contested", None)  # sooner, where the velocity part watches it
         found = (
-            (abs(gaps[0]) > BALANCE) | (self._never if contested is None else own(contested)),
+            (abs(gaps[0]) > BALANCE) | self._leaps(forces) | (self._never if contested is None else own(contested)),
             abs(gaps[1]) > BALANCE,
             (abs(load_gap) > LOAD) | (abs(self.heave) > HEAVE[0]),
             abs(gaps[2]) > VELOCITY[0] + VELOCITY[1] * abs(speed),
@@ -120,9 +133,29 @@ class CrossChecks(Memory):
         sums = np.asarray(failed, dtype=np.int32).reshape(shape)
         return Consistency(outputs[..., 0], outputs[..., 1], outputs[..., 2], outputs[..., 3], sums)
 
+    def _leaps(self, forces: Forces) -> Number:
+        """Whether the force gap changes as no drag, grade, bias or scale does; begins anew where a force is unknown."""
+        kit, choose, mass = self._kit, self._kit.where, self.vehicle.mass
+        gap = choose(forces.unknown, math.nan, forces.gap / mass)
+        known, turns = abs(gap) < math.inf, self.phase + 1.0 >= self._turn
+        self.phase = choose(turns | kit.no(known), 0.0, self.phase + 1.0)
+        changes = []
+        for k, value in enumerate((gap, gap + forces.push / mass)):
+            before = self.quick[k]
+            quick = choose(abs(before) < math.inf, before + self._leap * (value - before), value)
+            recent, older = self.recent[k], self.older[k]
+            changes.append(abs(quick - older))
+            self.quick[k] = quick
+            self.older[k] = choose(turns, recent, choose(known, older, math.nan))
+            self.recent[k] = choose(turns, quick, choose(known, recent, math.nan))
+        floor, share = LEAP
+        return changes[0] > floor + share * changes[1]
+
     def reset(self, where: npt.ArrayLike | None = None) -> None:
         """Forgets the gaps of the entries `where` (bool mask; None: all)."""
         chosen = self._kit.own(mask(where, self.batch_shape, "where"))
         self.gaps = [self._kit.where(chosen, 0.0, gap) for gap in self.gaps]
-        self.alone = self._kit.where(chosen, 0.0, self.alone)
+        for old in (self.quick, self.recent, self.older):
+            old[:] = [self._kit.where(chosen, math.nan, value) for value in old]
+        self.alone, self.phase = (self._kit.where(chosen, 0.0, value) for value in (self.alone, self.phase))
         self.heave = self._kit.where(chosen, 0.0, self.heave)

@@ -36,6 +36,7 @@ class ConditionedInputs(NamedTuple):
     silent: Signals  # a wheel that hardly turns
     steer: Signals
     steered: Number  # whether all steering angles were there
+    locked: Number  # whether they have been the same for longer than a slow sensor is
     present: Number  # whether all inertial signals were there
     alive: Number  # whether a_x was there, and has not been the same for longer than a slow sensor is
     flags: Number
@@ -45,7 +46,7 @@ class ConditionedInputs(NamedTuple):
 class FusionInputs(CarsMemory):
     """Remembers the last good values of `count` cars."""
 
-    memory = ("inertial", "run", "wheel_speed", "age", "steer", "slope", "slip_left")
+    memory = ("inertial", "run", "wheel_speed", "age", "steer", "locked", "slope", "slip_left")
     unknowns = ("wheel_speed",)
 
     def __init__(self, radius: Signals, settings: FusionSettings, count: int) -> None:
@@ -56,7 +57,7 @@ class FusionInputs(CarsMemory):
         self._quiet = kit.signals((s.acceleration_noise, s.acceleration_noise, s.yaw_rate_noise))
         self._loud = kit.signals((s.missing_acceleration, s.missing_acceleration, s.missing_yaw_rate))
         three, four = kit.signals((0.0,) * 3), kit.signals((0.0,) * 4)
-        zero = kit.full(0.0)
+        self.locked = zero = kit.full(0.0)  # s since a steering angle last changed
         self.inertial, self.run = kit.each(lambda v: (v + zero, v + zero), three)
         # of the wheels: s since each last said something new, filtered derivative rad/s^2, s of high slip still believed
         wheels = kit.each(lambda v: (v + zero, v + zero, v + zero, v + zero, v + zero + math.nan), four)
@@ -81,6 +82,8 @@ class FusionInputs(CarsMemory):
         if some(no(steered)):
             flags = flags | choose(steered, 0, _MISSING_INPUT)
             (steer,) = kit.each(lambda good, angle, old: (choose(good, angle, old),), turned, steer, self.steer)
+        same = [angle == old for angle, old in zip(steer, self.steer, strict=True)]
+        self.locked = choose(same[0] & same[1] & same[2] & same[3], self.locked + elapsed, 0.0)
         self.steer = steer
         self.inertial, self.run = value, run
 
@@ -107,7 +110,8 @@ class FusionInputs(CarsMemory):
         )
         wheels = (speed, fresh, gap, silent, self.steer)
         alive = good[0] & (run[0] < _LONGEST_RUN) & ((run[0] - 1.0) * elapsed < self.settings.slowest_unit)
-        return ConditionedInputs(value, noise, run, good, *wheels, steered, present, alive, flags, wheel_flags)
+        locked = self.locked > self.settings.slowest_unit
+        return ConditionedInputs(value, noise, run, good, *wheels, steered, locked, present, alive, flags, wheel_flags)
 
     def slipping(self, acceleration: Signals, fresh: Signals, elapsed: Number, doubt: Number) -> Signals:
         """Fresh wheels whose surface leaves the car, |R w' - a| too large, now or within the hold time.

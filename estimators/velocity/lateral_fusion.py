@@ -54,7 +54,7 @@ class AxleUpdate(NamedTuple):
 class LateralFusion(CarsMemory):
     """V_y filter of `count` cars."""
 
-    memory = ("axle_error", "bend", "apart")
+    memory = ("axle_error", "lasting_error", "bend", "apart")
 
     def __init__(self, vehicle: VehicleParameters, settings: FusionSettings, every: int, count: int) -> None:
         s = self.settings = settings
@@ -69,6 +69,7 @@ class LateralFusion(CarsMemory):
         spread = np.diag([*body, *np.square(tires)])
         self.filter = speed_filter(mean, spread, rates, (BANK, 1.0 / s.road_length), SIZE, every, count)
         self.axle_error: Number = self.kit.full(0.0)  # m/s by which axles have been off of late
+        self.lasting_error: Number = self.kit.full(0.0)  # the same, low-passed
         self.bend: Signals = self.kit.stacked([self.kit.full(0.0)] * 2)  # side slip per F_y/F_z beyond c_1, rad
         self.apart: Number = self.kit.full(0.0)  # m/s between what the axles say of V_y, low-passed
         self._both = self.kit.signals((1.0, 1.0))
@@ -217,8 +218,15 @@ class LateralFusion(CarsMemory):
             judged, explained, innovation, model, white, values[5], mu, usable, kit.stacked((gap, gap))
         )
         self.axle_error = kit.maximum(kept * self.axle_error, kit.maximum(*beyond))
+        self.lasting_error = kept * self.lasting_error + (1.0 - kept) * self.axle_error
         self.filter.weigh(innovation, variance, used)
         return AxleUpdate(innovation, used, mu, excited[0] | excited[1])
+
+    def excuse(self, where: Number) -> None:
+        """A sensor of the cars `where` was found wrong: what axles were off by since shortly before is its error, not theirs."""
+        self.axle_error = self.kit.where(
+            where, self.kit.minimum(self.axle_error, self.lasting_error), self.axle_error
+        )
 
     @property
     def wheel_bend(self) -> Signals:

@@ -58,6 +58,8 @@ from estimators.velocity.longitudinal_fusion import LongitudinalFusion
 from estimators.velocity.pull_monitor import PullMonitor
 from estimators.velocity.turn_monitor import TurnMonitor
 
+_LOCKED = 2.0  # standard deviations, in place of `gate`, of a steering angle that repeats itself
+
 
 class Judged(NamedTuple):
     """What the filters are to use; readings a_x, a_y, r without the gravity that is known."""
@@ -139,7 +141,8 @@ class SignalMonitor(CarsMemory):
         share = s.side_floor + s.side_linear * s.side_compliance * kit.maximum(abs(mu), abs(nu))
         white = s.steering_noise * s.steering_noise * (1.0 - kept) / (1.0 + kept)
         model = magnitude * magnitude * (tires + 2.0 * share * share + white) + 2.0 * s.slip_speed**2
-        off = (self.astray * self.astray > s.gate**2 * model) & (abs(front) > abs(rear))
+        gate = kit.where(seen.locked, _LOCKED, s.gate)
+        off = (self.astray * self.astray > gate * gate * model) & (abs(front) > abs(rear))
         self.remaining = kit.where(off, s.error_memory, kit.maximum(self.remaining - elapsed, 0.0))
 
     def forget(self, where: Number) -> None:

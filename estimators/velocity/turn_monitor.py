@@ -16,6 +16,7 @@ import math
 from typing import NamedTuple
 
 from estimators.arithmetic import Number, Signals, arithmetic
+from estimators.signals import limits
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity.exclusion import Exclusion
 from estimators.velocity.fusion_inputs import ConditionedInputs
@@ -60,6 +61,8 @@ class TurnMonitor(Exclusion):
         self.settings, self.along, self.across = along.settings, along, across
         self.kit = kit = arithmetic((count,))
         self._length, self._arm = vehicle.wheelbase, vehicle.rear_axle_distance
+        # rad/s^2: both axles at their limit, one against the other, turn a car with I_z = m L_f L_r no quicker
+        self._quickest = 2.0 * limits.FRICTION * GRAVITY / vehicle.wheelbase
         self._tracks = (vehicle.corner_y[0::2] - vehicle.corner_y[1::2]).tolist()
         zero, self._never, self._always = kit.full(0.0), kit.full(False), kit.full(True)
         self._nothing = zero, zero
@@ -92,15 +95,16 @@ class TurnMonitor(Exclusion):
         v_g, v_p, v_f, v_q = level[:4]
         t_g, t_p, t_f, t_q = readings.allowed[:4]
         known = readings.known
-        quiet = known[YAW_RATE] & known[SIDE] & (abs(v_p - v_g) < t_p + t_g)
+        quiet = known[YAW_RATE] & known[SIDE] & (abs(v_p - v_g) < t_p + t_g) & (abs(now[SIDE] - now[YAW_RATE]) < t_p + t_g)
         quiet = (
             quiet
             & (kit.no(known[FRONT]) | (abs(v_f - v_g) < t_f + t_g))
             & (kit.no(known[REAR]) | (abs(v_q - v_g) < t_q + t_g))
         )
-        quiet = quiet & (self.remaining[_AY] + self.remaining[_R] + self.remaining[_ROLL] == 0.0)
+        stuck = tuple((run - 1.0) * elapsed > s.slowest_unit for run in seen.run)
+        quiet = quiet & (self.remaining[_AY] + self.remaining[_R] + self.remaining[_ROLL] == 0.0) & kit.no(stuck[1])
         if kit.some(kit.no(quiet)):
-            return self._outvoted(elapsed, seen, readings, sway, off)
+            return self._outvoted(elapsed, seen, readings, sway, off, stuck, now)
         self._differentiate(r, self.since[_R] > 0.0, elapsed)
         self.since = kit.stacked(self._nothing)
         self.sloped = kit.maximum(self.sloped - elapsed, 0.0)
@@ -109,15 +113,25 @@ class TurnMonitor(Exclusion):
         return Turning((b, r), noises, used, self._nothing[0], self._never, *off, gated)
 
     def _outvoted(
-        self, elapsed: Number, seen: ConditionedInputs, readings: Readings, sway: Number, gravity: tuple[Number, Number]
+        self,
+        elapsed: Number,
+        seen: ConditionedInputs,
+        readings: Readings,
+        sway: Number,
+        gravity: tuple[Number, Number],
+        stuck: tuple[Number, ...],
+        now: tuple[Number, ...],
     ) -> Turning:
         s, kit, no, largest = self.settings, self.kit, self.kit.no, self.kit.maximum
         level, known, never = readings.level, readings.known, self._never
-        _, stuck_y, stuck_r = ((run - 1.0) * elapsed > s.slowest_unit for run in seen.run)
+        _, stuck_y, stuck_r = stuck
         # a car that slides is turned further than its side force carries it, never less
         carried, steered = level[SIDE], level[STEERING]
-        beyond = kit.maximum(abs(carried) - abs(steered), -carried * kit.sign(steered))
-        excess = beyond > readings.allowed[SIDE]
+        allowed = readings.allowed
+        excess, leaps = (
+            kit.maximum(abs(side) - abs(steered), -side * kit.sign(steered)) > allowed[SIDE]
+            for side in (carried, now[SIDE])
+        )
         plausible = tuple(excess if rule.one_sided else self._always for rule in TURN.rules)
         verdicts, agree = vote(kit, TURN, readings, (stuck_r, never, stuck_y), plausible)
         yaw, roll, side = verdicts
@@ -128,7 +142,8 @@ class TurnMonitor(Exclusion):
         front, rear = (agree[YAW_RATE, i] & agree[i, STEERING] for i in (FRONT, REAR))
         # tires of a banked car carry less than its turn takes: it follows its steering closely
         follows = abs(level[YAW_RATE] - steered) < readings.allowed[YAW_RATE] + _UNDERSTEER
-        grip = agree[YAW_RATE, STEERING] & follows & (front | rear)
+        second = agree[YAW_RATE, STEERING] & (front | rear)
+        grip = second & follows
         banked = self._banked(elapsed, apart & grip & (no(side.wrong) | straight) & no(stuck_y | roll.wrong), gap)
         before = self.remaining
         judged = (side._replace(wrong=side.wrong & no(banked)), yaw, roll)
@@ -136,15 +151,22 @@ class TurnMonitor(Exclusion):
         begun_y, begun_r, begun_roll = ((now > 0.0) & (old == 0.0) for now, old in zip(left, before, strict=True))
         followed = kit.where(begun_r, level[YAW_RATE] - level[REAR], gap) * s.error_memory
         self.across.filter.widen(begun_y | begun_r | begun_roll, followed * followed)
+        self.across.excuse(begun_y | begun_r)
         self.remaining = kit.stacked(left)
-        used_y, used_r = known[SIDE] & (left[0] == 0.0), known[YAW_RATE] & (left[1] == 0.0)
+        used_y, used_r = known[SIDE] & (left[0] == 0.0) & no(stuck_y), known[YAW_RATE] & (left[1] == 0.0)
+        apart_now = abs(now[YAW_RATE] - now[SIDE])
+        # of a car whose steering and wheels do not follow its turn, which slides, a_y is the best there is
+        pending = used_y & used_r & leaps & second & (apart_now > allowed[YAW_RATE] + allowed[SIDE])
+        pending = kit.where(pending, apart_now, 0.0)
+        reported = known[SIDE] & (left[0] == 0.0)  # one that repeats what the others say is no fault
         levelled = left[2] == 0.0
         off = tuple(kit.where(levelled, value, 0.0) for value in gravity)
         if kit.some(no(levelled)):
             a, b, r = seen.inertial
             seen = seen._replace(inertial=kit.stacked((a, kit.where(levelled, b, b + gravity[0]), r)))
-        found = self._replaced(elapsed, seen, readings, used_y, used_r, sway)
-        return found._replace(gravity=off[0], road=off[1], gated=found.gated | no(levelled))
+        found = self._replaced(elapsed, seen, readings, used_y, used_r, sway, pending)
+        gated = no(reported & used_r & levelled)
+        return found._replace(used=(reported, used_r), gravity=off[0], road=off[1], gated=gated)
 
     def _say(self, seen: ConditionedInputs, gravity: Number | None) -> tuple[tuple[Number, ...], Signals]:
         """The six and V_y', not low-passed; the surface speeds of the wheels. `gravity`: what a levelled a_y had besides."""
@@ -208,9 +230,16 @@ class TurnMonitor(Exclusion):
         return found
 
     def _replaced(
-        self, elapsed: Number, seen: ConditionedInputs, readings: Readings, used_y: Number, used_r: Number, sway: Number
+        self,
+        elapsed: Number,
+        seen: ConditionedInputs,
+        readings: Readings,
+        used_y: Number,
+        used_r: Number,
+        sway: Number,
+        pending: Number,
     ) -> Turning:
-        """Readings that are not used, from those that are."""
+        """Readings that are not used, from those that are; `pending`: m/s^2 of doubt in an a_y that still is."""
         s, kit, choose, no = self.settings, self.kit, self.kit.where, self.kit.no
         _, b, r = seen.inertial
         (level, allowed, known), y, speed = readings, self.across.filter.mean, self.along.speed
@@ -231,7 +260,7 @@ class TurnMonitor(Exclusion):
         switched = (self.since[_R] > 0.0) == used_r
         ages = [
             choose(used, 0.0, kit.minimum(age + elapsed, s.error_memory))
-            for used, age in zip((used_y, used_r), self.since, strict=True)
+            for used, age in zip((used_y & (pending == 0.0), used_r), self.since, strict=True)
         ]
         self.since = kit.stacked(ages)
         grown_y, grown_r = (self.grown(age, elapsed) for age in ages)
@@ -239,9 +268,9 @@ class TurnMonitor(Exclusion):
         own = choose(used_r, speed * turn, other) + sway + y[BIAS] + y[BANK]
         ay = choose(used_y, b, own / (1.0 - y[SCALE]))
         doubt_y = (_UNDULATION + abs(sway) + choose(used_r, allowed[YAW_RATE], doubt)) / s.gate
-        noise_y = choose(used_y, seen.noise[1], doubt_y * grown_y)
+        doubt_y = choose(used_y, pending, doubt_y)
+        noise_y = choose(doubt_y > 0.0, doubt_y * grown_y, seen.noise[1])
         self._differentiate(yaw_rate, switched, elapsed)
-        doubt_y = choose(used_y, 0.0, doubt_y)
         reading, noises, used = (ay, yaw_rate), (noise_y, noise_r), (used_y, used_r)
         return Turning(reading, noises, used, doubt_y, unknown, *self._nothing, no(used_y & used_r))
 
@@ -250,5 +279,6 @@ class TurnMonitor(Exclusion):
         kit, kept = self.kit, self.kit.exp(-elapsed / self.settings.wheel_lag)
         steady = kit.no(switched) & (abs(self.yaw_rate) < math.inf)
         slope = kit.where(steady, (yaw_rate - self.yaw_rate) / elapsed, self.yaw_acceleration)
+        slope = kit.maximum(kit.minimum(slope, self._quickest), -self._quickest)
         self.yaw_acceleration = kept * self.yaw_acceleration + (1.0 - kept) * slope
         self.yaw_rate = yaw_rate
