@@ -52,7 +52,7 @@ class CarByCar(Memory):
         attitude: AttitudePart | None,
     ) -> None:
         self.batch_shape = batch_shape
-        self.velocity = None if divides(velocity) else velocity
+        self.velocity = None if divides(velocity, batch_shape) else velocity
         self.parts = ("velocity",) if hasattr(self.velocity, "save") else ()
         own: list[Any] = [loads, velocity if self.velocity is None else None, attitude]
         self.cars = [
