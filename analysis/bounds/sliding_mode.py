@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -13,7 +13,8 @@ from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
 from estimators.display import Display
 from estimators.errors import unknown
-from synthesis.models.param import Constant
+from estimators.sideslip import SlidingGains
+from estimators.vehicle import RigidBody
 
 Output = Literal["yaw_rate", "lateral_acceleration", "longitudinal_acceleration"]
 OUTPUTS: tuple[Output, ...] = ("yaw_rate", "lateral_acceleration", "longitudinal_acceleration")
@@ -51,30 +52,11 @@ class SlidingModeGains(Display):
         return float(self.matrix.ravel()[number - 1])
 
 
-# P5 notes 1; Omega_5 is rounded from 52142.857.
-PUBLISHED = SlidingModeGains.of(omega1=10, omega4=40000, omega5=52000, omega7=-40000, omega8=40000, omega12=50000)
-
-
-@dataclass(frozen=True)
-class Vehicle:
-    """Mass [kg], yaw inertia [kg*m^2], distances of the axles from the centre of gravity [m]."""
-
-    mass: float
-    yaw_inertia: float
-    front_axle_distance: float
-    rear_axle_distance: float
-
-    def __post_init__(self) -> None:
-        for entry in fields(self):
-            positive(entry.name, getattr(self, entry.name))
-
-    @classmethod
-    def of(cls, constants: Mapping[str, Constant]) -> Vehicle:
-        """From the constants of a model of the catalogue; raises AnalysisError for one that is missing."""
-        missing = [entry.name for entry in fields(cls) if entry.name not in constants]
-        if missing:
-            raise AnalysisError(f"no constant {', '.join(missing)}; give all of the vehicle")
-        return cls(**{entry.name: constants[entry.name].value for entry in fields(cls)})
+_P5 = SlidingGains()
+PUBLISHED = SlidingModeGains.of(
+    omega1=_P5.yaw, omega4=_P5.split, omega5=_P5.front, omega7=-_P5.split, omega8=_P5.rear, omega12=_P5.longitudinal
+)
+"""P5 notes 1; Omega_5 is rounded from 52142.857."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +100,7 @@ class SlidingModeConvergence(Display):
 
 def sliding_mode_convergence(
     gains: SlidingModeGains,
-    vehicle: Vehicle,
+    vehicle: RigidBody,
     yaw_moment_error: float = 0.0,
     force_rates: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> SlidingModeConvergence:
@@ -127,8 +109,8 @@ def sliding_mode_convergence(
     `force_rates` are bounds on |F_y1'|, |F_yw2'|, |F_x1'| [N/s]; the paper assumes constant forces, but they add to the
     disturbance that each sign term must overcome, and leave a split error of sup|L_1 F_y1' - L_2 F_yw2'| / decay.
 
-    >>> from analysis.bounds.sliding_mode import PUBLISHED, Vehicle
-    >>> car = Vehicle(mass=1400.0, yaw_inertia=2400.0, front_axle_distance=1.1, rear_axle_distance=1.6)
+    >>> from analysis.bounds.sliding_mode import PUBLISHED
+    >>> car = RigidBody(mass=1400.0, yaw_inertia=2400.0, front_axle_distance=1.1, rear_axle_distance=1.6)
     >>> sliding_mode_convergence(PUBLISHED, car, yaw_moment_error=1000.0).holds
     True
     """
@@ -173,7 +155,7 @@ def sliding_mode_convergence(
     return SlidingModeConvergence(limit, yaw, along, across, decay, residual, ultimate, tuple(violations))
 
 
-def reaching_time(gains: SlidingModeGains, vehicle: Vehicle, yaw_error: float, yaw_moment_error: float) -> float:
+def reaching_time(gains: SlidingModeGains, vehicle: RigidBody, yaw_error: float, yaw_moment_error: float) -> float:
     r"""Bound on the time [s] to reach the sliding surface x1 = 0 for good, from any |x1| [rad/s] and |s| [N*m].
 
     (A.4) is local, |s| < I_z Omega_1, but convergence is not. With (7) exact, V = (L_1 + L_2) Omega_4 |x1| + s^2 / (2 I_z) has
@@ -189,7 +171,7 @@ def reaching_time(gains: SlidingModeGains, vehicle: Vehicle, yaw_error: float, y
     return float(start / (span * gains[4] * gains[1]))
 
 
-def linear_zone_matrix(gains: SlidingModeGains, vehicle: Vehicle, widths: Mapping[Output, float]) -> FloatArray:
+def linear_zone_matrix(gains: SlidingModeGains, vehicle: RigidBody, widths: Mapping[Output, float]) -> FloatArray:
     r"""A (4, 4) of x~' = A x~ inside the linear zones, sign(y_i) replaced by y_i / width_i (P5 notes 4).
 
     Widths in rad/s, m/s^2, m/s^2; P5 does not print them.
@@ -215,11 +197,11 @@ def sampled_radius(matrix: FloatArray, sample_time: float) -> float:
     return float(np.abs(np.linalg.eigvals(np.eye(len(A)) + step * A)).max())
 
 
-def smallest_zone_widths(gains: SlidingModeGains, vehicle: Vehicle, sample_time: float) -> dict[Output, float]:
+def smallest_zone_widths(gains: SlidingModeGains, vehicle: RigidBody, sample_time: float) -> dict[Output, float]:
     """Width below which each loop alone overshoots by more than it corrects: gain times T / 2 (radius 1 of I + T A).
 
-    >>> from analysis.bounds.sliding_mode import PUBLISHED, Vehicle
-    >>> car = Vehicle(mass=1400.0, yaw_inertia=2400.0, front_axle_distance=1.1, rear_axle_distance=1.6)
+    >>> from analysis.bounds.sliding_mode import PUBLISHED
+    >>> car = RigidBody(mass=1400.0, yaw_inertia=2400.0, front_axle_distance=1.1, rear_axle_distance=1.6)
     >>> round(smallest_zone_widths(PUBLISHED, car, sample_time=0.001)["yaw_rate"], 6)  # rad/s
     0.005
     """

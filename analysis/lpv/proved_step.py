@@ -14,6 +14,7 @@ from typing import Any
 
 from flint import acb, acb_mat, arb, arb_mat, fmpq, fmpq_mat
 
+from analysis.exact import total
 from analysis.lpv.question import Question
 from synthesis.polynomials.enclosure import PolynomialMatrix, row_sum
 
@@ -78,9 +79,9 @@ class Line:
         order = len(flow)
         terms = [_diagonal([1] * (n + m))]
         for k in range(TERMS):
-            terms.append(_sum([flow[i] * terms[k - i] for i in range(min(order, k + 1))]) * fmpq(1, k + 1))
+            terms.append(total([flow[i] * terms[k - i] for i in range(min(order, k + 1))]) * fmpq(1, k + 1))
         left_over = sum(
-            size(_sum([flow[i] * terms[k - i] for i in range(k - TERMS, min(order, k + 1))]))
+            size(total([flow[i] * terms[k - i] for i in range(k - TERMS, min(order, k + 1))]))
             for k in range(TERMS, TERMS + order)
         ) + loose * sum(size(term) for term in terms)
         error = (arb(sum(size(term) for term in flow) + loose).exp() * arb(left_over)).abs_upper()
@@ -91,10 +92,10 @@ class Line:
             for k, term in enumerate(terms):
                 out[i + k] = out[i + k] + seen * term
         # Weights of the integral are positive, so a ball that holds a function everywhere holds its mean.
-        energy = _sum(
-            [adjoint(a) * _sum([b * fmpq(1, i + k + 1) for k, b in enumerate(out)]) for i, a in enumerate(out)]
+        energy = total(
+            [adjoint(a) * total([b * fmpq(1, i + k + 1) for k, b in enumerate(out)]) for i, a in enumerate(out)]
         )
-        return Interval(_sum(terms), energy * self.h)
+        return Interval(total(terms), energy * self.h)
 
     def _along(self, key: str) -> list[Any]:
         """Coefficients of the powers of s of a matrix on the line."""
@@ -184,10 +185,3 @@ def _beside(C: Any, D: Any) -> Any:
 def _diagonal(entries: list[Any]) -> Any:
     n = len(entries)
     return acb_mat(n, n, [entries[i] if i == j else 0 for i, j in product(range(n), repeat=2)])
-
-
-def _sum(matrices: list[Any]) -> Any:
-    total = matrices[0]
-    for matrix in matrices[1:]:
-        total = total + matrix
-    return total

@@ -18,17 +18,14 @@ import numpy as np
 
 from analysis.checks import symmetric
 from analysis.errors import AnalysisError
-from estimators.arrays import FloatArray, IndexArray
+from estimators.arrays import FloatArray
+from synthesis.lmi.blocks import triangle_by_rows
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-@lru_cache(maxsize=64)
-def triangle(size: int) -> tuple[IndexArray, IndexArray, FloatArray]:
-    """Rows, columns and weights (1 on the diagonal, sqrt 2 beside it) of the upper triangle, row by row."""
-    rows, columns = np.triu_indices(size)
-    return rows, columns, np.where(rows == columns, 1.0, np.sqrt(2.0))
+triangle = lru_cache(maxsize=64)(triangle_by_rows)
 
 
 def svec(matrix: ArrayLike) -> FloatArray:

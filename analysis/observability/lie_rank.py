@@ -12,6 +12,7 @@ import sympy as sp
 from flint import arb, arb_mat, arb_series
 
 from analysis.errors import AnalysisError
+from analysis.exact import total
 from analysis.observability.exact_expression import exact, in_cases
 from analysis.observability.lie_series import Evaluator, ball, series_arithmetic
 from analysis.observability.matrix import exact_number
@@ -127,9 +128,8 @@ class LieRankTest(Display):
         H = [_coefficient(entries[n * n :], ny, n, k) for k in range(order + 1)]
         phi = [arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])]
         for k in range(order):
-            total = _sum([F[j] * phi[k - j] for j in range(k + 1)])
-            phi.append(total / arb(k + 1))
-        blocks = [_sum([H[j] * phi[k - j] for j in range(k + 1)]) for k in range(order + 1)]
+            phi.append(total([F[j] * phi[k - j] for j in range(k + 1)]) / arb(k + 1))
+        blocks = [total([H[j] * phi[k - j] for j in range(k + 1)]) for k in range(order + 1)]
         return [[block[i, j] for j in range(n)] for block in blocks for i in range(ny)]
 
     def _rank(self, rows: list[list[Any]]) -> LieRank:
@@ -196,13 +196,6 @@ def _null_space(rows: list[list[Any]], rank: int) -> FloatArray:
 
 def _coefficient(entries: list[Any], rows: int, columns: int, k: int) -> Any:
     return arb_mat(rows, columns, [e[k] if k < e.length() else arb(0) for e in entries])
-
-
-def _sum(matrices: list[Any]) -> Any:
-    total = matrices[0]
-    for matrix in matrices[1:]:
-        total = total + matrix
-    return total
 
 
 def _rational(name: str, value: Number) -> sp.Rational:

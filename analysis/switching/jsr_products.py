@@ -20,11 +20,10 @@ WIDTH = 4000  # products kept at each length
 
 @dataclass(frozen=True)
 class Search:
-    """Best product found (`word`, the mode applied first stands first) and its rate; `exhausted`: all others were bounded."""
+    """Best product found (`word`, the mode applied first stands first) and its rate."""
 
     word: tuple[int, ...]
     rate: float
-    exhausted: bool
     depth: int
 
 
@@ -38,7 +37,7 @@ def search_products(modes: FloatArray, tolerance: float, depth: int) -> Search:
     for length in range(2, depth + 1):
         keep = _open(bound, rate, tolerance)
         if not len(keep):
-            return Search(word, rate, True, length - 1)
+            return Search(word, rate, length - 1)
         products = np.einsum("aij,gjk->gaik", modes, products[keep]).reshape(-1, *modes.shape[1:])
         letters = np.tile(np.arange(len(modes)), len(keep))[:, None]
         words = np.concatenate([np.repeat(words[keep], len(modes), axis=0), letters], axis=1)
@@ -46,7 +45,7 @@ def search_products(modes: FloatArray, tolerance: float, depth: int) -> Search:
         if found is not None:
             word, rate = tuple(int(i) for i in words[found[0]]), found[1]
         bound = np.minimum(np.repeat(bound[keep], len(modes)), _rates(products, length, rate * (1.0 + tolerance)))
-    return Search(word, rate, not len(_open(bound, rate, tolerance)), depth)
+    return Search(word, rate, depth)
 
 
 def _fastest(products: FloatArray, length: int, rate: float) -> tuple[int, float] | None:

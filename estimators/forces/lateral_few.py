@@ -70,8 +70,10 @@ class LateralFew(CovarianceFilter):
         """
         shape = self.batch_shape
         if shape:
-            given = (self._mean, self._spread, y, steer, force, load)
-            cars = zip(*(array.reshape(-1, *array.shape[len(shape) :]).tolist() for array in given), strict=True)
+            given = [self._mean, self._spread, y, steer, force, load]
+            if len(shape) > 1:
+                given = [array.reshape(-1, *array.shape[len(shape) :]) for array in given]
+            cars = zip(*(array.tolist() for array in given), strict=True)
             fades = [False] * math.prod(shape) if unseen is None else unseen.reshape(-1).tolist()
             found = [
                 self._one(x, P, z, angle, push, weight, fading, threshold)

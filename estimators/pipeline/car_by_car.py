@@ -52,7 +52,7 @@ class CarByCar(Memory):
         attitude: AttitudePart | None,
     ) -> None:
         self.batch_shape = batch_shape
-        self.velocity = None if divides(velocity) else velocity
+        self.velocity = None if divides(velocity, batch_shape) else velocity
         self.parts = ("velocity",) if hasattr(self.velocity, "save") else ()
         own: list[Any] = [loads, velocity if self.velocity is None else None, attitude]
         self.cars = [
@@ -63,12 +63,13 @@ class CarByCar(Memory):
 
     def signed(self, w: FloatArray, ax: Number, gear: npt.ArrayLike | None) -> SignedWheels | None:
         """As `CarMotion.signed`."""
-        given = zip(w.reshape(-1, 4), ax.ravel().tolist(), apart(gear, self.batch_shape, "direction"), strict=True)
-        found = [car.signed(*own) for car, own in zip(self.cars, given, strict=True)]
-        cars = [one for one in found if one is not None]
-        if not cars:
+        if self.cars[0].direction is None:
             return None
-        signed = joined(cars, self.batch_shape)
+        given = zip(
+            self.cars, w.reshape(-1, 4), ax.ravel().tolist(), apart(gear, self.batch_shape, "direction"), strict=True
+        )
+        found = (car.signed(wheels, pull, way) for car, wheels, pull, way in given)
+        signed = joined([one for one in found if one is not None], self.batch_shape)
         if np.count_nonzero(signed.turned):
             self._restart(signed.turned, signed.speed)
         return signed

@@ -228,9 +228,9 @@ def check_parts(
             )
 
 
-def divides(part: Any) -> bool:
+def divides(part: Any, batch_shape: tuple[int, ...]) -> bool:
     """Whether a part of several cars may be replaced by one for each: its own class has `like`, and it has not begun; or None."""
     if part is None or "like" not in vars(type(part)):  # a subclass may do more than what it inherits can build
         return part is None
-    own, new = part.save(), part.like(part.batch_shape).save()
+    own, new = (one.save() if hasattr(one, "save") else {} for one in (part, part.like(batch_shape)))
     return all(np.array_equal(own[name], new[name], equal_nan=True) for name in new)

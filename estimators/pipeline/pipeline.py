@@ -132,7 +132,7 @@ class EstimationPipeline(Memory):
             velocity or VelocityFusion(vehicle, time, shape),
             attitude,
         )
-        apart = 1 < math.prod(shape) <= FEW and divides(chosen[0]) and divides(attitude)
+        apart = 1 < math.prod(shape) <= FEW and divides(chosen[0], shape) and divides(attitude, shape)
         self.motion = CarByCar(shape, partial(motion, ()), *chosen) if apart else motion(shape, *chosen)
         if isinstance(self.motion, CarMotion):
             self.loads, self.velocity, self.attitude = self.motion.loads, self.motion.velocity, self.motion.attitude

@@ -29,13 +29,12 @@ Columns = dict[str, AnyArray]
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a run produced: ``metrics`` as written to metrics.json, what reading the log found, the files, and the arrays.
+    """What a run produced: ``metrics`` as written to metrics.json, the files, and the arrays.
 
     ``replaced``: the drive whose results were in the folder before; empty if there were none.
     """
 
     metrics: dict[str, Any]
-    log_report: dict[str, Any]
     paths: tuple[Path, ...]
     data: DriveData
     replaced: str = ""
@@ -65,7 +64,7 @@ def run_drive(
         write_json(paths[1], metrics)
         paths += write_figures(figures(data), out, lambda done: progress(0.4 + 0.6 * done))
     progress(1.0)
-    return RunResult(metrics, data.log.report, tuple(paths), data, replaced)
+    return RunResult(metrics, tuple(paths), data, replaced)
 
 
 def _drive_of(metrics: Path) -> str:

@@ -156,7 +156,7 @@ def test_prediction_equals_filterpy() -> None:
 def test_batch_against_a_loop_over_filterpy(benchmark: Any, kind: str) -> None:
     """Both in one process, in turns, in processor time; the middle of the rounds' ratios is what is reported.
 
-    A round is a twentieth of a second: what slows the machine slows both. The best times are told beside.
+    A round is a twentieth of a second: what slows the machine slows both. The best times stand beside.
     """
     theirs, observer, given = reference(kind), batch(), inputs()
     observer.step(*given)

@@ -20,18 +20,18 @@ from analysis.bounds.forces import (
 from analysis.bounds.sliding_mode import (
     OUTPUTS,
     PUBLISHED,
-    Vehicle,
     linear_zone_matrix,
     reaching_time,
     sampled_radius,
     sliding_mode_convergence,
     smallest_zone_widths,
 )
+from estimators.vehicle import RigidBody
 from synthesis.models.catalogue.single_track import PEUGEOT_307
 from synthesis.models.discretise import zero_order_hold
 
 Array = Any
-CAR = Vehicle.of(PEUGEOT_307)
+CAR = RigidBody(*(constant.value for constant in list(PEUGEOT_307.values())[:4]))
 
 
 def test_p1_wheel_error_matrix_is_hurwitz_and_hardly_damped() -> None:

@@ -1,6 +1,6 @@
-"""The claims of P3: complete, recomputed by a second road, against the reference list, and refutable.
+"""The claims of P3: complete, recomputed a second way, against the reference list, and refutable.
 
-The second roads start from the printed decimals (`PRINT`) and from formulas written out here; they share no code with the study.
+They start from the printed decimals (`PRINT`) and from formulas written out here, and share no code with the study.
 """
 
 from __future__ import annotations
@@ -187,7 +187,7 @@ def test_numbers_that_the_list_gives_in_words(path: tuple[Any, ...], digits: flo
     assert value == pytest.approx(digits, abs=half * (1 + 1e-9))
 
 
-# --- second roads for what the list leaves to find ----------------------------------------------------------------------
+# --- second calculations of what the list leaves to find ---------------------------------------------------------------
 
 
 def error_matrix(

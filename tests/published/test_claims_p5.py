@@ -1,4 +1,4 @@
-"""The claims of P5 as the study recomputes them: complete, in line with the reference, and confirmed on a second road."""
+"""The claims of P5 as the study recomputes them: complete, in line with the reference, and confirmed by a second calculation."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class TestGains:
         assert found.computed["simulated_decay_1_s"] == pytest.approx(3.44, rel=1e-3)
 
     def test_split_decay_as_a_filippov_solution(self) -> None:
-        """Second road: on the surface the error obeys the equivalent sign of (A.6); integrated by scipy."""
+        """Second calculation: on the surface the error obeys the equivalent sign of (A.6); integrated by scipy."""
 
         def rate(_: float, x: np.ndarray) -> list[float]:
             equivalent = (1.12 * x[0] - 1.46 * x[1]) / (10.0 * 3000.0)
@@ -166,7 +166,7 @@ class TestSampling:
         np.testing.assert_allclose(np.ptp(path, axis=0)[1:], [920.0, 800.0, 500.0])
 
     def test_lag_of_the_split_on_the_runtime(self) -> None:
-        """Second road for the tracking figure: the runtime observer on an oscillating split, 400 Hz."""
+        """Second calculation for the tracking figure: the runtime observer on an oscillating split, 400 Hz."""
         step, frequency = 0.0025, 0.3
         omega = 2.0 * np.pi * frequency
         observer = SlidingModeObserver(published_car(), sample_time=step)
@@ -212,7 +212,7 @@ class TestObservability:
 
     @pytest.mark.parametrize(("steering", "hidden"), [(steady_turn, True), (None, False)])
     def test_steady_turn_on_the_runtime_model(self, steering, hidden: bool) -> None:  # type: ignore[no-untyped-def]
-        """Second road: stacked transition Jacobians of the runtime's model at the end of a drive with linear axles.
+        """Second calculation: stacked transition Jacobians of the runtime's model at the end of a drive with linear axles.
 
         In the steady turn a third of the singular values vanishes against the slalom's: softer tires with more slip measure
         the same.
@@ -263,7 +263,7 @@ class TestFixedStiffness:
         assert sideslip_settings.fixed_stiffness((0.5, 0.7)).verdict is ClaimVerdict.REPRODUCED  # both too soft
 
     def test_steady_state_by_hand(self) -> None:
-        """Second road: in a steady turn the rear force is fixed by speed and yaw rate, so the slip is as 1 / factor."""
+        """Second calculation: in a steady turn the rear force is fixed by speed and yaw rate, so the slip is as 1 / factor."""
         drive = simulate(steady_turn, seconds=8.0, friction=1e9)
         car = published_car()
         rear = car.mass * drive.speed[-1] * drive.yaw_rate[-1] * CAR.front_axle_distance / WHEELBASE

@@ -347,7 +347,7 @@ def frozen_filter_exists(gamma: mp.mpf) -> bool:
 
 
 def test_the_reference_lies_above_the_best_frozen_filter() -> None:
-    """Second road, without a solver: no gains do better at 140 rad/s alone, so no schedule does."""
+    """Second calculation, without a solver: no gains do better at 140 rad/s alone, so no schedule does."""
     with mp.workdps(30):
         assert frozen_filter_exists(mp.mpf("1.044186604"))
         assert not frozen_filter_exists(mp.mpf("1.044186603"))

@@ -85,7 +85,7 @@ def test_fig_5_deviation_of_the_norm() -> None:
             A_e, B_e = family.at(wheel_speed=140.0, sigma1=1.2 * nominal["sigma1"]).error_dynamics(
                 np.array(gain)[:, None]
             )
-            sweep = np.linspace(0.0, 100.0, 20001)[:, None, None] * 1j  # second road: a dense sweep
+            sweep = np.linspace(0.0, 100.0, 20001)[:, None, None] * 1j  # second calculation: a dense sweep
             gains = np.linalg.svd(np.linalg.solve(sweep * np.eye(2) - A_e, B_e[:, :2] + 0j), compute_uv=False)[:, 0]
             assert gains.max() == pytest.approx(found.nominal.values[-1] + deviation.values[-1], rel=1e-6)
             assert deviation.values[-1] == pytest.approx(0.0483, abs=5e-5)

@@ -52,7 +52,7 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
     table = columns(duration=1.0)
     table["v"] = table["v"] + 0.5  # the reference is another one than the wheels say
     data = replay_drive([write_log(folder / "log.csv", table)], write_drive(folder, DRIVE))
-    return RunResult(evaluate(data), data.log.report, (), data)
+    return RunResult(evaluate(data), (), data)
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,6 @@ from analysis.bounds.sliding_mode import (
     OUTPUTS,
     PUBLISHED,
     SlidingModeGains,
-    Vehicle,
     linear_zone_matrix,
     reaching_time,
     sampled_radius,
@@ -30,12 +29,13 @@ from analysis.bounds.sliding_mode import (
 )
 from analysis.errors import AnalysisError
 from analysis.loads import vertical_loads
+from estimators.vehicle import RigidBody
 from synthesis.models.catalogue.single_track import PEUGEOT_307
 from synthesis.models.discretise import zero_order_hold
 from synthesis.models.parameter_set import load_parameter_set
 
 Array = Any
-CAR = Vehicle.of(PEUGEOT_307)
+CAR = RigidBody(*(constant.value for constant in list(PEUGEOT_307.values())[:4]))
 EXACT = SlidingModeGains.of(
     omega1=10, omega4=40000, omega5=40000 * 1.46 / 1.12, omega7=-40000, omega8=40000, omega12=50000
 )
@@ -224,8 +224,6 @@ def test_smallest_widths_are_the_limits_of_single_loops() -> None:
         (lambda: wheel_error_matrix(1.0, 1.0, 0.0, 0.33), "wheel_inertia"),
         (lambda: SlidingModeGains(np.zeros((3, 4))), r"\(4, 3\)"),
         (lambda: SlidingModeGains.of(omega13=1.0), "unknown gain 'omega13'"),
-        (lambda: Vehicle(0.0, 1.0, 1.0, 1.0), "mass = 0"),
-        (lambda: Vehicle.of({}), "no constant mass, yaw_inertia"),
         (lambda: sliding_mode_convergence(PUBLISHED, CAR, float("inf")), "finite"),
         (lambda: linear_zone_matrix(PUBLISHED, CAR, {"yaw_rate": 0.1}), "no width for"),
         (lambda: sampled_radius(np.zeros((2, 3)), 0.01), "square"),

@@ -272,7 +272,7 @@ def test_rational_plant_by_state_feedback() -> None:
 
 
 def test_care_gain_of_a_continuous_loop() -> None:
-    """u = -B'S x with S of the Riccati equation: the frequency response of the closed loop is the second road."""
+    """u = -B'S x with S of the Riccati equation: the frequency response of the closed loop is the second calculation."""
     A, B = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, -1.0, 0.5]]), np.array([[0.0], [0.0], [1.0]])
     K = np.round(-B.T @ solve_continuous_are(A, B, np.eye(3), np.eye(1)), 3)
     model = constant_model(A, B, B)

@@ -92,7 +92,7 @@ def test_large_batches_of_two_states_equal_their_members(modes: int) -> None:
     A[200:300] *= 1e100
     together = MarkovJumpSystem(A, P).second_moment_radius()
     one_by_one = [float(MarkovJumpSystem(a, p).second_moment_radius()) for a, p in zip(A, P, strict=True)]
-    # A defective eigenvalue is determined to a root of the rounding error only, on either road.
+    # A defective eigenvalue is determined to a root of the rounding error only, in either way.
     np.testing.assert_allclose(together[40:60], 1.0, rtol=1e-4)
     keep = np.r_[0:40, 60:600]
     np.testing.assert_allclose(together[keep], np.array(one_by_one)[keep], rtol=1e-10, atol=1e-300)

@@ -50,7 +50,7 @@ def stepped(unit: MountedUnit, readings: FloatArray, names: tuple[str, ...] = NA
 
 
 def test_a_point_of_a_turning_body_is_accelerated_as_its_path_says() -> None:
-    """Second road: the position R(t) l of a point on a body that turns about z and x, differentiated numerically."""
+    """Second calculation: the position R(t) l of a point on a body that turns about z and x, differentiated numerically."""
     lever, h, at = np.array([1.2, -0.3, 0.25]), 1e-4, 0.7
 
     def attitude(t: float) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimators import Flag, GainSchedule
-from estimators.forces import AttitudeObserver, VerticalLoads
+from estimators.forces import AttitudeObserver, LoadStep, VerticalLoads
 from estimators.pipeline import CornerObservers, CornerVelocity, EstimationPipeline, PipelineStep, VehicleSignals
 from estimators.pipeline.car_by_car import FEW, CarByCar
 from estimators.vehicle import GRAVITY
@@ -114,6 +114,31 @@ def test_each_of_a_few_cars_is_a_pipeline_of_its_own(name: str) -> None:
 
 class Softer(VerticalLoads):
     """Of a user, who has not said how it is divided."""
+
+
+class Level:
+    """Of a user, without a state: nothing but what the pipeline asks for."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self.shape = shape
+
+    def like(self, batch_shape: tuple[int, ...]) -> Level:
+        return Level(batch_shape)
+
+    def step(self, ax: Any, ay: Any, az: Any = None, pitch: Any = None, roll: Any = None) -> LoadStep:
+        four = (*self.shape, 4)
+        load = np.broadcast_to(CAR.static_loads, four)
+        return LoadStep(load, np.zeros(four, dtype=np.bool_), np.zeros(self.shape, dtype=np.int32))
+
+
+def test_a_part_without_a_state_is_divided_and_changes_nothing() -> None:
+    few, one = (EstimationPipeline(CAR, TIME, shape, loads=Level(shape)) for shape in ((2,), ()))
+    assert isinstance(few.motion, CarByCar)
+    for _ in range(5):
+        together = few.step(VehicleSignals(np.full((2, 4), 60.0), ax=0.1, torque=np.full((2, 4), 50.0)))
+        alone = one.step(VehicleSignals(np.full(4, 60.0), ax=0.1, torque=np.full(4, 50.0)))
+    np.testing.assert_allclose(together.vx, alone.vx, rtol=1e-12)
+    np.testing.assert_array_equal(together.force_z, np.tile(CAR.static_loads, (2, 1)))
 
 
 def test_more_cars_and_parts_that_cannot_be_divided_run_on_arrays() -> None:

@@ -80,7 +80,7 @@ def _disguised(plant: Plant) -> Plant:
 
 @pytest.mark.parametrize("update", ["held", "sampled", "feedback"])
 def test_a_plant_that_is_secretly_polynomial_has_the_same_claims(update: str) -> None:
-    """The least level that one P proves, by bisection: the same with and without a common factor, by both roads."""
+    """The least level that one P proves, by bisection: the same with and without a common factor, in both ways."""
     p = sp.Symbol("p")
     model = small_model(
         [[0, 1], [-2 - p, -1]], [[1, 0]], (parameter("p", 0.0, 2.0, 3.0),), B=[[0], [1]], E=[[0, 0], [1, 0]], F=[[0, 1]]

@@ -92,7 +92,7 @@ def test_a_changed_gain_or_level_is_not_proved(content: dict, index: tuple[int, 
 
 
 def test_the_quick_road_proves_nothing_that_balls_refuse(deployment: Deployment) -> None:
-    """Both roads on the claims as they are, and on the same claims at levels that do not hold."""
+    """Both methods on the claims as they are, and on the same claims at levels that do not hold."""
     loop, names = deployment.loop, names_of(deployment.gains.model)
     for claim in deployment.claims:
         easier_up = "gain" in claim.kind or "pole" in claim.kind

@@ -100,7 +100,7 @@ def test_matrices_that_do_not_commute_are_integrated_with_order_four() -> None:
 
 @pytest.mark.parametrize("update", ["held", "sampled"])
 def test_the_runtime_follows_the_error_recursion(update: str) -> None:
-    """Two roads: plant beside runtime, and the recursion of the error with the plant's motion as an input."""
+    """Two ways: plant beside runtime, and the recursion of the error with the plant's motion as an input."""
     schedule = any_schedule(update=update, table=0.3 * any_schedule().table)
     paths = random_trajectories(schedule, 40, 5, seed=3)
     given = {schedule.disturbances[0].name: np.random.default_rng(1).normal(size=(5, 40))}

@@ -67,7 +67,7 @@ def test_scalar_plant_in_closed_form(rate: float) -> None:
 
 
 def test_the_dual_observer_has_the_same_level() -> None:
-    """Transposed plant, disturbances and errors exchanged: one number on two roads, with two parameters and their rates."""
+    """Transposed plant, disturbances and errors exchanged: one number in two ways, with two parameters and their rates."""
     # What grows for the observer falls for the law: rates change their sign.
     there, back = (
         (SchedulingParameter("p", "1", -1.0, 3.0, *rates), parameter("q", 0.0, 1.0, 0.5))

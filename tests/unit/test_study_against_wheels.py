@@ -1,4 +1,4 @@
-"""The study against the wheels: what counts as behind, and errors by a second road."""
+"""The study against the wheels: what counts as behind, and errors calculated a second way."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ class TestLiteral:
         assert 1.0 < float(exact) < 1.0 + 1e-10
 
     def test_static_gain_of_random_gains(self) -> None:
-        """Second road for the floor: A_e^-1 B_e in numbers, whatever the gain is."""
+        """Second calculation of the floor: A_e^-1 B_e in numbers, whatever the gain is."""
         rng, grid = np.random.default_rng(1), np.linspace(0.0, 140.0, 8)
         a = 8.32 * 0.33 * grid
         for _ in range(10):

@@ -78,7 +78,7 @@ def test_another_car_is_told_apart(theirs: dict[tuple[str, str], Truth]) -> None
 
 
 def test_estimators_run_on_the_foreign_vehicle(theirs: dict[tuple[str, str], Truth]) -> None:
-    """The same road from truth to sensors to estimates."""
+    """The same way from truth to sensors to estimates."""
     truth = theirs["mb", "turn"]
     measured = draw(truth, Sensors(), range(4), sample_time=0.01)
     pipeline = EstimationPipeline(truth.vehicles[0].parameters, 0.01, measured.batch_shape)

@@ -103,11 +103,11 @@ def exact_ranks(acceleration: object = 0, jerk: object = 0) -> list[int]:
     return [matrix.rank_at({"wheel_speed": w, ACCELERATION: acceleration, JERK: jerk}) for w in SPEEDS]
 
 
-def second_piece(limit: int = 800) -> float:
-    """Wheel speed in rad/s below which rank may be lost while accelerating, for accelerations up to `limit` rad/s^2."""
+def second_piece() -> float:
+    """Wheel speed in rad/s below which rank may be lost while accelerating, for accelerations up to 800 rad/s^2."""
     steady = rank_loss(speed_observability(), {JERK: 0})
     curve = max(steady.curve(ACCELERATION), key=sp.count_ops)
-    (top,) = (root for root in sp.real_roots(sp.numer(sp.together(curve - limit))) if root > 0)
+    (top,) = (root for root in sp.real_roots(sp.numer(sp.together(curve - 800))) if root > 0)
     return float(top)
 
 

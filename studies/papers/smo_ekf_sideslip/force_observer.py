@@ -160,14 +160,14 @@ def late_peaks(widths: Sequence[float] | None, starts: int = 400) -> FloatArray:
     return np.asarray(np.abs(path[round(3.0 / SAMPLE_TIME) :]).max(axis=0))
 
 
-def split_tracking(frequency: ArrayLike, yaw_width: float, gains: SlidingModeGains = PUBLISHED) -> FloatArray:
+def split_tracking(frequency: ArrayLike, yaw_width: float) -> FloatArray:
     r"""|error / true| of the split L_1 F_y1 - L_2 F_yw2 that oscillates with `frequency` [Hz], inside the yaw rate zone.
 
     s (s + d) / (s^2 + d s + k) with d = Omega_1 / width and k = Omega_4 (L_1 + L_2) / (width I_z), from (1) and (6) with s(e) =
     e / width. For slow motion it is |s| d / k = |s| Omega_1 I_z / (Omega_4 (L_1 + L_2)): a lag of 0.29 s for every width.
     """
     s = 2j * np.pi * np.asarray(frequency, float)
-    d, k = gains[1] / yaw_width, gains[4] * WHEELBASE / (yaw_width * CAR.yaw_inertia)
+    d, k = PUBLISHED[1] / yaw_width, PUBLISHED[4] * WHEELBASE / (yaw_width * CAR.yaw_inertia)
     return np.abs(s * (s + d) / (s**2 + d * s + k))
 
 

@@ -166,9 +166,9 @@ def mass_figure(run: SimulatedRun, found: Estimates) -> Figure:
         panels, size=(9.4, 3.8))  # fmt: skip
 
 
-def zone_of(slip: FloatArray, force: FloatArray, threshold: float = THRESHOLD) -> FloatArray:
+def zone_of(slip: FloatArray, force: FloatArray) -> FloatArray:
     """0 for zones 1 and 2 (slip and force disagree), 1 for zones 3 and 4 (small force), 2 for zones 5 and 6 (P5 notes 5)."""
-    return np.where(slip * force < 0.0, 0, np.where(np.abs(force) < threshold, 1, 2))
+    return np.where(slip * force < 0.0, 0, np.where(np.abs(force) < THRESHOLD, 1, 2))
 
 
 def zones(run: SimulatedRun, found: Estimates) -> Figure:

@@ -1,4 +1,4 @@
-"""The roads of the norms one by one: what leaves one of them without proof goes on to the next, and never out as a bound."""
+"""The methods of the norms one by one: what leaves one of them without proof goes on to the next, and never out as a bound."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_a_zero_gain_at_the_first_guess_proves_no_zero_norm() -> None:
     assert exact_peak(nothing, 0.0, 0.0, (0.0, inf), 1e-9)[2] == 0.0
 
 
-def test_two_states_without_a_proof_take_another_road(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_states_without_a_proof_take_another_method(monkeypatch: pytest.MonkeyPatch) -> None:
     A, B, C = resonance(7.0, 0.1)
     truth = 1.0 / (0.2 * sqrt(1.0 - 0.01))
     systems = Systems(A[None], B[None], C[None], np.zeros((1, 1, 1)))
@@ -45,13 +45,13 @@ def test_two_states_without_a_proof_take_another_road(monkeypatch: pytest.Monkey
 
 
 def test_levels_without_a_proof_are_no_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Three states: neither the Taylor bounds nor the Hamiltonian road may say what they did not prove."""
+    """Three states: neither the Taylor bounds nor the Hamiltonian matrix may say what they did not prove."""
     A, B, C = resonance(7.0, 0.1)
     A, B, C = np.block([[A, np.zeros((2, 1))], [np.zeros((1, 2)), -1.0]]), np.vstack([B, 0.0]), np.hstack([C, [[0.0]]])
     truth = 1.0 / (0.2 * sqrt(1.0 - 0.01))
     used: list[int] = []
     monkeypatch.setattr(peaks, "hamiltonian_peaks", lambda systems, *_: used.append(len(systems)))
-    assert hinf_norm(A, B, C).upper == pytest.approx(truth, rel=1e-7) and not used  # proved on the first road alone
+    assert hinf_norm(A, B, C).upper == pytest.approx(truth, rel=1e-7) and not used  # proved by the first method alone
     monkeypatch.undo()
     monkeypatch.setattr(peaks, "level_proof", lambda parts, gamma, *_: (np.zeros(len(gamma), bool), 0.0 * gamma))
     found = hinf_norm(A, B, C)
