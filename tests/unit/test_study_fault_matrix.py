@@ -44,7 +44,7 @@ def test_a_fusion_without_its_monitor_is_found_out(monkeypatch: pytest.MonkeyPat
         return (Verdict(never, never, ~never),) * len(TURN.rules), defaultdict(lambda: never)
 
     monkeypatch.setattr(turn_monitor, "vote", nobody)
-    cells = matrix(1, [("ay", "zero"), ("yaw_rate", "negated")])
+    cells = matrix(1, [("ay", "negated"), ("yaw_rate", "negated")])
     for cell in cells:
         if cell.drive == "turn":
             assert {"y", "f"} & set(cell.missed())
