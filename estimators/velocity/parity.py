@@ -100,7 +100,11 @@ TURN = Relation(
 )  # fmt: skip
 PULL = Relation(
     "pull",
-    (_witness("a_x", "ax", "pitch"), _witness("forces", "torque"), _witness("wheels", *CORNERS, "slip", "grade", least=2)),
+    (
+        _witness("a_x", "ax", "pitch"),
+        _witness("forces", "torque"),
+        _witness("wheels", *CORNERS, "slip", "grade", least=2),
+    ),
     (Rule("ax", UNIT, live=((FORCES, WHEELS),), repeating=((),), peers=(FORCES, WHEELS)),),
 )
 SPEED = Relation(
