@@ -137,19 +137,21 @@ class CrossChecks(Memory):
         """Whether the force gap changes as no drag, grade, bias or scale does; begins anew where a force is unknown."""
         kit, choose, mass = self._kit, self._kit.where, self.vehicle.mass
         gap = choose(forces.unknown, math.nan, forces.gap / mass)
-        known, turns = abs(gap) < math.inf, self.phase + 1.0 >= self._turn
-        self.phase = choose(turns | kit.no(known), 0.0, self.phase + 1.0)
-        changes = []
-        for k, value in enumerate((gap, gap + forces.push / mass)):
-            before = self.quick[k]
-            quick = choose(abs(before) < math.inf, before + self._leap * (value - before), value)
-            recent, older = self.recent[k], self.older[k]
-            changes.append(abs(quick - older))
-            self.quick[k] = quick
-            self.older[k] = choose(turns, recent, choose(known, older, math.nan))
-            self.recent[k] = choose(turns, quick, choose(known, recent, math.nan))
+        total, gain = gap + forces.push / mass, self._leap
+        self.quick = [
+            choose(abs(before) < math.inf, before + gain * (value - before), value)
+            for before, value in zip(self.quick, (gap, total), strict=True)
+        ]
+        self.phase = self.phase + 1.0
+        turns, lost = self.phase >= self._turn, kit.no(abs(gap) < math.inf)
+        if kit.some(turns | lost):
+            self.phase = choose(turns | lost, 0.0, self.phase)
+            for k, quick in enumerate(self.quick):
+                recent = choose(lost, math.nan, self.recent[k])
+                self.older[k] = choose(turns, recent, choose(lost, math.nan, self.older[k]))
+                self.recent[k] = choose(turns, quick, recent)
         floor, share = LEAP
-        return changes[0] > floor + share * changes[1]
+        return abs(self.quick[0] - self.older[0]) > floor + share * abs(self.quick[1] - self.older[1])
 
     def reset(self, where: npt.ArrayLike | None = None) -> None:
         """Forgets the gaps of the entries `where` (bool mask; None: all)."""

@@ -70,9 +70,11 @@ def table(levelled: bool = True, most: int = 1) -> str:
 
 
 def _witnesses(relation: Relation, levelled: bool) -> tuple[Witness, ...]:
-    """Without an attitude part a_y is what it reads, and there is no second one."""
-    if levelled or relation is not TURN:
+    """Without an attitude part a_x and a_y are what they read, and there is no second a_y."""
+    if levelled:
         return relation.witnesses
+    if relation is not TURN:
+        return tuple(witness._replace(made_of=witness.made_of - {"pitch"}) for witness in relation.witnesses)
     plain = relation.witnesses[UNLEVELLED]._replace(name=relation.witnesses[SIDE].name)
     return (*relation.witnesses[:SIDE], plain, *relation.witnesses[SIDE + 1 : UNLEVELLED])
 

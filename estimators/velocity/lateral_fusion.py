@@ -224,9 +224,7 @@ class LateralFusion(CarsMemory):
 
     def excuse(self, where: Number) -> None:
         """A sensor of the cars `where` was found wrong: what axles were off by since shortly before is its error, not theirs."""
-        self.axle_error = self.kit.where(
-            where, self.kit.minimum(self.axle_error, self.lasting_error), self.axle_error
-        )
+        self.axle_error = self.kit.where(where, self.kit.minimum(self.axle_error, self.lasting_error), self.axle_error)
 
     @property
     def wheel_bend(self) -> Signals:

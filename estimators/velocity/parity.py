@@ -2,7 +2,7 @@
 
     turn    m/s^2, centripetal   yaw rate V_x r; a_y levelled and less V_y'; front and rear wheels V_x (v_r - v_l)/t; steering
                                  V_x^2 tan(delta)/L; a_y as it is, where an attitude part levels the other
-    pull    m/s^2, along         a_x; forces sum F_x/m; the middle of what the wheels gain
+    pull    m/s^2, along         a_x, levelled; forces sum F_x/m; the middle of what the wheels gain
     speed   m/s                  each wheel; the estimate, which the other wheels and the inertial unit hold
     axles   m/s, V_y             the front axle condition, the rear one; the estimate
 
@@ -100,7 +100,11 @@ TURN = Relation(
 )  # fmt: skip
 PULL = Relation(
     "pull",
-    (_witness("a_x", "ax"), _witness("forces", "torque"), _witness("wheels", *CORNERS, "slip", "grade", least=2)),
+    (
+        _witness("a_x", "ax", "pitch"),
+        _witness("forces", "torque"),
+        _witness("wheels", *CORNERS, "slip", "grade", least=2),
+    ),
     (Rule("ax", UNIT, live=((FORCES, WHEELS),), repeating=((),), peers=(FORCES, WHEELS)),),
 )
 SPEED = Relation(

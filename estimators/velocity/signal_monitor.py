@@ -13,18 +13,20 @@ Which witnesses tell the same number is in `parity`, what they say and by how mu
 slip against their force disprove it without any torque, for `lost_time`. Where neither a_x nor the forces tell, the wheels
 do, by +-`unseen_acceleration`.
 
-**a_y, yaw rate.** Until it was found V_y followed it: its variance grows by that. A car that follows its steering closely, as
-one does whose tires carry little, while a_y, alive, contradicts it for 0.5 s is on a banked road: the variance of the bank
-grows, and a_y is believed again. An a_y that has lost its gain looks the same. A car that is caught from a slide turns against
-its side force for a moment, while a_y goes through zero: only an a_y that is on the other side of it, or beyond what the
-steering would carry, by more than its own allowance is doubted.
+**a_y, yaw rate.** Until it was found V_y followed it: its variance grows by that, and what the axles were off by since shortly
+before is not held against the tires. While wheels and steering follow the turn, an a_y beyond it is as unsure as they are
+apart, from its first sample on. One that repeats itself is replaced at once, for nothing says that the car still does. A car
+that follows its steering closely, as one does whose tires carry little, while a_y, alive, contradicts it for 0.5 s is on a
+banked road: the variance of the bank grows, and a_y is believed again. An a_y that has lost its gain looks the same. A car that
+is caught from a slide turns against its side force for a moment, while a_y goes through zero: only an a_y that is on the other
+side of it, or beyond what the steering would carry, by more than its own allowance is doubted.
 
 **Attitude.** A levelled a_y that the turn contradicts while the one that is not levelled agrees: roll is wrong, and nothing is
 levelled. The contrary is a banked road, and no fault.
 
 **Steering.** What the two axle conditions say of V_y differs by V_x delta - L r - |V_x| (alpha_f - alpha_r), whatever V_y is.
 Where that, low-passed, is more than the model explains and the front axle is the further one from the estimate, its condition
-is not used: a wrong steering angle looks like front tires beyond their grip.
+is not used: a wrong steering angle looks like front tires beyond their grip. One that repeats itself is held to less.
 
 **Wheels.** The gate of `longitudinal_fusion`: each innovation is a wheel against the estimate, that the others hold.
 
@@ -41,7 +43,8 @@ cannot be told apart, are in the guide (Why: Faults of sensors):
 | wheel rl | - | wheel rl | wheel rl |
 | wheel rr | - | wheel rr | wheel rr |
 | steer | front grip | steer | steer |
-| ax | - | ax | ax |
+| ax | pitch | ax | ax |
+| pitch | ax | ax | ax |
 | torque | - | - | - |
 """
 

@@ -95,14 +95,16 @@ class TurnMonitor(Exclusion):
         v_g, v_p, v_f, v_q = level[:4]
         t_g, t_p, t_f, t_q = readings.allowed[:4]
         known = readings.known
-        quiet = known[YAW_RATE] & known[SIDE] & (abs(v_p - v_g) < t_p + t_g) & (abs(now[SIDE] - now[YAW_RATE]) < t_p + t_g)
+        stuck = tuple((run - 1.0) * elapsed > s.slowest_unit for run in seen.run)
+        wide = t_p + t_g
+        quiet = known[YAW_RATE] & known[SIDE] & (abs(v_p - v_g) < wide) & (abs(now[SIDE] - now[YAW_RATE]) < wide)
         quiet = (
             quiet
+            & kit.no(stuck[1])
             & (kit.no(known[FRONT]) | (abs(v_f - v_g) < t_f + t_g))
             & (kit.no(known[REAR]) | (abs(v_q - v_g) < t_q + t_g))
         )
-        stuck = tuple((run - 1.0) * elapsed > s.slowest_unit for run in seen.run)
-        quiet = quiet & (self.remaining[_AY] + self.remaining[_R] + self.remaining[_ROLL] == 0.0) & kit.no(stuck[1])
+        quiet = quiet & (self.remaining[_AY] + self.remaining[_R] + self.remaining[_ROLL] == 0.0)
         if kit.some(kit.no(quiet)):
             return self._outvoted(elapsed, seen, readings, sway, off, stuck, now)
         self._differentiate(r, self.since[_R] > 0.0, elapsed)

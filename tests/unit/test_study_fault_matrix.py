@@ -12,6 +12,7 @@ from studies.beyond.fault_matrix.matrix import Cell, cases, matrix
 from studies.beyond.fault_matrix.study import STUDY
 
 CHOSEN = [("none", "none"), ("ay", "zero"), ("yaw_rate", "negated"), ("wheel_speed rr", "zero"), ("ax", "missing")]
+CHOSEN += [("ay", "frozen"), ("ay", "doubled"), ("yaw_rate", "clipped"), ("steer", "frozen"), ("torque fl", "clipped")]
 
 
 @pytest.fixture(scope="module")
@@ -28,8 +29,12 @@ def test_every_cell_is_there_once(found: list[Cell]) -> None:
 def test_the_chosen_cells_hold_their_bounds(found: list[Cell]) -> None:
     for cell in found:
         assert not set(cell.missed()) & set("xyrf"), cell
-    (turn,) = (c for c in found if c.signal == "ay" and c.drive == "turn")
-    assert turn.flagged
+    turns = [c for c in found if c.drive == "turn" and (c.signal, c.fault) in CHOSEN[1:3] + CHOSEN[5:9]]
+    assert len(turns) == 6
+    assert all(cell.flagged for cell in turns)
+    straight = next(c for c in found if c.signal == "steer" and c.drive == "straight")
+    assert straight.flagged is None  # a frozen angle of a car that goes straight reads what the healthy one does
+    assert all(cell.pitch < 0.02 for cell in found if cell.signal == "none")  # the car itself pitches by 0.03
     assert not any(c.flagged is not None for c in found if c.signal == "none")
 
 
@@ -44,7 +49,7 @@ def test_a_fusion_without_its_monitor_is_found_out(monkeypatch: pytest.MonkeyPat
         return (Verdict(never, never, ~never),) * len(TURN.rules), defaultdict(lambda: never)
 
     monkeypatch.setattr(turn_monitor, "vote", nobody)
-    cells = matrix(1, [("ay", "zero"), ("yaw_rate", "negated")])
+    cells = matrix(1, [("ay", "negated"), ("yaw_rate", "negated")])
     for cell in cells:
         if cell.drive == "turn":
             assert {"y", "f"} & set(cell.missed())

@@ -41,4 +41,8 @@ SEVERE = {
     "ax": 1.0, "ay": 1.0, "yaw_rate": 0.05, "az": 2.0, "roll_rate": 0.1, "pitch_rate": 0.1, "wheel_speed": 3.0, "steer": 0.01,
     "torque": 300.0,
 }  # fmt: skip
-"""How far a reading is from the true one before it matters: m/s^2, rad/s, rad, N m; a wheel by 1 m/s."""
+"""How far a reading is from the true one before it matters; a wheel by 1 m/s."""
+UNITS = {
+    "ax": "m/s^2", "ay": "m/s^2", "yaw_rate": "rad/s", "az": "m/s^2", "roll_rate": "rad/s", "pitch_rate": "rad/s",
+    "wheel_speed": "rad/s", "steer": "rad", "torque": "N m",
+}  # fmt: skip

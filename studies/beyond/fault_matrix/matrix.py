@@ -40,6 +40,7 @@ class Cell:
     vy_after: float
     beyond: float  # s, longest time beyond three deviations, V_x or V_y
     flagged: bool | None  # whether in time; None where the signal never was far off for so long
+    pitch: float  # rad, largest error of the body's pitch during the fault
 
     def missed(self) -> str:
         """What it misses, by letter: x, y during the fault, r recovery, s deviations, f flag."""
@@ -78,6 +79,7 @@ def matrix(seeds: int, chosen: Sequence[Case] | None = None) -> list[Cell]:
     estimates, flagged = _estimated(drawn, signals, len(chosen))
     time, truth = drawn.sample_time, drawn.truth
     errors = [np.abs(estimates[name] - truth[name]) for name in ("vx", "vy")]
+    tilt = np.abs(estimates["pitch"] - truth["pitch"])
     deviations = (estimates["vx_deviation"], estimates["vy_deviation"])
     beyond = np.any([error > 3.0 * spread for error, spread in zip(errors, deviations, strict=True)], axis=0)
     during = _samples(drawn)
@@ -88,7 +90,8 @@ def matrix(seeds: int, chosen: Sequence[Case] | None = None) -> list[Cell]:
             vx, vy, vx_after, vy_after = (float(e[k, :, b, part].max()) for part in (during, after) for e in errors)
             longest = max(_longest(row) for row in beyond[k, :, b]) * time
             in_time = _flagged_in_time(off[k, :, b], flagged[k, :, b], round(FLAG_TIME / time))
-            found.append(Cell(signal, fault, drive, vx, vy, vx_after, vy_after, longest, in_time))
+            pitch = float(tilt[k, :, b, during].max())
+            found.append(Cell(signal, fault, drive, vx, vy, vx_after, vy_after, longest, in_time, pitch))
     return found
 
 
@@ -99,7 +102,7 @@ def _samples(drawn: Measured) -> slice:
 def _estimated(drawn: Measured, signals: dict[str, FloatArray], count: int) -> tuple[dict[str, FloatArray], BoolArray]:
     shape, time = (count, *drawn.batch_shape), drawn.sample_time
     pipeline = EstimationPipeline(assumed_car(drawn), time, shape, attitude=AttitudeObserver(time, shape))
-    names = ("vx", "vy", "vx_deviation", "vy_deviation")
+    names = ("vx", "vy", "vx_deviation", "vy_deviation", "pitch")
     rows: dict[str, list[FloatArray]] = {name: [] for name in names}
     flagged: list[AnyArray] = []
     for k in range(drawn.time.size):
