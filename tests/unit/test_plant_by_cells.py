@@ -38,7 +38,7 @@ from synthesis.loop.from_model import plant_of
 from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
-from synthesis.models.table import Table
+from synthesis.models.table import LookupTable
 
 NOISE, PERIOD = 0.5, 0.02
 ERROR = (Channel(("w", "n"), ("x",)),)
@@ -54,11 +54,11 @@ def moving(rate: float = 1.0, name: str = "p") -> SchedulingParameter:
 STEADY = moving()
 
 
-def table(points: Any, values: Any, over: tuple[str, ...] = ("p",)) -> Table:
-    return Table("1", "test", over, points if len(over) > 1 else (points,), values)
+def table(points: Any, values: Any, over: tuple[str, ...] = ("p",)) -> LookupTable:
+    return LookupTable("1", "test", over, points if len(over) > 1 else (points,), values)
 
 
-def plant(A: Any, tables: dict[str, Table], parameters: Any = (STEADY,), B: Any = 1) -> LpvModel:
+def plant(A: Any, tables: dict[str, LookupTable], parameters: Any = (STEADY,), B: Any = 1) -> LpvModel:
     """x' = A x + B u + w, y = x + n / 2."""
     one: dict[str, Any] = {
         key: (Signal(name, "1"),) for key, name in (("states", "x"), ("outputs", "y"), ("inputs", "u"))
@@ -76,7 +76,7 @@ JUMP = table((0.0, 0.7, 0.7, 2.0), [3.0, 2.0, 1.0, 2.5])
 
 
 @pytest.mark.parametrize("dip", [KINK, JUMP, table((0.0, 0.7, 2.0), [3.0, 1.4, 2.5])])
-def test_an_observer_attains_the_closed_form_at_the_kink_and_at_one_side_of_a_jump(dip: Table) -> None:
+def test_an_observer_attains_the_closed_form_at_the_kink_and_at_one_side_of_a_jump(dip: LookupTable) -> None:
     """x' = -a x + w, y = x + f n under any motion: the least gain to the error is f / sqrt(1 + f^2 a^2), at the least a."""
     least = NOISE / math.sqrt(1.0 + NOISE**2 * dip.values.min() ** 2)
     gains = design_observer(plant(-a, {"a": dip}, (moving(math.inf),)), ObserverDesign(ERROR, fastest_pole=50.0))
@@ -267,6 +267,8 @@ def test_several_parameters_and_tables_make_the_cells_of_all() -> None:
     wanted = -((1 - share) * ends[0] + share * ends[1]) * np.interp(draw[:, 0], [0.0, 1.5, 2.0], [1.0, 2.0, 1.5])
     np.testing.assert_allclose(model.on(draw).A[:, 0, 0], wanted - draw[:, 0] * draw[:, 1], rtol=1e-12)
     assert plant_of(model).is_continuous
+    stored = plant_by_cells(_plant(model), {"A": (1, 1)})["A"]
+    np.testing.assert_allclose(stored.at(draw)[:, 0, 0], wanted - draw[:, 0] * draw[:, 1], rtol=1e-12)
 
 
 def test_a_jump_is_stated_and_belongs_to_the_upper_cell_at_its_place() -> None:
