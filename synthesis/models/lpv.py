@@ -35,8 +35,8 @@ class LpvModel(Display):
     r"""x' = A(p) x + B(p) u + E(p) d,  y = C(p) x + D(p) u + F(p) d, with p(t) in a box and dp/dt in another.
 
     `constraints` are linear inequalities between the parameters that cut corners off their box; the matrices are defined on
-    all of it. Rate bounds hold as far as the set allows. `tables` are quantities known at breakpoints (`LookupTable`), used in the
-    matrices by their names: the plant is a polynomial on each cell of their grid (`pieces`), with kinks between them.
+    all of it. Rate bounds hold as far as the set allows. `tables` are quantities known at breakpoints (`LookupTable`), used by
+    their names: the plant is a polynomial on each cell of their grid (`pieces`), with kinks between them.
 
     Matrices are sympy matrices whose symbols are the names of `parameters`, `constants` and `tables`, polynomial or rational in
     the parameters (with tables, polynomial). A disturbance whose column of E is zero is measurement noise. B, D, E and F
