@@ -30,6 +30,7 @@ from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGain
 from synthesis.design.output_feedback import OutputFeedbackDesign, design_output_feedback
 from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.design.sampled_state_feedback import design_sampled_state_feedback
+from synthesis.design.stability import affine_quadratic_stability
 from synthesis.design.state_feedback import StateFeedbackDesign, design_state_feedback
 from synthesis.design.static_feedback import design_static_feedback
 from synthesis.design.static_feedback_design import StaticFeedbackDesign
@@ -114,7 +115,7 @@ def test_gains_bend_where_the_plant_does() -> None:
         )
 
 
-@pytest.mark.parametrize("law", ["held", "sampled", "feedback", "sampled feedback", "output feedback"])
+@pytest.mark.parametrize("law", ["held", "sampled", "feedback", "sampled feedback", "output feedback", "static"])
 def test_a_polynomial_plant_that_is_cut_keeps_its_level(law: str) -> None:
     cut = plant(-1 - a**2, {"a": table((0.0, 0.3, 1.1, 2.0), [0.0, 0.3, 1.1, 2.0])})
     levels = []
@@ -125,12 +126,15 @@ def test_a_polynomial_plant_that_is_cut_keeps_its_level(law: str) -> None:
             levels.append(design_sampled_observer(model, ObserverDesign(ERROR, degree=0), PERIOD).gamma_lower)
         elif law == "feedback":
             levels.append(design_state_feedback(model, StateFeedbackDesign(LAW, degree=0)).gamma_lower)
+        elif law == "static":
+            asked = StaticFeedbackDesign(LAW, degree=0, backoff=0.1, start=((-2.0,),), steps=1)
+            levels.append(design_static_feedback(model, asked).levels[0])  # of the start, before any step
         elif law == "output feedback":
             levels.append(design_output_feedback(model, OutputFeedbackDesign(NOISY_LAW, degree=0)).gamma_lower)
         else:
             levels.append(design_sampled_state_feedback(model, StateFeedbackDesign(LAW, degree=0), PERIOD).gamma_lower)
     assert len(cut.pieces) == 3
-    assert levels[0] == pytest.approx(levels[1], rel=1e-4)
+    assert isinstance(levels[0], float) and levels[0] == pytest.approx(levels[1], rel=1e-4)
 
 
 def test_output_feedback_of_a_kink_lies_between_its_frozen_loops_and_is_proved() -> None:
@@ -317,6 +321,6 @@ def test_cells_at_once_are_those_one_by_one() -> None:
 def test_what_knows_no_cells_says_so_before_the_solve() -> None:
     model = plant(-a, {"a": KINK})
     with pytest.raises(ModelError, match=r"table\(s\) a: .* does not support a plant by cells"):
-        design_static_feedback(model, StaticFeedbackDesign(LAW))
+        affine_quadratic_stability(model, [[1.0]])
     with pytest.raises(ModelError, match="divides by a parameter or a table"):
         plant(-1 / a, {"a": KINK})
