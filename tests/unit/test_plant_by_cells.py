@@ -321,6 +321,6 @@ def test_cells_at_once_are_those_one_by_one() -> None:
 def test_what_knows_no_cells_says_so_before_the_solve() -> None:
     model = plant(-a, {"a": KINK})
     with pytest.raises(ModelError, match=r"table\(s\) a: .* does not support a plant by cells"):
-        affine_quadratic_stability(model, [[1.0]])
+        affine_quadratic_stability(model, np.ones((1, 1)))
     with pytest.raises(ModelError, match="divides by a parameter or a table"):
         plant(-1 / a, {"a": KINK})
