@@ -177,6 +177,25 @@ def test_what_is_deployed_is_proved_between_all_breakpoints(content: dict[str, A
     assert all(proof.proved for proof in prove(content, "file"))
 
 
+def test_the_proved_gain_holds_in_floats_from_the_numbers_of_the_file(content: dict[str, Any]) -> None:
+    """dV/dt + e^2 < g^2 |d|^2 with V = P e^2 at many places and both rates, the plant by `np.interp` of the table."""
+    (claim,) = (c for c in content["claims"] if c["kind"] == "gain")
+    places, stored = np.linspace(0.0, 2.0, 401), content["model"]["tables"]["a"]
+    rate = np.interp(places, stored["breakpoints"][0], stored["values"])
+    L = np.interp(places, content["scheduling"][0]["breakpoints"], np.ravel(content["gain"]["table"]))
+    coefficients = np.zeros(2)
+    coefficients[[order for (order,) in claim["P"]["orders"]]] = np.ravel(claim["P"]["coefficients"])
+    P = coefficients[0] + coefficients[1] * (places - 1.0)
+
+    def most(level: float) -> float:
+        """The largest left side over all e and d, for e = 1."""
+        still = -2.0 * (rate + L) * P + 1.0 + P**2 * (1.0 + NOISE**2 * L**2) / level**2
+        return float((still + abs(coefficients[1])).max())
+
+    assert P.min() > 0.0 and most(claim["level"]) < 0.0
+    assert most(0.99 * claim["level"]) > 0.0  # the level is no loose one
+
+
 def swapped(content: dict[str, Any]) -> None:
     content["plant"]["cells"].reverse()
 
