@@ -228,6 +228,19 @@ def short(content: dict[str, Any]) -> None:
     content["model"]["tables"]["a"]["breakpoints"][0][2] = 1.9
 
 
+def bomb(content: dict[str, Any]) -> None:
+    """A file of a few megabytes that would be gigabytes in memory."""
+    names = [f"p{k}" for k in range(3)]
+    content["scheduling"] += [content["scheduling"][0] | {"name": name, "breakpoints": [0.0, 2.0]} for name in names]
+    line = np.linspace(0.0, 2.0, 17).tolist()
+    content["plant"]["breakpoints"] = [line, line, [0.0, 1.0, 2.0], [0.0, 2.0]]
+    cell = {
+        key: {"orders": [[0] * 4], "coefficients": m["coefficients"][:1]}
+        for key, m in content["plant"]["cells"][0].items()
+    }
+    content["plant"]["cells"] = [cell] * 511 + [cell | {"A": {"orders": [[16] * 4], "coefficients": [[[1.0]]]}}]
+
+
 def thrice(content: dict[str, Any]) -> None:
     content["model"]["tables"]["a"] |= {"breakpoints": [[0.0, 0.7, 0.7, 0.7, 2.0]], "values": [3.0, 1.0, 1.0, 1.0, 2.5]}
 
@@ -238,6 +251,7 @@ def thrice(content: dict[str, Any]) -> None:
         (swapped, r"plant.cells\[0\].A: entry \[0\]\[0\]"), (one_value, r"plant.cells\[0\].A"), (one_cell, r"plant.cells\[1\].A"),
         (moved, r"plant.breakpoints\[0\]"), (no_cells, "plant: is one polynomial"), (without_table, "'a' is neither"),
         (idle, "model.tables.c: appears in no formula"), (short, "do not cover the range of p"), (thrice, "twice is a jump"),
+        (bomb, r"plant\.cells: make \d{9} numbers"),
     ],
 )  # fmt: skip
 def test_a_file_whose_table_or_plant_was_changed_is_refused(content: dict[str, Any], change: Any, words: str) -> None:
