@@ -52,7 +52,7 @@ from .models.param import SchedulingParameter as SchedulingParameter
 from .models.param import Signal as Signal
 from .models.parameter_set import ParameterSet as ParameterSet
 from .models.parameter_set import load_parameter_set as load_parameter_set
-from .models.table import Table as Table
+from .models.table import LookupTable as LookupTable
 from .models.weighted import weighted as weighted
 from .models.weights import first_order_weight as first_order_weight
 from .published_certificate import CertifiedRange as CertifiedRange

@@ -17,6 +17,7 @@ from typing import Any
 from estimators.schedule.checker import Checker, quoted, shown
 
 MOST_TABLES, MOST_CELLS = 256, 4096
+MOST_NUMBERS = 10_000_000  # of all matrices on all cells
 BY_CELLS = ("breakpoints", "cells")
 
 
@@ -75,7 +76,13 @@ def check_cells(
         counts.append(len(numbers) - 1)
     if prod(counts) > MOST_CELLS:
         check.fail("plant.breakpoints", f"make {prod(counts)} cells; at most {MOST_CELLS} are read")
+    highest = [0] * len(counts)
     for k, cell in enumerate(check.items(plant["cells"], "plant.cells", prod(counts))):
         check.keys(cell, f"plant.cells[{k}]", tuple(shapes))
         for key, shape in shapes.items():
             check.polynomial(cell[key], f"plant.cells[{k}].{key}", len(counts), shape, order)
+            highest = [max(column) for column in zip(highest, *cell[key]["orders"], strict=True)]
+    # A runtime keeps all orders up to the highest, of all matrices on all cells.
+    kept = prod(counts) * prod(n + 1 for n in highest) * sum(map(prod, shapes.values()))
+    if kept > MOST_NUMBERS:
+        check.fail("plant.cells", f"make {kept} numbers; at most {MOST_NUMBERS} are kept")

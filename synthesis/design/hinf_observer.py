@@ -31,7 +31,7 @@ from synthesis.design.kinked import KinkedUnknown, kinked_values
 from synthesis.design.norms import ChannelSizes, Norm, compact_form, levels, per_sample, require_energy
 from synthesis.design.pole_regions import PoleRegions, require_regions
 from synthesis.design.refusals import refuse_undetectable
-from synthesis.design.three_solves import Problem, problem_for, three_solves
+from synthesis.design.three_solves import Problem, lyapunov_degree, problem_for, three_solves
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
@@ -243,11 +243,7 @@ def observer_problem(
     """
     problem = problem_for(model, gamma, maximise_margin, floor)
     unit, nx, ny = error_unit(model, design, scale), len(model.states), len(model.outputs)
-    # A parameter that jumps may move the gains, but not the Lyapunov function.
-    jumps = any(p.may_jump for p in model.parameters)
-    whole = problem.symmetric(
-        "P", nx, tuple(0 if p.may_jump else design.degree for p in model.parameters) if jumps else design.degree
-    )
+    whole = problem.symmetric("P", nx, lyapunov_degree(model, design.degree))
     gains = KinkedUnknown.of(problem, model, "X", (nx, ny), design.degree)
     outputs = problem.constant(np.diag(1.0 / outputs_of(model, design, scale)))
     sizes: dict[str, tuple[MatrixPolynomial, MatrixPolynomial]] = {}

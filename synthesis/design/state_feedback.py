@@ -34,7 +34,7 @@ from synthesis.design.kinked import KinkedUnknown, kinked_values
 from synthesis.design.norms import NORMS, ChannelSizes, compact_form, levels, require_energy
 from synthesis.design.pole_regions import PoleRegions, require_damping, require_disc, require_regions
 from synthesis.design.refusals import refuse_feedthrough, refuse_unstabilisable
-from synthesis.design.three_solves import problem_for, three_solves
+from synthesis.design.three_solves import lyapunov_degree, problem_for, three_solves
 from synthesis.errors import ProblemError
 from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
@@ -183,11 +183,7 @@ def state_feedback_problem(
     """
     problem, clock = problem_for(model, gamma, maximise_margin, floor), scale.clock
     nx, nu = len(model.states), len(model.inputs)
-    # A parameter that jumps may move the gains, but not the Lyapunov function.
-    jumps = any(p.may_jump for p in model.parameters)
-    whole = problem.symmetric(
-        "Q", nx, tuple(0 if p.may_jump else design.degree for p in model.parameters) if jumps else design.degree
-    )
+    whole = problem.symmetric("Q", nx, lyapunov_degree(model, design.degree))
     gains = KinkedUnknown.of(problem, model, "Y", (nu, nx), design.degree)
     sizes: dict[str, tuple[MatrixPolynomial, MatrixPolynomial]] = {}
     problem.require("Q > 0", whole)

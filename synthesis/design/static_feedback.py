@@ -85,25 +85,24 @@ def design_static_feedback(model: LpvModel, design: StaticFeedbackDesign) -> Sta
     >>> print(found.verdict, found.gain([1.0, 2.0]).shape)
     certified (2, 1, 1)
     """
-    model.refuse_tables("static output feedback")
     refuse_unstabilisable(model)
     refuse_undetectable(model)
     seen = structure(model, design.uses).any(axis=0)
-    if model.polynomial.D[..., seen, :].any():
+    if any(piece.polynomial.D[..., seen, :].any() for piece in model.pieces):
         raise ProblemError(
             f"model '{model.name}': inputs act on outputs at once (D), a static law would close an algebraic loop; leave such "
             "outputs out by `uses`, or design a law with states"
         )
-    plant = generalised_plant(model, design.channels)
-    for part in plant.channels:
+    plants = [generalised_plant(model, design.channels, piece=piece) for piece in model.pieces]
+    for part in (part for plant in plants for part in plant.channels):
         through = part.Dzd.any() or (part.Dzu.any() and part.F.any())
         if part.channel.norm != "H-infinity" and through:
             raise ProblemError(
                 f"channel '{part.channel.name}': a disturbance acts on a performance signal at once (by F, or by F and the law), "
                 f"so its {part.channel.norm} norm is infinite in continuous time; leave the noise or the inputs out of it"
             )
-    frame = frame_of(plant)
-    steps = Steps(model, design, plant.scaled(frame), frame)
+    frame = frame_of(plants[model.pieces.index(model.cells.middle)])
+    steps = Steps(model, design, [plant.scaled(frame) for plant in plants], frame)
     point = steps.stable(steps.start())
     point, levels = steps.lowered(point)
     settled = three_solves(

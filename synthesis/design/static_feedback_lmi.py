@@ -39,7 +39,8 @@ class Structure:
 class StaticLoop:
     """A problem in P, with K given (`at` None) or unknown near the pair `at`; time in units of 1/clock s.
 
-    Of a rational plant B K C is over the square of its denominator, and so is every inequality.
+    Of a rational plant B K C is over the square of its denominator, and so is every inequality. Of a plant by cells one loop is
+    made for each (`LmiProblem.on_cell`); all share P and K of the `first`.
     """
 
     def __init__(
@@ -50,21 +51,30 @@ class StaticLoop:
         degree: int,
         gain: MatrixPolynomial | Structure,
         at: Point | None = None,
+        first: StaticLoop | None = None,
     ) -> None:
-        self.problem, self.at = problem, at
-        self.A, self.B, self.C = (problem.scaled(getattr(plant, key)) for key in "ABC")  # numerators
-        denominator = problem.scaled(plant.denominator)
+        self.problem = problem
+        self.at = None if at is None else Point(problem.here(at.P), problem.here(at.K))
+        self.A, self.B, self.C = (self._known(getattr(plant, key)) for key in "ABC")  # numerators
+        denominator = self._known(plant.denominator)
         self.below = denominator if any(denominator.degrees) else None
-        degrees = tuple(0 if p.may_jump else degree for p in problem.parameters)
-        self.P = problem.symmetric("P", self.A.shape[0], degrees)
-        self.K = self._unknown(gain) if isinstance(gain, Structure) else gain
-        product = self.P @ self._over(self.A)
-        self.rate = product + product.T + self._over(problem.time_derivative(self.P), 2) * (1.0 / clock)
+        if first is None:
+            degrees = tuple(0 if p.may_jump else degree for p in problem.parameters)
+            P = problem.symmetric("P", self.A.shape[0], degrees)
+            self.whole = Point(P, self._unknown(gain) if isinstance(gain, Structure) else gain)
+        else:
+            self.whole = first.whole
+        self.P, self.K = problem.here(self.whole.P), problem.here(self.whole.K)
+        product, moved = self.P @ self._over(self.A), problem.here(problem.time_derivative(self.whole.P))
+        self.rate = product + product.T + self._over(moved, 2) * (1.0 / clock)
         problem.require("P > 0", self.P)
+
+    def _known(self, coefficients: FloatArray) -> MatrixPolynomial:
+        return self.problem.here(self.problem.scaled(coefficients))
 
     def require_gain(self, part: ChannelPlant, level: MatrixPolynomial) -> None:
         """The L2 gain of a channel."""
-        E, F, Cz, Dzd, Dzu = (self.problem.scaled(getattr(part, key)) for key in ("E", "F", "Cz", "Dzd", "Dzu"))
+        E, F, Cz, Dzd, Dzu = (self._known(getattr(part, key)) for key in ("E", "F", "Cz", "Dzd", "Dzu"))
         outputs, direct = self._over(Cz) + Dzu @ self.K @ self.C, self._over(Dzd) + Dzu @ self.K @ F
         level = self._over(level, 2)
         w, z = (self.problem.constant(np.eye(size)).scaled_by(level) for size in (E.shape[1], Cz.shape[0]))
@@ -79,7 +89,7 @@ class StaticLoop:
 
     def require_energy(self, part: ChannelPlant, level: MatrixPolynomial) -> None:
         """The generalised H2 norm of a channel, or its H2 norm (`synthesis.design.norms`); nothing acts on it at once."""
-        E, F, Cz, Dzu = (self.problem.scaled(getattr(part, key)) for key in ("E", "F", "Cz", "Dzu"))
+        E, F, Cz, Dzu = (self._known(getattr(part, key)) for key in ("E", "F", "Cz", "Dzu"))
         outputs, name, n = Cz + Dzu @ self.K @ self.C, part.channel.name, self.A.shape[0]
         k, m = E.shape[1], Cz.shape[0]
         w, z = (self.problem.constant(np.eye(size)).scaled_by(level) for size in (k, m))
@@ -162,4 +172,5 @@ class StaticLoop:
 
     def found(self, result: LmiResult) -> Point:
         """P and K that a solve ended with."""
-        return Point(result.values["P"], self.K.substitute(result.decisions) if self.K.decisions else self.K)
+        K = self.whole.K
+        return Point(result.values["P"], K.substitute(result.decisions) if K.decisions else K)

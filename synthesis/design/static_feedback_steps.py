@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 
@@ -27,10 +28,12 @@ SHARE = 0.05  # by which a growth is exceeded on the way to stability
 
 
 class Steps:
-    """The steps of one design, in the coordinates of its frame."""
+    """The steps of one design, in the coordinates of its frame; `plants` are those of the model's pieces."""
 
-    def __init__(self, model: LpvModel, design: StaticFeedbackDesign, plant: GeneralisedPlant, frame: Frame) -> None:
-        self.model, self.design, self.plant, self.frame = model, design, plant, frame
+    def __init__(
+        self, model: LpvModel, design: StaticFeedbackDesign, plants: list[GeneralisedPlant], frame: Frame
+    ) -> None:
+        self.model, self.design, self.plants, self.frame = model, design, plants, frame
         self.settings = design.settings
         if self.settings.relaxation == "auto":
             self.settings = replace(self.settings, relaxation="exchange")
@@ -122,30 +125,42 @@ class Steps:
         problem = LmiProblem(
             self.model.parameters, margin, least_norm=floor > 0.0, floor=floor, half_spaces=self.model.half_spaces
         )
-        loop = StaticLoop(problem, self.plant, self.frame.clock, self.design.degree, gain, at)
-        if self.decay:
-            loop.require_decay(self.decay)
-        if self.design.fastest_pole is not None:
-            loop.require_disc(self.design.fastest_pole / (1.0 + self.design.reserve) / self.frame.clock)
-        for part in self.plant.channels:
-            bound = gamma if part.channel.bound is None else part.channel.bound
-            if bound is None:
-                level = problem.scalar("gamma")
-                problem.minimise("gamma")
-            else:
-                level = problem.constant(np.array([[bound / self.unit(part.channel)]]))
-            (loop.require_gain if part.channel.norm == "H-infinity" else loop.require_energy)(part, level)
+        for loop, plant in self._loops(problem, gain, at):
+            if self.decay:
+                loop.require_decay(self.decay)
+            if self.design.fastest_pole is not None:
+                loop.require_disc(self.design.fastest_pole / (1.0 + self.design.reserve) / self.frame.clock)
+            for part in plant.channels:
+                bound = gamma if part.channel.bound is None else part.channel.bound
+                if bound is not None:
+                    level = problem.constant(np.array([[bound / self.unit(part.channel)]]))
+                else:
+                    level = problem.unknowns.get("gamma") or problem.scalar("gamma")
+                    problem.minimise("gamma")
+                (loop.require_gain if part.channel.norm == "H-infinity" else loop.require_energy)(part, level)
         return problem, loop
+
+    def _loops(
+        self, problem: LmiProblem, gain: MatrixPolynomial | Structure, at: Point | None
+    ) -> Iterator[tuple[StaticLoop, GeneralisedPlant]]:
+        """The loop on every piece of the plant, while the problem asks about it; all share P and K."""
+        first = None
+        for number, (piece, plant) in enumerate(zip(self.model.pieces, self.plants, strict=True)):
+            problem.on_cell(number, piece.box)
+            loop = StaticLoop(problem, plant, self.frame.clock, self.design.degree, gain, at, first)
+            first = first or loop
+            yield loop, plant
+        problem.on_cell()
 
     def _shifted(
         self, gain: MatrixPolynomial | Structure, at: Point | None, growth: float
     ) -> tuple[LmiProblem, StaticLoop]:
         """The largest margin of decay with (growth) taken off A, P < 1."""
         problem = LmiProblem(self.model.parameters, maximise_margin=True, half_spaces=self.model.half_spaces)
-        loop = StaticLoop(problem, self.plant, self.frame.clock, self.design.degree, gain, at)
-        loop.require_decay(-growth)
-        unit = problem.constant(np.eye(loop.P.shape[0]))
-        problem.require("P < 1", unit - loop.P, strict=False)
+        for loop, _ in self._loops(problem, gain, at):
+            loop.require_decay(-growth)
+            unit = problem.constant(np.eye(loop.P.shape[0]))
+            problem.require("P < 1", unit - loop.P, strict=False)
         return problem, loop
 
     def _solved(self, problem: LmiProblem, loop: StaticLoop) -> tuple[Point, float] | None:
@@ -185,9 +200,14 @@ class Steps:
 
     def _closed(self, K: MatrixPolynomial, places: FloatArray) -> FloatArray:
         still = places[:, : places.shape[1] // 2]
-        below = values(self.plant.denominator, still)
-        A, B, C = (values(getattr(self.plant, key), still) / below for key in "ABC")
-        return np.asarray(A + B @ K.at(places)[..., 0] @ C)
+        gain, owner, n = K.at(places)[..., 0], self.model.cells.owner(still), len(self.model.states)
+        closed = np.zeros((len(places), n, n))
+        for index in np.unique(owner):
+            plant, chosen = self.plants[index], owner == index
+            below = values(plant.denominator, still[chosen])
+            A, B, C = (values(getattr(plant, key), still[chosen]) / below for key in "ABC")
+            closed[chosen] = A + B @ gain[chosen] @ C
+        return closed
 
 
 def structure(model: LpvModel, uses: tuple[tuple[str, str], ...] | None) -> FloatArray:

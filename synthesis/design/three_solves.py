@@ -64,6 +64,13 @@ def problem_for(model: LpvModel, gamma: float | None, maximise_margin: bool, flo
     )  # fmt: skip
 
 
+def lyapunov_degree(model: LpvModel, degree: int) -> int | tuple[int, ...]:
+    """Of a Lyapunov matrix: a parameter that jumps may move the gains, but not it."""
+    if not any(p.may_jump for p in model.parameters):
+        return degree
+    return tuple(0 if p.may_jump else degree for p in model.parameters)
+
+
 def starting_places(problem: LmiProblem) -> Memory:
     """Where the solves start: in the corners alone, little is asked of laws that are free elsewhere, and unknowns run away.
 

@@ -19,7 +19,7 @@ from synthesis.exchange.model_table import ModelFile, ParameterTable, Rows, Sign
 from synthesis.models.constraint import ParameterConstraint, scaled_set
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import Constant, SchedulingParameter, Signal
-from synthesis.models.table import Table, check_table
+from synthesis.models.table import LookupTable, check_table
 from synthesis.toml_file import read_table, read_toml
 from synthesis.toml_places import Path, Places
 
@@ -63,7 +63,7 @@ class _Reader:
             for name, c in table.constants.items()
         }
         tables = {
-            name: self._made(("tables", name), Table, t.unit, t.source, tuple(t.over), t.lines, t.values)
+            name: self._made(("tables", name), LookupTable, t.unit, t.source, tuple(t.over), t.lines, t.values)
             for name, t in table.tables.items()
         }
         for name, one in tables.items():

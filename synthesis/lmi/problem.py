@@ -212,9 +212,9 @@ class LmiProblem(Display):
         self.inequalities.append(Inequality(name + self.suffix, matrix, offset, factor, strict, floor))
 
     def on_cell(self, number: int = 0, box: tuple[FloatArray, FloatArray] | None = None) -> None:
-        """What follows is required on a box of the parameters u = offset + factor t, |t| <= 1, (p,) each, and for all rates.
+        """What follows is required on a box of the parameters u = offset + factor t, |t| <= 1, and for all rates, in t (`here`).
 
-        Its matrices are given in t (`here`). Without a box, or where it is the whole range, all is as it was.
+        Without a box (offset and factor, (p,) each), or where it is the whole range, all is as it was.
         """
         self.cell, self.suffix = None, ""
         if box is not None and not (box[1] == 1.0).all():

@@ -52,7 +52,7 @@ def on_cells(
 ) -> list[tuple[Point, Point, dict[str, Any]]]:
     """Matrices in (u, t), t the tables in order, on every cell of `lines` as polynomials in u: offset, factor, matrices.
 
-    Tables are given as `Table.plain`; `names` are those of the parameters. Raises ModelError for too much work.
+    Tables are given as `LookupTable.plain`; `names` are those of the parameters. Raises ModelError for too much work.
     """
     count = len(names)
     ranges = [

@@ -9,12 +9,12 @@ import sympy as sp
 
 from estimators.arrays import FloatArray
 from synthesis.models.fitted import Fitted
-from synthesis.models.table import Table
+from synthesis.models.table import LookupTable
 
 
 def as_tables(
     build: Fitted, source: str, lines: Sequence[FloatArray], values: Mapping[str, FloatArray]
-) -> tuple[dict[str, sp.Matrix], dict[str, Table]]:
+) -> tuple[dict[str, sp.Matrix], dict[str, LookupTable]]:
     """Matrices (g_1, .., g_p, rows, columns) by their letters, as formulas of tables `A_1_2`, and those tables.
 
     An entry is a table over the parameters that move it, and a number where none does.
@@ -32,7 +32,7 @@ def as_tables(
             own = entry[tuple(slice(None) if axis in moving else 0 for axis in range(count))]
             over = tuple(build.parameters[axis].name for axis in moving)
             points = tuple(tuple(lines[axis].tolist()) for axis in moving)
-            tables[name] = Table(build.unit(key, i, j), source, over, points, own)
+            tables[name] = LookupTable(build.unit(key, i, j), source, over, points, own)
             matrix[i, j] = sp.Symbol(name)
         made[key] = matrix
     return made, tables

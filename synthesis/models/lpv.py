@@ -23,7 +23,7 @@ from synthesis.models.numeric import NumericModel, evaluate_pieces
 from synthesis.models.param import Constant, SchedulingParameter, Signal
 from synthesis.models.pieces import ModelPiece, Pieces, pieces_of, whole
 from synthesis.models.symbols import plain
-from synthesis.models.table import Table, check_table, table_words
+from synthesis.models.table import LookupTable, check_table, table_words
 from synthesis.polynomials.half_spaces import Faces, HalfSpaces
 
 if TYPE_CHECKING:
@@ -35,8 +35,8 @@ class LpvModel(Display):
     r"""x' = A(p) x + B(p) u + E(p) d,  y = C(p) x + D(p) u + F(p) d, with p(t) in a box and dp/dt in another.
 
     `constraints` are linear inequalities between the parameters that cut corners off their box; the matrices are defined on
-    all of it. Rate bounds hold as far as the set allows. `tables` are quantities that are known at breakpoints (`Table`), used
-    in the matrices by their names: the plant is a polynomial on each cell of their grid (`pieces`), with kinks between them.
+    all of it. Rate bounds hold as far as the set allows. `tables` are quantities known at breakpoints (`LookupTable`), used by
+    their names: the plant is a polynomial on each cell of their grid (`pieces`), with kinks between them.
 
     Matrices are sympy matrices whose symbols are the names of `parameters`, `constants` and `tables`, polynomial or rational in
     the parameters (with tables, polynomial). A disturbance whose column of E is zero is measurement noise. B, D, E and F
@@ -72,7 +72,7 @@ class LpvModel(Display):
     F: sp.Matrix | None = None
     constants: Mapping[str, Constant] = field(default_factory=dict)
     constraints: tuple[ParameterConstraint, ...] = ()
-    tables: Mapping[str, Table] = field(default_factory=dict)
+    tables: Mapping[str, LookupTable] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         nx, ny, nu, nd = len(self.states), len(self.outputs), len(self.inputs), len(self.disturbances)
@@ -280,7 +280,7 @@ class LpvModel(Display):
         leaves no entry off by more than `tolerance` of its largest value (at most half as many as points, so that points are left
         to tell). `fit` says what the plant is between the points: "polynomial", the fit itself; "piecewise-linear", straight
         lines, so that the residual is bounded over the whole range. With the fit "table" there is none: the plant is multilinear
-        between the points, exactly, another polynomial on every cell (`Table`); a point of a line that stands twice is a jump.
+        between the points, exactly, another polynomial on every cell (`LookupTable`); a point that stands twice is a jump.
 
         The residual enters the model as a stated uncertainty (`synthesis.models.fitted`): for each row that is off, a disturbance
         `NAME_fit_error` between -1 and 1 with a constant `NAME_fit_error_size`; name these disturbances in the channels of a

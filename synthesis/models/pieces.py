@@ -17,7 +17,7 @@ from synthesis.models.cells import cell_lines, on_cells
 from synthesis.models.extract import MATRICES, ExactModel, PolynomialModel, extract, in_floats
 from synthesis.models.numeric import owners
 from synthesis.models.param import Constant, SchedulingParameter
-from synthesis.models.table import Table
+from synthesis.models.table import LookupTable
 from synthesis.polynomials.multilinear import Point
 from synthesis.polynomials.rational import as_float
 
@@ -78,7 +78,7 @@ def pieces_of(
     symbolic: Mapping[str, sp.Matrix],
     parameters: Sequence[SchedulingParameter],
     constants: Mapping[str, Constant],
-    tables: Mapping[str, Table],
+    tables: Mapping[str, LookupTable],
 ) -> Pieces:
     """The model on the cells of its tables. Raises ModelError for entries that divide by parameters or tables."""
     names = [sp.Symbol(name) for name in (*(p.name for p in parameters), *tables)]

@@ -22,12 +22,12 @@ from synthesis.models.param import SchedulingParameter, check_unit
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Table(Display):
+class LookupTable(Display):
     """Values (b_1, .., b_k) at the breakpoints (b_i,) of the parameters `over`, multilinear between them.
 
     Raises ModelError for breakpoints that do not rise or stand more than twice, and for values that do not fit them.
 
-    >>> Table("1/s", "measured", ("speed",), ((0.0, 10.0, 10.0, 40.0),), [1.0, 3.0, 3.5, 4.0]).jumps
+    >>> LookupTable("1/s", "measured", ("speed",), ((0.0, 10.0, 10.0, 40.0),), [1.0, 3.0, 3.5, 4.0]).jumps
     {'speed': (10.0,)}
     """
 
@@ -72,7 +72,7 @@ class Table(Display):
         ]
         jumps = [f"{name} = {place:g}" for name, places in self.jumps.items() for place in places]
         return (
-            f"Table ({self.source})",
+            f"LookupTable ({self.source})",
             f"values: {self.values.min():.6g} to {self.values.max():.6g} {self.unit}",
             f"over: {'; '.join(spans)}",
             f"jumps: {', '.join(jumps) or 'none'}",
@@ -110,7 +110,7 @@ def _check_line(name: str, line: Sequence[float]) -> None:
         raise ModelError(f"table: jumps at an end of the breakpoints of {name}; give one value there")
 
 
-def check_table(table: Table, parameters: Sequence[SchedulingParameter], where: str) -> None:
+def check_table(table: LookupTable, parameters: Sequence[SchedulingParameter], where: str) -> None:
     """Raise ModelError for a table over parameters that there are not, or that does not cover a range."""
     known = {p.name: p for p in parameters}
     for name, line in zip(table.over, table.breakpoints, strict=True):
@@ -124,7 +124,9 @@ def check_table(table: Table, parameters: Sequence[SchedulingParameter], where: 
             )
 
 
-def table_words(tables: Mapping[str, Table], parameters: Sequence[SchedulingParameter], cells: int) -> tuple[str, ...]:
+def table_words(
+    tables: Mapping[str, LookupTable], parameters: Sequence[SchedulingParameter], cells: int
+) -> tuple[str, ...]:
     """One line on the tables and their jumps; none without tables."""
     if not tables:
         return ()

@@ -133,8 +133,8 @@ REAL: dict[str, Any] = {
     "VehicleSignals": (signals, ("m/s^2", "rad/s")),
     "PipelineStep": (step, ("50 cars", "m/s", "F_z", "N", "unknown_force")),
     "LpvModel": (lambda: gains().model, ("wheel_speed 0 to 140 rad/s",)),
-    "Table": (
-        lambda: synthesis.Table("V", "bench", ("charge",), (tuple(range(99)),), np.arange(99.0)),
+    "LookupTable": (
+        lambda: synthesis.LookupTable("V", "bench", ("charge",), (tuple(range(99)),), np.arange(99.0)),
         ("0 to 98 V", "charge 0 to 98, 99 points"),
     ),
     "ObserverDesign": (lambda: gains().design, ("decay rate 80",)),

@@ -30,6 +30,7 @@ from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGain
 from synthesis.design.output_feedback import OutputFeedbackDesign, design_output_feedback
 from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.design.sampled_state_feedback import design_sampled_state_feedback
+from synthesis.design.stability import affine_quadratic_stability
 from synthesis.design.state_feedback import StateFeedbackDesign, design_state_feedback
 from synthesis.design.static_feedback import design_static_feedback
 from synthesis.design.static_feedback_design import StaticFeedbackDesign
@@ -38,7 +39,7 @@ from synthesis.loop.from_model import plant_of
 from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
-from synthesis.models.table import Table
+from synthesis.models.table import LookupTable
 
 NOISE, PERIOD = 0.5, 0.02
 ERROR = (Channel(("w", "n"), ("x",)),)
@@ -54,11 +55,11 @@ def moving(rate: float = 1.0, name: str = "p") -> SchedulingParameter:
 STEADY = moving()
 
 
-def table(points: Any, values: Any, over: tuple[str, ...] = ("p",)) -> Table:
-    return Table("1", "test", over, points if len(over) > 1 else (points,), values)
+def table(points: Any, values: Any, over: tuple[str, ...] = ("p",)) -> LookupTable:
+    return LookupTable("1", "test", over, points if len(over) > 1 else (points,), values)
 
 
-def plant(A: Any, tables: dict[str, Table], parameters: Any = (STEADY,), B: Any = 1) -> LpvModel:
+def plant(A: Any, tables: dict[str, LookupTable], parameters: Any = (STEADY,), B: Any = 1) -> LpvModel:
     """x' = A x + B u + w, y = x + n / 2."""
     one: dict[str, Any] = {
         key: (Signal(name, "1"),) for key, name in (("states", "x"), ("outputs", "y"), ("inputs", "u"))
@@ -76,7 +77,7 @@ JUMP = table((0.0, 0.7, 0.7, 2.0), [3.0, 2.0, 1.0, 2.5])
 
 
 @pytest.mark.parametrize("dip", [KINK, JUMP, table((0.0, 0.7, 2.0), [3.0, 1.4, 2.5])])
-def test_an_observer_attains_the_closed_form_at_the_kink_and_at_one_side_of_a_jump(dip: Table) -> None:
+def test_an_observer_attains_the_closed_form_at_the_kink_and_at_one_side_of_a_jump(dip: LookupTable) -> None:
     """x' = -a x + w, y = x + f n under any motion: the least gain to the error is f / sqrt(1 + f^2 a^2), at the least a."""
     least = NOISE / math.sqrt(1.0 + NOISE**2 * dip.values.min() ** 2)
     gains = design_observer(plant(-a, {"a": dip}, (moving(math.inf),)), ObserverDesign(ERROR, fastest_pole=50.0))
@@ -114,7 +115,7 @@ def test_gains_bend_where_the_plant_does() -> None:
         )
 
 
-@pytest.mark.parametrize("law", ["held", "sampled", "feedback", "sampled feedback", "output feedback"])
+@pytest.mark.parametrize("law", ["held", "sampled", "feedback", "sampled feedback", "output feedback", "static"])
 def test_a_polynomial_plant_that_is_cut_keeps_its_level(law: str) -> None:
     cut = plant(-1 - a**2, {"a": table((0.0, 0.3, 1.1, 2.0), [0.0, 0.3, 1.1, 2.0])})
     levels = []
@@ -125,12 +126,15 @@ def test_a_polynomial_plant_that_is_cut_keeps_its_level(law: str) -> None:
             levels.append(design_sampled_observer(model, ObserverDesign(ERROR, degree=0), PERIOD).gamma_lower)
         elif law == "feedback":
             levels.append(design_state_feedback(model, StateFeedbackDesign(LAW, degree=0)).gamma_lower)
+        elif law == "static":
+            asked = StaticFeedbackDesign(LAW, degree=0, backoff=0.1, start=((-2.0,),), steps=1)
+            levels.append(design_static_feedback(model, asked).levels[0])  # of the start, before any step
         elif law == "output feedback":
             levels.append(design_output_feedback(model, OutputFeedbackDesign(NOISY_LAW, degree=0)).gamma_lower)
         else:
             levels.append(design_sampled_state_feedback(model, StateFeedbackDesign(LAW, degree=0), PERIOD).gamma_lower)
     assert len(cut.pieces) == 3
-    assert levels[0] == pytest.approx(levels[1], rel=1e-4)
+    assert isinstance(levels[0], float) and levels[0] == pytest.approx(levels[1], rel=1e-4)
 
 
 def test_output_feedback_of_a_kink_lies_between_its_frozen_loops_and_is_proved() -> None:
@@ -173,6 +177,25 @@ def test_what_is_deployed_is_proved_between_all_breakpoints(content: dict[str, A
     assert all(proof.proved for proof in prove(content, "file"))
 
 
+def test_the_proved_gain_holds_in_floats_from_the_numbers_of_the_file(content: dict[str, Any]) -> None:
+    """dV/dt + e^2 < g^2 |d|^2 with V = P e^2 at many places and both rates, the plant by `np.interp` of the table."""
+    (claim,) = (c for c in content["claims"] if c["kind"] == "gain")
+    places, stored = np.linspace(0.0, 2.0, 401), content["model"]["tables"]["a"]
+    rate = np.interp(places, stored["breakpoints"][0], stored["values"])
+    L = np.interp(places, content["scheduling"][0]["breakpoints"], np.ravel(content["gain"]["table"]))
+    coefficients = np.zeros(2)
+    coefficients[[order for (order,) in claim["P"]["orders"]]] = np.ravel(claim["P"]["coefficients"])
+    P = coefficients[0] + coefficients[1] * (places - 1.0)
+
+    def most(level: float) -> float:
+        """The largest left side over all e and d, for e = 1."""
+        still = -2.0 * (rate + L) * P + 1.0 + P**2 * (1.0 + NOISE**2 * L**2) / level**2
+        return float((still + abs(coefficients[1])).max())
+
+    assert P.min() > 0.0 and most(claim["level"]) < 0.0
+    assert most(0.99 * claim["level"]) > 0.0  # the level is no loose one
+
+
 def swapped(content: dict[str, Any]) -> None:
     content["plant"]["cells"].reverse()
 
@@ -205,6 +228,19 @@ def short(content: dict[str, Any]) -> None:
     content["model"]["tables"]["a"]["breakpoints"][0][2] = 1.9
 
 
+def bomb(content: dict[str, Any]) -> None:
+    """A file of a few megabytes that would be gigabytes in memory."""
+    names = [f"p{k}" for k in range(3)]
+    content["scheduling"] += [content["scheduling"][0] | {"name": name, "breakpoints": [0.0, 2.0]} for name in names]
+    line = np.linspace(0.0, 2.0, 17).tolist()
+    content["plant"]["breakpoints"] = [line, line, [0.0, 1.0, 2.0], [0.0, 2.0]]
+    cell = {
+        key: {"orders": [[0] * 4], "coefficients": m["coefficients"][:1]}
+        for key, m in content["plant"]["cells"][0].items()
+    }
+    content["plant"]["cells"] = [cell] * 511 + [cell | {"A": {"orders": [[16] * 4], "coefficients": [[[1.0]]]}}]
+
+
 def thrice(content: dict[str, Any]) -> None:
     content["model"]["tables"]["a"] |= {"breakpoints": [[0.0, 0.7, 0.7, 0.7, 2.0]], "values": [3.0, 1.0, 1.0, 1.0, 2.5]}
 
@@ -215,6 +251,7 @@ def thrice(content: dict[str, Any]) -> None:
         (swapped, r"plant.cells\[0\].A: entry \[0\]\[0\]"), (one_value, r"plant.cells\[0\].A"), (one_cell, r"plant.cells\[1\].A"),
         (moved, r"plant.breakpoints\[0\]"), (no_cells, "plant: is one polynomial"), (without_table, "'a' is neither"),
         (idle, "model.tables.c: appears in no formula"), (short, "do not cover the range of p"), (thrice, "twice is a jump"),
+        (bomb, r"plant\.cells: make \d{9} numbers"),
     ],
 )  # fmt: skip
 def test_a_file_whose_table_or_plant_was_changed_is_refused(content: dict[str, Any], change: Any, words: str) -> None:
@@ -267,6 +304,8 @@ def test_several_parameters_and_tables_make_the_cells_of_all() -> None:
     wanted = -((1 - share) * ends[0] + share * ends[1]) * np.interp(draw[:, 0], [0.0, 1.5, 2.0], [1.0, 2.0, 1.5])
     np.testing.assert_allclose(model.on(draw).A[:, 0, 0], wanted - draw[:, 0] * draw[:, 1], rtol=1e-12)
     assert plant_of(model).is_continuous
+    stored = plant_by_cells(_plant(model), {"A": (1, 1)})["A"]
+    np.testing.assert_allclose(stored.at(draw)[:, 0, 0], wanted - draw[:, 0] * draw[:, 1], rtol=1e-12)
 
 
 def test_a_jump_is_stated_and_belongs_to_the_upper_cell_at_its_place() -> None:
@@ -315,6 +354,6 @@ def test_cells_at_once_are_those_one_by_one() -> None:
 def test_what_knows_no_cells_says_so_before_the_solve() -> None:
     model = plant(-a, {"a": KINK})
     with pytest.raises(ModelError, match=r"table\(s\) a: .* does not support a plant by cells"):
-        design_static_feedback(model, StaticFeedbackDesign(LAW))
+        affine_quadratic_stability(model, np.ones((1, 1)))
     with pytest.raises(ModelError, match="divides by a parameter or a table"):
         plant(-1 / a, {"a": KINK})

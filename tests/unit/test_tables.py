@@ -16,7 +16,7 @@ from synthesis.exchange.model_text import save_model
 from synthesis.exchange.model_units import check_units
 from synthesis.models.lpv import LpvModel
 from synthesis.models.param import SchedulingParameter, Signal
-from synthesis.models.table import Table
+from synthesis.models.table import LookupTable
 
 TEXT = """name = "pitch"
 source = "test"
@@ -168,7 +168,7 @@ def test_a_grid_line_with_a_value_twice_is_a_jump() -> None:
 
 def test_too_many_cells_are_refused_at_once() -> None:
     line = tuple(np.linspace(0.0, 2.0, 100).tolist())
-    table = Table("1", "test", ("p", "q"), (line, line), np.ones((100, 100)))
+    table = LookupTable("1", "test", ("p", "q"), (line, line), np.ones((100, 100)))
     axes = tuple(SchedulingParameter(name, "1", 0.0, 2.0, 0.0, 0.0) for name in "pq")
     one = (Signal("x", "1"),)
     with pytest.raises(ModelError, match="9801 cells, at most 4096"):
