@@ -171,7 +171,7 @@ def require_box(question: Question) -> None:
         words = ", ".join(constraint.words for constraint in question.model.constraints)
         raise AnalysisError(
             f"model '{question.model.name}' has constraints between its parameters ({words}), this analysis is about boxes; "
-            "lpv_l2_gain and lpv_decay_rate keep to the set, or shrink the ranges"
+            "worst_case_gain, lpv_l2_gain and lpv_decay_rate keep to the set, or shrink the ranges"
         )
 
 

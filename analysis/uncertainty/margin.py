@@ -64,7 +64,8 @@ def robust_stability_margin(
 
     `tolerance` is the relative gap that is aimed at. Nothing is looked for beyond `farthest` times the ranges: a system that is
     stable there has this number as lower bound and inf as upper. Raises AnalysisError if the middle is not stable, for no
-    parameters, and for numbers that are not positive. Sources: de Gaston, Safonov 1988 (the margin); Zettler, Garloff 1998
+    parameters, for constraints between them (what grows is the box about the middle, which a set need not hold), and for numbers
+    that are not positive. Sources: de Gaston, Safonov 1988 (the margin); Zettler, Garloff 1998
     (Bernstein expansion of Hurwitz determinants).
 
     >>> import sympy as sp

@@ -133,14 +133,18 @@ class Search:
             self._least[key] = named if solved else self._held_level(wish, named)
         return self._least[key]
 
+    def frozen_level(self, wish: Wish) -> float:
+        """What no level of a claim about an update is below, whatever P: that of parameters that stand still, in floats."""
+        assert wish.channel is not None
+        return frozen_level(self.loop, self._sizes(wish.channel, wish.kind), self._errors(wish), wish.kind)
+
     def _held_level(self, wish: Wish, named: float) -> float:
         """The first level above one that a stalled solve named where all inequalities have a margin; inf if none of a few has.
 
         No level of an update lies below the one of parameters that stand still, whatever the solve names.
         """
-        if wish.channel is not None and wish.kind.startswith("sampled"):
-            d, z = self._sizes(wish.channel, wish.kind), self._errors(wish)
-            named = max(named if np.isfinite(named) else 0.0, frozen_level(self.loop, d, z, wish.kind))
+        if wish.kind.startswith("sampled"):
+            named = max(named if np.isfinite(named) else 0.0, self.frozen_level(wish))
         levels = (named * step for step in STALLED) if np.isfinite(named) else ()
         return next((x for x in levels if self.largest_margin(replace(wish, level=x)) > 0.0), np.inf)
 

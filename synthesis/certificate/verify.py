@@ -158,7 +158,10 @@ class Verifier:
             return broken
         waiting, done = [(cell, 0)], 0
         cut = any(not h.contains(cell.offset, cell.factor) for h in plant.half_spaces)
-        most = self.most_regions // LESS ** (count - 1) if cut else self.most_regions
+        bounded = sum(
+            any(h.normal[i] for h in plant.half_spaces) for i in range(count)
+        )  # by the border: the others are as cheap
+        most = self.most_regions // LESS ** (bounded - 1) if cut else self.most_regions
         while waiting:
             region, depth = waiting.pop()
             if cut and plant.misses(region.offset, region.factor):

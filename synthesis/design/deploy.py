@@ -114,10 +114,11 @@ def deploy(
             raise ProblemError(f"model '{model.name}' is not deployed: {posed.message}")
     wishes = [Wish(CLAIMED[channel.norm], None, claim_channel(channel)) for channel in design.channels]
     compared = wishes if observer is not None and observer.update == "held" else [sampled(wish) for wish in wishes]
+    degrees, allowed = lyapunov_degrees(model, gains), 1.0 + settings.interpolation_cost
     for segments in _candidates(gains, settings):
         progress(f"{' x '.join(map(str, segments))} segments")
         found: list[Deployment] = []
-        for degree in lyapunov_degrees(model, gains):
+        for degree in degrees:
             search, points, table = _tabulated(gains, segments, settings, settings.dtype, degree)
             fine = tuple(REFINEMENT * number for number in segments)
             finer, _, _ = _tabulated(gains, fine, settings, "float64", degree)
@@ -127,10 +128,14 @@ def deploy(
             claims = _claims(gains, search, wishes, settings.settle)
             if claims is not None:
                 found.append(Deployment(gains, settings, points, table, claims, cost))
+                if len(degrees) > 1 and _claimed(found[-1]) <= allowed * np.prod(
+                    [search.frozen_level(w) for w in compared]
+                ):
+                    break  # no other P is better by more than is allowed
         if found:
             refuse_beyond_limits(gains, found[0].table)
             least = min(_claimed(one) for one in found)
-            return next(one for one in found if _claimed(one) <= least * (1.0 + settings.interpolation_cost))
+            return next(one for one in found if _claimed(one) <= least * allowed)
     raise ProblemError(
         f"model '{model.name}': no table with up to {' x '.join(map(str, segments))} segments keeps the guarantee within "
         f"{100 * settings.interpolation_cost:g} %; give the design more back-off or a lower degree"
@@ -157,13 +162,17 @@ def _candidates(gains: Gains, settings: DeploySettings) -> Iterator[tuple[int, .
     """Segments along every parameter, coarsest first.
 
     With several parameters an axis is cut until interpolating along it alone costs no more than the allowed share of the
-    largest gain; then all of them are doubled together. An axis along which the gains are straight keeps one segment.
+    largest gain, and not finer than tables may be; then all of them are doubled together. An axis along which the gains are
+    straight keeps one segment.
     """
     count = len(gains.model.parameters)
     if count == 1:
         yield from ((number,) for number in SEGMENTS)
         return
-    segments: tuple[int, ...] = tuple(_along(gains, axis, settings) for axis in range(count))
+    wanted = [_along(gains, axis, settings) for axis in range(count)]
+    while np.prod([number + 1 for number in wanted]) > MOST_ENTRIES:
+        wanted[int(np.argmax(wanted))] //= 2
+    segments = tuple(wanted)
     while np.prod([number + 1 for number in segments]) <= MOST_ENTRIES:
         yield segments
         segments = tuple(2 * number for number in segments)

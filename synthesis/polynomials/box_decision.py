@@ -1,4 +1,4 @@
-"""Are polynomials positive on a whole box? Bernstein coefficients, and boxes that are halved until it shows.
+"""Are polynomials positive on a box, or on what half spaces leave of it? Bernstein coefficients, and boxes that are halved.
 
 Many boxes at once in float64 with a guard for all rounding, and what the guard leaves open in balls of 128 bits. A point where
 a polynomial is not positive counts only if its exact value there is not.
@@ -16,6 +16,7 @@ from estimators.arrays import FloatArray
 from synthesis.polynomials.bernstein import halved, in_bernstein
 from synthesis.polynomials.definite import sign_on_box
 from synthesis.polynomials.enclosure import PolynomialMatrix
+from synthesis.polynomials.half_spaces import Faces, HalfSpaces, faces_of
 from synthesis.polynomials.rational import rational
 
 MOST_BOXES = 300  # in balls
@@ -36,13 +37,18 @@ class Decision:
     open_at: tuple[fmpq, ...] | None = None
 
 
-def all_positive(polynomials: Sequence[PolynomialMatrix], offset: Sequence[fmpq], factor: Sequence[fmpq]) -> Decision:
-    """Every 1 x 1 polynomial on the box offset + factor [-1, 1]^v."""
+def all_positive(
+    polynomials: Sequence[PolynomialMatrix],
+    offset: Sequence[fmpq],
+    factor: Sequence[fmpq],
+    half_spaces: HalfSpaces = (),
+) -> Decision:
+    """Every 1 x 1 polynomial on the box offset + factor t, t in [-1, 1]^v where the half spaces of t hold."""
     for polynomial in polynomials:
         local = polynomial.affine(offset, factor)
-        found = _in_floats(local)
+        found = _in_floats(local, half_spaces)
         if isinstance(found, list):
-            found = _in_balls(local, found)
+            found = _in_balls(local, found, half_spaces)
         if not found.positive:
             places = (None if t is None else _outside(t, offset, factor) for t in (found.fails_at, found.open_at))
             return Decision(False, *places)
@@ -53,7 +59,7 @@ def _outside(t: tuple[fmpq, ...], offset: Sequence[fmpq], factor: Sequence[fmpq]
     return tuple(o + f * x for o, f, x in zip(offset, factor, t, strict=True))
 
 
-def _in_floats(polynomial: PolynomialMatrix) -> Decision | list[Box]:
+def _in_floats(polynomial: PolynomialMatrix, half_spaces: HalfSpaces) -> Decision | list[Box]:
     """The decision, or the boxes of [-1, 1]^v that float64 leaves open."""
     degrees, v = polynomial.degrees, polynomial.variables
     coefficients = np.zeros([d + 1 for d in degrees])
@@ -65,12 +71,18 @@ def _in_floats(polynomial: PolynomialMatrix) -> Decision | list[Box]:
         return [whole]
     boxes, centre, half = in_bernstein(coefficients, range(v))[None], np.zeros((1, v)), np.ones((1, v))
     left: list[Box] = []
+    faces = faces_of(half_spaces)
     for _ in range(LEVELS * max(v, 1)):
+        if faces is not None:
+            kept = ~faces.misses(centre, half)
+            boxes, centre, half = boxes[kept], centre[kept], half[kept]
+            if not len(boxes):
+                return left or Decision(True)
         lowest, highest = (f(boxes.reshape(len(boxes), -1), axis=1) for f in (np.min, np.max))
-        below = _negative_corner(boxes, centre, half, degrees, guard)
+        below = _negative_corner(boxes, centre, half, degrees, guard, faces)
         if below is not None:
             point = tuple(rational(float(x)) for x in below)
-            if polynomial.at(point)[0, 0] <= 0:
+            if polynomial.at(point)[0, 0] <= 0 and all(h.holds(point) for h in half_spaces):
                 return Decision(False, point)
         hopeless = highest <= 4.0 * guard
         left += [_exact(c, h) for c, h in zip(centre[hopeless], half[hopeless], strict=True)]
@@ -84,15 +96,22 @@ def _in_floats(polynomial: PolynomialMatrix) -> Decision | list[Box]:
 
 
 def _negative_corner(
-    boxes: FloatArray, centre: FloatArray, half: FloatArray, degrees: tuple[int, ...], guard: float
+    boxes: FloatArray,
+    centre: FloatArray,
+    half: FloatArray,
+    degrees: tuple[int, ...],
+    guard: float,
+    faces: Faces | None,
 ) -> FloatArray | None:
-    """The corner with the least value, if that is certainly negative."""
+    """The corner in the set with the least value, if that is certainly negative."""
     best, place = -guard, None
     for corner in np.ndindex(*(2 if d else 1 for d in degrees)):
+        places = centre + half * (2.0 * np.array(corner) - 1.0)
         values = boxes[(slice(None), *(-c for c in corner))]
+        values = values if faces is None else np.where(faces.inside(places), values, np.inf)
         worst = int(values.argmin())
         if values[worst] < best:
-            best, place = float(values[worst]), centre[worst] + half[worst] * (2.0 * np.array(corner) - 1.0)
+            best, place = float(values[worst]), places[worst]
     return place
 
 
@@ -122,18 +141,22 @@ def _exact(centre: FloatArray, half: FloatArray) -> Box:
     return tuple(rational(float(x)) for x in centre), tuple(rational(float(x)) for x in half)
 
 
-def _in_balls(polynomial: PolynomialMatrix, boxes: list[Box]) -> Decision:
+def _in_balls(polynomial: PolynomialMatrix, boxes: list[Box], half_spaces: HalfSpaces) -> Decision:
     """The same in 128 bits, on boxes of [-1, 1]^v."""
     waiting, done = list(boxes), 0
     if len(boxes) > MOST_BOXES:
         return Decision(False, None, boxes[0][0])
     while waiting:
         centre, half = waiting.pop()
+        if any(h.misses(centre, half) for h in half_spaces):
+            continue
         done += 1
         local = polynomial.affine(centre, half)
         sign = sign_on_box(local.balls())
         if sign.fails_at is not None:
-            return Decision(False, _outside(tuple(fmpq(t) for t in sign.fails_at), centre, half))
+            point = _outside(tuple(fmpq(t) for t in sign.fails_at), centre, half)
+            if all(h.holds(point) for h in half_spaces):
+                return Decision(False, point)
         if sign.positive:
             continue
         if done > MOST_BOXES:

@@ -17,6 +17,7 @@ from flint import fmpq
 from analysis import lpv_decay_rate, random_trajectories
 from analysis.errors import AnalysisError
 from analysis.uncertainty.margin import robust_stability_margin
+from analysis.uncertainty.worst_gain import worst_case_gain
 from estimators import Flag, GainSchedule, LpvObserver
 from estimators.errors import RangeError, ScheduleError
 from synthesis.certificate.proof import prove
@@ -100,6 +101,21 @@ def test_bounds_of_the_decay_rate_are_those_of_the_set() -> None:
 def test_what_is_about_boxes_says_so() -> None:
     with pytest.raises(AnalysisError, match=r"p \+ q <= 0.4.*about boxes"):
         robust_stability_margin(rotor(below(0.4)))
+
+
+def test_the_worst_gain_is_that_of_the_set() -> None:
+    """x' = -(2 - p - q) x + d, z = x: 1/(2 - max(p + q)), infinite on the box; one set misses its middle."""
+    A = [[p + q - 2]]
+    model = small_model(A, [[1]], [parameter("p"), parameter("q")], E=[[1]], F=[[0]])
+    assert worst_case_gain(model, ("d1",)).lower == np.inf
+    for most in (1.0, -0.5):
+        found = worst_case_gain(replaced(model, (below(most),)), ("d1",))
+        assert found.lower <= 1.0 / (2.0 - most) <= found.upper
+        assert found.upper < 1.002 * found.lower
+        assert sum(found.witness.values()) <= most
+    unstable = worst_case_gain(replaced(small_model(A, [[1]], [parameter("p", -1.5, 1.5), parameter("q", -1.5, 1.5)], E=[[1]],
+                                                    F=[[0]]), (below(2.1),)), ("d1",))  # fmt: skip
+    assert unstable.lower == np.inf and 2.0 <= sum(unstable.witness.values()) <= 2.1
 
 
 def test_designs_keep_to_the_set_and_undetectable_places_in_it_are_refused() -> None:
