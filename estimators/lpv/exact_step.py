@@ -143,7 +143,7 @@ class ExactStep:
             values = chebyshev((parameters - self.middle) / self.half, self.orders) @ self.coefficients
         else:
             number, t = self.cells.local(parameters)
-            values = (chebyshev(t, self.orders)[:, None] @ self.coefficients.take(number, 0))[:, 0]
+            values = np.einsum("gk,gkf->gf", chebyshev(t, self.orders), self.coefficients.take(number, 0))
         if self.divided:  # by the last column
             values = values / values[:, -1:]
         A, B, C, D = np.split(values, self.ends, axis=1)[:4]
