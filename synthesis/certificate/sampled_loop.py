@@ -15,11 +15,14 @@ from estimators.arrays import FloatArray
 from synthesis.certificate.unknowns import in_scaled_states
 from synthesis.lmi.samples import Samples
 from synthesis.loop.loop import Loop
+from synthesis.loop.on_boxes import MOST_BOXES
 from synthesis.loop.system import Region, System, Time
 from synthesis.polynomials.boxes import Boxes, orders
 from synthesis.polynomials.half_spaces import Faces
 
 MOST_PLACES = 4000  # of the parameters; larger tables are looked at in the corners of their cells only
+AT_ONCE = 2000  # cells of a table with more than MOST_BOXES of them, or places
+FEW = 50  # places that are worked out one by one
 MOST_STANDING = 600  # places of a rational plant that are looked at one by one
 INSIDE = 1e-7  # of a cell of a plant that jumps, from its border
 MATRICES = ("A", "C", "coasting", "denominator")
@@ -65,10 +68,12 @@ class SampledLoop:
 
     def at(self, places: FloatArray) -> System:
         """The system at scaled parameters (g, p), every matrix `Samples`."""
-        keys = [_key(place) for place in places]
-        for key in keys:
-            if key not in self._rows:
-                self._fill(self._standing(key), np.zeros((1, len(key))))
+        keys = _keys(places)
+        missing = [self._standing(key) for key in dict.fromkeys(keys) if key not in self._rows]
+        here = np.zeros((1, places.shape[1]))
+        if len(missing) < FEW or not self._fill_parts(missing, here):
+            for region in missing:
+                self._fill(region, here)
         rows = [self._rows[key] for key in keys]
 
         def stacked(name: Any) -> Samples:
@@ -100,18 +105,27 @@ class SampledLoop:
     def _fill_standing(self, cells: list[Region], local: FloatArray) -> bool:
         """Place by place: where cells are few and wide, the middle of an enclosed quotient is no good guess of it."""
         for offset, factor in zip(*_places(cells, local.shape[1]), strict=True):
-            for place in offset + factor * local:
-                key = _key(place)
+            for key in _keys(offset + factor * local):
                 if key not in self._rows and not self._fill(self._standing(key), np.zeros((1, len(key)))):
                     return False
         return True
 
     def _fill_at_once(self, cells: list[Region], local: FloatArray) -> bool:
-        """All cells from the middles of their enclosures, where the loop has them."""
+        """All cells from the middles of their enclosures, where the loop has them; those of a large table part by part."""
+        if len(cells) > MOST_BOXES:
+            return self._fill_parts(cells, local)
         if self.time not in self.on_boxes:
             quick = getattr(self.loop, "on_boxes", None)
             self.on_boxes[self.time] = None if quick is None else quick(self.time, cells)
-        system, count = self.on_boxes[self.time], local.shape[1]
+        return self._fill_boxes(self.on_boxes[self.time], cells, local)
+
+    def _fill_parts(self, cells: list[Region], local: FloatArray) -> bool:
+        quick = getattr(self.loop, "on_boxes", None)
+        parts = (cells[start : start + AT_ONCE] for start in range(0, len(cells), AT_ONCE))
+        return quick is not None and all(self._fill_boxes(quick(self.time, part), part, local) for part in parts)
+
+    def _fill_boxes(self, system: System | None, cells: list[Region], local: FloatArray) -> bool:
+        count = local.shape[1]
         if system is None:
             return False
         powers = np.array(orders(count, system.A.highest).powers)
@@ -138,8 +152,9 @@ class SampledLoop:
         offset, factor = _places(cells, count)
         places = np.round((offset + factor * local).reshape(-1, count), 12)
         _, first = np.unique(places, axis=0, return_index=True)
-        for index in np.sort(first):
-            self._rows[_key(places[index])] = {name: values[index] for name, values in found.items()}
+        first = np.sort(first)
+        for index, key in zip(first, _keys(places[first]), strict=True):
+            self._rows[key] = {name: values[index] for name, values in found.items()}
         return all(np.isfinite(values).all() for values in found.values())
 
     def _fill(self, region: Region, local: FloatArray) -> bool:
@@ -159,8 +174,8 @@ class SampledLoop:
         for letter in GROUPS:
             matrices: Mapping[str, Any] = getattr(system, letter)
             found |= {(letter, group): matrix.at(points)[..., 0] for group, matrix in matrices.items()}
-        for index, place in enumerate(offset + factor * local):
-            self._rows.setdefault(_key(place), {name: values[index] for name, values in found.items()})
+        for index, key in enumerate(_keys(offset + factor * local)):
+            self._rows.setdefault(key, {name: values[index] for name, values in found.items()})
         return True
 
 
@@ -173,6 +188,6 @@ def _places(cells: list[Region], count: int) -> tuple[FloatArray, FloatArray]:
     return offset, factor
 
 
-def _key(place: FloatArray) -> tuple[float, ...]:
+def _keys(places: FloatArray) -> list[tuple[float, ...]]:
     """Corners that neighbouring cells share are one place, although they were rounded separately."""
-    return tuple(float(x) for x in np.round(place, 12))
+    return [tuple(place) for place in np.round(places, 12).tolist()]

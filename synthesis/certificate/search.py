@@ -149,7 +149,9 @@ class Search:
         return next((x for x in levels if self.largest_margin(replace(wish, level=x)) > 0.0), np.inf)
 
     def _solved(self, asked: Asked, wish: Wish) -> RawAnswer:
-        found = exchange(asked.problem, asked.families, replace(self.settings, verify=False), ACCURACY)
+        beyond = np.inf if wish.level is None or asked.problem.margin_index is None else 0.0  # no margin at all
+        settings = replace(self.settings, verify=False)
+        found = exchange(asked.problem, asked.families, settings, ACCURACY, beyond)
         if not found.infeasible and np.isfinite(found.decisions).all():
             remember(asked.families, found.decisions, self._memory.setdefault(wish.kind, {}))
         return found

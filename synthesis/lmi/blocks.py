@@ -8,6 +8,8 @@ import numpy as np
 
 from estimators.arrays import FloatArray, IndexArray
 
+IN_CACHE = 1 << 17  # numbers that are worked on together
+
 
 class Blocks:
     """S_j = F_j0 + sum_i x_i F_ji: `fixed` (g, k, k) and `free` (g, k, k, n) for each group, and `columns`, its decisions.
@@ -70,13 +72,19 @@ class Blocks:
         parts = []
         for inverse, free, (_, _, weights) in zip(left, self.free, self.triangles, strict=True):
             size, count = inverse.shape[-1], free.shape[-1]
-            once = (inverse @ free.reshape(len(free), size, size * count)).reshape(free.shape)
             flat = np.empty((len(free), len(weights), count))
-            start = 0
-            for row in range(size):  # the F_i are symmetric, and only the upper triangle of what comes out is wanted
-                np.matmul(inverse[:, row:], once[:, row], out=flat[:, start : start + size - row])
-                start += size - row
-            flat *= weights[:, None]
+            places = max(1, IN_CACHE // (size * size * count))
+            for first in range(0, len(free), places):
+                here = slice(first, first + places)
+                left_here, out = inverse[here], flat[here]
+                once = (left_here @ free[here].reshape(-1, size, size * count)).reshape(-1, size, size, count)
+                start = 0
+                for row in range(
+                    size
+                ):  # the F_i are symmetric, and only the upper triangle of what comes out is wanted
+                    rest = left_here[:, row:] * weights[start : start + size - row, None]
+                    np.matmul(rest, once[:, row], out=out[:, start : start + size - row])
+                    start += size - row
             parts.append(flat.reshape(len(free) * len(weights), count))
         return parts
 

@@ -21,7 +21,8 @@ class RawAnswer:
     """A point and what the solver claims about it.
 
     `excluded` is what re-evaluation makes of a claim of infeasibility: no decisions of a 1-norm below it can satisfy the
-    inequalities (0: nothing is excluded, or nothing was claimed).
+    inequalities (0: nothing is excluded, or nothing was claimed). `centre` is a point on the way, and its mean complementarity:
+    what the same problem with a few more inequalities does well to start from.
     """
 
     solver: str
@@ -32,6 +33,7 @@ class RawAnswer:
     iterations: int
     seconds: float
     dual_bound: float
+    centre: tuple[FloatArray, float] | None = None
 
 
 def solve_with_clarabel(data: ConicData, decisions: int, settings: LmiSettings) -> RawAnswer:

@@ -45,7 +45,8 @@ FINE, ROUGH = 1e-6, 1e-3  # relative accuracy of an objective; of a largest marg
 class Family:
     """One inequality at the places where it is looked at.
 
-    `rows(places)` gives its values with unknowns (g, k, k, 1+N), `known(decisions, places)` those of known decisions (g, k, k).
+    `rows(places)` gives its values with unknowns (g, k, k, 1+N), `known(decisions, places)` those of known decisions (g, k, k);
+    `held` are those with unknowns that are worked out already.
     `active` are the indices of the places that are solved for. Where the first places are a grid, `shape` and `spacing` are
     those of `synthesis.lmi.local_minima`; without them only the places themselves are looked at.
     """
@@ -58,6 +59,16 @@ class Family:
     strict: bool = True
     shape: tuple[int, ...] = ()
     spacing: FloatArray | None = None
+    held: FloatArray | None = None
+
+    def values(self) -> FloatArray:
+        """With unknowns, at the places that are solved for; each is worked out once."""
+        more = self.active[0 if self.held is None else len(self.held) :]
+        if more:
+            rows = self.rows(self.places[more])
+            self.held = rows if self.held is None else np.concatenate([self.held, rows])
+        assert self.held is not None
+        return self.held
 
     def add(self, place: FloatArray) -> bool:
         """Look there, and solve for it; False if it is solved for already."""
@@ -115,8 +126,14 @@ class Family:
 Memory = dict[str, FloatArray]  # places of every inequality that decided when a problem of the same kind was solved
 
 
-def solve_sampled(relaxed: RelaxedProblem, settings: LmiSettings, tolerance: float = FINE) -> RawAnswer:
-    """Solve a sampled problem with the method for few places and many unknowns."""
+def solve_sampled(
+    relaxed: RelaxedProblem,
+    settings: LmiSettings,
+    tolerance: float = FINE,
+    beyond: float = np.inf,
+    centre: tuple[FloatArray, float] | None = None,
+) -> RawAnswer:
+    """Solve a sampled problem with the method for few places and many unknowns (`solve_with_interior`)."""
     if settings.solver.startswith("cvxpy:"):
         from synthesis.lmi.cvxpy_backend import solve_with_cvxpy  # cvxpy takes 1 s to import
 
@@ -130,7 +147,8 @@ def solve_sampled(relaxed: RelaxedProblem, settings: LmiSettings, tolerance: flo
         blocks.append(values)
     tolerance = max(settings.tolerance, tolerance)
     margins = [part.margin for part in relaxed.sampled]
-    found = solve_with_interior(blocks, relaxed.cost, relaxed.weights, tolerance, settings.max_iterations, margins)
+    most = settings.max_iterations
+    found = solve_with_interior(blocks, relaxed.cost, relaxed.weights, tolerance, most, margins, beyond, centre)
     if not found.infeasible:
         return found
     other = solve_with_clarabel(assemble(relaxed), len(relaxed.cost), settings)  # which polishes its evidence
@@ -138,10 +156,15 @@ def solve_sampled(relaxed: RelaxedProblem, settings: LmiSettings, tolerance: flo
 
 
 def exchange(
-    problem: LmiProblem, families: Sequence[Family], settings: LmiSettings, tolerance: float | None = None
+    problem: LmiProblem,
+    families: Sequence[Family],
+    settings: LmiSettings,
+    tolerance: float | None = None,
+    beyond: float = np.inf,
 ) -> RawAnswer:
     """Solve until no place that is looked at falls short; the families remember what is solved for.
 
+    A cost that is certainly above `beyond` ends it: more places only raise it.
     Without `verify` an objective that does not move any more ends it, too: then it bounds, and nothing else is asked of it.
     """
     index = problem.margin_index
@@ -151,18 +174,21 @@ def exchange(
     for _ in range(ROUNDS):
         sampled = tuple(
             SampledInequality(
-                family.name, widened(family.rows(places), problem.decisions), places,
+                family.name, widened(family.values(), problem.decisions), family.places[family.active],
                 max(settings.margin, EDGE) if family.strict else 0.0,
             )
-            for family in families if len(places := family.places[family.active])
+            for family in families if family.active
         )  # fmt: skip
         answer = solve_sampled(
-            RelaxedProblem("exchange", sampled, (), problem.cost, problem.weights), settings, tolerance
-        )
+            RelaxedProblem("exchange", sampled, (), problem.cost, problem.weights), settings, tolerance, beyond,
+            None if answer is None else answer.centre,
+        )  # fmt: skip
         iterations, seconds = iterations + answer.iterations, seconds + answer.seconds
         if answer.infeasible or not np.isfinite(answer.decisions).all():
             break
         value = float(problem.cost @ answer.decisions)
+        if value > beyond:
+            break
         if not settings.verify and index is None and abs(value - before) <= STEADY * abs(value):
             break
         if index is not None and hopeless(problem, answer):

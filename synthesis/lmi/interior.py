@@ -27,6 +27,7 @@ from synthesis.lmi.clarabel_backend import RawAnswer
 REGULAR = (1e-14, 1e-12, 1e-10, 1e-8)  # shares of the diagonal that keep the system definite where a direction is free
 STEP = 0.98  # of the way to the boundary
 LOST = 1e-3  # steps shorter than this lead nowhere
+INSIDE = 10.0  # eigenvalues of S to start with from a given centre are at least so many times its mean complementarity
 LIFTED = 1e-2  # relative accuracy with which the least lift of an infeasible problem is sought
 
 
@@ -51,6 +52,7 @@ class Found:
     point: Iterate
     status: str
     iterations: int
+    centre: tuple[FloatArray, float] | None = None
 
 
 def solve_with_interior(
@@ -60,12 +62,20 @@ def solve_with_interior(
     tolerance: float,
     limit: int = 100,
     margins: Sequence[float] = (),
+    beyond: float = np.inf,
+    centre: tuple[FloatArray, float] | None = None,
 ) -> RawAnswer:
-    """Solve; `given` holds arrays (g, k, k, 1+N) with their margins taken off. Bounds and evidence are those without margins."""
+    """Solve; `given` holds arrays (g, k, k, 1+N) with their margins taken off. Bounds and evidence are those without margins.
+
+    A cost that is certainly above `beyond` is as good as another; `centre` is that of an answer with fewer inequalities.
+    """
     began = perf_counter()
     blocks = Blocks(given, margins)
-    found = _run(blocks, cost, weights, tolerance, limit)
+    found = _run(blocks, cost, weights, tolerance, limit, beyond, centre)
     excluded, iterations = 0.0, found.iterations
+    if found.status != "Solved" and centre is not None:
+        found = _run(blocks, cost, weights, tolerance, limit, beyond)
+        iterations += found.iterations
     if found.status == "Stalled" and not _strict(blocks, found.point.x):
         excluded, more = _lift(given, margins, limit)
         iterations += more
@@ -77,7 +87,9 @@ def solve_with_interior(
         )
     status = "PrimalInfeasible" if excluded else found.status
     seconds = perf_counter() - began
-    return RawAnswer("interior", found.point.x, status, excluded > 0.0, excluded, iterations, seconds, bound)
+    return RawAnswer(
+        "interior", found.point.x, status, excluded > 0.0, excluded, iterations, seconds, bound, found.centre
+    )
 
 
 def _strict(blocks: Blocks, x: FloatArray) -> bool:
@@ -110,8 +122,18 @@ def _lift(given: Sequence[FloatArray], margins: Sequence[float], limit: int) -> 
     return (gap / max(rest, np.finfo(float).tiny) if gap > 0.0 else 0.0), found.iterations
 
 
-def _run(blocks: Blocks, cost: FloatArray, weights: FloatArray, tolerance: float, limit: int) -> Found:
-    point = _start(blocks, cost, weights)
+def _run(
+    blocks: Blocks,
+    cost: FloatArray,
+    weights: FloatArray,
+    tolerance: float,
+    limit: int,
+    beyond: float = np.inf,
+    centre: tuple[FloatArray, float] | None = None,
+) -> Found:
+    if weights.any():
+        centre = None  # of a strictly convex cost it is no better start than any
+    point = _start(blocks, cost, weights) if centre is None else _centred(blocks, *centre)
     if point is None:
         n = len(cost)
         return Found(Iterate(np.zeros(n), blocks.fixed, blocks.fixed), "Stalled", 0)
@@ -125,16 +147,20 @@ def _run(blocks: Blocks, cost: FloatArray, weights: FloatArray, tolerance: float
             s - fixed - part for s, fixed, part in zip(point.S, blocks.fixed, blocks.linear(point.x), strict=True)
         ]
         gap, value = point.gap, float(cost @ point.x) + 0.5 * float(weights @ point.x**2)
+        if centre is None or gap > abs(value):
+            centre = point.x, gap / blocks.order
         primal = max(float(np.abs(part).max()) for part in primal_rest) / size
         dual = float(np.abs(dual_rest).max(initial=0.0)) / max(1.0, float(np.abs(slope).max(initial=0.0)))
         if primal < 1e-8 and dual < 1e-6 and gap < best_gap:
             best, best_gap = point, gap
             if gap <= tolerance * max(abs(value), 1e-7):
-                return Found(point, "Solved", iteration)
+                return Found(point, "Solved", iteration, centre)
         # Where multipliers are large, rounding leaves more of the dual equations; what that can cost is what counts.
         lost = gap + float(np.abs(dual_rest) @ np.maximum(np.abs(point.x), 1e-3))
         if primal < 1e-8 and lost <= tolerance * max(abs(value), 1e-7):
-            near = Found(point, "Solved", iteration)
+            near = Found(point, "Solved", iteration, centre)
+        if primal < 1e-8 and value - lost > beyond:
+            return Found(point, "Solved", iteration, centre)
         moved = _step(blocks, point, weights, dual_rest, primal_rest)
         if moved is None:
             break
@@ -142,7 +168,7 @@ def _run(blocks: Blocks, cost: FloatArray, weights: FloatArray, tolerance: float
     if near is not None and not best_gap <= tolerance * max(abs(float(cost @ best.x)), 1e-7):
         return near
     almost = np.isfinite(best_gap) and best_gap <= 1e-3 * max(abs(float(cost @ best.x)), 1e-7)
-    return Found(best if np.isfinite(best_gap) else point, "AlmostSolved" if almost else "Stalled", limit)
+    return Found(best if np.isfinite(best_gap) else point, "AlmostSolved" if almost else "Stalled", limit, centre)
 
 
 def _start(blocks: Blocks, cost: FloatArray, weights: FloatArray) -> Iterate | None:
@@ -155,6 +181,17 @@ def _start(blocks: Blocks, cost: FloatArray, weights: FloatArray) -> Iterate | N
     S = [fixed + part for fixed, part in zip(blocks.fixed, blocks.linear(x), strict=True)]
     Y = blocks.linear(normal.solve(cost + weights * x))
     return Iterate(x, _lifted(S), _lifted(Y))
+
+
+def _centred(blocks: Blocks, x: FloatArray, mean: float) -> Iterate:
+    """S and Y with S Y = `mean` I, S as the inequalities are at x where that is inside."""
+    S, Y = [], []
+    for fixed, part in zip(blocks.fixed, blocks.linear(x), strict=True):
+        values, vectors = np.linalg.eigh(fixed + part)
+        values = np.maximum(values, INSIDE * mean)[:, None]
+        S.append((vectors * values) @ np.swapaxes(vectors, -1, -2))
+        Y.append((vectors * (mean / values)) @ np.swapaxes(vectors, -1, -2))
+    return Iterate(x, S, Y)
 
 
 def _lifted(matrices: list[FloatArray]) -> list[FloatArray]:
@@ -203,18 +240,22 @@ def _step(
     rest = [a @ part @ np.swapaxes(a, -1, -2) for a, part in zip(left, primal_rest, strict=True)]
     mean = point.gap / blocks.order
 
-    def direction(right: list[FloatArray]) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
+    def direction(
+        right: list[FloatArray],
+    ) -> tuple[FloatArray, list[FloatArray], list[FloatArray], list[FloatArray]]:
         asked = [q + part for q, part in zip(right, rest, strict=True)]
         x = normal.solve(blocks.against(turned, asked) - dual_rest)
-        change = [a @ part @ np.swapaxes(a, -1, -2) for a, part in zip(left, blocks.linear(x), strict=True)]
+        moved = blocks.linear(x)
+        change = [a @ part @ np.swapaxes(a, -1, -2) for a, part in zip(left, moved, strict=True)]
         return (
             x,
+            moved,
             [c - r for c, r in zip(change, rest, strict=True)],
             [q - c for q, c in zip(asked, change, strict=True)],
         )
 
     eye = [np.eye(v.shape[-1]) for v in values]
-    _, dS, dY = direction([-v[..., None] * e for v, e in zip(values, eye, strict=True)])
+    _, _, dS, dY = direction([-v[..., None] * e for v, e in zip(values, eye, strict=True)])
     reach = min(1.0, _reach(values, dS), _reach(values, dY))
     centring = (1.0 - reach) ** 3
     right = []
@@ -222,11 +263,11 @@ def _step(
         product = s @ y
         wanted = (centring * mean - v[..., None] ** 2) * e - 0.5 * (product + np.swapaxes(product, -1, -2))
         right.append(2.0 * wanted / (v[:, :, None] + v[:, None, :]))
-    x, dS, dY = direction(right)
+    x, moved, dS, dY = direction(right)
     reach = min(1.0, STEP * _reach(values, dS), STEP * _reach(values, dY))
     if not (np.isfinite(x).all() and reach > LOST):
         return None
-    S = [old + reach * (part - r) for old, part, r in zip(point.S, blocks.linear(x), primal_rest, strict=True)]
+    S = [old + reach * (part - r) for old, part, r in zip(point.S, moved, primal_rest, strict=True)]
     back = [np.swapaxes(a, -1, -2) @ y @ a for a, y in zip(left, dY, strict=True)]
     Y = [old + reach * 0.5 * (y + np.swapaxes(y, -1, -2)) for old, y in zip(point.Y, back, strict=True)]
     return Iterate(point.x + reach * x, S, Y)

@@ -63,7 +63,7 @@ def gains(
     """
     count, first = len(breakpoints), next(iter(table.values()))
     shape = first.nrows(), first.ncols()
-    numbers = {index: np.array([_float(x) for x in m.entries()]).reshape(shape) for index, m in table.items()}
+    numbers: dict[tuple[int, ...], FloatArray] = {}  # of the corners that are met
     scaled = [[axis.scaled(x) for x in line] for axis, line in zip(axes, breakpoints, strict=True)]
     moved = np.empty((len(cells), *(2,) * count, *shape))
     offset, factor = np.empty((len(cells), count)), np.empty((len(cells), count))
@@ -75,7 +75,10 @@ def gains(
             middle, half = (line[k] + line[k + 1]) / 2, (line[k + 1] - line[k]) / 2
             offset[g, i], factor[g, i] = _float((cell.offset[i] - middle) / half), _float(cell.factor[i] / half)
         for corner in product((0, 1), repeat=count):
-            moved[(g, *corner)] = numbers[tuple(k + c for k, c in zip(low, corner, strict=True))]
+            index = tuple(k + c for k, c in zip(low, corner, strict=True))
+            if index not in numbers:
+                numbers[index] = np.array([_float(x) for x in table[index].entries()]).reshape(shape)
+            moved[(g, *corner)] = numbers[index]
     size = np.abs(moved).sum(axis=tuple(range(1, count + 1)))
     for axis in range(count):
         left, right = np.take(moved, 0, axis=axis + 1), np.take(moved, 1, axis=axis + 1)
