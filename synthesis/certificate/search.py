@@ -38,6 +38,10 @@ from synthesis.polynomials.rational import as_float
 ANGLES = np.concatenate([[0.0], np.geomspace(1e-3, np.pi, 15)])  # per sample, where the size of a gain is looked for
 ACCURACY = 1e-4  # relative, of a least gain or a largest margin: what holds is proved afterwards
 STALLED = (1.0005, 1.002, 1.01, 1.05, 1.2)  # times the level that a stalled solve names
+BENDS, PATIENCE = (
+    2,
+    6,
+)  # P of a higher degree gives way between few places: levels rest for some rounds before they rise
 PROOFS = 3  # of one wish: a place where one fails is solved for, too
 
 
@@ -139,10 +143,7 @@ class Search:
         return frozen_level(self.loop, self._sizes(wish.channel, wish.kind), self._errors(wish), wish.kind)
 
     def _held_level(self, wish: Wish, named: float) -> float:
-        """The first level above one that a stalled solve named where all inequalities have a margin; inf if none of a few has.
-
-        No level of an update lies below the one of parameters that stand still, whatever the solve names.
-        """
+        """The first level above one that a stalled solve named where all inequalities have a margin; inf if none of a few has."""
         if wish.kind.startswith("sampled"):
             named = max(named if np.isfinite(named) else 0.0, self.frozen_level(wish))
         levels = (named * step for step in STALLED) if np.isfinite(named) else ()
@@ -150,8 +151,9 @@ class Search:
 
     def _solved(self, asked: Asked, wish: Wish) -> RawAnswer:
         beyond = np.inf if wish.level is None or asked.problem.margin_index is None else 0.0  # no margin at all
+        patience = PATIENCE if max(asked.P.degrees, default=0) > BENDS else 1
         settings = replace(self.settings, verify=False)
-        found = exchange(asked.problem, asked.families, settings, ACCURACY, beyond)
+        found = exchange(asked.problem, asked.families, settings, ACCURACY, beyond, patience)
         if not found.infeasible and np.isfinite(found.decisions).all():
             remember(asked.families, found.decisions, self._memory.setdefault(wish.kind, {}))
         return found

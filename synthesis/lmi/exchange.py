@@ -161,16 +161,17 @@ def exchange(
     settings: LmiSettings,
     tolerance: float | None = None,
     beyond: float = np.inf,
+    patience: int = 1,
 ) -> RawAnswer:
     """Solve until no place that is looked at falls short; the families remember what is solved for.
 
-    A cost that is certainly above `beyond` ends it: more places only raise it.
-    Without `verify` an objective that does not move any more ends it, too: then it bounds, and nothing else is asked of it.
+    A cost that is certainly above `beyond` ends it: more places only raise it. Without `verify` an objective that does not move
+    for `patience` rounds ends it, too: then it bounds, and nothing else is asked of it.
     """
     index = problem.margin_index
     if tolerance is None:
         tolerance = ROUGH if index is not None or problem.least_norm else FINE
-    iterations, seconds, before, answer = 0, 0.0, np.inf, None
+    iterations, seconds, before, steady, answer = 0, 0.0, np.inf, 0, None
     for _ in range(ROUNDS):
         sampled = tuple(
             SampledInequality(
@@ -189,7 +190,8 @@ def exchange(
         value = float(problem.cost @ answer.decisions)
         if value > beyond:
             break
-        if not settings.verify and index is None and abs(value - before) <= STEADY * abs(value):
+        steady = steady + 1 if abs(value - before) <= STEADY * abs(value) else 0
+        if not settings.verify and index is None and steady == patience:
             break
         if index is not None and hopeless(problem, answer):
             break  # even these places leave no margin
