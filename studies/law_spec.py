@@ -29,12 +29,6 @@ KEYS_OF = {  # of [design], beside those that observers have
 OF_LAWS = tuple(dict.fromkeys(key for keys in KEYS_OF.values() for key in keys))
 FeedbackDesign = StateFeedbackDesign | OutputFeedbackDesign | StaticFeedbackDesign
 OF_CHANNELS = ("errors", "performance", "sizes", "norm")  # one of the first two is there
-OTHER_NORMS = (
-    None,
-    "state feedback",
-    "sampled state feedback",
-    "static output feedback",
-)  # laws that take more than L2 gains
 
 
 def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
@@ -50,10 +44,6 @@ def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
             raise ValueError(f"{place}: {wanted} is missing; {who} needs it")
         if channel.sizes is not None and not feedback:
             raise ValueError(f"{place}: sizes are not for an observer; remove them")
-        if channel.norm not in (None, "H-infinity") and design.law not in OTHER_NORMS:
-            raise ValueError(
-                f'{place}: norm = "{channel.norm}" is not for {who}, whose channels are L2 gains; remove it'
-            )
     if feedback and "update" in deploy.model_fields_set:
         raise ValueError(f"deploy.update is not for {who}, which runs once a sample; remove it")
     if feedback and (design.input_limits is None) != (design.state_sizes is None):
@@ -73,7 +63,7 @@ def check_keys(design: DesignSpec, deploy: DeploySpec) -> None:
 
 def _check_regions(design: DesignSpec, deploy: DeploySpec, who: str) -> None:
     """Their law has them, in its time."""
-    if design.law not in (None, "state feedback", SAMPLED):
+    if design.law == "static output feedback":
         raise ValueError(f"design.regions are not for {who}; remove them, or give a decay rate")
     discrete = design.law == SAMPLED or (design.law is None and deploy.update == "sampled")
     try:
@@ -112,7 +102,7 @@ def feedback_design(spec: DesignSpec) -> FeedbackDesign:
         measured = None if spec.measured is None else tuple(spec.measured)
         return OutputFeedbackDesign(
             channels, spec.degree, spec.decay_rate, spec.fastest_pole, spec.feedthrough, measured,
-            backoff=spec.backoff, settings=settings,
+            backoff=spec.backoff, settings=settings, regions=regions_of(spec),
         )  # fmt: skip
     if spec.law == "static output feedback":
         start = None if spec.start is None else tuple(tuple(row) for row in spec.start)

@@ -23,6 +23,7 @@ from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGain
 from synthesis.design.output_feedback import OutputFeedbackDesign
 from synthesis.design.refusals import refuse_feedthrough, refuse_undetectable
 from synthesis.design.state_feedback import StateFeedbackDesign, check_limits
+from synthesis.design.static_feedback_design import StaticFeedbackDesign
 from synthesis.design.weighted_state_feedback import check_weighted_states
 from synthesis.errors import ProblemError
 from synthesis.models.lpv import LpvModel
@@ -62,7 +63,7 @@ def _check_feedback(spec: ScheduleSpec, model: LpvModel) -> None:
     limits = design.limits if isinstance(design, StateFeedbackDesign) else None
     check_limits(model, limits)
     for channel, (W, Z) in zip(design.channels, pairs, strict=True):
-        if channel.norm != "H-infinity" and spec.law == "state feedback":
+        if channel.norm != "H-infinity" and spec.law in ("state feedback", "output feedback"):
             refuse_feedthrough(model, channel, Z, W)
     if spec.weight_states and isinstance(design, StateFeedbackDesign):
         check_weighted_states(model, spec.weight_states)
@@ -78,7 +79,7 @@ def _check_feedback(spec: ScheduleSpec, model: LpvModel) -> None:
         )
     if not isinstance(design, StateFeedbackDesign):
         refuse_undetectable(model, measured_rows(model, getattr(design, "measured", None)))
-    if design.fastest_pole is not None or (isinstance(design, StateFeedbackDesign) and design.regions.bounded):
+    if design.fastest_pole is not None or (not isinstance(design, StaticFeedbackDesign) and design.regions.bounded):
         return
     if isinstance(design, OutputFeedbackDesign):
         _check_noise(model, forces, measured_rows(model, design.measured))

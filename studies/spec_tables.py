@@ -36,7 +36,7 @@ class ChannelSpec(StrictTable):
     """One channel of the design; without `bound` it is the one that is minimised.
 
     An observer has `errors`, a feedback law `performance` signals with `sizes`. `norm`: what is bounded, the L2 gain if it is
-    left out (synthesis.design.norms); not for dynamic output feedback.
+    left out (synthesis.design.norms).
     """
 
     disturbances: list[str] = Field(min_length=1)

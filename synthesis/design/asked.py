@@ -37,12 +37,10 @@ class Asked(Protocol):
 Kind = TypeVar("Kind", bound=Asked)
 
 
-def check_channels(
-    channels: Sequence[Asked], ends: Sequence[tuple[str, ...]], what: str, norms: Sequence[Norm] = NORMS
-) -> None:
+def check_channels(channels: Sequence[Asked], ends: Sequence[tuple[str, ...]], what: str) -> None:
     """Exactly one channel is minimised, the others have positive bounds, and none is without a `what` at its end.
 
-    Raises ProblemError, also for a norm that is not one of `norms`.
+    Raises ProblemError.
     """
     if sum(channel.bound is None for channel in channels) != 1:
         raise ProblemError("exactly one channel must have no bound: it is the one that is minimised")
@@ -53,11 +51,6 @@ def check_channels(
             raise ProblemError(f"channel '{channel.name}' needs at least one disturbance and one {what}")
         if channel.norm not in NORMS:
             raise ProblemError(f"channel '{channel.name}': {unknown('norm', channel.norm, NORMS)}")
-        if channel.norm not in norms:
-            raise ProblemError(
-                f"channel '{channel.name}': the norm '{channel.norm}' is not for this law, whose channels have "
-                f"{', '.join(norms)}; observers, state feedback and static output feedback take it"
-            )
 
 
 def minimised_channel(channels: Sequence[Kind]) -> Kind:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,6 +83,6 @@ def feedback_channel_matrices(model: LpvModel, channel: FeedbackChannel) -> tupl
     return np.asarray(W), np.asarray(Z)
 
 
-def check_feedback_channels(channels: tuple[FeedbackChannel, ...], norms: Sequence[Norm] = ("H-infinity",)) -> None:
-    """As `synthesis.design.asked.check_channels`; a design that knows other norms names them."""
-    check_channels(channels, [channel.performance for channel in channels], "performance signal", norms)
+def check_feedback_channels(channels: tuple[FeedbackChannel, ...]) -> None:
+    """As `synthesis.design.asked.check_channels`."""
+    check_channels(channels, [channel.performance for channel in channels], "performance signal")

@@ -9,20 +9,24 @@ what is claimed of it is proved of that table, whatever the inequalities here ha
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from functools import partial
+from typing import Any, ClassVar
 
 import numpy as np
+from scipy.optimize import minimize
 
 from estimators.arrays import FloatArray
 from estimators.display import Display
 from synthesis.design.asked import check_degree_and_poles, check_shares, minimised_channel
-from synthesis.design.feedback_channel import FeedbackChannel, check_feedback_channels
+from synthesis.design.feedback_channel import FeedbackChannel, check_feedback_channels, feedback_channel_matrices
 from synthesis.design.generalised_plant import Frame, GeneralisedPlant, frame_of, generalised_plant, measured_rows
 from synthesis.design.halves import halves_of
 from synthesis.design.output_feedback_lmi import Still, Wanted, build
+from synthesis.design.pole_regions import PoleRegions
 from synthesis.design.reconstruct import reconstructed
-from synthesis.design.refusals import refuse_undetectable, refuse_unstabilisable
+from synthesis.design.refusals import refuse_feedthrough, refuse_undetectable, refuse_unstabilisable
 from synthesis.design.three_solves import Problem, least, starting_places, three_solves
 from synthesis.errors import ProblemError
 from synthesis.lmi.exchange import Memory
@@ -33,6 +37,10 @@ from synthesis.loop.feedback import Measured
 from synthesis.models.lpv import LpvModel
 
 RATIONAL = 2  # degrees of P that come close to an inverse
+TRIALS = 12  # of each weight
+HUGE = 1e30  # for a search, what was not found at all
+
+Tried = tuple[LmiResult, Wanted, Problem, Memory]
 
 
 @dataclass(frozen=True, repr=False)
@@ -56,6 +64,7 @@ class OutputFeedbackDesign(Display):
     backoff: float = 0.01  # the minimised gain may be this fraction worse; what it buys is margin
     reserve: float = 0.01  # poles are designed this much tighter than they are claimed, for the table's sake
     settings: LmiSettings = field(default_factory=LmiSettings)
+    regions: PoleRegions = field(default_factory=PoleRegions)  # of every frozen pole, in continuous time
 
     def __post_init__(self) -> None:
         check_feedback_channels(self.channels)
@@ -63,6 +72,7 @@ class OutputFeedbackDesign(Display):
         check_shares(self.backoff, self.reserve)
         if self.backoff == 0.0:
             raise ProblemError("backoff 0 must be more: gains grow without end at the optimum")
+        self.regions.refuse_for("continuous")
 
     @property
     def minimised(self) -> FeedbackChannel:
@@ -75,8 +85,8 @@ class OutputFeedback(Display):
     """A controller with the bound that was minimised.
 
     `gamma` is the level that the inequalities prove, `gamma_lower` a bound from below for every X and Y of these degrees in one
-    of the two forms (weak duality), where there is one. `result` carries verdict and margins, `optimum` the first solve, and
-    `wanted.still` says which form was taken.
+    of the two forms (weak duality), where there is one; where norms differ, for the weights of channels that were found.
+    `result` carries verdict and margins, `optimum` the first solve, and `wanted.still` says which form was taken.
     """
 
     design: OutputFeedbackDesign
@@ -160,6 +170,10 @@ def design_output_feedback(model: LpvModel, design: OutputFeedbackDesign) -> Out
     """
     refuse_unstabilisable(model)
     refuse_undetectable(model, measured_rows(model, design.measured))
+    for channel in design.channels:
+        if channel.norm != "H-infinity":
+            W, Z = feedback_channel_matrices(model, channel)
+            refuse_feedthrough(model, channel, Z, W)
     plants, middle = plants_of(model, design)
     feedthrough, frame, tight = _feedthrough(model, design, plants), frame_of(middle), 1.0 + design.reserve
     weights = halves_of(middle, frame).weights
@@ -168,9 +182,12 @@ def design_output_feedback(model: LpvModel, design: OutputFeedbackDesign) -> Out
     settings = design.settings
     if settings.relaxation == "auto":  # unknowns that run away at the optimum end other solvers early
         settings = replace(settings, relaxation="exchange")
-    tried: list[tuple[LmiResult, Wanted, Problem, Memory]] = []
+    tried: list[Tried] = []
     for form in _forms(model, design):
-        wanted = Wanted(design.degree, design.decay_rate * tight / frame.clock, radius, feedthrough, form, frame.clock)
+        wanted = Wanted(
+            design.degree, design.decay_rate * tight / frame.clock, radius, feedthrough, form, frame.clock,
+            design.regions, design.reserve, (1.0,) * len(design.channels),
+        )  # fmt: skip
 
         def problem(
             gamma: float | None, margin: bool = True, floor: float = 0.0, wanted: Wanted = wanted
@@ -182,13 +199,42 @@ def design_output_feedback(model: LpvModel, design: OutputFeedbackDesign) -> Out
             )
 
         memory = starting_places(problem(None))
-        tried.append((least(problem, design.backoff, settings, memory), wanted, problem, memory))
+
+        def weighed(weights: tuple[float, ...], wanted: Wanted = wanted, memory: Memory = memory) -> Tried:
+            own = replace(wanted, weights=weights)
+            posed = partial(problem, wanted=own)
+            return least(posed, design.backoff, settings, memory), own, posed, memory
+
+        tried.append(_best_weighed(design, weighed))
     found = [entry[0] for entry in tried]
     optimum, wanted, problem, memory = min(tried, key=lambda entry: _named(entry[0]))
     settled = three_solves(model.name, problem, lambda x: x * frame.unit, design.backoff, settings, optimum, memory)
     lower = [result.lower_bound for result in found if np.isfinite(_named(result))]
     bound = None if None in lower else max(min(x for x in lower if x is not None), 0.0) * frame.unit
     return OutputFeedback(design, model, bound, settled.gamma, settled.result, optimum, frame, wanted)
+
+
+def _best_weighed(design: OutputFeedbackDesign, weighed: Callable[[tuple[float, ...]], Tried]) -> Tried:
+    """The least first solve, over the weights of bounded channels where norms differ: a search, as it is not convex in them."""
+    best = weighed((1.0,) * len(design.channels))
+    free = [channel.bound is not None for channel in design.channels]
+    if len({channel.norm for channel in design.channels}) == 1:
+        return best
+
+    def level(logarithms: FloatArray) -> float:
+        nonlocal best
+        weights = np.ones(len(free))
+        weights[free] = 10.0**logarithms
+        found = weighed(tuple(weights.tolist()))
+        if _named(found[0]) < _named(best[0]):
+            best = found
+        return min(_named(found[0]), HUGE)
+
+    count = sum(free)
+    corners = 0.5 * np.vstack([np.zeros(count), np.eye(count)])
+    options: Any = {"initial_simplex": corners, "maxfev": TRIALS * count, "xatol": 0.05, "fatol": 0.0}
+    minimize(level, np.zeros(count), method="Nelder-Mead", options=options)
+    return best
 
 
 def _named(result: LmiResult) -> float:
@@ -209,6 +255,15 @@ def _forms(model: LpvModel, design: OutputFeedbackDesign) -> tuple[Still, ...]:
 def _feedthrough(model: LpvModel, design: OutputFeedbackDesign, plants: list[GeneralisedPlant]) -> bool:
     """Whether Dk is an unknown. Raises ProblemError where it is asked for and cannot be."""
     loops = any(plant.D.any() for plant in plants)
+    for part in (part for plant in plants for part in plant.channels if part.channel.norm != "H-infinity"):
+        if not (part.Dzu.any() and part.F.any()):
+            continue
+        if design.feedthrough:
+            raise ProblemError(
+                f"channel '{part.channel.name}': with feedthrough its measurement noise moves inputs at once, where the norm "
+                f"'{part.channel.norm}' is infinite; leave `feedthrough` out"
+            )
+        loops = True
     if design.feedthrough and loops:
         raise ProblemError(
             f"model '{model.name}' takes no feedthrough: the inputs act on a measured output at once (D), which would close an "

@@ -15,6 +15,11 @@ The off-diagonal term is the only place where Ak would need the rate. It vanishe
     channel        [A_c + A_c' + dP/dt, B_c, C_c'; *, -g I, D_c'; *, *, -g I] < 0          L2 gain at most g
     decay          A_c + A_c' + dP/dt + 2 alpha P_c < 0
     fastest pole   [r P_c, A_c; A_c', r P_c] > 0                                           every frozen pole within a disc
+    regions        as in `synthesis.design.pole_regions`, with V = P_c and M = A_c
+    other norms    as in `synthesis.design.norms`, with V of P_c, where D_c = 0
+
+A channel of bound g weighs in V by w/g: g is w g for its d and g/w for its z. Among L2 gains all w are one; with other norms,
+whose V has other units, they are sought (`synthesis.design.output_feedback`).
 
 The halves of Y and of X are written in coordinates of their own, with J for I (`synthesis.design.halves`). Ah enters the upper
 right block of one inequality only where nothing else is asked for: then it is eliminated (projection lemma: both diagonal parts,
@@ -33,6 +38,8 @@ from estimators.arrays import FloatArray
 from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.design.generalised_plant import ChannelPlant
 from synthesis.design.halves import Halves
+from synthesis.design.norms import ChannelSizes, require_energy
+from synthesis.design.pole_regions import PoleRegions, require_regions
 from synthesis.lmi.problem import LmiProblem
 from synthesis.models.param import SchedulingParameter
 from synthesis.polynomials.half_spaces import HalfSpaces
@@ -52,10 +59,14 @@ class Wanted:
     feedthrough: bool
     still: Still
     clock: float  # rates of parameters are given in 1/s
+    regions: PoleRegions  # in 1/s
+    reserve: float  # of these
+    weights: tuple[float, ...]  # w of every channel
 
-    def eliminated(self, channels: int) -> bool:
-        """Whether there is one inequality in Ah only: that of one channel."""
-        return channels == 1 and self.radius is None and not self.decay
+    def eliminated(self, channels: Sequence[ChannelPlant]) -> bool:
+        """Whether there is one inequality in Ah only: that of one L2 gain."""
+        alone = len(channels) == 1 and channels[0].channel.norm == "H-infinity"
+        return alone and self.radius is None and not self.decay and not self.regions
 
 
 def build(
@@ -76,7 +87,10 @@ def build(
     unknowns = _unknowns(problem, first, wanted)
     J = problem.constant(first.joint)
     problem.require("coupling", symmetric_block([[unknowns["Y"], J], [None, unknowns["X"]]]))
-    level = {part.channel: _level(problem, levels[part.channel]) for part in first.filter.channels}
+    level = [
+        _sizes(part.channel, wanted, weight, _level(problem, levels[part.channel]))
+        for part, weight in zip(first.filter.channels, wanted.weights, strict=True)
+    ]
     for number, (box, plant) in enumerate(plants):
         problem.on_cell(number, box)
         _require(problem, _Loop(problem, plant, wanted, unknowns), plant, wanted, level)
@@ -84,18 +98,16 @@ def build(
     return problem
 
 
-def _require(
-    problem: LmiProblem, loop: _Loop, plant: Halves, wanted: Wanted, levels: dict[FeedbackChannel, MatrixPolynomial]
-) -> None:
+def _require(problem: LmiProblem, loop: _Loop, plant: Halves, wanted: Wanted, levels: Sequence[ChannelSizes]) -> None:
     """What is asked of one piece."""
     parts = [
-        ({"Y": first, "X": second}, levels[first.channel])
-        for first, second in zip(plant.regulator.channels, plant.filter.channels, strict=True)
+        ({"Y": first, "X": second}, sizes)
+        for first, second, sizes in zip(plant.regulator.channels, plant.filter.channels, levels, strict=True)
     ]
-    if wanted.eliminated(len(parts)):
-        ((part, level),) = parts
+    if wanted.eliminated(plant.filter.channels):
+        ((part, sizes),) = parts
         for half, word in (("Y", "regulator"), ("X", "filter")):
-            block = loop.gain(part[half], level, loop.rate(half), loop.input(part, half), loop.output(part, half).T)
+            block = loop.gain(part[half], sizes, loop.rate(half), loop.input(part, half), loop.output(part, half).T)
             problem.require(f"gain {part[half].channel.name}, {word}", -block)
         return
     rate = symmetric_block([[loop.rate("Y"), loop.cross], [None, loop.rate("X")]])
@@ -106,10 +118,17 @@ def _require(
     if wanted.radius is not None:
         disc = loop.coupling.scaled_by(loop.below) * wanted.radius
         problem.require("fastest pole", symmetric_block([[disc, loop.closed_loop()], [None, disc]]))
-    for part, level in parts:
+    if wanted.regions:
+        lyapunov = loop.coupling.scaled_by(loop.below)
+        require_regions(problem, wanted.regions, wanted.reserve, wanted.clock, loop.closed_loop(), lyapunov)
+    for part, sizes in parts:
         inputs = over(loop.input(part, "Y"), loop.input(part, "X"))
         outputs = over(loop.output(part, "Y").T, loop.output(part, "X").T)
-        problem.require(f"gain {part['X'].channel.name}", -loop.gain(part["X"], level, rate, inputs, outputs))
+        if sizes.norm == "H-infinity":
+            problem.require(f"gain {sizes.name}", -loop.gain(part["X"], sizes, rate, inputs, outputs))
+            continue
+        lyapunov = loop.weighted(loop.coupling)
+        require_energy(problem, sizes, -rate, inputs, outputs.T, lyapunov, loop.below, wanted.clock)
 
 
 def _unknowns(problem: LmiProblem, plant: Halves, wanted: Wanted) -> dict[str, MatrixPolynomial]:
@@ -124,7 +143,7 @@ def _unknowns(problem: LmiProblem, plant: Halves, wanted: Wanted) -> dict[str, M
     found["Ch"] = problem.matrix("Ch", m, n, wanted.degree)
     if wanted.feedthrough:
         found["Dh"] = problem.matrix("Dh", m, k, wanted.degree)
-    if not wanted.eliminated(len(plant.filter.channels)):
+    if not wanted.eliminated(plant.filter.channels):
         found["cross"] = problem.matrix("cross", n, n, wanted.degree)
     return found
 
@@ -135,6 +154,10 @@ def _level(problem: LmiProblem, level: float | None) -> MatrixPolynomial:
     unknown = problem.scalar("gamma")
     problem.minimise("gamma")
     return unknown
+
+
+def _sizes(channel: FeedbackChannel, wanted: Wanted, weight: float, level: MatrixPolynomial) -> ChannelSizes:
+    return ChannelSizes(channel.name, channel.norm, wanted.degree, level * weight, level * (1.0 / weight))
 
 
 Pair = dict[str, ChannelPlant]  # a channel in the coordinates of both halves
@@ -212,13 +235,15 @@ class _Loop:
         return (self._over(Cz) @ self.unknown["Y"] + self._over(Dzu) @ self.Ch) @ self.weights[half]
 
     def gain(
-        self, part: ChannelPlant, level: MatrixPolynomial, rate: MatrixPolynomial, inputs: MatrixPolynomial,
+        self, part: ChannelPlant, sizes: ChannelSizes, rate: MatrixPolynomial, inputs: MatrixPolynomial,
         outputs: MatrixPolynomial,
     ) -> MatrixPolynomial:  # fmt: skip
         """The block of a channel; `outputs` is C_c'."""
         direct = self._with_feedthrough(*(self._known(m) for m in (part.Dzd, part.Dzu, part.F)))
-        level = level.scaled_by(self.below)
-        w, z = (self.problem.constant(np.eye(size)).scaled_by(level) for size in (direct.shape[1], direct.shape[0]))
+        w, z = (
+            self.problem.constant(np.eye(count)).scaled_by(level.scaled_by(self.below))
+            for count, level in ((direct.shape[1], sizes.inner), (direct.shape[0], sizes.outer))
+        )
         return symmetric_block([[rate, inputs, outputs], [None, -w, direct.T], [None, None, -z]])
 
     def _with_feedthrough(

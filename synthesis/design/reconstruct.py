@@ -28,7 +28,7 @@ def reconstructed(plant: Halves, result: LmiResult, wanted: Wanted, points: Floa
         result.values["Dh"].at(still)[..., 0] if wanted.feedthrough else np.zeros((len(points), B.shape[2], C.shape[1]))
     )
     J, Br, Ar = plant.joint, values(plant.regulator.B, points) / below, values(plant.regulator.A, points) / below
-    if wanted.eliminated(len(plant.filter.channels)):
+    if wanted.eliminated(plant.filter.channels):
         regulator, filtering = (
             {key: values(getattr(half.channels[0], key), points) / below for key in ("E", "F", "Cz", "Dzd", "Dzu")}
             for half in (plant.regulator, plant.filter)

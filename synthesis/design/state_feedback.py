@@ -31,7 +31,7 @@ from synthesis.design.asked import check_degree_and_poles, check_shares, minimis
 from synthesis.design.feedback_channel import FeedbackChannel, check_feedback_channels, feedback_channel_matrices
 from synthesis.design.feedback_scale import FeedbackScale, feedback_scale
 from synthesis.design.kinked import KinkedUnknown, kinked_values
-from synthesis.design.norms import NORMS, ChannelSizes, compact_form, levels, require_energy
+from synthesis.design.norms import ChannelSizes, compact_form, levels, require_energy
 from synthesis.design.pole_regions import PoleRegions, require_damping, require_disc, require_regions
 from synthesis.design.refusals import refuse_feedthrough, refuse_unstabilisable
 from synthesis.design.three_solves import lyapunov_degree, problem_for, three_solves
@@ -79,7 +79,7 @@ class StateFeedbackDesign(Display):
     regions: PoleRegions = field(default_factory=PoleRegions)
 
     def __post_init__(self) -> None:
-        check_feedback_channels(self.channels, NORMS)
+        check_feedback_channels(self.channels)
         check_degree_and_poles(self.degree, self.decay_rate, self.fastest_pole)
         if self.damping is not None and self.regions.damping is not None:
             raise ProblemError("damping and regions.damping ask for the same twice; remove one")

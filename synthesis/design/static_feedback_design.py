@@ -8,7 +8,6 @@ from typing import ClassVar
 from estimators.display import Display
 from synthesis.design.asked import check_degree_and_poles, check_shares, minimised_channel
 from synthesis.design.feedback_channel import FeedbackChannel, check_feedback_channels
-from synthesis.design.norms import NORMS
 from synthesis.errors import ProblemError
 from synthesis.lmi.settings import LmiSettings
 
@@ -38,7 +37,7 @@ class StaticFeedbackDesign(Display):
     settings: LmiSettings = field(default_factory=LmiSettings)
 
     def __post_init__(self) -> None:
-        check_feedback_channels(self.channels, NORMS)
+        check_feedback_channels(self.channels)
         check_degree_and_poles(self.degree, self.decay_rate, self.fastest_pole)
         if self.steps < 1:
             raise ProblemError(f"{self.steps} steps are none; give one at least")

@@ -21,7 +21,8 @@ from synthesis.design.export import schedule_content
 from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.design.hinf_observer import Channel, ObserverDesign, design_observer
 from synthesis.design.norms import Norm
-from synthesis.design.output_feedback import OutputFeedbackDesign
+from synthesis.design.output_feedback import OutputFeedback, OutputFeedbackDesign, design_output_feedback
+from synthesis.design.pole_regions import PoleRegions
 from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.design.sampled_state_feedback import design_sampled_state_feedback
 from synthesis.design.state_feedback import StateFeedbackDesign, design_state_feedback
@@ -77,6 +78,69 @@ def test_the_least_h2_norms_are_those_of_riccati_equations() -> None:
         L = observer.gain(STILL)[0]
         assert observer.gamma_lower is not None and observer.gamma_lower == pytest.approx(least, rel=2e-3)
         assert least <= energies(A - L @ C, at.E[0] - L @ at.F[0], np.eye(2))[norm] <= observer.gamma < 1.02 * least
+
+
+def noisy_law(norm: Norm, **more: Any) -> FeedbackChannel:
+    return replace(law(norm, **more), disturbances=("d1", "d2"))
+
+
+def closed_by(found: OutputFeedback) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The spring with a controller that has no feedthrough; x1/0.05 and u1 are looked at."""
+    at, (Ak, Bk, Ck, _) = spring().on(STILL), (matrix[0] for matrix in found.controller(STILL))
+    A = np.block([[at.A[0], at.B[0] @ Ck], [Bk @ at.C[0], Ak]])
+    return (
+        A,
+        np.vstack([at.E[0], Bk @ at.F[0]]),
+        np.block([[np.array([[20.0, 0.0, 0.0, 0.0]])], [np.zeros((1, 2)), Ck]]),
+    )
+
+
+def test_the_least_h2_norm_of_output_feedback_is_that_of_two_riccati_equations() -> None:
+    """The linear quadratic Gaussian regulator; a peak below it, mixed with an L2 gain, and never below the loop's own."""
+    at = spring().on(STILL)
+    A, B, C, E, F = (getattr(at, key)[0] for key in "ABCEF")
+    X, S = (
+        solve_continuous_are(A, B, np.diag([400.0, 0.0]), np.eye(1)),
+        solve_continuous_are(A.T, C.T, E @ E.T, F @ F.T),
+    )
+    best = float(np.sqrt(np.trace(E.T @ X @ E) + np.trace(B.T @ X @ S @ X @ B)))
+    found = design_output_feedback(spring(), OutputFeedbackDesign((noisy_law("H2"),)))
+    assert found.gamma_lower == pytest.approx(best, rel=1e-4)
+    assert best * (1.0 - 1e-6) <= energies(*closed_by(found))["H2"] <= found.gamma < 1.02 * best
+    with pytest.raises(ProblemError):  # no law is below the best
+        design_output_feedback(spring(), OutputFeedbackDesign((noisy_law("H2", bound=0.98 * best), noisy_law(PEAK))))
+    peak = design_output_feedback(spring(), OutputFeedbackDesign((noisy_law(PEAK),)))
+    assert 0.98 * peak.gamma < energies(*closed_by(peak))[PEAK] <= peak.gamma < found.gamma
+    gain = FeedbackChannel(("d1", "d2"), ("x1",), bound=9.0)
+    loose, tight = (
+        design_output_feedback(spring(), OutputFeedbackDesign((noisy_law("H2"), replace(gain, bound=bound))))
+        for bound in (50.0, 0.45)
+    )
+    assert loose.gamma == pytest.approx(found.gamma, rel=2e-3)
+    level = [float(hinf_norm(A, B, C[:1] / 20.0).norm) for A, B, C in map(closed_by, (found, tight))]
+    assert level[1] <= 0.45 < level[0] and energies(*closed_by(tight))["H2"] <= tight.gamma < 1.4 * best
+
+
+def test_output_feedback_between_strips_and_what_is_claimed_of_its_table() -> None:
+    """Of a moving stiffness: poles at frozen places, every claim proved, and a lower level of a norm refuted."""
+    regions = PoleRegions(vertical_strip=(1.0, 15.0), horizontal_strip=3.5)
+    free, bound = (
+        design_output_feedback(spring(2.0, 1.0), OutputFeedbackDesign((noisy_law(PEAK),), regions=given))
+        for given in (PoleRegions(), regions)
+    )
+    A, *_ = closed_by(bound)
+    poles, others = np.linalg.eigvals(A), np.linalg.eigvals(closed_by(free)[0])
+    assert poles.real.min() > -15.0 and poles.real.max() < -1.0 and np.abs(poles.imag).max() < 3.5
+    assert not (others.real.min() > -15.0 and others.real.max() < -1.0 and np.abs(others.imag).max() < 3.5)
+    content = schedule_content(deploy(bound, DeploySettings(sample_time=0.02)), "strips")
+    kinds = [claim["kind"] for claim in content["claims"]]
+    assert {"sampled energy to peak", "sampled slowest pole", "sampled fastest pole", "sampled imaginary part"} < set(
+        kinds
+    )
+    assert all(proof.proved for proof in prove(content))
+    place = kinds.index("sampled energy to peak")
+    content["claims"][place]["level"] = 0.9 * frozen_levels(content)[place].values.max()
+    assert [proof.refuted for proof in prove(content)] == [i == place for i in range(len(kinds))]
 
 
 @pytest.mark.parametrize("norm", [PEAK, "H2"])
@@ -187,8 +251,12 @@ def test_what_has_no_such_norm_is_refused() -> None:
     channel = replace(law(PEAK), performance=("x1", "y1"), disturbances=("d2",))
     with pytest.raises(ProblemError, match=r"'d2' acts on 'y1' at once \(F\), so its generalised H2 norm is infinite"):
         design_state_feedback(spring(), StateFeedbackDesign((channel,)))
-    with pytest.raises(ProblemError, match="the norm 'H2' is not for this law"):
-        OutputFeedbackDesign((law("H2"),))
+    with pytest.raises(ProblemError, match=r"'d2' acts on 'y1' at once \(F\), so its generalised H2 norm is infinite"):
+        design_output_feedback(spring(), OutputFeedbackDesign((channel,)))
+    with pytest.raises(
+        ProblemError, match="noise moves inputs at once, where the norm 'H2' is infinite; leave `feedthrough`"
+    ):
+        design_output_feedback(spring(), OutputFeedbackDesign((noisy_law("H2"),), feedthrough=True))
     wrong: Any = "H3"
     with pytest.raises(ProblemError, match="unknown norm 'H3'; known: H-infinity, H2, generalised H2"):
         ObserverDesign((Channel(("d1",), ("x1",), norm=wrong),))

@@ -68,7 +68,7 @@ CASES = {
     "measured": (LAW, "degree = 1", 'degree = 1\nmeasured = ["measured_deflecton"]', "did you mean measured_deflection"),
     "errors": (LAW, "performance = [", "errors = [", "errors is not for the law 'output feedback'; give performance"),
     "norm": (
-        LAW, "weights = [", 'norm = "generalised H2"\nweights = [', "norm = .* is not for the law 'output",
+        LAW, "weights = [", 'norm = "generalised H2"\nweights = [', "acts on 'measured_body_acceleration' at once",
     ),
     "noise": (
         LAW, 'fastest_pole = 400.0 # 1/s, imaginary parts counted\n\n[[design.channels]]\ndisturbances = ["road_velocity", '

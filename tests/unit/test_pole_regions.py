@@ -174,7 +174,11 @@ def test_regions_that_mean_nothing_are_refused(tmp_path: Path) -> None:
     for name, line, words in (
         ("quarter-car-feedback", "{ vertical_strip = [1.0] }", "vertical_strip"),
         ("quarter-car-feedback", "{ strip = 1.0 }", "strip"),
-        ("quarter-car-output-feedback", "{ disc = 1.0 }", "regions are not for the law 'output feedback'"),
+        (
+            "quarter-car-output-feedback",
+            "{ sampled_disc = [0.5, 0.4] }",
+            "regions: sampled_disc is for sampled designs",
+        ),
         ("quarter-car-observer", "{ disc = 1.0 }", "regions: disc has no image"),
     ):
         text = (examples / f"{name}.toml").read_text().replace("degree = 1", f"degree = 1\nregions = {line}", 1)
