@@ -110,6 +110,7 @@ def sliding_mode_convergence(
     disturbance that each sign term must overcome, and leave a split error of sup|L_1 F_y1' - L_2 F_yw2'| / decay.
 
     >>> from analysis.bounds.sliding_mode import PUBLISHED
+    >>> from estimators.vehicle import RigidBody
     >>> car = RigidBody(mass=1400.0, yaw_inertia=2400.0, front_axle_distance=1.1, rear_axle_distance=1.6)
     >>> sliding_mode_convergence(PUBLISHED, car, yaw_moment_error=1000.0).holds
     True
@@ -201,6 +202,7 @@ def smallest_zone_widths(gains: SlidingModeGains, vehicle: RigidBody, sample_tim
     """Width below which each loop alone overshoots by more than it corrects: gain times T / 2 (radius 1 of I + T A).
 
     >>> from analysis.bounds.sliding_mode import PUBLISHED
+    >>> from estimators.vehicle import RigidBody
     >>> car = RigidBody(mass=1400.0, yaw_inertia=2400.0, front_axle_distance=1.1, rear_axle_distance=1.6)
     >>> round(smallest_zone_widths(PUBLISHED, car, sample_time=0.001)["yaw_rate"], 6)  # rad/s
     0.005

@@ -102,6 +102,8 @@ def test_a_thousand_cars(benchmark: Any) -> None:
 @pytest.mark.parametrize("cars", [2, 3, 4, 8])
 def test_several_cars_against_a_loop(benchmark: Any, name: str, cars: int) -> None:
     """Both by turns in one run; `extra_info` has the median of the ratios of processor time: see the changelog."""
+    if benchmark.disabled and (name, cars) != ("default", 2):
+        pytest.skip("runs when benchmarks are enabled")
     batch, ones = chain(name, (cars,)), [chain(name) for _ in range(cars)]
     together, apart = samples((cars,), 8), samples((), 8)
     ratios: list[float] = []
@@ -117,4 +119,4 @@ def test_several_cars_against_a_loop(benchmark: Any, name: str, cars: int) -> No
         assert np.isfinite(steps[-1].vx).all()
 
     benchmark.pedantic(paired, rounds=40, warmup_rounds=4)
-    benchmark.extra_info["of a loop"] = round(statistics.median(ratios[4:]), 3)
+    benchmark.extra_info["of a loop"] = round(statistics.median(ratios[4:] or ratios), 3)
