@@ -178,8 +178,7 @@ class Search:
         speeds = rates(self.loop.plant.axes, P, one, lambda i: u[count + i], as_float, jump)
         later = one_sample_later(P, speeds, period) if discrete else time_derivative(P, speeds)
         places = rate_places(sampled.grid, later, count)
-        unknown = None if square is None else Samples(square.coefficients.reshape(1, 1, 1, -1))
-        question = self._question(wish, period, unknown)
+        question = self._question(wish, period, None)
 
         last: dict[bool, tuple[tuple[bytes, bytes], dict[str, FloatArray]]] = {}
 
@@ -195,7 +194,8 @@ class Search:
             if name == POSITIVE:
                 return {name: at(P)}
             now, then = Samples(at(P)), Samples(at(later))
-            found = inequalities(question, sampled.at(chosen[:, :count]), now, then, Sampling())
+            level = None if square is None else Samples(at(square)[:1])  # a number, too, where decisions are known
+            found = inequalities(replace(question, square=level), sampled.at(chosen[:, :count]), now, then, Sampling())
             out = {name: np.broadcast_to(m.values, (len(chosen), *m.values.shape[1:])) for name, m in found}
             last[decisions is not None] = key, out
             return out

@@ -28,7 +28,7 @@ from synthesis.lmi.result import Verdict
 from tests.support.any_size import any_schedule, signals
 from tests.support.chain import chain, chain_design
 
-CASES = [(2, 1), (4, 1), (8, 1), (16, 1), (19, 1), (2, 2), (4, 2), (8, 2), (4, 3)]
+CASES = [(2, 1), (4, 1), (8, 1), (16, 1), (19, 1), (2, 2), (4, 2), (8, 2), (4, 3), (8, 3)]
 
 
 @pytest.mark.parametrize(("states", "parameters"), CASES)

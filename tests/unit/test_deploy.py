@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.linalg import expm
 from estimators.schedule import read_content
 from synthesis.certificate.claims import Claim
 from synthesis.certificate.frozen import critical_probability, frozen_gain, slowest_decay
+from synthesis.certificate.inequalities import inequalities
 from synthesis.certificate.proof import prove
 from synthesis.certificate.search import Search, Wish
 from synthesis.design.deploy import Deployment, claim_channel, deploy, names_of, tabulate
@@ -69,6 +71,27 @@ def claim_of(deployment: Deployment, kind: str, channel: Channel | None = None) 
 def search_of(gains: ObserverGains, segments: int) -> Search:
     loop = deployed_loop(gains, *tabulate(gains, segments, "float64", 0.005), 0.005)
     return Search(loop, names_of(gains.model), gains.model.parameters, 1, gains.design.settings)
+
+
+def test_places_that_are_only_looked_at_have_no_unknowns(gains: ObserverGains, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the level of a gain among them, too: they are many, and each would be as many times larger as there are unknowns."""
+    widths: list[int] = []
+
+    def recorded(*args: Any) -> list[tuple[str, Any]]:
+        found = inequalities(*args)
+        widths.extend(m.values.shape[-1] for _, m in found)
+        return found
+
+    search = search_of(gains, 14)
+    asked = search._asked(Wish("gain", None, claim_channel(NOISE)))
+    assert asked is not None
+    monkeypatch.setattr("synthesis.certificate.search.inequalities", recorded)
+    (gain,) = (family for family in asked.families if family.name == "gain")
+    gain.least(np.zeros(asked.problem.decisions))
+    assert set(widths) == {1}
+    widths.clear()
+    gain.values()  # the control: what is solved for
+    assert max(widths) > 1
 
 
 def test_well_posed_design_lies_in_the_published_ranges(model: LpvModel, gains: ObserverGains) -> None:
