@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 from flint import fmpq, fmpq_mat, fmpq_poly
 
 from estimators.arrays import FloatArray
-from synthesis.polynomials.rational import is_positive_definite, rational
+from synthesis.polynomials.rational import as_float, is_positive_definite, rational
 
 Rational: TypeAlias = Any  # flint.fmpq_mat; flint has no type stubs
 
@@ -40,7 +40,7 @@ def as_float_up(number: Any) -> float:
     """The least float not below a rational number (so that a bound stays a bound)."""
     from math import inf, nextafter
 
-    value = int(number.p) / int(number.q)
+    value = as_float(number)
     return value if rational(value) >= number else nextafter(value, inf)
 
 

@@ -11,7 +11,7 @@ from analysis.lpv.proved_path import floor_of
 from analysis.lpv.question import Question
 from analysis.norms.gramians import gramian_matrix
 from estimators.arrays import FloatArray
-from synthesis.polynomials.rational import rational
+from synthesis.polynomials.rational import as_float, rational
 from synthesis.polynomials.stable import is_hurwitz, is_schur
 
 
@@ -42,7 +42,7 @@ def proved_energy_to_peak(question: Question, u: FloatArray) -> float:
     if seen is None:
         return 0.0
     n = seen.nrows()
-    floats = np.array([int(x.p) / int(x.q) for x in seen.entries()]).reshape(n, n)
+    floats = np.array([as_float(x) for x in seen.entries()]).reshape(n, n)
     v = fmpq_mat([[rational(float(x))] for x in np.linalg.eigh(floats)[1][:, -1]])
     above, below = (v.transpose() * seen * v)[0, 0], (v.transpose() * v)[0, 0]
     return floor_of(arb(above / below).sqrt())

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from flint import fmpq
 
 from analysis.errors import AnalysisError
 from estimators.arrays import FloatArray
 from estimators.display import Display
 from synthesis.loop.plant import Axis
 from synthesis.polynomials.half_spaces import Faces, HalfSpaces
-from synthesis.polynomials.rational import rational
+from synthesis.polynomials.rational import as_float, rational
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,7 +68,7 @@ class Path:
 
     def trajectory(self, axes: tuple[Axis, ...], frequency: float) -> Trajectory:
         """In physical numbers."""
-        middle, half = (np.array([float_of(getattr(a, key)) for a in axes]) for key in ("middle", "half"))
+        middle, half = (np.array([as_float(getattr(a, key)) for a in axes]) for key in ("middle", "half"))
         names = tuple(axis.name for axis in axes)
         return Trajectory(names, self.durations, middle + half * self.start, middle + half * self.end, frequency)
 
@@ -84,7 +83,7 @@ def admissible(knots: FloatArray, durations: FloatArray, axes: tuple[Axis, ...],
     for i, axis in enumerate(axes):
         if jumps[i]:
             continue
-        low, high = (float_of(rate / axis.half) * durations for rate in (axis.rate_low, axis.rate_high))
+        low, high = (as_float(rate / axis.half) * durations for rate in (axis.rate_low, axis.rate_high))
         move = np.roll(knots[:, i], -1) - knots[:, i]
         allowed = np.where(move < 0.0, -low, high)
         share = np.divide(np.abs(move), allowed, out=np.where(move == 0.0, 0.0, np.inf), where=allowed > 0.0).max()
@@ -110,8 +109,3 @@ def check_admissible(path: Path, axes: tuple[Axis, ...], half_spaces: HalfSpaces
         for u in (*path.start, *path.end):
             if not half_space.holds([rational(float(x)) for x in u]):
                 raise AnalysisError("the trajectory leaves the set of the parameters")
-
-
-def float_of(number: fmpq) -> float:
-    """The nearest float."""
-    return int(number.p) / int(number.q)

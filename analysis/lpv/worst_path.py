@@ -15,8 +15,9 @@ from scipy.optimize import minimize
 
 from analysis.lpv.lifted import lift, worst_input
 from analysis.lpv.question import Searched
-from analysis.lpv.trajectory import Path, admissible, float_of
+from analysis.lpv.trajectory import Path, admissible
 from estimators.arrays import FloatArray
+from synthesis.polynomials.rational import as_float
 
 KNOTS = 8
 PARTS = 4  # intervals of a piece during the search
@@ -114,7 +115,7 @@ def _ways(question: Searched) -> list[float]:
     for axis in question.axes:
         low, high = axis.rate_low, axis.rate_high
         if low is not None and high is not None and low < 0 < high:
-            found.append(2.0 * float_of(axis.half / high - axis.half / low))
+            found.append(2.0 * as_float(axis.half / high - axis.half / low))
     return found
 
 

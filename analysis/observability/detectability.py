@@ -78,7 +78,7 @@ def detectable(
     inconclusive
     """
     A, C, time = observed_pair(A, C, discrete)
-    return _judge(A, C, time, precision)
+    return _decide(A, C, time, precision)
 
 
 def stabilizable(
@@ -90,10 +90,10 @@ def stabilizable(
     certified
     """
     A, B, time = driven_pair(A, B, discrete)
-    return _judge(A, B, time, precision, dual=True)
+    return _decide(A, B, time, precision, dual=True)
 
 
-def _judge(A: FloatArray, C: FloatArray, discrete: bool, precision: float | None, dual: bool = False) -> Detectability:
+def _decide(A: FloatArray, C: FloatArray, discrete: bool, precision: float | None, dual: bool = False) -> Detectability:
     if A.ndim != 2:
         raise AnalysisError(f"A has the shape {A.shape}; give one pair (n, n), or ask hautus_test for a stack")
     used = rounding_tolerance(A.shape[-1]) if precision is None else precision

@@ -15,6 +15,7 @@ from synthesis.certificate.refute import undetectable_place
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.plant import Plant
 from synthesis.models.lpv import LpvModel
+from synthesis.polynomials.rational import as_float
 
 SHARE = 0.1  # of the largest component of an eigenvector: smaller ones are not named
 
@@ -92,4 +93,4 @@ def _mode(A: FloatArray, C: FloatArray) -> tuple[complex, FloatArray]:
 
 
 def _value(middle: float, half: float, u: fmpq) -> float:
-    return middle + half * (int(u.p) / int(u.q))
+    return middle + half * as_float(u)

@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.lpv.frozen import largest_gain, slowest_decay
 from analysis.lpv.lifted import lift, samples, worst_input
-from analysis.lpv.trajectory import Path, admissible, float_of
+from analysis.lpv.trajectory import Path, admissible
 from analysis.lpv.worst_path import gain_of, growth_of, simple_paths, worst_path
 from analysis.simulation.box import box_of
 from analysis.simulation.channel import channel_of
@@ -23,7 +23,7 @@ from synthesis.certificate.claims import ERROR_EQUATION, ClaimChannel
 from synthesis.loop.plant import Axis
 from synthesis.models.constraint import ParameterConstraint, half_spaces_of
 from synthesis.polynomials.half_spaces import HalfSpaces
-from synthesis.polynomials.rational import decimal
+from synthesis.polynomials.rational import as_float, decimal
 
 EVALUATIONS = 40  # of the search for slow decay
 GENERATIONS, BEST, CHILDREN, CHANGE = 2, 4, 8, 0.4  # of the search for large gains
@@ -93,7 +93,7 @@ class ScheduleQuestion:
     def physical(self, u: FloatArray) -> FloatArray:
         """Parameter values of scaled ones, inside the range."""
         box = box_of(self.schedule)
-        middle, half = (np.array([float_of(getattr(axis, key)) for axis in self.axes]) for key in ("middle", "half"))
+        middle, half = (np.array([as_float(getattr(axis, key)) for axis in self.axes]) for key in ("middle", "half"))
         found: FloatArray = np.clip(middle + half * u, box.low, box.high)
         return found
 

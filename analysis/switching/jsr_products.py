@@ -13,7 +13,7 @@ from flint import fmpq, fmpq_mat, fmpq_poly
 
 from analysis.exact import Rational, rationals, total
 from estimators.arrays import FloatArray, IndexArray
-from synthesis.polynomials.rational import rational
+from synthesis.polynomials.rational import as_float, rational
 
 WIDTH = 4000  # products kept at each length
 
@@ -105,7 +105,7 @@ def proved_rate(modes: FloatArray, word: tuple[int, ...]) -> float:
         radius = max(radius, _floor(root.abs_lower()))
     if radius == 0:
         return 0.0
-    rate = float((int(radius.p) / int(radius.q)) ** (1.0 / len(word)))
+    rate = float(as_float(radius) ** (1.0 / len(word)))
     while rational(rate) ** len(word) > radius:
         rate = float(np.nextafter(rate, 0.0))
     return rate

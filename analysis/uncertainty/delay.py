@@ -24,7 +24,7 @@ from analysis.checks import positive
 from analysis.uncertainty.jitter import observer_matrices
 from estimators.arrays import FloatArray
 from estimators.display import Display
-from synthesis.polynomials.rational import rational
+from synthesis.polynomials.rational import as_float, rational
 from synthesis.polynomials.stable import is_schur
 
 FINEST = 14  # halvings of a sample before a delay counts as open
@@ -109,10 +109,10 @@ def _balls(matrix: FloatArray) -> arb_mat:
 
 
 def _down(number: fmpq) -> float:
-    value = int(number.p) / int(number.q)
+    value = as_float(number)
     return value if rational(value) <= number else float(np.nextafter(value, -np.inf))
 
 
 def _up(number: fmpq) -> float:
-    value = int(number.p) / int(number.q)
+    value = as_float(number)
     return value if rational(value) >= number else float(np.nextafter(value, np.inf))

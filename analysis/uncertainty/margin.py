@@ -26,7 +26,7 @@ from estimators.display import Display
 from synthesis.lmi.result import Verdict
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.box_decision import all_positive
-from synthesis.polynomials.rational import rational
+from synthesis.polynomials.rational import as_float, rational
 
 FARTHEST = 1000.0  # times the ranges: no witness is looked for beyond
 RAYS, SCALES = 96, 80
@@ -104,7 +104,7 @@ def robust_stability_margin(
                 lower = scale
                 break
             if found.fails_at is not None:
-                better = _certain(question, _pulled(question, np.array([int(x.p) / int(x.q) for x in found.fails_at])))
+                better = _certain(question, _pulled(question, np.array([as_float(x) for x in found.fails_at])))
                 break
         if better is None or not np.abs(better).max() < upper:
             break

@@ -30,7 +30,7 @@ from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.box_decision import Decision, all_positive
 from synthesis.polynomials.enclosure import PolynomialMatrix
 from synthesis.polynomials.half_spaces import centre_of, corners_of, faces_of
-from synthesis.polynomials.rational import rational
+from synthesis.polynomials.rational import as_float, rational
 
 ROOM = (1.0, 5.0, 25.0, 100.0, 1000.0)  # times the tolerance above the lower bound, until a proof holds
 EXCHANGES = 12
@@ -166,7 +166,7 @@ def _climbed(question: Question, u: FloatArray) -> tuple[FloatArray, float]:
 
 
 def _floats(point: tuple[fmpq, ...]) -> FloatArray:
-    return np.array([int(x.p) / int(x.q) for x in point])
+    return np.array([as_float(x) for x in point])
 
 
 def _values(question: Question, u: FloatArray) -> dict[str, float]:

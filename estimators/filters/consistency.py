@@ -79,7 +79,7 @@ class Consistency:
 def consistency(
     values: npt.ArrayLike, freedom: float, confidence: float = 0.95, least_inside: float | None = None
 ) -> Consistency:
-    """Judges NEES or NIS values (runs, steps) of independent runs.
+    """Tests NEES or NIS values (runs, steps) of independent runs.
 
     Averages of neighbouring steps are correlated, so the share of steps inside scatters more than a binomial count;
     by default `least_inside` is the confidence less 5 standard deviations of a count over a tenth of the steps.

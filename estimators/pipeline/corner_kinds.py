@@ -1,6 +1,6 @@
 """The papers' corner observers behind one interface: what `CornerObservers` and a replay put at the four corners of a car.
 
-A kind has `batch_shape`, which ends with the four corners, `sample_time`, `judges_slip` (whether it looks at the slip ratios
+A kind has `batch_shape`, which ends with the four corners, `sample_time`, `uses_slip` (whether it looks at the slip ratios
 and the accelerations of the car), `step(CornerSample) -> CornerStep` and `reset(where)`; `save` and `restore` as `Memory`.
 """
 
@@ -49,7 +49,7 @@ class CornerKind(Protocol):
 
     batch_shape: tuple[int, ...]
     sample_time: float
-    judges_slip: bool
+    uses_slip: bool
 
     def step(self, sample: CornerSample) -> CornerStep:
         """Takes one sample."""
@@ -69,7 +69,7 @@ class ScheduledCorners(Memory):
     """
 
     parts = ("observer",)
-    judges_slip = False
+    uses_slip = False
 
     def __init__(self, schedule: GainSchedule, batch_shape: tuple[int, ...] = (4,)) -> None:
         self.batch_shape, self.sample_time = batch(batch_shape, corners=True), schedule.sample_time
@@ -95,7 +95,7 @@ class SwitchedCorners(Memory):
     """
 
     parts = ("observer",)
-    judges_slip = True
+    uses_slip = True
 
     def __init__(self, schedule: GainSchedule, batch_shape: tuple[int, ...] = (4,)) -> None:
         self.batch_shape, self.sample_time = batch(batch_shape, corners=True), schedule.sample_time
@@ -127,7 +127,7 @@ class KalmanCorners(Memory):
     """
 
     parts = ("observer", "detector")
-    judges_slip = True
+    uses_slip = True
 
     def __init__(
         self,

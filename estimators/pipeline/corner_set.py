@@ -102,7 +102,7 @@ class CornerObservers(Memory):
         self.uses_forces = suspension is not None  # the pipeline gives F_x and F_y of the tires as `forces`
         self._rigid = np.zeros((*self.batch_shape, 4, 2))
         self._rigid.flags.writeable = False
-        self._judged = self.along.judges_slip or (self.across is not None and self.across.judges_slip)
+        self._uses_slip = self.along.uses_slip or (self.across is not None and self.across.uses_slip)
         self._no_slip = np.zeros((*self.batch_shape, 4))
         self.slope = FilteredDerivative(self.sample_time, lag, (*self.batch_shape, 9))
         self.parts: tuple[str, ...] = ("along", "across", "slope", "suspension")  # without what is None
@@ -171,7 +171,7 @@ class CornerObservers(Memory):
         )
         rest = (
             *(w, rate.derivative[..., :4]),
-            kit.table((self.slip,), shape) if self._judged else self._no_slip,
+            kit.table((self.slip,), shape) if self._uses_slip else self._no_slip,
             *(ax, ay),
         )
         use = entries(longitudinal_use, four, "longitudinal_use")
@@ -248,7 +248,7 @@ class CornerObservers(Memory):
         self, speed: Signals, ahead: Signals, beside: Signals, sine: Signals, cosine: Signals, wheels: FloatArray
     ) -> None:
         """Slips and slip angles for the next sample, if somebody asks for them; `wheels` are psi'."""
-        if self.weights is None and not self._judged:
+        if self.weights is None and not self._uses_slip:
             return
         if self.suspension is not None:
             psi = (self._kit.rows(wheels[..., k], 4) for k in (0, 1))

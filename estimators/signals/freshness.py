@@ -53,7 +53,7 @@ class Freshness(Memory):
         self.run: IntArray = np.zeros(self.batch_shape, dtype=np.int64)
 
     def step(self, value: npt.ArrayLike) -> FreshStep:
-        """Judges one sample of the batch shape.
+        """Classifies one sample of the batch shape.
 
         Raises:
             EstimatorError: another shape, or not numbers.

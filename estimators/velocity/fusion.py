@@ -138,8 +138,8 @@ class VelocityFusion(Memory):
             seen = seen._replace(inertial=kit.stacked((a - heavy[0], b - heavy[1], r)))
         self._begin(seen)
         given = None if normalised_force is None else kit.wheels(normalised_force, shape, "normalised_force")
-        judged = self.signal_monitor(dt, seen, given, self.inputs.slope, heavy)
-        (a, b, r), noise, used, doubt, taken, road, mu, blind, unknown, steered, gated, contested = judged
+        validated = self.signal_monitor(dt, seen, given, self.inputs.slope, heavy)
+        (a, b, r), noise, used, doubt, taken, road, mu, blind, unknown, steered, gated, contested = validated
         turn, before = across.yaw_rate(r), along.speed
         unsure = 1.0 * across.filter.variance(lateral.SPEED)  # of arrays a copy: prediction writes into the covariance
         along.predict(dt, a, noise[0], turn, (across.speed, unsure), doubt[0] > 0.0)

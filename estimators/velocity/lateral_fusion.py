@@ -196,7 +196,7 @@ class LateralFusion(CarsMemory):
         self.apart = bent * self.apart + (1.0 - bent) * kit.where(both, innovation[0] - innovation[1], 0.0)
         gap = 0.5 * abs(self.apart)
 
-        def judged(
+        def tested(
             explained: Number,
             off: Number,
             model: Number,
@@ -215,7 +215,7 @@ class LateralFusion(CarsMemory):
 
         explained = self.filter.expect(_SEEN, values)
         used, variance, excited, beyond = kit.each(
-            judged, explained, innovation, model, white, values[5], mu, usable, kit.stacked((gap, gap))
+            tested, explained, innovation, model, white, values[5], mu, usable, kit.stacked((gap, gap))
         )
         self.axle_error = kit.maximum(kept * self.axle_error, kit.maximum(*beyond))
         self.lasting_error = kept * self.lasting_error + (1.0 - kept) * self.axle_error

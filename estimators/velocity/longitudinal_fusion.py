@@ -187,7 +187,7 @@ class LongitudinalFusion(CarsMemory):
             predicted, seen.wheel_speed, seen.silent, mu, *course, self.radius, x[RADIUS:], self.steady
         )
 
-        def judged(
+        def tested(
             explained: Number,
             off: Number,
             model: Number,
@@ -205,7 +205,7 @@ class LongitudinalFusion(CarsMemory):
 
         explained = self.filter.expect(_SEEN, values)
         gated, used, variance, free = kit.each(
-            judged, explained, innovation, model, slid, self._white, mu, seen.fresh, slipping
+            tested, explained, innovation, model, slid, self._white, mu, seen.fresh, slipping
         )
         learning = free[0] & free[1] & free[2] & free[3] & (across * across < freely * freely) & kit.no(blind)
         shared = [(i, k, slid[i] * slid[k] * lasting - moved * held) for i, k in _AXLES]

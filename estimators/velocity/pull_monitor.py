@@ -28,7 +28,7 @@ LARGEST_ACCELERATION = limits.FRICTION * GRAVITY  # m/s^2 of a car on its tires
 
 
 class Pull(NamedTuple):
-    """What is to be used of a_x, see `Judged`."""
+    """What is to be used of a_x, see `Validated`."""
 
     reading: Number
     noise: Number

@@ -64,7 +64,7 @@ from estimators.velocity.turn_monitor import TurnMonitor
 _LOCKED = 2.0  # standard deviations, in place of `gate`, of a steering angle that repeats itself
 
 
-class Judged(NamedTuple):
+class Validated(NamedTuple):
     """What the filters are to use; readings a_x, a_y, r without the gravity that is known."""
 
     reading: tuple[Number, Number, Number]  # what was read, or should have been
@@ -82,7 +82,7 @@ class Judged(NamedTuple):
 
 
 class SignalMonitor(CarsMemory):
-    """Judges the signals of `count` cars."""
+    """Validates the signals of `count` cars."""
 
     memory = ("astray", "remaining", "mu")
     parts = ("pull", "turn")
@@ -99,7 +99,7 @@ class SignalMonitor(CarsMemory):
 
     def __call__(
         self, elapsed: Number, seen: ConditionedInputs, given: Signals | None, slope: Signals, gravity: Signals | None
-    ) -> Judged:
+    ) -> Validated:
         """One sample: `given` F_x/F_z of the wheels, not finite where unknown; `slope` of their speeds, rad/s^2.
 
         `gravity`: m/s^2 that an attitude part has taken off a_x and a_y, and of these what grade and bank make.
@@ -109,7 +109,7 @@ class SignalMonitor(CarsMemory):
         ahead, road = (self._zero, self._zero) if gravity is None else (gravity[0], gravity[2])
         pull = self.pull(elapsed, seen, given, slope, road)
         self.mu, steered = pull.mu, self.remaining == 0.0
-        return Judged(
+        return Validated(
             reading=(pull.reading, *turn.reading),
             noise=(pull.noise, *turn.noise),
             used=(pull.used, *turn.used),

@@ -37,7 +37,7 @@ _AY, _R, _ROLL = range(3)
 
 
 class Turning(NamedTuple):
-    """What is to be used of a_y and yaw rate, see `Judged`."""
+    """What is to be used of a_y and yaw rate, see `Validated`."""
 
     reading: tuple[Number, Number]
     noise: tuple[Number, Number]
@@ -91,7 +91,9 @@ class TurnMonitor(Exclusion):
         now, surface = self._say(seen, None if gravity is None else off[0])
         self.level = kit.stacked([kept * old + (1.0 - kept) * new for old, new in zip(self.level, now, strict=True)])
         *level, sway = self.level
-        readings = self._judged(seen, level, sway, surface, mu, self._never if gravity is None else self._always)
+        readings = self._with_allowances(
+            seen, level, sway, surface, mu, self._never if gravity is None else self._always
+        )
         v_g, v_p, v_f, v_q = level[:4]
         t_g, t_p, t_f, t_q = readings.allowed[:4]
         known = readings.known
@@ -148,8 +150,8 @@ class TurnMonitor(Exclusion):
         grip = second & follows
         banked = self._banked(elapsed, apart & grip & (no(side.wrong) | straight) & no(stuck_y | roll.wrong), gap)
         before = self.remaining
-        judged = (side._replace(wrong=side.wrong & no(banked)), yaw, roll)
-        left = [self.left(elapsed, verdict, old) for verdict, old in zip(judged, before, strict=True)]
+        decided = (side._replace(wrong=side.wrong & no(banked)), yaw, roll)
+        left = [self.left(elapsed, verdict, old) for verdict, old in zip(decided, before, strict=True)]
         begun_y, begun_r, begun_roll = ((now > 0.0) & (old == 0.0) for now, old in zip(left, before, strict=True))
         followed = kit.where(begun_r, level[YAW_RATE] - level[REAR], gap) * s.error_memory
         self.across.filter.widen(begun_y | begun_r | begun_roll, followed * followed)
@@ -197,7 +199,7 @@ class TurnMonitor(Exclusion):
         )
         return levels, surface
 
-    def _judged(
+    def _with_allowances(
         self, seen: ConditionedInputs, level: Signals, sway: Number, surface: Signals, mu: Signals, levelled: Number
     ) -> Readings:
         """The low-passed `level` with allowances; `mu` F_x/F_z of the wheels, `levelled`: an attitude part is there."""

@@ -32,6 +32,7 @@ from synthesis.certificate.refute import grid
 from synthesis.loop.loop import Loop
 from synthesis.loop.system import Region, System
 from synthesis.polynomials.enclosure import PolynomialMatrix
+from synthesis.polynomials.rational import as_float
 
 
 @dataclass(frozen=True)
@@ -67,9 +68,10 @@ def frozen_levels(content: Mapping[str, Any], where: str = "schedule") -> list[F
     subject = subject_of(content, where)
     loop, axes = subject.loop, subject.loop.plant.axes
     points = list(dict.fromkeys(grid(loop)))
-    scale = np.array([[_number(axis.middle), _number(axis.half)] for axis in axes]).reshape(-1, 2)
+    scale = np.array([[as_float(axis.middle), as_float(axis.half)] for axis in axes]).reshape(-1, 2)
     places = (
-        np.array([[_number(u) for u in point] for point in points]).reshape(len(points), -1) * scale[:, 1] + scale[:, 0]
+        np.array([[as_float(u) for u in point] for point in points]).reshape(len(points), -1) * scale[:, 1]
+        + scale[:, 0]
     )
     found = []
     for claim in claims_of(content, subject, where):
@@ -93,14 +95,14 @@ def _values(claim: Claim, systems: list[System], names: Any, loop: Loop) -> Floa
     poles = np.linalg.eigvals(A)
     if claim.kind in (*CONTINUOUS, *DISCRETE):
         poles = poles - (claim.centre or 0.0)
-        return pole_levels(claim.kind, poles, 1.0 if loop.sample_time is None else _number(loop.sample_time))
+        return pole_levels(claim.kind, poles, 1.0 if loop.sample_time is None else as_float(loop.sample_time))
     match claim.kind:
         case "decay rate":
             return np.asarray(-poles.real.max(axis=-1), float)
         case "fastest pole":
             return np.asarray(-poles.real.min(axis=-1), float)
         case "internal update" | "sampled error":
-            period = _number(loop.sample_time) if loop.sample_time is not None else 1.0
+            period = as_float(loop.sample_time) if loop.sample_time is not None else 1.0
             return np.asarray(-np.log(np.abs(poles).max(axis=-1)) / period, float)
         case "drop probability":
             return critical_drop_probability(np.array([_matrix(s.coasting, s) for s in systems]), A)
@@ -116,7 +118,7 @@ def _values(claim: Claim, systems: list[System], names: Any, loop: Loop) -> Floa
     D = np.array([Z @ _entries(system.D[group])[:, where] * np.array(sizes) for system in systems])
     if claim.kind not in GAINS:
         discrete = claim.kind.startswith("sampled")
-        period = _number(loop.sample_time) if discrete and loop.sample_time is not None else 1.0
+        period = as_float(loop.sample_time) if discrete and loop.sample_time is not None else 1.0
         return np.asarray(_impulse(A, B, C, D, discrete, peak=claim.kind.endswith("peak")) / np.sqrt(period))
     return hinf_norm(A, B, C, D, discrete=claim.kind != "gain").norm
 
@@ -143,10 +145,6 @@ def _entries(matrix: PolynomialMatrix) -> FloatArray:
     entries = matrix.terms.get((0,) * matrix.variables)
     if entries is None:
         return np.zeros(matrix.shape)
-    return np.array([float(x.mid()) if hasattr(x, "mid") else _number(x) for x in entries.entries()]).reshape(
+    return np.array([float(x.mid()) if hasattr(x, "mid") else as_float(x) for x in entries.entries()]).reshape(
         matrix.shape
     )
-
-
-def _number(value: fmpq) -> float:
-    return int(value.p) / int(value.q)

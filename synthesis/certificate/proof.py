@@ -16,6 +16,7 @@ from synthesis.certificate.inside_sample import inside_sample
 from synthesis.certificate.refute import refuting_place
 from synthesis.certificate.verify import Outcome, Verifier
 from synthesis.loop.plant import Axis
+from synthesis.polynomials.rational import as_float
 
 
 @dataclass(frozen=True, repr=False)
@@ -92,12 +93,8 @@ def _proof(claim: Claim, verifier: Verifier, subject: Subject) -> Proof:
 def place_words(axes: tuple[Axis, ...], point: tuple[fmpq, ...], outcome: Outcome | None = None) -> str:
     """Parameter values of a scaled place, and the inequality that failed there."""
     values = [
-        f"{axis.name} = {_number(axis.middle + axis.half * u):.6g} {axis.unit}"
+        f"{axis.name} = {as_float(axis.middle + axis.half * u):.6g} {axis.unit}"
         for axis, u in zip(axes, point, strict=False)
     ]
     words = ", ".join(values) or "its only point"
     return words if outcome is None else f"{words} (inequality '{outcome.inequality}')"
-
-
-def _number(value: fmpq) -> float:
-    return int(value.p) / int(value.q)

@@ -8,7 +8,7 @@ from flint import fmpq_mat
 from estimators.arrays import FloatArray
 from synthesis.polynomials.chebyshev import from_chebyshev, to_chebyshev
 from synthesis.polynomials.enclosure import PolynomialMatrix
-from synthesis.polynomials.rational import decimal, rational
+from synthesis.polynomials.rational import as_float, decimal, rational
 
 LYAPUNOV_DIGITS = 8  # of P, relative to its largest value in each entry's own units
 LEVEL_DIGITS = 4
@@ -34,10 +34,7 @@ def rounded_lyapunov(
     terms = {}
     for index, entries in chebyshev.terms.items():
         rows = [
-            [
-                decimal(significant(int(x.p) / int(x.q) * scale[i] * scale[j], unit[i, j], digits))
-                for j, x in enumerate(row)
-            ]
+            [decimal(significant(as_float(x) * scale[i] * scale[j], unit[i, j], digits)) for j, x in enumerate(row)]
             for i, row in enumerate(entries.tolist())
         ]
         if any(x != 0 for row in rows for x in row):

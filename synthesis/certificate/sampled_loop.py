@@ -19,6 +19,7 @@ from synthesis.loop.on_boxes import MOST_BOXES
 from synthesis.loop.system import Region, System, Time
 from synthesis.polynomials.boxes import Boxes, orders
 from synthesis.polynomials.half_spaces import Faces
+from synthesis.polynomials.rational import as_float
 
 MOST_PLACES = 4000  # of the parameters; larger tables are looked at in the corners of their cells only
 AT_ONCE = 2000  # cells of a table with more than MOST_BOXES of them, or places
@@ -163,9 +164,7 @@ class SampledLoop:
         if exact is None:
             return False
         system, count = in_scaled_states(exact, self.scale), region.parameters
-        offset, factor = (
-            np.array([int(x.p) / int(x.q) for x in side[:count]]) for side in (region.offset, region.factor)
-        )
+        offset, factor = (np.array([as_float(x) for x in side[:count]]) for side in (region.offset, region.factor))
         points = np.hstack([local, np.zeros_like(local)])
         found: dict[Any, FloatArray] = {}
         for name in MATRICES:
@@ -182,7 +181,7 @@ class SampledLoop:
 def _places(cells: list[Region], count: int) -> tuple[FloatArray, FloatArray]:
     """Middles and half widths (g, 1, count) of the cells."""
     offset, factor = (
-        np.array([[int(x.p) / int(x.q) for x in side[:count]] for side in sides])[:, None]
+        np.array([[as_float(x) for x in side[:count]] for side in sides])[:, None]
         for sides in ([cell.offset for cell in cells], [cell.factor for cell in cells])
     )
     return offset, factor

@@ -112,7 +112,7 @@ class Search:
             outcome = self.verifier.prove(claim)
             if outcome.proved:
                 return claim, outcome
-            place = np.array([int(x.p) / int(x.q) for x in outcome.place])
+            place = np.array([as_float(x) for x in outcome.place])
             if not len(place) or not asked.add(outcome.inequality, place):
                 break
         return None, outcome
@@ -172,7 +172,7 @@ class Search:
         if square is not None:
             problem.minimise("gamma^2")
         one = problem.constant(np.ones((1, 1)))
-        period = 0.0 if self.loop.sample_time is None else int(self.loop.sample_time.p) / int(self.loop.sample_time.q)
+        period = 0.0 if self.loop.sample_time is None else as_float(self.loop.sample_time)
         u = [variable(i, 2 * count) for i in range(2 * count)]  # and r
         jump = (lambda i: (u[count + i] - u[i]) * (1.0 / period)) if discrete and period else None
         speeds = rates(self.loop.plant.axes, P, one, lambda i: u[count + i], as_float, jump)
@@ -272,7 +272,7 @@ class Search:
         assert wish.channel is not None
         if self.size is not None:
             return self.size
-        period = 1.0 if self.loop.sample_time is None else int(self.loop.sample_time.p) / int(self.loop.sample_time.q)
+        period = 1.0 if self.loop.sample_time is None else as_float(self.loop.sample_time)
         root = np.sqrt(period) if wish.kind.startswith("sampled") and wish.kind not in GAINS else 1.0
         cells = list(self.loop.cells())
         region: Region = cells[len(cells) // 2]

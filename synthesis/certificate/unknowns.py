@@ -10,6 +10,7 @@ from estimators.arrays import FloatArray
 from synthesis.loop.system import System
 from synthesis.polynomials.enclosure import PolynomialMatrix
 from synthesis.polynomials.matrix import MatrixPolynomial, constant
+from synthesis.polynomials.rational import as_float
 
 
 def floats(matrix: PolynomialMatrix) -> MatrixPolynomial:
@@ -21,7 +22,7 @@ def floats(matrix: PolynomialMatrix) -> MatrixPolynomial:
 
 
 def _middle(x: Any) -> Any:
-    return x.mid() if hasattr(x, "mid") else int(x.p) / int(x.q)
+    return x.mid() if hasattr(x, "mid") else as_float(x)
 
 
 def in_scaled_states(system: System, scale: FloatArray) -> System:

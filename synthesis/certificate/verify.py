@@ -168,7 +168,7 @@ class Verifier:
                 continue
             done += 1
             named = self._named(region, task)
-            failed, undecided = (None, "matrix exponential") if named is None else _judge(named)
+            failed, undecided = (None, "matrix exponential") if named is None else _failure(named)
             if failed is not None and failed[1] is not None and plant.admits(region.point(failed[1])):
                 return Outcome(False, failed[0], region.point(failed[1]))
             if undecided is None or (cut and named and positive_inside(named, region, plant.half_spaces, ORDER)):
@@ -215,7 +215,7 @@ class Verifier:
                 named = self._named(point, task)
                 if named is None:
                     return None
-                failed, _ = _judge(named)
+                failed, _ = _failure(named)
                 if failed is not None and failed[1] is not None:
                     return Outcome(False, failed[0], point.offset)
         return None
@@ -241,7 +241,7 @@ class Verifier:
         return Question(claim.kind, level, group, W, Z, period)
 
 
-def _judge(named: Sequence[tuple[str, PolynomialMatrix]]) -> tuple[Any, str | None]:
+def _failure(named: Sequence[tuple[str, PolynomialMatrix]]) -> tuple[Any, str | None]:
     """(inequality, corner) that certainly fails, and the name of one that is not decided."""
     undecided = None
     for name, matrix in named:

@@ -11,6 +11,7 @@ from estimators.arrays import FloatArray
 from estimators.display import Display, counted
 from estimators.schedule.check import HIGHEST_ORDER
 from synthesis.certificate.claims import Claim, ClaimChannel, claim_unit
+from synthesis.certificate.frozen import slowest_decay
 from synthesis.certificate.levels import feedback_claims, held_claims, sampled, sampled_claims
 from synthesis.certificate.rounding import significant
 from synthesis.certificate.search import Search, Wish
@@ -36,6 +37,7 @@ from synthesis.lmi.result import Verdict
 from synthesis.loop.feedback import FeedbackLoop
 from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
+from synthesis.one_thread import one_thread
 from synthesis.polynomials.half_spaces import faces_of
 
 SEGMENTS = (7, 14, 28, 56, 112)
@@ -84,12 +86,14 @@ class Deployment(Display):
         return deployed_loop(self.gains, self.breakpoints, self.table, self.settings.sample_time)
 
 
+@one_thread
 def deploy(
     gains: Gains, settings: DeploySettings | None = None, progress: Callable[[str], None] = lambda _: None
 ) -> Deployment:
     """Tabulate on the coarsest breakpoints that cost less than the allowed share of every gain, and prove claims.
 
-    Raises ProblemError if the gains are not certified, if the design is ill-posed, or if no table is fine enough.
+    Raises ProblemError if the gains are not certified, if the design is ill-posed, if the loop is not stable at this sample time
+    although parameters stand still, or if no table is fine enough.
 
     >>> model = corner_velocity_model(load_parameter_set("corner-estimation"), "longitudinal", wheel_speed_maximum=140.0)
     >>> channels = (Channel(("friction",), ("relative_velocity",), bound=1.05), Channel(("force_noise",), ("relative_velocity",)))
@@ -123,6 +127,8 @@ def deploy(
             fine = tuple(REFINEMENT * number for number in segments)
             finer, _, _ = _tabulated(gains, fine, settings, "float64", degree)
             cost = max(table_cost(search, finer, wish) for wish in compared)
+            if not np.isfinite(cost):
+                refuse_unstable(gains, finer, settings.sample_time)
             if not cost < settings.interpolation_cost:
                 continue
             claims = _claims(gains, search, wishes, settings.settle)
@@ -156,6 +162,18 @@ def refuse_undeployable(model: LpvModel) -> None:
             f"model '{model.name}' has a power {highest} of a scheduling parameter over its common denominator; schedule files "
             f"store powers up to {HIGHEST_ORDER}"
         )
+
+
+def refuse_unstable(gains: Gains, search: Search, sample_time: float) -> None:
+    """Raise ProblemError where the update of a fine table grows although parameters stand still: no finer one helps then."""
+    decay = slowest_decay(search.loop)
+    if not decay < 0.0:
+        return
+    raise ProblemError(
+        f"model '{gains.model.name}': run every {sample_time:g} s the loop is unstable while parameters stand still (it grows by "
+        f"{-decay:.3g} 1/s), so that no table helps; give a shorter sample_time, a bound on the fastest pole, more back-off, or "
+        "take a sampled design"
+    )
 
 
 def _candidates(gains: Gains, settings: DeploySettings) -> Iterator[tuple[int, ...]]:

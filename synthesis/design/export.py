@@ -24,6 +24,7 @@ from synthesis.errors import ProblemError
 from synthesis.models.lpv import LpvModel
 from synthesis.polynomials.chebyshev import to_chebyshev
 from synthesis.polynomials.enclosure import PolynomialMatrix
+from synthesis.polynomials.rational import as_float
 
 
 def schedule_content(
@@ -99,7 +100,7 @@ def stored(matrix: PolynomialMatrix) -> dict[str, Any]:
         entries = series.terms.get(order)
         rows, columns = matrix.shape
         coefficients.append(
-            [[0.0 if entries is None else int(entries[i, j].p) / int(entries[i, j].q) for j in range(columns)]
+            [[0.0 if entries is None else as_float(entries[i, j]) for j in range(columns)]
              for i in range(rows)]
         )  # fmt: skip
     return {"orders": [list(order) for order in orders], "coefficients": coefficients}

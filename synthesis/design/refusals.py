@@ -17,6 +17,7 @@ from synthesis.loop.plant import Plant
 from synthesis.models.lpv import LpvModel
 from synthesis.models.numeric import NumericModel
 from synthesis.polynomials.enclosure import PolynomialMatrix
+from synthesis.polynomials.rational import as_float
 
 
 def refuse_undetectable(model: LpvModel, measured: Sequence[int] | None = None) -> None:
@@ -80,7 +81,7 @@ def refuse_feedthrough(model: LpvModel, channel: FeedbackChannel, Z: FloatArray,
 
 
 def _values(model: LpvModel, place: tuple[fmpq, ...]) -> list[float]:
-    return [p.middle + p.half_width * int(u.p) / int(u.q) for p, u in zip(model.parameters, place, strict=True)]
+    return [p.middle + p.half_width * as_float(u) for p, u in zip(model.parameters, place, strict=True)]
 
 
 def _where(model: LpvModel, place: tuple[fmpq, ...]) -> str:

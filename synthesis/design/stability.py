@@ -32,7 +32,7 @@ from synthesis.lmi.solve import solve
 from synthesis.loop.from_model import plant_of
 from synthesis.loop.observer import ObserverLoop
 from synthesis.models.lpv import LpvModel
-from synthesis.polynomials.rational import decimal, rational
+from synthesis.polynomials.rational import as_float, decimal, rational
 
 PRECISE = 15  # digits of P when it is proved right here
 
@@ -128,11 +128,11 @@ def affine_quadratic_stability(
     result = solve(problem, settings)
     weights = scale if form == "primal" else 1.0 / scale
     lyapunov = physical(model, result, "P") * np.outer(weights, weights)
-    verdict, message = _judged(model, vertices, result, weights, form, decay_rate)
+    verdict, message = _verdict(model, vertices, result, weights, form, decay_rate)
     return StabilityResult(verdict, message, form, lyapunov, result, result.margins)
 
 
-def _judged(
+def _verdict(
     model: LpvModel, gains: FloatArray, result: LmiResult, weights: FloatArray, form: Form, decay_rate: float
 ) -> tuple[Verdict, str]:
     """The verdict on the exact model and the P that was found, in ball arithmetic; refuted where a frozen pole is not stable."""
@@ -165,7 +165,7 @@ def _judged(
 
 
 def _pole_words(model: LpvModel, gain: FloatArray, place: tuple[fmpq, ...], decay_rate: float) -> str:
-    values = [p.middle + p.half_width * int(u.p) / int(u.q) for p, u in zip(model.parameters, place, strict=True)]
+    values = [p.middle + p.half_width * as_float(u) for p, u in zip(model.parameters, place, strict=True)]
     point = np.array([values]).reshape(1, len(values))
     inside = np.clip(point, [p.minimum for p in model.parameters], [p.maximum for p in model.parameters])
     pole = float(np.linalg.eigvals(model.on(inside).error_dynamics(gain)[0]).real.max())

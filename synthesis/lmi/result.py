@@ -1,4 +1,4 @@
-"""What an LMI solve returns: an object that can be judged."""
+"""What an LMI solve returns: verdict, margins and values, whatever the solver has said."""
 
 from __future__ import annotations
 

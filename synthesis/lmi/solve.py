@@ -1,4 +1,4 @@
-"""Solve an LMI problem and judge the answer outside the solver."""
+"""Solve an LMI problem and decide about the answer outside the solver."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.relaxation import relax, relaxation_of
 from synthesis.lmi.result import LmiResult, Margin, SolverReport, Verdict
 from synthesis.lmi.settings import LmiSettings
+from synthesis.one_thread import one_thread
 from synthesis.polynomials.matrix import constant
 from synthesis.polynomials.positivity import prove_positive
 
@@ -29,6 +30,7 @@ NECESSARY = ("grid", "exact", "exchange")  # relaxations that no solution on the
 MOST_ITERATIONS = 600  # of the solver, over all rounds of an exchange
 
 
+@one_thread
 def solve(problem: LmiProblem, settings: LmiSettings | None = None, memory: Memory | None = None) -> LmiResult:
     """Relax, solve, substitute, re-evaluate every named inequality on the continuum, and return a verdict.
 
@@ -55,7 +57,7 @@ def solve(problem: LmiProblem, settings: LmiSettings | None = None, memory: Memo
         if settings.verify and not answer.infeasible and np.isfinite(decisions).all():
             decisions, margins, _ = _verified(problem, answer.decisions, settings)
         verification = perf_counter() - start
-    verdict, message = _judge(answer, margins, kind)
+    verdict, message = _verdict(answer, margins, kind)
     report = SolverReport(
         answer.solver, answer.status, answer.iterations, answer.seconds, assembly, verification, kind, answer.dual_bound
     )
@@ -151,7 +153,7 @@ def _margins(problem: LmiProblem, decisions: FloatArray, depth: int) -> tuple[tu
     return tuple(out), places
 
 
-def _judge(answer: RawAnswer, margins: tuple[Margin, ...], relaxation: str) -> tuple[Verdict, str]:
+def _verdict(answer: RawAnswer, margins: tuple[Margin, ...], relaxation: str) -> tuple[Verdict, str]:
     if answer.infeasible:
         if relaxation in NECESSARY and answer.excluded > EXCLUDED:
             # Points are necessary, sums of squares exact: this refutes the whole for this degree of the unknowns.

@@ -14,6 +14,7 @@ from synthesis.loop.plant import Axis
 from synthesis.loop.system import Region
 from synthesis.polynomials.boxes import EPS, Boxes, constants, orders
 from synthesis.polynomials.enclosure import PolynomialMatrix
+from synthesis.polynomials.rational import as_float
 
 HIGHEST = {1: 8, 2: 7, 3: 6}  # total degree that is kept, by the number of parameters
 MOST_BOXES = 20_000
@@ -125,7 +126,7 @@ def _floats(entries: Any) -> tuple[FloatArray, FloatArray]:
 
 
 def _float(x: Any) -> float:
-    return float(x) if isinstance(x, arb) else int(x.p) / int(x.q)
+    return float(x) if isinstance(x, arb) else as_float(x)
 
 
 def _above(x: Any) -> float:

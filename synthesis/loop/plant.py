@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import prod
@@ -140,17 +140,19 @@ class Plant:
         return not any(self.denominator.degrees)
 
 
-class ByCells(dict[str, PolynomialMatrix]):
-    """Stands for the matrices of a plant by cells, which are others on every cell."""
+class ByCells(Mapping[str, PolynomialMatrix]):
+    """Stands for the matrices of a plant by cells, which are others on every cell: whoever reads it is refused."""
 
-    def __missing__(self, key: str) -> NoReturn:
+    def __getitem__(self, key: str) -> NoReturn:
         raise ProblemError(
             "this takes one polynomial plant for the whole range; a plant by cells (tables) is not supported here"
         )
 
-    def items(self) -> NoReturn:
-        """None."""
-        self.__missing__("")
+    def __iter__(self) -> Iterator[str]:
+        return self[""]
+
+    def __len__(self) -> int:
+        return self[""]
 
 
 def by_cells(

@@ -8,11 +8,11 @@ from typing import Any
 
 from flint import fmpq
 
+from estimators.schedule.check_tables import MOST_CELLS
 from synthesis.errors import ModelError
 from synthesis.polynomials.multilinear import Point, boxes, composed, multilinear
 from synthesis.polynomials.rational import decimal
 
-MOST_CELLS = 4096  # of a plant: each has a polynomial and inequalities of its own
 MOST_PRODUCTS = 400_000  # of tables and parameters, on all cells together
 
 

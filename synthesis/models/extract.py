@@ -20,7 +20,7 @@ from synthesis.polynomials.definite import sign_on_box
 from synthesis.polynomials.enclosure import PolynomialMatrix, Powers
 from synthesis.polynomials.matrix import MatrixPolynomial
 from synthesis.polynomials.positivity import prove_positive
-from synthesis.polynomials.rational import decimal
+from synthesis.polynomials.rational import as_float, decimal
 
 MATRICES = ("A", "B", "C", "D", "E", "F")
 
@@ -189,7 +189,7 @@ def _polynomial(
 def _array(matrix: PolynomialMatrix) -> FloatArray:
     out = np.zeros((*(d + 1 for d in matrix.degrees), *matrix.shape))
     for powers, entries in matrix.terms.items():
-        out[powers] = [[int(x.p) / int(x.q) for x in row] for row in entries.tolist()]
+        out[powers] = [[as_float(x) for x in row] for row in entries.tolist()]
     out.setflags(write=False)
     return out
 

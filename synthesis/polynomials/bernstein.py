@@ -9,12 +9,13 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from synthesis.polynomials import definite
+from synthesis.polynomials.rational import as_float
 
 
 @cache
 def to_bernstein(degree: int) -> FloatArray:
     """Matrix from powers to Bernstein coefficients; exact but for one rounding, and no entry is larger than one."""
-    return np.array([[int(x.p) / int(x.q) for x in row] for row in definite.to_bernstein(degree)])
+    return np.array([[as_float(x) for x in row] for row in definite.to_bernstein(degree)])
 
 
 def in_bernstein(powers: FloatArray, axes: Iterable[int]) -> FloatArray:

@@ -17,7 +17,7 @@ from synthesis.polynomials.bernstein import halved, in_bernstein
 from synthesis.polynomials.definite import sign_on_box
 from synthesis.polynomials.enclosure import PolynomialMatrix
 from synthesis.polynomials.half_spaces import Faces, HalfSpaces, faces_of
-from synthesis.polynomials.rational import rational
+from synthesis.polynomials.rational import as_float, rational
 
 MOST_BOXES = 300  # in balls
 MOST_AT_ONCE, LEVELS = 60_000, 40  # in floats
@@ -64,7 +64,7 @@ def _in_floats(polynomial: PolynomialMatrix, half_spaces: HalfSpaces) -> Decisio
     degrees, v = polynomial.degrees, polynomial.variables
     coefficients = np.zeros([d + 1 for d in degrees])
     for powers, entries in polynomial.terms.items():
-        coefficients[powers] = int(entries[0, 0].p) / int(entries[0, 0].q)
+        coefficients[powers] = as_float(entries[0, 0])
     guard = GUARD * float(np.abs(coefficients).sum())
     whole = ((fmpq(0),) * v, (fmpq(1),) * v)
     if not np.isfinite(guard):
@@ -172,4 +172,4 @@ def _in_balls(polynomial: PolynomialMatrix, boxes: list[Box], half_spaces: HalfS
 
 def _weight(polynomial: PolynomialMatrix, axis: int) -> float:
     """How much a polynomial varies along an axis."""
-    return sum(abs(int(m[0, 0].p) / int(m[0, 0].q)) * k[axis] for k, m in polynomial.terms.items())
+    return sum(abs(as_float(m[0, 0])) * k[axis] for k, m in polynomial.terms.items())

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from estimators.arrays import BoolArray, FloatArray, IndexArray
+from synthesis.polynomials.rational import as_float
 
 EPS = 2.0**-52
 INFLATE = 1.0 + 1e-9  # after every operation on radii, each of which is off by fewer than 10^5 roundings
@@ -179,7 +180,7 @@ def _number(factor: Any) -> tuple[float, float]:
     if hasattr(factor, "mid"):
         value = float(factor.mid())
         return value, 4 * EPS + (float(factor.rad()) * (1 + 1e-9) / abs(value) if value else float(factor.rad()))
-    return int(factor.p) / int(factor.q), EPS
+    return as_float(factor), EPS
 
 
 class BoxArithmetic:
@@ -191,9 +192,7 @@ class BoxArithmetic:
 
     def known(self, rows: Any, like: Boxes) -> Boxes:
         """A matrix of rationals."""
-        array = np.array([[int(x.p) / int(x.q) for x in row] for row in rows.tolist()]).reshape(
-            rows.nrows(), rows.ncols()
-        )
+        array = np.array([[as_float(x) for x in row] for row in rows.tolist()]).reshape(rows.nrows(), rows.ncols())
         return constants(array, like.variables, like.highest).widened(EPS * np.abs(array)[None])
 
     def block(self, rows: Any) -> Boxes:

@@ -259,3 +259,16 @@ def test_a_law_with_states_is_discretised_deployed_and_proved(deployment: Deploy
     wrong = schedule_content(done, "lag")
     wrong["gain"]["table"] = (np.array(wrong["gain"]["table"]) * np.array([[1.0, 1.0], [1.0, -1.0]])).tolist()
     assert prove(wrong)[0].refuted
+
+
+def test_a_sample_time_that_no_table_can_mend_is_refused_at_once() -> None:
+    """Designed in continuous time with poles near -20 1/s: sampled five times a second it oscillates and grows."""
+    channel = FeedbackChannel(("d1",), ("x1",))
+    gains = design_state_feedback(mass(), StateFeedbackDesign((channel,), fastest_pole=20.0))
+    tried: list[str] = []
+    with pytest.raises(
+        ProblemError, match=r"run every 0\.2 s the loop is unstable while parameters stand still \(it grows"
+    ):
+        deploy(gains, DeploySettings(sample_time=0.2), tried.append)
+    assert len(tried) == 1
+    assert deploy(gains, DeploySettings(sample_time=0.002)).cost < 0.01  # the control

@@ -28,6 +28,7 @@ from synthesis.design.export import _plant, schedule_content
 from synthesis.design.feedback_channel import FeedbackChannel
 from synthesis.design.hinf_observer import Channel, ObserverDesign, ObserverGains, design_observer
 from synthesis.design.output_feedback import OutputFeedbackDesign, design_output_feedback
+from synthesis.design.pole_regions import PoleRegions
 from synthesis.design.sampled_observer import design_sampled_observer
 from synthesis.design.sampled_state_feedback import design_sampled_state_feedback
 from synthesis.design.stability import affine_quadratic_stability
@@ -135,6 +136,26 @@ def test_a_polynomial_plant_that_is_cut_keeps_its_level(law: str) -> None:
             levels.append(design_sampled_state_feedback(model, StateFeedbackDesign(LAW, degree=0), PERIOD).gamma_lower)
     assert len(cut.pieces) == 3
     assert isinstance(levels[0], float) and levels[0] == pytest.approx(levels[1], rel=1e-4)
+
+
+def test_poles_of_sampled_designs_lie_in_their_region_on_every_cell() -> None:
+    """Slower than 12 1/s and faster than 7 1/s, with the exact update of the plant at places of both cells."""
+    regions, places = PoleRegions(vertical_strip=(7.0, 12.0)), np.linspace(0.0, 2.0, 21)
+    rate = np.interp(places, *KINK_LINE)
+    observer = design_sampled_observer(plant(-a, {"a": KINK}), ObserverDesign(ERROR, regions=regions), PERIOD)
+    law = design_sampled_state_feedback(plant(-a, {"a": KINK}), StateFeedbackDesign(LAW, regions=regions), PERIOD)
+    coast, driven = np.exp(-rate * PERIOD), (1.0 - np.exp(-rate * PERIOD)) / rate
+    for z in (coast - observer.gain(places)[:, 0, 0], coast + driven * law.gain(places)[:, 0, 0]):
+        assert np.exp(-12.0 * PERIOD) < z.min() and z.max() < np.exp(-7.0 * PERIOD)
+    free = design_sampled_observer(plant(-a, {"a": KINK}), ObserverDesign(ERROR), PERIOD).gain(places)[:, 0, 0]
+    assert (coast - free).max() > np.exp(-7.0 * PERIOD)  # the control
+
+
+@pytest.mark.parametrize("read", [list, dict, len, lambda matrices: matrices["A"], lambda matrices: "A" in matrices])
+def test_what_takes_one_polynomial_is_refused_and_finds_no_empty_plant(read: Any) -> None:
+    assert len(plant_of(plant(-a, {"a": table((0.0, 2.0), [1.0, 2.0])})).matrices) == 6  # one cell
+    with pytest.raises(ProblemError, match=r"plant by cells \(tables\) is not supported here"):
+        read(plant_of(plant(-a, {"a": KINK})).matrices)
 
 
 def test_output_feedback_of_a_kink_lies_between_its_frozen_loops_and_is_proved() -> None:

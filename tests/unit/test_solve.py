@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from synthesis.errors import ProblemError
 from synthesis.lmi import solve as solve_module
@@ -16,6 +17,7 @@ from synthesis.lmi.problem import LmiProblem
 from synthesis.lmi.result import LmiResult, Verdict
 from synthesis.lmi.settings import LmiSettings, Relaxation
 from synthesis.lmi.solve import margins_of, solve
+from tests.support.blas_threads import blas_threads
 from tests.support.lmi_cases import (
     closed_loop,
     condition_problem,
@@ -240,3 +242,24 @@ def test_a_maximised_margin_decides_by_its_sign() -> None:
         result = solve(lyapunov_problem((parameter(),), a * ONE, 0))
         assert result.objective == pytest.approx(margin, abs=1e-6)
         assert (result.verdict is Verdict.CERTIFIED) is (a < 0.0)
+
+
+def test_linear_algebra_has_one_thread_meanwhile_and_as_many_as_before_afterwards(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen: list[dict[str, int]] = []
+    verified = solve_module._verified
+
+    def counted(*args: Any) -> Any:
+        seen.append(blas_threads())
+        return verified(*args)
+
+    monkeypatch.setattr(solve_module, "_verified", counted)
+    with threadpool_limits(2, "blas"):
+        before = blas_threads()
+        if 2 not in before.values():
+            pytest.skip("a BLAS whose threads cannot be set")
+        solve(lyapunov_problem((parameter(),), STABLE), LmiSettings())
+        after = blas_threads()
+    assert seen and all(at[file] == 1 for at in seen for file in before)
+    assert {file: after[file] for file in before} == before
