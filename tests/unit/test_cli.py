@@ -19,7 +19,7 @@ import pytest
 from estimators.schedule import read_content, write_content
 from studies.cli import main
 from studies.schedules import ScheduleRun, compare, run_spec
-from studies.spec import shipped_specs
+from studies.spec import load_spec, shipped_specs
 from synthesis.lmi.clarabel_backend import RawAnswer, solve_with_clarabel
 from synthesis.lmi.conic import ConicData
 
@@ -33,6 +33,8 @@ def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
     found = json.loads(capsys.readouterr().out)
     assert set(found["schedules"]) == set(found["specifications"]) == set(shipped_specs())
     assert len(found["parameter sets"]) == 3
+    for name, words in (found["specifications"] | found["examples"]).items():
+        assert words == load_spec(name)[0].description
     assert main(["list"]) == 0
     assert "resilient-velocity-lateral" in capsys.readouterr().out
 

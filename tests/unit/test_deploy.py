@@ -10,10 +10,12 @@ import pytest
 from scipy.linalg import expm
 
 from estimators.schedule import read_content
+from synthesis.certificate import sampled_loop
 from synthesis.certificate.claims import Claim
 from synthesis.certificate.frozen import critical_probability, frozen_gain, slowest_decay
 from synthesis.certificate.inequalities import inequalities
 from synthesis.certificate.proof import prove
+from synthesis.certificate.sampled_loop import SampledLoop
 from synthesis.certificate.search import Search, Wish
 from synthesis.design.deploy import Deployment, claim_channel, deploy, names_of, tabulate
 from synthesis.design.deploy_settings import DeploySettings
@@ -71,6 +73,27 @@ def claim_of(deployment: Deployment, kind: str, channel: Channel | None = None) 
 def search_of(gains: ObserverGains, segments: int) -> Search:
     loop = deployed_loop(gains, *tabulate(gains, segments, "float64", 0.005), 0.005)
     return Search(loop, names_of(gains.model), gains.model.parameters, 1, gains.design.settings)
+
+
+def test_a_large_table_is_evaluated_in_parts_as_place_by_place(
+    gains: ObserverGains, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The cells five at a time, and places between them at once or one by one in balls: the same places, the same numbers."""
+    loop = deployed_loop(gains, *tabulate(gains, 14, "float64", 0.005), 0.005)
+    one, scale = SampledLoop(loop, gains.scale, "continuous"), gains.scale
+    monkeypatch.setattr(sampled_loop, "MOST_BOXES", 0)
+    monkeypatch.setattr(sampled_loop, "AT_ONCE", 5)
+    parts = SampledLoop(loop, scale, "continuous")
+    assert one.grid is not None and parts.grid is not None
+    np.testing.assert_array_equal(np.sort(parts.grid, axis=0), np.sort(one.grid, axis=0))
+    between = one.grid[:-1] + 0.3 * np.diff(one.grid, axis=0)
+    places = np.concatenate([one.grid, between[:60]])
+    monkeypatch.setattr(sampled_loop, "FEW", 1000)
+    alone = one.at(places)
+    monkeypatch.setattr(sampled_loop, "FEW", 1)
+    together = parts.at(places)
+    for mine, its in ((together.A, alone.A), (together.C, alone.C)):
+        np.testing.assert_allclose(mine.values, its.values, rtol=1e-9, atol=1e-9 * np.abs(its.values).max())
 
 
 def test_places_that_are_only_looked_at_have_no_unknowns(gains: ObserverGains, monkeypatch: pytest.MonkeyPatch) -> None:
