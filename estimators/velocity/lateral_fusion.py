@@ -209,8 +209,8 @@ class LateralFusion(CarsMemory):
             shows, error = linear * s.side_compliance_spread, white + model
             calm = abs(friction) < sure
             far = usable & kit.no((calm & slid) | (off * off < gate * (explained + error)))
-            stays = kit.where(off * friction < 0.0, 0.0, lasting)  # slid further, never less
-            wide = white + model * held + kit.where(calm, 0.0, axle_error) * stays
+            stays = kit.where(calm | (off * friction < 0.0), 0.0, axle_error)  # slid further, never less
+            wide = white + model * held + stays * lasting
             beyond = kit.where(calm, 0.0, largest(kit.where(far, abs(off), 0.0), gap))
             return usable & kit.no(far), wide, shows * shows > error, beyond
 
