@@ -103,7 +103,10 @@ class LongitudinalReset(CarsMemory):
 
 
 class LateralReset(CarsMemory):
-    """Counts how long unloaded axles have contradicted V_y of `count` cars."""
+    """Counts how long both axles have contradicted V_y of `count` cars, alike and in a way that no road explains.
+
+    Unloaded ones, which slip on no road, or loaded ones that would slip less than their force takes.
+    """
 
     memory = ("contradicted",)
 
@@ -119,8 +122,14 @@ class LateralReset(CarsMemory):
             self.contradicted = kit.full(0.0)
             return gated
         calm = (abs(axle.friction[0]) < s.unloaded) & (abs(axle.friction[1]) < s.unloaded)
-        doubt = abs(speed) * (s.side_floor + 2.0 * s.side_compliance * s.unloaded) + s.slip_speed  # m/s, of either axle
-        contradicts = gated & calm & (abs(front - rear) <= doubt)
+        used, beside = (
+            kit.maximum(*(abs(mu) for mu in axle.friction)),
+            (front * axle.friction[0], rear * axle.friction[1]),
+        )
+        grips = (beside[0] < 0.0) & (beside[1] < 0.0)
+        # m/s, of either axle
+        doubt = abs(speed) * (s.side_floor + 2.0 * s.side_compliance * kit.maximum(used, s.unloaded)) + s.slip_speed
+        contradicts = gated & (calm | grips) & (abs(front - rear) <= doubt)
         time = self.contradicted + kit.minimum(elapsed, s.error_memory)
         lost = contradicts & (time > s.lost_time)
         self.contradicted = kit.where(contradicts & kit.no(lost), time, 0.0)

@@ -65,11 +65,15 @@ class FusionSettings:
     # side slip: alpha = c_1 mu + c_3 mu^3 at each axle
     side_compliance: float = 0.09  # rad per unit of F_y/F_z, 5 deg/g: usual cornering compliance of an axle
     side_compliance_spread: float = 0.03
-    side_cubic: float = 0.15  # rad per unit of mu^3: a brush with peak friction near 1 has about c_1
-    side_cubic_spread: float = 0.12  # peak friction between 0.8 and 1.3
+    side_cubic: float = (
+        0.15  # rad per unit of mu^3: a brush with peak friction near 1 has about c_1, an axle that leans on
+    )
+    # its outer tire more
+    side_cubic_spread: float = 0.12  # peak friction between 0.7 and 1.3
     side_memory: float = 300.0  # s
     side_floor: float = 0.002  # rad, 0.1 deg: toe and linkage
-    side_linear: float = 0.05  # relative error of the slip angle
+    side_linear: float = 0.02  # relative error of the slip angle
+    side_excess: float = 0.05  # the same of a tire that slips further than its curve, for as long as a turn
     side_speed_spread: float = 2.0  # stated deviations by which V_y may be off as long: curves of tires differ
     side_speed_memory: float = 2.0  # s: how long an error of V_y stays the same, one turn
     side_error_memory: float = 0.1  # s: how long its error stays the same, one stroke of the steering

@@ -14,6 +14,10 @@ error lasts as long as the turn, and no number of samples averages it away: each
 `lost_time`, where toe and linkage change with every stroke of the steering (`side_error_memory`). Without side force an axle
 is believed, and leads V_y back, for it does not slip sideways on any road.
 
+The error has a side. On a slippery road, or where it pulls along as well, a tire slips further than alpha(mu), never less: so
+do errors that stay, beyond 5 % of c_1 mu at least (`side_excess`). An axle that would slip less is believed like one without
+side force, and holds V_y from that side.
+
 Two scale errors decide how far the kinematics may be believed in a turn, where a and r V_x are large and cancel: s is that
 of a, sensor and leftover body roll; s_t is that of the product r V_x, of the yaw rate sensor and of the speed, whose error
 is that of the radii. Only the sensor's share of s_t is taken off the yaw rate. Attitude follows the estimated speeds, and
@@ -205,18 +209,20 @@ class LateralFusion(CarsMemory):
             friction: Number,
             usable: Number,
             gap: Number,
+            c1: Number,
         ) -> tuple[Number, ...]:
             shows, error = linear * s.side_compliance_spread, white + model
             calm = abs(friction) < sure
             far = usable & kit.no((calm & slid) | (off * off < gate * (explained + error)))
-            stays = kit.where(calm | (off * friction < 0.0), 0.0, axle_error)  # slid further, never less
+            excess = s.side_excess * c1 * linear
+            stays = kit.where(calm | (off * friction < 0.0), 0.0, axle_error + excess * excess)
             wide = white + model * held + stays * lasting
             beyond = kit.where(calm, 0.0, largest(kit.where(far, abs(off), 0.0), gap))
             return usable & kit.no(far), wide, shows * shows > error, beyond
 
         explained = self.filter.expect(_SEEN, values)
         used, variance, excited, beyond = kit.each(
-            tested, explained, innovation, model, white, values[5], mu, usable, kit.stacked((gap, gap))
+            tested, explained, innovation, model, white, values[5], mu, usable, kit.stacked((gap, gap)), tires[0]
         )
         self.axle_error = kit.maximum(kept * self.axle_error, kit.maximum(*beyond))
         self.lasting_error = kept * self.lasting_error + (1.0 - kept) * self.axle_error
