@@ -121,14 +121,11 @@ class LateralReset(CarsMemory):
         if not kit.some(gated):
             self.contradicted = kit.full(0.0)
             return gated
-        calm = (abs(axle.friction[0]) < s.unloaded) & (abs(axle.friction[1]) < s.unloaded)
-        used, beside = (
-            kit.maximum(*(abs(mu) for mu in axle.friction)),
-            (front * axle.friction[0], rear * axle.friction[1]),
-        )
-        grips = (beside[0] < 0.0) & (beside[1] < 0.0)
-        # m/s, of either axle
-        doubt = abs(speed) * (s.side_floor + 2.0 * s.side_compliance * kit.maximum(used, s.unloaded)) + s.slip_speed
+        size = [abs(mu) for mu in axle.friction]
+        calm, loaded = (size[0] < s.unloaded) & (size[1] < s.unloaded), kit.minimum(*size) > s.unloaded
+        grips = loaded & (front * axle.friction[0] < 0.0) & (rear * axle.friction[1] < 0.0)
+        slip = 2.0 * s.side_compliance * kit.maximum(kit.maximum(*size), s.unloaded)
+        doubt = abs(speed) * (s.side_floor + slip) + s.slip_speed  # m/s, of either axle
         contradicts = gated & (calm | grips) & (abs(front - rear) <= doubt)
         time = self.contradicted + kit.minimum(elapsed, s.error_memory)
         lost = contradicts & (time > s.lost_time)

@@ -209,7 +209,7 @@ def test_it_knows_how_well_it_knows(table: dict[str, FloatArray]) -> None:
 
 def test_lateral_velocity_where_the_car_steers(table: dict[str, FloatArray]) -> None:
     """Every single run, though scale errors of a_y and r that differ by 4 % drift by 0.3 m/s^2."""
-    assert table["fusion_vy"][list(SIMULATED).index("steer")].max() < 6.0
+    assert table["fusion_vy"][list(SIMULATED).index("steer")].max() < 7.5
 
 
 def test_no_estimate_is_taken_for_lost(table: dict[str, FloatArray]) -> None:

@@ -12,7 +12,7 @@ from estimators.vehicle import GRAVITY
 from estimators.velocity import FusionSettings, FusionStep, VelocityFusion
 from tests.support.fusion_course import CAR, STEP, Signals, driven
 
-SETTINGS = FusionSettings()
+TIRE = (0.09, 0.09)  # alpha = c_1 mu + c_3 mu^3, rad
 
 
 class Turn(NamedTuple):
@@ -26,14 +26,14 @@ class Turn(NamedTuple):
 def turn(
     seconds: float, yaw_rate: FloatArray, speed: float = 20.0, gravity: FloatArray | float = 0.0, seed: int = 0
 ) -> Turn:
-    """Quasi-steady: V_y follows the side forces, slips are those of the fusion's own model; `gravity` along y is in a_y too.
+    """Quasi-steady: V_y follows the side forces as on brush tires (`TIRE`); `gravity` along y is in a_y too.
 
     `yaw_rate` (n,); V_y' is part of a_y.
     """
     n, rng, car = round(seconds / STEP), np.random.default_rng(seed), CAR
     felt = speed * yaw_rate + gravity
     mu = felt / GRAVITY
-    angle = -(SETTINGS.side_compliance * mu + SETTINGS.side_cubic * mu**3)
+    angle = -(TIRE[0] * mu + TIRE[1] * mu**3)
     vy = speed * np.tan(angle) + yaw_rate * car.rear_axle_distance
     delta = np.arctan((vy + yaw_rate * car.front_axle_distance) / speed) - angle
     steer = np.stack([delta, delta, 0.0 * delta, 0.0 * delta], axis=1)

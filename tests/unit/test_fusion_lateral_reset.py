@@ -10,6 +10,7 @@ from estimators.velocity import FusionSettings, VelocityFusion
 from estimators.velocity.consistency_reset import LateralReset
 from estimators.velocity.lateral_fusion import AxleUpdate
 from tests.support.fusion_course import CAR, STEP, Signals, course, driven, phases, sensed
+from tests.support.turning_course import resets, turn
 
 SETTINGS = FusionSettings()
 BEFORE, AFTER = 400, 600
@@ -54,6 +55,8 @@ CALM = AxleUpdate((-1.5, -1.45), (False, False), (0.01, -0.02), False)
 CASES = {
     "lost": (CALM, (True, True), True),
     "one axle carries a side force": (CALM._replace(friction=(0.01, 0.2)), (True, True), False),
+    "both would slip less than their force takes": (CALM._replace(friction=(0.3, 0.25)), (True, True), True),
+    "both slide, as on ice": (CALM._replace(friction=(-0.3, -0.25)), (True, True), False),
     "the axles contradict each other": (CALM._replace(innovation=(-1.5, 1.5)), (True, True), False),
     "one axle is believed": (CALM._replace(used=(True, False)), (True, True), False),
     "the wheels of one axle slip": (CALM, (True, False), False),
@@ -71,6 +74,34 @@ def test_what_is_evidence(case: str, count: int) -> None:
     clock: LateralReset = fusion.lateral_reset
     found = [bool(np.all(clock(STEP, 20.0, verdict, usable))) for _ in range(AFTER)]
     assert any(found) is expected
+
+
+@pytest.mark.parametrize("wrong", [3.0, -3.0])
+def test_tires_of_a_turn_slip_as_far_as_they_pull_or_further(wrong: float) -> None:
+    """One side of V_y is impossible on any road; on the other the car would slide, as it does on ice."""
+    steady = turn(1.5, np.full(300, 0.25))
+    fusion = VelocityFusion(CAR, STEP)
+    fusion.reset(vx=20.0, vy=steady.vy[0] + wrong)
+    steps, _ = driven(steady.signals, fusion)
+    assert resets(steps) == (2 if wrong > 0.0 else 1)  # the one that was asked for, too
+    if wrong > 0.0:
+        assert abs(steps[-1].vy - steady.vy[-1]) < 2.0 * steps[-1].vy_deviation
+
+
+def test_an_axle_that_was_off_still_bounds_v_y() -> None:
+    """Of late the axles were 0.5 m/s off, as on ice: that the car slides they hardly tell, that it cannot slide less they do."""
+    steady = turn(2.0, np.full(400, 0.25))
+    back = []
+    for wrong in (0.15, -0.15):
+        fusion = VelocityFusion(CAR, STEP)
+        first, rest = (Signals(*(value[part] for value in steady.signals)) for part in (slice(300), slice(300, 320)))
+        driven(first, fusion)
+        fusion.lateral_filter.restart(True, steady.vy[300] + wrong, 0.1**2)
+        fusion._across.axle_error = 0.5
+        steps, _ = driven(rest, fusion)
+        back.append((wrong - (steps[-1].vy - steady.vy[320])) / wrong)
+    assert back[0] > 0.3
+    assert back[1] < 0.1
 
 
 def test_evidence_with_a_gap_starts_over() -> None:

@@ -152,7 +152,7 @@ def test_a_roll_angle_that_is_right_is_no_fault() -> None:
     error, gated, used = rolled(turn(8.0, YAW, gravity=bank), bank)
     assert not gated.any()
     assert used.all()
-    assert np.abs(error).max() < 0.8  # tires of this course carry nothing of V_y', which the bank changes
+    assert np.abs(error).max() < 1.0  # tires of this course carry nothing of V_y', which the bank changes
 
 
 def test_a_steering_angle_that_freezes_is_not_believed() -> None:
