@@ -9,7 +9,7 @@ import numpy as np
 from estimators.arrays import FloatArray
 from estimators.faults import Flag
 from estimators.vehicle import GRAVITY
-from estimators.velocity import FusionSettings, FusionStep, VelocityFusion
+from estimators.velocity import FusionStep, VelocityFusion
 from tests.support.fusion_course import CAR, STEP, Signals, driven
 
 TIRE = (0.09, 0.09)  # alpha = c_1 mu + c_3 mu^3, rad
