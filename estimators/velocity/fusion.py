@@ -169,7 +169,7 @@ class VelocityFusion(Memory):
         axle = across.correct(
             dt, felt, r, yaw_acceleration, angles, along.speed, a + road[0], usable, rolling, doubt[1]
         )
-        self.signal_monitor.learn(dt, seen, wheel.innovation, along.speed, axle, rolling)
+        self.signal_monitor.learn(dt, seen, wheel.innovation, along.speed, r, axle, rolling)
         restarted = self.lateral_reset(dt, along.speed, axle, usable)
         across.blind(dt, unknown)
         across.zero_velocity_update(standing, r)

@@ -34,6 +34,7 @@ class ConditionedInputs(NamedTuple):
     fresh: Signals  # a wheel speed that says something new
     gap: Signals  # s since the wheel last said something new
     silent: Signals  # a wheel that hardly turns
+    left: Signals  # s for which a wheel is still believed to slip, as of the last sample
     steer: Signals
     steered: Number  # whether all steering angles were there
     locked: Number  # whether they have been the same for longer than a slow sensor is
@@ -108,7 +109,7 @@ class FusionInputs(CarsMemory):
         self.wheel_speed, self.age, self.slope, speed, fresh, gap, silent, wheel_flags = kit.each(
             wheel, wheel_speed, self.wheel_speed, self.age, self.slope, self.radius
         )
-        wheels = (speed, fresh, gap, silent, self.steer)
+        wheels = (speed, fresh, gap, silent, self.slip_left, self.steer)
         alive = good[0] & (run[0] < _LONGEST_RUN) & ((run[0] - 1.0) * elapsed < self.settings.slowest_unit)
         locked = self.locked > self.settings.slowest_unit
         return ConditionedInputs(value, noise, run, good, *wheels, steered, locked, present, alive, flags, wheel_flags)

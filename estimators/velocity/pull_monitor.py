@@ -94,7 +94,7 @@ class PullMonitor(Exclusion):
             (self._zero, t_f, kit.maximum(0.5 * abs(gap), s.rolling)),
             (seen.good[0], known, near),
         )
-        (verdict,), _ = vote(kit, PULL, readings, (no(seen.alive),), (self._always,))
+        (verdict,), _ = vote(kit, PULL, readings, (no(seen.alive),), (self._always,), (self._never,))
         # one that repeats what the others say, as at rest, has done nothing wrong: it is believed as soon as it lives
         blameless = no(seen.alive) & verdict.supported & no(verdict.contradicted)
         left = self.left(elapsed, verdict._replace(wrong=verdict.wrong & no(blameless)), before)

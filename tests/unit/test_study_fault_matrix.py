@@ -11,14 +11,15 @@ from studies.beyond.fault_matrix.faults import FAULTS, SIGNALS
 from studies.beyond.fault_matrix.matrix import Cell, cases, matrix
 from studies.beyond.fault_matrix.study import STUDY
 
-CHOSEN = [("none", "none"), ("ay", "zero"), ("yaw_rate", "negated"), ("wheel_speed rr", "zero"), ("ax", "missing")]
-CHOSEN += [("ay", "frozen"), ("ay", "doubled"), ("yaw_rate", "clipped"), ("steer", "frozen"), ("torque fl", "clipped")]
-CHOSEN += [("yaw_rate", "doubled")]
+SINGLE = [("ay", "zero"), ("yaw_rate", "negated"), ("wheel_speed rr", "zero"), ("ax", "missing")]
+SINGLE += [("ay", "frozen"), ("ay", "doubled"), ("yaw_rate", "clipped"), ("steer", "frozen"), ("torque fl", "clipped")]
+SINGLE += [("yaw_rate", "doubled")]
+CHOSEN = [(), *((case,) for case in SINGLE)]
 
 
 @pytest.fixture(scope="module")
 def found() -> list[Cell]:
-    return matrix(1, CHOSEN)
+    return matrix(range(1), CHOSEN)
 
 
 def test_every_cell_is_there_once(found: list[Cell]) -> None:
@@ -30,7 +31,7 @@ def test_every_cell_is_there_once(found: list[Cell]) -> None:
 def test_the_chosen_cells_hold_their_bounds(found: list[Cell]) -> None:
     for cell in found:
         assert not set(cell.missed()) & set("xyrf"), cell
-    turns = [c for c in found if c.drive == "turn" and (c.signal, c.fault) in CHOSEN[1:3] + CHOSEN[5:9]]
+    turns = [c for c in found if c.drive == "turn" and (c.signal, c.fault) in SINGLE[:2] + SINGLE[4:8]]
     assert len(turns) == 6
     assert all(cell.flagged for cell in turns)
     straight = next(c for c in found if c.signal == "steer" and c.drive == "straight")
@@ -52,12 +53,12 @@ def test_a_fusion_without_its_monitor_is_found_out(monkeypatch: pytest.MonkeyPat
     from estimators.velocity.parity import TURN
     from estimators.velocity.signal_vote import Verdict
 
-    def nobody(kit: object, relation: object, told: tuple[np.ndarray, ...], *_: object) -> tuple[object, object]:
-        never = np.zeros(np.shape(told[0])[1:], dtype=np.bool_)
+    def nobody(kit: object, relation: object, levels: tuple[np.ndarray, ...], *_: object) -> tuple[object, object]:
+        never = np.zeros(np.shape(levels[0])[1:], dtype=np.bool_)
         return (Verdict(never, never, ~never),) * len(TURN.rules), defaultdict(lambda: never)
 
     monkeypatch.setattr(turn_monitor, "vote", nobody)
-    cells = matrix(1, [("ay", "negated"), ("yaw_rate", "negated")])
+    cells = matrix(range(1), [(("ay", "negated"),), (("yaw_rate", "negated"),)])
     for cell in cells:
         if cell.drive == "turn":
             assert {"y", "f"} & set(cell.missed())

@@ -28,7 +28,7 @@ COLUMNS = (
 @TOPIC.part("matrix", "Every signal at fault in every way on five drives", cost=60.0)
 def fault_matrix(scope: Scope) -> PartResult:
     """A row for every signal and fault: the drives and what is missed there; and every cell that misses anything."""
-    found = matrix(QUICK_SEEDS if scope.quick else SEEDS)
+    found = matrix(range(QUICK_SEEDS if scope.quick else SEEDS))
     drives = list(dict.fromkeys(cell.drive for cell in found))
     rows: dict[tuple[str, str], dict[str, Cell]] = {}
     for cell in found:
