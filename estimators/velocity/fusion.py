@@ -163,7 +163,8 @@ class VelocityFusion(Memory):
         calm, silent = across.friction(b) < self.settings.unloaded, seen.silent
         front_rolls, rear_rolls = (calm | kit.no(silent[i] & silent[i + 1]) for i in (0, 2))
         rolling = (known & seen.steered & front_rolls & kit.no(front), known & rear_rolls & kit.no(rear))
-        usable = kit.stacked((rolling[0] & steered, rolling[1]))
+        # one that repeats itself is believed where the rear axle can contradict it
+        usable = kit.stacked((rolling[0] & steered & (rolling[1] | kit.no(seen.locked)), rolling[1]))
         fl, fr, rl, rr = seen.steer
         angles = kit.stacked((0.5 * (fl + fr), 0.5 * (rl + rr)))
         axle = across.correct(

@@ -43,17 +43,17 @@ def vote(
     """One verdict for each rule of the relation, in their order; and which two witnesses agree.
 
     Of each rule `stuck`: its signal repeats itself, `plausible`: its live reading may be doubted at all, `seconded`:
-    it cannot be on any road, so that a group needs no other witness to second it.
+    it cannot be on any road, so that a group needs neither another witness to second it nor that margin.
     """
     no, never = kit.no, kit.full(False)
     against, agree, beyond = _pairs(kit, relation, readings)
     wrong: list[Number] = []
     out: dict[int, Number] = {}  # witnesses for which a signal is already found: no fault of another, and no voters
 
-    def outvoted(me: int, groups: Groups, alive: bool, second: int | None, sure: Number) -> Number:
+    def outvoted(me: int, groups: Groups, slides: Number, second: int | None, sure: Number) -> Number:
         found = never
         for group in groups:
-            all_, far = kit.full(True), kit.full(not alive)
+            all_, far = kit.full(True), no(slides)
             for place, i in enumerate(group):
                 all_ = all_ & against[me, i] & no(out.get(i, never))
                 far = far | beyond[me, i]
@@ -68,8 +68,8 @@ def vote(
         me, backed = rule.witness, out.get(rule.witness, never)
         for friend in rule.backers:
             backed = backed | agree[me, friend]
-        found = outvoted(me, rule.live, True, rule.second, sure) & open_ & no(backed)
-        found = readings.known[me] & (found | (repeats & outvoted(me, rule.repeating, False, None, never)))
+        found = outvoted(me, rule.live, no(sure), rule.second, sure) & open_ & no(backed)
+        found = readings.known[me] & (found | (repeats & outvoted(me, rule.repeating, never, None, never)))
         wrong.append(found)
         out[me] = out.get(me, never) | found
     verdicts = []

@@ -17,6 +17,7 @@ from estimators.velocity.signal_vote import Readings, vote
 from estimators.velocity.turn_witnesses import UNDERSTEER, UNDULATION, TurnWitnesses
 
 _PATIENCE = 0.5  # s for which a car that follows its steering contradicts its a_y before the road is taken for banked
+_TRANSITION = 0.1  # s for which an a_y beyond what the steering carries may be V_y' of a car that is not steady
 _BANK = 0.3  # rad: banked curves of test tracks are up to 0.5
 _AY, _R, _ROLL = range(3)
 
@@ -108,13 +109,15 @@ class TurnMonitor(Exclusion):
             kit.maximum(abs(side) - abs(steered), -side * kit.sign(steered)) > allowed[SIDE]
             for side in (carried, now[SIDE])
         )
-        impossible = self.impossible > 0.0
-        plausible = tuple(excess | impossible if rule.one_sided else self._always for rule in TURN.rules)
-        verdicts, agree = vote(kit, TURN, readings, (stuck_r, never, stuck_y), plausible, (never, never, impossible))
-        yaw, roll, side = verdicts
         gap = level[YAW_RATE] - level[SIDE]
+        wide, lasts = allowed[YAW_RATE] + allowed[SIDE], self.since[_AY] > _TRANSITION
+        # what V_y' may explain lasts a moment, and counts twice
+        sure = (self.impossible > 0.0) | (leaps & lasts & (abs(gap) > wide + abs(sway)))
+        plausible = tuple(excess | sure if rule.one_sided else self._always for rule in TURN.rules)
+        verdicts, agree = vote(kit, TURN, readings, (stuck_r, never, stuck_y), plausible, (never, never, sure))
+        yaw, roll, side = verdicts
         steady = abs(sway) < 0.5 * abs(gap)
-        apart = known[SIDE] & steady & (abs(gap) > readings.allowed[YAW_RATE] + readings.allowed[SIDE] - abs(sway))
+        apart = known[SIDE] & steady & (abs(gap) > wide - abs(sway))
         straight = largest(abs(level[YAW_RATE]), abs(level[STEERING])) < UNDERSTEER
         front, rear = (agree[YAW_RATE, i] & agree[i, STEERING] for i in (FRONT, REAR))
         # tires of a banked car carry less than its turn takes: it follows its steering closely
@@ -133,7 +136,7 @@ class TurnMonitor(Exclusion):
         used_y, used_r = known[SIDE] & (left[0] == 0.0) & no(stuck_y), known[YAW_RATE] & (left[1] == 0.0)
         apart_now = abs(now[YAW_RATE] - now[SIDE])
         # of a car whose steering and wheels do not follow its turn, which slides, a_y is the best there is
-        pending = used_y & used_r & leaps & second & (apart_now > allowed[YAW_RATE] + allowed[SIDE])
+        pending = used_y & used_r & leaps & second & (apart_now > wide)
         pending = kit.where(pending, apart_now, 0.0)
         reported = known[SIDE] & (left[0] == 0.0)  # one that repeats what the others say is no fault
         levelled = left[2] == 0.0
