@@ -61,7 +61,7 @@ from estimators.velocity.longitudinal_fusion import LongitudinalFusion
 from estimators.velocity.pull_monitor import PullMonitor
 from estimators.velocity.turn_monitor import TurnMonitor
 
-_LOCKED = 2.0  # standard deviations, in place of `gate`, of a steering angle that repeats itself
+LOCKED = 2.0  # standard deviations, in place of `gate`, of a steering angle that repeats itself
 
 
 class Validated(NamedTuple):
@@ -94,6 +94,7 @@ class SignalMonitor(CarsMemory):
         self.pull, self.turn = PullMonitor(vehicle, along, count), TurnMonitor(vehicle, along, across, count)
         self._zero, self._arm = self.kit.full(0.0), vehicle.rear_axle_distance
         self.astray: Number = self._zero  # m/s, front less rear axle innovation, low-passed
+        self.spread: Number = self._zero  # m/s, what the model explains of it with one standard deviation
         self.remaining: Number = self._zero  # s for which the steering is not believed
         self.mu: Signals = self.kit.stacked([self._zero] * 4)  # F_x/F_z of the wheels at the last sample
 
@@ -146,8 +147,8 @@ class SignalMonitor(CarsMemory):
         share = s.side_floor + s.side_linear * s.side_compliance * kit.maximum(abs(mu), abs(nu))
         white = s.steering_noise * s.steering_noise * (1.0 - kept) / (1.0 + kept)
         model = magnitude * magnitude * (tires + 2.0 * share * share + white) + 2.0 * s.slip_speed**2
-        gate = kit.where(seen.locked, _LOCKED, s.gate)
-        off = (self.astray * self.astray > gate * gate * model) & (abs(front) > abs(rear))
+        self.spread = kit.sqrt(model)
+        off = (abs(self.astray) > kit.where(seen.locked, LOCKED, s.gate) * self.spread) & (abs(front) > abs(rear))
         self.remaining = kit.where(off, s.error_memory, kit.maximum(self.remaining - elapsed, 0.0))
 
     def _slips_along(self, turn: Number, magnitude: Number, mu: Signals) -> Number:

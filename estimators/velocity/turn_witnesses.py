@@ -34,10 +34,11 @@ _SETTLED = 3.0  # time constants until a low-passed level has forgotten wheels t
 
 
 class TurnWitnesses(CarsMemory):
-    """Remembers what they said."""
+    """Remembers what they said; `readings` are those of the last sample."""
 
     memory = ("level", "rolled", "lean", "leaning")
     unknowns = ("lean",)
+    readings: Readings
 
     def __init__(
         self, vehicle: VehicleParameters, along: LongitudinalFusion, across: LateralFusion, count: int
@@ -70,8 +71,8 @@ class TurnWitnesses(CarsMemory):
         now, surface = self.say(seen, yaw_acceleration, None if gravity is None else gravity[0])
         self.level = kit.stacked([kept * old + (1.0 - kept) * new for old, new in zip(self.level, now, strict=True)])
         *level, sway = self.level
-        readings = self._with_allowances(elapsed, seen, level, sway, surface, mu, gravity is not None)
-        return readings, sway, now
+        self.readings = self._with_allowances(elapsed, seen, level, sway, surface, mu, gravity is not None)
+        return self.readings, sway, now
 
     def say(
         self, seen: ConditionedInputs, yaw_acceleration: Number, gravity: Number | None

@@ -43,6 +43,8 @@ PAIRED: dict[str, list[int] | None] = {
     "ax": None, "ay": None, "yaw_rate": None, "steer": None, "wheel_speed rl+rr": [2, 3]
 }  # fmt: skip
 """Signals of which two fail at once; the wheels of an axle by what they have in common, as a bus, count as one."""
+RELATED = {"wheel_speed rl+rr": ("wheel rl", "wheel rr")}
+"""What the parity relations call it, where not the same."""
 SEVERE = {
     "ax": 1.0, "ay": 1.0, "yaw_rate": 0.05, "az": 2.0, "roll_rate": 0.1, "pitch_rate": 0.1, "wheel_speed": 3.0, "steer": 0.01,
     "torque": 300.0,
