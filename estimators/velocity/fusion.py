@@ -163,13 +163,14 @@ class VelocityFusion(Memory):
         calm, silent = across.friction(b) < self.settings.unloaded, seen.silent
         front_rolls, rear_rolls = (calm | kit.no(silent[i] & silent[i + 1]) for i in (0, 2))
         rolling = (known & seen.steered & front_rolls & kit.no(front), known & rear_rolls & kit.no(rear))
-        usable = kit.stacked((rolling[0] & steered, rolling[1]))
+        # one that repeats itself is believed where the rear axle can contradict it
+        usable = kit.stacked((rolling[0] & steered & (rolling[1] | kit.no(seen.locked)), rolling[1]))
         fl, fr, rl, rr = seen.steer
         angles = kit.stacked((0.5 * (fl + fr), 0.5 * (rl + rr)))
         axle = across.correct(
             dt, felt, r, yaw_acceleration, angles, along.speed, a + road[0], usable, rolling, doubt[1]
         )
-        self.signal_monitor.learn(dt, seen, wheel.innovation, along.speed, axle, rolling)
+        self.signal_monitor.learn(dt, seen, wheel.innovation, along.speed, r, axle, rolling)
         restarted = self.lateral_reset(dt, along.speed, axle, usable)
         across.blind(dt, unknown)
         across.zero_velocity_update(standing, r)

@@ -34,9 +34,10 @@ class ConditionedInputs(NamedTuple):
     fresh: Signals  # a wheel speed that says something new
     gap: Signals  # s since the wheel last said something new
     silent: Signals  # a wheel that hardly turns
+    left: Signals  # s for which a wheel is still believed to slip, as of the last sample
     steer: Signals
     steered: Number  # whether all steering angles were there
-    locked: Number  # whether they have been the same for longer than a slow sensor is
+    locked: Number  # whether those in front have been the same for longer than a slow sensor is
     present: Number  # whether all inertial signals were there
     alive: Number  # whether a_x was there, and has not been the same for longer than a slow sensor is
     flags: Number
@@ -57,7 +58,7 @@ class FusionInputs(CarsMemory):
         self._quiet = kit.signals((s.acceleration_noise, s.acceleration_noise, s.yaw_rate_noise))
         self._loud = kit.signals((s.missing_acceleration, s.missing_acceleration, s.missing_yaw_rate))
         three, four = kit.signals((0.0,) * 3), kit.signals((0.0,) * 4)
-        self.locked = zero = kit.full(0.0)  # s since a steering angle last changed
+        self.locked = zero = kit.full(0.0)  # s since a front steering angle last changed
         self.inertial, self.run = kit.each(lambda v: (v + zero, v + zero), three)
         # of the wheels: s since each last said something new, filtered derivative rad/s^2, s of high slip still believed
         wheels = kit.each(lambda v: (v + zero, v + zero, v + zero, v + zero, v + zero + math.nan), four)
@@ -82,8 +83,8 @@ class FusionInputs(CarsMemory):
         if some(no(steered)):
             flags = flags | choose(steered, 0, _MISSING_INPUT)
             (steer,) = kit.each(lambda good, angle, old: (choose(good, angle, old),), turned, steer, self.steer)
-        same = [angle == old for angle, old in zip(steer, self.steer, strict=True)]
-        self.locked = choose(same[0] & same[1] & same[2] & same[3], self.locked + elapsed, 0.0)
+        same = (steer[0] == self.steer[0]) & (steer[1] == self.steer[1])
+        self.locked = choose(same, self.locked + elapsed, 0.0)
         self.steer = steer
         self.inertial, self.run = value, run
 
@@ -108,7 +109,7 @@ class FusionInputs(CarsMemory):
         self.wheel_speed, self.age, self.slope, speed, fresh, gap, silent, wheel_flags = kit.each(
             wheel, wheel_speed, self.wheel_speed, self.age, self.slope, self.radius
         )
-        wheels = (speed, fresh, gap, silent, self.steer)
+        wheels = (speed, fresh, gap, silent, self.slip_left, self.steer)
         alive = good[0] & (run[0] < _LONGEST_RUN) & ((run[0] - 1.0) * elapsed < self.settings.slowest_unit)
         locked = self.locked > self.settings.slowest_unit
         return ConditionedInputs(value, noise, run, good, *wheels, steered, locked, present, alive, flags, wheel_flags)

@@ -94,9 +94,10 @@ def _reported(group: tuple[str, ...], levelled: bool, repeating: bool, large: bo
         blank = [0.0] * (len(relation.witnesses) - len(level))
         stuck = tuple(repeating and rule.signal in group for rule in relation.rules)
         plausible = tuple(large or not rule.one_sided for rule in relation.rules)
+        impossible = tuple(large and rule.one_sided and rule.signal in group for rule in relation.rules)
         readings = Readings(
             (*level, *blank), (0.1,) * len(relation.witnesses), (True,) * len(level) + (False,) * len(blank)
         )
-        verdicts, _ = vote(arithmetic(()), relation, readings, stuck, plausible)
+        verdicts, _ = vote(arithmetic(()), relation, readings, stuck, plausible, impossible)
         found += [rule.signal for rule, verdict in zip(relation.rules, verdicts, strict=True) if verdict.wrong]
     return tuple(found)

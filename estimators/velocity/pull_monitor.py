@@ -54,6 +54,7 @@ class PullMonitor(Exclusion):
         zero, self._never, self._always = kit.full(0.0), kit.full(False), kit.full(True)
         self._zero = zero
         self.gap: Number = zero  # m/s^2, a_x - forces, low-passed
+        self.allowed: Number = zero  # m/s^2 that a_x and forces may be apart, at the last sample
         self.apart: Number = zero  # m/s^2, wheels - forces, low-passed since a_x is in doubt
         self.remaining: Number = zero  # s for which a_x is not believed
         self.since: Number = zero  # s since it is in doubt
@@ -69,6 +70,7 @@ class PullMonitor(Exclusion):
         reading, noise, before = seen.inertial[0], seen.noise[0], self.remaining
         mu, known = self._shares(given, reading + road)
         force, t_f = self._forces(mu, seen)
+        self.allowed = t_f
         unit = self._unit(reading + road)
         kept = kit.exp(-elapsed / s.force_gap_memory)
         self.gap = gap = choose(known & seen.alive, kept * self.gap + (1.0 - kept) * (unit - force), 0.0)
@@ -94,7 +96,7 @@ class PullMonitor(Exclusion):
             (self._zero, t_f, kit.maximum(0.5 * abs(gap), s.rolling)),
             (seen.good[0], known, near),
         )
-        (verdict,), _ = vote(kit, PULL, readings, (no(seen.alive),), (self._always,))
+        (verdict,), _ = vote(kit, PULL, readings, (no(seen.alive),), (self._always,), (self._never,))
         # one that repeats what the others say, as at rest, has done nothing wrong: it is believed as soon as it lives
         blameless = no(seen.alive) & verdict.supported & no(verdict.contradicted)
         left = self.left(elapsed, verdict._replace(wrong=verdict.wrong & no(blameless)), before)

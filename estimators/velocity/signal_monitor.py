@@ -56,12 +56,12 @@ from estimators.arithmetic import Number, Signals, arithmetic
 from estimators.memory import CarsMemory
 from estimators.vehicle import VehicleParameters
 from estimators.velocity.fusion_inputs import ConditionedInputs
-from estimators.velocity.lateral_fusion import TIRES, AxleUpdate, LateralFusion
+from estimators.velocity.lateral_fusion import SPEED, TIRES, AxleUpdate, LateralFusion
 from estimators.velocity.longitudinal_fusion import LongitudinalFusion
 from estimators.velocity.pull_monitor import PullMonitor
 from estimators.velocity.turn_monitor import TurnMonitor
 
-_LOCKED = 2.0  # standard deviations, in place of `gate`, of a steering angle that repeats itself
+LOCKED = 2.0  # standard deviations, in place of `gate`, of a steering angle that repeats itself
 
 
 class Validated(NamedTuple):
@@ -92,8 +92,9 @@ class SignalMonitor(CarsMemory):
     ) -> None:
         self.settings, self.kit, self.across = along.settings, arithmetic((count,)), across
         self.pull, self.turn = PullMonitor(vehicle, along, count), TurnMonitor(vehicle, along, across, count)
-        self._zero = self.kit.full(0.0)
+        self._zero, self._arm = self.kit.full(0.0), vehicle.rear_axle_distance
         self.astray: Number = self._zero  # m/s, front less rear axle innovation, low-passed
+        self.spread: Number = self._zero  # m/s, what the model explains of it with one standard deviation
         self.remaining: Number = self._zero  # s for which the steering is not believed
         self.mu: Signals = self.kit.stacked([self._zero] * 4)  # F_x/F_z of the wheels at the last sample
 
@@ -130,23 +131,36 @@ class SignalMonitor(CarsMemory):
         seen: ConditionedInputs,
         innovation: Signals,
         speed: Number,
+        yaw_rate: Number,
         axle: AxleUpdate,
         usable: Signals,
     ) -> None:
-        """What the corrections say of a_x (`innovation` of the wheels, m/s) and of the steering; `speed` V_x."""
+        """What the corrections say of a_x (by the `innovation` of wheels, m/s), a_y and steering; `yaw_rate` as read."""
         s, kit, P = self.settings, self.kit, self.across.filter.variance
         self.pull.learn(seen, innovation, self.mu)
         (front, rear), (mu, nu) = axle.innovation, axle.friction
         kept, magnitude = kit.exp(-elapsed / s.wheel_lag), abs(speed)
         apart = kit.where(usable[0] & usable[1], front - rear, 0.0)
+        self.turn.impossible = self._slips_along(self.across.yaw_rate(yaw_rate), magnitude, axle.friction)
         self.astray = kept * self.astray + (1.0 - kept) * apart
         tires = P(TIRES) * mu * mu + P(TIRES + 2) * nu * nu - 2.0 * P(TIRES, TIRES + 2) * mu * nu
         share = s.side_floor + s.side_linear * s.side_compliance * kit.maximum(abs(mu), abs(nu))
         white = s.steering_noise * s.steering_noise * (1.0 - kept) / (1.0 + kept)
         model = magnitude * magnitude * (tires + 2.0 * share * share + white) + 2.0 * s.slip_speed**2
-        gate = kit.where(seen.locked, _LOCKED, s.gate)
-        off = (self.astray * self.astray > gate * gate * model) & (abs(front) > abs(rear))
+        self.spread = kit.sqrt(model)
+        off = (abs(self.astray) > kit.where(seen.locked, LOCKED, s.gate) * self.spread) & (abs(front) > abs(rear))
         self.remaining = kit.where(off, s.error_memory, kit.maximum(self.remaining - elapsed, 0.0))
+
+    def _slips_along(self, turn: Number, magnitude: Number, mu: Signals) -> Number:
+        """1 where both axles push the car to where the rear one slips, by F_y/F_z `mu`: no tire does, a_y leads V_y astray.
+
+        Beyond what the uncertainty of V_y and toe allow; `turn` rad/s, `magnitude` of V_x.
+        """
+        s, kit, speed = self.settings, self.kit, self.across.filter
+        slip = speed.mean[SPEED] - self._arm * turn  # m/s, to the left
+        unsure = s.gate * kit.sqrt(speed.variance(SPEED)) + s.side_floor * magnitude + s.dead_speed
+        side, least = kit.sign(slip), s.unloaded
+        return kit.where((abs(slip) > unsure) & (mu[0] * side > least) & (mu[1] * side > least), 1.0, 0.0)
 
     def forget(self, where: Number) -> None:
         """Starts the cars `where` afresh."""

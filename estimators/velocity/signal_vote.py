@@ -38,34 +38,38 @@ def vote(
     readings: Readings,
     stuck: tuple[Number, ...],
     plausible: tuple[Number, ...],
+    seconded: tuple[Number, ...],
 ) -> tuple[tuple[Verdict, ...], Pairs]:
     """One verdict for each rule of the relation, in their order; and which two witnesses agree.
 
-    Of each rule `stuck`: its signal repeats itself, `plausible`: its live reading may be doubted at all.
+    Of each rule `stuck`: its signal repeats itself, `plausible`: its live reading may be doubted at all, `seconded`:
+    it cannot be on any road, so that a group needs neither another witness to second it nor that margin.
     """
     no, never = kit.no, kit.full(False)
     against, agree, beyond = _pairs(kit, relation, readings)
     wrong: list[Number] = []
     out: dict[int, Number] = {}  # witnesses for which a signal is already found: no fault of another, and no voters
 
-    def outvoted(me: int, groups: Groups, alive: bool, second: int | None = None) -> Number:
+    def outvoted(me: int, groups: Groups, slides: Number, second: int | None, sure: Number) -> Number:
         found = never
         for group in groups:
-            all_, far = kit.full(True), kit.full(not alive)
+            all_, far = kit.full(True), no(slides)
             for place, i in enumerate(group):
                 all_ = all_ & against[me, i] & no(out.get(i, never))
                 far = far | beyond[me, i]
-                for k in (*group[:place], *(() if second is None else (second,))):
+                for k in group[:place]:
                     all_ = all_ & agree[i, k]
+                if second is not None:
+                    all_ = all_ & (agree[i, second] | sure)
             found = found | (all_ & far)
         return found
 
-    for rule, repeats, open_ in zip(relation.rules, stuck, plausible, strict=True):
+    for rule, repeats, open_, sure in zip(relation.rules, stuck, plausible, seconded, strict=True):
         me, backed = rule.witness, out.get(rule.witness, never)
         for friend in rule.backers:
             backed = backed | agree[me, friend]
-        found = outvoted(me, rule.live, True, rule.second) & open_ & no(backed)
-        found = readings.known[me] & (found | (repeats & outvoted(me, rule.repeating, False)))
+        found = outvoted(me, rule.live, no(sure), rule.second, sure) & open_ & no(backed)
+        found = readings.known[me] & (found | (repeats & outvoted(me, rule.repeating, never, None, never)))
         wrong.append(found)
         out[me] = out.get(me, never) | found
     verdicts = []

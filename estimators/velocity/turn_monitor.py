@@ -1,14 +1,4 @@
-"""a_y, yaw rate and roll: the witnesses of `turn` (`parity`), and what replaces a signal that they outvote.
-
-    yaw rate      V_x r                                            bias and scale error, as far as they are known
-    a_y           a_y - b - g_bank - V_y'                          bias, bank, and V_y' itself,
-                  V_y' = r' L_r - (V_x r + g_bank)' V_x c_1/g      that the forces make
-    front wheels  V_x (v_fr - v_fl)/(t_f cos delta)                slips that differ, radii as far as they are known
-    rear wheels   V_x (v_rr - v_rl)/t_r                            likewise
-    steering      V_x^2 tan(delta)/L                               half of itself: the tires slip
-
-in m/s^2, each with an allowance for its error, all low-passed alike (`wheel_lag`).
-"""
+"""a_y, yaw rate and roll: what replaces a signal that the witnesses of `turn` (`turn_witnesses`) outvote."""
 
 from __future__ import annotations
 
@@ -20,18 +10,14 @@ from estimators.signals import limits
 from estimators.vehicle import GRAVITY, VehicleParameters
 from estimators.velocity.exclusion import Exclusion
 from estimators.velocity.fusion_inputs import ConditionedInputs
-from estimators.velocity.lateral_fusion import BANK, BIAS, SCALE, TIRES, YAW_BIAS, LateralFusion
-from estimators.velocity.longitudinal_fusion import RADIUS, LongitudinalFusion
+from estimators.velocity.lateral_fusion import BANK, BIAS, SCALE, LateralFusion
+from estimators.velocity.longitudinal_fusion import LongitudinalFusion
 from estimators.velocity.parity import FRONT, REAR, SIDE, STEERING, TURN, YAW_RATE
 from estimators.velocity.signal_vote import Readings, vote
+from estimators.velocity.turn_witnesses import UNDERSTEER, UNDULATION, TurnWitnesses
 
-_UNDERSTEER = 1.0  # m/s^2 by which steering may be off where tires slip: 2 deg/g at 25 m/s
-_FOLLOW = 0.5  # share of itself: the same, and the lag of the car behind its steering
-_TOE = 0.02  # 1/m: 3.5 deg of steering over a wheelbase, all that is left of it at walking pace
-_UNDULATION = 0.5  # m/s^2 of side wind, ruts and body roll in a_y
-_UNLIKE = 0.001  # slip of a free-rolling wheel that the other one of its axle does not share
-_SHARE = 0.03  # relative: scale errors of the inertial unit and of V_x
 _PATIENCE = 0.5  # s for which a car that follows its steering contradicts its a_y before the road is taken for banked
+_TRANSITION = 0.1  # s for which an a_y beyond what the steering carries may be V_y' of a car that is not steady
 _BANK = 0.3  # rad: banked curves of test tracks are up to 0.5
 _AY, _R, _ROLL = range(3)
 
@@ -52,52 +38,39 @@ class Turning(NamedTuple):
 class TurnMonitor(Exclusion):
     """Remembers the witnesses, and for how long who is not believed."""
 
-    memory = ("level", "remaining", "since", "sloped", "yaw_rate", "yaw_acceleration", "lean", "leaning")
-    unknowns = ("yaw_rate", "lean")
+    memory = ("remaining", "since", "sloped", "yaw_rate", "yaw_acceleration", "impossible")
+    parts = ("witnesses",)
+    unknowns = ("yaw_rate",)
 
     def __init__(
         self, vehicle: VehicleParameters, along: LongitudinalFusion, across: LateralFusion, count: int
     ) -> None:
         self.settings, self.along, self.across = along.settings, along, across
         self.kit = kit = arithmetic((count,))
-        self._length, self._arm = vehicle.wheelbase, vehicle.rear_axle_distance
+        self.witnesses = TurnWitnesses(vehicle, along, across, count)
         # rad/s^2: both axles at their limit, one against the other, turn a car with I_z = m L_f L_r no quicker
         self._quickest = 2.0 * limits.FRICTION * GRAVITY / vehicle.wheelbase
-        self._tracks = (vehicle.corner_y[0::2] - vehicle.corner_y[1::2]).tolist()
         zero, self._never, self._always = kit.full(0.0), kit.full(False), kit.full(True)
         self._nothing = zero, zero
-        self.level: Signals = kit.stacked([zero] * (len(TURN.witnesses) + 1))  # and V_y', low-passed, m/s^2
         self.remaining: Signals = kit.stacked([zero] * 3)  # s for which a_y, yaw rate, roll are not believed
         self.since: Signals = kit.stacked([zero] * 2)  # s since a_y, yaw rate have been replaced
         self.sloped: Number = zero  # s for which a_y has been off as on a bank
         self.yaw_rate: Number = kit.full(math.nan)  # the last one that was used, rad/s
         self.yaw_acceleration: Number = zero  # filtered, rad/s^2
-        self.lean: Number = kit.full(
-            math.nan
-        )  # m/s^2 of gravity across the road at the last sample, where attitude is known
-        self.leaning: Number = zero  # its filtered derivative, m/s^3
+        self.impossible: Number = zero  # 1 where tires would slip along their side force, as of the last sample
 
     def __call__(
         self, elapsed: Number, seen: ConditionedInputs, mu: Signals, gravity: tuple[Number, Number] | None
     ) -> Turning:
         """One sample; `mu` F_x/F_z of the wheels, `gravity` as in `Turning`, which has been taken off a_y."""
-        s, kit = self.settings, self.kit
-        _, b, r = seen.inertial
-        kept, off = kit.exp(-elapsed / s.wheel_lag), self._nothing
-        if gravity is not None:
-            off = gravity
-            change = kit.where(abs(self.lean) < math.inf, off[1] - self.lean, 0.0)
-            self.lean, self.leaning = off[1], kept * self.leaning + (1.0 - kept) * change / elapsed
-        now, surface = self._say(seen, None if gravity is None else off[0])
-        self.level = kit.stacked([kept * old + (1.0 - kept) * new for old, new in zip(self.level, now, strict=True)])
-        *level, sway = self.level
-        readings = self._with_allowances(
-            seen, level, sway, surface, mu, self._never if gravity is None else self._always
-        )
+        kit, (_, b, r) = self.kit, seen.inertial
+        off = self._nothing if gravity is None else gravity
+        readings, sway, now = self.witnesses(elapsed, seen, self.yaw_acceleration, mu, gravity)
+        level = readings.level
         v_g, v_p, v_f, v_q = level[:4]
         t_g, t_p, t_f, t_q = readings.allowed[:4]
         known = readings.known
-        stuck = tuple((run - 1.0) * elapsed > s.slowest_unit for run in seen.run)
+        stuck = tuple((run - 1.0) * elapsed > self.settings.slowest_unit for run in seen.run)
         wide = t_p + t_g
         quiet = known[YAW_RATE] & known[SIDE] & (abs(v_p - v_g) < wide) & (abs(now[SIDE] - now[YAW_RATE]) < wide)
         quiet = (
@@ -136,16 +109,19 @@ class TurnMonitor(Exclusion):
             kit.maximum(abs(side) - abs(steered), -side * kit.sign(steered)) > allowed[SIDE]
             for side in (carried, now[SIDE])
         )
-        plausible = tuple(excess if rule.one_sided else self._always for rule in TURN.rules)
-        verdicts, agree = vote(kit, TURN, readings, (stuck_r, never, stuck_y), plausible)
-        yaw, roll, side = verdicts
         gap = level[YAW_RATE] - level[SIDE]
+        wide, lasts = allowed[YAW_RATE] + allowed[SIDE], self.since[_AY] > _TRANSITION
+        # what V_y' may explain lasts a moment, and counts twice
+        sure = (self.impossible > 0.0) | (leaps & lasts & (abs(gap) > wide + abs(sway)))
+        plausible = tuple(excess | sure if rule.one_sided else self._always for rule in TURN.rules)
+        verdicts, agree = vote(kit, TURN, readings, (stuck_r, never, stuck_y), plausible, (never, never, sure))
+        yaw, roll, side = verdicts
         steady = abs(sway) < 0.5 * abs(gap)
-        apart = known[SIDE] & steady & (abs(gap) > readings.allowed[YAW_RATE] + readings.allowed[SIDE] - abs(sway))
-        straight = largest(abs(level[YAW_RATE]), abs(level[STEERING])) < _UNDERSTEER
+        apart = known[SIDE] & steady & (abs(gap) > wide - abs(sway))
+        straight = largest(abs(level[YAW_RATE]), abs(level[STEERING])) < UNDERSTEER
         front, rear = (agree[YAW_RATE, i] & agree[i, STEERING] for i in (FRONT, REAR))
         # tires of a banked car carry less than its turn takes: it follows its steering closely
-        follows = abs(level[YAW_RATE] - steered) < readings.allowed[YAW_RATE] + _UNDERSTEER
+        follows = abs(level[YAW_RATE] - steered) < readings.allowed[YAW_RATE] + UNDERSTEER
         second = agree[YAW_RATE, STEERING] & (front | rear)
         grip = second & follows
         banked = self._banked(elapsed, apart & grip & (no(side.wrong) | straight) & no(stuck_y | roll.wrong), gap)
@@ -160,7 +136,7 @@ class TurnMonitor(Exclusion):
         used_y, used_r = known[SIDE] & (left[0] == 0.0) & no(stuck_y), known[YAW_RATE] & (left[1] == 0.0)
         apart_now = abs(now[YAW_RATE] - now[SIDE])
         # of a car whose steering and wheels do not follow its turn, which slides, a_y is the best there is
-        pending = used_y & used_r & leaps & second & (apart_now > allowed[YAW_RATE] + allowed[SIDE])
+        pending = used_y & used_r & leaps & second & (apart_now > wide)
         pending = kit.where(pending, apart_now, 0.0)
         reported = known[SIDE] & (left[0] == 0.0)  # one that repeats what the others say is no fault
         levelled = left[2] == 0.0
@@ -172,55 +148,10 @@ class TurnMonitor(Exclusion):
         gated = no(reported & used_r & levelled)
         return found._replace(used=(reported, used_r), gravity=off[0], road=off[1], gated=gated)
 
-    def _say(self, seen: ConditionedInputs, gravity: Number | None) -> tuple[tuple[Number, ...], Signals]:
-        """The six and V_y', not low-passed; the surface speeds of the wheels. `gravity`: what a levelled a_y had besides."""
-        kit, along, across = self.kit, self.along, self.across
-        x, y, speed = along.filter.mean, across.filter.mean, along.speed
-        _, b, r = seen.inertial
-        fl, fr, rl, rr = seen.steer
-        angle = 0.5 * (fl + fr)
-        surface = tuple(
-            R * w * (1.0 + rho) for R, w, rho in zip(along.radius, seen.wheel_speed, x[RADIUS:], strict=True)
-        )
-        square = speed * speed
-        sway = self.yaw_acceleration * self._arm
-        sway = sway - speed * y[TIRES + 2] / GRAVITY * (speed * self.yaw_acceleration + self.leaning)
-        own = b * (1.0 - y[SCALE]) - y[BIAS] - sway
-        front, rear = self._tracks
-        levelled = own - y[BANK]
-        levels = (
-            speed * across.yaw_rate(r),
-            levelled,
-            speed * (surface[1] - surface[0]) / (front * kit.cos(angle)),
-            speed * (surface[3] - surface[2]) / rear,
-            square * kit.tan(angle - 0.5 * (rl + rr)) / self._length,
-            levelled if gravity is None else own + gravity,
-            sway,
-        )
-        return levels, surface
-
-    def _with_allowances(
-        self, seen: ConditionedInputs, level: Signals, sway: Number, surface: Signals, mu: Signals, levelled: Number
-    ) -> Readings:
-        """The low-passed `level` with allowances; `mu` F_x/F_z of the wheels, `levelled`: an attitude part is there."""
-        s, kit, speed = self.settings, self.kit, self.along.speed
-        P, Q, gate = self.across.filter.variance, self.along.filter.variance, s.gate
-        magnitude, largest = abs(speed), kit.maximum
-        t_g = magnitude * gate * kit.sqrt(P(YAW_BIAS) + s.yaw_rate_noise**2) + _SHARE * abs(level[YAW_RATE])
-        t_p = gate * kit.sqrt(P(BIAS) + P(BANK)) + _UNDULATION + _SHARE * abs(level[SIDE]) + abs(sway)
-        allowed, known = [t_g, t_p], [seen.good[2], seen.good[1]]
-        for axle, track in enumerate(self._tracks):
-            i, k = 2 * axle, 2 * axle + 1
-            a, c = RADIUS + i, RADIUS + k
-            force = largest(abs(mu[i]), abs(mu[k]))
-            share = _UNLIKE + (s.slip_linear + s.slip_cubic * force * force) * force
-            radii = kit.sqrt(largest(Q(a) + Q(c) - 2.0 * Q(a, c), 0.0))
-            allowed.append(magnitude * (magnitude * (share + radii) + s.slip_speed) / track)
-            rolls = abs(0.5 * (surface[i] + surface[k]) - speed) < s.agreement * magnitude + s.dead_speed
-            live = (seen.gap[i] < s.error_memory) & (seen.gap[k] < s.error_memory)
-            known.append(live & rolls & kit.no(seen.silent[i] | seen.silent[k]))
-        allowed.append(kit.minimum(_UNDERSTEER, _TOE * speed * speed) + _FOLLOW * abs(level[STEERING]))
-        return Readings(tuple(level), (*allowed, t_p), (*known, seen.steered, seen.good[1] & levelled))
+    def forget(self, where: Number) -> None:
+        """Starts the cars `where` afresh."""
+        super().forget(where)
+        self.witnesses.forget(where)
 
     def _banked(self, elapsed: Number, looks: Number, gap: Number) -> Number:
         """Cars whose road has looked banked for so long that the filter is to learn its bank."""
@@ -271,7 +202,7 @@ class TurnMonitor(Exclusion):
         noise_r = choose(used_r, seen.noise[2], doubt / (s.gate * abs(speed_at_least)) * grown_r)
         own = choose(used_r, speed * turn, other) + sway + y[BIAS] + y[BANK]
         ay = choose(used_y, b, own / (1.0 - y[SCALE]))
-        doubt_y = (_UNDULATION + abs(sway) + choose(used_r, allowed[YAW_RATE], doubt)) / s.gate
+        doubt_y = (UNDULATION + abs(sway) + choose(used_r, allowed[YAW_RATE], doubt)) / s.gate
         doubt_y = choose(used_y, pending, doubt_y)
         noise_y = choose(doubt_y > 0.0, doubt_y * grown_y, seen.noise[1])
         self._differentiate(yaw_rate, switched, elapsed)

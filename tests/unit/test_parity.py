@@ -32,7 +32,7 @@ def told(faults: dict[str, float]) -> dict[str, list[float]]:
         wheel_speed=wheels, gap=(STEP,) * 4,
     )  # fmt: skip
     monitor = fusion.signal_monitor
-    six, _ = monitor.turn._say(seen, 0.3 + off["roll"])
+    six, _ = monitor.turn.witnesses.say(seen, monitor.turn.yaw_acceleration, 0.3 + off["roll"])
     force, _ = monitor.pull._forces([0.1 + 0.1 * off["torque"]] * 4, seen)
     slope = [1.0 + off[name] for name in PLACES]
     return {

@@ -11,32 +11,49 @@ from studies.beyond.fault_matrix.faults import FAULTS, SIGNALS
 from studies.beyond.fault_matrix.matrix import Cell, cases, matrix
 from studies.beyond.fault_matrix.study import STUDY
 
-CHOSEN = [("none", "none"), ("ay", "zero"), ("yaw_rate", "negated"), ("wheel_speed rr", "zero"), ("ax", "missing")]
-CHOSEN += [("ay", "frozen"), ("ay", "doubled"), ("yaw_rate", "clipped"), ("steer", "frozen"), ("torque fl", "clipped")]
-CHOSEN += [("yaw_rate", "doubled")]
+SINGLE = [("ay", "zero"), ("yaw_rate", "negated"), ("wheel_speed rr", "zero"), ("ax", "missing")]
+SINGLE += [("ay", "frozen"), ("ay", "doubled"), ("yaw_rate", "clipped"), ("steer", "frozen"), ("torque fl", "clipped")]
+SINGLE += [("yaw_rate", "doubled")]
+SINGLE += [("pitch_rate", "negated")]
+CHOSEN = [(), *((case,) for case in SINGLE), (("ay", "negated"), ("steer", "missing"))]
 
 
 @pytest.fixture(scope="module")
 def found() -> list[Cell]:
-    return matrix(1, CHOSEN)
+    return matrix(range(1), CHOSEN)
 
 
 def test_every_cell_is_there_once(found: list[Cell]) -> None:
     assert len(cases()) == 1 + len(SIGNALS) * len(FAULTS)
     assert len({(c.signal, c.fault, c.drive) for c in found}) == len(found) == 5 * len(CHOSEN)
-    assert [part.name for part in STUDY.parts] == ["matrix"]
+    assert [part.name for part in STUDY.parts] == ["matrix", "doubles"]
 
 
 def test_the_chosen_cells_hold_their_bounds(found: list[Cell]) -> None:
     for cell in found:
         assert not set(cell.missed()) & set("xyrf"), cell
-    turns = [c for c in found if c.drive == "turn" and (c.signal, c.fault) in CHOSEN[1:3] + CHOSEN[5:9]]
+    turns = [c for c in found if c.drive == "turn" and (c.signal, c.fault) in SINGLE[:2] + SINGLE[4:8]]
     assert len(turns) == 6
     assert all(cell.flagged for cell in turns)
     straight = next(c for c in found if c.signal == "steer" and c.drive == "straight")
     assert straight.flagged is None  # a frozen angle of a car that goes straight reads what the healthy one does
     assert all(cell.pitch < 0.02 for cell in found if cell.signal == "none")  # the car itself pitches by 0.03
     assert not any(c.flagged is not None for c in found if c.signal == "none")
+
+
+def test_an_accelerometer_of_the_wrong_sign_is_found_without_steering(found: list[Cell]) -> None:
+    """12.8 m/s if only the steering may second a vote against a live a_y."""
+    (turn,) = (c for c in found if c.signal == "ay and steer" and c.drive == "turn")
+    assert turn.flagged
+    assert turn.vy < 0.3
+
+
+def test_what_no_relation_shows_is_not_missed(found: list[Cell]) -> None:
+    """A pitch of 2.5 to 5 degrees makes 0.4 to 0.9 m/s^2 of a_x; forces may be off by 0.8 and 15 %."""
+    cells = {c.drive: c for c in found if c.signal == "pitch_rate"}
+    for drive in ("launch", "brake"):
+        assert cells[drive].hidden
+        assert 0.2 < cells[drive].share < 0.8
 
 
 @pytest.mark.parametrize("fault", ["clipped", "doubled"])
@@ -52,13 +69,14 @@ def test_a_fusion_without_its_monitor_is_found_out(monkeypatch: pytest.MonkeyPat
     from estimators.velocity.parity import TURN
     from estimators.velocity.signal_vote import Verdict
 
-    def nobody(kit: object, relation: object, told: tuple[np.ndarray, ...], *_: object) -> tuple[object, object]:
-        never = np.zeros(np.shape(told[0])[1:], dtype=np.bool_)
+    def nobody(kit: object, relation: object, levels: tuple[np.ndarray, ...], *_: object) -> tuple[object, object]:
+        never = np.zeros(np.shape(levels[0])[1:], dtype=np.bool_)
         return (Verdict(never, never, ~never),) * len(TURN.rules), defaultdict(lambda: never)
 
     monkeypatch.setattr(turn_monitor, "vote", nobody)
-    cells = matrix(1, [("ay", "negated"), ("yaw_rate", "negated")])
+    cells = matrix(range(1), [(("ay", "negated"),), (("yaw_rate", "negated"),)])
     for cell in cells:
         if cell.drive == "turn":
             assert {"y", "f"} & set(cell.missed())
             assert cell.vy > 2.0
+            assert not cell.hidden

@@ -32,11 +32,19 @@ FAULTS: dict[str, Fault] = {
     "doubled": lambda value, at, _: 2.0 * value[at],
     "delayed": lambda value, at, late: value[at.start - late : at.stop - late],
 }
-SIGNALS: dict[str, int | None] = {
+Case = tuple[tuple[str, str], ...]
+"""(signal, fault) of each signal at fault at once; none of a healthy car."""
+SIGNALS: dict[str, list[int] | None] = {
     "ax": None, "ay": None, "yaw_rate": None, "az": None, "roll_rate": None, "pitch_rate": None,
-    "wheel_speed fl": 0, "wheel_speed rr": 3, "steer": None, "torque fl": 0,
+    "wheel_speed fl": [0], "wheel_speed rr": [3], "steer": None, "torque fl": [0],
 }  # fmt: skip
 """Signals at fault, and the wheel where one of four fails alone; two wheels stand for all, front and rear, left and right."""
+PAIRED: dict[str, list[int] | None] = {
+    "ax": None, "ay": None, "yaw_rate": None, "steer": None, "wheel_speed rl+rr": [2, 3]
+}  # fmt: skip
+"""Signals of which two fail at once; the wheels of an axle by what they have in common, as a bus, count as one."""
+RELATED = {"wheel_speed rl+rr": ("wheel rl", "wheel rr")}
+"""What the parity relations call it, where not the same."""
 SEVERE = {
     "ax": 1.0, "ay": 1.0, "yaw_rate": 0.05, "az": 2.0, "roll_rate": 0.1, "pitch_rate": 0.1, "wheel_speed": 3.0, "steer": 0.01,
     "torque": 300.0,
