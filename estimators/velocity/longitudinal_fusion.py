@@ -85,6 +85,7 @@ class LongitudinalFusion(CarsMemory):
         rates[[BIAS, SCALE]], rates[SLIP] = 1.0 / s.sensor_memory, 1.0 / s.slip_memory
         rates[SIDE], rates[RADIUS:] = 1.0 / s.side_speed_memory, 1.0 / s.radius_memory
         self.filter = speed_filter(mean, spread, rates, (GRADE, 1.0 / s.road_length), RADIUS, every, count)
+        self._levelling = s.road_length / s.pitch_memory  # m/s
         (self._white,) = self.kit.each(lambda R: ((R * s.wheel_speed_noise) ** 2,), radius)
 
     @property
@@ -105,10 +106,12 @@ class LongitudinalFusion(CarsMemory):
         yaw_rate: Number,
         lateral: tuple[Number, Number],
         doubted: Number,
+        levelled: bool,
     ) -> None:
         """`measured` a_x with the standard deviation `noise` of its mean over the sample, m/s^2; `lateral` V_y and its variance.
 
-        A reading that is `doubted` teaches nothing about the sensor, nor about the road.
+        A reading that is `doubted` teaches nothing about the sensor, nor about the road; of one that is `levelled` attitude
+        took the gravity, and what it leaves changes with its own errors, not only with the road.
         """
         sigma, teaching, pull = elapsed * noise, elapsed, measured
         left, unsure = lateral
@@ -117,7 +120,8 @@ class LongitudinalFusion(CarsMemory):
             pull = self.kit.where(doubted, self.acceleration(measured), measured)
         shift = elapsed * (pull + yaw_rate * left)
         coupling = (-teaching, -teaching, -teaching * measured, elapsed * yaw_rate * self.kit.sqrt(unsure))
-        self.filter.move(elapsed, abs(self.speed), _MOVING, coupling, shift, sigma * sigma)
+        way = abs(self.speed) + self._levelling if levelled else abs(self.speed)
+        self.filter.move(elapsed, way, _MOVING, coupling, shift, sigma * sigma)
 
     def correct(
         self,
