@@ -142,7 +142,7 @@ class VelocityFusion(Memory):
         (a, b, r), noise, used, doubt, taken, road, mu, blind, unknown, steered, gated, contested = validated
         turn, before = across.yaw_rate(r), along.speed
         unsure = 1.0 * across.filter.variance(lateral.SPEED)  # of arrays a copy: prediction writes into the covariance
-        along.predict(dt, a, noise[0], turn, (across.speed, unsure), doubt[0] > 0.0)
+        along.predict(dt, a, noise[0], turn, (across.speed, unsure), doubt[0] > 0.0, heavy is not None)
         across.predict(dt, b, noise[1], r, noise[2], before, (doubt[1] == 0.0) & used[2], seen.present)
         yaw_acceleration, left, felt = self.signal_monitor.turn.yaw_acceleration, across.speed, b + road[1]
         own = along.acceleration(a) + turn * left

@@ -29,7 +29,7 @@ class FusionSettings:
         0.02  # rad per g, 1.1 deg: a body rolls by 3 to 6 deg per g, and attitude leaves part of it in a_y
     )
     sensor_memory: float = 3600.0  # s: biases and scales drift with temperature
-    levelling_memory: float = 40.0  # s over which attitude, led by speeds that err, changes what it leaves in a_y
+    levelling_memory: float = 40.0  # s over which attitude, led by speeds that err, changes what it leaves in both
     missing_acceleration: float = 2.0  # m/s^2: how far a held acceleration may be off
     missing_yaw_rate: float = 0.1  # rad/s
     slowest_unit: float = 0.05  # s for which a live accelerometer may repeat itself: 20 Hz

@@ -3,11 +3,12 @@
     dV_x/dt = a (1 - s) - b - g + r (V_y + sigma_y z)                               P2 (15) with bias, grade and scale
     R_i w_i = v_xt,i + |V_x| (c + e_i) mu_i - rho_i R_i w_i + error                 a wheel: slip follows the force
 
-s scale error, b bias, g gravity along the road, c slip compliance, e_i what side slip adds to it, mu_i = F_x/F_z, rho_i
-relative radius error, v_xt,i speed of the wheel centre along the tire, sigma_y the deviation of V_y and z how many of these it
-is off. The slip error grows with the friction used; a wheel whose surface leaves the car, or whose innovation is larger than its
-own model can explain, is left out while that lasts (the high-slip detection of P2 notes 7 asks the same two questions). The
-force tells the side to which a wheel slips: towards the other side a wheel is believed twice as far. Radii are learned from
+s scale error, b bias, g gravity along the road, or what attitude leaves of it, c slip compliance, e_i what side slip adds to it,
+mu_i = F_x/F_z, rho_i relative radius error, v_xt,i speed of the wheel centre along the tire, sigma_y the deviation of V_y and z
+how many of these it is off. The slip error grows with the friction used; a wheel whose surface leaves the car, or whose
+innovation is larger than its own model can explain, is left out while that lasts (the high-slip detection of P2 notes 7 asks the
+same two questions). The force tells the side to which a wheel slips: towards the other side a wheel is believed twice as far.
+What attitude leaves changes within `levelling_memory`: taken for constant, it would be learned as radii. These are learned from
 wheels that roll freely, where no slip hides them: neither one along the tire nor one across it.
 
 Friction opposes slip, so slips along and across are to each other as the forces are (isotropic tire, Pacejka (2006) 3.2.3): a
@@ -85,6 +86,7 @@ class LongitudinalFusion(CarsMemory):
         rates[[BIAS, SCALE]], rates[SLIP] = 1.0 / s.sensor_memory, 1.0 / s.slip_memory
         rates[SIDE], rates[RADIUS:] = 1.0 / s.side_speed_memory, 1.0 / s.radius_memory
         self.filter = speed_filter(mean, spread, rates, (GRADE, 1.0 / s.road_length), RADIUS, every, count)
+        self._levelling = s.road_length / s.levelling_memory  # m/s
         (self._white,) = self.kit.each(lambda R: ((R * s.wheel_speed_noise) ** 2,), radius)
 
     @property
@@ -105,10 +107,12 @@ class LongitudinalFusion(CarsMemory):
         yaw_rate: Number,
         lateral: tuple[Number, Number],
         doubted: Number,
+        levelled: bool,
     ) -> None:
         """`measured` a_x with the standard deviation `noise` of its mean over the sample, m/s^2; `lateral` V_y and its variance.
 
-        A reading that is `doubted` teaches nothing about the sensor, nor about the road.
+        A reading that is `doubted` teaches nothing about the sensor, nor about the road; of one that is `levelled` attitude
+        took the gravity, and what it leaves changes with its own errors, not only with the road.
         """
         sigma, teaching, pull = elapsed * noise, elapsed, measured
         left, unsure = lateral
@@ -117,7 +121,8 @@ class LongitudinalFusion(CarsMemory):
             pull = self.kit.where(doubted, self.acceleration(measured), measured)
         shift = elapsed * (pull + yaw_rate * left)
         coupling = (-teaching, -teaching, -teaching * measured, elapsed * yaw_rate * self.kit.sqrt(unsure))
-        self.filter.move(elapsed, abs(self.speed), _MOVING, coupling, shift, sigma * sigma)
+        way = abs(self.speed) + self._levelling if levelled else abs(self.speed)
+        self.filter.move(elapsed, way, _MOVING, coupling, shift, sigma * sigma)
 
     def correct(
         self,

@@ -12,7 +12,8 @@ from estimators.arrays import FloatArray
 from estimators.faults import Flag
 from estimators.forces import vertical_loads
 from estimators.vehicle import GRAVITY
-from estimators.velocity import FusionStep, VelocityFusion
+from estimators.velocity import FusionSettings, FusionStep, VelocityFusion
+from estimators.velocity.longitudinal_fusion import GRADE, SPEED, LongitudinalFusion
 from tests.support.fusion_course import CAR, COMPLIANCE, STEP, Course, Signals, course, driven, phases, sensed
 
 FROM = 200  # sample at which the fault begins, 1 s
@@ -211,3 +212,15 @@ def test_an_accelerometer_that_repeated_at_rest_is_believed_from_the_start_of_a_
     used = np.array([bool(step.inertial_used[0]) for step in steps])
     assert used[242:].all()
     assert np.abs(speed - launch.speed)[240:].max() < 0.1
+
+
+@pytest.mark.parametrize(("levelled", "rate"), [(True, 10.0 / 200.0 + 1.0 / 40.0), (False, 10.0 / 200.0)])
+def test_what_attitude_leaves_is_forgotten_in_time_and_a_grade_along_the_road(levelled: bool, rate: float) -> None:
+    """g = g_0 exp(-(V/L + 1/T) t) while nothing measures; the same car without attitude is the negative control."""
+    half = LongitudinalFusion([0.3] * 4, FusionSettings(road_length=200.0, levelling_memory=40.0), 1, 1)
+    half.filter.renew(True, 10.0, 0.01)
+    half.filter.mean[GRADE] = 0.2
+    for _ in range(100):
+        half.filter.mean[SPEED] = 10.0
+        half.predict(0.02, 0.0, 0.1, 0.0, (0.0, 0.0), False, levelled)
+    assert half.filter.mean[GRADE] == pytest.approx(0.2 * np.exp(-2.0 * rate), rel=1e-3)

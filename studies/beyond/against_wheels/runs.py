@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from estimators.arrays import FloatArray
 from estimators.pipeline import CornerObservers
 from estimators.schedule import GainSchedule
 from estimators.vehicle import CORNERS, VehicleParameters
 from estimators.velocity import FusionSettings, VelocityFusion
+from studies.trials.accuracy import Spread, known_spread
 from studies.trials.estimation import TEST_CAR, WHEELS, Reading, baselines, run_pipeline
 from studies.truth import Truth, draw
 
@@ -37,6 +37,7 @@ class Errors:
     wheels: float  # their mean speed
     corners: float  # mean of the four corner observers
     alone: tuple[float, float, float, float]  # each of them
+    gap: Spread  # pipeline minus the best of these, seed by seed
 
     @property
     def best_corner(self) -> str:
@@ -71,13 +72,13 @@ def errors(truth: Truth, seeds: Sequence[int]) -> Iterator[Errors]:
         got = run_pipeline(drawn, PIPELINE | CORNER, with_corners)
         known = run_pipeline(drawn, PIPELINE, known_radii)["vx"]
         wheels, true = baselines(drawn)[WHEELS], drawn.truth
+        signals = (got["vx"], known, wheels, got["mean"], *np.moveaxis(got["each"], -1, 0))
 
         for b, name in enumerate(true.names):
             speed, counts = true["vx"][b, true.valid[b]], true.valid[b]
 
-            def rms(found: FloatArray, row: int = b, speed: FloatArray = speed, counts: Any = counts) -> float:
-                return float(np.sqrt(((found[:, row][:, counts] - speed) ** 2).mean(axis=1)).mean())
-
-            fl, fr, rl, rr = (rms(got["each"][..., k]) for k in range(4))
-            four = (rms(got["vx"]), rms(known), rms(wheels), rms(got["mean"]))
-            yield Errors(name, true.tires[b], *four, (fl, fr, rl, rr))
+            rms = np.stack([np.sqrt(((one[:, b, counts] - speed) ** 2).mean(axis=-1)) for one in signals])
+            own, given, *others = rms.mean(axis=1).tolist()
+            gap = known_spread(rms[0] - rms[2 + int(np.argmin(others))])
+            mean, corners, fl, fr, rl, rr = others
+            yield Errors(name, true.tires[b], own, given, mean, corners, (fl, fr, rl, rr), gap)
