@@ -258,7 +258,16 @@ def _log_lines(file: _Found, files: list[_Found]) -> list[str]:
     if len(files) > 1:
         lines.append(f"file = {_quoted(file.path.name)}")
     lines += [f"time = {_quoted(entry.time)}", f'rate = "{float(f"{file.rate:.3g}"):g} Hz"']
-    for key in ("time_unit", "time_format", "delimiter", "decimal", "encoding", "units_row"):
+    for key in (
+        "time_unit",
+        "time_format",
+        "delimiter",
+        "decimal",
+        "thousands",
+        "encoding",
+        "header_line",
+        "units_row",
+    ):
         value = getattr(entry, key)
         if value != LogFile.model_fields[key].default:
             lines.append(f"{key} = {json.dumps(value)}")
