@@ -169,10 +169,12 @@ def _unit(file: _Found, column: str) -> tuple[str, str, str]:
         return one.unit or "m/s^2", "", WEIGHTLESS
     if one.unit is not None:
         return one.unit, sign, ""
+    lifted = [float(np.nanmedian(file.values[name])) for name, other in file.guesses.items() if other.name == "az"]
+    in_g = any(0.5 < abs(one) < 2.0 for one in lifted)  # one sensor, one unit, and only az shows which
     unit = {
         "wheel_speed": "rpm" if high > 400.0 else "rad/s", "torque": "N*m", "steer": "deg" if high > 1.3 else "rad",
         "steering": "deg" if high > 1.3 else "rad", "hand_wheel": "deg" if high > 15.0 else "rad",
-        "ax": "m/s^2", "ay": "m/s^2", "az": "g" if 0.5 < abs(middle) < 2.0 else "m/s^2", "vx": "km/h" if high > 90.0 else "m/s",
+        **dict.fromkeys(("ax", "ay", "az"), "g" if in_g else "m/s^2"), "vx": "km/h" if high > 90.0 else "m/s",
         "vy": "m/s",
     }.get(kind, "deg/s" if high > 3.0 else "rad/s")  # fmt: skip
     return unit, sign, "the unit is a guess"
