@@ -120,9 +120,11 @@ def _look(path: Path) -> _Found:
         raise LogError(f"{path.name}: time column '{short(clocks[0], 40)}' holds less than two stamps; record again")
     step = float(np.median(spacing))
     unit = "s" if entry.time_format == "iso" or table.merged else given.unit or _time_unit(step)
-    step *= factor_to(unit, "s")
-    entry = entry.model_copy(update={"time_unit": unit})
     values = {column: table.values[column] for column in guesses if column != clocks[0]}
+    own = [np.diff(stamps[np.isfinite(value)]) for value in values.values()] if table.merged else []
+    steps = [float(np.median(one)) for one in own if one.size] or [step]  # columns of a merged table have their own
+    step, slowest = (each * factor_to(unit, "s") for each in (min(steps), max(steps)))
+    entry = entry.model_copy(update={"time_unit": unit, "max_gap": 5.0 * slowest if slowest > 1.5 * step else None})
     return _Found(path, entry, guesses, values, 1.0 / step, float(np.nanmin(stamps)) * factor_to(unit, "s"))
 
 
@@ -273,6 +275,8 @@ def _log_lines(file: _Found, files: list[_Found]) -> list[str]:
         value = getattr(entry, key)
         if value != LogFile.model_fields[key].default:
             lines.append(f"{key} = {json.dumps(value)}")
+    if entry.max_gap is not None:
+        lines.append(f'max_gap = "{1e3 * entry.max_gap:.3g} ms" # five samples of the slowest signal')
     other = files[0]
     holds = [{one.name for one in each.guesses.values()} for each in (file, other)]
     apart = file is not other and abs(file.start - other.start) > 1e-3

@@ -10,9 +10,12 @@ import polars as pl
 import pytest
 
 from studies.drives.csv_log import CsvForm, read_columns
+from studies.drives.guess_names import guess_column
 from studies.drives.iso_time import iso_seconds
 from studies.drives.sniff import sniff
 from studies.errors import LogError
+from tests.support.drive_logs import read as read_rows
+from tests.support.drive_logs import rows
 
 PLAIN = "t,a,b\n0.0,1136.5,1\n0.5,-2.25,2\n1.0,3,3\n"
 WANTED = dict.fromkeys("tab", "signal")
@@ -96,3 +99,29 @@ def test_the_first_lines_say_where_the_header_is_and_how_thousands_are_written(t
     assert (found.header_line, found.delimiter, found.decimal, found.thousands) == (3, ";", ",", ".")
     path.write_text("time,a,b,c\n0.5,1,1,1\n")
     assert (sniff(path).header_line, sniff(path).thousands) == (1, "")
+
+
+@pytest.mark.parametrize(
+    ("column", "found"),
+    [
+        ("Vitesse roue AVG (tr/min)", ("signals", "wheel_speed_fl", "rpm")),
+        ("Accélération latérale (m/s²)", ("signals", "ay", "m/s^2")),
+        ("Raddrehzahl hinten rechts", ("signals", "wheel_speed_rr", None)),
+        ("yaw rate in °/s", ("signals", "yaw_rate", "deg/s")),
+        ("a_x/(m/s²)", ("signals", "ax", "m/s^2")),
+        ("AccX, raw [g]", ("signals", "ax", "g")),
+        ("v_avg", None),  # an average, not a French wheel
+        ("raw", None),
+    ],
+)
+def test_names_in_more_languages_and_orders(column: str, found: tuple[str, str, str | None] | None) -> None:
+    assert guess_column(column) == found
+
+
+def test_a_column_slower_than_its_log_does_not_vanish_in_silence(tmp_path: Path) -> None:
+    text = rows([f"{0.005 * k:.3f}" for k in range(200)])
+    lines = text.splitlines()
+    slow = [line if k % 8 == 1 or k == 0 else ",".join([*line.split(",")[:-1], ""]) for k, line in enumerate(lines)]
+    read_rows(tmp_path, text)
+    with pytest.raises(LogError, match=r"has a sample every 0\.04 s, .*set max_gap = \"200 ms\" for log 'log'"):
+        read_rows(tmp_path, "\n".join(slow) + "\n")
