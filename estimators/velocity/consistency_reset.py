@@ -10,9 +10,10 @@ standstill or wheels that turn have supported the estimate for as long, the cloc
 explain the side to which they are off (beyond `unloaded`): four wheels may well slip together, but they had grip before.
 
 A wheel that does not turn has no vote for another speed: four locked wheels agree as well, and are no evidence of anything.
-But it may support the estimate, of a car that stands on ice while the others spin: more wheels must contradict than support.
-As many against as for it is a `split`: it stays open which pair is right, and how far they are apart is reported. A car that
-stands beyond doubt for `lost_time` while its estimate moves is lost too; a sliding car decelerates.
+But it may support the estimate, of a car that stands on ice while the others spin: more wheels must contradict than support,
+and against an estimate that was supported before, one that supports is enough. Then it is a `split`: it stays open who is right,
+and how far they are apart is reported. A car that stands beyond doubt for `lost_time` while its estimate moves is lost too; a
+sliding car decelerates.
 
 **V_y.** Is V_y lost? After a slide the axle conditions may stay gated for good: they are far from a V_y that is wrong.
 
@@ -95,8 +96,9 @@ class LongitudinalReset(CarsMemory):
         explained = (force * kit.sign(off) > s.unloaded * turning) & (self.supported >= s.lost_time)
         time = self.contradicted + gap * choose(explained, _PATIENCE, 1.0)
         against = (turning >= 2) & no(dissent)
-        self.split = choose(against & (turning == support), abs(off), 0.0)
-        contradicted = choose(against & rolls & (turning > support), time, 0.0)
+        split = against & (support > 0) & ((turning == support) | (self.supported >= s.lost_time))
+        self.split = choose(split, abs(off), 0.0)
+        contradicted = choose(against & rolls & (turning > support) & no(split), time, 0.0)
         self.contradicted = choose(news, contradicted, self.contradicted)
         self.since, self.apart = choose(news, since, self.since), choose(news, apart, self.apart)
         return self.contradicted > s.lost_time

@@ -15,7 +15,7 @@ from types import FrameType
 from studies.errors import escaped
 
 DONE, BAD, REFUSED = 0, 1, 2
-LONGEST = 300  # characters of a message
+LONGEST = 400  # characters of a message
 AGAIN = 0.05  # s
 BY_SIGNAL = 128  # exit code of a program that a signal ended, above the signal's number
 RESUME = {
@@ -79,7 +79,7 @@ def one_line(text: str, most: int = LONGEST) -> str:
     clean = escaped(shown)
     if len(text) <= most and len(clean) <= most:
         return clean
-    tail = most // 2
+    tail = 3 * most // 5  # a command to be copied is whole
     return f"{clean[: most - tail - 5]} ... {clean[-tail:]}"
 
 

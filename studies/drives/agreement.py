@@ -36,7 +36,7 @@ BAND, WIDE_BAND = 1.7, 5.0
 steering on ice reaches 0.42, and a line through the origin holds offsets and grades."""
 MATCH, WIDE_MATCH = 1.6, 3.0
 """Factors up to which a mistake explains a slope: less than what is no news, since a mistake leaves a slope of 1 behind."""
-SURE = 0.9  # least quality of a line from which a mistake is inferred
+SURE = 0.9  # least quality of a line from which a mistake is inferred; any clear one of the other sign will do
 WHEEL_SPREAD = 0.2  # interquartile range of a wheel's ratio to the others, above which it slips rather than misreads
 
 
@@ -76,7 +76,12 @@ class Comparison:
     @property
     def contradicts(self) -> bool:
         """Whether a mistake may be inferred from this line."""
-        return not self.agrees and self.line is not None and self.line.quality >= SURE
+        return not self.agrees and self.line is not None and (self.line.quality >= SURE or self.line.slope < 0.0)
+
+    @property
+    def sure(self) -> bool:
+        """Whether the slope is known to a few percent: no offset is in it."""
+        return self.line is not None and self.line.quality >= SURE and not self.line.anchored
 
     def explained(self, factors: Mapping[str, float], wheels: float = 1.0) -> bool:
         """Whether the slope is 1 once the factors are taken out; one that agrees and has none of them stays as it is.

@@ -63,7 +63,8 @@ class LogFile(StrictTable):
     """One log file: its form, its clock, its rate, and the longest pause that may be bridged by interpolation.
 
     ``time_format = "iso"``: stamps are text, dates of ISO 8601 or times of day. An epoch is a number with its ``time_unit``.
-    ``delimiter``, ``decimal``, ``encoding`` and ``units_row`` (a second line that holds units) are for text files.
+    For text files: ``delimiter``, ``decimal``, ``thousands`` (between groups of three digits), ``encoding``, ``header_line`` (the
+    line that holds the names, from 1) and ``units_row`` (a line of units behind it).
     """
 
     name: str = Field(min_length=1, examples=["car"])
@@ -74,7 +75,9 @@ class LogFile(StrictTable):
     time_format: Literal["number", "iso"] = "number"
     delimiter: str = Field(default=",", min_length=1, max_length=1)
     decimal: Literal[".", ","] = "."
+    thousands: Literal["", ",", ".", " ", "'"] = ""
     encoding: Annotated[str, AfterValidator(_an_encoding)] = "utf-8"
+    header_line: int = Field(default=1, ge=1, le=10_000)
     units_row: bool = False
     max_gap: si.Duration | None = None
     duplicates: Literal["mean", "last", "refuse"] = "mean"
@@ -86,6 +89,8 @@ class LogFile(StrictTable):
     def _readable(self) -> Self:
         if self.delimiter == self.decimal:
             raise ValueError('decimal: the comma also separates columns; set delimiter, such as ";"')
+        if self.thousands == self.decimal:
+            raise ValueError(f"thousands: '{self.thousands}' is the decimal sign as well; correct one of the two")
         return self
 
     @property

@@ -22,8 +22,17 @@ from studies.errors import LogError
 
 LONGEST_HEADER = 100_000  # characters
 DELIMITERS = (",", ";", "\t", "|")
+NUMBER = re.compile(r"[-+]?\d+([.,]\d*)?([eE][-+]?\d+)?|[-+]?[.,]\d+")
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
-_NO_NUMBER = re.compile(r"[^0-9]*")
+_GROUPED = re.compile(
+    r"[-+]?\d{1,3}(?:([ '\u00a0\u202f])\d{3}(?:\1\d{3})*|(,)\d{3}(?:,\d{3})*(?=\.|,)|(\.)\d{3}(?:\.\d{3})*(?=,|\.))(?:[.,]\d*)?"
+)
+_DATE = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\D.*|.*\d:\d\d.*")
+_MISSING = frozenset({
+    "na", "n/a", "#n/a", "#na", "<na>", "#nv", "nan(ind)", "-nan(ind)", "1.#ind", "-1.#ind", "1.#qnan", "-1.#qnan",
+    "null", "none", "nil", "missing", "-", "--",
+})  # fmt: skip
+"""What loggers, spreadsheets and languages write where nothing was measured, beside an empty cell, NaN and inf."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +44,13 @@ class CsvForm:
     encoding: str = "utf-8"
     units_row: bool = False
     iso: str | None = None
+    thousands: str = ""
+    header_line: int = 1
 
     @property
     def first_line(self) -> int:
-        """The line of row 0, counted from 1: one header line, and one of units if there is one."""
-        return 3 if self.units_row else 2
+        """The line of row 0, counted from 1: behind the header, and the line of units if there is one."""
+        return self.header_line + (2 if self.units_row else 1)
 
 
 @dataclass(frozen=True)
@@ -56,6 +67,8 @@ class _File:
         encoding = "utf-8-sig" if self.form.encoding.lower() in ("utf-8", "utf8") else self.form.encoding
         try:
             with self.path.open(encoding=encoding, errors="replace", newline="") as stream:
+                for _ in range(self.form.header_line - 1):
+                    stream.readline()
                 yield stream
         except UnicodeError as error:
             raise self.undecodable(error) from error
@@ -107,7 +120,7 @@ def read_header(path: Path, form: CsvForm) -> list[str]:
         raise LogError(f"{path.name}: line 1 has more than {LONGEST_HEADER} characters; it must hold the column names")
     header = file.split(line)
     if len(header) == 1:
-        for other in DELIMITERS:
+        for other in (*DELIMITERS, " "):
             if other != form.delimiter and len(file.split(line, other)) > 1:
                 shown = other.replace("\t", "\\t")
                 raise LogError(
@@ -139,8 +152,15 @@ def _read_text(file: _File) -> pl.DataFrame:
         data: Path | bytes = source
         if form.encoding.lower() not in ("utf-8", "utf8"):
             data = source.read_bytes().decode(form.encoding).lstrip("\ufeff").encode()
-        skip = 1 if form.units_row else 0
-        return pl.read_csv(data, separator=form.delimiter, infer_schema=False, skip_rows_after_header=skip)
+        if _returns_only(file):
+            data = (source.read_bytes() if isinstance(data, Path) else data).replace(b"\r", b"\n")
+        table = pl.read_csv(
+            data, separator=form.delimiter, infer_schema=False, skip_lines=form.header_line - 1,
+            skip_rows_after_header=1 if form.units_row else 0,
+        )  # fmt: skip
+        while table.height and not any(table.row(-1)):  # empty lines at the end are no rows
+            table = table.head(-1)
+        return table
     except OSError as error:
         raise LogError(f"{file.name}: cannot be read ({error.strerror or error}); check the path") from error
     except UnicodeError as error:
@@ -151,12 +171,26 @@ def _read_text(file: _File) -> pl.DataFrame:
         raise LogError(f"{file.name}: {_why_refused(file)}") from error
 
 
+def _returns_only(file: _File) -> bool:
+    """Whether lines end as they did on the first Macintosh, with a carriage return alone."""
+    with file.text() as stream:
+        line = stream.readline(LONGEST_HEADER)
+    return line.endswith("\r")
+
+
 def _why_refused(file: _File) -> str:
     """Why polars refuses a file: nearly always a row with more fields than the header, or another encoding."""
     with file.text() as stream:
         fields = len(file.split(stream.readline()))
-        for number, line in enumerate(stream, start=2):
-            found = len(file.split(line))
+        for number, line in enumerate(stream, start=file.form.header_line + 1):
+            cells = file.split(line)
+            found = len(cells)
+            if found == fields + 1 and not cells[-1].strip():
+                shown = file.form.delimiter.replace("\t", "\\t")
+                header = f"line {file.form.header_line}"
+                return (
+                    f'line {number} ends with a "{shown}" that the header does not have; add one to the end of {header}'
+                )
             if found > fields:
                 comma = file.form.delimiter == "," and _decimal_commas(line)
                 hint = "; commas seem to be decimal signs: export with another delimiter" if comma else ""
@@ -176,19 +210,21 @@ def _decimal_commas(line: str) -> bool:
 def _refuse_units_row(file: _File, table: pl.DataFrame) -> None:
     cells = [str(cell or "").strip() for cell in table.row(0)]
     words = [cell for cell in cells if cell]
-    if file.form.units_row or not words or any(_NO_NUMBER.fullmatch(cell.replace("^2", "")) is None for cell in words):
+    if file.form.units_row or len(words) < len(cells) // 2 or any(map(_is_value, words)):
         return
-    if (
-        all(cell.lower() in ("nan", "inf", "-inf", "na", "null", "none") for cell in words)
-        or len(words) < len(cells) // 2
-    ):
-        return
-    if table.height > 1 and _NO_NUMBER.fullmatch(str(table.row(1)[0] or "")):
+    if table.height > 1 and not _is_value(str(table.row(1)[0] or "")):
         return
     shown = short(", ".join(words), 40)
     raise LogError(
-        f"{file.name}: line 2 is a row of units ({shown}), not of numbers; set units_row = true for this log in the drive file"
+        f"{file.name}: line {file.form.first_line} is a row of units ({shown}), not of numbers; "
+        "set units_row = true for this log in the drive file"
     )
+
+
+def _is_value(cell: str) -> bool:
+    """Whether a cell is a measurement, a missing one included, or a time stamp; not a name or a unit."""
+    numeric = NUMBER.fullmatch(cell) or _GROUPED.fullmatch(cell) or _DATE.fullmatch(cell)
+    return numeric is not None or cell.lower() in _MISSING | {"nan", "inf", "-inf"}
 
 
 def _refuse_short_rows(file: _File, table: pl.DataFrame) -> None:
@@ -197,7 +233,7 @@ def _refuse_short_rows(file: _File, table: pl.DataFrame) -> None:
     if not suspects:
         return
     with file.text() as stream:
-        lines = dict(zip(itertools.count(1), stream, strict=False))
+        lines = dict(zip(itertools.count(file.form.header_line), stream, strict=False))
     for row in suspects:
         number = row + file.form.first_line
         found = len(file.split(lines.get(number, "")))
@@ -218,23 +254,44 @@ def _numbers(file: _File, text: pl.Series) -> FloatArray:
             cell = short(str(stripped[int(wrong[0])]), 30)
             raise LogError(f"{place} holds '{cell}', not a time such as 2024-05-01T12:00:00.005; correct time_format")
         return seconds
-    decimal = file.form.decimal
-    plain = stripped if decimal == "." else stripped.str.replace(decimal, ".", literal=True)
+    decimal, grouped = file.form.decimal, file.form.thousands
+    plain = (
+        stripped.str.replace_all(f"[{grouped}\u00a0\u202f]" if grouped == " " else f"[{grouped}]", "")
+        if grouped
+        else stripped
+    )
+    plain = plain if decimal == "." else plain.str.replace(decimal, ".", literal=True)
     numbers = plain.cast(pl.Float64, strict=False)
     wrong_rows = (numbers.is_null() & stripped.is_not_null() & (stripped != "")).arg_true()
+    if wrong_rows.len():
+        wrong_rows = wrong_rows.filter(~stripped.gather(wrong_rows).str.to_lowercase().is_in(list(_MISSING)))
     if wrong_rows.len():
         row = int(wrong_rows[0])
         cell = str(stripped[row])
         raise LogError(
             f"{file.name}: line {row + file.form.first_line}: column '{text.name}' holds '{short(cell, 30)}', not a number; "
-            f"{_cell_remedy(cell, decimal)}"
+            f"{cell_remedy(cell, decimal)}"
         )
     return np.array(numbers.fill_null(np.nan).to_numpy(), dtype=np.float64)
 
 
-def _cell_remedy(cell: str, decimal: str) -> str:
+def grouped_by(cell: str) -> str:
+    """The sign between groups of three digits, empty where a cell has none for certain: 1,234 alone may be a decimal."""
+    found = _GROUPED.fullmatch(cell)
+    sign = "" if found is None else next(one for one in found.groups() if one)
+    return " " if sign in "\u00a0\u202f" and sign else sign
+
+
+def cell_remedy(cell: str, decimal: str) -> str:
+    """What would make a number of a cell that is none."""
+    in_file = "for this log in the drive file"
+    if (sign := grouped_by(cell)) != "":
+        comma = 'decimal = "," and ' if sign == decimal == "." else ""
+        return f'set {comma}thousands = "{sign}" {in_file}'
     if decimal == "." and _DECIMAL_COMMA.fullmatch(cell):
-        return 'set decimal = "," for this log in the drive file'
+        return f'set decimal = "," {in_file}'
     if looks_iso(cell):
-        return 'if it is the time column, set time_format = "iso" for this log in the drive file'
+        return f'if it is the time column, set time_format = "iso" {in_file}'
+    if _DATE.fullmatch(cell):
+        return "write time stamps as seconds, or as 2024-05-01T12:00:00.005"
     return "leave the cell empty where nothing was measured"

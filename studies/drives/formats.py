@@ -59,4 +59,6 @@ def _reader(path: Path) -> tuple[Read, Name] | None:
 def form_of(entry: LogFile) -> CsvForm:
     """How the cells of a text file are written."""
     iso = entry.time if entry.time_format == "iso" else None
-    return CsvForm(entry.delimiter, entry.decimal, entry.encoding, entry.units_row, iso)
+    return CsvForm(
+        entry.delimiter, entry.decimal, entry.encoding, entry.units_row, iso, entry.thousands, entry.header_line
+    )

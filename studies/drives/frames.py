@@ -2,7 +2,8 @@
 
 Every mistake multiplies the slopes of :mod:`.agreement` by a known factor: a negated column by -1, m/s^2 declared for g by
 0.102, left and right wheels exchanged the wheel differences by -1. The mistake that is named explains all slopes that the log
-excites; where two explain them equally well, both are named; where none does, two at once, then any factor of one column.
+excites; where two explain them equally well, both are named; where none does, two at once, then any factor of one column. Two
+columns in one another's place leave no slope at all: they are put back for a trial (:data:`EXCHANGES`).
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from estimators.display import Display
-from studies.drives.agreement import Comparison, compare, wheels_apart
+from studies.drives.agreement import SURE, WIDE_MATCH, Comparison, compare, wheels_apart
 from studies.drives.direction import of_known_way
 from studies.drives.drive_file import WHEEL_SPEEDS, DriveFile
 from studies.drives.log import DriveLog, read_log
@@ -31,11 +32,20 @@ UNITS = {
     "yaw_rate": RATE_UNITS, "steering": ANGLE_UNITS, "wheels": WHEEL_UNITS,
     **dict.fromkeys(WHEEL_SPEEDS, WHEEL_UNITS),
 }  # fmt: skip
+EXCHANGES = (
+    ("ax", "ay"), ("ax", "az"), ("ay", "az"), ("yaw_rate", "roll_rate"), ("yaw_rate", "pitch_rate"),
+    ("wheel_speed_fr", "wheel_speed_rl"), ("wheel_speed_fl", "wheel_speed_rr"),
+)  # fmt: skip
+"""Columns that are taken for one another: axes of the inertial unit, and wheels in the order fl, rl, fr, rr. Wheels of one side
+roll alike: front and rear cannot be told apart."""
 AS_GOOD = 0.1  # by which the misfits of two explanations may differ to be told apart: 10 %
 MOST_NAMED = 3  # explanations in one line
-LONGEST = 130  # characters of all explanations in one line
+LONGEST = 200  # characters of all explanations in one line
 MANY, NEAR = 80, 0.95
 """Points and quality of a line that may show a factor that is no unit: a slide looks like one for a while."""
+ALIKE = (1.15, 1.5)
+"""Factors between two units of a wheel speed that no single slope can show: 1 km/h on a wheel of 0.35 m reads like 1.26 rad/s."""
+NEARER = 0.55  # of the way, on a logarithmic scale, that all slopes must lie nearer to such a factor than to 1
 WEIGHTLESS = 0.05  # az over g below which gravity was taken out
 ESCAPE = "correct the drive file (or --no-check)"
 
@@ -114,8 +124,32 @@ def check_frames(signals: Mapping[str, FloatArray], drive: DriveFile, files: Map
         return compare(corrected, drive)
 
     found = tuple(compared(1.0))
-    named = _named(compared, drive)
+    named = _exchanged(signals, drive, found) or _named(compared, drive)
     return FrameReport(found, _line_of(drive, files, found, named) if named else None)
+
+
+def _exchanged(signals: Mapping[str, FloatArray], drive: DriveFile, given: Sequence[Comparison]) -> list[Mistake]:
+    """The two columns whose exchange makes lines of everything in them that follows nothing, and leaves no line off."""
+    off = [one.line is not None and not (one.decides and one.agrees) for one in given]
+    fits = []
+    for a, b in EXCHANGES:
+        groups = {"front", "rear"} if a in WHEEL_SPEEDS else {a, b}
+        strange = [k for k, one in enumerate(given) if off[k] and groups & one.gains.keys()]
+        if not (strange and {a, b} <= signals.keys()):
+            continue
+        found = compare({**signals, a: signals[b], b: signals[a]}, drive)
+        lines = [found[k].line for k in strange if found[k].match < WIDE_MATCH]
+        lost = any(not off[k] and old.decides and not found[k].decides for k, old in enumerate(given))
+        clear = all(line is None or line.clear for line in lines)
+        if lost or not clear or not any(line is not None and line.quality >= SURE for line in lines):
+            continue
+        for names in ((),) if a in WHEEL_SPEEDS else ((), (a,), (b,), (a, b)):
+            signs = dict.fromkeys(names, -1.0)
+            if all(one.explained(signs) for one in found):
+                words = f"signals.{a} and signals.{b} exchanged"
+                words += f", and then the other sign for {_keys(names)}" if names else ""
+                fits.append((len(names), sum(one.misfit(signs) for one in found), Mistake({a: 1.0, b: 1.0}, words)))
+    return [mistake for _, _, mistake in sorted(fits, key=lambda fit: fit[:2])[:1]]
 
 
 def _named(compared: Compared, drive: DriveFile) -> list[Mistake]:
@@ -129,7 +163,21 @@ def _named(compared: Compared, drive: DriveFile) -> list[Mistake]:
         pairs = [(a, b) for a, b in combinations(known, 2) if not a.factors.keys() & b.factors.keys()]
         both = [Mistake({**a.factors, **b.factors}, f"{a.remedy} and {b.remedy}", a.rare or b.rare) for a, b in pairs]
         named = _explain(compared, both)
-    return named or _explain(compared, _any_factor(found, drive))
+    return named or _explain(compared, _any_factor(found, drive)) or _unit_alike(found, drive)
+
+
+def _unit_alike(found: Sequence[Comparison], drive: DriveFile) -> list[Mistake]:
+    """A unit of the wheel speeds that is not far from the right one: every slope with them is off by just that factor."""
+    sure = [one for one in found if one.gains.get("wheels") == -1 and "steering" not in one.gains and one.sure]
+    mistakes = [
+        one for one in _units(drive, "wheels") if ALIKE[0] < max(f := one.factors["wheels"], 1.0 / f) <= ALIKE[1]
+    ]
+    return [
+        Mistake(one.factors, f"{one.remedy}, or another effective_radius")
+        for one in mistakes
+        if len(sure) > 1
+        and max(each.misfit(one.factors) for each in sure) < NEARER * abs(np.log(one.factors["wheels"]))
+    ]
 
 
 def _mistakes(drive: DriveFile) -> list[Mistake]:
@@ -169,21 +217,29 @@ def _mistakes(drive: DriveFile) -> list[Mistake]:
 def _singles(drive: DriveFile, group: str) -> list[Mistake]:
     """Sign and unit of one group of columns, and both at once."""
     names = _columns(drive, group)
-    units = {drive.signals[name].unit for name in names}
     if not names:
         return []
     flip = _flip(drive, names)
     reversing = " (or reversed with unsigned wheel speeds: unsigned_wheels = true)" if group == "wheels" else ""
     found = [Mistake({group: -1.0}, flip + reversing, rare=group == "wheels")]
-    if len(units) > 1:
-        return found
-    column, target, radius = drive.signals[names[0]], SIGNALS[names[0]], drive.vehicle.radius_for(names[0])
-    for unit in UNITS[group]:
-        factor = column.factor_of(column.unit, target, radius) / column.factor_of(unit, target, radius)
-        if abs(np.log(factor)) > np.log(1.5):
-            change = f'unit = "{unit}" for {_keys(names)}'
-            found += [Mistake({group: factor}, change), Mistake({group: -factor}, f"{change} and {flip}", rare=True)]
+    for one in _units(drive, group):
+        factor = one.factors[group]
+        if abs(np.log(factor)) > np.log(ALIKE[1]):
+            found += [one, Mistake({group: -factor}, f"{one.remedy} and {flip}", rare=True)]
     return found
+
+
+def _units(drive: DriveFile, group: str) -> list[Mistake]:
+    """Another unit of one group of columns, if they have one in common."""
+    names = _columns(drive, group)
+    if len({drive.signals[name].unit for name in names}) != 1:
+        return []
+    column, target, radius = drive.signals[names[0]], SIGNALS[names[0]], drive.vehicle.radius_for(names[0])
+    given = column.factor_of(column.unit, target, radius)
+    return [
+        Mistake({group: given / column.factor_of(unit, target, radius)}, f'unit = "{unit}" for {_keys(names)}')
+        for unit in UNITS[group]
+    ]
 
 
 def _any_factor(found: Sequence[Comparison], drive: DriveFile) -> list[Mistake]:
@@ -224,13 +280,14 @@ def _explain(compared: Compared, mistakes: Sequence[Mistake]) -> list[Mistake]:
 
 
 def _line_of(drive: DriveFile, files: Mapping[str, str], found: Sequence[Comparison], named: list[Mistake]) -> str:
-    worst = max(found, key=lambda one: one.misfit({}) - np.log(one.band))
+    off = [one for one in found if not one.agrees] or [one for one in found if one.line is not None and not one.decides]
+    worst = max(off or found, key=lambda one: one.misfit({}) - np.log(one.band))
     groups = list(named[0].factors)
     names = [name for group in groups for name in _columns(drive, group)] or [WHEEL_SPEEDS[0]]
     column = drive.signals[names[0]]
     place = f"{files[drive.log_of(column)]}: signals.{names[0]}: column '{short(column.column, 30)}' in {short(column.unit)}"
     slope = worst.line.slope if worst.line is not None else np.nan
-    seen = f"{worst.title} is {slope:.3g}, should be 1"
+    seen = f"{worst.title} is {slope:.3g}, should be 1" if worst.decides else f"{worst.title} has no steady slope"
     remedies = [one.remedy for one in named]
     while len(remedies) > 1 and sum(map(len, remedies)) > LONGEST:
         remedies.pop()

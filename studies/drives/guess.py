@@ -120,9 +120,11 @@ def _look(path: Path) -> _Found:
         raise LogError(f"{path.name}: time column '{short(clocks[0], 40)}' holds less than two stamps; record again")
     step = float(np.median(spacing))
     unit = "s" if entry.time_format == "iso" or table.merged else given.unit or _time_unit(step)
-    step *= factor_to(unit, "s")
-    entry = entry.model_copy(update={"time_unit": unit})
     values = {column: table.values[column] for column in guesses if column != clocks[0]}
+    own = [np.diff(stamps[np.isfinite(value)]) for value in values.values()] if table.merged else []
+    steps = [float(np.median(one)) for one in own if one.size] or [step]  # columns of a merged table have their own
+    step, slowest = (each * factor_to(unit, "s") for each in (min(steps), max(steps)))
+    entry = entry.model_copy(update={"time_unit": unit, "max_gap": 5.0 * slowest if slowest > 1.5 * step else None})
     return _Found(path, entry, guesses, values, 1.0 / step, float(np.nanmin(stamps)) * factor_to(unit, "s"))
 
 
@@ -169,10 +171,12 @@ def _unit(file: _Found, column: str) -> tuple[str, str, str]:
         return one.unit or "m/s^2", "", WEIGHTLESS
     if one.unit is not None:
         return one.unit, sign, ""
+    lifted = [float(np.nanmedian(file.values[name])) for name, other in file.guesses.items() if other.name == "az"]
+    in_g = any(0.5 < abs(one) < 2.0 for one in lifted)  # one sensor, one unit, and only az shows which
     unit = {
         "wheel_speed": "rpm" if high > 400.0 else "rad/s", "torque": "N*m", "steer": "deg" if high > 1.3 else "rad",
         "steering": "deg" if high > 1.3 else "rad", "hand_wheel": "deg" if high > 15.0 else "rad",
-        "ax": "m/s^2", "ay": "m/s^2", "az": "g" if 0.5 < abs(middle) < 2.0 else "m/s^2", "vx": "km/h" if high > 90.0 else "m/s",
+        **dict.fromkeys(("ax", "ay", "az"), "g" if in_g else "m/s^2"), "vx": "km/h" if high > 90.0 else "m/s",
         "vy": "m/s",
     }.get(kind, "deg/s" if high > 3.0 else "rad/s")  # fmt: skip
     return unit, sign, "the unit is a guess"
@@ -258,10 +262,21 @@ def _log_lines(file: _Found, files: list[_Found]) -> list[str]:
     if len(files) > 1:
         lines.append(f"file = {_quoted(file.path.name)}")
     lines += [f"time = {_quoted(entry.time)}", f'rate = "{float(f"{file.rate:.3g}"):g} Hz"']
-    for key in ("time_unit", "time_format", "delimiter", "decimal", "encoding", "units_row"):
+    for key in (
+        "time_unit",
+        "time_format",
+        "delimiter",
+        "decimal",
+        "thousands",
+        "encoding",
+        "header_line",
+        "units_row",
+    ):
         value = getattr(entry, key)
         if value != LogFile.model_fields[key].default:
             lines.append(f"{key} = {json.dumps(value)}")
+    if entry.max_gap is not None:
+        lines.append(f'max_gap = "{1e3 * entry.max_gap:.3g} ms" # five samples of the slowest signal')
     other = files[0]
     holds = [{one.name for one in each.guesses.values()} for each in (file, other)]
     apart = file is not other and abs(file.start - other.start) > 1e-3

@@ -79,7 +79,11 @@ def read_log(paths: Sequence[Path], drive: DriveFile) -> DriveLog:
         for name, column in columns.items():
             log = drive.log_of(column)
             values: dict[str, FloatArray] = getattr(tracks[log], table)
-            out[name] = resample(tracks[log].stamped.time + offsets[log], values[name], grid, gaps[log])
+            when = tracks[log].stamped.time + offsets[log]
+            _check_bridged(
+                f"{files[log].name}: {table}.{name}: column '{column.column}'", when, values[name], gaps[log], log
+            )
+            out[name] = resample(when, values[name], grid, gaps[log])
         return out
 
     signals, reference = on_grid(drive.signals, "signals"), on_grid(drive.reference, "reference")
@@ -205,6 +209,17 @@ def _check_gap(path: Path, entry: LogFile, table: LogTable, raw: FloatArray, tim
             f"{path.name}: time column '{entry.time}' jumps by {gap:g} s on {place} (from {time[k]:.10g} s to "
             f"{time[k + 1]:.10g} s), at most {longest:g} s may be missing; correct the clock from there on, or cut "
             "the log in two"
+        )
+
+
+def _check_bridged(place: str, time: FloatArray, value: FloatArray, gap: float, log: str) -> None:
+    """A column slower than its log would vanish between its own samples."""
+    spacing = np.diff(time[np.isfinite(value)])
+    usual = float(np.median(spacing)) if spacing.size else 0.0
+    if usual > gap * (1 + 1e-6) + 1e-6:
+        raise LogError(
+            f"{place} has a sample every {usual:.3g} s, and gaps above {gap:.3g} s are not bridged: nothing is left of it; "
+            f"set max_gap = \"{5e3 * usual:.3g} ms\" for log '{log}'"
         )
 
 

@@ -43,6 +43,8 @@ LIMITS: dict[str, Limit] = {
 QUANTILE = 99.0
 FAST = 5.0  # m/s of V_x above which wheels roll: a start or a stop says little about units
 ROLLING = (0.7, 1.4)  # R_e w / V_x of all wheels, at the median of a drive
+STEADY, STEADY_ROLLING = 0.05, (0.89, 1.12)
+"""The same where the mean of the wheels keeps it to 5 % (quartiles): no slip, and km/h read as rad/s shows, 1.26 at 0.35 m."""
 ONE_WHEEL = (0.4, 2.5)  # the same of one wheel among good ones, which may spin or slide for most of a drive
 STANDING = 0.012
 """R_e w / V_x below which a wheel is locked or its sensor dead: a fault, not a unit (the smallest one is 0.0175)."""
@@ -93,39 +95,47 @@ def _check_rolling(
     strange = known & ~((median >= ONE_WHEEL[0]) & (median <= ONE_WHEEL[1]))
     if strange.any() and not strange[known].all():
         wheel = int(np.flatnonzero(strange)[0])
-        raise LogError(_odd_wheel(drive, files, wheel, float(median[wheel]), surface / radius, whole=False))
+        raise LogError(_odd_wheel(drive, files, wheel, float(median[wheel]), surface / radius))
     if known.any():
         whole = float(np.median(ratio[turning & known]))
-        if not ROLLING[0] <= whole <= ROLLING[1]:
+        each = np.where(turning & known, ratio, np.nan)[(turning & known).any(axis=1)]
+        low, high = np.percentile(np.nanmean(each, axis=1), (25.0, 75.0))
+        rolling = STEADY_ROLLING if abs(high - low) < STEADY * abs(whole) else ROLLING
+        if not rolling[0] <= whole <= rolling[1]:
             wheel = int(np.flatnonzero(known)[0])
-            raise LogError(_odd_wheel(drive, files, wheel, whole, surface / radius, whole=True))
+            raise LogError(_odd_wheel(drive, files, wheel, whole, surface / radius, rolling))
 
 
 def _odd_wheel(
-    drive: DriveFile, files: Mapping[str, str], wheel: int, ratio: float, speed: FloatArray, *, whole: bool
+    drive: DriveFile,
+    files: Mapping[str, str],
+    wheel: int,
+    ratio: float,
+    speed: FloatArray,
+    whole: tuple[float, float] | None = None,
 ) -> str:
+    """What is said of a wheel, or of the range ``whole`` in which the ratio of all wheels should be."""
+    low, high = whole or ROLLING
     name = f"wheel_speed_{CORNERS[wheel]}"
     column, velocity = drive.signals[name], drive.reference["vx"]
     factor = partial(column.factor_of, si_unit="rad/s", radius=drive.vehicle.radius_for(name))
     given = factor(column.unit)
-    fitting = [f'unit = "{unit}"' for unit in WHEEL_UNITS if _rolls(ratio * factor(unit) / given)]
+    fitting = [f'unit = "{unit}"' for unit in WHEEL_UNITS if low <= ratio * factor(unit) / given <= high]
     place = f"{_place(drive, files, f'signals.{name}', column)} in {column.unit}"
-    peak = float(np.nanmax(np.abs(speed[:, wheel])))
     if not fitting and whole:
         given = factor_to(velocity.unit, "m/s")
         units = ("m/s", "km/h", "mph")
-        fitting = [f'unit = "{u}" for reference.vx' for u in units if _rolls(ratio * given / factor_to(u, "m/s"))]
-    if not fitting and _rolls(-ratio):
+        fitting = [
+            f'unit = "{u}" for reference.vx' for u in units if low <= ratio * given / factor_to(u, "m/s") <= high
+        ]
+    if not fitting and low <= -ratio <= high:
         fitting = [f'sign = "{"positive" if column.sign == "negative" else "negative"}"']
     return (
-        f"{place} reaches {peak:.4g} rad/s: R_e w / V_x is {ratio:.3g} at the median{' of all wheels' if whole else ''} "
-        f"while reference.vx (column '{velocity.column}' in {velocity.unit}) is above {FAST:g} m/s, a rolling wheel has "
-        f"{ROLLING[0]:g} to {ROLLING[1]:g}; {_remedy(fitting, column, 'or effective_radius' if whole else '')}"
+        f"{place} reaches {float(np.nanmax(np.abs(speed[:, wheel]))):.4g} rad/s: R_e w / V_x is {ratio:.3g} "
+        f"at the median{' of all wheels' if whole else ''} while reference.vx (column '{velocity.column}' in {velocity.unit}) "
+        f"is above {FAST:g} m/s, a rolling wheel has {low:g} to {high:g}; "
+        f"{_remedy(fitting, column, 'or effective_radius' if whole else '')}"
     )
-
-
-def _rolls(ratio: float) -> bool:
-    return ROLLING[0] <= ratio <= ROLLING[1]
 
 
 def _place(drive: DriveFile, files: Mapping[str, str], key: str, column: Column) -> str:

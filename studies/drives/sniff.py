@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from studies.drives.columns import LogFile
-from studies.drives.csv_log import DELIMITERS
+from studies.drives.csv_log import DELIMITERS, NUMBER, grouped_by
 from studies.drives.formats import is_text
 from studies.drives.guess_names import guess_column
 from studies.drives.iso_time import looks_iso
 from studies.errors import LogError
 
 LINES = 20
-_NUMBER = re.compile(r"[-+]?\d+([.,]\d*)?([eE][-+]?\d+)?|[-+]?[.,]\d+")
 
 
 def sniff(path: Path) -> LogFile:
@@ -30,24 +29,44 @@ def sniff(path: Path) -> LogFile:
         raise LogError(
             f"{path.name}: cannot be read as text ({error}); give a CSV log, or write the drive file by hand"
         ) from error
-    if not lines or not lines[0].strip():
+    start = _header(lines)
+    if start is None:
         raise LogError(f"{path.name}: line 1 is empty; it must hold the column names")
-    delimiter = max(DELIMITERS, key=lambda one: len(_split(lines[0], one)))
-    header, rows = _split(lines[0], delimiter), [_split(line, delimiter) for line in lines[1:] if line]
-    units_row = bool(rows) and not any(_NUMBER.fullmatch(cell) or looks_iso(cell) for cell in rows[0] if cell)
+    delimiter = _delimiter(lines[start])
+    header, rows = _split(lines[start], delimiter), [_split(line, delimiter) for line in lines[start + 1 :] if line]
+    units_row = bool(rows) and not any(NUMBER.fullmatch(cell) or looks_iso(cell) for cell in rows[0] if cell)
     body = rows[1:] if units_row else rows
     cells = [cell for row in body for cell in row]
-    commas = sum(bool(re.fullmatch(r"[-+]?\d+,\d+([eE][-+]?\d+)?", cell)) for cell in cells)
-    points = sum(bool(re.fullmatch(r"[-+]?\d+\.\d+([eE][-+]?\d+)?", cell)) for cell in cells)
+    commas = sum(bool(re.fullmatch(r"[-+]?[\d.' ]+,\d+([eE][-+]?\d+)?", cell)) for cell in cells)
+    points = sum(bool(re.fullmatch(r"[-+]?[\d,' ]+\.\d+([eE][-+]?\d+)?", cell)) for cell in cells)
+    decimal = "," if delimiter != "," and commas > points else "."
+    grouped = {sign for cell in cells if (sign := grouped_by(cell))} - {decimal}
     clock = next(
         (k for k, name in enumerate(header) if (g := guess_column(name)) is not None and g.table == "time"), None
     )
     iso = clock is not None and any(looks_iso(row[clock]) for row in body if len(row) > clock)
     return _log({
         "name": path.stem, "time": header[clock] if clock is not None else "time", "delimiter": delimiter,
-        "decimal": "," if delimiter != "," and commas > points else ".", "encoding": encoding, "units_row": units_row,
-        "time_format": "iso" if iso else "number",
+        "decimal": decimal, "thousands": min(grouped, default=""), "encoding": encoding, "header_line": start + 1,
+        "units_row": units_row, "time_format": "iso" if iso else "number",
     })  # fmt: skip
+
+
+def _header(lines: list[str]) -> int | None:
+    """The first line that has as many fields as the last one, several: what a logger says of itself may stand before it."""
+    for k, line in enumerate(lines):
+        cells = _split(line, _delimiter(line))
+        if any(map(NUMBER.fullmatch, cells)):
+            break
+        if len(cells) > 1 and len(cells) == len(_split(lines[-1], _delimiter(line))):
+            return k
+    return 0 if lines and lines[0].strip() else None
+
+
+def _delimiter(header: str) -> str:
+    """What splits a header into the most fields; a space only where nothing else does."""
+    best = max(DELIMITERS, key=lambda one: len(_split(header, one)))
+    return best if len(_split(header, best)) > 1 else " " if " " in header.strip() else best
 
 
 def _log(keys: dict[str, Any]) -> LogFile:

@@ -43,6 +43,10 @@ def exchanged(*axles: str) -> Callable[[Table], Table]:
     return lambda table: table | {f"w_{a}{s}": table[f"w_{a}{'lr'['rl'.index(s)]}"] for a in axles for s in "lr"}
 
 
+def traded(a: str, b: str) -> Callable[[Table], Table]:
+    return lambda table: table | {a: table[b], b: table[a]}
+
+
 def declared(column: str, unit: str) -> str:
     start = TURNING.index(f'column = "{column}"')
     end = TURNING.index("}", start)
@@ -97,6 +101,26 @@ CASES: dict[str, tuple[str, Callable[[Table], Table], str, str]] = {
         lambda t: scaled(180 / math.pi, "d")(scaled(-1.0, "r")(t)),
         "yaw_rate",
         'sign = "negative" for signals.yaw_rate and unit = "deg" for signals.steering',
+    ),
+    "km/h for rad/s": (
+        TURNING,
+        scaled(0.33 * 3.6, *WHEELS),
+        "wheel_speed_fl",
+        'unit = "km/h" for signals.wheel_speed_*, or',
+    ),
+    "ax and ay": (TURNING, traded("ax", "ay"), "ax", "likely signals.ax and signals.ay exchanged;"),
+    "unit turned by 90 degrees": (
+        TURNING,
+        lambda t: traded("ax", "ay")(scaled(-1.0, "ax")(t)),
+        "ax",
+        "signals.ax and signals.ay exchanged, and then the other sign for signals.ax;",
+    ),
+    "ay and az": (TURNING, traded("ay", "az"), "ay", "likely signals.ay and signals.az exchanged;"),
+    "order fl, rl, fr, rr": (
+        TURNING,
+        traded("w_fr", "w_rl"),
+        "wheel_speed_fr",
+        "likely signals.wheel_speed_fr and signals.wheel_speed_rl exchanged;",
     ),
     "reversed": (
         TURNING,
@@ -157,6 +181,14 @@ def test_what_is_not_excited_is_not_judged(tmp_path: Path) -> None:
         assert found.complaint is None
         verdicts = {row["verdict"] for row in found.rows() if row["comparison"] != "az over gravity"}
         assert not verdicts & {"agrees", "contradicts"}
+
+
+def test_an_exchange_that_mends_one_line_and_loses_another_is_none(tmp_path: Path) -> None:
+    """An accelerometer that follows nothing is no exchange, nor is front with rear, which roll alike."""
+    table, rng = turning(), np.random.default_rng(2)
+    table |= {"ax": 2.0 * np.sin(2.7 * table["t"]) + 0.05 * rng.standard_normal(table["t"].size)}
+    assert look(tmp_path, TURNING, table).complaint is None
+    assert look(tmp_path, TURNING, traded("w_fl", "w_rl")(traded("w_fr", "w_rr")(turning()))).complaint is None
 
 
 def test_a_mistake_must_not_silence_what_contradicts_it(tmp_path: Path) -> None:

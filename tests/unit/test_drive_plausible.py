@@ -143,6 +143,15 @@ def test_wheels_that_do_not_roll_beside_the_reference(
     assert "\n" not in message
 
 
+def test_rolling_wheels_in_km_h_are_no_rad_s_and_slipping_ones_stay(tmp_path: Path) -> None:
+    """1.19 rad/s a km/h on this wheel: less than slip may be, but slip does not stay the same."""
+    km_h = FAST | {f"w_{corner}": 3.6 * 0.33 * FAST[f"w_{corner}"] for corner in CORNERS}
+    with pytest.raises(LogError, match=r"R_e w / V_x is 1\.2 .* 0\.89 to 1\.12; likely unit = \"km/h\""):
+        read(tmp_path, DRIVE, km_h)
+    slip = np.linspace(1.05, 1.35, FAST["t"].size)
+    read(tmp_path, DRIVE, FAST | {f"w_{corner}": slip * FAST[f"w_{corner}"] for corner in CORNERS})
+
+
 def test_one_wheel_among_good_ones(tmp_path: Path) -> None:
     text = DRIVE.replace('"w_rr", unit = "rad/s"', '"w_rr", unit = "rpm"')
     with pytest.raises(LogError, match=r"signals\.wheel_speed_rr: column 'w_rr' in rpm .*likely unit = \"rad/s\""):

@@ -85,6 +85,16 @@ def test_two_wheels_that_spin_and_two_that_stand(since: int) -> None:
     assert 3.0 * steps[-1].vx_deviation > 10.0
 
 
+def test_three_wheels_that_spin_do_not_outvote_the_one_that_held_the_car() -> None:
+    """Stuck, known to stand: 10.8 m/s with a deviation of 0.16 m/s before. It is told as open, too."""
+    signals = unloaded(sensed(AT_REST))
+    signals.wheel_speed[300:, 1:] = 10.8 / CAR.radius[1:] + 0.05 * np.random.default_rng(1).normal(size=(N - 300, 3))
+    steps, vx = driven(signals)
+    assert np.abs(vx).max() < 0.1
+    assert resets(steps[1:]) == 0
+    assert 3.0 * steps[-1].vx_deviation > 10.0
+
+
 def test_three_wheels_that_roll_outvote_one() -> None:
     """The negative control: one dead sensor does not keep the car at rest."""
     drive = course(phases((3.0, 0.0)), start=10.8)
