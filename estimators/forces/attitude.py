@@ -164,7 +164,7 @@ class AttitudeObserver(Renewable):
         used = [abs(value) <= LIMIT for value in sines]
         roll, pitch = self.angle
         up = kit.sqrt(1.0 - kit.minimum(roll * roll + pitch * pitch, 1.0))
-        slides = kit.own(np.asarray(sliding)) & known[0], self._still
+        slides = kit.own(sliding) & known[0], self._still
         spins, unlike = (p * up - turn * pitch, turn * roll - q * up), GYRO_BIAS + MISALIGNED * abs(turn)
         states = self.angle, self.lagged, self.share, self.drift
         moved = [
