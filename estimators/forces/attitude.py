@@ -22,6 +22,16 @@ from estimators.vehicle import GRAVITY
 
 STEEPEST = math.sin(math.radians(60.0))
 """Sine of the largest tilt; beyond it a car lies on its side, and the difference of accelerations is an error."""
+ACCELERATION_BIAS = 0.15
+"""m/s^2, standard deviation of what the accelerometers read too much and nothing takes off."""
+GYRO_BIAS = 0.003
+"""rad/s, the same of the gyros."""
+MISALIGNED = 0.005
+"""rad, of the axes of the unit: a turn at r adds this much of r to both rates."""
+LEVEL = (0.01, 0.02)
+"""rad, standard deviations of bank and grade of a road before anything is known of it."""
+_SLIDE = 0.8 / GRAVITY  # rad: V_y' of a slide that lasts, 0.8 m/s^2; no body leans as far beside its gyros
+_SURE = 2.0  # deviations by which accelerometers may differ before the deviation grows with them
 
 
 class AttitudeStep(NamedTuple):
@@ -31,6 +41,8 @@ class AttitudeStep(NamedTuple):
     pitch: FloatArray  # rad (theta_v)
     total_roll: FloatArray  # rad, against the horizon (phi_v + phi_r)
     total_pitch: FloatArray  # rad
+    roll_deviation: FloatArray  # rad, standard deviation of the total roll; where the bank is given, of roll, too
+    pitch_deviation: FloatArray  # rad
     innovation: FloatArray  # (..., 2) rad, low-passed accelerometer angle minus low-passed estimate, roll and pitch
     used: BoolArray  # (..., 2) whether the accelerometers corrected roll and pitch
     flags: FlagArray  # MISSING_MEASUREMENT (accelerometer), MISSING_INPUT (gyro, grade, bank), RESET
@@ -52,6 +64,14 @@ class AttitudeObserver(Renewable):
     frequency. The error obeys tau e'' + e' + L e = 0; the default L = 1/(2 tau) damps it with 0.71. A gyro bias b
     leaves the error b/L. (P2 gives no gains; the yaw rate turns a sloping car's roll into pitch, and is left out if not given.)
 
+    A slide has a V_y' that nothing measures, and that reads like roll. Where one is known of (`sliding`) a low-passed difference
+    e counts as roll by 1/(1 + (e^2/(e_s^2 + sigma^2))^2), e_s = 0.8 m/s^2/g: short slides change little, in long ones the gyros
+    carry roll, until what their bias may have added reaches e.
+
+    Deviations are those of errors that last, as the first-order error obeys them: with the share u of the accelerometers,
+    u' = L (1 - u), and the drift d' = bias + misalignment |r| - L d of the gyros, sigma^2 = (b_a u/g)^2 + (level (1-u))^2 + d^2;
+    a difference above 2 sigma that is no slide is an error of either, and its excess counts.
+
     Without the motion of the car (None or missing) the gyros alone carry the angles; without gyros the accelerometers
     alone. Grade and bank of the road are inputs: the body's angle is the total one minus them.
 
@@ -70,7 +90,8 @@ class AttitudeObserver(Renewable):
     (0.0, 0.0)
     """
 
-    memory = ("angle", "lagged", "yaw_rate", "road", "renewed")
+    memory = ("angle", "lagged", "share", "drift", "yaw_rate", "road", "renewed")
+    uses_sliding = True  # `step` takes it
 
     def __init__(
         self,
@@ -87,6 +108,9 @@ class AttitudeObserver(Renewable):
         self._kit = kit = arithmetic(self.batch_shape)
         self.angle: Signals = kit.stacked([kit.full(0.0)] * 2)  # sin of roll and pitch, against the horizon
         self.lagged: Signals = kit.stacked([kit.full(0.0)] * 2)  # F(s) (stationary - estimate)
+        self.share: Signals = kit.stacked([kit.full(0.0)] * 2)  # of the accelerometers in the angles
+        self.drift: Signals = kit.stacked([kit.full(0.0)] * 2)  # deviation of what the gyros have added, rad
+        self._still = kit.full(False)
         self.yaw_rate: Number = kit.full(0.0)  # the last known ones
         self.road: Signals = kit.stacked([kit.full(0.0)] * 2)  # bank and grade
 
@@ -105,6 +129,7 @@ class AttitudeObserver(Renewable):
         yaw_rate: npt.ArrayLike = 0.0,
         grade: npt.ArrayLike = 0.0,
         bank: npt.ArrayLike = 0.0,
+        sliding: npt.ArrayLike = False,
     ) -> AttitudeStep:
         """Takes one sample of the batch shape.
 
@@ -114,6 +139,7 @@ class AttitudeObserver(Renewable):
             motion_x, motion_y: m/s^2, V_x' - r V_y and V_y' + r V_x; None: not known.
             yaw_rate: rad/s.
             grade, bank: rad, of the road: theta_r (uphill positive) and phi_r (left side up).
+            sliding: bool, no axle tells V_y', which `motion_y` leaves out.
 
         Raises:
             EstimatorError: another shape, or not numbers.
@@ -138,13 +164,16 @@ class AttitudeObserver(Renewable):
         used = [abs(value) <= LIMIT for value in sines]
         roll, pitch = self.angle
         up = kit.sqrt(1.0 - kit.minimum(roll * roll + pitch * pitch, 1.0))
+        slides = kit.own(sliding) & known[0], self._still
+        spins, unlike = (p * up - turn * pitch, turn * roll - q * up), GYRO_BIAS + MISALIGNED * abs(turn)
+        states = self.angle, self.lagged, self.share, self.drift
         moved = [
-            self._followed(*entry)
-            for entry in zip(
-                self.angle, self.lagged, (p * up - turn * pitch, turn * roll - q * up), sines, used, strict=True
-            )
+            self._followed(unlike, *entry) for entry in zip(*states, LEVEL, spins, sines, used, slides, strict=True)
         ]
-        self.angle, self.lagged = (kit.stacked(values) for values in zip(*moved, strict=True))
+        self.angle, self.lagged, self.share, self.drift, *sigma = (
+            kit.stacked(values) for values in zip(*moved, strict=True)
+        )
+        deviation = kit.table(sigma, shape)
         total = np.arcsin(kit.table((self.angle,), shape))
         body, counts = total - kit.table((self.road,), shape), kit.table((used,), shape)
         off = [choose(good, value, math.nan) for good, value in zip(used, self.lagged, strict=True)]
@@ -154,8 +183,9 @@ class AttitudeObserver(Renewable):
         flags: FlagArray = np.array(reasons, dtype=np.int32).reshape(shape)
         self._flag_renewed(flags)
         return AttitudeStep(
-            body[..., 0], body[..., 1], total[..., 0], total[..., 1], kit.table((off,), shape), counts, flags
-        )
+            body[..., 0], body[..., 1], total[..., 0], total[..., 1], deviation[..., 0], deviation[..., 1],
+            kit.table((off,), shape), counts, flags,
+        )  # fmt: skip
 
     def reset(self, where: npt.ArrayLike | None = None, roll: float = 0.0, pitch: float = 0.0) -> None:
         """Sets the entries `where` (bool mask; None: all) to the given angles against the horizon, rad; flagged RESET next.
@@ -168,20 +198,39 @@ class AttitudeObserver(Renewable):
         kit, here = self._kit, self._kit.own(chosen)
         starts = [min(max(math.sin(value), -STEEPEST), STEEPEST) for value in start]
         self.angle = kit.stacked([kit.where(here, new, old) for new, old in zip(starts, self.angle, strict=True)])
-        self.lagged, self.road = kit.replaced(here, 0.0, self.lagged), kit.replaced(here, 0.0, self.road)
-        self.yaw_rate = kit.replaced(here, 0.0, self.yaw_rate)
+        for name in ("lagged", "share", "drift", "road", "yaw_rate"):
+            setattr(self, name, kit.replaced(here, 0.0, getattr(self, name)))
         self._renew(chosen)
 
     def _followed(
-        self, angle: Number, lagged: Number, spin: Number, sine: Number, used: Number
-    ) -> tuple[Number, Number]:
-        """Sine and lagged difference of an angle, one sample on.
+        self,
+        unlike: Number,
+        angle: Number,
+        lagged: Number,
+        share: Number,
+        drift: Number,
+        level: float,
+        spin: Number,
+        sine: Number,
+        used: Number,
+        slides: Number,
+    ) -> tuple[Number, ...]:
+        """Sine, lagged difference, share, drift and deviation of an angle, one sample on.
 
         The direction of gravity u = (sin pitch, sin roll, up) turns with u' = -w x u; `spin` is what the gyros make of that,
-        1/s, `sine` the stationary one.
+        1/s, `sine` the stationary one; `unlike`: deviation of the gyros' lasting error, rad/s.
         """
-        kit = self._kit
+        kit, time = self._kit, self.sample_time
         stationary = kit.where(used, kit.minimum(kit.maximum(sine, -STEEPEST), STEEPEST), 0.0)
         lagged = self._keep * lagged + used * ((1.0 - self._keep) * (stationary - angle))
-        moved = angle + self.sample_time * (spin + used * (self.gain * lagged))
-        return kit.minimum(kit.maximum(moved, -STEEPEST), STEEPEST), lagged
+        felt, begun = ACCELERATION_BIAS / GRAVITY * share, level * (1.0 - share)
+        variance, square = felt * felt + begun * begun + drift * drift, lagged * lagged
+        far = slides * square / (_SLIDE * _SLIDE + variance)
+        gain = self.gain * used / (1.0 + far * far)
+        pull = gain * lagged
+        moved = angle + time * (spin + pull)
+        share = share + time * gain * (1.0 - share)
+        drift = drift + time * (unlike + slides * abs(pull) - gain * drift)
+        excess = kit.where(slides | kit.no(used), 0.0, kit.maximum(abs(lagged) - _SURE * kit.sqrt(variance), 0.0))
+        sigma = kit.sqrt(variance + excess * excess)
+        return kit.minimum(kit.maximum(moved, -STEEPEST), STEEPEST), lagged, share, kit.minimum(drift, STEEPEST), sigma

@@ -28,7 +28,7 @@ class LastSample(Memory):
     A reading that the velocity part replaced is replaced everywhere: loads, forces and attitude take its word.
     """
 
-    memory = ("bias", "speed", "used", "inertial", "gravity", "drive", "heavy", "road")
+    memory = ("bias", "speed", "used", "inertial", "gravity", "drive", "slides", "heavy", "road")
     unknowns = ("drive",)
 
     def __init__(self, sample_time: float, batch_shape: tuple[int, ...]) -> None:
@@ -41,6 +41,7 @@ class LastSample(Memory):
         self.gravity: Number = kit.full(0.0)  # in a_x, m/s^2, of what grade the attitude leaves
         self.heavy: Number = kit.full(0.0)  # in a_x, m/s^2, as the attitude says
         self.road: Number = kit.full(0.0)  # of this, what grade makes
+        self.slides: Number = kit.full(False)  # no axle tells V_y'
         self.drive: Number = kit.full(math.nan)  # V_x' - r V_y without gravity, m/s^2, where anything tells
 
     def believed(self, *readings: Number) -> list[Number]:
@@ -60,6 +61,9 @@ class LastSample(Memory):
         if (used := getattr(moved, "inertial_used", None)) is not None:
             self.used, self.inertial = kit.rows(used, 3), kit.rows(moved.inertial, 3)
             self.gravity = kit.own(moved.gravity[..., 0])
+        if (told := getattr(moved, "axle_used", None)) is not None:
+            front, rear = kit.rows(told, 2)
+            self.slides = kit.no(front | rear)
         # Without torques, or on a slope, which the forces carry, what the wheels hold V_x to: slower, but no more in a loop with
         # gravity than they are.
         started = ((kit.own(moved.flags) & int(Flag.RESET)) != 0) | kit.own(moved.standing)
@@ -72,7 +76,7 @@ class LastSample(Memory):
         for name, start in (("bias", 0.0), ("speed", 0.0), ("used", True)):
             setattr(self, name, [choose(here, start, value) for value in getattr(self, name)])
         self.gravity, self.heavy, self.road = (choose(here, 0.0, v) for v in (self.gravity, self.heavy, self.road))
-        self.drive = choose(here, math.nan, self.drive)
+        self.drive, self.slides = choose(here, math.nan, self.drive), choose(here, False, self.slides)
 
     def pull(self, ax: Number) -> Number:
         """What `ax` says that V_x gains, m/s^2."""
@@ -90,6 +94,7 @@ class LastSample(Memory):
             """NaN for what is absent, and for what no sensor reads."""
             return math.nan if given is None else possible(kit, kit.car(given, shape, name), limit)
 
+        more = {"sliding": self.slides} if getattr(attitude, "uses_sliding", False) else {}
         tilt = attitude.step(
             read(signals.roll_rate, "roll_rate", limits.YAW_RATE),
             read(signals.pitch_rate, "pitch_rate", limits.YAW_RATE),
@@ -100,6 +105,7 @@ class LastSample(Memory):
             yaw_rate=kit.where(self.used[2], turn, self.inertial[2]),
             grade=read(signals.grade, "grade", limits.ANGLE),
             bank=read(signals.bank, "bank", limits.ANGLE),
+            **more,
         )
         up = read(signals.az, "az", limits.ACCELERATION)
         up = kit.where(abs(up) < math.inf, up, GRAVITY)

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from estimators.errors import EstimatorError
 from estimators.faults import Flag
-from estimators.forces import AttitudeObserver, without_gravity
+from estimators.forces import AttitudeObserver, attitude, without_gravity
 from estimators.vehicle import GRAVITY
 
 TIME = 0.005
@@ -99,6 +99,50 @@ def test_lost_sensors_are_flagged_and_the_others_carry_on() -> None:
     for _ in range(3000):
         found = runner.step(1e3, -1e90, 1e90, 1e90, 0.0, 0.0)
     assert np.abs(found.roll).max() <= math.radians(60.001)
+
+
+def test_deviations_are_those_of_cars_drawn_from_them() -> None:
+    """NEES of roll and pitch of 400 cars at rest on roads, with biases, drawn from what the deviation is made of."""
+    draw, cars = np.random.default_rng(3), 400
+    tilt = np.array(attitude.LEVEL)[:, None] * draw.normal(size=(2, cars))
+    felt = GRAVITY * tilt + attitude.ACCELERATION_BIAS * draw.normal(size=(2, cars))
+    spin = attitude.GYRO_BIAS * draw.normal(size=(2, cars))
+    runner, squares = AttitudeObserver(0.02, (cars,)), []
+    for k in range(400):
+        found = runner.step(spin[0], spin[1], felt[1], felt[0], 0.0, 0.0)
+        if k % 25 == 24:
+            sigma = np.stack([found.roll_deviation, found.pitch_deviation])
+            squares.append(((np.stack([found.total_roll, found.total_pitch]) - tilt) / sigma) ** 2)
+    nees = np.mean(squares)
+    assert 0.7 < nees < 1.3
+    assert np.mean(4.0 * np.array(squares)) > 2.0  # the negative control: half as wide is overconfident
+
+
+def test_a_gyro_that_is_wrong_shows_in_the_deviation() -> None:
+    """0.3 s at 0.3 rad/s of which the gyro says the opposite; accelerometers and motion tell the truth."""
+    runner, nose = AttitudeObserver(TIME), 0.0
+    before = runner.step(0.0, 0.0, 0.0, 0.0, 0.0, 0.0).pitch_deviation
+    for k in range(400):
+        rate = 0.3 if k < 60 else 0.0
+        nose += TIME * rate
+        found = runner.step(0.0, rate, GRAVITY * math.sin(nose), 0.0, 0.0, 0.0)
+    assert abs(found.pitch - nose) > 4.0 * before
+    assert abs(found.pitch - nose) < 3.0 * found.pitch_deviation
+
+
+def test_a_slide_leaves_roll_to_the_gyros() -> None:
+    """2.5 m/s^2 of V_y' for 3 s: roll that is none, if it counts as roll."""
+    runner = AttitudeObserver(TIME, (3,))
+    sliding = np.array([True, False, True])
+    for _ in range(600):
+        found = runner.step(0.0, 0.0, 0.0, np.array([2.5, 2.5, 0.25]), 0.0, 0.0, sliding=sliding)
+    held, led, short = found.total_roll
+    assert led > 0.07 > 3.0 * held
+    assert short == pytest.approx(0.1 * led, rel=0.05)  # below 0.8 m/s^2 a slide changes nothing
+    assert abs(held) < 2.0 * found.roll_deviation[0]
+    for _ in range(600):  # a gyro that is missing leaves accelerometers alone, sliding or not
+        found = runner.step(math.nan, 0.0, 0.0, 1.5, 0.0, 0.0, sliding=True)
+    assert found.total_roll[0] > 0.05
 
 
 def test_states_are_saved_and_nonsense_is_refused() -> None:

@@ -43,6 +43,13 @@ def test_a_third_of_sigma_leaves_the_band(driven: list[Errors]) -> None:
     assert not any(one.within(BAND)[2] for one in sure)
 
 
+def test_tilt_is_no_surer_than_it_may_be_and_half_of_sigma_is_found_out(driven: list[Errors]) -> None:
+    """The negative control: roll and pitch stated twice as sure, on the car whose turn and braking tilt it most."""
+    for shrink, sure in ((1.0, False), (2.5, True)):
+        tilts = [one.tested(shrink).nees[3:] for one in driven]
+        assert (max(max(pair) for pair in tilts) > BAND[1]) is sure
+
+
 @pytest.mark.parametrize(("manoeuvre", "seconds"), [("p1-brake-in-turn-snow", 5.0), ("p2-launch-ice", 6.0)])
 def test_errors_that_last_a_manoeuvre_are_in_the_deviation_of_the_lateral_velocity(
     manoeuvre: str, seconds: float

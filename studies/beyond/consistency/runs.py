@@ -1,4 +1,4 @@
-"""Normalised errors of V_x and V_y of the whole pipeline on the shipped manoeuvres, many seeds side by side.
+"""Normalised errors of speeds and tilt of the whole pipeline on the shipped manoeuvres, many seeds side by side.
 
 Each seed has its own sensor errors (`TEST_CAR`) and its own effective radii: rho of all wheels alike and of each wheel, with the
 standard deviations that the fusion assumes. A wheel of the radius R (1 + rho) that is taken for R turns by 1/(1 + rho) less.
@@ -18,6 +18,10 @@ from estimators.velocity import FusionSettings
 from studies.trials.estimation import TEST_CAR, run_pipeline
 from studies.truth import Measured, Truth, draw
 
+SIGNALS = {"vx": "vx", "vy": "vy", "roll": "attitude.total_roll", "pitch": "attitude.total_pitch"}
+"""What is compared, V_x and V_y in m/s, roll and pitch against the horizon in rad, and where a step has it."""
+DEVIATIONS = ("vx_deviation", "vy_deviation", "attitude.roll_deviation", "attitude.pitch_deviation")
+ROAD = {"roll": "bank", "pitch": "grade"}
 MOST_VALUES = 2_000_000  # cars times samples in one batch: 25 signals of 8 bytes each, 400 MB
 
 
@@ -25,21 +29,21 @@ MOST_VALUES = 2_000_000  # cars times samples in one batch: 25 signals of 8 byte
 class Consistency:
     """One manoeuvre on one kind of tire.
 
-    ``nees`` is the average of e^2/sigma^2 over seeds and time of V_x, of V_y, and of both (half their sum, for the pipeline
-    states no correlation): 1 where sigma is true. ``beyond``: share of samples with |e| > 3 sigma. ``rms``: of the errors, m/s.
+    ``nees`` is the average of e^2/sigma^2 over seeds and time of V_x, of V_y, of both (half their sum, for the pipeline
+    states no correlation), of roll and of pitch: 1 where sigma is true. The others are of `SIGNALS`: ``beyond``: share of samples
+    with |e| > 3 sigma; ``rms``: of the errors, m/s and rad; ``sigma``: root of the mean variance that is stated.
     """
 
     manoeuvre: str
     tire: str
-    nees: tuple[float, float, float]
-    beyond: tuple[float, float]
-    rms: tuple[float, float]
-    sigma: tuple[float, float]  # m/s, root of the mean variance that is stated
+    nees: tuple[float, ...]
+    beyond: tuple[float, ...]
+    rms: tuple[float, ...]
+    sigma: tuple[float, ...]
 
-    def within(self, band: tuple[float, float]) -> tuple[bool, bool, bool]:
-        """Whether V_x, V_y and both are inside."""
-        x, y, both = (band[0] <= value <= band[1] for value in self.nees)
-        return x, y, both
+    def within(self, band: tuple[float, float]) -> tuple[bool, ...]:
+        """Whether V_x, V_y, both, roll and pitch are inside."""
+        return tuple(band[0] <= value <= band[1] for value in self.nees)
 
 
 def with_own_radii(drawn: Measured) -> Measured:
@@ -54,7 +58,7 @@ def with_own_radii(drawn: Measured) -> Measured:
 
 @dataclass(frozen=True)
 class Errors:
-    """Of one manoeuvre, (2, seeds, n): errors of V_x and V_y, and the deviations that the pipeline states of them, m/s."""
+    """Of one manoeuvre, (4, seeds, n): errors of `SIGNALS`, and the deviations that the pipeline states of them."""
 
     manoeuvre: str
     tire: str
@@ -65,7 +69,7 @@ class Errors:
         """``shrink`` divides the stated deviations."""
         sigma = self.sigma / shrink
         square = (self.error / sigma) ** 2
-        x, y = square.mean(axis=(1, 2)).tolist()
+        x, y, roll, pitch = square.mean(axis=(1, 2)).tolist()
         beyond, rms, stated = (
             tuple(value.tolist())
             for value in (
@@ -74,19 +78,22 @@ class Errors:
                 np.sqrt((sigma**2).mean(axis=(1, 2))),
             )
         )
-        return Consistency(self.manoeuvre, self.tire, (x, y, 0.5 * (x + y)), beyond, rms, stated)
+        return Consistency(self.manoeuvre, self.tire, (x, y, 0.5 * (x + y), roll, pitch), beyond, rms, stated)
 
 
 def errors(truth: Truth, seeds: Sequence[int]) -> Iterator[Errors]:
     """Of every run of the truth, batch by batch of one car."""
     for rows in _batches(truth, len(seeds)):
         drawn = with_own_radii(draw(truth.only(rows), TEST_CAR, seeds))
-        got = run_pipeline(drawn, {name: attrgetter(name) for name in ("vx", "vy", "vx_deviation", "vy_deviation")})
+        got = run_pipeline(drawn, {name: attrgetter(name) for name in (*SIGNALS.values(), *DEVIATIONS)})
         true = drawn.truth
         for b, name in enumerate(true.names):
             counts = true.valid[b]
-            off = np.stack([got[signal][:, b] - true[signal][b] for signal in ("vx", "vy")])
-            sigma = np.stack([got[f"{signal}_deviation"][:, b] for signal in ("vx", "vy")])
+            off = np.stack([got[place][:, b] - true[signal][b] for signal, place in SIGNALS.items()])
+            for row, signal in enumerate(SIGNALS):
+                if signal in ROAD:
+                    off[row] -= true[ROAD[signal]][b]
+            sigma = np.stack([got[name][:, b] for name in DEVIATIONS])
             yield Errors(name, true.tires[b], off[..., counts], sigma[..., counts])
 
 

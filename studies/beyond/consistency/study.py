@@ -22,9 +22,16 @@ The chi-square band of an ideal filter is in the table's caption; errors of tire
 pipeline on a truth vehicle stays inside it."""
 COLUMNS = (
     "manoeuvre", "NEES V_x", "NEES V_y", "NEES both", "V_x beyond 3 sigma [%]", "V_y beyond 3 sigma [%]", "V_x RMS [m/s]",
-    "V_x sigma [m/s]", "V_y RMS [m/s]", "V_y sigma [m/s]", "verdict",
+    "V_x sigma [m/s]", "V_y RMS [m/s]", "V_y sigma [m/s]", "NEES roll", "NEES pitch", "roll beyond 3 sigma [%]",
+    "pitch beyond 3 sigma [%]", "roll RMS [deg]", "roll sigma [deg]", "pitch RMS [deg]", "pitch sigma [deg]", "verdict",
 )  # fmt: skip
-
+NAMES = ("V_x", "V_y", "both", "roll", "pitch")
+"""As `Consistency.nees` has them."""
+MARKS = (
+    ("V_x", -0.24, colours.FUSION, "o"), ("V_y", -0.08, colours.OWN_OBSERVERS, "s"),
+    ("roll", 0.08, colours.PIPELINE, "^"), ("pitch", 0.24, colours.SCHEDULE, "v"),
+)  # fmt: skip
+"""Of the picture: offset, colour and marker of each."""
 
 GROUPS = {"p1": ("p1-",), "p2": ("p2-",), "others": ("p3-", "p4-", "p5-", "floor-")}
 """Manoeuvres by the start of their names: a part each, for workers to share and for a run that goes on to keep."""
@@ -47,7 +54,7 @@ def consistency_part(scope: Scope, tire: str, group: str) -> PartResult:
     )
     counts = {
         f"{tire}, {group}: manoeuvres with {name} {word}": float(sum(_side(one.nees[k]) == side for one in found))
-        for k, name in enumerate(("V_x", "V_y", "both"))
+        for k, name in enumerate(NAMES)
         for side, word in ((1, "overconfident"), (0, "true"), (-1, "too wide"))
     }
     return PartResult(
@@ -58,19 +65,19 @@ def consistency_part(scope: Scope, tire: str, group: str) -> PartResult:
 
 
 def picture(name: str, caption: str, found: Sequence[Consistency]) -> Figure:
-    """NEES of V_x and V_y, manoeuvre below manoeuvre, and the band."""
+    """NEES of speeds and tilt, manoeuvre below manoeuvre, and the band."""
     rows = np.arange(len(found))
     marks: list[Mark] = [
-        dots([one.nees[0] for one in found], rows - 0.12, "V_x", colours.FUSION),
-        dots([one.nees[1] for one in found], rows + 0.12, "V_y", colours.OWN_OBSERVERS, "s"),
+        *(
+            dots([one.nees[NAMES.index(name)] for one in found], rows + shift, name, colour, marker)
+            for name, shift, colour, marker in MARKS
+        ),
         Shade(*BAND, "x", "at most twice too wide, or by 1.4 too narrow"),
     ]
     panel = Panel(
         marks, Axis("NEES, average over seeds and time", scale="log"), row_axis([one.manoeuvre for one in found])
     )
-    words = (
-        f"Dots of the NEES of both velocities for {len(found)} manoeuvres, between 0.01 and 100, with the band {BAND}."
-    )
+    words = f"Dots of the NEES of speeds, roll and pitch for {len(found)} manoeuvres, between 0.01 and 100, with the band {BAND}."
     return Figure(name, caption, words, panel, (7.2, 0.8 + 0.22 * len(found)), "below")
 
 
@@ -82,13 +89,16 @@ def _side(value: float) -> int:
 def _row(one: Consistency) -> list[Cell]:
     words = {1: "overconfident", -1: "too wide"}
     said = [
-        f"{name} {words[side]}" for name, value in zip(("V_x", "V_y"), one.nees, strict=False) if (side := _side(value))
+        f"{name} {words[side]}"
+        for name, value in zip(NAMES, one.nees, strict=True)
+        if name != "both" and (side := _side(value))
     ]
-    numbers = [*one.nees, *(100.0 * share for share in one.beyond)]
-    speeds = (one.rms[0], one.sigma[0], one.rms[1], one.sigma[1])
+    shares = [100.0 * share for share in one.beyond]
+    sizes = [value for pair in zip(one.rms, one.sigma, strict=True) for value in pair]
+    tilt = (*one.nees[3:], *shares[2:], *np.degrees(sizes[4:]).tolist())
     return [
-        one.manoeuvre, *(round(value, 3) for value in numbers), *(round(value, 4) for value in speeds),
-        ", ".join(said) or "true",
+        one.manoeuvre, *(round(value, 3) for value in (*one.nees[:3], *shares[:2])), *(round(value, 4) for value in sizes[:4]),
+        *(round(value, 3) for value in tilt), ", ".join(said) or "true",
     ]  # fmt: skip
 
 
@@ -96,8 +106,8 @@ STUDY = Study(
     "consistency",
     "Whether the stated deviations are true: NEES of the whole pipeline",
     "",
-    "V_x and V_y of the default pipeline with an attitude part on every shipped manoeuvre, over seeds of sensor errors and of "
-    "tire radii: normalised errors, where the pipeline is overconfident and where its deviations are far too wide.",
+    "V_x, V_y, roll and pitch of the default pipeline with an attitude part on every shipped manoeuvre, over seeds of sensor "
+    "errors and of tire radii: normalised errors, where the pipeline is overconfident and where its deviations are far too wide.",
     tuple(
         Part(
             f"{tire}-{group}",
