@@ -215,8 +215,8 @@ class LateralFusion(CarsMemory):
             calm = abs(friction) < sure
             far = usable & kit.no((calm & slid) | (off * off < gate * (explained + error)))
             excess = s.side_excess * c1 * linear
-            stays = kit.where(calm | (off * friction < 0.0), 0.0, axle_error + excess * excess)
-            wide = white + model * held + stays * lasting
+            stays = kit.where(off * friction < 0.0, explained * held, (axle_error + excess * excess) * lasting)
+            wide = white + model * held + kit.where(calm, 0.0, stays)
             beyond = kit.where(calm, 0.0, largest(kit.where(far, abs(off), 0.0), gap))
             return usable & kit.no(far), wide, shows * shows > error, beyond
 
