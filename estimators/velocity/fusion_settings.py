@@ -73,7 +73,7 @@ class FusionSettings:
     side_memory: float = 300.0  # s
     side_floor: float = 0.002  # rad, 0.1 deg: toe and linkage
     side_linear: float = 0.02  # relative error of the slip angle
-    side_excess: float = 0.05  # the same of a tire that slips further than its curve, for as long as a turn
+    side_excess_memory: float = 0.5  # s over which an axle shows that it slips further than its curve
     side_speed_spread: float = 2.0  # stated deviations by which V_y may be off as long: curves of tires differ
     side_speed_memory: float = 2.0  # s: how long an error of V_y stays the same, one turn
     side_error_memory: float = 0.1  # s: how long its error stays the same, one stroke of the steering

@@ -14,9 +14,10 @@ error lasts as long as the turn, and no number of samples averages it away: each
 `lost_time`, where toe and linkage change with every stroke of the steering (`side_error_memory`). Without side force an axle
 is believed, and leads V_y back, for it does not slip sideways on any road.
 
-The error has a side. On a slippery road, or where it pulls along as well, a tire slips further than alpha(mu), never less: so
-do errors that stay, beyond 5 % of c_1 mu at least (`side_excess`). An axle that would slip less is believed like one without
-side force, and holds V_y from that side.
+The error has a side. On a slippery road, or where it pulls along as well, a tire slips further than alpha(mu), never less. An
+axle that slips further, low-passed over `side_excess_memory`, is not believed more than that. One that would slip less is a
+bound that V_y is led back to; it does not say where beyond it V_y is: of what it says within twice `side_error_memory` nothing
+is surer than V_y itself.
 
 Two scale errors decide how far the kinematics may be believed in a turn, where a and r V_x are large and cancel: s is that
 of a, sensor and leftover body roll; s_t is that of the product r V_x, of the yaw rate sensor and of the speed, whose error
@@ -58,7 +59,7 @@ class AxleUpdate(NamedTuple):
 class LateralFusion(CarsMemory):
     """V_y filter of `count` cars."""
 
-    memory = ("axle_error", "lasting_error", "bend", "apart")
+    memory = ("axle_error", "lasting_error", "bend", "apart", "excess")
 
     def __init__(self, vehicle: VehicleParameters, settings: FusionSettings, every: int, count: int) -> None:
         s = self.settings = settings
@@ -76,6 +77,7 @@ class LateralFusion(CarsMemory):
         self.lasting_error: Number = self.kit.full(0.0)  # the same, low-passed
         self.bend: Signals = self.kit.stacked([self.kit.full(0.0)] * 2)  # side slip per F_y/F_z beyond c_1, rad
         self.apart: Number = self.kit.full(0.0)  # m/s between what the axles say of V_y, low-passed
+        self.excess: Signals = self.kit.stacked([self.kit.full(0.0)] * 2)  # m/s, slip beyond alpha(mu), low-passed
         self._both = self.kit.signals((1.0, 1.0))
         self._sensor = s.scale**2 / turn_scale  # share of the yaw rate sensor in s_t
         m, L, inertia = vehicle.mass, vehicle.wheelbase, vehicle.yaw_inertia
@@ -199,6 +201,12 @@ class LateralFusion(CarsMemory):
         both = rolling[0] & rolling[1]
         self.apart = bent * self.apart + (1.0 - bent) * kit.where(both, innovation[0] - innovation[1], 0.0)
         gap = 0.5 * abs(self.apart)
+        late = kit.exp(-elapsed / s.side_excess_memory)
+
+        def further(old: Number, off: Number, friction: Number, usable: Number) -> tuple[Number, ...]:
+            return (late * old + (1.0 - late) * kit.where(usable, off * kit.sign(friction), 0.0),)
+
+        (self.excess,) = kit.each(further, self.excess, innovation, mu, usable)
 
         def tested(
             explained: Number,
@@ -209,20 +217,20 @@ class LateralFusion(CarsMemory):
             friction: Number,
             usable: Number,
             gap: Number,
-            c1: Number,
+            excess: Number,
         ) -> tuple[Number, ...]:
             shows, error = linear * s.side_compliance_spread, white + model
             calm = abs(friction) < sure
             far = usable & kit.no((calm & slid) | (off * off < gate * (explained + error)))
-            excess = s.side_excess * c1 * linear
-            stays = kit.where(off * friction < 0.0, explained * held, (axle_error + excess * excess) * lasting)
+            excess = largest(excess, 0.0)
+            stays = kit.where(off * friction < 0.0, explained * held, largest(axle_error, excess * excess) * lasting)
             wide = white + model * held + kit.where(calm, 0.0, stays)
             beyond = kit.where(calm, 0.0, largest(kit.where(far, abs(off), 0.0), gap))
             return usable & kit.no(far), wide, shows * shows > error, beyond
 
         explained = self.filter.expect(_SEEN, values)
         used, variance, excited, beyond = kit.each(
-            tested, explained, innovation, model, white, values[5], mu, usable, kit.stacked((gap, gap)), tires[0]
+            tested, explained, innovation, model, white, values[5], mu, usable, kit.stacked((gap, gap)), self.excess
         )
         self.axle_error = kit.maximum(kept * self.axle_error, kit.maximum(*beyond))
         self.lasting_error = kept * self.lasting_error + (1.0 - kept) * self.axle_error

@@ -89,7 +89,7 @@ def test_tires_of_a_turn_slip_as_far_as_they_pull_or_further(wrong: float) -> No
 
 
 def test_an_axle_that_was_off_still_bounds_v_y() -> None:
-    """Of late the axles were 0.5 m/s off, as on ice: that the car slides they hardly tell, that it cannot slide less they do."""
+    """Of late the axles were 0.5 m/s off, as on ice: that the car slides they do not tell, that it cannot slide less they do."""
     steady = turn(2.0, np.full(400, 0.25))
     back = []
     for wrong in (0.15, -0.15):
@@ -101,7 +101,7 @@ def test_an_axle_that_was_off_still_bounds_v_y() -> None:
         steps, _ = driven(rest, fusion)
         back.append(1.0 - (steps[-1].vy - said) / wrong)
     assert back[0] > 0.1
-    assert back[0] > 4.0 * abs(back[1])
+    assert back[1] < 0.0
 
 
 def test_evidence_with_a_gap_starts_over() -> None:
