@@ -174,7 +174,8 @@ def test_options_of_the_command_want_units(
 def test_without_schedules_the_pipeline_runs_alone(tmp_path: Path) -> None:
     """At any sample time and with any wheel: the fusion needs no gains."""
     text = DRIVE.replace('[schedules]\nlongitudinal = "schedule.json"\n', "").replace('"0.33 m"', '"0.40 m"')
-    log = write_log(tmp_path / "log.csv", columns(0.5))
+    larger = {name: value * 0.33 / 0.40 if name.startswith("w_") else value for name, value in columns(0.5).items()}
+    log = write_log(tmp_path / "log.csv", larger)
     data = replay_drive([log], write_drive(tmp_path, text.replace('"5 ms"', '"10 ms"')))
     assert data.replay is None
     metrics = evaluate(data)
