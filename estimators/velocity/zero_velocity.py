@@ -42,9 +42,10 @@ class ZeroVelocityDetector(CarsMemory):
         self, seen: ConditionedInputs, ax: Number, ay: Number, turn: Number, elapsed: Number
     ) -> tuple[Number, Number]:
         """Whether the car stands; and whether it does for so long that an estimate which moves must be lost."""
-        s, kit, silent = self.settings, self.kit, seen.silent
+        s, kit, silent, crept = self.settings, self.kit, seen.silent, self.hidden()
         if not kit.some(silent[0] | silent[1] | silent[2] | silent[3]):
             self.calm, self.turned, self.slow = self._zero, kit.full(1.0), self._never
+            self._wakes(crept)
             return self._never, self._never
         count, moving = 0, self._never
         for fresh, still in zip(seen.fresh, silent, strict=True):
@@ -54,6 +55,7 @@ class ZeroVelocityDetector(CarsMemory):
         for w, R in zip(seen.wheel_speed, self._along.radius, strict=True):
             fastest = kit.maximum(fastest, abs(R * w))
         self.slow = (fastest <= s.dead_speed) & (count >= 2)
+        self._wakes(crept)
         self.turned = kit.where(fastest > s.dead_speed, 1.0, self.turned)
         unsure = kit.sqrt(self._across.filter.variance(YAW_BIAS))
         calm = (seen.good[0] | seen.good[1] | seen.good[2]) & kit.no(moving) & (count >= 2)
@@ -64,6 +66,10 @@ class ZeroVelocityDetector(CarsMemory):
         moves = self._moves() & kit.no(steady & (self.turned == 0.0))
         enough = kit.where(level, s.still_time, _PATIENCE)
         return (self.calm > enough) & kit.no(moves), (self.calm > s.lost_time) & level & moves & seen.alive
+
+    def _wakes(self, crept: Number) -> None:
+        """Wheels that tell of the speed again find it as uncertain as they left it: else what it is off by looks like radii."""
+        self._along.filter.widen((crept > 0.0) & self.kit.no(self.slow), crept * crept)
 
     def hidden(self) -> Number:
         """Deviation of the speeds that no measurement can take away, m/s: three of it are the dead band of the wheels."""

@@ -104,3 +104,16 @@ def test_three_wheels_that_roll_outvote_one() -> None:
     assert np.abs(vx - drive.speed)[10:].max() < 0.2
     assert bool(steps[-1].wheel_flags[1] & Flag.GATED)
     assert steps[-1].vx_deviation < 0.3
+
+
+def test_a_car_that_crept_below_the_dead_band_teaches_no_radii() -> None:
+    """It moves off at 0.5 m/s^2 while wheels read zero below 0.3 m/s, and rolls on at 0.8 m/s: radii came out 6 % low."""
+    rng, fusion = np.random.default_rng(0), VelocityFusion(CAR, STEP)
+    for k in range(1600):
+        speed = min(0.5 * STEP * max(k - 600, 0), 0.8)
+        turning = speed / 0.33 + 0.05 * rng.normal(size=4) if speed > 0.3 else np.zeros(4)
+        pull = 0.5 if 600 < k < 920 else 0.0
+        step = fusion.step(turning, 0.0, pull + 0.05 * rng.normal(), 0.05 * rng.normal(), 0.002 * rng.normal())
+    assert step.vx == pytest.approx(0.8, abs=0.03)
+    assert abs(step.vx - 0.8) < 3.0 * step.vx_deviation
+    assert np.abs(step.radius / 0.33 - 1.0).max() < 0.02
