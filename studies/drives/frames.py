@@ -3,7 +3,7 @@
 Every mistake multiplies the slopes of :mod:`.agreement` by a known factor: a negated column by -1, m/s^2 declared for g by
 0.102, left and right wheels exchanged the wheel differences by -1. The mistake that is named explains all slopes that the log
 excites; where two explain them equally well, both are named; where none does, two at once, then any factor of one column. Two
-columns in one another's place leave no slope at all: they are put back for a trial (:data:`EXCHANGES`).
+columns in one another's place leave no slope at all: they are put back for a trial (:mod:`.exchanged`).
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ import numpy as np
 
 from estimators.arrays import FloatArray
 from estimators.display import Display
-from studies.drives.agreement import SURE, WIDE_MATCH, Comparison, compare, wheels_apart
+from studies.drives.agreement import Comparison, compare, wheels_apart
 from studies.drives.direction import of_known_way
 from studies.drives.drive_file import WHEEL_SPEEDS, DriveFile
+from studies.drives.exchanged import exchanged
 from studies.drives.log import DriveLog, read_log
 from studies.drives.plausible import ACCELERATION_UNITS, ANGLE_UNITS, RATE_UNITS, STANDING, WHEEL_UNITS
 from studies.drives.quantities import CORNERS, SIGNALS, short
@@ -32,12 +33,6 @@ UNITS = {
     "yaw_rate": RATE_UNITS, "steering": ANGLE_UNITS, "wheels": WHEEL_UNITS,
     **dict.fromkeys(WHEEL_SPEEDS, WHEEL_UNITS),
 }  # fmt: skip
-EXCHANGES = (
-    ("ax", "ay"), ("ax", "az"), ("ay", "az"), ("yaw_rate", "roll_rate"), ("yaw_rate", "pitch_rate"),
-    ("wheel_speed_fr", "wheel_speed_rl"), ("wheel_speed_fl", "wheel_speed_rr"),
-)  # fmt: skip
-"""Columns that are taken for one another: axes of the inertial unit, and wheels in the order fl, rl, fr, rr. Wheels of one side
-roll alike: front and rear cannot be told apart."""
 AS_GOOD = 0.1  # by which the misfits of two explanations may differ to be told apart: 10 %
 MOST_NAMED = 3  # explanations in one line
 LONGEST = 200  # characters of all explanations in one line
@@ -129,27 +124,12 @@ def check_frames(signals: Mapping[str, FloatArray], drive: DriveFile, files: Map
 
 
 def _exchanged(signals: Mapping[str, FloatArray], drive: DriveFile, given: Sequence[Comparison]) -> list[Mistake]:
-    """The two columns whose exchange makes lines of everything in them that follows nothing, and leaves no line off."""
-    off = [one.line is not None and not (one.decides and one.agrees) for one in given]
-    fits = []
-    for a, b in EXCHANGES:
-        groups = {"front", "rear"} if a in WHEEL_SPEEDS else {a, b}
-        strange = [k for k, one in enumerate(given) if off[k] and groups & one.gains.keys()]
-        if not (strange and {a, b} <= signals.keys()):
-            continue
-        found = compare({**signals, a: signals[b], b: signals[a]}, drive)
-        lines = [found[k].line for k in strange if found[k].match < WIDE_MATCH]
-        lost = any(not off[k] and old.decides and not found[k].decides for k, old in enumerate(given))
-        clear = all(line is None or line.clear for line in lines)
-        if lost or not clear or not any(line is not None and line.quality >= SURE for line in lines):
-            continue
-        for names in ((),) if a in WHEEL_SPEEDS else ((), (a,), (b,), (a, b)):
-            signs = dict.fromkeys(names, -1.0)
-            if all(one.explained(signs) for one in found):
-                words = f"signals.{a} and signals.{b} exchanged"
-                words += f", and then the other sign for {_keys(names)}" if names else ""
-                fits.append((len(names), sum(one.misfit(signs) for one in found), Mistake({a: 1.0, b: 1.0}, words)))
-    return [mistake for _, _, mistake in sorted(fits, key=lambda fit: fit[:2])[:1]]
+    found = exchanged(signals, drive, given)
+    if found is None:
+        return []
+    (a, b), negated = found
+    words = f", and then the other sign for {_keys(negated)}" if negated else ""
+    return [Mistake({a: 1.0, b: 1.0}, f"signals.{a} and signals.{b} exchanged{words}")]
 
 
 def _named(compared: Compared, drive: DriveFile) -> list[Mistake]:

@@ -27,6 +27,9 @@ WEIGHTLESS = "left out: az must hold gravity, +9.81 m/s^2 at rest"
 CALM = 0.3  # share of such samples, those of least acceleration, that the radii are taken from
 FAST = 5.0  # m/s of the reference above which wheels roll
 
+WRITTEN = ("time_unit", "time_format", "delimiter", "decimal", "thousands", "encoding", "header_line", "units_row")
+"""Keys of a log that a guess writes where they are not the usual ones."""
+
 
 @dataclass
 class _Found:
@@ -262,16 +265,7 @@ def _log_lines(file: _Found, files: list[_Found]) -> list[str]:
     if len(files) > 1:
         lines.append(f"file = {_quoted(file.path.name)}")
     lines += [f"time = {_quoted(entry.time)}", f'rate = "{float(f"{file.rate:.3g}"):g} Hz"']
-    for key in (
-        "time_unit",
-        "time_format",
-        "delimiter",
-        "decimal",
-        "thousands",
-        "encoding",
-        "header_line",
-        "units_row",
-    ):
+    for key in WRITTEN:
         value = getattr(entry, key)
         if value != LogFile.model_fields[key].default:
             lines.append(f"{key} = {json.dumps(value)}")

@@ -75,8 +75,9 @@ def test_steady_turn_is_found_in_all_its_parts() -> None:
     pipeline.reset(vx=truth.vx[0], vy=truth.vy[0])
     last = run(pipeline, noisy(truth, 3))[-1]
     assert last.vx == pytest.approx(truth.vx[-1], abs=0.1)
-    assert last.vy == pytest.approx(truth.vy[-1], abs=0.1)
-    assert last.sideslip == pytest.approx(np.arctan(truth.vy[-1] / truth.vx[-1]), abs=0.005)
+    assert last.vy == pytest.approx(truth.vy[-1], abs=0.15)  # a_y has a bias of 0.1 m/s^2, and 2 s are a short time
+    assert abs(last.vy - truth.vy[-1]) < 2.0 * last.vy_deviation
+    assert last.sideslip == pytest.approx(np.arctan(truth.vy[-1] / truth.vx[-1]), abs=0.0075)
     np.testing.assert_allclose(last.axle_force_y, truth.axle_force_y[-1], rtol=0.04)
     np.testing.assert_allclose(last.force_z, truth.force_z[-1], rtol=0.02)
     assert last.force_y.sum() == pytest.approx(last.axle_force_y.sum(), rel=1e-9)
