@@ -17,9 +17,10 @@ sliding car decelerates.
 
 **V_y.** Is V_y lost? After a slide the axle conditions may stay gated for good: they are far from a V_y that is wrong.
 
-An axle that carries no side force does not slip far sideways, on any road. So V_y is lost when, for `lost_time`, both
-axles roll, both need less than `unloaded` of friction, both are gated, and both see V_y off by the same: then it starts
-again from what they see. What is known of sensors and tires stays.
+An axle that carries no side force does not slip far sideways, on any road; one that carries some slips to that side, as far as
+its tires need for it or further. So V_y is lost when, for `lost_time`, both axles roll, both are gated, both see V_y off by the
+same, and both need less than `unloaded` of friction, or would slip less by V_y than they need: then it starts again from what
+they see. What is known of sensors and tires stays.
 """
 
 from __future__ import annotations

@@ -65,10 +65,7 @@ class FusionSettings:
     # side slip: alpha = c_1 mu + c_3 mu^3 at each axle
     side_compliance: float = 0.09  # rad per unit of F_y/F_z, 5 deg/g: usual cornering compliance of an axle
     side_compliance_spread: float = 0.03
-    side_cubic: float = (
-        0.15  # rad per unit of mu^3: a brush with peak friction near 1 has about c_1, an axle that leans on
-    )
-    # its outer tire more
+    side_cubic: float = 0.15  # rad per unit of mu^3: c_1 for a brush of peak friction 1, more for an axle of two tires
     side_cubic_spread: float = 0.12  # peak friction between 0.7 and 1.3
     side_memory: float = 300.0  # s
     side_floor: float = 0.002  # rad, 0.1 deg: toe and linkage

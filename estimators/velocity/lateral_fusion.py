@@ -16,8 +16,8 @@ is believed, and leads V_y back, for it does not slip sideways on any road.
 
 The error has a side. On a slippery road, or where it pulls along as well, a tire slips further than alpha(mu), never less. An
 axle that slips further, low-passed over `side_excess_memory`, is not believed more than that. One that would slip less is a
-bound that V_y is led back to; it does not say where beyond it V_y is: of what it says within twice `side_error_memory` nothing
-is surer than V_y itself.
+bound that V_y is led back to. A bound does not say where beyond it V_y is: all that it says within twice `side_error_memory`
+counts as no surer than V_y itself.
 
 Two scale errors decide how far the kinematics may be believed in a turn, where a and r V_x are large and cancel: s is that
 of a, sensor and leftover body roll; s_t is that of the product r V_x, of the yaw rate sensor and of the speed, whose error
