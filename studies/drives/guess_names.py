@@ -54,21 +54,8 @@ _REFERENCE = {
 }  # fmt: skip
 _BESIDE = {"ref", "reference", "true", "truth", "gps", "gnss", "ins", "optical"}  # what measures a reference
 _NOISE = {
-    "raw",
-    "filtered",
-    "filt",
-    "corrected",
-    "corr",
-    "meas",
-    "measured",
-    "sensor",
-    "signal",
-    "value",
-    "imu",
-    "can",
-    "act",
-    "ist",
-}
+    "raw", "filtered", "filt", "corrected", "corr", "meas", "measured", "sensor", "signal", "value", "imu", "can", "act", "ist",
+}  # fmt: skip
 """Words that say nothing of what a column is."""
 _UNITS = {
     "°": "deg", "grad": "deg", "degree": "deg", "degrees": "deg", "°/s": "deg/s",

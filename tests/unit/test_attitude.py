@@ -113,9 +113,19 @@ def test_deviations_are_those_of_cars_drawn_from_them() -> None:
         if k % 25 == 24:
             sigma = np.stack([found.roll_deviation, found.pitch_deviation])
             squares.append(((np.stack([found.total_roll, found.total_pitch]) - tilt) / sigma) ** 2)
-    nees = np.mean(squares)
-    assert 0.7 < nees < 1.3
-    assert np.mean(4.0 * np.array(squares)) > 2.0  # the negative control: half as wide is overconfident
+    assert 0.7 < np.mean(squares) < 1.3  # half as wide makes it 4, twice as wide 0.25
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.5])
+def test_in_the_end_the_deviation_is_that_of_biases(turn: float) -> None:
+    """sigma^2 = (b_a/g)^2 + ((b + misalignment |r|)/L)^2 once the accelerometers have all the share."""
+    runner = AttitudeObserver(0.02)
+    for _ in range(4000):
+        found = runner.step(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, yaw_rate=turn)
+    drift = (attitude.GYRO_BIAS + attitude.MISALIGNED * turn) / runner.gain
+    expected = np.hypot(attitude.ACCELERATION_BIAS / GRAVITY, drift)
+    assert found.roll_deviation == pytest.approx(expected, rel=1e-3)
+    assert found.pitch_deviation == pytest.approx(expected, rel=1e-3)
 
 
 def test_a_gyro_that_is_wrong_shows_in_the_deviation() -> None:
@@ -139,7 +149,7 @@ def test_a_slide_leaves_roll_to_the_gyros() -> None:
     held, led, short = found.total_roll
     assert led > 0.07 > 3.0 * held
     assert short == pytest.approx(0.1 * led, rel=0.05)  # below 0.8 m/s^2 a slide changes nothing
-    assert abs(held) < 2.0 * found.roll_deviation[0]
+    assert abs(held) < found.roll_deviation[0]
     for _ in range(600):  # a gyro that is missing leaves accelerometers alone, sliding or not
         found = runner.step(math.nan, 0.0, 0.0, 1.5, 0.0, 0.0, sliding=True)
     assert found.total_roll[0] > 0.05

@@ -21,7 +21,8 @@ from studies.errors import LogError
 from studies.trials.estimation import TEST_CAR
 from studies.truth import Measured, draw, load_manoeuvre, simulate_manoeuvres
 from studies.truth import write_drive as write_truth_drive
-from tests.support.synthetic_drive import write_drive
+from tests.support.schedule_content import EFFECTIVE_RADIUS
+from tests.support.synthetic_drive import FRONT, REAR, TRACK, write_drive
 from tests.support.turning_drive import TURNING, turning, write_table
 
 Table = dict[str, Any]
@@ -181,6 +182,18 @@ def test_what_is_not_excited_is_not_judged(tmp_path: Path) -> None:
         assert found.complaint is None
         verdicts = {row["verdict"] for row in found.rows() if row["comparison"] != "az over gravity"}
         assert not verdicts & {"agrees", "contradicts"}
+
+
+def test_a_column_in_its_place_is_not_given_away_for_one_that_follows_nothing(tmp_path: Path) -> None:
+    """V r = V': a_y reads what a dead a_x should. In its place it would mend that line, and leave its own with nothing."""
+    table, rng = turning(), np.random.default_rng(2)
+    v, pull = table["v"], 2.1 * np.cos(0.6 * table["t"])
+    r = pull / v
+    for corner, side in (("fl", 1.0), ("fr", -1.0), ("rl", 1.0), ("rr", -1.0)):
+        table[f"w_{corner}"] = (v - r * side * TRACK / 2.0) / EFFECTIVE_RADIUS + 0.05 * rng.standard_normal(v.size)
+    table |= {"r": r, "ay": pull, "d": (FRONT + REAR) * r / v * (1.0 + (v / 30.0) ** 2)}
+    assert look(tmp_path, TURNING, table | {"ax": pull}).complaint is None
+    assert look(tmp_path, TURNING, table | {"ax": rng.standard_normal(v.size)}).complaint is None
 
 
 def test_an_exchange_that_mends_one_line_and_loses_another_is_none(tmp_path: Path) -> None:

@@ -172,3 +172,12 @@ def test_a_slow_log_with_other_wheels_says_how_to_get_schedules(tmp_path: Path) 
     assert '--radius "0.4 m" --sample-time "50 ms" --out .' in guessed.text
     assert read_drive(target).schedules is None
     assert read_drive(target).vehicle.effective_radius_front == pytest.approx(0.40, rel=0.01)
+
+
+@pytest.mark.parametrize(("lift", "unit"), [(1.0, "g"), (9.81, "m/s^2")])
+def test_one_unit_of_accelerometers_as_gravity_shows_it(tmp_path: Path, lift: float, unit: str) -> None:
+    table = turning()
+    log = write_table(tmp_path / "log.csv", table | {"az": table["az"] * lift / 9.81})
+    _, guessed = write_guess([log], None)
+    for name in ("ax", "ay", "az"):
+        assert f'{name} = {{ column = "{name}", unit = "{unit}" }}' in guessed.text

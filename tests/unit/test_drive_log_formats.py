@@ -156,6 +156,15 @@ def test_matlab_7_3_and_other_lengths(tmp_path: Path) -> None:
         read(tmp_path, log, TURNING)
 
 
+def test_a_guess_bridges_the_slowest_of_several_clocks(tmp_path: Path) -> None:
+    """Wheels at half the rate of the others: five of their samples."""
+    pytest.importorskip("asammdf")
+    log, _ = written(tmp_path, ".mf4", turning(1.0))
+    _, guessed = write_guess([log], tmp_path / "guessed.toml")
+    table = turning(1.0)["t"]
+    assert f'max_gap = "{1e4 * (table[1] - table[0]):.3g} ms" # five samples of the slowest signal' in guessed.text
+
+
 def test_channels_of_several_groups_and_of_text(tmp_path: Path) -> None:
     pytest.importorskip("asammdf")
     log, text = written(tmp_path, ".mf4", turning(1.0))

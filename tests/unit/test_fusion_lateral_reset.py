@@ -91,7 +91,7 @@ def test_tires_of_a_turn_slip_as_far_as_they_pull_or_further(wrong: float) -> No
 def test_an_axle_that_was_off_still_bounds_v_y() -> None:
     """Of late the axles were 0.5 m/s off, as on ice: that the car slides they do not tell, that it cannot slide less they do."""
     steady = turn(2.0, np.full(400, 0.25))
-    back = []
+    back, surest = [], []
     for wrong in (0.15, -0.15):
         fusion = VelocityFusion(CAR, STEP)
         first, rest = (Signals(*(value[part] for value in steady.signals)) for part in (slice(300), slice(300, 380)))
@@ -100,8 +100,10 @@ def test_an_axle_that_was_off_still_bounds_v_y() -> None:
         fusion._across.axle_error = 0.5
         steps, _ = driven(rest, fusion)
         back.append(1.0 - (steps[-1].vy - said) / wrong)
+        surest.append(steps[-1].vy_deviation)
     assert back[0] > 0.1
     assert back[1] < 0.0
+    assert surest[0] > 0.09  # a bound hardly makes V_y surer than the 0.1 m/s that it was
 
 
 def test_evidence_with_a_gap_starts_over() -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from estimators.forces import AttitudeObserver
+from estimators.forces import AttitudeObserver, AttitudeStep
 from estimators.pipeline import Check, EstimationPipeline, PipelineStep, VehicleSignals
 from estimators.vehicle import GRAVITY
 from estimators.velocity import VelocityFusion
@@ -72,3 +74,32 @@ def test_wheels_at_50_hz_are_wheels() -> None:
     for k in range(40):
         step = pipeline.step(VehicleSignals(np.full(4, 60.0 if k < 20 else np.nan), 0.001 * k))
     assert step.consistency.failed & Check.NO_WHEEL
+
+
+@pytest.mark.parametrize("rolling", [True, False])
+def test_an_attitude_part_hears_of_a_slide(rolling: bool) -> None:
+    """Four locked wheels and a side force: no axle tells V_y'. The negative control: the same with wheels that roll."""
+    heard: list[bool] = []
+
+    class Listening(AttitudeObserver):
+        def step(self, *given: Any, sliding: Any = False, **more: Any) -> AttitudeStep:
+            heard.append(bool(sliding))
+            return super().step(*given, sliding=sliding, **more)
+
+    pipeline = EstimationPipeline(CAR, TIME, attitude=Listening(TIME))
+    pipeline.reset(vx=20.0)
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        wheels = 20.0 / CAR.radius + 0.05 * rng.normal(size=4) if rolling else np.zeros(4)
+        signals = VehicleSignals(
+            wheels,
+            0.05 * rng.normal(),
+            2.0 + 0.05 * rng.normal(),
+            0.1,
+            roll_rate=0.0,
+            pitch_rate=0.0,
+            steer=np.array([0.02, 0.02, 0.0, 0.0]),
+        )
+        pipeline.step(signals)
+    assert heard[-1] is not rolling
+    assert not heard[0]

@@ -7,9 +7,14 @@ from collections import defaultdict
 import numpy as np
 import pytest
 
+from estimators.vehicle import GRAVITY
+from studies.beyond.fault_matrix.drives import driven
 from studies.beyond.fault_matrix.faults import FAULTS, SIGNALS
 from studies.beyond.fault_matrix.matrix import Cell, cases, matrix
+from studies.beyond.fault_matrix.observable import healthy, shares
 from studies.beyond.fault_matrix.study import STUDY
+from studies.trials.estimation import TEST_CAR
+from studies.truth import draw
 
 SINGLE = [("ay", "zero"), ("yaw_rate", "negated"), ("wheel_speed rr", "zero"), ("ax", "missing")]
 SINGLE += [("ay", "frozen"), ("ay", "doubled"), ("yaw_rate", "clipped"), ("steer", "frozen"), ("torque fl", "clipped")]
@@ -80,3 +85,25 @@ def test_a_fusion_without_its_monitor_is_found_out(monkeypatch: pytest.MonkeyPat
             assert {"y", "f"} & set(cell.missed())
             assert cell.vy > 2.0
             assert not cell.hidden
+
+
+def test_an_accelerometer_that_stays_too_large_is_outvoted() -> None:
+    """Sensor draws in which a_y never exceeds the margin of a slide: V_y was 0.68 m/s off, and nothing flagged."""
+    (turn,) = (c for c in matrix(range(202, 204), [(("ay", "doubled"),)]) if c.drive == "turn")
+    assert turn.flagged
+    assert turn.vy < 0.5
+
+
+def test_pitch_that_takes_off_what_a_x_reads_too_much_shows_in_no_relation() -> None:
+    """1 m/s^2 in a_x and the pitch of it: the forces see nothing; either alone, or the opposite pitch, they see."""
+    drawn = draw(driven().until(1.0), TEST_CAR, range(1))
+    of = healthy(drawn)
+
+    def largest(more: float, pitch: float) -> float:
+        signals = {**drawn.signals, "ax": drawn.signals["ax"] + more}
+        return float(shares(of, signals, {"roll": of.roll, "pitch": of.pitch + pitch}).max())
+
+    quiet = largest(1.0, 1.0 / GRAVITY)
+    assert quiet < 0.9
+    assert min(largest(1.0, 0.0), largest(0.0, 1.0 / GRAVITY)) > quiet + 0.3
+    assert largest(1.0, -1.0 / GRAVITY) > quiet + 1.0

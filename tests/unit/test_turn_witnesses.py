@@ -44,3 +44,17 @@ def test_a_front_angle_that_repeats_itself_is_seen_whatever_the_rear_one_does() 
             steer = np.array([front, front, 1e-3, 1e-3]) * rng.normal(size=4)
             fusion.step(np.full(4, ROLLING), steer, 0.0, 0.0, 0.0)
         assert (float(fusion.inputs.locked) > fusion.settings.slowest_unit) is repeats
+
+
+@pytest.mark.parametrize(("jitter", "rear", "believed"), [(0.0, 2.0, False), (1e-3, 2.0, True), (0.0, 1.0, True)])
+def test_an_angle_that_repeats_itself_is_believed_while_the_rear_axle_can_contradict_it(
+    jitter: float, rear: float, believed: bool
+) -> None:
+    """Rear wheels that spin at twice the speed cannot; the negative controls: an angle that moves, and wheels that roll."""
+    rng, fusion = np.random.default_rng(0), VelocityFusion(CAR, STEP)
+    for k in range(120):
+        wheels = ROLLING + 0.05 * rng.normal(size=4)
+        wheels[2:] *= rear if k > 60 else 1.0
+        steer = np.array([1.0, 1.0, 0.0, 0.0]) * jitter * rng.normal()
+        step = fusion.step(wheels, steer, 0.05 * rng.normal(), 0.05 * rng.normal(), 0.002 * rng.normal(), np.zeros(4))
+    assert bool(step.axle_used[0]) is believed
