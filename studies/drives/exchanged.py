@@ -35,8 +35,7 @@ def exchanged(signals: Mapping[str, FloatArray], drive: DriveFile, given: Sequen
         found = compare({**signals, a: signals[b], b: signals[a]}, drive)
         lines = [found[k].line for k in strange if found[k].match < WIDE_MATCH]
         lost = any(not off[k] and old.decides and not found[k].decides for k, old in enumerate(given))
-        clear = all(line is None or line.clear for line in lines)
-        if lost or not clear or not any(line is not None and line.quality >= SURE for line in lines):
+        if lost or not any(line is not None and line.quality >= SURE for line in lines):
             continue
         for negated in ((),) if a in WHEEL_SPEEDS else ((), (a,), (b,), (a, b)):
             signs = dict.fromkeys(negated, -1.0)
