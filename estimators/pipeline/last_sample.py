@@ -61,8 +61,8 @@ class LastSample(Memory):
         if (used := getattr(moved, "inertial_used", None)) is not None:
             self.used, self.inertial = kit.rows(used, 3), kit.rows(moved.inertial, 3)
             self.gravity = kit.own(moved.gravity[..., 0])
-        if (told := getattr(moved, "axle_used", None)) is not None:
-            front, rear = kit.rows(told, 2)
+        if (axles := getattr(moved, "axle_used", None)) is not None:
+            front, rear = kit.rows(axles, 2)
             self.slides = kit.no(front | rear)
         # Without torques, or on a slope, which the forces carry, what the wheels hold V_x to: slower, but no more in a loop with
         # gravity than they are.
