@@ -21,7 +21,7 @@ Exchange = tuple[tuple[str, str], tuple[str, ...]]
 
 
 def exchanged(signals: Mapping[str, FloatArray], drive: DriveFile, given: Sequence[Comparison]) -> Exchange | None:
-    """The exchange that makes lines of everything in the two columns that follows nothing, and leaves no line off.
+    """The exchange that makes a sure line of something in the two columns that follows nothing, and leaves no line off.
 
     ``given``: the comparisons of the signals (n,) as they are.
     """
