@@ -67,7 +67,8 @@ class _Rows:
     products: FloatArray  # F[w w'] (n, 3, 3)
     velocity_slope: FloatArray  # D[V_x, V_y] (n, 2)
     turning: FloatArray  # F[w_i V_j] (n, 3, 2)
-    level: FloatArray  # F[a_x, a_y] (n, 2) of the car, without washout
+    pulled: FloatArray  # F[a_x, a_y] (n, 2) of the car
+    level: FloatArray  # the same without washout
     change: FloatArray  # D[a_x, a_y] (n, 2) of the car, without washout
     squares: FloatArray  # F[a_x^2, a_y^2] (n, 2) of the car
     turned: FloatArray  # F[r a_x, r a_y] (n, 2) of the car, without washout
@@ -87,8 +88,8 @@ class _Rows:
         roll, fall = ((self.angle @ R.T)[:, :2] - self.twist * tilt).T * self.tilts[:2, None]
         free_x, free_y = np.array([p["scale_x"], p["scale_y"]]) + GRAVITY * tilt * (1.0 - self.tilts[1::-1])
         car = np.stack([
-            (1.0 + free_x) * along - GRAVITY * fall + p["late_x"] * change[:, 0],
-            (1.0 + free_y) * across + GRAVITY * roll + p["late_y"] * change[:, 1],
+            along + free_x * self.pulled[:, 0] - GRAVITY * fall + p["late_x"] * change[:, 0],
+            across + free_y * self.pulled[:, 1] + GRAVITY * roll + p["late_y"] * change[:, 1],
             slope[:, 0] * p["heave_x"] + slope[:, 1] * p["heave_y"] + p["jacking"] * self.level[:, 1] - self.squares @ tilt,
         ], axis=1) + rest  # fmt: skip
         products = R @ self.products @ R.T
@@ -111,7 +112,7 @@ def fit_mounting(log: DriveLog, drive: DriveFile, settings: IdentifySettings) ->
     pull, rate = (np.stack([log.unit.get(name, zero) for name in names], axis=1) for names in (PULLS, RATES))
     velocity = np.stack([log.reference["vx"], log.reference["vy"]], axis=1)
     known = np.isfinite(np.concatenate([pull, rate, velocity], axis=1)).all(axis=1)
-    filter_ = Prefilter(known, drive.sample_time, settings.slow_lag, settings.settling)
+    filter_ = Prefilter(known, drive.sample_time, settings.mounting_lag, settings.settling)
     every = max(1, filter_.correlation // ROWS)
     slow = ~known | (np.abs(velocity[:, 0]) < settings.least_speed)
     settled = filter_.settled(slow)
@@ -177,7 +178,7 @@ def _rows(
     columns = (
         washed(smooth(pull)), smooth(rate), washed(smooth(summed(rate))), washed(spin), spin,
         washed(smooth(products)).reshape(n, 3, 3), washed(slope(velocity)), washed(smooth(turning)).reshape(n, 3, 2),
-        smooth(own), slope(own), washed(smooth(own**2)), smooth(curved), washed(smooth(summed(curved))),
+        washed(smooth(own)), smooth(own), slope(own), washed(smooth(own**2)), smooth(curved), washed(smooth(summed(curved))),
     )  # fmt: skip
     names = (*PULLS, *RATES[:2])
     there = np.array([name in measured for name in names])

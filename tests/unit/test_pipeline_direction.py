@@ -10,14 +10,15 @@ from tests.support.pipeline_truth import CAR, TIME, Truth, noisy, straight
 
 
 def driven(
-    truth: Truth, direction: float | None = None, torque: bool = False, unsigned: bool = True
+    truth: Truth, direction: float | np.ndarray | None = None, torque: bool = False, unsigned: bool = True
 ) -> tuple[np.ndarray, ...]:
     """V_x error and deviation of a car whose sensors count teeth."""
     pipeline = EstimationPipeline(CAR, TIME, unsigned_wheels=unsigned)
+    gear = None if direction is None else np.broadcast_to(direction, truth.ax.shape)
     steps = [
         pipeline.step(VehicleSignals(
             np.abs(truth.wheel_speed[k]), truth.ax[k], truth.ay[k], truth.yaw_rate[k], truth.steer[k],
-            truth.torque[k] if torque else np.nan, direction=direction,
+            truth.torque[k] if torque else np.nan, direction=None if gear is None else gear[k],
         ))
         for k in range(truth.ax.size)
     ]  # fmt: skip
@@ -69,3 +70,26 @@ def test_signed_wheels_are_left_alone_and_a_fast_car_drives_forward() -> None:
     signed, usual = driven(truth, unsigned=False)
     np.testing.assert_array_equal(error, signed)
     np.testing.assert_array_equal(deviation[2:], usual[2:])
+
+
+def test_a_car_that_rolls_back_in_a_forward_gear_is_not_sure_of_its_way() -> None:
+    """A start on a hill: back to -1.6 m/s, then off; taken at its word, the gear makes that +1.6 with a deviation of 0.03."""
+    pull = np.concatenate([np.zeros(200), np.full(320, -1.0), np.full(480, 2.0)])
+    truth = noisy(straight(pull, 0.0), 6, (0.1, 0.0, 0.0))
+    error, deviation = driven(truth, 1.0)
+    assert (np.abs(error) < 3.0 * deviation + 0.1).all()
+    assert np.abs(error)[460:540].max() < 0.2  # by then the accelerometer is sure
+    assert np.abs(error)[850:].max() < 0.2
+    straight_off, certain = driven(from_rest(1.0), 1.0)
+    assert np.abs(straight_off)[420:].max() < 0.3
+    assert certain[700:].max() < 0.3  # where gear and accelerometer agree, nothing is open
+
+
+def test_a_lever_moved_while_the_car_still_rolls_is_for_the_way_after_the_stop() -> None:
+    pull = np.concatenate([np.zeros(200), np.full(500, -1.0), np.zeros(100)])
+    truth = noisy(straight(pull, 1.5), 7)
+    error, deviation = driven(truth, np.where(np.arange(800) < 250, 1.0, -1.0))
+    assert np.abs(error)[20:].max() < 0.5
+    assert np.abs(error[truth.vx > 0.4][20:]).max() < 0.2
+    assert np.abs(error[truth.vx < -0.4]).max() < 0.2
+    assert deviation[truth.vx < -0.4].max() < 0.3
