@@ -20,12 +20,14 @@ import numpy as np
 from estimators.arrays import FloatArray
 from estimators.display import Display
 from studies.drives.agreement import Comparison, compare, wheels_apart
+from studies.drives.backward import read_as_forward
 from studies.drives.direction import of_known_way
 from studies.drives.drive_file import WHEEL_SPEEDS, DriveFile
 from studies.drives.exchanged import exchanged
 from studies.drives.log import DriveLog, read_log
 from studies.drives.plausible import ACCELERATION_UNITS, ANGLE_UNITS, RATE_UNITS, STANDING, WHEEL_UNITS
 from studies.drives.quantities import CORNERS, SIGNALS, short
+from studies.drives.remedies import flip, keys, times_too_large
 from studies.errors import LogError
 
 UNITS = {
@@ -120,6 +122,11 @@ def check_frames(signals: Mapping[str, FloatArray], drive: DriveFile, files: Map
 
     found = tuple(compared(1.0))
     named = _exchanged(signals, drive, found) or _named(compared, drive)
+    if not named and not drive.unsigned_wheels and (backward := read_as_forward(signals, drive)) is not None:
+        unsigned = Mistake(
+            {"wheels": -1.0}, "unsigned_wheels = true at the top of the drive file (backward reads as forward)"
+        )
+        return FrameReport((*found, backward), _line_of(drive, files, (backward,), [unsigned]))
     return FrameReport(found, _line_of(drive, files, found, named) if named else None)
 
 
@@ -128,7 +135,7 @@ def _exchanged(signals: Mapping[str, FloatArray], drive: DriveFile, given: Seque
     if found is None:
         return []
     (a, b), negated = found
-    words = f", and then the other sign for {_keys(negated)}" if negated else ""
+    words = f", and then the other sign for {keys(negated)}" if negated else ""
     return [Mistake({a: 1.0, b: 1.0}, f"signals.{a} and signals.{b} exchanged{words}")]
 
 
@@ -178,7 +185,7 @@ def _mistakes(drive: DriveFile) -> list[Mistake]:
                 unit, own = "ax", given["ax"].unit
                 for other in UNITS[unit]:
                     factor = given["ax"].factor_of(own, "m/s^2") / given["ax"].factor_of(other, "m/s^2")
-                    found.append(Mistake(dict.fromkeys(sub, factor), f'unit = "{other}" for {_keys(sub)}'))
+                    found.append(Mistake(dict.fromkeys(sub, factor), f'unit = "{other}" for {keys(sub)}'))
     steered = [name for name in ("steering",) if _columns(drive, "steering")]
     for axes, why in (
         (["ax", "ay"], "sensor turned by 180 degrees"),
@@ -189,7 +196,7 @@ def _mistakes(drive: DriveFile) -> list[Mistake]:
     ):
         if all(name in given or name == "steering" for name in axes):
             names = [column for axis in axes for column in _columns(drive, axis)]
-            found.append(Mistake(dict.fromkeys(axes, -1.0), f"{_flip(drive, names)} ({why})", rare="ax" in axes))
+            found.append(Mistake(dict.fromkeys(axes, -1.0), f"{flip(drive, names)} ({why})", rare="ax" in axes))
     unique = {tuple(sorted(one.factors.items())): one for one in found}
     return [one for one in unique.values() if any(factor != 1.0 for factor in one.factors.values())]
 
@@ -199,13 +206,13 @@ def _singles(drive: DriveFile, group: str) -> list[Mistake]:
     names = _columns(drive, group)
     if not names:
         return []
-    flip = _flip(drive, names)
+    other = flip(drive, names)
     reversing = " (or reversed with unsigned wheel speeds: unsigned_wheels = true)" if group == "wheels" else ""
-    found = [Mistake({group: -1.0}, flip + reversing, rare=group == "wheels")]
+    found = [Mistake({group: -1.0}, other + reversing, rare=group == "wheels")]
     for one in _units(drive, group):
         factor = one.factors[group]
         if abs(np.log(factor)) > np.log(ALIKE[1]):
-            found += [one, Mistake({group: -factor}, f"{one.remedy} and {flip}", rare=True)]
+            found += [one, Mistake({group: -factor}, f"{one.remedy} and {other}", rare=True)]
     return found
 
 
@@ -217,7 +224,7 @@ def _units(drive: DriveFile, group: str) -> list[Mistake]:
     column, target, radius = drive.signals[names[0]], SIGNALS[names[0]], drive.vehicle.radius_for(names[0])
     given = column.factor_of(column.unit, target, radius)
     return [
-        Mistake({group: given / column.factor_of(unit, target, radius)}, f'unit = "{unit}" for {_keys(names)}')
+        Mistake({group: given / column.factor_of(unit, target, radius)}, f'unit = "{unit}" for {keys(names)}')
         for unit in UNITS[group]
     ]
 
@@ -229,12 +236,10 @@ def _any_factor(found: Sequence[Comparison], drive: DriveFile) -> list[Mistake]:
     for one in found:
         if one.line is None or one.agrees or one.line.points < MANY or one.line.quality < NEAR:
             continue
-        for group in sorted((groups & one.gains.keys()) - {"steering"}):
+        for group in sorted(groups & one.gains.keys()):
             if abs(one.gains[group]) == 1:
                 factor = one.line.slope ** one.gains[group]
-                keys = _keys(_columns(drive, group))
-                words = f"{keys} read {factor:.3g} times too large: divide factor by {factor:.3g}"
-                mistakes.append(Mistake({group: factor}, words))
+                mistakes.append(Mistake({group: factor}, times_too_large(_columns(drive, group), factor)))
     return mistakes
 
 
@@ -282,12 +287,3 @@ def _columns(drive: DriveFile, group: str) -> list[str]:
     if group == "steering":
         return [name for name in ("steering", "hand_wheel", "steer_fl", "steer_fr") if name in drive.signals]
     return [group] if group in drive.signals else []
-
-
-def _flip(drive: DriveFile, names: list[str]) -> str:
-    signs = {"negative" if drive.signals[name].sign == "positive" else "positive" for name in names}
-    return f'sign = "{signs.pop()}" for {_keys(names)}' if len(signs) == 1 else f"the other sign for {_keys(names)}"
-
-
-def _keys(names: Sequence[str]) -> str:
-    return "signals.wheel_speed_*" if list(names) == list(WHEEL_SPEEDS) else "signals." + ", ".join(names)

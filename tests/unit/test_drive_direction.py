@@ -41,8 +41,18 @@ def reversing(seconds: float = 8.0) -> dict[str, Any]:
     return table | {name: left if name.endswith("l") else right for name in WHEELS}
 
 
-def looked(folder: Path, text: str) -> str | None:
-    log = write_table(folder / "log.csv", reversing())
+def parked(signed: bool) -> dict[str, Any]:
+    """A drive that ends two metres backward into a gap: 20 s forward to 10 m/s, a stop, 4 s backward at up to 1.2 m/s."""
+    t = np.arange(2600) / 100
+    v = np.where(t < 20.0, 5.0 * (1.0 - np.cos(2.0 * np.pi * t / 20.0)), 0.0)
+    v = np.where((t > 21.0) & (t < 25.0), -0.6 * (1.0 - np.cos(2.0 * np.pi * (t - 21.0) / 4.0)), v)
+    noise = np.random.default_rng(1).normal(0.0, 0.05, t.size)
+    table = {"t": t, "v": v, "ax": np.gradient(v, t) + noise, "ay": 0.0 * t, "r": 0.0 * t}
+    return table | dict.fromkeys(WHEELS, (v if signed else np.abs(v)) / EFFECTIVE_RADIUS)
+
+
+def looked(folder: Path, text: str, table: dict[str, Any] | None = None) -> str | None:
+    log = write_table(folder / "log.csv", table or reversing())
     drive = read_drive(write_drive(folder, text))
     found = read_log([log], drive)
     return check_frames(found.signals, drive, found.files).complaint
@@ -78,6 +88,16 @@ def test_signs_that_are_missing_without_a_word_are_refused_and_so_is_the_wrong_g
     assert looked(tmp_path, forward + ALONE) is not None
     with pytest.raises(LogError, match="should be 1"):
         replay_drive([tmp_path / "log.csv"], write_drive(tmp_path, forward + ALONE))
+
+
+def test_a_few_metres_backward_that_read_as_forward_are_found_in_a_long_drive(tmp_path: Path) -> None:
+    said = looked(tmp_path, ALONE, parked(signed=False))
+    assert said is not None
+    assert "from 21.7 to 24.3 s, ax over the slope of the wheel speed is -" in said
+    assert "likely unsigned_wheels = true at the top" in said
+    assert len(said) <= 300
+    for table, text in ((parked(signed=True), ALONE), (parked(signed=False), UNSIGNED + ALONE)):
+        assert looked(tmp_path, text, table) is None
 
 
 def test_readings_of_a_gear() -> None:

@@ -60,6 +60,7 @@ IN_RPM = TURNING
 for wheel in WHEELS:
     IN_RPM = IN_RPM.replace(f'column = "{wheel}", unit = "rad/s"', f'column = "{wheel}", unit = "rpm"')
 IN_METRES = IN_RPM.replace('unit = "rpm"', 'unit = "m/s"')
+HAND = TURNING.replace("steering = {", "hand_wheel = {").replace("[schedules]", "steering_ratio = 15.0\n[schedules]")
 SAME: Callable[[Table], Table] = dict
 CASES: dict[str, tuple[str, Callable[[Table], Table], str, str]] = {
     "yaw rate negated": (TURNING, scaled(-1.0, "r"), "yaw_rate", 'likely sign = "negative" for signals.yaw_rate;'),
@@ -73,6 +74,18 @@ CASES: dict[str, tuple[str, Callable[[Table], Table], str, str]] = {
     "deg/s for rad/s": (TURNING, scaled(180 / math.pi, "r"), "yaw_rate", 'likely unit = "deg/s" for signals.yaw_rate;'),
     "deg/s declared": (declared("r", "deg/s"), SAME, "yaw_rate", 'likely unit = "rad/s" for signals.yaw_rate;'),
     "deg declared": (declared("d", "deg"), SAME, "steering", 'likely unit = "rad" for signals.steering;'),
+    "steering wheel's angle": (
+        TURNING,
+        scaled(15.0, "d"),
+        "steering",
+        "name it hand_wheel, with vehicle.steering_ratio (near 1",
+    ),
+    "road wheels' angle": (
+        HAND,
+        SAME,
+        "hand_wheel",
+        "signals.hand_wheel holds the angle of the road wheels: name it steering;",
+    ),
     "rpm declared": (IN_RPM, SAME, "wheel_speed_fl", 'likely unit = "rad/s" for signals.wheel_speed_*;'),
     "rad/s declared": (TURNING, scaled(RPM, *WHEELS), "wheel_speed_fl", 'unit = "rpm" for signals.wheel_speed_*;'),
     "one wheel in rpm": (TURNING, scaled(RPM, "w_rl"), "wheel_speed_rl", 'unit = "rpm" for signals.wheel_speed_rl;'),
@@ -144,6 +157,12 @@ def test_what_contradicts_is_named_with_its_mend(
     assert mend in found.complaint
     assert "\n" not in found.complaint
     assert len(found.complaint) <= 300
+
+
+def test_a_steering_wheel_that_is_one_is_no_mistake(tmp_path: Path) -> None:
+    """Negative control; so is a car whose understeer takes two thirds of its yaw rate."""
+    assert look(tmp_path, HAND, scaled(15.0, "d")(turning())).complaint is None
+    assert look(tmp_path, TURNING, turning(understeer=7.0)).complaint is None
 
 
 @pytest.mark.parametrize("seed", range(5))
