@@ -11,6 +11,7 @@ from studies.drives.csv_log import CsvForm, read_columns, read_header, read_unit
 from studies.drives.mat_log import name_variables, read_variables
 from studies.drives.mdf_log import name_channels, read_channels
 from studies.drives.table import LogTable
+from studies.errors import LogError
 
 Read = Callable[[Path, Mapping[str, str], str], LogTable]
 Name = Callable[[Path], dict[str, str]]
@@ -45,6 +46,8 @@ def name_columns(path: Path, entry: LogFile) -> dict[str, str]:
     """Names of all columns with their units, empty where the file has none."""
     reader = _reader(path)
     if reader is not None:
+        if not path.exists():
+            raise LogError(f"{path.name}: cannot be read (no such file); check the path")
         return reader[1](path)
     form = form_of(entry)
     names = read_header(path, form)

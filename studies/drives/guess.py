@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,6 +26,8 @@ RADIUS = 0.33  # m where no reference velocity says it: the shipped schedules ar
 RATES = ("yaw_rate", "roll_rate", "pitch_rate")
 WEIGHTLESS = "left out: az must hold gravity, +9.81 m/s^2 at rest"
 CALM = 0.3  # share of such samples, those of least acceleration, that the radii are taken from
+BY_HAND = "write the drive file by hand (gainsmith new my-car --drive has one with comments)"
+MOST_OTHERS = 1000  # characters of the names of columns that were taken for nothing
 FAST = 5.0  # m/s of the reference above which wheels roll
 
 WRITTEN = ("time_unit", "time_format", "delimiter", "decimal", "thousands", "encoding", "header_line", "units_row")
@@ -108,14 +111,15 @@ def _look(path: Path) -> _Found:
         clocks = [entry.time]
     if not clocks:
         shown = short(", ".join(names), 80)
-        raise LogError(
-            f"{path.name}: no column looks like a clock ({shown}); rename it to time, or write the drive file by hand"
-        )
+        raise LogError(f"{path.name}: no column looks like a clock ({shown}); rename it to time, or {BY_HAND}")
     for other in [column for column, one in guesses.items() if one.table == "time" and column != clocks[0]]:
         del guesses[other]
     given = guesses.get(clocks[0], Guess("time", "time", None))
     wanted = dict.fromkeys([clocks[0], *(c for c in guesses if c != clocks[0])], "guess")
     entry = entry.model_copy(update={"time": clocks[0]})
+    others = [name for name in names if name not in guesses and name != clocks[0]]
+    if len(guesses) <= (clocks[0] in guesses):
+        raise LogError(f"{path.name}: no name says what is measured ({short(', '.join(others), 100)}); {BY_HAND}")
     table = read_table(path, wanted, entry)
     stamps = table.values[clocks[0]]
     spacing = np.diff(np.unique(stamps[np.isfinite(stamps)]))
@@ -128,7 +132,10 @@ def _look(path: Path) -> _Found:
     steps = [float(np.median(one)) for one in own if one.size] or [step]  # columns of a merged table have their own
     step, slowest = (each * factor_to(unit, "s") for each in (min(steps), max(steps)))
     entry = entry.model_copy(update={"time_unit": unit, "max_gap": 5.0 * slowest if slowest > 1.5 * step else None})
-    return _Found(path, entry, guesses, values, 1.0 / step, float(np.nanmin(stamps)) * factor_to(unit, "s"))
+    start = float(np.nanmin(stamps)) * factor_to(unit, "s")
+    spare = dict.fromkeys(re.sub(r"\[\d+\]", "[]", name) for name in others)  # an array once
+    told = [f"not taken for a signal: {short(', '.join(spare), MOST_OTHERS)}"] if spare else []
+    return _Found(path, entry, guesses, values, 1.0 / step, start, told)
 
 
 def _time_unit(step: float) -> str:
@@ -172,8 +179,9 @@ def _unit(file: _Found, column: str) -> tuple[str, str, str]:
     sign = ', sign = "negative"' if one.name == "az" and middle < 0.0 else ""
     if one.name == "az" and abs(middle) < 0.05:
         return one.unit or "m/s^2", "", WEIGHTLESS
+    order = "the order of the wheels is a guess" if kind == "wheel_speed" and re.search(r"\[\d+\]$", column) else ""
     if one.unit is not None:
-        return one.unit, sign, ""
+        return one.unit, sign, order
     lifted = [float(np.nanmedian(file.values[name])) for name, other in file.guesses.items() if other.name == "az"]
     in_g = any(0.5 < abs(one) < 2.0 for one in lifted)  # one sensor, one unit, and only az shows which
     unit = {
@@ -182,7 +190,7 @@ def _unit(file: _Found, column: str) -> tuple[str, str, str]:
         **dict.fromkeys(("ax", "ay", "az"), "g" if in_g else "m/s^2"), "vx": "km/h" if high > 90.0 else "m/s",
         "vy": "m/s",
     }.get(kind, "deg/s" if high > 3.0 else "rad/s")  # fmt: skip
-    return unit, sign, "the unit is a guess"
+    return unit, sign, "unit and order of the wheels are guesses" if order else "the unit is a guess"
 
 
 def _radii(files: list[_Found]) -> tuple[float, float]:

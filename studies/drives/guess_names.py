@@ -6,7 +6,7 @@ import re
 import unicodedata
 from typing import NamedTuple
 
-from studies.drives.quantities import REFERENCES, SIGNALS, factor_to
+from studies.drives.quantities import CORNERS, REFERENCES, SIGNALS, factor_to
 
 _CORNERS = {
     "fl": "fl", "fr": "fr", "rl": "rl", "rr": "rr", "vl": "fl", "vr": "fr", "hl": "rl", "hr": "rr", "lf": "fl", "rf": "fr",
@@ -26,7 +26,7 @@ _AT_CORNER = {
     "steer": r"(d|delta|steer|steering|steer(ing)? ?(angle|ang)|road wheel angle|angle (de )?braquage( roue)?|"
     r"lenkwinkel|radlenkwinkel)",
 }  # fmt: skip
-_ACCELERATION = r"(a|acc|accel|acceleration|linear acceleration|beschleunigung)"
+_ACCELERATION = r"(a|g|acc|accel|acceleration|linear acceleration|beschleunigung)"
 _RATE = r"(rate|velocity|speed|angular rate|angular velocity)"
 _OF_CAR = {
     "time": r"(t|time|zeit|temps|horodatage|time ?stamps?|car time|zeitstempel|uhrzeit|time rel|rel time|epoch|sec|seconds)",
@@ -42,21 +42,26 @@ _OF_CAR = {
     rf"querbeschleunigung|alat)",
     "az": rf"({_ACCELERATION} ?(z|verticale?|vertikal|hoch)|az|vert(ical)? ?(acc|accel|acceleration)|"
     rf"vertikalbeschleunigung|hochbeschleunigung)",
-    "hand_wheel": r"(hand ?wheel( angle)?|steering ?wheel ?(angle|ang)?|swa|lenkrad ?winkel|angle (du |de )?volant|lws)",
+    "hand_wheel": r"(hand ?wheel( angle)?|steering ?wheel ?(angle|ang)?|swa|lenkrad ?winkel|angle (du |de )?volant|lws|lrw)",
     "steering": r"(steer(ing)?( angle)?|delta( f)?|road wheel angle|front steer(ing)?( angle)?|(rad)?lenkwinkel)",
 }  # fmt: skip
 _REFERENCE = {
-    "vx": r"(vx|v ?x|velocity ?x|geschwindigkeit laengs|vitesse (longitudinale|vehicule)|(veh|vehicle|car) ?(spd|vel)|"
+    "vx": r"(vx|v ?x|(twist )+linear x|velocity ?x|geschwindigkeit laengs|vitesse (longitudinale|vehicule)|"
+    r"(veh|vehicle|car) ?(spd|vel)|"
     r"long(itudinal)? ?(velocity|vel|speed)|laengsgeschwindigkeit|v ?ref|v|"
-    r"(gps|gnss|ins|reference) ?(speed|velocity)|(vehicle )?speed|velocity|geschwindigkeit|fahrzeuggeschwindigkeit|v ?long)",
-    "vy": r"(vy|v ?y|velocity ?y|geschwindigkeit quer|vitesse (laterale|transversale)|lat(eral)? ?(velocity|vel|"
-    r"speed)|quergeschwindigkeit|v ?lat)",
+    r"(gps|gnss|ins|reference) ?(speed|velocity)|(vehicle )?speed|velocity|geschwindigkeit|fahrzeuggeschwindigkeit|"
+    r"v ?long)",
+    "vy": r"(vy|v ?y|(twist )+linear y|velocity ?y|geschwindigkeit quer|vitesse (laterale|transversale)|"
+    r"lat(eral)? ?(velocity|vel|speed)|quergeschwindigkeit|v ?lat)",
 }  # fmt: skip
 _BESIDE = {"ref", "reference", "true", "truth", "gps", "gnss", "ins", "optical"}  # what measures a reference
 _NOISE = {
-    "raw", "filtered", "filt", "corrected", "corr", "meas", "measured", "sensor", "signal", "value", "imu", "can", "act", "ist",
+    "esp", "esc", "abs", "dsc", "lwi", "ecu", "data", "values", "raw", "filtered", "filt", "corrected", "corr", "meas",
+    "measured", "sensor", "signal", "value", "imu", "can", "act", "ist",
 }  # fmt: skip
 """Words that say nothing of what a column is."""
+_WHOLE = {"beschl": "beschleunigung", "geschw": "geschwindigkeit"}
+_ABBREVIATED = re.compile("(beschl|geschw)$")
 _UNITS = {
     "°": "deg", "grad": "deg", "degree": "deg", "degrees": "deg", "°/s": "deg/s",
     "deg/sec": "deg/s", "degps": "deg/s", "dps": "deg/s",
@@ -68,6 +73,8 @@ _UNITS = {
     "µs": "us", "usec": "us", "g": "g",
 }  # fmt: skip
 _SAID = re.compile(r"(.+?)(?: in |\s*/\s*)([^/].*)")  # wheel speed in rad/s, v/(m/s)
+_GROUP = re.compile(r"@\d+$")  # of an MDF file
+_ELEMENT = re.compile(r"(.+)\[(\d+)\]")
 _BRACKETS = re.compile(r"\s*[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
 
 
@@ -85,12 +92,24 @@ class Guess(NamedTuple):
 def guess_column(column: str, unit: str = "") -> Guess | None:
     """What a column of this name is; ``unit`` as a row of units has it. None where no rule knows it.
 
-    A field of a struct or of a message, a.b.c, is what its whole name says, or else its last part.
+    A field of a struct or of a message, a.b.c, is what its whole name says, or else b.c, or else c. Of an array of wheel speeds
+    the elements are taken in the order front left, front right, rear left, rear right.
     """
-    found = _guess(column, unit)
-    if found is None and "." in column and "[" not in column:
-        return _guess(column.rpartition(".")[2], unit)
-    return found
+    column = _GROUP.sub("", column)
+    while column:
+        found = _guess(column, unit) or _of_array(column, unit)
+        if found is not None or ("[" in column and not _ELEMENT.fullmatch(column)):
+            return found
+        column = column.partition(".")[2]
+    return None
+
+
+def _of_array(column: str, unit: str) -> Guess | None:
+    element = _ELEMENT.fullmatch(column)
+    if element is None or int(element[2]) >= len(CORNERS):
+        return None
+    found = _guess(f"{element[1]} {CORNERS[int(element[2])]}", unit)
+    return found if found is not None and found.name.startswith("wheel_speed_") else None
 
 
 def _guess(column: str, unit: str) -> Guess | None:
@@ -140,6 +159,7 @@ def _words(name: str) -> list[str]:
         name = name.replace(umlaut, plain)
     name = "".join(letter for letter in unicodedata.normalize("NFKD", name) if not unicodedata.combining(letter))
     words = re.sub(r"[^A-Za-z0-9]+", " ", name).lower().split()
+    words = [_ABBREVIATED.sub(lambda cut: _WHOLE[cut[0]], word) for word in words]
     joined: list[str] = []
     for word in words:
         last = joined[-1] if joined else ""

@@ -1,4 +1,4 @@
-"""Reading variables of a MATLAB file up to version 7: vectors, and vectors in structs as ``struct.field``."""
+"""Reading variables of a MATLAB file up to version 7: vectors, ``struct.field``, and columns of a matrix ``name[0]``."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from studies.drives.quantities import short
 from studies.drives.table import LogTable, no_column, table_of
 from studies.errors import LogError
 
+MOST_ELEMENTS = 16  # columns of a matrix that is a table of signals
 HDF5 = b"\x89HDF"
 
 
@@ -28,7 +29,7 @@ def read_variables(path: Path, wanted: Mapping[str, str], time: str) -> LogTable
         if found[name].size != found[time].size:
             raise LogError(
                 f"{path.name}: {role}: variable '{short(name, 40)}' has {found[name].size} samples, '{short(time, 40)}' has "
-                f"{found[time].size}; they must be the same"
+                f"{found[time].size}; a signal with another time belongs to a [[log]] of its own, with the same file"
             )
     return table_of({name: found[name] for name in wanted}, None)
 
@@ -60,5 +61,11 @@ def _vectors(path: Path) -> dict[str, FloatArray]:
 def _collect(found: dict[str, FloatArray], name: str, value: Any) -> None:
     for one in getattr(value, "_fieldnames", ()):
         _collect(found, f"{name}.{one}", getattr(value, one))
-    if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "buif":
-        found[name] = value.astype(np.float64)
+    if isinstance(value, np.ndarray) and value.dtype == object:  # a struct array, of which Simulink labels each entry
+        for k, one in enumerate(value.flat):
+            _collect(found, f"{name}.{getattr(one, 'label', '') or k}", one)
+    if isinstance(value, np.ndarray) and value.dtype.kind in "buif":
+        if value.ndim == 1:
+            found[name] = value.astype(np.float64)
+        elif value.ndim == 2 and value.shape[1] <= MOST_ELEMENTS < value.shape[0]:
+            found |= {f"{name}[{k}]": column for k, column in enumerate(value.T.astype(np.float64))}

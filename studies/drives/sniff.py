@@ -14,7 +14,7 @@ from studies.drives.guess_names import guess_column
 from studies.drives.iso_time import looks_iso
 from studies.errors import LogError
 
-LINES = 20
+LINES = 60
 
 
 def sniff(path: Path) -> LogFile:
@@ -56,8 +56,8 @@ def _header(lines: list[str]) -> int | None:
     """The first line that has as many fields as the last one, several: what a logger says of itself may stand before it."""
     for k, line in enumerate(lines):
         cells = _split(line, _delimiter(line))
-        if any(map(NUMBER.fullmatch, cells)):
-            break
+        if 2 * sum(NUMBER.fullmatch(cell) is not None for cell in cells) > len(cells):
+            break  # measured rows have begun; a title may hold a number, too
         if len(cells) > 1 and len(cells) == len(_split(lines[-1], _delimiter(line))):
             return k
     return 0 if lines and lines[0].strip() else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,6 +11,8 @@ import numpy as np
 from estimators.arrays import FloatArray
 from studies.drives.table import LogTable
 from studies.errors import LogError
+
+MOST_LATE = 10  # rows that a logger with buffers may write behind later ones
 
 
 @dataclass(frozen=True)
@@ -41,12 +44,15 @@ def clean_stamps(
     if missing.size:
         raise LogError(f"{file}: {table.place(int(missing[0]))} has no time stamp; remove the line")
     backwards = np.flatnonzero(np.diff(time) < 0)
-    if backwards.size and not sort:
+    if backwards.size:
         k = int(backwards[0])
-        raise LogError(
-            f"{file}: time runs backwards on {table.place(k + 1)} ({time[k + 1]:g} s after {time[k]:g} s); "
-            "repair the log, or set sort = true for it in the drive file"
-        )
+        where = f"time runs backwards on {table.place(k + 1)} ({time[k + 1]:.10g} s after {time[k]:.10g} s)"
+        if _overlap(time, values, k):
+            raise LogError(
+                f"{file}: {where} and goes on from there; correct the clock from there on, or cut the log in two"
+            )
+        if not sort:
+            raise LogError(f"{file}: {where}; repair the log, or set sort = true for it in the drive file")
     order = np.argsort(time, kind="stable")
     time = time[order]
     values = {name: value[order] for name, value in values.items()}
@@ -61,6 +67,22 @@ def clean_stamps(
         values = {name: _merge(time, value, duplicates == "mean") for name, value in values.items()}
         time = np.unique(time)
     return Stamped(time=time, values=values, duplicates=int(repeats.size), out_of_order=int(backwards.size))
+
+
+def _overlap(time: FloatArray, values: Mapping[str, FloatArray], k: int) -> bool:
+    """Whether a column comes a second time from row k + 1 on, as after a clock that was set back: rows late in a file fill gaps.
+
+    Sorted, such rows would be two drives mixed. They stand where the rows up to k have no gap.
+    """
+    for value in values.values():
+        there = np.isfinite(value)
+        first, again = np.sort(time[: k + 1][there[: k + 1]]), time[k + 1 :][there[k + 1 :]]
+        if first.size > MOST_LATE:
+            gaps = np.diff(first)
+            at = np.searchsorted(first, again[(again >= first[0]) & (again < first[-1])], side="right")
+            if np.count_nonzero(gaps[at - 1] < 1.5 * np.median(gaps)) > MOST_LATE:
+                return True
+    return False
 
 
 def _merge(time: FloatArray, value: FloatArray, mean: bool) -> FloatArray:

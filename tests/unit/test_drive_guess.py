@@ -105,6 +105,19 @@ def test_units_in_a_row_and_iso_time(tmp_path: Path) -> None:
         ("Velocity_X", ("reference", "vx", None)),
         ("reference_vy [km/h]", ("reference", "vy", "km/h")),
         ("true_vx", ("reference", "vx", None)),
+        ("ESP_Laengsbeschl [g]", ("signals", "ax", "g")),
+        ("ESP_VL_Radgeschw", ("signals", "wheel_speed_fl", None)),
+        ("G_Lat", ("signals", "ay", None)),
+        ("LRW", ("signals", "hand_wheel", None)),
+        ("v_rad_vl@3", ("signals", "wheel_speed_fl", None)),
+        ("log.wheel.fl", ("signals", "wheel_speed_fl", None)),
+        ("out.signals.ax.values", ("signals", "ax", None)),
+        ("wheelSpeed[2]", ("signals", "wheel_speed_rl", None)),
+        ("/car/wheels.wheel_speed[3]", ("signals", "wheel_speed_rr", None)),
+        ("/odom.twist.twist.linear.x", ("reference", "vx", None)),
+        ("wheelSpeed[4]", None),
+        ("/imu.angular_velocity_covariance[0]", None),
+        ("torque[0]", None),
         ("true_ax", None),
         ("slip_FL", None),
         ("Fx_fl", None),
@@ -143,10 +156,30 @@ def test_what_is_not_found_is_asked_for(tmp_path: Path) -> None:
         read_drive(target)
 
 
+def test_what_a_logger_says_of_itself_may_hold_numbers(tmp_path: Path) -> None:
+    log = write_table(tmp_path / "log.csv", renamed(CAMEL, IN_CAMEL))
+    said = ["Exported by Logger 3.2", "Car, test 7", ""] + [f"setting {k}: {k}" for k in range(25)]
+    log.write_text("\n".join([*said, log.read_text(encoding="utf-8")]), encoding="utf-8")
+    target, guessed = write_guess([log], None)
+    assert f"header_line = {len(said) + 1}" in guessed.text
+    assert read_back([log], target).time.size == 3999
+
+
+def test_columns_that_were_taken_for_nothing_are_listed(tmp_path: Path) -> None:
+    table = turning(2.0) | {"engine": np.zeros(200)} | {f"cov[{k}]": np.zeros(200) for k in range(3)}
+    log = write_table(tmp_path / "log.csv", table)
+    assert guess([log]).text.endswith("# not taken for a signal: d, engine, cov[]\n")
+    assert "not taken" not in guess([write_table(tmp_path / "log.csv", renamed(GERMAN, IN_GERMAN))]).text
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
         (b"", "line 1 is empty"),
+        (
+            b"time,colour,smell\n1,2,3\n2,3,4\n",
+            "no name says what is measured (colour, smell); write the drive file by hand",
+        ),
         (b"a,b\n1,2\n3,4\n", "no column looks like a clock"),
         (b"time,ax\n1,2\n", "holds less than two stamps"),
         (b"time,ax\n1,2\n2,x\n", "line 3: column 'ax' holds 'x'"),

@@ -105,6 +105,22 @@ def test_unsorted_rows_are_sorted_on_request(tmp_path: Path) -> None:
     assert log.report["logs"]["log"]["out_of_order"] == 1
 
 
+def test_a_clock_that_was_set_back_is_not_sorted_into_itself(tmp_path: Path) -> None:
+    """Rows that come late fill gaps, and columns of another sensor at the same times are merged; a second drive is neither."""
+    twice = [f"{0.005 * (k % 40):g}" for k in range(60)]
+    for extra in ("", "sort = true"):
+        with pytest.raises(
+            LogError, match=r"backwards on line 42 \(0 s after 0\.195 s\) and goes on from there; correct the clock"
+        ):
+            read(tmp_path, rows(twice), extra)
+    order = [*range(15), *range(30, 40), *range(15, 30)]
+    late = read(tmp_path, rows([f"{0.005 * k:g}" for k in order]), "sort = true")
+    assert late.time.size == 40
+    times = [f"{0.005 * k:g}" for k in range(40)]
+    blocks = [f"{t},1,1,,,," for t in times] + [f"{t},,,1,1,1,1" for t in times]
+    assert read(tmp_path, HEADER + "\n" + "\n".join(blocks) + "\n", "sort = true").time.size == 40
+
+
 def test_milliseconds_and_other_delimiters(tmp_path: Path) -> None:
     text = rows(["0", "5", "10", "15"]).replace(",", ";")
     log = read(tmp_path, text, 'time_unit = "ms"\ndelimiter = ";"')

@@ -156,6 +156,51 @@ def test_matlab_7_3_and_other_lengths(tmp_path: Path) -> None:
         read(tmp_path, log, TURNING)
 
 
+def test_matrices_struct_arrays_and_times_of_their_own_in_matlab_files(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    table = turning(4.0)
+    wheels = np.column_stack([table[f"w_{corner}"] for corner in ("fl", "fr", "rl", "rr")])
+    entries = np.array(
+        [("ax", table["ax"][::2, None]), ("engine", table["ax"][::2])], dtype=[("label", "O"), ("values", "O")]
+    )
+    log = tmp_path / "log.mat"
+    savemat(log, {"t": table["t"], "wheelSpeed": wheels, "out": {"time": table["t"][::2], "signals": entries}})
+    with pytest.raises(
+        LogError, match=r"'out\.signals\.ax\.values' has 200 samples, 't' has 400; .* a \[\[log\]\] of its own"
+    ):
+        write_guess([log], None)
+    text = TURNING.split("ay =", maxsplit=1)[0].replace('name = "log"', 'name = "log"\nfile = "log.mat"')
+    for k, corner in enumerate(("fl", "fr", "rl", "rr")):
+        text = text.replace(f'column = "w_{corner}"', f'log = "log", column = "wheelSpeed[{k}]"')
+    text = text.replace('column = "ax"', 'log = "unit", column = "out.signals.ax.values"')
+    unit = '[[log]]\nname = "unit"\nfile = "log.mat"\ntime = "out.time"\nrate = "50 Hz"\n\n[signals]'
+    found = read(tmp_path, log, text.replace("[signals]", unit))
+    on_grid = np.interp(table["t"][::2][:-2], found.time, found.signals["ax"])
+    np.testing.assert_allclose(on_grid, table["ax"][::2][:-2], atol=1e-6)
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".mf4", ".mat", ".csv"])
+def test_a_file_that_is_not_there_is_said_to_be(tmp_path: Path, ending: str) -> None:
+    with pytest.raises(LogError, match="cannot be read"):
+        write_guess([tmp_path / f"none{ending}"], None)
+
+
+def test_a_guess_of_channels_that_are_in_two_groups_takes_the_first(tmp_path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    table = turning(2.0)
+    names = {"ax": "AccelX", **{f"w_{c}": f"v_rad_{c}" for c in ("fl", "fr", "rl", "rr")}}
+    with asammdf.MDF(version="4.10") as file:
+        for factor in (1.0, 2.0):
+            file.append([asammdf.Signal(factor * table[a], table["t"], name=b) for a, b in names.items()])
+        file.save(tmp_path / "log.mf4")
+    target, guessed = write_guess([tmp_path / "log.mf4"], None)
+    assert guessed.found["ax"] == "AccelX@0"
+    assert "# not taken for a signal: AccelX@1, v_rad_fl@1" in guessed.text
+    found = read_log([tmp_path / "log.mf4"], read_drive(target))
+    np.testing.assert_allclose(found.signals["ax"][::2], np.interp(found.time[::2], table["t"], table["ax"]), atol=1e-9)
+
+
 def test_a_guess_bridges_the_slowest_of_several_clocks(tmp_path: Path) -> None:
     """Wheels at half the rate of the others: five of their samples."""
     pytest.importorskip("asammdf")

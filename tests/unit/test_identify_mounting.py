@@ -68,7 +68,7 @@ def found_in(log: DriveLog, drive: DriveFile) -> MountingFit:
     return found
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
 def test_a_drive_that_turns_and_brakes_says_how_the_unit_is_mounted(tmp_path: Path, seed: int) -> None:
     fit = found_in(log_of(seed=seed), drive_of(tmp_path)).fit
     assert fit is not None
