@@ -84,7 +84,11 @@ def run_log(
     if as_json:
         print(json.dumps(result.metrics, indent=1))
         return 0
-    print_table(f"{result.metrics.get('drive', drive.stem)}: against the reference", HEADER, summary_rows(result))
+    rows = summary_rows(result)
+    if rows:
+        print_table(f"{result.metrics.get('drive', drive.stem)}: against the reference", HEADER, rows)
+    else:
+        print("no reference: nothing to compare the estimates with")
     for line in remarks(result):
         print(line)
     earlier = f", in the place of the results of '{one_line(result.replaced, 60)}'" if result.replaced else ""

@@ -99,7 +99,7 @@ def compare(signals: Mapping[str, FloatArray], drive: DriveFile) -> list[Compari
 
 def wheels_apart(signals: Mapping[str, FloatArray], drive: DriveFile) -> list[Comparison]:
     """Each wheel beside the median of all: a steady ratio far from 1 is a unit, a sign or a factor of one column."""
-    speed = _surface_speeds(signals, drive.vehicle)
+    speed = surface_speeds(signals, drive.vehicle)
     whole = np.median(speed, axis=1)
     whole = np.where(np.isfinite(whole) & (np.abs(whole) > MOVING), whole, np.nan)
     found = []
@@ -118,7 +118,7 @@ class _Log:
     def __init__(self, signals: Mapping[str, FloatArray], drive: DriveFile) -> None:
         self.signals, self.car = signals, drive.vehicle
         self.window, self.step = (max(1, round(span / drive.sample_time)) for span in (WINDOW, STEP))
-        wheels = _surface_speeds(signals, self.car)
+        wheels = surface_speeds(signals, self.car)
         speed = np.stack([self.mean(one) for one in wheels.T], axis=-1)
         front, rear = speed[:, :2].mean(axis=1), speed[:, 2:].mean(axis=1)
         self.speed = 0.5 * (front + rear)
@@ -199,19 +199,25 @@ class _Log:
         return Comparison(title, gains, line, WIDE_BAND if wide else band, match)
 
     def mean(self, value: FloatArray, samples: int | None = None) -> FloatArray:
-        """Centred mean over the window of the finite samples; NaN where less than half of them are."""
-        half = (samples or self.window) // 2
-        known = np.isfinite(value)
-        total = np.concatenate([[0.0], np.cumsum(np.where(known, value, 0.0))])
-        count = np.concatenate([[0], np.cumsum(known)])
-        k = np.arange(value.size)
-        low, high = np.maximum(k - half, 0), np.minimum(k + half + 1, value.size)
-        n = count[high] - count[low]
-        mean = (total[high] - total[low]) / np.maximum(n, 1)
-        return np.where(2 * n > 2 * half + 1, mean, np.nan)
+        """Over the window, or so many samples."""
+        return averaged(value, samples or self.window)
 
 
-def _surface_speeds(signals: Mapping[str, FloatArray], car: Vehicle) -> FloatArray:
+def averaged(value: FloatArray, samples: int) -> FloatArray:
+    """Centred mean of the finite samples (n,); NaN where less than half of them are."""
+    half = samples // 2
+    known = np.isfinite(value)
+    total = np.concatenate([[0.0], np.cumsum(np.where(known, value, 0.0))])
+    count = np.concatenate([[0], np.cumsum(known)])
+    k = np.arange(value.size)
+    low, high = np.maximum(k - half, 0), np.minimum(k + half + 1, value.size)
+    n = count[high] - count[low]
+    mean = (total[high] - total[low]) / np.maximum(n, 1)
+    return np.where(2 * n > 2 * half + 1, mean, np.nan)
+
+
+def surface_speeds(signals: Mapping[str, FloatArray], car: Vehicle) -> FloatArray:
+    """R_e w (n, 4), m/s."""
     radius = np.repeat([car.effective_radius_front, car.effective_radius_rear], 2)
     return np.asarray(at_corners(signals, "wheel_speed") * radius)
 

@@ -12,17 +12,15 @@ from dataclasses import replace
 import numpy as np
 
 from estimators.arrays import FloatArray
-from studies.drives.agreement import Comparison, compare
+from studies.drives.agreement import Comparison, compare, surface_speeds
 from studies.drives.drive_file import DriveFile
-from studies.drives.quantities import at_corners
 
 STOPPED = 0.3  # m/s below which a wheel sensor gives no pulses
 
 
 def read_as_forward(signals: Mapping[str, FloatArray], drive: DriveFile) -> Comparison | None:
     """The clearest stretch that contradicts a_x by its sign alone; None without one, and where some wheel reads backward."""
-    car = drive.vehicle
-    speed = at_corners(signals, "wheel_speed") * np.repeat([car.effective_radius_front, car.effective_radius_rear], 2)
+    speed = surface_speeds(signals, drive.vehicle)
     if not (speed[np.isfinite(speed)] > -STOPPED).all():
         return None
     known = np.isfinite(speed)

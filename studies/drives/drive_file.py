@@ -201,8 +201,10 @@ def check_estimators(
     cornered = [name for name in ("corner_velocity", "axle_weights") if name in chosen.model_fields_set]
     if schedules is None and (cornered or chosen.velocity != "fusion"):
         name = cornered[0] if cornered else "velocity"
+        kind = str(getattr(chosen, name))
+        why = "has its tire from a gain schedule" if kind.startswith("kalman") else "runs on gain schedules"
         raise ValueError(
-            f"schedules: missing, but estimators.{name} = '{getattr(chosen, name)}' runs on gain schedules; add a table "
+            f"schedules: missing, but estimators.{name} = '{kind}' {why}; add a table "
             '[schedules] with longitudinal = "corner-estimation-longitudinal"'
         )
     if chosen.velocity != "fusion" and (schedules is None or schedules.lateral is None):

@@ -27,6 +27,7 @@ from studies.drives.exchanged import exchanged
 from studies.drives.log import DriveLog, read_log
 from studies.drives.plausible import ACCELERATION_UNITS, ANGLE_UNITS, RATE_UNITS, STANDING, WHEEL_UNITS
 from studies.drives.quantities import CORNERS, SIGNALS, short
+from studies.drives.reference_place import reference_off
 from studies.drives.remedies import flip, keys, times_too_large
 from studies.errors import LogError
 
@@ -98,15 +99,20 @@ def read_checked(paths: Sequence[Path], drive: DriveFile, check: bool = True) ->
     log = read_log(paths, drive)
     if not (check and drive.check):
         return log, ("signs, units and sides of the signals are right: not checked (--no-check, or check = false)",)
-    found = check_frames(log.signals, drive, log.files)
+    found = check_frames(log.signals, drive, log.files, log.reference)
     if found.complaint is not None:
         raise LogError(found.complaint)
     log.report["frames"] = found.rows()
     return log, ()
 
 
-def check_frames(signals: Mapping[str, FloatArray], drive: DriveFile, files: Mapping[str, str]) -> FrameReport:
-    """Compare the signals (n,) in SI with one another; ``files`` names the file of each log, for the message."""
+def check_frames(
+    signals: Mapping[str, FloatArray],
+    drive: DriveFile,
+    files: Mapping[str, str],
+    reference: Mapping[str, FloatArray] | None = None,
+) -> FrameReport:
+    """Compare the signals (n,) in SI with one another, and with the ``reference``; ``files`` names the file of each log."""
     if drive.unsigned_wheels:
         signals = of_known_way(signals, drive.vehicle.parameters)
     apart = [one for one in wheels_apart(signals, drive) if one.line is None or abs(one.line.slope) > STANDING]
@@ -127,7 +133,10 @@ def check_frames(signals: Mapping[str, FloatArray], drive: DriveFile, files: Map
             {"wheels": -1.0}, "unsigned_wheels = true at the top of the drive file (backward reads as forward)"
         )
         return FrameReport((*found, backward), _line_of(drive, files, (backward,), [unsigned]))
-    return FrameReport(found, _line_of(drive, files, found, named) if named else None)
+    if named or (off := reference_off(signals, reference or {}, drive)) is None:
+        return FrameReport(found, _line_of(drive, files, found, named) if named else None)
+    file = files[drive.log_of(drive.reference["vx"])]
+    return FrameReport(found, f"{file}: {off[0]}: {off[1]}; {ESCAPE}")
 
 
 def _exchanged(signals: Mapping[str, FloatArray], drive: DriveFile, given: Sequence[Comparison]) -> list[Mistake]:

@@ -93,10 +93,10 @@ def read_log(paths: Sequence[Path], drive: DriveFile) -> DriveLog:
         signals["direction"] = np.where(np.abs(way) == 1.0, way, 0.0)  # between two gears it says nothing
     if drive.unsigned_wheels:
         signals |= signed_wheels(signals)
-    check_plausible(drive, signals, reference, {name: path.name for name, path in files.items()})
-    unit = {name: signals[name] for name in (*PULLS, *RATES) if name in signals}
+    unit, read = {name: signals[name] for name in (*PULLS, *RATES) if name in signals}, signals
     signals = centred_signals(signals, drive.mounting.inertial, drive.sample_time)
     reference = centred_reference(reference, signals, drive.mounting.reference)
+    check_plausible(drive, read, reference, {name: path.name for name, path in files.items()})
     missing = {name: int(np.count_nonzero(np.isnan(value))) for name, value in {**reference, **signals}.items()}
     report["grid"] = {
         "samples": int(grid.size), "sample_time_s": drive.sample_time, "start_s": float(grid[0]),

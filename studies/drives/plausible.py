@@ -74,10 +74,10 @@ def _check_size(drive: DriveFile, files: Mapping[str, str], name: str, value: Fl
     factor = partial(column.factor_of, si_unit=si, radius=drive.vehicle.radius_for(name))
     given = factor(column.unit)
     fitting = [f'unit = "{unit}"' for unit in limit.units if high * factor(unit) / given <= limit.largest]
-    other = "" if name != "steering" else "; or it is the angle of the steering wheel: then name it hand_wheel"
+    turns = ", as a steering wheel does (name it hand_wheel then)" if name == "steering" else ""
     raise LogError(
         f"{_place(drive, files, f'signals.{name}', column)} in {column.unit} reaches {size.max():.4g} {si}, and more than "
-        f"{limit.largest:g} {si} too often to be spikes; {_remedy(fitting, column)}{other}"
+        f"{limit.largest:g} {si} too often to be spikes{turns}; {_remedy(fitting, column)}"
     )
 
 

@@ -79,6 +79,10 @@ def corner_inputs_of(log: DriveLog, drive: DriveFile) -> CornerInputs:
     ax, ay = log.signals["ax"], measured("ay", "lateral acceleration")
     yaw_rate, vy = measured("yaw_rate", "yaw rate"), measured("vy", "lateral velocity")
     steer = _steer(log, drive, assumptions)
+    if drive.unsigned_wheels and (log.signals.get("direction", 0.0 * log.time) == 0.0).any():
+        assumptions.append(
+            "mean wheel speed is forward where no gear tells the way; the pipeline has it from the accelerometer"
+        )
     wheel_acceleration = rate(wheel_speed)
     load = vertical_loads(car.parameters, ax, ay)
     force, sources = _forces(log, drive, wheel_speed, wheel_acceleration, load, radius)

@@ -94,7 +94,7 @@ def check_drive(logs: Sequence[Path], drive: Path) -> FrameReport:
     """
     description = read_drive(drive)
     log = read_log(logs, description)
-    return check_frames(log.signals, description, log.files)
+    return check_frames(log.signals, description, log.files, log.reference)
 
 
 def replay_drive(

@@ -327,7 +327,7 @@ def test_no_false_alarm_on_slippery_roads(tmp_path: Path, driven: Measured, run_
         log, file = write_truth_drive(tmp_path, driven, seed=seed, run=run_)
         drive = read_drive(file)
         found = read_log([log], drive)
-        assert check_frames(found.signals, drive, found.files).complaint is None
+        assert check_frames(found.signals, drive, found.files, found.reference).complaint is None
         for start in range(0, 1000, 250):  # and 2.5 s of it, which may show nothing but a slide
             part = {name: value[start : start + 500] for name, value in found.signals.items()}
             assert check_frames(part, drive, found.files).complaint is None, start
@@ -341,7 +341,7 @@ def test_no_false_alarm_on_slippery_roads(tmp_path: Path, driven: Measured, run_
 def test_no_false_alarm_on_recorded_and_foreign_drives(path: Path) -> None:
     drive = read_drive(path)
     found = read_log([DATA], drive)
-    assert check_frames(found.signals, drive, found.files).complaint is None
+    assert check_frames(found.signals, drive, found.files, found.reference).complaint is None
     wrong = found.signals | {"ax": -found.signals["ax"], "yaw_rate": -found.signals["yaw_rate"]}
     assert check_frames(wrong, drive, found.files).complaint is not None
 
