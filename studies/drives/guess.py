@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from estimators.arrays import FloatArray
 from studies.drives.columns import LogFile
 from studies.drives.formats import name_columns, read_table
 from studies.drives.guess_names import Guess, guess_column
+from studies.drives.guess_units import units_together
 from studies.drives.quantities import SIGNALS, factor_to, short
 from studies.drives.sniff import sniff
 from studies.errors import LogError
@@ -45,6 +47,12 @@ class _Found:
     rate: float
     start: float
     remarks: list[str] = field(default_factory=list)
+
+    @cached_property
+    def likely(self) -> dict[str, str]:
+        """Units by kind, where the columns show them together."""
+        known = {one.name: (self.values[name], one.unit) for name, one in self.guesses.items() if name in self.values}
+        return units_together(known, self.rate)
 
 
 @dataclass(frozen=True)
@@ -189,6 +197,7 @@ def _unit(file: _Found, column: str) -> tuple[str, str, str]:
         "steering": "deg" if high > 1.3 else "rad", "hand_wheel": "deg" if high > 15.0 else "rad",
         **dict.fromkeys(("ax", "ay", "az"), "g" if in_g else "m/s^2"), "vx": "km/h" if high > 90.0 else "m/s",
         "vy": "m/s",
+        **file.likely,
     }.get(kind, "deg/s" if high > 3.0 else "rad/s")  # fmt: skip
     return unit, sign, "unit and order of the wheels are guesses" if order else "the unit is a guess"
 

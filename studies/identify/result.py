@@ -181,7 +181,7 @@ class MountingFile(StrictTable):
 
 def mounting_file(found: Identification) -> str:
     """The table `[mounting.inertial]` of a drive file: what was identified, and what the drive file had besides."""
-    lines = [f"# {', '.join(found.logs)}: into the drive file", "[mounting.inertial]"]
+    lines = [f"# {', '.join(found.logs)}: into the drive file, for its mounting.inertial", "[mounting.inertial]"]
     for name, entry in mounting_parameters(found).items():
         if entry.interval is not None:
             lines.append(

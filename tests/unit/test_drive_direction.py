@@ -117,3 +117,12 @@ def test_readings_of_a_gear() -> None:
 def test_a_gear_that_means_nothing_is_refused(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(SpecError, match=message):
         read_drive(write_drive(tmp_path, text))
+
+
+def test_what_the_mean_of_the_wheels_cannot_know_is_said(tmp_path: Path) -> None:
+    log = write_table(tmp_path / "log.csv", reversing())
+    said = "mean wheel speed is forward where no gear tells the way; the pipeline has it from the accelerometer"
+    assert said in replay_drive([log], write_drive(tmp_path, UNSIGNED + ALONE)).inputs.assumptions
+    always = reversing() | {"gear": np.full(801, 7.0)}
+    log = write_table(tmp_path / "log.csv", always)
+    assert said not in replay_drive([log], write_drive(tmp_path, UNSIGNED + GEAR + ALONE)).inputs.assumptions

@@ -100,6 +100,7 @@ REFUSALS = [
     (edited('rate = "200 Hz"\n', ""), 'log[0].rate: missing; add it, such as rate = "200 Hz"'),
     (edited('sample_time = "5 ms"\n', ""), 'sample_time: missing; add it, such as sample_time = "5 ms"'),
     (edited('[schedules]\nlongitudinal = "schedule.json"\n', '[estimators]\ncorner_velocity = "lpv"\n'), "schedules: missing, but estimators.corner_velocity = 'lpv' runs on gain schedules; add a table [schedules] with longitudinal = \"corner-estimation-longitudinal\""),
+    (edited('[schedules]\nlongitudinal = "schedule.json"\n', '[estimators]\ncorner_velocity = "kalman-two-state"\n'), "schedules: missing, but estimators.corner_velocity = 'kalman-two-state' has its tire from a gain schedule; add a table [schedules] with longitudinal = \"corner-estimation-longitudinal\""),
     (edited('[schedules]\nlongitudinal = "schedule.json"\n', '[estimators]\nvelocity = "corners"\n'), "schedules: missing, but estimators.velocity = 'corners' runs on gain schedules; add a table [schedules] with longitudinal = \"corner-estimation-longitudinal\""),
     (edited('name = "closed form"', "name = 5"), 'name: 5 is not text; write it in quotes, such as "brake test"'),
     (edited('name = "closed form"', 'name = ""'), 'name: is empty; write at least one character, such as "brake test"'),

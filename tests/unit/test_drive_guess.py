@@ -165,6 +165,33 @@ def test_what_a_logger_says_of_itself_may_hold_numbers(tmp_path: Path) -> None:
     assert read_back([log], target).time.size == 3999
 
 
+@pytest.mark.parametrize("speed", ["m/s", "km/h", "mph"])
+@pytest.mark.parametrize("pull", ["m/s^2", "g"])
+def test_units_of_speed_and_acceleration_are_found_together(tmp_path: Path, speed: str, pull: str) -> None:
+    """No name says a unit, and no a_z how large g is; wheels that read like the car are in its unit."""
+    factors = {"m/s": 1.0, "km/h": 3.6, "mph": 1.0 / 0.44704, "m/s^2": 1.0, "g": 1.0 / 9.80665}
+    table = turning()
+    del table["az"]
+    table |= {"v": factors[speed] * table["v"]} | {name: factors[pull] * table[name] for name in ("ax", "ay")}
+    table |= {name: 0.33 * factors[speed] * table[name] for name in table if name.startswith("w_")}
+    log = write_table(tmp_path / "log.csv", table)
+    target, guessed = write_guess([log], None)
+    for name, unit in (("vx", speed), ("wheel_speed_rr", speed), ("ax", pull), ("ay", pull)):
+        line = next(line for line in guessed.text.splitlines() if line.startswith(f"{name} ="))
+        assert f'unit = "{unit}" }} # CHECK' in line
+    assert read_back([log], target).time.size == 3999
+
+
+def test_units_are_not_found_together_where_nothing_changes(tmp_path: Path) -> None:
+    """Negative control: 80 km/h all the time is 80 m/s to whoever sees no more; angular wheel speeds stay what they are."""
+    table = turning()
+    steady = table | {"v": np.full(2000, 80.0), "ax": table["ax"] - 2.1 * np.cos(0.6 * table["t"])}
+    text = guess([write_table(tmp_path / "log.csv", steady)]).text
+    assert 'vx = { column = "v", unit = "m/s" }' in text
+    assert 'column = "w_fl", unit = "rad/s"' in text
+    assert 'column = "w_fl", unit = "rad/s"' in guess([write_table(tmp_path / "log.csv", table)]).text
+
+
 def test_columns_that_were_taken_for_nothing_are_listed(tmp_path: Path) -> None:
     table = turning(2.0) | {"engine": np.zeros(200)} | {f"cov[{k}]": np.zeros(200) for k in range(3)}
     log = write_table(tmp_path / "log.csv", table)
@@ -210,6 +237,7 @@ def test_a_slow_log_with_other_wheels_says_how_to_get_schedules(tmp_path: Path) 
 @pytest.mark.parametrize(("lift", "unit"), [(1.0, "g"), (9.81, "m/s^2")])
 def test_one_unit_of_accelerometers_as_gravity_shows_it(tmp_path: Path, lift: float, unit: str) -> None:
     table = turning()
+    del table["v"]  # it would say that ax alone is in m/s^2
     log = write_table(tmp_path / "log.csv", table | {"az": table["az"] * lift / 9.81})
     _, guessed = write_guess([log], None)
     for name in ("ax", "ay", "az"):
