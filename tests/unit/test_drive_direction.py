@@ -41,13 +41,13 @@ def reversing(seconds: float = 8.0) -> dict[str, Any]:
     return table | {name: left if name.endswith("l") else right for name in WHEELS}
 
 
-def parked(signed: bool) -> dict[str, Any]:
+def parked(signed: bool, way: float = -1.0) -> dict[str, Any]:
     """A drive that ends two metres backward into a gap: 20 s forward to 10 m/s, a stop, 4 s backward at up to 1.2 m/s."""
     t = np.arange(2600) / 100
     v = np.where(t < 20.0, 5.0 * (1.0 - np.cos(2.0 * np.pi * t / 20.0)), 0.0)
-    v = np.where((t > 21.0) & (t < 25.0), -0.6 * (1.0 - np.cos(2.0 * np.pi * (t - 21.0) / 4.0)), v)
+    v = np.where((t > 21.0) & (t < 25.0), 0.6 * way * (1.0 - np.cos(2.0 * np.pi * (t - 21.0) / 4.0)), v)
     noise = np.random.default_rng(1).normal(0.0, 0.05, t.size)
-    table = {"t": t, "v": v, "ax": np.gradient(v, t) + noise, "ay": 0.0 * t, "r": 0.0 * t}
+    table = {"t": t, "v": v, "ax": np.gradient(v, t) + noise, "ay": 0.0 * t, "r": 0.0 * t, "gear": 1.0 + 0.0 * t}
     return table | dict.fromkeys(WHEELS, (v if signed else np.abs(v)) / EFFECTIVE_RADIUS)
 
 
@@ -96,7 +96,15 @@ def test_a_few_metres_backward_that_read_as_forward_are_found_in_a_long_drive(tm
     assert "from 21.7 to 24.3 s, ax over the slope of the wheel speed is -" in said
     assert "likely unsigned_wheels = true at the top" in said
     assert len(said) <= 300
-    for table, text in ((parked(signed=True), ALONE), (parked(signed=False), UNSIGNED + ALONE)):
+    creeps = parked(signed=False, way=0.3)  # too little to tell anything
+    rolls_back = UNSIGNED + GEAR + ALONE  # in a forward gear
+    right = [
+        (parked(True), ALONE),
+        (parked(False), UNSIGNED + ALONE),
+        (parked(False), rolls_back),
+        (parked(False, 1.0), ALONE),
+    ]
+    for table, text in [*right, (creeps, ALONE)]:
         assert looked(tmp_path, text, table) is None
 
 

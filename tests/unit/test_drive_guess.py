@@ -192,6 +192,15 @@ def test_units_are_not_found_together_where_nothing_changes(tmp_path: Path) -> N
     assert 'column = "w_fl", unit = "rad/s"' in guess([write_table(tmp_path / "log.csv", table)]).text
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_units_are_not_found_together_in_noise(tmp_path: Path, seed: int) -> None:
+    """An accelerometer that follows nothing, of the size that km/h would have."""
+    table, noise = turning(), np.random.default_rng(seed).normal(0.0, 1.0, 2000)
+    felt = np.convolve(noise, np.full(100, 0.01), "valid")
+    table["ax"] = noise * np.std(table["v"][100:] - table["v"][:-100]) / (3.6 * np.std(felt))
+    assert 'vx = { column = "v", unit = "m/s" }' in guess([write_table(tmp_path / "log.csv", table)]).text
+
+
 def test_columns_that_were_taken_for_nothing_are_listed(tmp_path: Path) -> None:
     table = turning(2.0) | {"engine": np.zeros(200)} | {f"cov[{k}]": np.zeros(200) for k in range(3)}
     log = write_table(tmp_path / "log.csv", table)

@@ -85,10 +85,11 @@ def test_a_car_that_rolls_back_in_a_forward_gear_is_not_sure_of_its_way() -> Non
     assert certain[700:].max() < 0.3  # where gear and accelerometer agree, nothing is open
 
 
-def test_a_lever_moved_while_the_car_still_rolls_is_for_the_way_after_the_stop() -> None:
+@pytest.mark.parametrize("moved", [250, 500])  # at 1.25 m/s, and at the stop, where the wheels give no pulses for 0.6 s
+def test_a_lever_moved_while_the_car_still_rolls_is_for_the_way_after_the_stop(moved: int) -> None:
     pull = np.concatenate([np.zeros(200), np.full(500, -1.0), np.zeros(100)])
     truth = noisy(straight(pull, 1.5), 7)
-    error, deviation = driven(truth, np.where(np.arange(800) < 250, 1.0, -1.0))
+    error, deviation = driven(truth, np.where(np.arange(800) < moved, 1.0, -1.0))
     assert np.abs(error)[20:].max() < 0.5
     assert np.abs(error[truth.vx > 0.4][20:]).max() < 0.2
     assert np.abs(error[truth.vx < -0.4]).max() < 0.2
