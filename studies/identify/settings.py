@@ -14,9 +14,7 @@ class IdentifySettings:
 
     filter_lag: float = 0.02  # s, 8 Hz: above what a driver and a brake valve do, below the noise of a derivative
     slow_lag: float = 0.05  # s, 3 Hz: a car turns slower, and noise of a yaw acceleration would pull at its coefficient
-    mounting_lag: float = (
-        0.12  # s, 1.3 Hz: where a body on its springs still follows; noise of gyros in w' falls as lag^-1.5
-    )
+    mounting_lag: float = 0.12  # s, 1.3 Hz: a body on its springs still follows; noise of w' falls as lag^-1.5
     settling: float = 8.0  # filter lags until a bad sample is forgotten: (1 + 8) exp(-8) = 3e-3 of it is left
     least_speed: float = 0.75  # m/s: below it a ring of 48 teeth gives less than one pulse in two filter lags
     least_seconds: float = 1.0  # s of usable driving: a hundred relaxation times at 12 m/s
