@@ -86,7 +86,9 @@ def test_healthy_tires_are_not_named_in_bends_nor_where_an_axle_pulls() -> None:
 def test_what_slip_and_load_leave_open_is_in_the_deviation() -> None:
     speed = np.array([25.0, 25.0])
     free = Drive(speed).on(10.0, FREE).deviation.max()
-    assert Drive(speed).on(10.0, FREE, np.array([0.0, 0.0, 0.2, 0.2])).deviation.min() > 1.3 * free
+    driven = Drive(speed).on(10.0, FREE, np.array([0.0, 0.0, 0.2, 0.2]))
+    assert driven.deviation.min() > 2.4 * free
+    assert np.abs(driven.change).max() < 0.0005  # slip as it is expected is taken off: 0.0016
     assert Drive(speed, 3.0).on(10.0, FREE).deviation.min() > 1.3 * free
 
 
