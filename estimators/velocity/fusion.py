@@ -20,6 +20,7 @@ from estimators.velocity.fusion_inputs import ConditionedInputs, FusionInputs
 from estimators.velocity.fusion_settings import FusionSettings
 from estimators.velocity.fusion_step import FusionStep, Outcome, fusion_step
 from estimators.velocity.signal_monitor import SignalMonitor
+from estimators.velocity.soft_tire_monitor import SoftTireMonitor
 from estimators.velocity.zero_velocity import ZeroVelocityDetector
 
 _MISSING_INPUT, _RESET, _GATED = int(Flag.MISSING_INPUT), int(Flag.RESET), int(Flag.GATED)
@@ -59,7 +60,7 @@ class VelocityFusion(Memory):
     memory = ("new", "renewed", "start")
     parts = (
         "_along", "_across", "inputs", "longitudinal_filter", "lateral_filter", "signal_monitor",
-        "longitudinal_reset", "lateral_reset", "zero_velocity",
+        "longitudinal_reset", "lateral_reset", "zero_velocity", "soft_tire_monitor",
     )  # fmt: skip
     unknowns = ("start",)
     uses_gravity = True  # `step` takes it
@@ -89,6 +90,7 @@ class VelocityFusion(Memory):
         self.longitudinal_reset = LongitudinalReset(self.settings, count)
         self.lateral_reset = LateralReset(self.settings, self._across, count)
         self.zero_velocity = ZeroVelocityDetector(self.settings, self._along, self._across, count)
+        self.soft_tire_monitor = SoftTireMonitor(self.settings, self._along, self._across, count)
         self.new: Number = kit.full(True)  # waits for a first wheel speed
         self.renewed: Number = kit.full(False)
         self.start: Signals = kit.stacked([kit.full(math.nan)] * 2)  # V_x, V_y asked for by `reset`
@@ -154,13 +156,13 @@ class VelocityFusion(Memory):
         course = longitudinal.WheelMotion._make((*kit.each(moves, seen.steer, *self._places), across.wheel_bend))
         slipping = self.inputs.slipping(course.acceleration, seen.fresh, dt, doubt[0])
         wheel = along.correct(dt, seen, slipping, mu, felt / GRAVITY, unsure, course, blind)
+        self.soft_tire_monitor(dt, seen, course, mu, felt / GRAVITY, unsure, turn, slipping, blind)
         standing, lost = self.zero_velocity(seen, a, b, turn, dt)
         lost = lost | self.longitudinal_reset(dt, standing, seen, wheel, slipping, mu, self._radius)
         along.zero_velocity_update(standing)
         front, rear = (slipping[i] | slipping[i + 1] | wheel.gated[i] | wheel.gated[i + 1] for i in (0, 2))
-        known = kit.no(unknown)
         # wheels that slide sideways do not turn, and have no slip angle; no road is so slippery that the car feels nothing
-        calm, silent = across.friction(b) < self.settings.unloaded, seen.silent
+        known, calm, silent = kit.no(unknown), across.friction(b) < self.settings.unloaded, seen.silent
         front_rolls, rear_rolls = (calm | kit.no(silent[i] & silent[i + 1]) for i in (0, 2))
         rolling = (known & seen.steered & front_rolls & kit.no(front), known & rear_rolls & kit.no(rear))
         # one that repeats itself is believed where the rear axle can contradict it
