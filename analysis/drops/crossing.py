@@ -22,7 +22,8 @@ def largest_real(K: FloatArray, condition: FloatArray) -> tuple[FloatArray, Bool
     identity = np.eye(K.shape[-1])
     single = (np.linalg.slogdet(vectors)[0] != 0.0)[..., None]
     back = np.linalg.inv(np.where(single[..., None], vectors, identity))
-    steep = np.where(single, np.linalg.norm(back, axis=-1), np.inf)
+    with np.errstate(over="ignore"):  # vectors that are nearly parallel: infinite is what it is then
+        steep = np.where(single, np.linalg.norm(back, axis=-1), np.inf)
     size = np.linalg.norm(K, axis=(-2, -1)) * (1.0 + condition / 8.0)
     moved = len(identity) * np.finfo(float).eps * size[..., None] * steep
     real = np.abs(mu.imag) <= REAL * np.abs(mu)

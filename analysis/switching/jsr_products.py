@@ -43,9 +43,14 @@ def search_products(modes: FloatArray, tolerance: float, depth: int) -> Search:
         words = np.concatenate([np.repeat(words[keep], len(modes), axis=0), letters], axis=1)
         found = _fastest(products, length, rate)
         if found is not None:
-            word, rate = tuple(int(i) for i in words[found[0]]), found[1]
+            word, rate = _first_rotation([int(i) for i in words[found[0]]]), found[1]
         bound = np.minimum(np.repeat(bound[keep], len(modes)), _rates(products, length, rate * (1.0 + tolerance)))
     return Search(word, rate, depth)
+
+
+def _first_rotation(word: list[int]) -> tuple[int, ...]:
+    """Rotations have the same eigenvalues but for rounding, which must not choose among them."""
+    return min(tuple(word[k:] + word[:k]) for k in range(len(word)))
 
 
 def _fastest(products: FloatArray, length: int, rate: float) -> tuple[int, float] | None:

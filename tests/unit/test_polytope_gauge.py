@@ -51,7 +51,7 @@ def test_a_bound_from_a_polytope_is_never_below_the_radius() -> None:
 def test_five_states_and_four_modes_close() -> None:
     family = np.random.default_rng(7).normal(size=(4, 5, 5))
     found = joint_spectral_radius(family)
-    assert found.closed and found.proof == "polytope" and found.product == (3, 1)
+    assert found.closed and found.proof == "polytope" and found.product == (1, 3)
     rate = np.abs(np.linalg.eigvals(family[1] @ family[3])).max() ** 0.5
     assert rate * (1.0 - 1e-12) <= found.upper <= rate * (1.0 + 1.1e-4)
     assert found.vertices is not None
