@@ -30,7 +30,6 @@ MISALIGNED = 0.005
 """rad, of the axes of the unit: a turn at r adds this much of r to both rates."""
 LEVEL = (0.01, 0.02)
 """rad, standard deviations of bank and grade of a road before anything is known of it."""
-_SLIDE = 0.8 / GRAVITY  # rad: V_y' of a slide that lasts, 0.8 m/s^2; no body leans as far beside its gyros
 _SURE = 2.0  # deviations by which accelerometers may differ before the deviation grows with them
 
 
@@ -64,13 +63,9 @@ class AttitudeObserver(Renewable):
     frequency. The error obeys tau e'' + e' + L e = 0; the default L = 1/(2 tau) damps it with 0.71. A gyro bias b
     leaves the error b/L. (P2 gives no gains; the yaw rate turns a sloping car's roll into pitch, and is left out if not given.)
 
-    A slide has a V_y' that nothing measures, and that reads like roll. Where one is known of (`sliding`) a low-passed difference
-    e counts as roll by 1/(1 + (e^2/(e_s^2 + sigma^2))^2), e_s = 0.8 m/s^2/g: short slides change little, in long ones the gyros
-    carry roll, until what their bias may have added reaches e.
-
     Deviations are those of errors that last, as the first-order error obeys them: with the share u of the accelerometers,
     u' = L (1 - u), and the drift d' = bias + misalignment |r| - L d of the gyros, sigma^2 = (b_a u/g)^2 + (level (1-u))^2 + d^2;
-    a difference above 2 sigma that is no slide is an error of either, and its excess counts.
+    a difference above 2 sigma is an error of either, and its excess counts.
 
     Without the motion of the car (None or missing) the gyros alone carry the angles; without gyros the accelerometers
     alone. Grade and bank of the road are inputs: the body's angle is the total one minus them.
@@ -91,7 +86,6 @@ class AttitudeObserver(Renewable):
     """
 
     memory = ("angle", "lagged", "share", "drift", "yaw_rate", "road", "renewed")
-    uses_sliding = True  # `step` takes it
 
     def __init__(
         self,
@@ -110,7 +104,6 @@ class AttitudeObserver(Renewable):
         self.lagged: Signals = kit.stacked([kit.full(0.0)] * 2)  # F(s) (stationary - estimate)
         self.share: Signals = kit.stacked([kit.full(0.0)] * 2)  # of the accelerometers in the angles
         self.drift: Signals = kit.stacked([kit.full(0.0)] * 2)  # deviation of what the gyros have added, rad
-        self._still = kit.full(False)
         self.yaw_rate: Number = kit.full(0.0)  # the last known ones
         self.road: Signals = kit.stacked([kit.full(0.0)] * 2)  # bank and grade
 
@@ -129,7 +122,6 @@ class AttitudeObserver(Renewable):
         yaw_rate: npt.ArrayLike = 0.0,
         grade: npt.ArrayLike = 0.0,
         bank: npt.ArrayLike = 0.0,
-        sliding: npt.ArrayLike = False,
     ) -> AttitudeStep:
         """Takes one sample of the batch shape.
 
@@ -139,7 +131,6 @@ class AttitudeObserver(Renewable):
             motion_x, motion_y: m/s^2, V_x' - r V_y and V_y' + r V_x; None: not known.
             yaw_rate: rad/s.
             grade, bank: rad, of the road: theta_r (uphill positive) and phi_r (left side up).
-            sliding: bool, no axle tells V_y', which `motion_y` leaves out.
 
         Raises:
             EstimatorError: another shape, or not numbers.
@@ -164,12 +155,9 @@ class AttitudeObserver(Renewable):
         used = [abs(value) <= LIMIT for value in sines]
         roll, pitch = self.angle
         up = kit.sqrt(1.0 - kit.minimum(roll * roll + pitch * pitch, 1.0))
-        slides = kit.own(sliding) & known[0], self._still
         spins, unlike = (p * up - turn * pitch, turn * roll - q * up), GYRO_BIAS + MISALIGNED * abs(turn)
         states = self.angle, self.lagged, self.share, self.drift
-        moved = [
-            self._followed(unlike, *entry) for entry in zip(*states, LEVEL, spins, sines, used, slides, strict=True)
-        ]
+        moved = [self._followed(unlike, *entry) for entry in zip(*states, LEVEL, spins, sines, used, strict=True)]
         self.angle, self.lagged, self.share, self.drift, *sigma = (
             kit.stacked(values) for values in zip(*moved, strict=True)
         )
@@ -213,7 +201,6 @@ class AttitudeObserver(Renewable):
         spin: Number,
         sine: Number,
         used: Number,
-        slides: Number,
     ) -> tuple[Number, ...]:
         """Sine, lagged difference, share, drift and deviation of an angle, one sample on.
 
@@ -224,13 +211,10 @@ class AttitudeObserver(Renewable):
         stationary = kit.where(used, kit.minimum(kit.maximum(sine, -STEEPEST), STEEPEST), 0.0)
         lagged = self._keep * lagged + used * ((1.0 - self._keep) * (stationary - angle))
         felt, begun = ACCELERATION_BIAS / GRAVITY * share, level * (1.0 - share)
-        variance, square = felt * felt + begun * begun + drift * drift, lagged * lagged
-        far = slides * square / (_SLIDE * _SLIDE + variance)
-        gain = self.gain * used / (1.0 + far * far)
-        pull = gain * lagged
-        moved = angle + time * (spin + pull)
+        variance, gain = felt * felt + begun * begun + drift * drift, self.gain * used
+        moved = angle + time * (spin + gain * lagged)
         share = share + time * gain * (1.0 - share)
-        drift = drift + time * (unlike + slides * abs(pull) - gain * drift)
-        excess = kit.where(slides | kit.no(used), 0.0, kit.maximum(abs(lagged) - _SURE * kit.sqrt(variance), 0.0))
+        drift = drift + time * (unlike - gain * drift)
+        excess = used * kit.maximum(abs(lagged) - _SURE * kit.sqrt(variance), 0.0)
         sigma = kit.sqrt(variance + excess * excess)
         return kit.minimum(kit.maximum(moved, -STEEPEST), STEEPEST), lagged, share, kit.minimum(drift, STEEPEST), sigma

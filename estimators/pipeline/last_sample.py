@@ -15,11 +15,18 @@ from estimators.memory import Memory
 from estimators.pipeline.parts import AttitudePart
 from estimators.pipeline.signals import VehicleSignals
 from estimators.signals import limits
-from estimators.vehicle import GRAVITY
+from estimators.vehicle import GRAVITY, VehicleParameters
 
 SOFTEST = (0.07, 0.12)
 """rad per g: how far the softest body pitches and rolls, 4 and 7 degrees."""
 _LOADED = 0.02  # rad: passengers and load on one side
+_SLIDE = 0.4  # m/s^2 of V_y': more than a bias of a_y, 0.15, and errors of V_y make over `_LASTS`
+_LASTS = 1.0  # s
+_LED = 10.0  # s after which gyros alone say less of gravity than an accelerometer that is not believed
+_LIVE = 0.1  # s within which a reading changes
+_ROLLING = 0.01 * GRAVITY  # m/s^2, of tires on asphalt: c_rr is 0.008 to 0.013
+_DRAG = 0.5 * 1.2 * 0.7  # kg/m, of air by a passenger car: c_d A is 0.6 to 0.9 m^2
+_ROLLS = 1.0  # m/s, from which on a car rolls in one direction, whatever V_x is off by
 
 
 class LastSample(Memory):
@@ -28,11 +35,15 @@ class LastSample(Memory):
     A reading that the velocity part replaced is replaced everywhere: loads, forces and attitude take its word.
     """
 
-    memory = ("bias", "speed", "used", "inertial", "gravity", "drive", "slides", "heavy", "road")
-    unknowns = ("drive",)
+    memory = (
+        "bias", "speed", "used", "inertial", "gravity", "drive", "side", "gliding", "heavy", "road", "doubted", "same", "read",
+    )  # fmt: skip
+    unknowns = ("drive", "read")
 
-    def __init__(self, sample_time: float, batch_shape: tuple[int, ...]) -> None:
-        self.sample_time, self.batch_shape = sample_time, batch_shape
+    def __init__(self, vehicle: VehicleParameters, sample_time: float, batch_shape: tuple[int, ...]) -> None:
+        self.sample_time, self.batch_shape, self.mass = sample_time, batch_shape, vehicle.mass
+        # what F_x of wheels has too much that know of no rolling resistance
+        self._rolling = 0.0 if vehicle.rolling_resistance > 0.0 else _ROLLING
         self._kit = kit = arithmetic(batch_shape)
         self.bias: list[Number] = [kit.full(0.0)] * 2  # of a_x, a_y, m/s^2
         self.speed: list[Number] = [kit.full(0.0)] * 3  # V_x, V_y, r
@@ -41,8 +52,13 @@ class LastSample(Memory):
         self.gravity: Number = kit.full(0.0)  # in a_x, m/s^2, of what grade the attitude leaves
         self.heavy: Number = kit.full(0.0)  # in a_x, m/s^2, as the attitude says
         self.road: Number = kit.full(0.0)  # of this, what grade makes
-        self.slides: Number = kit.full(False)  # no axle tells V_y'
         self.drive: Number = kit.full(math.nan)  # V_x' - r V_y without gravity, m/s^2, where anything tells
+        self.side: Number = kit.full(0.0)  # r V_x, and V_y' of a slide, m/s^2
+        self.gliding: Number = kit.full(0.0)  # V_y', low-passed over `_LASTS`
+        self._keep = math.exp(-sample_time / _LASTS)
+        self.doubted: list[Number] = [kit.full(0.0)] * 2  # s for which a_x, a_y were not believed
+        self.same: list[Number] = [kit.full(0.0)] * 2  # s for which they have been the same
+        self.read: list[Number] = [kit.full(math.nan)] * 2  # and what they were
 
     def believed(self, *readings: Number) -> list[Number]:
         """Of a_x, a_y and r, as many as are given: what was not believed, replaced; what is missing stays so."""
@@ -53,34 +69,63 @@ class LastSample(Memory):
         ]
 
     def learn(self, moved: Any, force: Number, lost: Number) -> None:
-        """From the step of the velocity part; `force` m/s^2, the wheels' F_x over m, `lost` where one of them is not known."""
+        """From the step of the velocity part; `force` N, what the wheels pull along, `lost` where F_x of one is not known."""
         kit = self._kit
-        before, turn = self.speed[0], kit.own(moved.yaw_rate)
+        (ahead, left, _), turn = self.speed, kit.own(moved.yaw_rate)
         vx, vy = kit.own(moved.vx), kit.own(moved.vy)
         self.bias, self.speed = kit.rows(moved.sensor_bias, 3)[:2], [vx, vy, turn]
         if (used := getattr(moved, "inertial_used", None)) is not None:
             self.used, self.inertial = kit.rows(used, 3), kit.rows(moved.inertial, 3)
             self.gravity = kit.own(moved.gravity[..., 0])
-        if (axles := getattr(moved, "axle_used", None)) is not None:
-            front, rear = kit.rows(axles, 2)
-            self.slides = kit.no(front | rear)
+            self.doubted = [
+                kit.where(good, 0.0, time + self.sample_time)
+                for good, time in zip(self.used[:2], self.doubted, strict=True)
+            ]
         # Without torques, or on a slope, which the forces carry, what the wheels hold V_x to: slower, but no more in a loop with
         # gravity than they are.
         started = ((kit.own(moved.flags) & int(Flag.RESET)) != 0) | kit.own(moved.standing)
-        gained = kit.where(started, math.nan, (vx - before) / self.sample_time - turn * vy)
-        self.drive = kit.where(lost | (abs(self.road) > GRAVITY * _LOADED), gained, force)
+        gained = kit.where(started, math.nan, (vx - ahead) / self.sample_time - turn * vy)
+        rolling = kit.maximum(kit.minimum(vx / _ROLLS, 1.0), -1.0) * self._rolling
+        pulled = (force - _DRAG * vx * abs(vx)) / self.mass - rolling
+        self.drive = kit.where(lost | (abs(self.road) > GRAVITY * _LOADED), gained, pulled)
+        # A slide must not count as roll, and errors of V_y must, or nothing would lead roll and V_y back: V_y' belongs to
+        # the motion the more, the larger it is.
+        moved_left = kit.where(started, 0.0, (vy - left) / self.sample_time)
+        self.gliding = self._keep * self.gliding + (1.0 - self._keep) * moved_left
+        far = (self.gliding / _SLIDE) ** 4
+        self.side = turn * vx + moved_left * far / (1.0 + far)
 
     def forget(self, here: Number) -> None:
         """Starts the cars `here` afresh."""
         choose = self._kit.where
-        for name, start in (("bias", 0.0), ("speed", 0.0), ("used", True)):
+        for name, start in (("bias", 0.0), ("speed", 0.0), ("used", True), ("doubted", 0.0), ("same", 0.0)):
             setattr(self, name, [choose(here, start, value) for value in getattr(self, name)])
         self.gravity, self.heavy, self.road = (choose(here, 0.0, v) for v in (self.gravity, self.heavy, self.road))
-        self.drive, self.slides = choose(here, math.nan, self.drive), choose(here, False, self.slides)
+        self.drive, self.side = choose(here, math.nan, self.drive), choose(here, 0.0, self.side)
+        self.gliding = choose(here, 0.0, self.gliding)
 
     def pull(self, ax: Number) -> Number:
         """What `ax` says that V_x gains, m/s^2."""
         return ax - self.heavy - self.bias[0] - self.gravity
+
+    def _led(self, *readings: Number) -> list[Number]:
+        """a_x and a_y as the attitude part is to have them.
+
+        A reading that is not believed says nothing of gravity: it would be taken for tilt, and agree. But a tilt that gyros alone
+        carry for long is off itself, contradicts every reading, and would keep it out for ever: then a live one leads again.
+        """
+        kit = self._kit
+        self.same = [
+            kit.where(new == old, time + self.sample_time, 0.0)
+            for new, old, time in zip(readings, self.read, self.same, strict=True)
+        ]
+        self.read = list(readings)
+        return [
+            kit.where(used | ((doubted > _LED) & (same < _LIVE)), value - bias, math.nan)
+            for used, doubted, same, value, bias in zip(
+                self.used[:2], self.doubted, self.same, readings, self.bias, strict=True
+            )
+        ]
 
     def tilted(
         self, attitude: AttitudePart | None, signals: VehicleSignals, ax: Number, ay: Number, turn: Number
@@ -94,18 +139,17 @@ class LastSample(Memory):
             """NaN for what is absent, and for what no sensor reads."""
             return math.nan if given is None else possible(kit, kit.car(given, shape, name), limit)
 
-        more = {"sliding": self.slides} if getattr(attitude, "uses_sliding", False) else {}
+        lead_x, lead_y = self._led(ax, ay)
         tilt = attitude.step(
             read(signals.roll_rate, "roll_rate", limits.YAW_RATE),
             read(signals.pitch_rate, "pitch_rate", limits.YAW_RATE),
-            kit.where(self.used[0], ax - self.bias[0], math.nan),
-            kit.where(self.used[1], ay - self.bias[1], math.nan),
+            lead_x,
+            lead_y,
             motion_x=self.drive,
-            motion_y=self.speed[2] * self.speed[0],
+            motion_y=self.side,
             yaw_rate=kit.where(self.used[2], turn, self.inertial[2]),
             grade=read(signals.grade, "grade", limits.ANGLE),
             bank=read(signals.bank, "bank", limits.ANGLE),
-            **more,
         )
         up = read(signals.az, "az", limits.ACCELERATION)
         up = kit.where(abs(up) < math.inf, up, GRAVITY)

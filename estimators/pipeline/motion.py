@@ -59,7 +59,7 @@ class CarMotion(Memory):
         self.loads, self.velocity, self.attitude = loads, velocity, attitude
         self.checks = CrossChecks(vehicle, sample_time, batch_shape, repeat_time=repeat_time)
         self.direction = DirectionOfTravel(vehicle, sample_time, batch_shape) if unsigned_wheels else None
-        self.last = LastSample(sample_time, batch_shape)
+        self.last = LastSample(vehicle, sample_time, batch_shape)
         named = ("loads", "velocity", "attitude", "checks", "last", "direction")
         self.parts = tuple(name for name in named if hasattr(getattr(self, name), "save"))
         self._takes_gravity = bool(getattr(velocity, "uses_gravity", False))
@@ -132,7 +132,7 @@ class CarMotion(Memory):
         kit, last, forces, moved = self._kit, self.last, self._forces, self._moved
         consistency = self.checks(forces, self._before.loads, moved, corner_speed, self._given[-1].az)
         self.front = forces.front
-        last.learn(moved, forces.push / self.vehicle.mass, forces.unknown)
+        last.learn(moved, forces.push - forces.front * kit.sin(self.angle), forces.unknown)
         vx, vy, _ = last.speed
         return consistency, kit.atan(vy / kit.maximum(abs(vx), LEAST_SPEED))
 

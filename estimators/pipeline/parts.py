@@ -60,7 +60,7 @@ class AttitudePart(Protocol):
         grade: npt.ArrayLike = 0.0,
         bank: npt.ArrayLike = 0.0,
     ) -> AttitudeStep:
-        """One sample: rad/s, m/s^2, rad; with `uses_sliding`, `sliding`, too, as `AttitudeObserver.step` takes it."""
+        """One sample: rad/s, m/s^2, rad; as `AttitudeObserver.step` takes it."""
 
 
 class LateralForcePart(Protocol):

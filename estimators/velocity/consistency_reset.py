@@ -5,7 +5,8 @@
 They differ in what the wheels do. Wheels that roll agree with each other, gain the speed that the accelerometer says, and
 need no force; a wheel that slips far carries the friction of the road, on the side to which it slips. So an estimate is
 lost when, for `lost_time`, all wheels that turn (two at least) are gated, agree within `agreement`, none leaves the car,
-and their distance from the prediction, which integrates the accelerometer, changes by no more than `rolling` allows. Once
+and their distance from the prediction, which integrates the accelerometer, changes by no more than `rolling` allows (wheels
+that carry no force, up to `unloaded`, roll whatever the accelerometer says, or the gravity that is taken off it). Once
 standstill or wheels that turn have supported the estimate for as long, the clock runs at a tenth while the force could
 explain the side to which they are off (beyond `unloaded`): four wheels may well slip together, but they had grip before.
 
@@ -69,7 +70,7 @@ class LongitudinalReset(CarsMemory):
             self.contradicted, self.split = choose(news, 0.0, self.contradicted), kit.full(0.0)
             return kit.full(False)
         turning, support, dissent = 0, 0, kit.full(False)
-        low, high, force, surface, gap = _FAR, -_FAR, 0.0, 0.0, 0.0
+        low, high, force, most, surface, gap = _FAR, -_FAR, 0.0, 0.0, 0.0, 0.0
         outputs = (
             seen.fresh,
             seen.silent,
@@ -85,15 +86,15 @@ class LongitudinalReset(CarsMemory):
             turns = fresh & no(silent)
             turning = turning + choose(turns, 1, 0)
             support = support + choose(silent & no(far), 1, 0)
-            dissent = dissent | (turns & (slips | no(far)))
+            dissent = dissent | (turns & ((slips & (abs(own) > s.unloaded)) | no(far)))
             low, high = choose(turns, kit.minimum(low, off), low), choose(turns, kit.maximum(high, off), high)
-            force = force + choose(turns, own, 0.0)
+            force, most = force + choose(turns, own, 0.0), kit.maximum(most, choose(turns, abs(own), 0.0))
             surface = kit.maximum(surface, choose(turns, R * abs(w), 0.0))
             gap = kit.maximum(gap, choose(turns, age, 0.0))
         off, gap, begins = 0.5 * (high + low), kit.minimum(gap, s.error_memory), self.contradicted == 0.0
         apart, since = choose(begins, off, self.apart), choose(begins, 0.0, self.since) + gap
         rolls = high - low <= s.agreement * surface + s.dead_speed
-        rolls = rolls & (abs(off - apart) <= s.dead_speed + s.rolling * since)
+        rolls = rolls & ((most < s.unloaded) | (abs(off - apart) <= s.dead_speed + s.rolling * since))
         explained = (force * kit.sign(off) > s.unloaded * turning) & (self.supported >= s.lost_time)
         time = self.contradicted + gap * choose(explained, _PATIENCE, 1.0)
         against = (turning >= 2) & no(dissent)

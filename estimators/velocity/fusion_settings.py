@@ -70,6 +70,7 @@ class FusionSettings:
     side_memory: float = 300.0  # s
     side_floor: float = 0.002  # rad, 0.1 deg: toe and linkage
     side_linear: float = 0.02  # relative error of the slip angle
+    relaxation_length: float = 0.3  # m of road within which a tire's side force follows its slip: 0.2 to 0.5
     side_excess_memory: float = 0.5  # s over which an axle shows that it slips further than its curve
     side_speed_spread: float = 2.0  # stated deviations by which V_y may be off as long: curves of tires differ
     side_speed_memory: float = 2.0  # s: how long an error of V_y stays the same, one turn

@@ -1,12 +1,13 @@
 """Lateral half of the fusion: V_y from the kinematics, held in place by what the two axles must slip to carry the car.
 
     dV_y/dt = a (1 - s) - b - g - V_x (r_m (1 - s_t) - b_r)                          P1 notes 5, with sensor errors
-    0 = V_y + L_f r - V_x tan(delta) + |V_x| alpha_f(mu_f),   0 = V_y - L_r r + |V_x| alpha_r(mu_r)
+    0 = V_y + L_f r - V_x tan(delta) + |V_x| alpha_f + l alpha_f',   0 = V_y - L_r r + |V_x| alpha_r + l alpha_r'
     alpha(mu) = c_1 mu + c_3 mu^3,   mu_f = (m a L_r + I_z r')/(L F_zf),   mu_r = (m a L_f - I_z r')/(L F_zr)
 
 A single-track car whose side slip follows its forces, with stiffnesses that adapt (P5 adapts one number per axle): no
 friction coefficient enters. alpha is positive where F_y is (P4, P5), the opposite of P1. The accelerometer feels forces
-alone, so mu needs no bank.
+alone, so mu needs no bank. The force of a tire follows its slip over l, `relaxation_length`: slip is ahead of alpha(mu), in a
+slalom by a third of V_y. alpha' is that of the forces, low-passed over `wheel_lag`.
 
 Every axle on one road: where one is further off than its model explains, or the two differ, which no V_y explains, neither is
 believed more than that (half the difference), for a second (`axle_error`), even where the steering is not believed. Such an
@@ -27,6 +28,7 @@ what it leaves in a wanders with their errors: b, s and s_t forget within `level
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -59,7 +61,8 @@ class AxleUpdate(NamedTuple):
 class LateralFusion(CarsMemory):
     """V_y filter of `count` cars."""
 
-    memory = ("axle_error", "lasting_error", "bend", "apart", "excess")
+    memory = ("axle_error", "lasting_error", "bend", "apart", "excess", "lagged")
+    unknowns = ("lagged",)
 
     def __init__(self, vehicle: VehicleParameters, settings: FusionSettings, every: int, count: int) -> None:
         s = self.settings = settings
@@ -78,6 +81,7 @@ class LateralFusion(CarsMemory):
         self.bend: Signals = self.kit.stacked([self.kit.full(0.0)] * 2)  # side slip per F_y/F_z beyond c_1, rad
         self.apart: Number = self.kit.full(0.0)  # m/s between what the axles say of V_y, low-passed
         self.excess: Signals = self.kit.stacked([self.kit.full(0.0)] * 2)  # m/s, slip beyond alpha(mu), low-passed
+        self.lagged: Signals = self.kit.stacked([self.kit.full(math.nan)] * 2)  # rad, alpha(mu) low-passed
         self._both = self.kit.signals((1.0, 1.0))
         self._sensor = s.scale**2 / turn_scale  # share of the yaw rate sensor in s_t
         m, L, inertia = vehicle.mass, vehicle.wheelbase, vehicle.yaw_inertia
@@ -164,10 +168,12 @@ class LateralFusion(CarsMemory):
         sensed, one, gate = self._sensor * yaw_rate, kit.full(1.0), s.gate**2
         kept, sure = kit.exp(-elapsed / s.lost_time), s.unloaded - s.gate * doubt / GRAVITY
         slid = self.axle_error > s.dead_speed
+        follows, ahead = kit.exp(-elapsed / s.wheel_lag), s.relaxation_length / s.wheel_lag
         axle_error, at_least = self.axle_error * self.axle_error, largest(magnitude, 1.0)
 
         def predicted(
             angle: Number,
+            lagged: Number,
             c1: Number,
             c3: Number,
             arm: float,
@@ -182,7 +188,8 @@ class LateralFusion(CarsMemory):
             mu = largest(smallest(mu, limits.FRICTION), -limits.FRICTION)
             square = mu * mu
             side, linear = (c1 + c3 * square) * mu, magnitude * mu
-            innovation = speed * kit.tan(angle) - left - arm * turn - magnitude * side
+            lagged = kit.where(abs(lagged) < math.inf, mu + follows * (lagged - mu), mu)
+            innovation = speed * kit.tan(angle) - left - arm * turn - magnitude * side - ahead * c1 * (mu - lagged)
             steep = -magnitude * (c1 + 3.0 * c3 * square) * share / load
             sigma = magnitude * (s.side_floor + s.side_linear * abs(side)) + s.slip_speed
             white = turn_noise + speed * speed * steering_noise
@@ -191,20 +198,22 @@ class LateralFusion(CarsMemory):
             # what the tires slip sideways by the kinematics, beyond the straight line
             beyond = (abs(innovation + magnitude * side) - sigma) / at_least - c1 * abs(mu)
             excess = smallest(largest(beyond, 0.0) * abs(mu) / largest(square, _TOLD), _STEEPEST)
-            return innovation, mu, sigma * sigma + unknown * unknown, white, excess, *values
+            return innovation, mu, lagged, sigma * sigma + unknown * unknown, white, excess, *values
 
         tires = x[TIRES::2], x[TIRES + 1 :: 2]
-        innovation, mu, model, white, excess, *values = kit.each(predicted, steer, *tires, *self._axles)
+        innovation, mu, self.lagged, model, white, excess, *values = kit.each(
+            predicted, steer, self.lagged, *tires, *self._axles
+        )
         bent = kit.exp(-elapsed / s.error_memory)
 
         (self.bend,) = kit.each(lambda old, new: (bent * old + (1.0 - bent) * new,), self.bend, excess)
         both = rolling[0] & rolling[1]
         self.apart = bent * self.apart + (1.0 - bent) * kit.where(both, innovation[0] - innovation[1], 0.0)
         gap = 0.5 * abs(self.apart)
-        late = kit.exp(-elapsed / s.side_excess_memory)
+        keeps = kit.exp(-elapsed / s.side_excess_memory)
 
         def further(old: Number, off: Number, friction: Number, usable: Number) -> tuple[Number, ...]:
-            return (late * old + (1.0 - late) * kit.where(usable, off * kit.sign(friction), 0.0),)
+            return (keeps * old + (1.0 - keeps) * kit.where(usable, off * kit.sign(friction), 0.0),)
 
         (self.excess,) = kit.each(further, self.excess, innovation, mu, usable)
 

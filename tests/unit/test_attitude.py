@@ -140,21 +140,6 @@ def test_a_gyro_that_is_wrong_shows_in_the_deviation() -> None:
     assert abs(found.pitch - nose) < 3.0 * found.pitch_deviation
 
 
-def test_a_slide_leaves_roll_to_the_gyros() -> None:
-    """2.5 m/s^2 of V_y' for 3 s: roll that is none, if it counts as roll."""
-    runner = AttitudeObserver(TIME, (3,))
-    sliding = np.array([True, False, True])
-    for _ in range(600):
-        found = runner.step(0.0, 0.0, 0.0, np.array([2.5, 2.5, 0.25]), 0.0, 0.0, sliding=sliding)
-    held, led, short = found.total_roll
-    assert led > 0.07 > 3.0 * held
-    assert short == pytest.approx(0.1 * led, rel=0.05)  # below 0.8 m/s^2 a slide changes nothing
-    assert abs(held) < found.roll_deviation[0]
-    for _ in range(600):  # a gyro that is missing leaves accelerometers alone, sliding or not
-        found = runner.step(math.nan, 0.0, 0.0, 1.5, 0.0, 0.0, sliding=True)
-    assert found.total_roll[0] > 0.05
-
-
 def test_states_are_saved_and_nonsense_is_refused() -> None:
     rng = np.random.default_rng(1)
     first, second = AttitudeObserver(TIME, (2,)), AttitudeObserver(TIME, (2,))

@@ -148,7 +148,7 @@ def test_a_roll_angle_at_fault_is_not_taken_off(known: float) -> None:
 
 def test_a_roll_angle_that_is_right_is_no_fault() -> None:
     """The negative control: a road that leans as much as the attitude says."""
-    bank = there_and_back(8.0, 3.0, 2.5, 4.5)
+    bank = there_and_back(8.0, 3.0, 2.5, 4.5, 0.8)
     error, gated, used = rolled(turn(8.0, YAW, gravity=bank), bank)
     assert not gated.any()
     assert used.all()

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from estimators.forces import AttitudeObserver, AttitudeStep
+from estimators.forces import AttitudeObserver
 from estimators.pipeline import Check, EstimationPipeline, PipelineStep, VehicleSignals
+from estimators.pipeline.last_sample import LastSample
 from estimators.vehicle import GRAVITY
 from estimators.velocity import VelocityFusion
 from tests.support.pipeline_truth import CAR, TIME, noisy, straight
@@ -43,6 +44,11 @@ def test_a_level_road_teaches_no_bank() -> None:
     assert longest(np.abs(found.error_y) > 3.0 * found.deviation_y) < 1.0
 
 
+def cruising(speed: float) -> float:
+    """N m of each wheel that hold a speed, m/s, against the air, c_d A = 0.8 m^2, and rolling resistance, 0.01."""
+    return 0.25 * CAR.radius * (0.5 * 1.2 * 0.8 * speed**2 + 0.01 * CAR.mass * GRAVITY)
+
+
 def piped(seconds: float, torque: bool, held: int, attitude: bool, spin: float = 0.0) -> list[PipelineStep]:
     """Straight on at 20 m/s; wheel speeds come every `held` samples, the pitch gyro has the bias `spin`."""
     truth = noisy(straight(np.zeros(round(seconds / TIME)), 20.0), 1)
@@ -51,7 +57,7 @@ def piped(seconds: float, torque: bool, held: int, attitude: bool, spin: float =
         pipeline.step(
             VehicleSignals(
                 truth.wheel_speed[k // held * held], truth.ax[k], truth.ay[k], truth.yaw_rate[k],
-                torque=truth.torque[k] if torque else np.nan, roll_rate=0.0, pitch_rate=spin,
+                torque=truth.torque[k] + cruising(20.0) if torque else np.nan, roll_rate=0.0, pitch_rate=spin,
             )
         )
         for k in range(truth.ax.size)
@@ -76,30 +82,78 @@ def test_wheels_at_50_hz_are_wheels() -> None:
     assert step.consistency.failed & Check.NO_WHEEL
 
 
-@pytest.mark.parametrize("rolling", [True, False])
-def test_an_attitude_part_hears_of_a_slide(rolling: bool) -> None:
-    """Four locked wheels and a side force: no axle tells V_y'. The negative control: the same with wheels that roll."""
-    heard: list[bool] = []
-
-    class Listening(AttitudeObserver):
-        def step(self, *given: Any, sliding: Any = False, **more: Any) -> AttitudeStep:
-            heard.append(bool(sliding))
-            return super().step(*given, sliding=sliding, **more)
-
-    pipeline = EstimationPipeline(CAR, TIME, attitude=Listening(TIME))
+def led(rolling: bool) -> tuple[float, float]:
+    """Three seconds of 2 m/s^2 to the left without a turn, steady gyros: deg of roll and its deviation."""
+    pipeline = EstimationPipeline(CAR, TIME, attitude=AttitudeObserver(TIME))
     pipeline.reset(vx=20.0)
     rng = np.random.default_rng(0)
-    for _ in range(40):
+    for _ in range(600):
         wheels = 20.0 / CAR.radius + 0.05 * rng.normal(size=4) if rolling else np.zeros(4)
-        signals = VehicleSignals(
-            wheels,
-            0.05 * rng.normal(),
-            2.0 + 0.05 * rng.normal(),
-            0.1,
-            roll_rate=0.0,
-            pitch_rate=0.0,
-            steer=np.array([0.02, 0.02, 0.0, 0.0]),
-        )
-        pipeline.step(signals)
-    assert heard[-1] is not rolling
-    assert not heard[0]
+        ax, ay, turn = 0.05 * rng.normal(), 2.0 + 0.05 * rng.normal(), 0.002 * rng.normal()
+        step = pipeline.step(VehicleSignals(wheels, ax, ay, turn, roll_rate=0.0, pitch_rate=0.0))
+    assert step.attitude is not None
+    return float(np.degrees(step.attitude.total_roll)), float(np.degrees(step.attitude.roll_deviation))
+
+
+def test_a_slide_is_no_roll() -> None:
+    """Four locked wheels: a_y is what V_y gains. The negative control: rolling wheels hold V_y, and the car leans."""
+    slid, deviation = led(rolling=False)
+    assert abs(slid) < 1.0
+    assert abs(slid) < deviation
+    leant, _ = led(rolling=True)
+    assert leant > 3.0
+
+
+def led_back(live: bool, seconds: float, used: bool = False) -> float:
+    """Pitch, rad, of a car on a level road that began with 0.1, whose a_x the fusion does not use; `live`: a_x has noise."""
+    attitude, last, rng = AttitudeObserver(TIME), LastSample(CAR, TIME, ()), np.random.default_rng(0)
+    attitude.reset(pitch=0.1)
+    moved = SimpleNamespace(
+        vx=np.zeros(()), vy=np.zeros(()), yaw_rate=np.zeros(()), sensor_bias=np.zeros(3), inertial=np.zeros(3),
+        inertial_used=np.array([used, True, True]), gravity=np.zeros(2), flags=np.zeros((), int), standing=np.array(False),
+    )  # fmt: skip
+    signals = VehicleSignals(np.full(4, 60.0), 0.0, 0.0, 0.0, roll_rate=0.0, pitch_rate=0.0)
+    for _ in range(round(seconds / TIME)):
+        last.learn(moved, 0.0, False)
+        found = last.tilted(attitude, signals, 0.05 * rng.normal() if live else 0.0, 0.05 * rng.normal(), 0.0)
+    assert found is not None
+    return float(found.step.total_pitch)
+
+
+def test_a_wrong_pitch_does_not_keep_a_x_out_for_ever() -> None:
+    """Pitch ran to -0.4 rad, and every a_x contradicted it: V_x was off by 29 m/s on a gravel road."""
+    assert abs(led_back(True, 25.0)) < 0.01
+    assert abs(led_back(True, 25.0, used=True)) < 0.01
+    assert led_back(True, 9.0) == pytest.approx(0.1, abs=1e-3)  # a fault of seconds is no gravity
+
+
+def test_an_a_x_that_is_stuck_does_not_lead_pitch() -> None:
+    """The negative control."""
+    assert led_back(False, 25.0) == pytest.approx(0.1, abs=1e-3)
+
+
+def test_wheels_that_carry_no_force_bring_v_x_back_from_a_wrong_pitch() -> None:
+    """17 degrees: gravity that is none took V_x along for ever, -48 m/s after 25 s, and all wheels counted as slipping."""
+    attitude = AttitudeObserver(TIME)
+    attitude.reset(pitch=0.3)
+    truth = noisy(straight(np.zeros(4000), 20.0), 1)
+    pipeline = EstimationPipeline(CAR, TIME, attitude=attitude)
+    for k in range(truth.ax.size):
+        signals = truth.wheel_speed[k], truth.ax[k], truth.ay[k], truth.yaw_rate[k]
+        step = pipeline.step(VehicleSignals(*signals, torque=truth.torque[k], roll_rate=0.0, pitch_rate=0.0))
+        assert abs(step.vx - 20.0) < 5.0
+    assert step.vx == pytest.approx(20.0, abs=0.2)
+
+
+@pytest.mark.parametrize("speed", [10.0, 40.0])
+def test_air_and_rolling_resistance_are_no_pitch(speed: float) -> None:
+    """Wheels pull against them, and the car gains nothing: 2.5 degrees of a slope that is none at 40 m/s."""
+    truth = noisy(straight(np.zeros(4000), speed), 1)
+    pipeline = EstimationPipeline(CAR, TIME, attitude=AttitudeObserver(TIME))
+    pitch = []
+    for k in range(truth.ax.size):
+        signals = truth.wheel_speed[k], truth.ax[k], truth.ay[k], truth.yaw_rate[k]
+        torque = truth.torque[k] + cruising(speed)
+        step = pipeline.step(VehicleSignals(*signals, torque=torque, roll_rate=0.0, pitch_rate=0.0))
+        pitch.append(step.pitch)
+    assert abs(np.degrees(np.mean(pitch[3000:]))) < 0.45

@@ -50,7 +50,8 @@ def consistency_part(scope: Scope, tire: str, group: str) -> PartResult:
     caption = (
         f"Average NEES over {scope.seeds} seeds and time on {tire} tires; 1 where the stated deviation is true. An ideal "
         f"filter's average over the seeds lies within {low:.2f} and {high:.2f} with 95 %. From {BAND[0]:g} to {BAND[1]:g} it is "
-        "at most twice too wide or by 1.4 too narrow. Radii differ from those assumed by 1.5 % (all wheels) and 0.5 % (each)."
+        "at most twice too wide or by 1.4 too narrow. Radii differ from those assumed by 1.5 % (all wheels) and 0.5 % (each), "
+        "the thrust angle of the rear axle and the angle of the front wheels by 0.1 degrees."
     )
     counts = {
         f"{tire}, {group}: manoeuvres with {name} {word}": float(sum(_side(one.nees[k]) == side for one in found))
@@ -107,7 +108,8 @@ STUDY = Study(
     "Whether the stated deviations are true: NEES of the whole pipeline",
     "",
     "V_x, V_y, roll and pitch of the default pipeline with an attitude part on every shipped manoeuvre, over seeds of sensor "
-    "errors and of tire radii: normalised errors, where the pipeline is overconfident and where its deviations are far too wide.",
+    "errors, of tire radii and of the alignment of axles: normalised "
+    "errors, where the pipeline is overconfident and where its deviations are far too wide.",
     tuple(
         Part(
             f"{tire}-{group}",
