@@ -1,13 +1,14 @@
 """Lateral half of the fusion: V_y from the kinematics, held in place by what the two axles must slip to carry the car.
 
     dV_y/dt = a (1 - s) - b - g - V_x (r_m (1 - s_t) - b_r)                          P1 notes 5, with sensor errors
-    0 = V_y + L_f r - V_x tan(delta) + |V_x| alpha_f + l alpha_f',   0 = V_y - L_r r + |V_x| alpha_r + l alpha_r'
+    0 = V_y + L_f r - V_x tan(delta) + |V_x| alpha_f + l c_1 mu_f',   0 = V_y - L_r r + |V_x| alpha_r + l c_1 mu_r'
     alpha(mu) = c_1 mu + c_3 mu^3,   mu_f = (m a L_r + I_z r')/(L F_zf),   mu_r = (m a L_f - I_z r')/(L F_zr)
 
 A single-track car whose side slip follows its forces, with stiffnesses that adapt (P5 adapts one number per axle): no
 friction coefficient enters. alpha is positive where F_y is (P4, P5), the opposite of P1. The accelerometer feels forces
 alone, so mu needs no bank. The force of a tire follows its slip over l, `relaxation_length`: slip is ahead of alpha(mu), in a
-slalom by a third of V_y. alpha' is that of the forces, low-passed over `wheel_lag`.
+slalom by a third of V_y. What gives is the carcass, as much at any slip: l c_1 mu', and not l alpha'. mu' is low-passed over
+`wheel_lag`.
 
 Every axle on one road: where one is further off than its model explains, or the two differ, which no V_y explains, neither is
 believed more than that (half the difference), for a second (`axle_error`), even where the steering is not believed. Such an
@@ -81,7 +82,7 @@ class LateralFusion(CarsMemory):
         self.bend: Signals = self.kit.stacked([self.kit.full(0.0)] * 2)  # side slip per F_y/F_z beyond c_1, rad
         self.apart: Number = self.kit.full(0.0)  # m/s between what the axles say of V_y, low-passed
         self.excess: Signals = self.kit.stacked([self.kit.full(0.0)] * 2)  # m/s, slip beyond alpha(mu), low-passed
-        self.lagged: Signals = self.kit.stacked([self.kit.full(math.nan)] * 2)  # rad, alpha(mu) low-passed
+        self.lagged: Signals = self.kit.stacked([self.kit.full(math.nan)] * 2)  # mu of the axles, low-passed
         self._both = self.kit.signals((1.0, 1.0))
         self._sensor = s.scale**2 / turn_scale  # share of the yaw rate sensor in s_t
         m, L, inertia = vehicle.mass, vehicle.wheelbase, vehicle.yaw_inertia
